@@ -1,0 +1,1 @@
+"""Five oscillators with dry friction: one authored model a file."""

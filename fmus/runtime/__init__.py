@@ -1,0 +1,1 @@
+"""What travels inside every FMU: standard library only, plain floats."""

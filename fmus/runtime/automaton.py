@@ -1,0 +1,113 @@
+"""Dry friction as modes: backward, stuck, forward; their guards, and where they settle.
+
+Sliding, the friction force is that of the model and opposes the direction of the mode.  Stuck, it is whatever
+holds the body at rest, up to the holding limit.  A mode ends where its guard does: a slide when the speed comes to
+zero, a stick when the load exceeds the limit (M. Otter, H. Elmqvist, S. E. Mattsson, Hybrid modeling in Modelica
+based on the synchronous data flow principle, CACSD 1999).
+"""
+
+from math import fabs, inf, sqrt
+
+from .march import EXACT, HYBRID, STUCK
+from .oscillator import Oscillator
+
+BACKWARD, FORWARD = -1, 1
+SIGN, THRESHOLD = 2, 3
+
+HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes, every change of mode is located as an event")
+SIGN_LAW = ("sign", SIGN, "sliding force times sign(v) as it stands: no event, no stick; chatters")
+THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but below a small speed friction balances the spring; chatters")
+
+MOST_HALVINGS = 200
+
+
+def sign(v):
+    """-1, 0 or 1."""
+    return 1 if v > 0.0 else -1 if v < 0.0 else 0
+
+
+class DryFriction(Oscillator):
+    """An oscillator that sticks: hold(t, x) tells the load on the body at rest, its rate and the holding limit."""
+
+    dry = True
+    rules = (
+        "friction = {friction} with solver.method = 1 (exact): the closed form holds for the hybrid law only; "
+        "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
+    )
+
+    def prepare(self):
+        return 1 if self.friction != HYBRID and self.solver.method == EXACT else 0
+
+    def settle(self, t, x, v):
+        """The mode that holds from here on."""
+        if v > 0.0:
+            return FORWARD
+        if v < 0.0:
+            return BACKWARD
+        load, _, limit = self.hold(t, x)
+        if load > limit:
+            return FORWARD
+        if load < -limit:
+            return BACKWARD
+        return STUCK
+
+    def release(self, t, x):
+        """When a body at rest at x breaks away, and in which direction; inf if it never does."""
+        load, rate, limit = self.hold(t, x)
+        if rate == 0.0:
+            return inf, STUCK
+        direction = FORWARD if rate > 0.0 else BACKWARD
+        wait = (limit - direction * load) / fabs(rate)
+        return t + (wait if wait > 0.0 else 0.0), direction
+
+    def reversal(self, march):
+        """When the speed leaves the direction of the mode within the step, to the last bit; inf if it does not."""
+        mode = march.mode0
+        low, high = march.t0, march.t1
+        ahead, behind = mode * march.v0, mode * march.v1
+        if behind > 0.0:
+            high = self.lowest(march)
+            if not high < inf:
+                return inf
+            _, v = march.at(self, high)
+            behind = mode * v
+            if behind > 0.0:
+                return inf
+        kept = 0  # the end of the bracket that the last secant left where it was
+        for _ in range(MOST_HALVINGS):
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
+            if ahead > 0.0 and behind < 0.0:
+                secant = low + (high - low) * (ahead / (ahead - behind))
+                if low < secant < high:
+                    middle = secant
+            _, v = march.at(self, middle)
+            v *= mode
+            if v > 0.0:
+                low, ahead = middle, v
+                if kept == 1:
+                    behind *= 0.5
+                kept = 1
+            else:
+                high, behind = middle, v
+                if kept == -1:
+                    ahead *= 0.5
+                kept = -1
+        return high
+
+    def lowest(self, march):
+        """When the cubic of the speed is lowest, if that is inside the step; else inf."""
+        h = march.span
+        v0, v1 = march.mode0 * march.v0, march.mode0 * march.v1
+        s0, s1 = h * march.mode0 * march.a0, h * march.mode0 * march.a1
+        if s0 >= 0.0 or s1 <= 0.0:
+            return inf
+        # v' = 3 A s^2 + 2 B s + s0 on s in [0, 1]
+        rise = v1 - v0
+        cubic, square = 3.0 * (s0 + s1 - 2.0 * rise), 3.0 * rise - 2.0 * s0 - s1
+        root = square * square - cubic * s0
+        if root < 0.0:
+            return inf
+        s = -s0 / (square + sqrt(root))  # the root at which v' changes from - to +
+        return march.t0 + s * h if 0.0 < s < 1.0 else inf

@@ -1,0 +1,140 @@
+"""Declared variables: the number, its unit, its range and its sentence in one place.
+
+A variable is an attribute of a class; it takes its name from there.  An instance of the class starts with
+plain numbers of the same names.  The XML, the pages and the error messages read the declaration.
+"""
+
+from math import inf, isfinite
+
+
+class Declared:
+    """What a variable is: unit, description and range; an enumeration has `items` (label, value, sentence)."""
+
+    type = "Real"
+    causality = ""
+    variability = ""
+    initial = ""
+    start = 0.0
+    items = ()
+
+    def __init__(self, unit, text, low=-inf, high=inf, above=-inf, below=inf, display=""):
+        self.name = ""
+        self.unit, self.text, self.display = unit, text, display
+        self.low, self.high, self.above, self.below = low, high, above, below
+
+    def __set_name__(self, owner, name):
+        self.name = name
+
+    @property
+    def allowed(self):
+        """The range in words."""
+        if self.items:
+            return "one of " + ", ".join(f"{value} ({label})" for label, value, _ in self.items)
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        bounds = (("at least", self.low), ("above", self.above), ("at most", self.high), ("below", self.below))
+        words = [f"{word} {bound!r}{unit}" for word, bound in bounds if isfinite(bound)]
+        return " and ".join(words) or "a finite number"
+
+    def refusal(self, name, value):
+        """The sentence about a value that is not allowed."""
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        return f"{name} = {value!r}{unit} is refused: {self.text} must be {self.allowed}"
+
+    def accepts(self, value):
+        """Whether `value` lies in the range; NaN and infinities never do."""
+        if self.items:
+            return value in [number for _, number, _ in self.items]
+        return isfinite(value) and self.low <= value <= self.high and self.above < value < self.below
+
+
+class Parameter(Declared):
+    """Set by the user; tunable at every communication point."""
+
+    causality, variability, initial = "parameter", "tunable", "exact"
+
+    def __init__(self, start, unit, text, **more):
+        super().__init__(unit, text, **more)
+        self.start = start
+
+
+class Fixed(Parameter):
+    """Set by the user before initialisation ends."""
+
+    variability = "fixed"
+
+
+class Choice(Fixed):
+    """An enumeration, set before initialisation ends: items of (label, value, sentence)."""
+
+    type = "Enumeration"
+
+    def __init__(self, start, text, items):
+        super().__init__(start, "", text)
+        self.items = items
+
+
+class Input(Parameter):
+    """Set by the importer, held over a communication step."""
+
+    causality, variability, initial = "input", "continuous", ""
+
+
+class Output(Declared):
+    """Calculated; `direct`: it follows a changed input at once, without a step in between."""
+
+    causality, variability, initial = "output", "continuous", "calculated"
+
+    def __init__(self, unit, text, direct=False, **more):
+        super().__init__(unit, text, **more)
+        self.direct = direct
+
+
+class Mode(Output):
+    """The discrete state of dry friction: -1, 0 or 1."""
+
+    type, variability, start = "Integer", "discrete", 0
+
+    def __init__(self, text):
+        super().__init__("", text, direct=True, low=-1, high=1)
+
+
+class Local(Declared):
+    """Calculated; read on request, not recorded by default."""
+
+    causality, variability, initial = "local", "discrete", "calculated"
+
+
+class Count(Local):
+    """A number of things that have happened."""
+
+    type, start = "Integer", 0
+
+    def __init__(self, text):
+        super().__init__("", text, low=0)
+
+
+class Declaring:
+    """An instance starts with the start value of every declared variable, as plain attributes."""
+
+    def __init__(self):
+        for declared in declarations(type(self)):
+            setattr(self, declared.name, declared.start)
+
+
+def declarations(cls):
+    """The declared variables of a class, its own before those of its bases; a class may declare one anew."""
+    found = {}
+    for base in cls.__mro__:
+        for name, value in vars(base).items():
+            if isinstance(value, Declared):
+                found.setdefault(name, value)
+    return list(found.values())
+
+
+def variables(thing, prefix=""):
+    """Dotted name and declaration of every variable of an object and of the objects it owns, in order."""
+    found = [(prefix + declared.name, declared) for declared in declarations(type(thing))]
+    for name, part in vars(thing).items():
+        if isinstance(part, Declaring):
+            found += variables(part, f"{prefix}{name}.")
+    return found

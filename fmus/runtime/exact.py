@@ -1,0 +1,121 @@
+"""Closed form of one linear piece: m x'' + c x' + k x = F + k u t, and its next standstill.
+
+With z = c/(2 m), n^2 = k/m, p = F/m and the impulse response G (G'' + 2 z G' + n^2 G = 0, G(0) = 0, G'(0) = 1)
+
+    x = x0 (G' + 2 z G) + v0 G + p I        I = integral of G
+    v = -n^2 x0 G + v0 G' + p G
+
+G, G' and I are written for each kind of damping so that no digit is lost near critical damping, with a weak
+spring or without one (L. Meirovitch, Fundamentals of Vibrations, chapters 2 and 4, has the usual forms).
+A resting point that drifts at the speed u (a driver pulling the spring) is offered without damping only: no
+oscillator here has both.
+"""
+
+from math import atan2, copysign, cos, exp, expm1, fabs, inf, log1p, pi, sin, sqrt
+
+UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE = 1, 2, 3, 4
+
+
+class Exact:
+    """The constants of the oscillator, and the piece that began at x0, v0 with the acceleration a0."""
+
+    def __init__(self):
+        self.kind = UNDAMPED
+        self.z = self.n2 = self.drift = 0.0
+        self.w = self.slow = 0.0
+        self.x0 = self.v0 = self.a0 = self.p = 0.0
+
+    def prepare(self, m, c, k, drift):
+        """Take over mass (kg), damping (N.s/m), stiffness (N/m) and the speed of the resting point (m/s)."""
+        self.z, self.n2, self.drift = 0.5 * c / m, k / m, drift
+        z, n = self.z, sqrt(self.n2)
+        square = (n - z) * (n + z)
+        self.w = sqrt(fabs(square))
+        self.slow = 0.0
+        if z == 0.0:
+            self.kind = UNDAMPED if n > 0.0 else FREE
+        elif square > 0.0:
+            self.kind = UNDERDAMPED
+        else:
+            self.kind = OVERDAMPED
+            self.slow = -self.n2 / (z + self.w)  # the slow root of s^2 + 2 z s + n^2, without cancellation
+
+    def begin(self, x, v, a, p):
+        """A piece from x, v with the acceleration a, of which p is due to the constant force."""
+        self.x0, self.v0, self.a0, self.p = x, v, a, p
+
+    def at(self, t):
+        """Position and speed t seconds after the beginning of the piece."""
+        if self.kind == UNDAMPED:
+            half = 0.5 * self.w * t
+            s, c = sin(half), cos(half)
+            g, fall = 2.0 * s * c / self.w, 2.0 * s * s
+            return (
+                self.x0 + self.v0 * g + self.a0 * fall / self.n2 + self.drift * (t - g),
+                self.v0 * (1.0 - fall) + self.a0 * g + self.drift * fall,
+            )
+        if self.kind == FREE:
+            return self.x0 + (self.v0 + 0.5 * self.a0 * t) * t, self.v0 + self.a0 * t
+        g, slope, integral = self.underdamped(t) if self.kind == UNDERDAMPED else self.overdamped(t)
+        return (
+            self.x0 * (slope + 2.0 * self.z * g) + self.v0 * g + self.p * integral,
+            (self.p - self.n2 * self.x0) * g + self.v0 * slope,
+        )
+
+    def underdamped(self, t):
+        """G, G' and the integral of G; 1 - e cos is split so that it keeps its digits at small t."""
+        half = 0.5 * self.w * t
+        e, s, c = exp(-self.z * t), sin(half), cos(half)
+        g, fall = 2.0 * s * c / self.w, 2.0 * s * s
+        zg = self.z * g
+        return e * g, e * (1.0 - fall - zg), (e * (fall - zg) - expm1(-self.z * t)) / self.n2
+
+    def overdamped(self, t):
+        """The same from the two real roots, which coincide at critical damping."""
+        z, w, slow = self.z, self.w, self.slow
+        e = exp(slow * t)
+        u = expm1(-2.0 * w * t)
+        g = -0.5 * e * u / w if w > 0.0 else e * t
+        mean = e * (1.0 + 0.5 * u)
+        if w > 0.5 * z:
+            fast = -(z + w)
+            far = expm1(slow * t) / slow if slow < 0.0 else t
+            integral = 0.5 * (far - expm1(fast * t) / fast) / w
+        else:
+            integral = (1.0 - mean - z * g) / self.n2
+        return g, mean - z * g, integral
+
+    def standstill(self, mode):
+        """When the speed, of the sign of mode, next comes to zero; inf if it never does."""
+        v, a = mode * self.v0, mode * self.a0
+        if v < 0.0:
+            v = 0.0  # a start from rest: -0.0, or the last bit of an event
+        if self.kind == UNDAMPED:
+            return self.undamped_standstill(v, a / self.w, mode * self.drift)
+        b = a + self.z * v
+        w = self.w
+        if self.kind == UNDERDAMPED:
+            return atan2(v * w, -b) / w
+        if v == 0.0 or b + w * v >= 0.0:
+            return inf
+        if w == 0.0:
+            return -v / b
+        return -0.5 * log1p(2.0 * w * v / (b - w * v)) / w
+
+    def undamped_standstill(self, v, q, u):
+        """First root of u + (v - u) cos y + q sin y, a quadratic in T = tan(y/2), over w."""
+        lead = 2.0 * u - v
+        square = q * q - v * lead
+        if square < 0.0:
+            return inf
+        s = -(q + copysign(sqrt(square), q))
+        first, second = half_angle(s, lead), half_angle(v, s)
+        return 2.0 * (first if first < second else second) / self.w
+
+
+def half_angle(over, under):
+    """The angle in (0, pi] whose tangent is over/under; a tangent of zero is the end of the turn, not its start."""
+    y = atan2(over, under)
+    if y <= 0.0:
+        y += pi
+    return y if y > 0.0 else pi

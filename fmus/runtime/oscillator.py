@@ -1,0 +1,35 @@
+"""One degree of freedom: what all oscillators share."""
+
+from .declare import Count, Declaring, Local
+
+
+class Events(Declaring):
+    """Changes of mode up to the present point."""
+
+    count = Count("changes of mode up to the present point")
+    t_last = Local("s", "time of the last change of mode; NaN before the first")
+
+
+class Oscillator(Declaring):
+    """An oscillator of position x and speed v, whatever the model calls them.
+
+    A model owns `solver`, a March, and says
+        initial(t)                     position and speed at the start, which is at time t
+        prepare()                      constants that follow from the values; 0, or the number of the broken rule
+        acceleration(t, x, v, mode)    mode is the direction of sliding, 0 where the law itself looks at v
+        observe(t, x, v, mode)         sets the outputs
+    """
+
+    dry = False  # friction with modes: see automaton.py
+    linear = False  # piecewise linear: it owns `exact` and has push(t, mode); see exact.py
+    rules = ()  # one sentence for each rule that binds several values, in their names
+    stop_time = 4.0
+    step_size = 0.004
+    tolerance = 1e-6
+
+    def __init__(self):
+        super().__init__()
+        self.events = Events()
+
+    def rebase(self, t):
+        """Fix at time t what is integrated in closed form, before a value changes."""
