@@ -1,0 +1,99 @@
+"""Which source files travel inside an FMU: those that a model reaches through its imports, and no others.
+
+They become one package that leans on nothing but the standard library.  The part of pythonfmu that is needed
+travels inside as `<package>/pythonfmu`, so the FMU never meets the pythonfmu of its host.
+"""
+
+import ast
+import sys
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path, PurePosixPath
+
+from . import BuildError
+from .catalogue import FMUS
+
+# The two package roots are written here: what stands in the originals does not travel.
+ROOTS = ("__init__.py", "pythonfmu/__init__.py")
+INIT = '''\
+"""{name} as an FMI 2.0 co-simulation slave."""
+
+from .{name} import {model} as Model
+from .runtime.slave import slave_for
+
+{model} = slave_for(Model)
+kept = []  # see the entry script
+'''
+
+
+def pythonfmu_folder() -> Path:
+    """Where pythonfmu is installed; it is found without being imported."""
+    spec = find_spec("pythonfmu")
+    if spec is None or spec.origin is None:
+        raise BuildError("pythonfmu is not installed, and an FMU carries a part of it: try 'pip install pythonfmu'.")
+    return Path(spec.origin).parent
+
+
+def travelling(name: str, root: Path = FMUS) -> dict[str, str]:
+    """Path inside the package and source text of every file that the model `name` in `root` needs."""
+    files = dict(zip(ROOTS, (INIT.format(name=name, model=name.capitalize()), ""), strict=True))
+    waiting = [f"{name}.py", "runtime/slave.py"]
+    for path in waiting:  # which grows on the way
+        if path not in files:
+            files[path], needed = _embed(path, root)
+            waiting += needed
+    return files
+
+
+def _on_disk(path: str, root: Path) -> Path:
+    """The source of a path inside the package."""
+    return pythonfmu_folder().parent / path if path.startswith("pythonfmu/") else root / path
+
+
+def _embed(path: str, root: Path) -> tuple[str, list[str]]:
+    """The text of a file as it travels, and the paths of the files that it needs in turn."""
+    # Text mode turns any line end into "\n", so that checkouts on all systems build the same bytes.
+    lines = _on_disk(path, root).read_text(encoding="utf-8").splitlines(keepends=True)
+    inside = PurePosixPath(path).parts
+    needed = ["/".join((*inside[:depth], "__init__.py")) for depth in range(1, len(inside))]
+    for node in _imports(path, "".join(lines)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                _standard(path, alias.name)
+            continue
+        base = tuple(node.module.split(".")) if node.module else ()
+        if node.level:
+            base = (*inside[: len(inside) - node.level], *base)
+        elif base[0] == "pythonfmu":
+            here = "." * len(inside)
+            lines[node.lineno - 1] = lines[node.lineno - 1].replace("from pythonfmu", f"from {here}pythonfmu", 1)
+        else:
+            _standard(path, base[0])
+            continue
+        needed += [_resolve(path, base, alias.name, root) for alias in node.names]
+    return "".join(lines), needed
+
+
+def _imports(path: str, source: str) -> Iterator[ast.Import | ast.ImportFrom]:
+    """Every import statement; all stand at the top, for a host may delete the files once they are loaded."""
+    tree = ast.parse(source, path)
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            if node not in tree.body:
+                raise BuildError(f"{path} imports inside a block in line {node.lineno}: import at the top of the file.")
+            yield node
+
+
+def _standard(path: str, module: str) -> None:
+    """Refuse a module that a host may not have."""
+    if module.split(".")[0] not in sys.stdlib_module_names:
+        raise BuildError(f"{path} imports {module}; inside an FMU only the standard library and relative imports work.")
+
+
+def _resolve(path: str, base: tuple[str, ...], name: str, root: Path) -> str:
+    """The file that `from base import name` reads: the module `base.name` or, for a name inside it, `base`."""
+    for parts in ((*base, name), base):
+        for candidate in ("/".join(parts) + ".py", "/".join((*parts, "__init__.py"))):
+            if candidate not in ROOTS and _on_disk(candidate, root).is_file():
+                return candidate
+    raise BuildError(f"{path} imports {name} from {'.'.join(base) or 'the package itself'}, which no FMU carries.")
