@@ -3,11 +3,12 @@
 from .runtime.automaton import HYBRID_LAW, SIGN_LAW, DryFriction, sign
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
 from .runtime.exact import Exact
-from .runtime.march import EXACT, EXACT_ITEM, HYBRID, METHODS, March
+from .runtime.march import HYBRID, March
+from .runtime.methods import EXACT, EXACT_ITEM, ITEMS
 
 
 class Solver(March):
-    method = Choice(EXACT, "integration method", (EXACT_ITEM, *METHODS))
+    method = Choice(EXACT, "integration method", (EXACT_ITEM, *ITEMS))
 
 
 class Coulomb(DryFriction):
@@ -54,6 +55,9 @@ class Coulomb(DryFriction):
         if mode == 0:
             mode = sign(v)
         return (self.F_ext - self.k * x - self.c * v - mode * self.f) / self.m
+
+    def jacobian(self, t, x, v, mode):
+        return 0.0, -self.k / self.m, -self.c / self.m
 
     def push(self, t, mode):
         return (self.F_ext - mode * self.f) / self.m

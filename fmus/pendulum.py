@@ -4,14 +4,15 @@ from math import cos, radians, sin, sqrt
 
 from .runtime.automaton import HYBRID_LAW, SIGN_LAW, DryFriction, sign
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
-from .runtime.march import HYBRID, METHODS, ODE23, March
+from .runtime.march import HYBRID, March
+from .runtime.methods import DOP853, ITEMS
 
 POUND, INCH = 0.45359237, 0.0254
 WEIGHT, REACTION = 1, 2
 
 
 class Solver(March):
-    method = Choice(ODE23, "integration method", METHODS)
+    method = Choice(DOP853, "integration method", ITEMS)
 
 
 class Pendulum(DryFriction):
@@ -50,6 +51,7 @@ class Pendulum(DryFriction):
 
     stop_time = 5.0
     step_size = 0.005
+    tolerance = 1e-10
     rules = (
         *DryFriction.rules,
         "J_G + m a^2 is zero: a pendulum needs inertia; raise J_G or a",
@@ -91,6 +93,23 @@ class Pendulum(DryFriction):
             mode = sign(v)
         load = self.T_ext - self.moment * sin(x)
         return (load - mode * self.arm * self.pin(load, x, v, mode)) / self.J
+
+    def jacobian(self, t, x, v, mode):
+        if mode == 0:
+            mode = sign(v)
+        load_x = -self.moment * cos(x)
+        if self.pin_load == WEIGHT:
+            return 0.0, load_x / self.J, 0.0
+        radial = self.weight * cos(x) + self.m * self.a * v * v
+        b = self.weight * sin(x) + self.m * self.a * (self.T_ext - self.moment * sin(x)) / self.J
+        b_x = self.weight * cos(x) + self.m * self.a * load_x / self.J
+        rest = 1.0 - self.share * self.share
+        root = sqrt(b * b + rest * radial * radial)
+        n_r = radial / root if root > 0.0 else 0.0
+        n_b = ((b / root if root > 0.0 else 0.0) - mode * self.share) / rest
+        n_x, n_v = n_b * b_x - n_r * self.weight * sin(x), n_r * 2.0 * self.m * self.a * v
+        drag = mode * self.arm / self.J
+        return 0.0, load_x / self.J - drag * n_x, -drag * n_v
 
     def hold(self, t, x):
         return self.T_ext - self.moment * sin(x), 0.0, self.arm * self.weight

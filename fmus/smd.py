@@ -2,12 +2,13 @@
 
 from .runtime.declare import Choice, Fixed, Input, Output, Parameter
 from .runtime.exact import Exact
-from .runtime.march import EXACT, EXACT_ITEM, METHODS, March
+from .runtime.march import March
+from .runtime.methods import EXACT, EXACT_ITEM, ITEMS
 from .runtime.oscillator import Oscillator
 
 
 class Solver(March):
-    method = Choice(EXACT, "integration method", (EXACT_ITEM, *METHODS))
+    method = Choice(EXACT, "integration method", (EXACT_ITEM, *ITEMS))
 
 
 class Smd(Oscillator):
@@ -47,6 +48,9 @@ class Smd(Oscillator):
 
     def acceleration(self, t, x, v, mode):
         return (self.F_ext - self.k * x - self.c * v) / self.m
+
+    def jacobian(self, t, x, v, mode):
+        return 0.0, -self.k / self.m, -self.c / self.m
 
     def push(self, t, mode):
         return self.F_ext / self.m

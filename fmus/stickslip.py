@@ -5,11 +5,12 @@ from math import fabs
 from .runtime.automaton import HYBRID_LAW, THRESHOLD_LAW, DryFriction, sign
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
 from .runtime.exact import Exact
-from .runtime.march import EXACT, EXACT_ITEM, HYBRID, METHODS, March
+from .runtime.march import HYBRID, March
+from .runtime.methods import EXACT, EXACT_ITEM, ITEMS
 
 
 class Solver(March):
-    method = Choice(EXACT, "integration method", (EXACT_ITEM, *METHODS))
+    method = Choice(EXACT, "integration method", (EXACT_ITEM, *ITEMS))
 
 
 class Stickslip(DryFriction):
@@ -77,6 +78,11 @@ class Stickslip(DryFriction):
     def acceleration(self, t, x, v, mode):
         pull = self.pull(t, x)
         return (pull - (mode * self.sliding if mode != 0 else self.threshold(pull, v))) / self.m
+
+    def jacobian(self, t, x, v, mode):
+        if mode == 0 and fabs(v) < self.eps and fabs(self.pull(t, x)) <= self.holding:
+            return 0.0, 0.0, 0.0
+        return self.k * self.v_driver / self.m, -self.k / self.m, 0.0
 
     def threshold(self, pull, v):
         """Friction by the threshold law."""

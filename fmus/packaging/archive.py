@@ -3,7 +3,7 @@
     modelDescription.xml
     binaries/<platform>/<name>.{so,dll}     the native layer of pythonfmu
     resources/slavemodule.txt               names the entry script
-    resources/<entry>.py                    imports the class; the native layer runs it for every instance
+    resources/<entry>.py                    imports the class; runs for every instance (guard.py says why)
     resources/<package>/                    the model and what it needs (modules.py)
     documentation/licenses/
 
@@ -24,11 +24,10 @@ from .catalogue import load
 from .description import describe
 from .modules import pythonfmu_folder, travelling
 
-# Seen with pythonfmu 0.7.0: without the last line the names of this module are freed under the second instance.
 ENTRY = """\
-from {package} import {model}, kept
+from {package} import {model}, hold
 
-kept.append(globals())  # the native layer gives up one reference to them per instance, which it does not own
+hold(globals())
 """
 EARLIEST, LATEST = datetime(1980, 1, 1, tzinfo=UTC), datetime(2107, 12, 31, tzinfo=UTC)  # that a zip can tell
 
@@ -45,7 +44,7 @@ def build(name: str, folder: Path) -> Path:
         "resources/slavemodule.txt": f"{package}_fmu".encode(),
         f"resources/{package}_fmu.py": ENTRY.format(package=package, model=model.__name__).encode(),
     }
-    return _write(folder / f"{name}.fmu", _zipped(entries | _binaries(name) | _licenses(), date))
+    return write(folder / f"{name}.fmu", zipped(entries | _binaries(name) | licenses(), date))
 
 
 def build_date() -> datetime:
@@ -66,7 +65,7 @@ def _binaries(name: str) -> dict[str, bytes]:
     return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in found}
 
 
-def _licenses() -> dict[str, bytes]:
+def licenses() -> dict[str, bytes]:
     """The licence of the FMU, and that of the part of pythonfmu inside it."""
     texts = {}
     for path, folder, pattern in (
@@ -80,7 +79,7 @@ def _licenses() -> dict[str, bytes]:
     return texts
 
 
-def _zipped(entries: dict[str, bytes], date: datetime) -> bytes:
+def zipped(entries: dict[str, bytes], date: datetime) -> bytes:
     """A zip of the entries; order, time, permissions and compression do not depend on the machine."""
     buffer = BytesIO()
     with ZipFile(buffer, "w") as archive:
@@ -92,7 +91,7 @@ def _zipped(entries: dict[str, bytes], date: datetime) -> bytes:
     return buffer.getvalue()
 
 
-def _write(path: Path, content: bytes) -> Path:
+def write(path: Path, content: bytes) -> Path:
     """Put the file in its place in one move; nothing else is left behind."""
     part = path.with_name(f".{path.name}.{os.getpid()}")
     try:

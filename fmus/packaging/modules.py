@@ -19,11 +19,12 @@ INIT = '''\
 """{name} as an FMI 2.0 co-simulation slave."""
 
 from .{name} import {model} as Model
+from .guard import hold
 from .runtime.slave import slave_for
 
 {model} = slave_for(Model)
-kept = []  # see the entry script
 '''
+GUARD = "guard.py"  # travels beside the model
 
 
 def pythonfmu_folder() -> Path:
@@ -37,7 +38,7 @@ def pythonfmu_folder() -> Path:
 def travelling(name: str, root: Path = FMUS) -> dict[str, str]:
     """Path inside the package and source text of every file that the model `name` in `root` needs."""
     files = dict(zip(ROOTS, (INIT.format(name=name, model=name.capitalize()), ""), strict=True))
-    waiting = [f"{name}.py", "runtime/slave.py"]
+    waiting = [f"{name}.py", GUARD, "runtime/slave.py"]
     for path in waiting:  # which grows on the way
         if path not in files:
             files[path], needed = _embed(path, root)
@@ -47,6 +48,8 @@ def travelling(name: str, root: Path = FMUS) -> dict[str, str]:
 
 def _on_disk(path: str, root: Path) -> Path:
     """The source of a path inside the package."""
+    if path == GUARD:
+        return Path(__file__).with_name(path)
     return pythonfmu_folder().parent / path if path.startswith("pythonfmu/") else root / path
 
 

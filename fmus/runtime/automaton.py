@@ -6,9 +6,10 @@ zero, a stick when the load exceeds the limit (M. Otter, H. Elmqvist, S. E. Matt
 based on the synchronous data flow principle, CACSD 1999).
 """
 
-from math import fabs, inf, sqrt
+from math import fabs, inf
 
-from .march import EXACT, HYBRID, STUCK
+from .march import HYBRID, STUCK
+from .methods import EXACT
 from .oscillator import Oscillator
 
 BACKWARD, FORWARD = -1, 1
@@ -19,6 +20,7 @@ SIGN_LAW = ("sign", SIGN, "sliding force times sign(v) as it stands: no event, n
 THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but below a small speed friction balances the spring; chatters")
 
 MOST_HALVINGS = 200
+MOST_THIRDS = 25
 
 
 def sign(v):
@@ -66,13 +68,11 @@ class DryFriction(Oscillator):
         low, high = march.t0, march.t1
         ahead, behind = mode * march.v0, mode * march.v1
         if behind > 0.0:
-            high = self.lowest(march)
+            high = self.dip(march)
             if not high < inf:
                 return inf
             _, v = march.at(self, high)
             behind = mode * v
-            if behind > 0.0:
-                return inf
         kept = 0  # the end of the bracket that the last secant left where it was
         for _ in range(MOST_HALVINGS):
             middle = 0.5 * (low + high)
@@ -96,18 +96,22 @@ class DryFriction(Oscillator):
                 kept = -1
         return high
 
-    def lowest(self, march):
-        """When the cubic of the speed is lowest, if that is inside the step; else inf."""
-        h = march.span
-        v0, v1 = march.mode0 * march.v0, march.mode0 * march.v1
-        s0, s1 = h * march.mode0 * march.a0, h * march.mode0 * march.a1
-        if s0 >= 0.0 or s1 <= 0.0:
+    def dip(self, march):
+        """When the speed is found against the mode within a step that it enters falling and leaves rising; else inf."""
+        mode = march.mode0
+        if mode * march.a0 >= 0.0 or mode * march.a1 <= 0.0:
             return inf
-        # v' = 3 A s^2 + 2 B s + s0 on s in [0, 1]
-        rise = v1 - v0
-        cubic, square = 3.0 * (s0 + s1 - 2.0 * rise), 3.0 * rise - 2.0 * s0 - s1
-        root = square * square - cubic * s0
-        if root < 0.0:
-            return inf
-        s = -s0 / (square + sqrt(root))  # the root at which v' changes from - to +
-        return march.t0 + s * h if 0.0 < s < 1.0 else inf
+        low, high = march.t0, march.t1
+        for _ in range(MOST_THIRDS):
+            third = (high - low) / 3.0
+            _, left = march.at(self, low + third)
+            _, right = march.at(self, high - third)
+            if mode * left <= 0.0:
+                return low + third
+            if mode * right <= 0.0:
+                return high - third
+            if mode * left < mode * right:
+                high -= third
+            else:
+                low += third
+        return inf

@@ -50,8 +50,9 @@ class Exact:
             half = 0.5 * self.w * t
             s, c = sin(half), cos(half)
             g, fall = 2.0 * s * c / self.w, 2.0 * s * s
+            lag = t - g if half > 0.25 else t * early_lag(4.0 * half * half)
             return (
-                self.x0 + self.v0 * g + self.a0 * fall / self.n2 + self.drift * (t - g),
+                self.x0 + self.v0 * g + self.a0 * fall / self.n2 + self.drift * lag,
                 self.v0 * (1.0 - fall) + self.a0 * g + self.drift * fall,
             )
         if self.kind == FREE:
@@ -77,7 +78,9 @@ class Exact:
         u = expm1(-2.0 * w * t)
         g = -0.5 * e * u / w if w > 0.0 else e * t
         mean = e * (1.0 + 0.5 * u)
-        if w > 0.5 * z:
+        if (z + w) * t < 0.5:
+            integral = self.early(t)
+        elif w > 0.5 * z:
             fast = -(z + w)
             far = expm1(slow * t) / slow if slow < 0.0 else t
             integral = 0.5 * (far - expm1(fast * t) / fast) / w
@@ -85,11 +88,19 @@ class Exact:
             integral = (1.0 - mean - z * g) / self.n2
         return g, mean - z * g, integral
 
+    def early(self, t):
+        """The integral of G at small t, where its closed form cancels: the series of I'' = 1 - 2 z I' - n^2 I."""
+        y, y2 = 2.0 * self.z * t, self.n2 * t * t
+        term, last = 0.5 * t * t, 0.0
+        total = term
+        for j in range(2, 18):
+            term, last = -(y * j * term + y2 * last) / ((j + 1.0) * j), term
+            total += term
+        return total
+
     def standstill(self, mode):
         """When the speed, of the sign of mode, next comes to zero; inf if it never does."""
-        v, a = mode * self.v0, mode * self.a0
-        if v < 0.0:
-            v = 0.0  # a start from rest: -0.0, or the last bit of an event
+        v, a = fabs(self.v0), mode * self.a0  # a product would turn the speed of a body at rest into -0.0
         if self.kind == UNDAMPED:
             return self.undamped_standstill(v, a / self.w, mode * self.drift)
         b = a + self.z * v
@@ -111,6 +122,12 @@ class Exact:
         s = -(q + copysign(sqrt(square), q))
         first, second = half_angle(s, lead), half_angle(v, s)
         return 2.0 * (first if first < second else second) / self.w
+
+
+def early_lag(square):
+    """1 - sin(y)/y for y below 0.5, from y^2, by its series."""
+    tail = 1.0 - square / 72.0 * (1.0 - square / 110.0 * (1.0 - square / 156.0 * (1.0 - square / 210.0)))
+    return square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * tail))
 
 
 def half_angle(over, under):

@@ -7,18 +7,14 @@ MATLAB's program give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, 
 
 from math import fabs, inf, nan
 
-from . import ode23
 from .declare import Choice, Count, Declaring, Fixed, Local
-
-EXACT, ODE23 = 1, 2
-EXACT_ITEM = ("exact", EXACT, "closed form of each linear piece, events included; the hybrid law only")
-METHODS = (("ode23", ODE23, "Bogacki-Shampine 3(2), with the step control of MATLAB's program"),)
+from .methods import EXACT, ITEMS, ODE23, Methods
 
 OK, DIVERGED, STALLED, ENDLESS = 0, 1, 2, 3
 
 STUCK, HYBRID = 0, 1
 ULP = 2.220446049250313e-16
-MOST_STEPS = 10_000_000  # within one communication step: half a minute at most, then a sentence
+MOST_STEPS = 2_000_000  # within one communication step: half a minute at most, then a sentence
 MOST_TRIES = 200  # of one step, which halves each time
 MOST_IDLE = 100  # steps in a row that hardly move the time
 
@@ -26,7 +22,7 @@ MOST_IDLE = 100  # steps in a row that hardly move the time
 class March(Declaring):
     """Solver settings, counts and the state of the integration."""
 
-    method = Choice(ODE23, "integration method", METHODS)
+    method = Choice(ODE23, "integration method", ITEMS)
     rtol = Fixed(0.0, "1", "relative tolerance; 0 takes the importer's", low=0.0, below=1.0)
     atol = Fixed(0.0, "1", "absolute tolerance in SI units; 0 takes 1e-3 of rtol", low=0.0)
     h_max = Fixed(0.0, "s", "largest internal step; 0 takes a tenth of the run", low=0.0)
@@ -38,6 +34,7 @@ class March(Declaring):
 
     def __init__(self):
         super().__init__()
+        self.methods = Methods()
         # the run: tolerances in force, largest step, stop time (inf where unknown)
         self.tolerance = self.threshold = self.longest = 0.0
         self.t_end = inf
@@ -48,7 +45,7 @@ class March(Declaring):
         self.t0 = self.x0 = self.v0 = self.a0 = 0.0
         self.t1 = self.x1 = self.v1 = self.a1 = 0.0
         self.mode0 = self.mode1 = STUCK
-        self.sticks = self.waiting = self.event = False
+        self.sticks = self.waiting = self.expanded = self.event = False
         # what the interpolant stands on: the length and the end of the step before an event cut it
         self.span = self.xe = self.ve = self.ae = 0.0
         # counts up to t1 and up to t0, and the size to try next
@@ -67,6 +64,7 @@ class March(Declaring):
         self.threshold = absolute / self.tolerance
         self.longest = self.h_max if self.h_max > 0.0 else 0.1 * run
         self.t_end = t_end
+        self.methods.choose(self.method)
         self.taken = self.refused = self.called = self.happened = self.idle = 0
         self.size = self.last_size = 0.0
         self.t_event = nan
@@ -89,6 +87,8 @@ class March(Declaring):
         self.event = False
         self.t1, self.x1, self.v1 = self.t, self.x, self.v
         self.settle(model)
+        if self.mode1 != self.mode:
+            self.note_event()
         if self.size == 0.0:
             self.size = self.first_size()
         self.stand()
@@ -234,9 +234,10 @@ class March(Declaring):
         if size_v < threshold:
             size_v = threshold
         tries = 0
+        methods = self.methods
         while True:
-            x1, v1, a1, e_x, e_v = ode23.step(model, mode, t, x, v, a, h)
-            self.called += ode23.STAGES
+            x1, v1, a1, e_x, e_v = methods.step(model, mode, t, x, v, a, h)
+            self.called += methods.stages
             p, q = fabs(x1), fabs(v1)
             p = fabs(e_x) / (p if p > size_x else size_x)
             q = fabs(e_v) / (q if q > size_v else size_v)
@@ -247,20 +248,24 @@ class March(Declaring):
             tries += 1
             if h <= smallest or tries == MOST_TRIES:
                 return STALLED if error < inf else DIVERGED
-            shrink = 0.8 * error**-ode23.POWER if 1.0 < error < inf and tries == 1 else 0.5
-            size = h * (shrink if shrink > 0.5 else 0.5)
+            shrink = methods.safety * error**-methods.power if 1.0 < error < inf and tries == 1 else 0.5
+            lowest = methods.shrink if tries == 1 else 0.5
+            size = h * (shrink if shrink > lowest else lowest)
             if size < smallest:
                 size = smallest
             h = size
             last = False
         if tries == 0:
-            grow = 0.8 * error**-ode23.POWER if error > 0.0041 else 5.0  # 0.8/5 cubed is 0.0041
-            size = h * (grow if grow < 5.0 else 5.0)
+            grow = methods.safety * error**-methods.power if error > 1e-9 else methods.grow
+            size = h * (grow if grow < methods.grow else methods.grow)
         self.size = size
         self.span, self.xe, self.ve, self.ae = h, x1, v1, a1
+        self.expanded = False
         self.t1, self.x1, self.v1, self.a1 = self.t_end if last else t + h, x1, v1, a1
         if model.dry and mode != STUCK:
             end = model.reversal(self)
+            if self.expanded:  # the search had to look inside
+                self.called += self.methods.extra
             if end <= self.t1:
                 self.t1 = end
                 self.x1, _ = self.at(model, end)
@@ -286,7 +291,7 @@ class March(Declaring):
         p = fabs(self.v1) / (x if x > self.threshold else self.threshold)
         q = fabs(self.a1) / (v if v > self.threshold else self.threshold)
         rate = p if p > q else q
-        size = 0.8 * self.tolerance**ode23.POWER
+        size = self.methods.safety * self.tolerance**self.methods.power
         return size / rate if size < rate * self.longest else self.longest
 
     def at(self, model, t):
@@ -295,4 +300,9 @@ class March(Declaring):
             return self.x0, 0.0
         if model.linear and self.method == EXACT:
             return model.exact.at(t - self.t0)
-        return ode23.at((t - self.t0) / self.span, self.span, self.x0, self.v0, self.a0, self.xe, self.ve, self.ae)
+        if not self.expanded:
+            self.methods.expand(
+                model, self.mode0, self.t0, self.x0, self.v0, self.a0, self.span, self.xe, self.ve, self.ae
+            )
+            self.expanded = True
+        return self.methods.at((t - self.t0) / self.span)

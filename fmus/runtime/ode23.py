@@ -4,30 +4,45 @@ P. Bogacki, L. F. Shampine, A 3(2) pair of Runge-Kutta formulas, Appl. Math. Let
 L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22.
 """
 
-STAGES = 3  # new right-hand sides a step
-POWER = 1.0 / 3.0  # the local error grows as h^(1/POWER)
+STAGES = 3  # right-hand sides a step; the last is the first of the next step
+EXTRA = 0  # right-hand sides that the interpolant needs on top
+POWER, SAFETY, SHRINK, GROW = 1.0 / 3.0, 0.8, 0.5, 5.0
 
 
-def step(model, mode, t, x, v, a, h):
-    """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
-    v2 = v + 0.5 * h * a
-    a2 = model.acceleration(t + 0.5 * h, x + 0.5 * h * v, v2, mode)
-    v3 = v + 0.75 * h * a2
-    a3 = model.acceleration(t + 0.75 * h, x + 0.75 * h * v2, v3, mode)
-    x1 = x + h * (2.0 * v + 3.0 * v2 + 4.0 * v3) / 9.0
-    v1 = v + h * (2.0 * a + 3.0 * a2 + 4.0 * a3) / 9.0
-    a1 = model.acceleration(t + h, x1, v1, mode)
-    return (
-        x1,
-        v1,
-        a1,
-        (-5.0 * v + 6.0 * v2 + 8.0 * v3 - 9.0 * v1) / 72.0,
-        (-5.0 * a + 6.0 * a2 + 8.0 * a3 - 9.0 * a1) / 72.0,
-    )
+class Ode23:
+    """One step, and the cubic through values and slopes of both its ends."""
 
+    def __init__(self):
+        self.x0 = self.x1 = self.x2 = self.x3 = 0.0
+        self.v0 = self.v1 = self.v2 = self.v3 = 0.0
 
-def at(s, h, x0, v0, a0, x1, v1, a1):
-    """Position and speed at the fraction s of a step: the cubic through values and slopes of both ends."""
-    r = 1.0 - s
-    p, q, u, w = (1.0 + 2.0 * s) * r * r, s * r * r * h, s * s * (3.0 - 2.0 * s), -s * s * r * h
-    return p * x0 + q * v0 + u * x1 + w * v1, p * v0 + q * a0 + u * v1 + w * a1
+    def step(self, model, mode, t, x, v, a, h):
+        """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
+        v2 = v + 0.5 * h * a
+        a2 = model.acceleration(t + 0.5 * h, x + 0.5 * h * v, v2, mode)
+        v3 = v + 0.75 * h * a2
+        a3 = model.acceleration(t + 0.75 * h, x + 0.75 * h * v2, v3, mode)
+        x1 = x + h * (2.0 * v + 3.0 * v2 + 4.0 * v3) / 9.0
+        v1 = v + h * (2.0 * a + 3.0 * a2 + 4.0 * a3) / 9.0
+        a1 = model.acceleration(t + h, x1, v1, mode)
+        return (
+            x1,
+            v1,
+            a1,
+            (-5.0 * v + 6.0 * v2 + 8.0 * v3 - 9.0 * v1) / 72.0,
+            (-5.0 * a + 6.0 * a2 + 8.0 * a3 - 9.0 * a1) / 72.0,
+        )
+
+    def expand(self, model, mode, t, x, v, a, h, x1, v1, a1):
+        """Coefficients of the interpolant of the step just taken."""
+        rise, p, q = x1 - x, h * v, h * v1
+        self.x0, self.x1, self.x2, self.x3 = x, p, 3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise
+        rise, p, q = v1 - v, h * a, h * a1
+        self.v0, self.v1, self.v2, self.v3 = v, p, 3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise
+
+    def at(self, s):
+        """Position and speed at the fraction s of the step."""
+        return (
+            self.x0 + s * (self.x1 + s * (self.x2 + s * self.x3)),
+            self.v0 + s * (self.v1 + s * (self.v2 + s * self.v3)),
+        )

@@ -98,7 +98,7 @@ class Slave(Fmi2Slave):
         end = current_time + step_size
         if fabs(end - march.t1) <= 1e-15 * fabs(end):
             end = march.t1  # the end of an internal step, but for the rounding of the sum
-        elif stop < end <= stop + 1e-9 * step_size + 1e-12 * fabs(stop):
+        elif stop < end < inf and end <= stop + 1e-9 * step_size + 1e-12 * fabs(stop):
             end = stop
         begins_here = fabs(current_time - now) <= 1e-6 * step_size + 1e-12 * fabs(now)
         if not (step_size > 0.0 and begins_here and now <= end <= stop and end < inf):
@@ -169,7 +169,7 @@ class Slave(Fmi2Slave):
             if not self.observed and not self.failure:
                 self.observe()
             values, ahead = reader
-            if ahead and not self.failure:
+            if ahead and self.observed and not self.failure:
                 self.model.solver.look_ahead(self.model)
             return list(values(self.model))[: len(references)]
         except BaseException as error:  # as above
@@ -185,7 +185,7 @@ class Slave(Fmi2Slave):
         """Name and declaration of a reference."""
         if 0 <= reference < len(self.variables):
             name, declared = self.variables[reference]
-            if (declared.type == "Real") == (kind == "Real"):
+            if kind == ("Real" if declared.type == "Real" else "Integer"):
                 return name, declared
         raise LookupError(f"value reference {reference} is not that of a variable of type {kind}")
 

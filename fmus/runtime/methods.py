@@ -1,0 +1,72 @@
+"""The integration methods there are, and the one in force."""
+
+from . import dop853, ode23, ode45, rodas
+from .dop853 import Dop853
+from .ode23 import Ode23
+from .ode45 import Ode45
+from .rodas import Rodas
+
+EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
+EXACT_ITEM = ("exact", EXACT, "closed form of each linear piece, events included; the hybrid law only")
+ITEMS = (
+    ("ode23", ODE23, "Bogacki-Shampine 3(2), with the step control of MATLAB's program; for loose tolerances"),
+    ("ode45", ODE45, "Dormand-Prince 5(4), with the step control of MATLAB's program; for moderate tolerances"),
+    ("dop853", DOP853, "Dormand-Prince 8(5,3); for tight tolerances"),
+    ("rodas", RODAS, "Rosenbrock 4(3), L-stable; for stiff friction curves"),
+)
+
+
+class Methods:
+    """The method chosen for a run, and how its step size is controlled."""
+
+    def __init__(self):
+        self.ode23, self.ode45, self.dop853, self.rodas = Ode23(), Ode45(), Dop853(), Rodas()
+        self.chosen = self.stages = self.extra = 0
+        self.power = self.safety = self.shrink = self.grow = 0.0
+
+    def choose(self, method):
+        """Put a method in force; between the events of the exact one there are no steps to control."""
+        self.chosen = method
+        if method == ODE45:
+            self.stages, self.extra = ode45.STAGES, ode45.EXTRA
+            self.power, self.safety, self.shrink, self.grow = ode45.POWER, ode45.SAFETY, ode45.SHRINK, ode45.GROW
+        elif method == DOP853:
+            self.stages, self.extra = dop853.STAGES, dop853.EXTRA
+            self.power, self.safety, self.shrink, self.grow = dop853.POWER, dop853.SAFETY, dop853.SHRINK, dop853.GROW
+        elif method == RODAS:
+            self.stages, self.extra = rodas.STAGES, rodas.EXTRA
+            self.power, self.safety, self.shrink, self.grow = rodas.POWER, rodas.SAFETY, rodas.SHRINK, rodas.GROW
+        else:
+            self.stages, self.extra = ode23.STAGES, ode23.EXTRA
+            self.power, self.safety, self.shrink, self.grow = ode23.POWER, ode23.SAFETY, ode23.SHRINK, ode23.GROW
+
+    def step(self, model, mode, t, x, v, a, h):
+        """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
+        if self.chosen == RODAS:
+            return self.rodas.step(model, mode, t, x, v, a, h)
+        if self.chosen == DOP853:
+            return self.dop853.step(model, mode, t, x, v, a, h)
+        if self.chosen == ODE45:
+            return self.ode45.step(model, mode, t, x, v, a, h)
+        return self.ode23.step(model, mode, t, x, v, a, h)
+
+    def expand(self, model, mode, t, x, v, a, h, x1, v1, a1):
+        """Coefficients of the interpolant of the step just taken."""
+        if self.chosen == RODAS:
+            self.rodas.expand(model, mode, t, x, v, a, h, x1, v1, a1)
+        elif self.chosen == DOP853:
+            self.dop853.expand(model, mode, t, x, v, a, h, x1, v1, a1)
+        elif self.chosen == ODE45:
+            self.ode45.expand(model, mode, t, x, v, a, h, x1, v1, a1)
+        else:
+            self.ode23.expand(model, mode, t, x, v, a, h, x1, v1, a1)
+
+    def at(self, s):
+        """Position and speed at the fraction s of the step."""
+        if self.chosen == RODAS:
+            return self.rodas.at(s)
+        if self.chosen == DOP853:
+            return self.dop853.at(s)
+        if self.chosen == ODE45:
+            return self.ode45.at(s)
+        return self.ode23.at(s)
