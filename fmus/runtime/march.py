@@ -95,6 +95,7 @@ class March(Declaring):
 
     def settle(self, model):
         """The mode and the acceleration that hold from t1 on."""
+        self.mode1 = STUCK
         if model.dry and self.sticks:
             self.mode1 = model.settle(self.t1, self.x1, self.v1)
         self.arrive(model)
