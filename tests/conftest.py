@@ -1,0 +1,64 @@
+"""Fixtures: the FMUs built once, and a process that runs them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from driver import Worker
+
+ROOT = Path(__file__).parent.parent
+
+
+def build(root, out, *names):
+    """Build FMUs from the sources under `root` in a process of their own."""
+    command = [sys.executable, "build_fmus.py", *names, "--out", str(out)]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.fixture(scope="session")
+def fmus(tmp_path_factory):
+    """The folder of the built FMUs."""
+    return build(ROOT, tmp_path_factory.mktemp("fmus"))
+
+
+@pytest.fixture(scope="session")
+def _workers():
+    workers = [Worker()]
+    yield workers
+    for worker in workers:
+        worker.close()
+
+
+@pytest.fixture
+def worker(_workers):
+    """The process that runs FMUs; a new one when the last test killed it."""
+    if not _workers[-1].alive:
+        _workers.append(Worker())
+    _workers[-1].complaints()
+    return _workers[-1]
+
+
+@pytest.fixture
+def fresh():
+    """A process of the test's own, which must end well: late damage to memory shows at the exit."""
+    worker = Worker()
+    yield worker
+    assert worker.close() == 0
+
+
+@pytest.fixture
+def launch(worker, fmus):
+    """launch(name, values, start=, stop=, tolerance=): an initialised instance, freed when the test ends."""
+    instances = []
+
+    def launch(name, values=None, **experiment):
+        instances.append(worker.instantiate(fmus / f"{name}.fmu"))
+        return instances[-1].begin(values, **experiment)
+
+    yield launch
+    for instance in instances:
+        if worker.alive and not instance.freed:
+            instance.free()

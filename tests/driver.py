@@ -1,0 +1,124 @@
+"""Built FMUs at arm's length: worker.py in a clean process, its crashes and hangs told in one sentence."""
+
+import itertools
+import json
+import os
+import select
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+PATIENCE = 120.0  # s, for one request
+
+
+class Refused(Exception):
+    """An FMI call did not return OK."""
+
+    def __init__(self, function, status):
+        super().__init__(f"{function} returned status {status}")
+        self.function, self.status = function, status
+
+
+class Worker:
+    """A process that runs FMUs; `alive` until it is closed, crashes or hangs."""
+
+    def __init__(self):
+        self.noise = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - lives as long as the process
+        command = [sys.executable, "-I", Path(__file__).with_name("worker.py")]
+        self.process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.noise, cwd=tempfile.gettempdir()
+        )
+        self.heard, self.pending = 0, b""
+
+    @property
+    def alive(self):
+        return self.process.poll() is None
+
+    def call(self, instance, function, *arguments):
+        """The value of one request; Refused when an FMI call fails, AssertionError when anything else does."""
+        try:
+            self.process.stdin.write(json.dumps([instance, function, arguments]).encode() + b"\n")
+            self.process.stdin.flush()
+            answer = json.loads(self._line(function))
+        except BrokenPipeError:
+            raise AssertionError(self._obituary(function)) from None
+        if "refused" in answer:
+            raise Refused(*answer["refused"])
+        assert "value" in answer, answer["failed"]
+        return answer["value"]
+
+    def _line(self, function):
+        out = self.process.stdout.fileno()
+        while b"\n" not in self.pending:
+            if not select.select([out], [], [], PATIENCE)[0]:
+                self.process.kill()
+                raise AssertionError(f"the FMU process hung for {PATIENCE:.0f} s in {function}: {self.complaints()}")
+            piece = os.read(out, 1 << 20)
+            if not piece:
+                raise AssertionError(self._obituary(function))
+            self.pending += piece
+        line, _, self.pending = self.pending.partition(b"\n")
+        return line
+
+    def _obituary(self, function):
+        return f"the FMU process died in {function} with exit code {self.process.wait(10)}: {self.complaints()}"
+
+    def complaints(self):
+        """What was written to standard error since the last call."""
+        self.noise.seek(self.heard)
+        text = self.noise.read()
+        self.heard += len(text)
+        return text.decode()
+
+    def instantiate(self, path, name="test"):
+        return Instance(self, self.call(None, "instantiate", str(path), name))
+
+    def modules(self):
+        return self.call(None, "modules")
+
+    def directory(self, path):
+        """Where an FMU that was instantiated was extracted to."""
+        return self.call(None, "directory", str(path))
+
+    def close(self):
+        """End the process; the exit code."""
+        self.process.stdin.close()
+        code = self.process.wait(30)
+        self.process.stdout.close()
+        self.noise.close()
+        return code
+
+
+class Instance:
+    """An instance in the worker; its methods are those of worker.Instance."""
+
+    def __init__(self, worker, number):
+        self.worker, self.number, self.freed = worker, number, False
+
+    def __getattr__(self, function):
+        return lambda *arguments: self.worker.call(self.number, function, *arguments)
+
+    def get(self, *names):
+        """The value of one variable, or the list of several."""
+        values = self.worker.call(self.number, "get", names)
+        return values[0] if len(names) == 1 else values
+
+    def begin(self, values=None, start=0.0, stop=None, tolerance=None):
+        """Set values, then go through initialisation."""
+        self.set(values or {})
+        self.setup(start, stop, tolerance)
+        self.init()
+        return self
+
+    def through(self, times, names, changes):
+        """As run; at the times in `changes` the values given there are set, after the row was read."""
+        rows, turns = [], [times[0], *sorted(changes), times[-1]]
+        for t, end in itertools.pairwise(turns):
+            self.set(changes.get(t, {}))
+            rows += self.run([s for s in times if t <= s <= end], names)[bool(rows) :]
+        return rows
+
+    def free(self):
+        self.freed = True
+        self.worker.call(self.number, "free")

@@ -1,0 +1,82 @@
+"""The list that completeness walks: every model file, its declared variables, and every law with every method."""
+
+from importlib import import_module
+from itertools import product
+from pathlib import Path
+
+from fmus.runtime.declare import Choice, Input, Output, Parameter, variables
+
+ROOT = Path(__file__).parent.parent
+MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
+EXACT, ODE23 = 1, 2
+HYBRID, SIGN, THRESHOLD = 1, 2, 3
+
+
+def model_class(name):
+    return getattr(import_module(f"fmus.{name}"), name.capitalize())
+
+
+def declared(name):
+    """Name and declaration of every variable of a model, in the order of the XML."""
+    return dict(variables(model_class(name)()))
+
+
+def outputs(name):
+    """Names of the outputs; position and speed come first."""
+    return [v for v, d in declared(name).items() if isinstance(d, Output)]
+
+
+def parameters(name):
+    """Names and declarations of what takes a number: parameters and inputs, but no choices."""
+    kinds = (Parameter, Input)
+    return {v: d for v, d in declared(name).items() if isinstance(d, kinds) and not isinstance(d, Choice)}
+
+
+def tunable(name):
+    """Those of them that may change in mid-run."""
+    return {v: d for v, d in parameters(name).items() if d.variability != "fixed"}
+
+
+def allowed(choices):
+    """Whether a combination of choices makes sense: the closed form needs the hybrid law."""
+    return not (choices.get("solver.method") == EXACT and choices.get("friction", HYBRID) != HYBRID)
+
+
+def combinations(name):
+    """Every allowed combination of a model's choices, as values to set."""
+    choices = {v: d for v, d in declared(name).items() if isinstance(d, Choice)}
+    items = [[value for _, value, _ in declaration.items] for declaration in choices.values()]
+    return [values for values in (dict(zip(choices, row, strict=True)) for row in product(*items)) if allowed(values)]
+
+
+def experiment(name, values):
+    """One run that tests share: (model, values, stop time).
+
+    Laws that chatter run as published, at rtol 1e-3, and end before the motion does: where friction should hold,
+    they take steps without number.
+    """
+    stop = model_class(name).stop_time
+    if values.get("friction", HYBRID) == HYBRID:
+        return name, values, stop
+    return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.8 * stop
+
+
+CASES = [experiment(name, values) for name in MODELS for values in combinations(name)]
+
+
+def label(case):
+    """A readable test id: the model and the labels of its choices."""
+    name, values, _ = case
+    names = [item[0] for v, value in values.items() for item in declared(name)[v].items if item[1] == value]
+    return "-".join([name, *names])
+
+
+def counts(name):
+    """Names of the counts and of the time of the last event, where the model has them: a run's whole history."""
+    wanted = ("solver.steps", "solver.rejected", "solver.evaluations", "solver.h", "events.count", "events.t_last")
+    return [v for v in declared(name) if v in wanted]
+
+
+def push(name):
+    """The input of a model, and a size that overcomes its friction."""
+    return ("T_ext", 0.02) if name == "pendulum" else ("F_ext", 200.0)

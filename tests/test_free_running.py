@@ -1,0 +1,149 @@
+"""The solver runs free: communication points, looks ahead and repeated settings leave no trace in the solution."""
+
+import random
+from math import cos, nextafter, sin
+
+import pytest
+from compare import close, identical
+from models import CASES, EXACT, counts, declared, label, outputs, parameters, push, tunable
+
+CHATTER = 1e-6  # m/s: below it the threshold law calls the mass stuck
+SLED = [case for case in CASES if "x_driver" in outputs(case[0])]
+
+
+@pytest.mark.parametrize("pushed", [False, True], ids=["free", "pushed"])
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_any_two_communication_grids_agree(launch, case, pushed):
+    name, values, stop = case
+    names, draw = outputs(name) + counts(name), random.Random(label(case))
+    shared = [0.0, *sorted(draw.uniform(0.0, stop) for _ in range(25)), stop]
+    force, size = push(name)
+    changes = {shared[i]: {force: sign * size} for i, sign in ((6, 1), (11, -1), (17, 0))} if pushed else {}
+
+    def solve(*extra):
+        times = sorted({*shared, *extra})
+        fmu = launch(name, values, stop=stop)
+        rows = fmu.through(times, names, changes)
+        fmu.free()
+        return [row for t, row in zip(times, rows, strict=True) if t in set(shared)]
+
+    expected = solve()
+    fmu = launch(name, values, stop=stop)
+    internal, _ = fmu.follow(0.0, stop, [])
+    straddling = [t + d for t in internal[1:-1:5] for d in (-1e-9, 1e-9)] + [
+        nextafter(t, stop) for t in internal[1:-1:7]
+    ]
+    for extra in (
+        internal,
+        straddling,
+        [draw.uniform(0.0, stop) for _ in range(400)],
+        [stop * i / 97 for i in range(97)],
+    ):
+        close(solve(*extra), expected, names, 1e-12)
+    if not pushed:
+        close(launch(name, values, stop=stop).run([0.0, stop], names)[-1:], expected[-1:], names, 1e-12)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_reading_changes_nothing_at_any_time(worker, fmus, case):
+    name, values, stop = case
+    names = outputs(name) + counts(name)
+    times = [stop * i / 150 for i in range(151)]
+    silent, curious = (worker.instantiate(fmus / f"{name}.fmu") for _ in range(2))
+    expected = silent.begin(values, stop=stop).run(times, names)
+    everything = list(declared(name))
+    curious.get(*everything)
+    curious.set(values)
+    curious.get(*everything)
+    curious.setup(0.0, stop, None)
+    curious.get(*everything)
+    curious.init()
+    rows = [row[: len(names)] for row in curious.run(times, [*names, *reversed(everything), "solver.t_next"])]
+    identical(rows, expected, names)
+    silent.free()
+    curious.free()
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_setting_a_value_to_what_it_is_changes_nothing(launch, case):
+    name, values, stop = case
+    names = outputs(name) + counts(name)
+    times = [stop * i / 60 for i in range(61)]
+    expected = launch(name, values, stop=stop).run(times, names)
+    fmu = launch(name, values, stop=stop)
+    same = dict(zip(tunable(name), fmu.get(*tunable(name)), strict=True))
+    identical(fmu.through(times, names, dict.fromkeys(times[1:-1], same)), expected, names)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_following_t_next_shows_every_internal_step(launch, case):
+    name, values, stop = case
+    times, rows = launch(name, values, stop=stop).follow(0.0, stop, ["solver.steps", "solver.h"])
+    assert times[-1] == stop
+    assert [steps for steps, _ in rows] == list(range(len(times)))
+    assert all(h == b - a for a, b, (_, h) in zip(times[:-1], times[1:], rows[1:], strict=True))
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction", 1) == 1], ids=label)
+def test_a_later_start_shifts_the_motion_and_nothing_else(launch, case):
+    """Laws that chatter are left out: there rounding of the time decides."""
+    name, values, stop = case
+    names = outputs(name)[:3]
+    times = [stop * i / 80 for i in range(81)]
+    early = launch(name, values, stop=stop).run(times, names)
+    late = launch(name, values, start=7.3, stop=7.3 + stop).run([7.3 + t for t in times], names)
+    close(late, early, names, 1e-12 if values["solver.method"] == EXACT else 1e-5)
+
+
+@pytest.mark.parametrize("case", SLED, ids=label)
+def test_a_changed_driver_speed_moves_nothing_suddenly(launch, case):
+    name, values, _stop = case
+    fmu = launch(name, values, start=7.3, stop=23.3)
+    names = [v for v in outputs(name) if v in ("x", "v", "x_driver", "F_spring", "energy")]
+    fmu.run([7.3, 11.9], names)
+    before = fmu.get(*names)
+    fmu.set({"v_driver": -1.0})
+    assert fmu.get(*names) == before
+    (_, after) = fmu.run([11.9, 11.9 + 1e-9], names)
+    assert after == pytest.approx(before, abs=1e-5)
+    assert fmu.get("x_driver") == pytest.approx(before[names.index("x_driver")] - 1e-9, abs=1e-15)
+    assert before[names.index("x_driver")] == pytest.approx(0.034 * 4.6, rel=1e-12)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_a_run_without_stop_time_goes_on(launch, case):
+    name, values, stop = case
+    names = outputs(name)[:2]
+    times = [stop * i / 40 for i in range(41)]
+    rows = launch(name, values).run(times, names)
+    if values["solver.method"] == EXACT:
+        close(rows, launch(name, values, stop=stop).run(times, names), names, 1e-12)
+    assert all(value == value for row in rows for value in row)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_outputs_balance(launch, case):
+    """The forces make the acceleration and the energy is of the state, at every point: also before the first step."""
+    name, values, stop = case
+    force, size = push(name)
+    fmu = launch(name, {**values, force: size / 50}, stop=stop)
+    value = dict(zip(parameters(name), fmu.get(*parameters(name)), strict=True))
+    for row in fmu.run([stop * i / 200 for i in range(201)], outputs(name)):
+        seen = dict(zip(outputs(name), row, strict=True))
+        if name == "pendulum":
+            weight, inertia = value["m"] * value["g"] * value["a"], value["J_G"] + value["m"] * value["a"] ** 2
+            drive = value["T_ext"] - weight * sin(seen["theta"]) - seen["T_friction"]
+            assert inertia * seen["alpha"] == pytest.approx(drive, rel=1e-9, abs=1e-14)
+            energy = inertia * seen["omega"] ** 2 / 2 + weight * (1 - cos(seen["theta"]))
+        else:
+            forces = ("F_spring", "F_damper")
+            drive = value["F_ext"] + sum(seen.get(f, 0.0) for f in forces) - seen.get("F_friction", 0.0)
+            drive -= value.get("c", 0.0) * seen["v"] if "F_damper" not in seen else 0.0
+            stretch = seen.get("x_driver", 0.0) - seen["x"]
+            assert seen["F_spring"] == pytest.approx(value["k"] * stretch, rel=1e-12, abs=1e-12)
+            assert value["m"] * seen["a"] == pytest.approx(drive, rel=1e-9, abs=1e-11)
+            energy = value["m"] * seen["v"] ** 2 / 2 + value["k"] * stretch**2 / 2
+        assert seen["energy"] == pytest.approx(energy, rel=1e-9, abs=1e-14)
+        if "mode" in seen:
+            _, speed, acceleration = row[:3]
+            assert seen["mode"] * speed > 0 or seen["mode"] * acceleration >= 0 == speed or abs(speed) < CHATTER

@@ -1,0 +1,93 @@
+"""The decay analysis on signals whose answer is known."""
+
+from math import cos, exp, pi, sin, sqrt
+
+import numpy as np
+import pytest
+
+from harness.decay import chosen, damping_ratio, friction, turning_points
+from harness.errors import HarnessError
+
+
+def damped(zeta, n=4001):
+    """Samples of t, x, v of exp(-zeta t) cos(...), from rest at 1, over six cycles of undamped period 2 pi."""
+    t = np.linspace(0.0, 12 * pi, n)
+    w = sqrt(1 - zeta * zeta)
+    x = np.exp(-zeta * t) * (np.cos(w * t) + zeta / w * np.sin(w * t))
+    return t, x, -np.exp(-zeta * t) * np.sin(w * t) / w
+
+
+def rubbed(loss, n=4001):
+    """Samples of an oscillation of period 2 pi that starts at 1 and loses `loss` in each half cycle until it rests."""
+    rows = []
+    for t in np.linspace(0.0, 12 * pi, n):
+        half = int(t / pi)
+        side, size = (-1) ** half, 1 - loss * half - loss / 2
+        if 1 - loss * half <= loss / 2:
+            rows.append((t, rows[-1][1], 0.0))
+        else:
+            rows.append((t, side * (size * cos(t - half * pi) + loss / 2), -side * size * sin(t - half * pi)))
+    return np.array(rows).T
+
+
+@pytest.mark.parametrize("zeta", [1e-4, 0.0796, 0.3])
+@pytest.mark.parametrize("cycles", [0.5, 2, 2.5, 5])
+def test_the_damping_ratio_of_an_exact_signal_comes_back(zeta, cycles):
+    times, positions = turning_points(*damped(zeta))
+    _, positions, used = chosen(times, positions, 0, cycles)
+    assert used == cycles
+    assert damping_ratio(abs(positions[0]), abs(positions[-1]), used) == pytest.approx(zeta, abs=1e-6)
+
+
+@pytest.mark.parametrize("n", [100, 200, 400])
+def test_turning_points_between_samples_converge_with_the_fourth_power(n):
+    """Twice the samples, a sixteenth of the error; here bounded by the error of a cubic, h^4/384 x''''."""
+    t, x, v = damped(0.0, n)
+    h = t[1]
+    _, positions = turning_points(t, x, v)
+    assert np.abs(np.abs(positions) - 1).max() <= 1.01 * h**4 / 384
+
+
+def test_turning_points_are_on_both_sides_and_half_a_cycle_apart():
+    times, positions = turning_points(*damped(0.1))
+    assert np.diff(times) == pytest.approx(pi / sqrt(1 - 0.01), abs=1e-7)
+    assert positions == pytest.approx([(-1) ** i * exp(-0.1 * times[i]) for i in range(len(times))], abs=1e-7)
+
+
+@pytest.mark.parametrize("cycles", [0.5, 1, 1.5, 3])
+def test_the_friction_of_an_exact_signal_comes_back(cycles):
+    """With k = 2 the loss of 0.1 per half cycle, 2 f/k, means f = 0.1."""
+    times, positions = turning_points(*rubbed(0.1))
+    _, positions, used = chosen(times, positions, 1, cycles)
+    assert friction(abs(positions[0]), abs(positions[-1]), used, 2.0) == pytest.approx(0.1, abs=1e-4)
+
+
+def test_rest_ends_the_turning_points():
+    times, positions = turning_points(*rubbed(0.3))
+    assert np.abs(positions) == pytest.approx([1.0, 0.7, 0.4, 0.1], abs=1e-4)
+    assert times == pytest.approx([0.0, pi, 2 * pi, 3 * pi], abs=1e-2)
+
+
+def test_a_rest_between_two_motions_of_one_direction_is_no_turning_point():
+    t = np.arange(7.0)
+    x = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 1.5, 2.0])
+    v = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
+    assert len(turning_points(t, x, v)[0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("first", "cycles", "sentence"),
+    [(0, 7, "needs 15 turning points"), (6, None, "needs 14 turning points"), (5, 1.5, "needs 14 turning points")],
+)
+def test_too_few_turning_points_are_refused(first, cycles, sentence):
+    times, positions = turning_points(*damped(0.05))
+    with pytest.raises(HarnessError, match=sentence):
+        chosen(times[:13], positions[:13], first, cycles)
+
+
+@pytest.mark.parametrize(("x_0", "x_n"), [(1.0, 1.0), (1.0, 1.1), (1.0, 0.0), (0.0, 0.0)])
+def test_what_does_not_decay_is_refused(x_0, x_n):
+    with pytest.raises(HarnessError, match="do not decay"):
+        damping_ratio(x_0, x_n, 1)
+    with pytest.raises(HarnessError, match="do not decay"):
+        friction(x_0, x_n, 1, 1.0)

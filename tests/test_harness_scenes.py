@@ -1,0 +1,94 @@
+"""Scenes: what they may say, and what a wrong one is told."""
+
+from dataclasses import fields
+
+import pytest
+
+from harness.errors import SceneError
+from harness.quantity import Quantity
+from harness.scene import KEYS, Scene, load, shipped
+
+GOOD = {"title": '"a title"', "model": '"stickslip"', "outputs": '["x", "v", "a"]'}
+
+
+def write(folder, extra="", **keys):
+    """A scene file; a key given as None is left out."""
+    lines = [f"{key} = {value}" for key, value in (GOOD | keys).items() if value is not None]
+    path = folder / "mine.toml"
+    path.write_text("\n".join([*lines, extra]))
+    return path
+
+
+@pytest.mark.parametrize("path", shipped(), ids=lambda path: path.stem)
+def test_every_shipped_scene_loads_and_names_its_source(path):
+    scene = load(path.stem)
+    assert scene == load(path)
+    assert scene.published["source"]
+
+
+def test_a_scene_has_a_field_for_every_key_of_its_file():
+    assert {field.name for field in fields(Scene)} == {"name", *KEYS}
+
+
+def test_what_a_scene_leaves_out_is_left_to_the_fmu(tmp_path):
+    scene = load(write(tmp_path))
+    assert {scene.method, scene.law, scene.rtol, scene.start, scene.stop, scene.grid} == {None}
+    assert (scene.analyses, scene.plots, scene.values, scene.follow) == ((), (), {}, True)
+
+
+def test_a_grid_does_not_follow_the_solver_unless_asked(tmp_path):
+    assert not load(write(tmp_path, grid="0.1")).follow
+    assert load(write(tmp_path, grid="0.1", follow="true")).follow
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ({"mehtod": '"ode23"'}, "unknown key 'mehtod' (nearest: 'method'); allowed: analyses, "),
+        ({"model": '"stikslip"'}, "unknown model 'stikslip' (nearest: 'stickslip'); allowed: coulomb, "),
+        ({"analyses": '["decy"]'}, "unknown name in analyses 'decy' (nearest: 'decay'); allowed: decay, slip, steps"),
+        ({"plots": '["phse"]'}, "unknown name in plots 'phse' (nearest: 'phase')"),
+        ({"title": None}, "the key 'title' is missing"),
+        ({"model": None}, "name one of model"),
+        ({"fmu": '"x.fmu"'}, "name one of model"),
+        ({"outputs": "[]"}, "outputs is empty"),
+        ({"outputs": '["x", "x"]'}, "is not a list of different names"),
+        ({"stop": '"soon"'}, "stop = 'soon' is not a finite number"),
+        ({"stop": "inf"}, "stop = inf is not a finite number"),
+        ({"rtol": "0"}, "rtol = 0 is not a finite number above 0"),
+        ({"repeat": "true"}, "repeat = True is not a whole number of at least 1"),
+        ({"follow": "false"}, "follow = false needs a grid"),
+        ({"grid": "0.1", "analyses": '["steps"]'}, "the analysis 'steps' needs follow = true"),
+        ({"outputs": '["x"]', "plots": '["phase"]'}, "the plot 'phase' needs the velocity: add v or omega"),
+        ({"analyses": '["decay"]'}, "the table [decay] with gives"),
+        ({"extra": "[decay]\ngives = 'mu'"}, "gives = 'mu' is not 'zeta', 'f' or 'T_f'"),
+        ({"extra": "[decay]\ncycles = 0.3"}, "cycles = 0.3 is not a whole or half number above 0"),
+        ({"extra": "[decay]\nfrist = 1"}, "unknown key in [decay] 'frist' (nearest: 'first')"),
+        ({"extra": "[published]\nperiod = 3"}, "[published] needs a source"),
+        ({"extra": "[published]\nsource = 'me'\nperiod = [1, 2, 3]"}, "published period = [1, 2, 3] is not"),
+        ({"title": "'''"}, "not valid TOML"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_wrong_scene_is_told_in_one_sentence(tmp_path, keys, sentence):
+    with pytest.raises(SceneError) as caught:
+        load(write(tmp_path, **keys))
+    assert str(caught.value).startswith("scene mine: ")
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unknown_scene_is_told_the_shipped_names():
+    with pytest.raises(SceneError, match=r"unknown scene 'pendulm' \(nearest: 'pendulum'\); allowed: coulomb, "):
+        load("pendulm")
+
+
+def test_a_missing_file_is_told():
+    with pytest.raises(SceneError, match=r"cannot read the scene nowhere\.toml: No such file"):
+        load("nowhere.toml")
+
+
+def test_quantities_change_their_unit_but_not_what_they_measure():
+    assert Quantity("T_f", 0.1129848290276167, "N.m", "").in_unit("lbf.in") == pytest.approx(1.0, rel=1e-15)
+    with pytest.raises(KeyError):
+        Quantity("period", 1.0, "s", "").in_unit("deg")

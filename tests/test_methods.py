@@ -1,0 +1,287 @@
+"""The integration methods of the runtime, one step at a time: every claim is checked on every method it is made for."""
+
+from importlib import import_module
+from itertools import pairwise
+from math import cos, exp, fabs, isnan, log2, nan, sin, sqrt
+
+import numpy as np
+import pytest
+import scipy.integrate
+from models import MODELS, ROOT, combinations, model_class
+
+from fmus.runtime import rodas
+
+# the order of a method, the order of its interpolant, and a step in the range where halving shows them
+METHODS = {"ode23": (3, 3, 0.05), "ode45": (5, 4, 0.1), "dop853": (8, 7, 0.25), "rodas": (4, 3, 0.05)}
+PEERS = {"ode23": "RK23", "ode45": "RK45", "dop853": "DOP853"}
+
+every_method = pytest.mark.parametrize("name", METHODS)
+
+
+class Motion:
+    """A model whose solution is known: x = sin(w t), forced and with nonlinear spring and damper."""
+
+    w = 1.3
+
+    def at(self, t):
+        return sin(self.w * t), self.w * cos(self.w * t)
+
+    def acceleration(self, t, x, v, mode):
+        at, speed = self.at(t)
+        return sin(at) - self.w**2 * at + 0.3 * speed**3 - sin(x) - 0.3 * v**3
+
+    def jacobian(self, t, x, v, mode):
+        at, speed = self.at(t)
+        return (cos(at) - self.w**2 - 0.9 * speed * self.w**2 * at) * speed, -cos(x), -0.9 * v**2
+
+
+class Linear:
+    """x'' = rate t^power + spring x + damper v, and a record of where its right-hand side was asked for."""
+
+    def __init__(self, rate=0.0, power=1, spring=0.0, damper=0.0):
+        self.rate, self.power, self.spring, self.damper = rate, power, spring, damper
+        self.calls = []
+
+    def acceleration(self, t, x, v, mode):
+        self.calls.append((t, x, v))
+        return self.rate * t**self.power + self.spring * x + self.damper * v
+
+    def jacobian(self, t, x, v, mode):
+        return self.rate * self.power * t ** (self.power - 1) if self.power else 0.0, self.spring, self.damper
+
+
+class Solver:
+    """A method with its numbers, and one step of it."""
+
+    def __init__(self, name):
+        self.numbers = import_module(f"fmus.runtime.{name}")
+        self.order, self.inner, self.h = METHODS[name]
+        self.method = getattr(self.numbers, name.capitalize())()
+
+    def step(self, model, t, x, v, h):
+        """New x, v and acceleration, and the rates of the error; the interpolant is ready."""
+        a = model.acceleration(t, x, v, 0)
+        new = self.method.step(model, 0, t, x, v, a, h)
+        self.method.expand(model, 0, t, x, v, a, h, *new[:3])
+        return new
+
+
+@pytest.fixture
+def solver(name):
+    return Solver(name)
+
+
+def falls_with(power, error, h):
+    """Whether error(h) falls as that power of h, seen by halving; the term after it may still be felt."""
+    return power - 0.5 < log2(error(h) / error(0.5 * h)) < power + 1.0
+
+
+def distance(one, other):
+    return max(fabs(p - q) for p, q in zip(one, other, strict=True))
+
+
+def test_every_method_of_the_runtime_is_tested_here():
+    files = (ROOT / "fmus" / "runtime").glob("*.py")
+    assert {file.stem for file in files if "\nSTAGES = " in file.read_text()} == set(METHODS)
+
+
+@every_method
+def test_the_error_of_a_run_falls_with_the_order_of_the_method(solver):
+    motion = Motion()
+
+    def error(h):
+        t, (x, v), worst = 0.2, motion.at(0.2), 0.0
+        for _ in range(round(4.0 / h)):
+            x, v, *_ = solver.step(motion, t, x, v, h)
+            t += h
+            worst = max(worst, distance((x, v), motion.at(t)))
+        return worst
+
+    assert falls_with(solver.order, error, solver.h)
+
+
+@every_method
+def test_the_error_inside_a_step_falls_with_the_order_of_the_interpolant(solver):
+    motion = Motion()
+
+    def error(h):
+        worst = 0.0
+        for t in (0.2, 1.4, 3.1):
+            solver.step(motion, t, *motion.at(t), h)
+            fractions = [0.1 * i for i in range(1, 10)]
+            worst = max(worst, *(distance(solver.method.at(s), motion.at(t + s * h)) for s in fractions))
+        return worst
+
+    assert falls_with(solver.inner + 1, error, solver.h)
+
+
+@every_method
+def test_the_estimated_error_falls_as_the_step_control_assumes(solver):
+    motion = Motion()
+
+    def error(h):
+        _, _, _, e_x, e_v = solver.step(motion, 0.7, *motion.at(0.7), h)
+        return h * max(fabs(e_x), fabs(e_v))
+
+    assert falls_with(1.0 / solver.numbers.POWER, error, solver.h)
+
+
+@every_method
+def test_the_interpolant_meets_both_ends(solver):
+    x, v, *_ = solver.step(Motion(), 0.2, 0.4, -1.7, solver.h)
+    assert solver.method.at(0.0) == (0.4, -1.7)
+    assert solver.method.at(1.0) == pytest.approx((x, v), abs=1e-14)
+
+
+@every_method
+def test_the_work_is_what_the_numbers_say_and_the_last_slope_is_the_first_of_the_next(solver):
+    model = Linear(1.0, 2, -3.0, -0.5)
+    x, v, a, _, _ = solver.step(model, 0.0, 0.3, 0.2, 0.1)
+    assert len(model.calls) == 1 + solver.numbers.STAGES + solver.numbers.EXTRA
+    assert model.calls[solver.numbers.STAGES] == (0.1, x, v)
+    assert a == Linear(1.0, 2, -3.0, -0.5).acceleration(0.1, x, v, 0)
+
+
+@every_method
+def test_row_sums_every_stage_stands_where_a_body_of_constant_speed_is(solver):
+    model = Linear()
+    solver.step(model, 0.0, 0.0, 1.0, 1.0)
+    assert len({t for t, _, _ in model.calls}) > 2
+    for t, x, v in model.calls:
+        assert (x, v) == pytest.approx((t, 1.0), abs=1e-14)
+
+
+@every_method
+def test_a_motion_that_is_a_polynomial_of_the_methods_degree_is_exact(solver):
+    """x = t^(n + 2)/((n + 1)(n + 2)), from the acceleration t^n."""
+
+    def truth(n, s):
+        return s ** (n + 2) / ((n + 1) * (n + 2)), s ** (n + 1) / (n + 1)
+
+    for n in range(solver.order - 1):
+        x, v, *_ = solver.step(Linear(1.0, n), 0.0, 0.0, 0.0, 1.0)
+        assert (x, v) == pytest.approx(truth(n, 1.0), abs=1e-13)
+        if n < solver.inner - 1:
+            assert solver.method.at(0.4) == pytest.approx(truth(n, 0.4), abs=1e-13)
+
+
+@every_method
+def test_one_step_of_a_damped_oscillator_agrees_with_exp(solver):
+    """x'' = -4 x - 0.6 v from (1, -0.3): x = exp(-0.3 t) cos(w t), w^2 = 3.91."""
+    w = sqrt(3.91)
+
+    def error(h):
+        x, v, *_ = solver.step(Linear(spring=-4.0, damper=-0.6), 0.0, 1.0, -0.3, h)
+        fall = exp(-0.3 * h)
+        return distance((x, v), (fall * cos(w * h), -fall * (0.3 * cos(w * h) + w * sin(w * h))))
+
+    assert falls_with(solver.order + 1, error, solver.h)
+
+
+@every_method
+def test_what_is_not_a_number_is_refused_and_rest_is_no_error(solver):
+    assert all(isnan(e) for e in solver.step(Linear(nan, 1), 0.0, 1.0, 1.0, 0.1)[3:])
+    assert solver.step(Linear(), 0.0, 0.0, 0.0, 0.1) == (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_a_step_its_inside_and_its_estimated_error_are_those_of_scipy(solver, name):
+    motion = Motion()
+    x, v, _, e_x, e_v = solver.step(motion, 0.3, 0.5, 0.7, 0.4)
+    peer = getattr(scipy.integrate, PEERS[name])(
+        lambda t, y: (y[1], motion.acceleration(t, y[0], y[1], 0)), 0.3, [0.5, 0.7], 1e3, first_step=0.4, rtol=1e3
+    )
+    peer.step()
+    assert (x, v) == pytest.approx(tuple(peer.y), abs=1e-14)
+    if name == "dop853":
+        fifth, third = peer.K.T @ peer.E5, peer.K.T @ peer.E3
+        error = fifth**2 / np.sqrt(fifth**2 + 0.01 * third**2)
+    else:
+        error = peer.K.T @ peer.E
+    assert np.abs((e_x, e_v)) == pytest.approx(np.abs(error), rel=1e-7, abs=0.0)
+    for s in (0.1, 0.5, 0.8):
+        assert solver.method.at(s) == pytest.approx(tuple(peer.dense_output()(0.3 + 0.4 * s)), abs=1e-13)
+
+
+# ---- rodas: what a stiff method must have on top
+
+
+def speed_after_one(damper, h=1.0):
+    """What is left of a speed of 1 after one step of v' = -damper v."""
+    return fabs(Solver("rodas").step(Linear(damper=-damper), 0.0, 0.0, 1.0, h)[1])
+
+
+def test_rodas_is_l_stable():
+    left = [speed_after_one(10.0**n) for n in range(2, 15, 2)]
+    assert all(after < before for before, after in pairwise(left))
+    assert left[-1] < 1e-12
+
+
+def test_rodas_never_lets_an_undamped_oscillator_grow():
+    for w in np.geomspace(1e-2, 1e6, 60):
+        x, v, *_ = Solver("rodas").step(Linear(spring=-w * w), 0.0, 1.0, 0.0, 1.0)
+        assert x * x + (v / w) ** 2 <= 1.0 + 1e-12
+
+
+def test_rodas_keeps_its_accuracy_on_a_slow_motion_however_stiff():
+    """v' = -damper (v - cos t) - sin t, v(0) = 1: v = cos t (A. Prothero, A. Robinson, Math. Comp. 28 (1974))."""
+
+    class Slow(Linear):
+        def acceleration(self, t, x, v, mode):
+            return self.damper * (v - cos(t)) - sin(t)
+
+        def jacobian(self, t, x, v, mode):
+            return self.damper * sin(t) - cos(t), 0.0, self.damper
+
+    for damper in (1e1, 1e3, 1e6, 1e9):
+        assert Solver("rodas").step(Slow(damper=-damper), 0.0, 0.0, 1.0, 0.1)[1] == pytest.approx(cos(0.1), abs=3e-7)
+
+
+def test_rodas_is_stiffly_accurate():
+    """The last stage is the new point less the estimated error."""
+    model, h = Linear(0.4, 2, -3.0, -50.0), 0.1
+    x, v, _, e_x, e_v = Solver("rodas").step(model, 0.0, 0.3, 0.2, h)
+    assert model.calls[-2] == pytest.approx((h, x - h * e_x, v - h * e_v), abs=1e-13)
+
+
+def test_rodas_meets_the_conditions_of_order_four_with_an_error_estimate_of_order_three():
+    """In the notation of E. Hairer and G. Wanner, IV.7: alpha and beta from the numbers of the transformed form."""
+
+    def row(letter, i):
+        return [getattr(rodas, f"{letter}{i}{j}", 0.0) for j in range(1, 7)]
+
+    A, G = (np.array([row(letter, i) for i in range(1, 7)]) for letter in "AG")
+    A[5] = A[4] + np.eye(6)[4]
+    gamma = np.linalg.inv(np.eye(6) / rodas.GAMMA - G)
+    alpha = A @ gamma
+    beta = alpha + gamma
+    c, b = alpha.sum(1), beta.sum(1)
+    assert c == pytest.approx([0.0, rodas.C2, rodas.C3, rodas.C4, 1.0, 1.0], abs=1e-14)
+    assert gamma.sum(1) == pytest.approx([rodas.D1, rodas.D2, rodas.D3, rodas.D4, 0.0, 0.0], abs=1e-14)
+    three = [(1 + 0 * c, 1), (b, 2), (c**2, 3), (beta @ b, 6)]
+    four = [(c**3, 4), (c * (alpha @ b), 8), (beta @ c**2, 12), (beta @ beta @ b, 24)]
+    weights, embedded = beta[5], alpha[5]
+    assert [weights @ tree for tree, _ in three + four] == pytest.approx([1.0 / n for _, n in three + four], abs=1e-14)
+    assert [embedded @ tree for tree, _ in three] == pytest.approx([1.0 / n for _, n in three], abs=1e-14)
+    assert all(fabs(embedded @ tree - 1.0 / n) > 1e-3 for tree, n in four)
+
+
+def test_rodas_refuses_the_one_step_whose_equations_have_no_solution():
+    assert isnan(Solver("rodas").step(Linear(damper=4.0), 0.0, 0.0, 1.0, 1.0)[4])
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_jacobian_is_the_slope_of_its_acceleration(name):
+    d = 1e-6
+    for values in combinations(name):
+        model = model_class(name)()
+        for choice, value in values.items():
+            setattr(model.solver if "." in choice else model, choice.split(".")[-1], value)
+        assert model.prepare() == 0
+        for t, x, v, mode in ((0.3, 0.02, 0.004, 1), (1.1, -0.7, -0.4, -1), (2.0, 2.9, 1.3, 0)):
+            slopes = [
+                (model.acceleration(t + p, x + q, v + r, mode) - model.acceleration(t - p, x - q, v - r, mode))
+                / (2 * d)
+                for p, q, r in ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d))
+            ]
+            assert model.jacobian(t, x, v, mode) == pytest.approx(slopes, rel=1e-5, abs=1e-5)

@@ -1,0 +1,63 @@
+"""Saving and restoring the FMU state, in memory and serialised, continues bit for bit."""
+
+import random
+
+import pytest
+from compare import identical
+from models import CASES, counts, declared, label, outputs, push
+
+
+def wander(fmu, name, t, stop):
+    """Leave the path: other forces, other steps, a look ahead."""
+    force, size = push(name)
+    fmu.set({force: size})
+    fmu.run([t, (t + stop) / 2, (t + 2 * stop) / 3], [])
+    fmu.set({force: -size})
+    fmu.get("solver.t_next")
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
+    """At random points and at one of every mode; after a look ahead or not; in this, in another, in a raw instance."""
+    name, values, stop = case
+    names = outputs(name) + counts(name) + ["solver.t_next"]
+    draw = random.Random(label(case))
+    times = [0.0, *sorted(draw.uniform(0.0, stop) for _ in range(60)), stop]
+    expected = launch(name, values, stop=stop).run(times, names)
+    places = {0, *draw.sample(range(1, 60), 4)}
+    if "mode" in names:
+        modes = [row[names.index("mode")] for row in expected]
+        places |= {draw.choice([i for i, m in enumerate(modes[:-1]) if m == mode]) for mode in set(modes[:-1])}
+
+    force, size = push(name)
+    other = launch(name, {force: size / 2, outputs(name)[0] + "0": 0.02}, start=-1.0, stop=99.0)
+    raw = worker.instantiate(fmus / f"{name}.fmu")
+    fmu, t, look = launch(name, values, stop=stop), 0, False
+    for i in sorted(places):
+        rows = fmu.run(times[t : i + 1], names if look else names[:-1])
+        state = fmu.save()
+        wander(fmu, name, times[i], stop)
+        fmu.restore(state)
+        identical(fmu.run(times[i:], names), expected[i:], names)
+        text = fmu.serialize(state)
+        for heir in (other, raw):
+            heir.restore(heir.deserialize(text))
+            identical(heir.run(times[i:], names), expected[i:], names)
+        fmu.restore(state)
+        identical([row[: len(names) - 1] for row in rows], [row[:-1] for row in expected[t : i + 1]], names[:-1])
+        t, look = i, not look
+    raw.free()
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_a_restored_state_brings_the_parameters_back(launch, case):
+    name, values, _ = case
+    fmu = launch(name, values, stop=4.0)
+    everything = list(declared(name))
+    before = fmu.get(*everything)
+    state = fmu.save()
+    force, size = push(name)
+    fmu.set({force: size, "g" if "g" in everything else "k": 3.0})
+    fmu.run([0.0, 0.5], [])
+    fmu.restore(state)
+    assert repr(fmu.get(*everything)) == repr(before)

@@ -1,0 +1,182 @@
+"""The far end of driver.py: built FMUs in a process of their own that never sees the sources.
+
+One request a line: [instance or null, function, arguments].  One answer a line: {"value": ...}, or {"refused": [FMI
+function, status]} when an FMI call does not return OK, or {"failed": traceback}.
+"""
+
+import ctypes
+import itertools
+import json
+import os
+import shutil
+import sys
+import tempfile
+import traceback
+
+from fmpy import calloc, extract, free, read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+from fmpy.logging import addLoggerProxy
+
+
+class Instance:
+    """One instantiated FMU; the public methods are the requests."""
+
+    def __init__(self, fmu, name):
+        directory, description = fmu
+        self.variables = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
+        self.states, self.log = [], []
+        self.callbacks = fmi2CallbackFunctions()
+        self.callbacks.logger = fmi2CallbackLoggerTYPE(self._hear)
+        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        addLoggerProxy(ctypes.byref(self.callbacks))
+        identifier = description.coSimulation.modelIdentifier
+        self.slave = FMU2Slave(
+            guid=description.guid, modelIdentifier=identifier, unzipDirectory=directory, instanceName=name
+        )
+        self.slave.instantiate(callbacks=self.callbacks, loggingOn=True)
+
+    def _hear(self, environment, instance, status, category, message):
+        self.log.append([status, category.decode(), message.decode()])
+
+    def messages(self):
+        """What was logged since the last call: [status, category, text]."""
+        heard, self.log = self.log, []
+        return heard
+
+    def set(self, values):
+        for name, value in values.items():
+            reference, kind = self.variables[name]
+            (self.slave.setReal if kind == "Real" else self.slave.setInteger)([reference], [value])
+
+    def get(self, names):
+        return self._reader(names)()
+
+    def _reader(self, names):
+        """A function that reads the named variables with one call per type."""
+        reals = [i for i, name in enumerate(names) if self.variables[name][1] == "Real"]
+        others = [i for i, name in enumerate(names) if self.variables[name][1] != "Real"]
+        real_references = [self.variables[names[i]][0] for i in reals]
+        other_references = [self.variables[names[i]][0] for i in others]
+
+        def read():
+            row = [None] * len(names)
+            for i, value in zip(reals, self.slave.getReal(real_references) if reals else [], strict=True):
+                row[i] = value
+            for i, value in zip(others, self.slave.getInteger(other_references) if others else [], strict=True):
+                row[i] = value
+            return row
+
+        return read
+
+    def setup(self, start, stop, tolerance):
+        self.slave.setupExperiment(startTime=start, stopTime=stop, tolerance=tolerance)
+
+    def init(self):
+        self.slave.enterInitializationMode()
+        self.slave.exitInitializationMode()
+
+    def step(self, t, h):
+        self.slave.doStep(t, h)
+
+    def run(self, times, names):
+        """Step from times[0] through all the times: a row of values for each, the first included."""
+        read = self._reader(names)
+        rows = [read()]
+        for t, ahead in itertools.pairwise(times):
+            self.slave.doStep(t, ahead - t)
+            rows.append(read())
+        return rows
+
+    def follow(self, t, stop, names):
+        """Step from t to stop as solver.t_next leads: the times, and a row of values for each."""
+        read, look = self._reader(names), self._reader(["solver.t_next"])
+        times, rows = [t], [read()]
+        while t < stop:
+            ahead = look()[0]
+            ahead = ahead if ahead < stop else stop  # NaN, a run that will fail, leads to the stop
+            if ahead <= t:
+                raise AssertionError(f"solver.t_next is {ahead!r} at {t!r}: it does not lead on")
+            self.slave.doStep(t, ahead - t)
+            t = ahead
+            times.append(t)
+            rows.append(read())
+        return times, rows
+
+    def save(self):
+        self.states.append(self.slave.getFMUstate())
+        return len(self.states) - 1
+
+    def restore(self, state):
+        self.slave.setFMUstate(self.states[state])
+
+    def serialize(self, state):
+        return self.slave.serializeFMUstate(self.states[state]).hex()
+
+    def deserialize(self, text):
+        self.states.append(self.slave.deSerializeFMUstate(bytes.fromhex(text)))
+        return len(self.states) - 1
+
+    def reset(self):
+        self.slave.reset()
+
+    def terminate(self):
+        self.slave.terminate()
+
+    def free(self):
+        for state in self.states:
+            self.slave.freeFMUstate(state)
+        self.slave.freeInstance()
+
+
+class Worker:
+    """The extracted FMUs and their instances."""
+
+    def __init__(self, room):
+        self.room, self.fmus, self.instances = room, {}, []
+
+    def instantiate(self, path, name):
+        if path not in self.fmus:
+            directory = extract(path, tempfile.mkdtemp(dir=self.room))
+            self.fmus[path] = directory, read_model_description(path)
+        self.instances.append(Instance(self.fmus[path], name))
+        return len(self.instances) - 1
+
+    def modules(self):
+        """The file of every loaded module that has one."""
+        files = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
+        return sorted(file for file in files if file)
+
+    def directory(self, path):
+        return str(self.fmus[path][0])
+
+    def answer(self, number, function, arguments):
+        return getattr(self if number is None else self.instances[number], function)(*arguments)
+
+
+def main():
+    room = tempfile.mkdtemp()
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what an FMU prints must not look like an answer
+    worker = Worker(room)
+    for line in sys.stdin:
+        try:
+            answer = {"value": worker.answer(*json.loads(line))}
+        except FMICallException as refusal:
+            answer = {"refused": [refusal.function, refusal.status]}
+        except Exception:
+            answer = {"failed": traceback.format_exc()}
+        sys.stderr.flush()
+        print(json.dumps(answer), file=answers, flush=True)
+    shutil.rmtree(room)
+
+
+if __name__ == "__main__":
+    main()
