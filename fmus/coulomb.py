@@ -1,9 +1,9 @@
 """Spring and mass with Coulomb friction."""
 
-from .runtime.automaton import HYBRID_LAW, SIGN_LAW, DryFriction, sign
+from .runtime.automaton import HYBRID, HYBRID_LAW, SIGN_LAW, DryFriction, sign
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
 from .runtime.exact import Exact
-from .runtime.march import HYBRID, March
+from .runtime.march import March
 from .runtime.methods import EXACT, EXACT_ITEM, ITEMS
 
 

@@ -2,9 +2,9 @@
 
 from math import cos, radians, sin, sqrt
 
-from .runtime.automaton import HYBRID_LAW, SIGN_LAW, DryFriction, sign
+from .runtime.automaton import HYBRID, HYBRID_LAW, SIGN_LAW, DryFriction, sign
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
-from .runtime.march import HYBRID, March
+from .runtime.march import March
 from .runtime.methods import DOP853, ITEMS
 
 POUND, INCH = 0.45359237, 0.0254

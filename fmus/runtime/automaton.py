@@ -8,9 +8,9 @@ based on the synchronous data flow principle, CACSD 1999).
 
 from math import fabs, inf
 
-from .march import HYBRID, STUCK
 from .methods import EXACT
 from .oscillator import Oscillator
+from .step import HYBRID, STUCK
 
 BACKWARD, FORWARD = -1, 1
 SIGN, THRESHOLD = 2, 3

@@ -12,7 +12,8 @@ from operator import attrgetter
 from pythonfmu.fmi2slave import Fmi2Slave, Fmi2Status
 
 from .declare import variables
-from .march import DIVERGED, ENDLESS, MOST_STEPS, OK, STALLED
+from .march import ENDLESS, MOST_STEPS
+from .step import DIVERGED, OK, STALLED
 
 SENTENCES = {
     DIVERGED: "the motion leaves the range of numbers after t = {t!r} s; lower what drives it or check the parameters",

@@ -1,0 +1,209 @@
+"""One internal step: propose, judge, accept; end it at an event; interpolate inside it.
+
+The step goes from t0 to t1.  It is a stick, up to the break-away; or a closed form, up to the next standstill; or a
+step of a method that meets the tolerance.  Its size is controlled as the public descriptions of MATLAB's ode23 and
+ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22).
+"""
+
+from math import fabs, inf, nan
+
+from .declare import Declaring
+from .methods import EXACT, Methods
+
+OK, DIVERGED, STALLED = 0, 1, 2
+
+STUCK, HYBRID = 0, 1
+ULP = 2.220446049250313e-16
+MOST_TRIES = 200  # of one step, which halves each time
+MOST_IDLE = 100  # steps in a row that hardly move the time
+
+
+class Step(Declaring):
+    """The internal step in force, and the counts up to both its ends."""
+
+    def __init__(self):
+        super().__init__()
+        self.methods = Methods()
+        # the run: tolerances in force, largest step, stop time (inf where unknown), whether zero speed is a mode
+        self.tolerance = self.threshold = self.longest = 0.0
+        self.t_end = inf
+        self.sticks = False
+        # the step: its beginning, its end, the mode within and the mode after
+        self.t0 = self.x0 = self.v0 = self.a0 = 0.0
+        self.t1 = self.x1 = self.v1 = self.a1 = 0.0
+        self.mode0 = self.mode1 = STUCK
+        self.waiting = self.event = False
+        # the interpolant: the length of the step before an event cut it, and whether it has been worked out
+        self.span = 0.0
+        self.expanded = False
+        # counts up to t1 and up to t0; the size to try next, then and before
+        self.taken = self.refused = self.called = self.happened = self.idle = 0
+        self.taken0 = self.refused0 = self.called0 = 0
+        self.size = self.size0 = self.last_size = 0.0
+        self.t_event = nan
+
+    def take(self, model):
+        """The internal step from t1 on; OK or the reason why not."""
+        if self.event:
+            self.note_event()
+            self.event = False
+        self.last_size = self.t1 - self.t0
+        self.remember()
+        self.t0, self.x0, self.v0, self.a0, self.mode0 = self.t1, self.x1, self.v1, self.a1, self.mode1
+        self.waiting = False
+        status = OK
+        if model.dry and self.sticks and self.mode0 == STUCK:
+            self.wait(model)
+        elif model.linear and self.method == EXACT:
+            status = self.take_piece(model)
+        else:
+            status = self.take_step(model)
+        self.taken += 1
+        if self.t1 - self.t0 > 16.0 * ULP * fabs(self.t0):
+            self.idle = 0
+        else:
+            self.idle += 1
+            if self.idle > MOST_IDLE:
+                return STALLED
+        return status
+
+    def remember(self):
+        """Counts and step size at the beginning of the step, for when the present point is still there."""
+        self.taken0, self.refused0, self.called0, self.size0 = self.taken, self.refused, self.called, self.size
+
+    def note_event(self):
+        self.happened += 1
+        self.t_event = self.t1
+
+    def wait(self, model):
+        """Stand still until the load exceeds what friction holds."""
+        self.waiting = True
+        self.x1, self.v1 = self.x0, 0.0
+        release, direction = model.release(self.t0, self.x0)
+        if release <= self.t_end and release < inf:
+            self.t1, self.mode1 = release, direction
+            self.begin_anew(model)
+        else:
+            self.t1, self.a1 = self.t_end, 0.0
+
+    def take_piece(self, model):
+        """One closed form, up to the next standstill or to the end of the run."""
+        model.exact.begin(self.x0, self.v0, self.a0, model.push(self.t0, self.mode0))
+        self.t1 = self.t_end
+        if model.dry:
+            end = self.t0 + model.exact.standstill(self.mode0)
+            if end <= self.t_end and end < inf:
+                self.t1 = end
+                self.x1, _ = model.exact.at(end - self.t0)
+                self.v1 = 0.0
+                return self.stop(model)
+        if self.t1 < inf:
+            self.x1, self.v1 = model.exact.at(self.t1 - self.t0)
+            self.a1 = model.acceleration(self.t1, self.x1, self.v1, self.mode1)
+            if not fabs(self.x1) + fabs(self.v1) < inf:
+                return DIVERGED
+        return OK
+
+    def take_step(self, model):
+        """One step of the method that meets the tolerance, cut where the mode changes."""
+        t, x, v, a, mode = self.t0, self.x0, self.v0, self.a0, self.mode0
+        threshold, tolerance = self.threshold, self.tolerance
+        smallest = 16.0 * ULP * fabs(t)
+        size = self.size if self.size < self.longest else self.longest
+        if size < smallest:
+            size = smallest
+        left = self.t_end - t
+        last = 1.1 * size >= left
+        h = left if last else size
+        size_x, size_v = fabs(x), fabs(v)
+        if size_x < threshold:
+            size_x = threshold
+        if size_v < threshold:
+            size_v = threshold
+        tries = 0
+        methods = self.methods
+        while True:
+            x1, v1, a1, e_x, e_v = methods.step(model, mode, t, x, v, a, h)
+            self.called += methods.stages
+            y, w = fabs(x1), fabs(v1)
+            p = fabs(e_x) / (y if y > size_x else size_x)
+            q = fabs(e_v) / (w if w > size_v else size_v)
+            error = h * (p if p > q else q) / tolerance
+            if error <= 1.0 and y + w + p + q < inf:  # NaN leaves here too
+                break
+            self.refused += 1
+            tries += 1
+            if h <= smallest or tries == MOST_TRIES:
+                return STALLED if error < inf else DIVERGED
+            shrink = methods.safety * error**-methods.power if 1.0 < error < inf and tries == 1 else 0.5
+            lowest = methods.shrink if tries == 1 else 0.5
+            size = h * (shrink if shrink > lowest else lowest)
+            if size < smallest:
+                size = smallest
+            h = size
+            last = False
+        if tries == 0:
+            grow = methods.safety * error**-methods.power if error > 1e-9 else methods.grow
+            size = h * (grow if grow < methods.grow else methods.grow)
+        self.size = size
+        self.span, self.expanded = h, False
+        self.t1, self.x1, self.v1, self.a1 = self.t_end if last else t + h, x1, v1, a1
+        if model.dry and mode != STUCK:
+            end = model.reversal(self)
+            if self.expanded:  # the search had to look inside
+                self.called += self.methods.extra
+            if end <= self.t1:
+                self.t1 = end
+                self.x1, _ = self.at(model, end)
+                self.v1 = 0.0
+                return self.stop(model)
+        return OK
+
+    def stop(self, model):
+        """The speed has come to zero at t1: stick, or slide the other way."""
+        self.mode1 = model.settle(self.t1, self.x1, 0.0)
+        self.begin_anew(model)
+        return OK if fabs(self.x1) < inf else DIVERGED
+
+    def settle(self, model):
+        """The mode and the acceleration that hold from t1 on."""
+        self.mode1 = STUCK
+        if model.dry and self.sticks:
+            self.mode1 = model.settle(self.t1, self.x1, self.v1)
+        self.arrive(model)
+
+    def arrive(self, model):
+        """The acceleration in the mode that holds from t1 on."""
+        if self.sticks and self.mode1 == STUCK:
+            self.a1 = 0.0
+        else:
+            self.a1 = model.acceleration(self.t1, self.x1, self.v1, self.mode1)
+            self.called += 1
+
+    def begin_anew(self, model):
+        """An event ends the step: forget the slope and the step size."""
+        self.event = True
+        self.arrive(model)
+        self.size = self.first_size()
+
+    def first_size(self):
+        """The step to try first, from the slopes at t1."""
+        x, v = fabs(self.x1), fabs(self.v1)
+        p = fabs(self.v1) / (x if x > self.threshold else self.threshold)
+        q = fabs(self.a1) / (v if v > self.threshold else self.threshold)
+        rate = p if p > q else q
+        size = self.methods.safety * self.tolerance**self.methods.power
+        return size / rate if size < rate * self.longest else self.longest
+
+    def at(self, model, t):
+        """Position and speed at t inside the step."""
+        if self.waiting:
+            return self.x0, 0.0
+        if model.linear and self.method == EXACT:
+            return model.exact.at(t - self.t0)
+        if not self.expanded:
+            self.methods.expand(
+                model, self.mode0, self.t0, self.x0, self.v0, self.a0, self.span, self.x1, self.v1, self.a1
+            )
+            self.expanded = True
+        return self.methods.at((t - self.t0) / self.span)
