@@ -44,7 +44,7 @@ class Pacejka(Oscillator):
 
     stop_time = 16.0
     step_size = 0.016
-    tolerance = 1e-8  # a position error shifts the next break-away, so the speed wants more digits than it shows
+    tolerance = 3e-7  # a position error shifts the next break-away: the speed loses a digit more
     rules = (
         "mu_d is {mu_d!r}, not below mu_s = {mu_s!r}: at mu_d = mu_s the factor C is 1 and no finite E puts the peak "
         "of the curve at x_m; lower mu_d or raise mu_s",
@@ -76,6 +76,9 @@ class Pacejka(Oscillator):
     def mu(self, v):
         z = self.B * v
         return self.D * sin(self.C * atan(z - self.E * (z - atan(z))))
+
+    def finest(self):
+        return self.x_m
 
     def acceleration(self, t, x, v, mode):
         pull = self.F_ext + self.k * (self.x_base + self.v_driver * (t - self.t_base) - x)

@@ -19,7 +19,12 @@ class March(Step):
 
     method = Choice(ODE23, "integration method", ITEMS)
     rtol = Fixed(0.0, "1", "relative tolerance; 0 takes the importer's", low=0.0, below=1.0)
-    atol = Fixed(0.0, "1", "absolute tolerance in SI units; 0 takes 1e-3 of rtol", low=0.0)
+    atol = Fixed(
+        0.0,
+        "1",
+        "absolute tolerance in SI units; 0 takes 1e-3 of rtol, less where creep matters",
+        low=0.0,
+    )
     h_max = Fixed(0.0, "s", "largest internal step; 0 takes a tenth of the run", low=0.0)
     steps = Count("accepted internal steps up to the present point")
     rejected = Count("refused internal steps up to the present point")
@@ -38,10 +43,6 @@ class March(Step):
         """Begin a run at t; t_end is inf where the importer does not know it."""
         run = t_end - t if t_end < inf else model.stop_time
         self.tolerance = self.rtol if self.rtol > 0.0 else tolerance
-        absolute = self.atol if self.atol > 0.0 else 1e-3 * self.tolerance
-        self.threshold = absolute / self.tolerance
-        if self.threshold < 1e-300:
-            self.threshold = 1e-300  # a divisor
         self.longest = self.h_max if self.h_max > 0.0 else 0.1 * run
         self.t_end = t_end
         self.methods.choose(self.method)
@@ -52,8 +53,8 @@ class March(Step):
         if model.dry:
             self.sticks = model.friction == HYBRID
         self.t1, self.x1, self.v1 = t, x, v
+        self.scale(model)
         self.settle(model)
-        self.size = self.first_size()
         self.stand()
 
     def restart(self, model):
@@ -66,15 +67,24 @@ class March(Step):
             self.size = self.size0
         self.event = False
         self.t1, self.x1, self.v1 = self.t, self.x, self.v
+        self.scale(model)
         self.settle(model)
         if self.mode1 != self.mode:
             self.note_event()
-        if self.size == 0.0:
-            self.size = self.first_size()
         self.stand()
 
+    def scale(self, model):
+        """The sizes of position and speed below which the tolerance is absolute."""
+        size = self.atol / self.tolerance if self.atol > 0.0 else 1e-3
+        self.least_x = self.least_v = size if size > 1e-300 else 1e-300  # divisors
+        finest = model.finest()
+        if self.atol == 0.0 and finest < self.least_v:
+            self.least_v = finest
+
     def stand(self):
-        """The present point is both ends of an empty step."""
+        """The present point is both ends of an empty step, and a step size is at hand unless the body is stuck."""
+        if self.size == 0.0 and not (self.sticks and self.mode1 == STUCK):
+            self.size = self.first_size()
         self.t, self.x, self.v, self.mode = self.t1, self.x1, self.v1, self.mode1
         self.t0 = self.t1
         self.remember()

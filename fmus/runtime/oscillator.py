@@ -1,5 +1,7 @@
 """One degree of freedom: what all oscillators share."""
 
+from math import inf
+
 from .declare import Count, Declaring, Local
 
 
@@ -31,6 +33,10 @@ class Oscillator(Declaring):
     def __init__(self):
         super().__init__()
         self.events = Events()
+
+    def finest(self):
+        """The speed, in m/s or rad/s, that an absolute tolerance must resolve; inf where none is special."""
+        return inf
 
     def rebase(self, t):
         """Fix at time t what is integrated in closed form, before a value changes."""

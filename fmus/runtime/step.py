@@ -25,7 +25,7 @@ class Step(Declaring):
         super().__init__()
         self.methods = Methods()
         # the run: tolerances in force, largest step, stop time (inf where unknown), whether zero speed is a mode
-        self.tolerance = self.threshold = self.longest = 0.0
+        self.tolerance = self.longest = self.least_x = self.least_v = 0.0
         self.t_end = inf
         self.sticks = False
         # the step: its beginning, its end, the mode within and the mode after
@@ -107,7 +107,7 @@ class Step(Declaring):
     def take_step(self, model):
         """One step of the method that meets the tolerance, cut where the mode changes."""
         t, x, v, a, mode = self.t0, self.x0, self.v0, self.a0, self.mode0
-        threshold, tolerance = self.threshold, self.tolerance
+        tolerance = self.tolerance
         smallest = 16.0 * ULP * fabs(t)
         size = self.size if self.size < self.longest else self.longest
         if size < smallest:
@@ -116,10 +116,10 @@ class Step(Declaring):
         last = 1.1 * size >= left
         h = left if last else size
         size_x, size_v = fabs(x), fabs(v)
-        if size_x < threshold:
-            size_x = threshold
-        if size_v < threshold:
-            size_v = threshold
+        if size_x < self.least_x:
+            size_x = self.least_x
+        if size_v < self.least_v:
+            size_v = self.least_v
         tries = 0
         methods = self.methods
         while True:
@@ -181,16 +181,17 @@ class Step(Declaring):
             self.called += 1
 
     def begin_anew(self, model):
-        """An event ends the step: forget the slope and the step size."""
+        """An event ends the step: forget the slope, but keep the step size of the last slide, if there was one."""
         self.event = True
         self.arrive(model)
-        self.size = self.first_size()
+        if self.size == 0.0:
+            self.size = self.first_size()
 
     def first_size(self):
         """The step to try first, from the slopes at t1."""
         x, v = fabs(self.x1), fabs(self.v1)
-        p = fabs(self.v1) / (x if x > self.threshold else self.threshold)
-        q = fabs(self.a1) / (v if v > self.threshold else self.threshold)
+        p = fabs(self.v1) / (x if x > self.least_x else self.least_x)
+        q = fabs(self.a1) / (v if v > self.least_v else self.least_v)
         rate = p if p > q else q
         size = self.methods.safety * self.tolerance**self.methods.power
         return size / rate if size < rate * self.longest else self.longest
