@@ -74,4 +74,4 @@ class Coulomb(DryFriction):
             self.mode = mode if mode != 0 else sign(v)
             self.F_friction = self.mode * self.f
             self.a = (self.F_ext + self.F_spring - self.c * v - self.F_friction) / self.m
-        self.energy = 0.5 * self.m * v * v + 0.5 * self.k * x * x
+        self.energy = 0.5 * (self.m * v * v + self.k * x * x)

@@ -92,9 +92,8 @@ class Pacejka(Oscillator):
         return self.k * self.v_driver / self.m, -self.k / self.m, -slope * self.g
 
     def observe(self, t, x, v, mode):
-        self.x, self.v = x, v
-        self.a = self.acceleration(t, x, v, mode)
-        self.x_driver = self.x_base + self.v_driver * (t - self.t_base)
-        self.F_spring = self.k * (self.x_driver - x)
-        self.F_friction = self.mu(v) * self.m * self.g
-        self.energy = 0.5 * self.m * v * v + 0.5 * self.F_spring * (self.x_driver - x)
+        driver = self.x_base + self.v_driver * (t - self.t_base)
+        spring, drag = self.k * (driver - x), self.mu(v) * self.m * self.g
+        self.x, self.v, self.x_driver, self.F_spring, self.F_friction = x, v, driver, spring, drag
+        self.a = (self.F_ext + spring - drag) / self.m
+        self.energy = 0.5 * (self.m * v * v + spring * (driver - x))

@@ -59,4 +59,4 @@ class Smd(Oscillator):
         self.x, self.v = x, v
         self.a = self.acceleration(t, x, v, mode)
         self.F_spring, self.F_damper = -self.k * x, -self.c * v
-        self.energy = 0.5 * self.m * v * v + 0.5 * self.k * x * x
+        self.energy = 0.5 * (self.m * v * v + self.k * x * x)

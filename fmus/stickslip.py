@@ -97,8 +97,10 @@ class Stickslip(DryFriction):
         return self.pull(t, x), self.k * self.v_driver, self.holding
 
     def observe(self, t, x, v, mode):
-        pull = self.pull(t, x)
-        self.x, self.v, self.mode = x, v, mode
+        driver = self.x_base + self.v_driver * (t - self.t_base)
+        spring = self.k * (driver - x)
+        pull = self.F_ext + spring
+        self.x, self.v, self.x_driver, self.F_spring, self.mode = x, v, driver, spring, mode
         if mode != 0:
             self.F_friction = mode * self.sliding
         elif self.friction == HYBRID:
@@ -107,6 +109,4 @@ class Stickslip(DryFriction):
             self.F_friction = self.threshold(pull, v)
             self.mode = sign(v) if fabs(v) >= self.eps else 0
         self.a = (pull - self.F_friction) / self.m
-        self.x_driver = self.x_base + self.v_driver * (t - self.t_base)
-        self.F_spring = self.k * (self.x_driver - x)
-        self.energy = 0.5 * self.m * v * v + 0.5 * self.F_spring * (self.x_driver - x)
+        self.energy = 0.5 * (self.m * v * v + spring * (driver - x))

@@ -42,7 +42,7 @@ class Slave(Fmi2Slave):
         self.model = self.Model()
         self.variables = variables(self.model)
         self.owners = [self.owner(name) for name, _ in self.variables]
-        self.readers = {}  # kind and value references -> how to read them all at once
+        self.readers = {"Real": {}, "Integer": {}, "Boolean": {}, "String": {}}  # value references -> what reads them
         self.phase = SETTING_UP
         self.start_time, self.stop_time, self.given_tolerance = 0.0, inf, self.model.tolerance
         self.refused = {}  # name -> sentence: values that were set and cannot be used
@@ -97,7 +97,7 @@ class Slave(Fmi2Slave):
         march = self.model.solver
         now, stop = march.t, march.t_end
         end = current_time + step_size
-        if fabs(end - march.t1) <= 1e-15 * fabs(end):
+        if fabs(end - march.t1) <= 1e-15 * fabs(end) < inf:
             end = march.t1  # the end of an internal step, but for the rounding of the sum
         elif stop < end < inf and end <= stop + 1e-9 * step_size + 1e-12 * fabs(stop):
             end = stop
@@ -141,7 +141,7 @@ class Slave(Fmi2Slave):
 
     def fail(self, sentence):
         """Say the sentence, and answer NaN from now on."""
-        self.failure = sentence
+        self.failure, self.observed = sentence, False
         self.silence()
         self.log(sentence, Fmi2Status.error)
         if sys.stderr is not None:
@@ -163,24 +163,27 @@ class Slave(Fmi2Slave):
     def read(self, kind, references):
         """The values of the references, all of one kind."""
         try:
-            key = (kind, *references)
-            reader = self.readers.get(key)
+            key = tuple(references)
+            reader = self.readers[kind].get(key)
             if reader is None:
-                reader = self.readers[key] = self.reader(*key)
+                reader = self.readers[kind][key] = self.reader(kind, key)
             if not self.observed and not self.failure:
                 self.observe()
-            values, ahead = reader
-            if ahead and self.observed and not self.failure:
-                self.model.solver.look_ahead(self.model)
-            return list(values(self.model))[: len(references)]
+            values, counts, ahead = reader
+            if counts and self.observed:
+                self.model.solver.report(self.model.events)
+                if ahead:
+                    self.model.solver.look_ahead(self.model)
+            return list(values(self.model)[:-1])
         except BaseException as error:  # as above
             self.fail(unforeseen(error, self.model))
             return [nan if kind == "Real" else 0 for _ in references]
 
-    def reader(self, kind, *references):
-        """How to read the references: an attrgetter of them all, and whether a look ahead must come first."""
+    def reader(self, kind, references):
+        """What reads the references, whether they tell of the solver, and whether a look ahead must come first."""
         names = [self.variable(kind, reference)[0] for reference in references]
-        return attrgetter(*names, "events", "events"), "solver.t_next" in names  # of two or more: it gives a tuple
+        together = attrgetter(*names, "solver")  # of two or more: of one alone it gives no tuple
+        return together, any("." in name for name in names), "solver.t_next" in names
 
     def variable(self, kind, reference):
         """Name and declaration of a reference."""
@@ -200,7 +203,6 @@ class Slave(Fmi2Slave):
             self.apply()
         march = model.solver
         model.observe(march.t, march.x, march.v, march.mode)
-        march.report(model.events)
         self.observed = True
 
     def write(self, kind, references, values):
