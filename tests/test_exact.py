@@ -1,7 +1,6 @@
 """The method `exact` of the built FMUs against the closed forms of evidence.py."""
 
 import csv
-import itertools
 import random
 import subprocess
 import sys

@@ -65,6 +65,23 @@ def test_reading_changes_nothing_at_any_time(worker, fmus, case):
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
+def test_a_change_at_the_end_of_an_internal_step_forgets_what_was_looked_at_beyond(launch, case):
+    name, values, stop = case
+    names = outputs(name) + counts(name)
+    internal, _ = launch(name, values, stop=stop).follow(0.0, stop, [])
+    t, (force, size) = internal[len(internal) // 3], push(name)
+    runs = []
+    for look in (False, True):
+        fmu = launch(name, values, stop=stop)
+        fmu.run([0.0, t][: 1 + (t > 0.0)], [])
+        if look:
+            fmu.get("solver.t_next")
+        fmu.set({force: size})
+        runs.append(fmu.run([t, t + 0.001, t + 0.05 * (stop - t)], names))
+    identical(runs[1], runs[0], names)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
 def test_setting_a_value_to_what_it_is_changes_nothing(launch, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
@@ -84,11 +101,24 @@ def test_following_t_next_shows_every_internal_step(launch, case):
     assert all(h == b - a for a, b, (_, h) in zip(times[:-1], times[1:], rows[1:], strict=True))
 
 
+@pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction") == 1], ids=label)
+def test_a_step_that_ends_within_rounding_of_an_event_ends_at_it(launch, case):
+    name, values, stop = case
+    fmu, t, ulp = launch(name, values, stop=stop), 0.0, 0
+    while t < stop:
+        ahead, count = fmu.get("solver.t_next", "events.count")
+        fmu.step(t, ahead + ulp * (nextafter(ahead, stop) - ahead) - t)
+        now, speed = fmu.get("events.count", outputs(name)[1])
+        assert now == count or speed == 0.0
+        t, ulp = ahead, (0, 1, -1)[now % 3] if ahead < 0.9 * stop else 0
+    assert count >= 3
+
+
 @pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction", 1) == 1], ids=label)
 def test_a_later_start_shifts_the_motion_and_nothing_else(launch, case):
     """Laws that chatter are left out: there rounding of the time decides."""
     name, values, stop = case
-    names = outputs(name)[:3]
+    names = outputs(name)[:2]
     times = [stop * i / 80 for i in range(81)]
     early = launch(name, values, stop=stop).run(times, names)
     late = launch(name, values, start=7.3, stop=7.3 + stop).run([7.3 + t for t in times], names)

@@ -44,7 +44,7 @@ class Instance:
         self.slave.instantiate(callbacks=self.callbacks, loggingOn=True)
 
     def _hear(self, environment, instance, status, category, message):
-        self.log.append([status, category.decode(), message.decode()])
+        self.log.append([status, (category or b"").decode(), (message or b"").decode()])
 
     def messages(self):
         """What was logged since the last call: [status, category, text]."""
@@ -79,9 +79,15 @@ class Instance:
     def setup(self, start, stop, tolerance):
         self.slave.setupExperiment(startTime=start, stopTime=stop, tolerance=tolerance)
 
-    def init(self):
+    def enter(self):
         self.slave.enterInitializationMode()
+
+    def exit(self):
         self.slave.exitInitializationMode()
+
+    def init(self):
+        self.enter()
+        self.exit()
 
     def step(self, t, h):
         self.slave.doStep(t, h)

@@ -36,6 +36,11 @@ class March(Step):
         super().__init__()
         self.t = self.x = self.v = 0.0
         self.mode = STUCK
+        # what the present point was before its values were renewed
+        self.renewed = False
+        self.called_then = self.happened_then = self.mode_then = 0
+        self.size_then = 0.0
+        self.t_event_then = nan
 
     # ---- the run
 
@@ -49,7 +54,7 @@ class March(Step):
         self.taken = self.refused = self.called = self.happened = self.idle = 0
         self.size = self.last_size = 0.0
         self.t_event = nan
-        self.event = False
+        self.event = self.renewed = False
         if model.dry:
             self.sticks = model.friction == HYBRID
         self.t1, self.x1, self.v1 = t, x, v
@@ -58,18 +63,29 @@ class March(Step):
         self.stand()
 
     def restart(self, model):
-        """Discard what lies beyond the present point, and go on from there with the values that now hold."""
+        """Discard what lies beyond the present point, and go on from there with the values that now hold.
+
+        Whoever sets two values at one point may read between them: the second time starts from where the first did.
+        """
         if self.t > self.t0:
+            self.last_size = self.t1 - self.t0
             if self.event and self.t >= self.t1:
                 self.note_event()
         else:
             self.taken, self.refused, self.called = self.taken0, self.refused0, self.called0
             self.size = self.size0
         self.event = False
+        if self.renewed:
+            self.called, self.happened, self.size = self.called_then, self.happened_then, self.size_then
+            self.t_event = self.t_event_then
+        else:
+            self.renewed = True
+            self.called_then, self.happened_then, self.size_then = self.called, self.happened, self.size
+            self.t_event_then, self.mode_then = self.t_event, self.mode
         self.t1, self.x1, self.v1 = self.t, self.x, self.v
         self.scale(model)
         self.settle(model)
-        if self.mode1 != self.mode:
+        if self.mode1 != self.mode_then:
             self.note_event()
         self.stand()
 
@@ -101,7 +117,7 @@ class March(Step):
             left -= 1
             if left == 0:
                 return ENDLESS
-        self.t = t
+        self.t, self.renewed = t, False
         if t == self.t1:
             self.x, self.v, self.mode = self.x1, self.v1, self.mode1
         else:

@@ -5,6 +5,7 @@ that is not Python would abort.  What is wrong is remembered and said in one sen
 error; do_step then returns False and every calculated Real reads NaN.
 """
 
+import json
 import sys
 from math import fabs, inf, isfinite, nan
 from operator import attrgetter
@@ -266,10 +267,20 @@ class Slave(Fmi2Slave):
         kept = {name: getattr(self, name) for name in KEPT}
         return kept | {"origin": __name__, "refused": dict(self.refused), "model": numbers(self.model)}
 
+    @staticmethod
+    def _fmu_state_from_bytes(state):
+        """The state in the bytes; what cannot be read becomes a state of no FMU, which is refused when it is set."""
+        try:
+            return json.loads(state)
+        except ValueError:
+            return {}
+
     def _set_fmu_state(self, state):
         try:
-            if state.get("origin") != __name__:
-                raise ValueError(f"a state of {state.get('origin')} is not one of {__name__}")
+            origin = state.get("origin") if isinstance(state, dict) else None
+            if origin != __name__:
+                self.fail(f"a state of {origin} is refused: it must be of {__name__}; take it from this very FMU")
+                return
             for name in KEPT:
                 setattr(self, name, state[name])
             self.refused = dict(state["refused"])

@@ -13,6 +13,7 @@ from .methods import EXACT, Methods
 OK, DIVERGED, STALLED = 0, 1, 2
 
 STUCK, HYBRID = 0, 1
+HUGE = 1e100  # beyond it squares, as of an energy, would overflow
 ULP = 2.220446049250313e-16
 MOST_TRIES = 200  # of one step, which halves each time
 MOST_IDLE = 100  # steps in a row that hardly move the time
@@ -100,7 +101,7 @@ class Step(Declaring):
         if self.t1 < inf:
             self.x1, self.v1 = model.exact.at(self.t1 - self.t0)
             self.a1 = model.acceleration(self.t1, self.x1, self.v1, self.mode1)
-            if not fabs(self.x1) + fabs(self.v1) < inf:
+            if not fabs(self.x1) + fabs(self.v1) < HUGE:
                 return DIVERGED
         return OK
 
@@ -129,12 +130,12 @@ class Step(Declaring):
             p = fabs(e_x) / (y if y > size_x else size_x)
             q = fabs(e_v) / (w if w > size_v else size_v)
             error = h * (p if p > q else q) / tolerance
-            if error <= 1.0 and y + w + p + q < inf:  # NaN leaves here too
+            if error <= 1.0 and y + w + p + q < HUGE:  # NaN leaves here too
                 break
             self.refused += 1
             tries += 1
             if h <= smallest or tries == MOST_TRIES:
-                return STALLED if error < inf else DIVERGED
+                return STALLED if error < inf and y + w < HUGE else DIVERGED
             shrink = methods.safety * error**-methods.power if 1.0 < error < inf and tries == 1 else 0.5
             lowest = methods.shrink if tries == 1 else 0.5
             size = h * (shrink if shrink > lowest else lowest)
@@ -163,7 +164,7 @@ class Step(Declaring):
         """The speed has come to zero at t1: stick, or slide the other way."""
         self.mode1 = model.settle(self.t1, self.x1, 0.0)
         self.begin_anew(model)
-        return OK if fabs(self.x1) < inf else DIVERGED
+        return OK if fabs(self.x1) < HUGE else DIVERGED
 
     def settle(self, model):
         """The mode and the acceleration that hold from t1 on."""

@@ -1,0 +1,220 @@
+"""Whatever cannot be used is refused in one sentence, and answers NaN; the process lives on and reset recovers."""
+
+from math import inf, isfinite, isnan, nan, nextafter
+
+import pytest
+from compare import identical
+from driver import Refused
+from models import CASES, EXACT, MODELS, ODE23, SIGN, Choice, counts, declared, label, outputs, parameters, push
+
+ERROR, DISCARD = 3, 2
+REALS = {name: [v for v in outputs(name) if declared(name)[v].type == "Real"] for name in MODELS}
+
+
+def bad_values(declaration):
+    """Values just outside the range, far outside it, and no numbers at all."""
+    yield from (nan, inf, -inf)
+    if isfinite(declaration.low):
+        yield from (nextafter(declaration.low, -inf), declaration.low - 1e9)
+    if isfinite(declaration.high):
+        yield from (nextafter(declaration.high, inf), declaration.high + 1e9)
+    yield from (bound for bound in (declaration.above, declaration.below) if isfinite(bound))
+
+
+def refuses(fmu, name, t, h, *words):
+    """The step from t fails, all outputs read NaN, and one sentence says `words`: in the log and on standard error."""
+    with pytest.raises(Refused) as refusal:
+        fmu.step(t, h)
+    assert (refusal.value.function, refusal.value.status) == ("fmi2DoStep", DISCARD)
+    assert all(isnan(value) for value in fmu.get(*REALS[name], "solver.t_next"))
+    ((status, category, sentence),) = [message for message in fmu.messages() if message[0] != 0]
+    assert (status, category) == (ERROR, "logStatusError")
+    assert [w for w in words if w not in sentence] == [], sentence
+    (line,) = fmu.worker.complaints().splitlines()
+    assert sentence in line
+    assert "Traceback" not in line
+
+
+def ranges():
+    return [(name, v) for name in MODELS for v in parameters(name)]
+
+
+@pytest.mark.parametrize(("name", "variable"), ranges(), ids=lambda part: part)
+def test_a_value_out_of_range_is_refused_by_its_name(launch, name, variable):
+    declaration = declared(name)[variable]
+    for value in bad_values(declaration):
+        fmu = launch(name, {variable: value})
+        assert all(isnan(v) for v in fmu.get(*REALS[name]))
+        refuses(fmu, name, 0.0, 0.1, variable, repr(value), declaration.allowed)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_a_value_that_turns_bad_in_mid_run_stops_the_run_and_reset_recovers(launch, case):
+    name, values, stop = case
+    times, names = [stop * i / 20 for i in range(21)], outputs(name) + counts(name)
+    expected = launch(name, values, stop=stop).run(times, names)
+    for variable, value in ((push(name)[0], nan), ("m", 0.0), (outputs(name)[0] + "0", 0.5)):
+        fmu = launch(name, values, stop=stop)
+        fmu.run(times[:11], [])
+        fmu.set({variable: value})
+        refuses(fmu, name, times[10], 0.01, variable, repr(value))
+        with pytest.raises(Refused):
+            fmu.step(times[10], 0.01)
+        fmu.reset()
+        identical(fmu.begin(values, stop=stop).run(times, names), expected, names)
+        fmu.worker.complaints()
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_bad_value_may_be_mended_before_it_is_used(launch, name):
+    fmu = launch(name, stop=1.0)
+    expected = fmu.run([0.0, 0.3, 0.6], outputs(name))
+    fmu = launch(name, stop=1.0)
+    force, _ = push(name)
+    fmu.set({force: nan, "m": -1.0})
+    fmu.set({force: 0.0, "m": declared(name)["m"].start})
+    identical(fmu.run([0.0, 0.3, 0.6], outputs(name)), expected, outputs(name))
+
+
+def choices():
+    found = [(name, v) for name in MODELS for v, d in declared(name).items() if isinstance(d, Choice)]
+    return [(name, v, value) for name, v in found for value in (0, 99, -1, 2**31 - 1)]
+
+
+@pytest.mark.parametrize(("name", "choice", "value"), choices(), ids=str)
+def test_an_unknown_choice_is_refused_with_those_there_are(launch, name, choice, value):
+    labels = [item[0] for item in declared(name)[choice].items]
+    refuses(launch(name, {choice: value}), name, 0.0, 0.1, choice, repr(value), *labels)
+
+
+RULES = {
+    "coulomb, exact with sign": (
+        "coulomb",
+        {"friction": SIGN, "solver.method": EXACT},
+        ("friction = 2", "exact", "hybrid"),
+    ),
+    "sled, exact with threshold": (
+        "stickslip",
+        {"friction": 3, "solver.method": EXACT},
+        ("friction = 3", "exact", "hybrid"),
+    ),
+    "sled, mu_d above mu_s": ("stickslip", {"mu_d": 1.0}, ("mu_d", "1.0", "mu_s", "0.9")),
+    "pacejka, mu_d above mu_s": ("pacejka", {"mu_d": 1.0}, ("mu_d", "1.0", "mu_s", "0.9")),
+    "pacejka, mu_d equal to mu_s": (
+        "pacejka",
+        {"mu_d": 0.9},
+        ("mu_d = mu_s", "the factor C is 1", "no finite E", "x_m"),
+    ),
+}
+
+
+@pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
+def test_values_that_do_not_go_together_are_refused(launch, rule):
+    name, values, words = rule
+    refuses(launch(name, values), name, 0.0, 0.1, *words)
+
+
+def test_friction_may_turn_bad_in_mid_run_only_as_a_pair(launch):
+    fmu = launch("stickslip")
+    fmu.step(0.0, 1.0)
+    fmu.set({"mu_s": 0.5})
+    fmu.set({"mu_d": 0.4})
+    fmu.step(1.0, 1.0)
+    fmu.set({"mu_d": 0.7})
+    refuses(fmu, "stickslip", 2.0, 0.1, "mu_d", "0.7", "mu_s", "0.5")
+
+
+STEPS = {
+    "of no size": (1.0, 0.0),
+    "backwards": (1.0, -0.5),
+    "of NaN": (1.0, nan),
+    "without end": (1.0, inf),
+    "from the past": (0.5, 0.1),
+    "from the future": (1.5, 0.1),
+    "from nowhere": (nan, 0.1),
+    "past the stop": (1.0, 3.2),
+}
+
+
+@pytest.mark.parametrize("step", STEPS.values(), ids=STEPS)
+@pytest.mark.parametrize("name", MODELS)
+def test_a_step_that_cannot_be_taken_is_refused(launch, name, step):
+    fmu = launch(name, stop=4.0)
+    fmu.step(0.0, 1.0)
+    refuses(fmu, name, *step, "step", *(repr(part) for part in step), "1.0 s", "4.0 s")
+
+
+def test_a_stop_before_the_start_and_a_start_at_no_time_are_refused(launch):
+    refuses(launch("smd", start=2.0, stop=1.0), "smd", 2.0, 0.1, "stop time", "1.0", "2.0")
+    refuses(launch("smd", start=nan), "smd", 0.0, 0.1, "start time", "nan")
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("smd", {"x0": 1e300, "k": 1e300}),
+        ("smd", {"x0": 1e300, "k": 1e300, "solver.method": ODE23}),
+        ("coulomb", {"F_ext": 1e308, "m": 1e-308}),
+        ("stickslip", {"F_ext": 1e308, "m": 1e-308}),
+        ("stickslip", {"F_ext": 1e308, "m": 1e-308, "solver.method": ODE23}),
+        ("pacejka", {"F_ext": 1e308, "m": 1e-300}),
+        ("pendulum", {"omega0": 1e150}),
+        ("pendulum", {"T_ext": 1e308}),
+    ],
+)
+def test_a_motion_out_of_all_range_fails_in_one_sentence_or_stays_finite(launch, name, values):
+    fmu = launch(name, values, stop=4.0)
+    try:
+        fmu.step(0.0, 1e-3)
+        fmu.step(1e-3, 1.0)
+    except Refused:
+        assert all(isnan(value) for value in fmu.get(*REALS[name]))
+        ((status, _, sentence),) = fmu.messages()
+        assert status == ERROR
+        assert "Traceback" not in sentence
+        assert len(fmu.worker.complaints().splitlines()) == 1
+    else:
+        assert all(isfinite(value) for value in fmu.get(*REALS[name]))
+
+
+def test_a_calculated_value_cannot_be_set(launch):
+    fmu = launch("smd")
+    fmu.set({"x": 1.0})
+    refuses(fmu, "smd", 0.0, 0.1, "x", "calculated")
+
+
+ALIEN = {
+    "of another FMU": lambda own: own.replace(b'"origin": "', b'"origin": "100 %s %n '),
+    "of nothing": lambda own: b"{}",
+    "of another kind": lambda own: b"[1, 2]",
+    "cut short": lambda own: own[:50],
+    "not even text": lambda own: b"\xff\x00\xfe",
+}
+
+
+@pytest.mark.parametrize("alien", ALIEN.values(), ids=ALIEN)
+def test_a_state_that_is_not_of_this_fmu_is_refused_and_the_process_lives(fresh, fmus, alien):
+    """Percent signs and all: the native layer takes a message for a printf format."""
+    fmu = fresh.instantiate(fmus / "smd.fmu").begin(stop=1.0)
+    text = alien(bytes.fromhex(fmu.serialize(fmu.save())))
+    fmu.restore(fmu.deserialize(text.hex()))
+    refuses(fmu, "smd", 0.0, 0.1, "state", *(["100 %s %n "] if b"%" in text else []))
+    fmu.reset()
+    fmu.begin(stop=1.0).step(0.0, 0.5)
+    fmu.free()
+
+
+def test_percent_signs_in_the_name_of_an_instance_do_no_harm(worker, fmus):
+    fmu = worker.instantiate(fmus / "smd.fmu", "50 %s %n %d sled")
+    fmu.begin({"m": -1.0})
+    with pytest.raises(Refused):
+        fmu.step(0.0, 0.1)
+    assert "50 %s %n %d sled" in worker.complaints()
+    assert [status for status, _, _ in fmu.messages()] == [ERROR]
+    fmu.free()
+
+
+def test_t_next_announces_a_run_that_will_fail(launch):
+    fmu = launch("smd", {"x0": 1e300, "k": 1e300, "solver.method": ODE23}, stop=4.0)
+    assert isnan(fmu.get("solver.t_next"))
+    refuses(fmu, "smd", 0.0, 4.0)

@@ -1,0 +1,206 @@
+"""The runtime from inside: the rules of its numerics, events to the last bit, and what a host must never see."""
+
+import ast
+from math import isnan, nextafter
+
+import pytest
+from models import CASES, MODELS, ROOT, SIGN, declared, label, model_class, outputs
+
+from fmus.runtime import march
+from fmus.runtime.declare import variables
+from fmus.runtime.slave import slave_for
+
+FMI_SIDE = {"__init__.py", "declare.py", "slave.py"}
+NUMERICS = sorted(
+    [path for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.name not in FMI_SIDE]
+    + [ROOT / "fmus" / f"{name}.py" for name in MODELS]
+)
+LIBM = "acos asin atan atan2 copysign cos cosh exp expm1 fabs fmod log log1p pow sin sinh sqrt tan tanh"
+MATH = {*LIBM.split(), "floor", "ceil", "isfinite", "isinf", "isnan", "inf", "nan", "pi", "radians"}
+BANNED = (
+    *(ast.Raise, ast.Try, ast.Lambda, ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp, ast.JoinedStr),
+    *(ast.With, ast.Yield, ast.YieldFrom, ast.Await, ast.Global, ast.Nonlocal, ast.Dict, ast.Set),
+    *(ast.FunctionDef, ast.ClassDef, ast.Import, ast.ImportFrom, ast.Assert, ast.Delete),
+)
+CALLS = {
+    "isinstance",
+    "type",
+    "getattr",
+    "setattr",
+    "hasattr",
+    "min",
+    "max",
+    "sum",
+    "pow",
+    "print",
+    "eval",
+    "exec",
+    "map",
+}
+
+
+def functions(tree):
+    return [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+
+
+def inside(function):
+    """Every node of the body, but for the docstring."""
+    body = function.body[1:] if ast.get_docstring(function) else function.body
+    return [node for statement in body for node in ast.walk(statement)]
+
+
+@pytest.mark.parametrize("path", NUMERICS, ids=lambda path: path.stem)
+def test_numerics_keep_to_what_can_be_frozen_to_c(path):
+    tree = ast.parse(path.read_text())
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and not node.level:
+            assert node.module == "math", f"line {node.lineno} imports {node.module}"
+            assert {alias.name for alias in node.names} <= MATH, f"line {node.lineno}: not all of this is libm"
+        assert not isinstance(node, ast.Import), f"line {node.lineno}: a whole module is imported"
+    for function in functions(tree):
+        for node in inside(function):
+            line = f"{path.name}, line {getattr(node, 'lineno', function.lineno)}"
+            assert not isinstance(node, BANNED), f"{line}: {type(node).__name__}"
+            if isinstance(node, ast.Constant):
+                assert isinstance(node.value, (bool, int, float)), f"{line}: {node.value!r} is no number"
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+                assert not isinstance(node.right, ast.Constant), f"{line}: a power that is a product"
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                assert node.func.id not in CALLS, f"{line}: {node.func.id}()"
+                assert node.func.id != function.name, f"{line}: recursion"
+
+
+@pytest.mark.parametrize("path", NUMERICS, ids=lambda path: path.stem)
+def test_no_while_relies_on_its_condition_alone(path):
+    """A NaN or a stall would keep it going: something inside must count, and return or break."""
+    for function in functions(ast.parse(path.read_text())):
+        for loop in [node for node in inside(function) if isinstance(node, ast.While)]:
+            ways_out = [node for node in ast.walk(loop) if isinstance(node, (ast.Return, ast.Break))]
+            assert ways_out, f"{path.name}, line {loop.lineno}: nothing but its condition ends this loop"
+
+
+def slave(name, values=None, stop=4.0):
+    """A slave in this process, past initialisation."""
+    made = slave_for(model_class(name))(instance_name="inside")
+    for reference, (variable, declaration) in enumerate(variables(made.model)):
+        if variable in (values or {}):
+            write = made.set_real if declaration.type == "Real" else made.set_integer
+            write([reference], [values[variable]])
+    made.setup_experiment(0.0, stop, None)
+    made.enter_initialization_mode()
+    made.exit_initialization_mode()
+    return made
+
+
+def read(made, *names):
+    """Values of Reals and Integers by name."""
+    references = {v: i for i, (v, _) in enumerate(variables(made.model))}
+    kinds = dict(variables(made.model))
+    return [
+        (made.get_real if kinds[name].type == "Real" else made.get_integer)([references[name]])[0] for name in names
+    ]
+
+
+def shape(thing, path, seen):
+    """Path and type of every number an object holds; it must own all its objects alone."""
+    assert id(thing) not in seen, f"{path} is owned twice"
+    seen.add(id(thing))
+    found = {}
+    for name, value in vars(thing).items():
+        here = f"{path}.{name}"
+        if hasattr(value, "__dict__"):
+            found |= shape(value, here, seen)
+        elif isinstance(value, list):
+            found[here] = (len(value), *map(type, value))
+        else:
+            assert type(value) in (float, int, bool), f"{here} is {value!r}"
+            found[here] = type(value)
+    return found
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_every_attribute_is_born_with_the_model_and_keeps_its_type(case):
+    """So that a flat copy of the numbers is the whole state."""
+    name, values, stop = case
+    made = slave(name, values, stop)
+    born = shape(model_class(name)(), name, set())
+    for i in range(8):
+        assert made.do_step(i * stop / 8, stop / 8)
+        read(made, *declared(name))
+        assert shape(made.model, name, set()) == born
+
+
+@pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction") == 1], ids=label)
+def test_turning_points_are_located_to_the_last_bit(case):
+    """One float earlier the mass still moves the old way."""
+    name, values, stop = case
+    made, turns = slave(name, values, stop), 0
+    solver, t = made.model.solver, 0.0
+    while t < stop:
+        (ahead,) = read(made, "solver.t_next")
+        mode, waiting, event = solver.mode0, solver.waiting, solver.event
+        if event and not waiting:
+            before, after = (solver.at(made.model, s)[1] for s in (nextafter(ahead, 0.0), ahead))
+            assert mode * before > 0.0
+            assert mode * after <= 0.0 or values["solver.method"] == 1  # the closed form knows its own last bit
+            turns += 1
+        assert made.do_step(t, ahead - t)
+        if event:
+            speed = read(made, outputs(name)[1])
+            assert speed == [0.0]
+        t = ahead
+    assert turns >= 3
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
+    """Neither from the physics nor from references that are not of this FMU: one sentence, then NaN."""
+    made = slave(name)
+    assert made.do_step(0.0, 0.1)
+
+    def broken(*_):
+        raise RuntimeError("100 % broken")
+
+    monkeypatch.setattr(type(made.model), "observe", broken)
+    monkeypatch.setattr(type(made.model), "prepare", broken)
+    made.set_real([list(declared(name)).index("m")], [2.0])
+    assert made.do_step(0.1, 0.1) is False
+    assert all(isnan(value) for value in read(made, *[v for v in outputs(name) if v != "mode"]))
+    assert made.do_step(0.1, 0.1) is False
+    (message,) = made.log_queue
+    assert "100 %% broken" in message.msg  # the native layer takes it for a printf format
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "100 % broken" in line
+
+    monkeypatch.undo()
+    for read_alien in ("get_real", "get_integer", "get_boolean", "get_string"):
+        made = slave(name)
+        assert len(getattr(made, read_alien)([10**6])) == 1
+        assert made.do_step(0.0, 0.1) is False
+    for write_alien in ("set_real", "set_integer", "set_boolean", "set_string"):
+        made = slave(name)
+        getattr(made, write_alien)([10**6], [1])
+        assert made.do_step(0.0, 0.1) is False
+
+
+def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
+    monkeypatch.setattr(march, "MOST_STEPS", 50)
+    made = slave("pacejka", {"solver.method": 2}, stop=16.0)
+    assert made.do_step(0.0, 16.0) is False
+    assert "internal steps" in capfd.readouterr().err
+    assert isnan(read(made, "x")[0])
+
+
+def test_a_solver_that_makes_no_headway_is_stopped_with_a_sentence(capfd):
+    """At the tightest tolerances the sign law asks for steps below the rounding of the time."""
+    made = slave("coulomb", {"friction": SIGN, "solver.method": 2, "solver.rtol": 1e-15})
+    assert made.do_step(0.0, 4.0) is False
+    assert len(capfd.readouterr().err.splitlines()) == 1
+    assert isnan(read(made, "x")[0])
+
+
+def test_a_state_of_another_fmu_is_refused():
+    state = slave("smd")._get_fmu_state()
+    made = slave("smd")
+    made._set_fmu_state({**state, "origin": "elsewhere"})
+    assert made.do_step(0.0, 0.1) is False
