@@ -44,7 +44,7 @@ class Pacejka(Oscillator):
 
     stop_time = 16.0
     step_size = 0.016
-    tolerance = 3e-7  # a position error shifts the next break-away: the speed loses a digit more
+    tolerance = 2e-7  # a position error shifts the next break-away: the speed loses a digit more
     rules = (
         "mu_d is {mu_d!r}, not below mu_s = {mu_s!r}: at mu_d = mu_s the factor C is 1 and no finite E puts the peak "
         "of the curve at x_m; lower mu_d or raise mu_s",

@@ -4,11 +4,11 @@ The march owns the internal step that covers the present point t, and tells the 
 beyond it, because somebody looked ahead, does not show.
 """
 
-from math import inf, nan
+from math import fabs, inf, nan
 
 from .declare import Choice, Count, Fixed, Local
 from .methods import ITEMS, ODE23
-from .step import HYBRID, OK, STUCK, Step
+from .step import DIVERGED, HUGE, HYBRID, OK, STUCK, Step
 
 ENDLESS = 3
 MOST_STEPS = 2_000_000  # within one communication step: half a minute at most, then a sentence
@@ -103,7 +103,7 @@ class March(Step):
             self.size = self.first_size()
         self.t, self.x, self.v, self.mode = self.t1, self.x1, self.v1, self.mode1
         self.t0 = self.t1
-        self.remember()
+        self.taken0, self.refused0, self.called0, self.size0 = self.taken, self.refused, self.called, self.size
 
     # ---- the present point
 
@@ -123,7 +123,7 @@ class March(Step):
         else:
             self.x, self.v = self.at(model, t)
             self.mode = self.mode0
-        return OK
+        return OK if fabs(self.x) + fabs(self.v) < HUGE else DIVERGED
 
     def look_ahead(self, model):
         """Where the internal step that covers the time after the present point ends; NaN if it fails."""

@@ -42,13 +42,14 @@ class Methods:
 
     def step(self, model, mode, t, x, v, a, h):
         """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
-        if self.chosen == RODAS:
+        chosen = self.chosen
+        if chosen == ODE23:
+            return self.ode23.step(model, mode, t, x, v, a, h)
+        if chosen == RODAS:
             return self.rodas.step(model, mode, t, x, v, a, h)
-        if self.chosen == DOP853:
+        if chosen == DOP853:
             return self.dop853.step(model, mode, t, x, v, a, h)
-        if self.chosen == ODE45:
-            return self.ode45.step(model, mode, t, x, v, a, h)
-        return self.ode23.step(model, mode, t, x, v, a, h)
+        return self.ode45.step(model, mode, t, x, v, a, h)
 
     def expand(self, model, mode, t, x, v, a, h, x1, v1, a1):
         """Coefficients of the interpolant of the step just taken."""

@@ -175,7 +175,7 @@ class Slave(Fmi2Slave):
                 self.model.solver.report(self.model.events)
                 if ahead:
                     self.model.solver.look_ahead(self.model)
-            return list(values(self.model)[:-1])
+            return list(values(self.model)[:-2])
         except BaseException as error:  # as above
             self.fail(unforeseen(error, self.model))
             return [nan if kind == "Real" else 0 for _ in references]
@@ -183,7 +183,7 @@ class Slave(Fmi2Slave):
     def reader(self, kind, references):
         """What reads the references, whether they tell of the solver, and whether a look ahead must come first."""
         names = [self.variable(kind, reference)[0] for reference in references]
-        together = attrgetter(*names, "solver")  # of two or more: of one alone it gives no tuple
+        together = attrgetter(*names, "solver", "solver")  # of two or more: of one alone it gives no tuple
         return together, any("." in name for name in names), "solver.t_next" in names
 
     def variable(self, kind, reference):

@@ -49,7 +49,7 @@ class Step(Declaring):
             self.note_event()
             self.event = False
         self.last_size = self.t1 - self.t0
-        self.remember()
+        self.taken0, self.refused0, self.called0, self.size0 = self.taken, self.refused, self.called, self.size
         self.t0, self.x0, self.v0, self.a0, self.mode0 = self.t1, self.x1, self.v1, self.a1, self.mode1
         self.waiting = False
         status = OK
@@ -67,10 +67,6 @@ class Step(Declaring):
             if self.idle > MOST_IDLE:
                 return STALLED
         return status
-
-    def remember(self):
-        """Counts and step size at the beginning of the step, for when the present point is still there."""
-        self.taken0, self.refused0, self.called0, self.size0 = self.taken, self.refused, self.called, self.size
 
     def note_event(self):
         self.happened += 1
