@@ -13,6 +13,16 @@ from .run import Run, heading
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
+# Methods of one family have one colour.
+FAMILIES = {
+    "exact": "#000000",
+    **dict.fromkeys(("ode23", "RK23"), BLUE),
+    **dict.fromkeys(("ode45", "RK45"), ORANGE),
+    **dict.fromkeys(("dop853", "DOP853"), GREEN),
+    **dict.fromkeys(("rodas", "Radau"), "#CC79A7"),
+    "LSODA": "#56B4E9",
+    **dict.fromkeys(("Adams", "BDF"), "#E69F00"),
+}
 STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.grid": True,

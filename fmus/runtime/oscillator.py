@@ -25,7 +25,7 @@ class Oscillator(Declaring):
 
     dry = False  # friction with modes: see automaton.py
     linear = False  # piecewise linear: it owns `exact` and has push(t, mode); see exact.py
-    rules = ()  # one sentence for each rule that binds several values, in their names
+    rules: tuple[str, ...] = ()  # one sentence for each rule that binds several values, in their names
     stop_time = 4.0
     step_size = 0.004
     tolerance = 1e-6

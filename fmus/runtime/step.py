@@ -178,8 +178,8 @@ class Step(Declaring):
             self.called += 1
 
     def begin_anew(self, model):
-        """An event ends the step: forget the slope, but keep the step size of the last slide, if there was one."""
-        self.event = True
+        """The step has been cut: forget the slope, but keep the step size of the last slide, if there was one."""
+        self.event = self.mode1 != self.mode0  # a slide that only touches zero goes on
         self.arrive(model)
         if self.size == 0.0:
             self.size = self.first_size()

@@ -1,0 +1,41 @@
+"""One number of the benchmark: what was measured, what is to be reached, and what stands beside it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What a number is compared with, measured in the same run; `value` is None where it is what the error is from."""
+
+    name: str
+    value: float | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """`value` in `unit`, to be at most `reach`."""
+
+    what: str
+    value: float
+    unit: str
+    reach: float
+    beside: tuple[Beside, ...]
+
+    @property
+    def reached(self) -> bool:
+        return self.value <= self.reach
+
+
+def best(call: Callable[[], object], times: int) -> float:
+    """Run time in s of the fastest of several calls, after one to warm up."""
+    call()
+    return min(timed(call) for _ in range(times))
+
+
+def timed(call: Callable[[], object]) -> float:
+    """Run time in s of one call."""
+    begun = perf_counter()
+    call()
+    return perf_counter() - begun

@@ -1,0 +1,1 @@
+"""The reference motions, and the script that makes them: python -m harness.references"""

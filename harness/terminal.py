@@ -1,0 +1,55 @@
+"""What the commands share at the terminal: options, the progress bar, numbers as JSON."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+OUT = click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("results"),
+    show_default=True,
+    help="Folder that receives one folder for each scene.",
+)
+QUIET = click.option("--quiet", is_flag=True, help="Print errors only.")
+JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
+
+
+@contextmanager
+def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error, gone at the end; yields what tells it the present scene and its share done."""
+    console = Console(file=sys.stderr)  # this very stream: runs redirect sys.stderr
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    hidden = quiet or not console.is_terminal
+    with Progress(*columns, console=console, transient=True, redirect_stderr=False, disable=hidden) as bar:
+        task = bar.add_task("", total=total)
+        done: list[str] = []
+
+        def report(name: str, share: float) -> None:
+            if name not in done:
+                done.append(name)
+            bar.update(task, description=name, completed=len(done) - 1 + share)
+
+        yield report
+
+
+def as_text(result: Any) -> str:
+    """A result of dicts, lists, texts and numbers as JSON; what is not finite is null there."""
+    return json.dumps(finite(result), indent=1, ensure_ascii=False, allow_nan=False)
+
+
+def finite(result: Any) -> Any:
+    """The result with None for numbers that JSON does not know."""
+    if isinstance(result, dict):
+        return {name: finite(value) for name, value in result.items()}
+    if isinstance(result, list | tuple):
+        return [finite(value) for value in result]
+    return None if isinstance(result, float) and not isfinite(result) else result

@@ -1,0 +1,80 @@
+"""The external anchors: problems of other people, whose answers are not of our making."""
+
+import numpy as np
+import pytest
+
+from harness import anchors, peers
+from harness.inside import Inside, offered
+from harness.problem import Belt, Classic, Plain, Smoothed
+
+BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as published
+ROWS = list(anchors.analyse())
+
+
+def rows(problem, solver):
+    return [row for row in ROWS if (row.problem, row.solver) == (problem, solver)]
+
+
+def test_the_true_end_of_the_block_is_the_published_one():
+    x, v = anchors.BLOCK
+    assert (round(x + 0.2 * 50.0, 7), round(v + 0.2, 7)) == BELT
+
+
+def test_the_true_end_of_the_block_is_that_of_two_methods():
+    for method, rtol in (("DOP853", 3e-14), ("Radau", 1e-11)):
+        answer = peers.solve("scipy", method, Belt(), np.array([0.0, 50.0]), rtol, 1e-3 * rtol)
+        assert answer.motion[-1] == pytest.approx(anchors.BLOCK, abs=2e-11)
+
+
+@pytest.mark.parametrize("method", offered(anchors.Block))
+def test_every_method_of_the_runtime_brings_the_block_to_its_end(method):
+    row = next(row for row in rows("block on a belt", anchors.RUNTIME) if row.method == method)
+    assert row.error < 200 * row.rtol
+    assert row.evaluations < 10_000
+
+
+def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
+    run = Inside.prepared(anchors.Block, {}, "dop853", 1e-11)
+    truth = peers.solve("scipy", "DOP853", Belt(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
+    found = run.events(50.0)
+    assert [mode for _, mode in found] == [mode for _, mode in truth] == [0, -1] * 4
+    assert [t for t, _ in found] == pytest.approx([t for t, _ in truth], abs=1e-8)
+
+
+def test_smoothing_is_four_digits_worse_at_more_cost_than_locating_events():
+    smooth = next(row for row in rows("block on a belt", "scipy, arctan(1e6 v)") if row.method == "LSODA")
+    located = next(row for row in rows("block on a belt", anchors.RUNTIME) if row.method == "ode45")
+    assert smooth.error > 1e4 * located.error
+    assert smooth.evaluations > located.evaluations
+
+
+@pytest.mark.parametrize("method", offered(anchors.Coulomb))
+def test_every_method_of_the_runtime_stops_the_classic_once_and_for_good(method):
+    row = next(row for row in rows("chattering classic", anchors.RUNTIME) if row.method == method)
+    assert row.error < 10 * row.rtol
+    assert row.evaluations < 200
+
+
+def test_no_peer_comes_to_an_end_with_plain_sign():
+    plain = rows("chattering classic", "scipy, plain sign(v)")
+    assert [row.method for row in plain] == ["RK23", "RK45", "LSODA", "Radau"]
+    assert all(row.failure and row.evaluations is None and np.isnan(row.error) for row in plain)
+
+
+def test_the_slope_of_the_block_is_that_of_its_acceleration():
+    block, h = anchors.Block(), 1e-6
+    for mode, v in ((-1, -0.3), (1, 0.2)):
+        at = np.array([3.0, 0.4, v])
+        steps = [block.acceleration(*(at + d), mode) - block.acceleration(*(at - d), mode) for d in h * np.eye(3)]
+        assert block.jacobian(*at, mode) == pytest.approx(np.array(steps) / (2 * h), abs=1e-8)
+
+
+def test_the_two_forms_of_each_anchor_are_one_equation():
+    block, belt = anchors.Block(), Belt()
+    for mode in (-1, 1):
+        assert belt.rates(mode)(3.0, (0.4, mode * 0.2))[1] == pytest.approx(
+            block.acceleration(3.0, 0.4, mode * 0.2, mode)
+        )
+        assert Plain().rates(1)(0.0, (0.3, mode * 0.2)) == Classic().rates(mode)(0.0, (0.3, mode * 0.2))
+    smooth = Smoothed().rates(1)(3.0, (0.4, 0.2))[1]
+    assert smooth == pytest.approx(block.acceleration(3.0, 0.4, 0.2, 1), abs=1e-5)

@@ -1,0 +1,90 @@
+"""The benchmark: every error is measured against a second route, every time beside somebody else's."""
+
+import csv
+from dataclasses import replace
+from functools import partial
+from math import inf, nan
+
+import pytest
+
+from harness import bench_speed
+from harness.bench import FILE, FOLDER, bench, measures
+from harness.bench_accuracy import default, drift, exact, late
+from harness.bench_measure import Beside, Measure, best
+from harness.bench_speed import communication_step, inside_python, many_runs, step
+from harness.bench_table import numbers, words
+
+FAST = Measure("a step", 2e-6, "s", 3e-6, (Beside("theirs", 5e-6), Beside("absent is not installed")))
+
+
+@pytest.fixture(scope="session")
+def place(fmus, tmp_path_factory):
+    """A folder with the built FMUs in it, as a user's would be."""
+    folder = tmp_path_factory.mktemp("place")
+    (folder / "fmus").symlink_to(fmus)
+    return folder
+
+
+@pytest.fixture
+def all_measures(place, monkeypatch):
+    """What the benchmark measures."""
+    monkeypatch.chdir(place)
+    monkeypatch.setattr(bench_speed, "RUNS", 20)
+    return measures()
+
+
+def of(all_measures, function):
+    """The measures that a function makes."""
+    return [measure for measure in all_measures if measure.func is function]
+
+
+def test_exact_and_its_events_and_the_pendulum_reach_their_numbers_and_a_stuck_body_stays(all_measures):
+    chosen = [call for function in (exact, late, drift) for call in of(all_measures, function)]
+    chosen += [call for call in of(all_measures, default) if call.args[0] == "pendulum"]
+    found = [call() for call in chosen]
+    assert len(found) == 3 + 2 + 3 + 2
+    assert [measure.what for measure in found if not measure.reached] == []
+
+
+def test_an_accuracy_that_is_missed_is_told(all_measures):
+    model, card, *rest = of(all_measures, default)[0].args
+    loose = replace(card, defaults={**card.defaults, "solver.method": 2, "solver.rtol": 1e-3})
+    measure = default(model, loose, *rest)
+    assert not measure.reached
+    assert 1e-4 < measure.value < 0.1
+
+
+def test_the_fmus_own_code_is_faster_than_python_peers(all_measures):
+    for call in (of(all_measures, inside_python)[0], *of(all_measures, step), *of(all_measures, many_runs)):
+        measure = call()
+        assert 0.0 < measure.value < measure.beside[0].value
+
+
+def test_a_communication_step_is_measured_beside_that_of_an_empty_fmu_with_the_same_outputs(all_measures):
+    measure = of(all_measures, communication_step)[2]()
+    mine, theirs = (beside.value for beside in measure.beside)
+    assert measure.value == mine / theirs
+    assert 0.0 < mine < 10 * theirs
+
+
+def test_the_best_run_counts_after_one_to_warm_up():
+    calls = []
+    assert 0.0 <= best(partial(calls.append, 1), 4) < inf
+    assert len(calls) == 5
+
+
+@pytest.mark.parametrize(("value", "reached"), [(1.0, True), (1.1, False), (nan, False)])
+def test_a_number_is_reached_up_to_its_bound(value, reached):
+    assert Measure("a number", value, "1", 1.0, ()).reached is reached
+
+
+def test_a_peer_is_told_as_a_multiple_and_a_missing_one_by_name():
+    assert [words(FAST, beside) for beside in FAST.beside] == ["theirs: 5 µs, 2.5 times", "absent is not installed"]
+    assert numbers([FAST]).row_count == 1
+
+
+def test_the_csv_holds_every_number(tmp_path):
+    bench([lambda: FAST], tmp_path, lambda name, share: None)
+    with (tmp_path / FOLDER / FILE).open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["measured"], row["its value"]) for row in rows] == [("2e-06", "5e-06"), ("2e-06", "")]

@@ -1,0 +1,196 @@
+"""Work-precision: what is measured, what counts as a gap, what the sentences say."""
+
+import csv
+import subprocess
+import sys
+from functools import partial
+from math import nan
+from pathlib import Path
+from time import sleep
+
+import numpy as np
+import pytest
+
+from harness import advice, laws, peers
+from harness.answer import Answer
+from harness.errors import HarnessError
+from harness.inside import Inside, embedded, offered
+from harness.precision import FMPY, FMU, QUICK, Extent, Job, Point, Study, jobs, sweep
+from harness.reference import CASES, errors, load
+
+ROOT = Path(__file__).parent.parent
+CASE = {case.name: case for case in CASES}
+SMOOTH = [case for case in CASES if not case.chatters]
+
+
+@pytest.fixture(scope="session")
+def place(fmus, tmp_path_factory):
+    """A folder with the built FMUs in it, as a user's would be."""
+    folder = tmp_path_factory.mktemp("place")
+    (folder / "fmus").symlink_to(fmus)
+    return folder
+
+
+def command(place, *arguments):
+    """The finished process of `python -m harness precision` in a folder."""
+    line = [sys.executable, "-m", "harness", "precision", *map(str, arguments)]
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
+    return subprocess.run(line, cwd=place, env=environment, capture_output=True, text=True, timeout=120)
+
+
+@pytest.mark.parametrize("name", ["smd", "coulomb", "stickslip"])
+def test_exact_is_within_1e_13_of_the_truth_and_1e_14_of_every_event(fmus, name):
+    truth = load(name)
+    answer = Inside.prepared(embedded(fmus / f"{name}.fmu"), {}, "exact", 0.0).answer(truth.times.tolist())
+    found = errors(answer, truth)
+    assert found.largest < 1e-13
+    assert not found.events or found.events < 1e-14 * truth.times[-1]
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_every_method_of_the_fmu_comes_near_the_truth_of_its_law(fmus, case):
+    truth, model = load(case.truth), embedded(fmus / f"{case.model}.fmu")
+    within = 0.02 if case.truth == "threshold" else 2e-3  # where it comes to rest below eps is left to chance
+    for method in offered(model):
+        if (case.name == "pacejka-0.0001" and method != "rodas") or (case.chatters and method == "exact"):
+            continue  # seconds of explicit steps; refused
+        answer = Inside.prepared(model, case.values, method, 1e-6).answer(truth.times.tolist())
+        assert errors(answer, truth).largest < within
+        assert answer.evaluations > 0
+
+
+@pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
+def test_every_peer_that_is_installed_comes_near_the_truth_and_its_events(case):
+    truth = load(case.truth)
+    for peer, methods in {"scipy": ("DOP853", "LSODA", "Radau"), "cvode": ("Adams", "BDF")}.items():
+        for method in methods:
+            if peer in peers.missing() or (case.problem.stiff and method in ("DOP853", "Adams")):
+                continue
+            answer = peers.solve(peer, method, case.problem, truth.times, 1e-7, 1e-10)
+            found = errors(answer, truth)
+            assert found.largest < 1e-3
+            assert (found.events is not None) == case.problem.dry
+            assert not found.events or found.events < 1e-4
+            assert answer.evaluations > 100
+
+
+def test_a_peer_that_is_not_installed_is_named_and_left_out(fmus, monkeypatch):
+    monkeypatch.setitem(peers.PACKAGES, "cvode", ("no_such_module", "scikit-sundae"))
+    assert peers.missing()["cvode"] == "scikit-sundae"
+    file = fmus / "smd.fmu"
+    assert "cvode" not in [job.tool for job in jobs(CASE["smd"], embedded(file), file)]
+
+
+def test_a_run_is_watched_in_steps_and_in_time():
+    ask = partial(peers.solve, "scipy", "RK23", CASE["smd"].problem, load("smd").times, 1e-9, 1e-12)
+    with pytest.raises(HarnessError, match=r"^at t = .* s after 500 right-hand sides$"):
+        ask(peers.at_most(500))
+    with pytest.raises(HarnessError, match=r"^at t = .* s after 0\.001 s of run time$"):
+        ask(peers.within(1e-3))
+
+
+def test_a_failed_run_is_a_gap_and_after_a_slow_one_tighter_ones_are_not_tried():
+    asked = []
+
+    def run(rtol, extent):
+        asked.append(rtol)
+        if rtol == 1e-3:
+            raise HarnessError("it fell over")
+        if rtol == 1e-5:
+            sleep(0.06)
+            raise HarnessError("it took too long")
+        return Answer(load("smd").motion, None, 7), 0.25
+
+    def broken(rtol, extent):
+        raise HarnessError("it fell over")
+
+    with pytest.raises(HarnessError, match="it fell over"):
+        list(sweep(CASE["smd"], Job("tool", "method", 1e-3, broken, must=True), QUICK))
+    assert list(sweep(CASE["smd"], Job("tool", "method", 1e-3, lambda rtol, extent: None), QUICK)) == []
+
+    tolerances = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+    points = list(sweep(CASE["smd"], Job("tool", "method", 1e-3, run), Extent(tolerances, 0.1, 0.1)))
+    assert asked == [1e-2, 1e-3, 1e-4, 1e-5]
+    assert [point.rtol for point in points] == list(tolerances)
+    assert [point.seconds for point in points] == pytest.approx([0.25, nan, 0.25, nan, nan], nan_ok=True)
+    assert [point.largest for point in points] == pytest.approx([0.0, nan, 0.0, nan, nan], nan_ok=True)
+    failures = ["", "it fell over", "", "it took too long", "not tried: at rtol 1e-05 it was only it took too long"]
+    assert [point.failure for point in points] == failures
+
+
+def point(method, seconds, largest, tool=FMU, case="stickslip", **more):
+    return Point(case, tool, method, 1e-6, 1e-9, seconds=seconds, evaluations=1, largest=largest, **more)
+
+
+def test_the_advice_is_read_off_the_points():
+    points = (
+        point("ode23", 1e-3, 1e-3),
+        point("ode23", 8e-3, 1e-7),
+        point("ode45", 2e-3, 1e-6),
+        point("ode45", 1.5e-3, 1e-5),
+        point("RK45", 2e-2, 1e-7, "scipy"),
+        point("ode23", 4e-3, 1e-9, FMPY),
+        point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
+    )
+    study = Study("stickslip", (CASE["stickslip"], CASE["stickslip-threshold"]), points)
+    assert advice.advise(study, []) == (
+        "stickslip: use ode45: 1e-6 of the motion takes 2 ms at rtol 1e-6 (hybrid; for 1e-6 ode23 4 times and "
+        "scipy RK45 10 times as long); the law 'threshold' never comes nearer to true stick and slip than 0.005."
+    )
+    nothing = Study("stickslip", (CASE["stickslip"],), points[:1])
+    assert advice.advise(nothing, []) == "stickslip: no method of the FMU gets there."
+
+
+def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
+    found = {case.name: laws.analyse(case, embedded(fmus / f"{case.model}.fmu")) for case in CASES if case.dry}
+    assert found["coulomb-sign"].largest == 0.0
+    assert found["stickslip-threshold"].creep == pytest.approx(1e-7)  # the threshold itself
+    assert found["stickslip-threshold"].period == pytest.approx(3.345104499330, rel=1e-4)
+    soft, *_, steep = magic = [found[f"pacejka-{x_m}"] for x_m in ("0.01", "0.001", "0.0001")]
+    for law, x_m in zip(magic, (0.01, 0.001, 0.0001), strict=True):
+        assert 0.3 * x_m < law.creep < 0.4 * x_m
+        assert 0.4 < law.asymmetry < 0.9
+    assert (soft.period, steep.period) == pytest.approx((3.7169, 3.3533), abs=1e-3)
+    assert soft.asymmetry < steep.asymmetry
+    assert soft.rms > steep.rms
+
+
+def test_stuck_points_are_those_between_a_stop_and_the_next_break_away():
+    truth = load("stickslip")
+    stuck = laws.stuck(truth)
+    assert np.array_equal(stuck, truth.motion[:, 1] == 0.0)
+    assert not laws.stuck(load("coulomb"))[1:].any()
+
+
+def test_the_command_writes_every_point_and_says_what_to_use(place, tmp_path):
+    done = command(place, "smd", "--quick", "--out", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "smd: use exact: " in done.stdout
+    folder = tmp_path / "precision"
+    assert {path.name for path in folder.iterdir()} == {"smd.csv", "smd.png", "smd.txt", "anchors.csv"}
+    with (folder / "smd.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    tools = {FMU, FMPY, "scipy", "cvode"} - peers.missing().keys()
+    assert {row["tool"] for row in rows} == tools
+    inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
+    assert len(inside) == 1 + 4 * len(QUICK.tolerances)
+    assert float(inside[0]["largest [1]"]) < 1e-13
+    numbers = ("method", "rtol [1]", "evaluations", "largest [1]")
+    same = [[[row[name] for name in numbers] for row in each if not row["failure"]] for each in (inside, outside)]
+    assert same[0] == same[1]
+    assert all(bool(row["failure"]) == (row["seconds [s]"] == "") for row in rows)
+
+
+def test_results_on_other_models_stay(place, tmp_path):
+    (tmp_path / "precision").mkdir()
+    (tmp_path / "precision/pendulum.csv").write_text("older")
+    assert command(place, "smd", "--quick", "--quiet", "--out", tmp_path).stdout == ""
+    assert (tmp_path / "precision/pendulum.csv").read_text() == "older"
+    assert (tmp_path / "precision/smd.csv").exists()
+
+
+def test_an_unknown_model_is_one_sentence(place, tmp_path):
+    done = command(place, "stikslip", "--out", tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("Error: unknown model 'stikslip' (nearest: 'stickslip'); allowed: coulomb, ")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,216 @@
+"""Stiff and extreme scenes: the answers they are held against, the judgement, and a part of the table itself."""
+
+import csv
+import os
+import time
+from dataclasses import replace
+from math import nan
+
+import evidence
+import evidence_pendulum
+import numpy as np
+import pytest
+from models import MODELS, declared
+
+from harness.bounded import bounded
+from harness.errors import HarnessError
+from harness.probe import Counts, Motion, Refusal, Refusals
+from harness.stability import FINISHED, REFUSED, WRONG, Row, all_cases, all_refused, finished, refused, regions, survey
+from harness.stability_cases import Case, scenes, spans, spread
+from harness.stability_table import endings, refusals, summary
+from harness.truth import Grid, Truth, truth
+from harness.truth_smooth import Curve
+
+QUICK = (
+    "c = {} N.s/m: damping ratio c/20",
+    "k = 0",
+    "f just below k x0: it moves by less than a bit",
+    "exactly inverted: the pin holds",
+    "stuck for 1e6 s",
+    "events on communication points",
+    "communication step of {}",
+    "stop at {} s",
+    "NaN, inf, -inf in every Real, before and in mid-run",
+)
+
+
+def silent(name, share):
+    """Progress that nobody watches."""
+
+
+@pytest.fixture(scope="session")
+def place(fmus, tmp_path_factory):
+    """A folder with the built FMUs in it, as a user's would be."""
+    folder = tmp_path_factory.mktemp("place")
+    (folder / "fmus").symlink_to(fmus)
+    return folder
+
+
+def defaults(name):
+    """The values of a model, SI units."""
+    return {variable: d.start for variable, d in declared(name).items() if d.causality in ("parameter", "input")}
+
+
+# ---- the answers
+
+
+LINEAR = {
+    "underdamped": ("coulomb", {"c": 2.0, "v0": 0.3, "F_ext": 0.2}),
+    "critically damped": ("coulomb", {"k": 100.0, "c": 20.0, "v0": 1.0}),
+    "overdamped, no spring": ("smd", {"k": 0.0, "v0": 1.0, "F_ext": 0.5}),
+    "driven": ("stickslip", {}),
+    "driven backward": ("stickslip", {"v_driver": -0.05, "F_ext": 3.0}),
+}
+
+
+@pytest.mark.parametrize("case", LINEAR.values(), ids=LINEAR)
+def test_the_closed_form_is_that_of_the_evidence(case):
+    name, chosen = case
+    values, stop = {**defaults(name), **chosen}, 16.0 if name == "stickslip" else 4.0
+    found = truth(name, [(0.0, stop, values)], Grid(0.0, stop, 60))
+    traits = {k: v for k, v in chosen.items() if k not in ("x0", "v0")}
+    motion = evidence.Trajectory([(0.0, getattr(evidence, name)(**traits))], values["x0"], values["v0"], stop)
+    expected = np.array([[float(value) for value in motion.at(t)] for t in found.times]).T
+    np.testing.assert_allclose([found.x, found.v], expected, rtol=1e-15, atol=1e-18)
+    assert [mode for _, mode in found.events] == [mode for _, mode in motion.events]
+    assert [t for t, _ in found.events] == pytest.approx([float(t) for t, _ in motion.events], rel=1e-15)
+
+
+def test_a_change_of_values_starts_a_new_piece():
+    values = defaults("stickslip")
+    changes = {2.0: {"F_ext": 90.0}, 2.1: {"F_ext": -50.0}}
+    found = truth("stickslip", spans(0.0, 16.0, values, changes), Grid(0.0, 16.0, 40, (2.0, 2.1)))
+    parts = [(0.0, evidence.stickslip()), *((t, evidence.stickslip(**change)) for t, change in changes.items())]
+    motion = evidence.Trajectory(parts, 0.0, 0.0, 16.0)
+    assert list(found.x) == pytest.approx([float(motion.at(t)[0]) for t in found.times], rel=1e-15, abs=1e-18)
+
+
+@pytest.mark.parametrize("reaction", [False, True], ids=["weight", "reaction"])
+def test_the_pendulum_is_that_of_the_evidence(reaction):
+    values = {**defaults("pendulum"), "pin_load": 1 + reaction}
+    found = truth("pendulum", [(0.0, 5.0, values)], Grid(0.0, 5.0, 60))
+    swing = evidence_pendulum.Swing([(0.0, evidence_pendulum.Pendulum(reaction))], values["theta0"], 0.0, 5.0)
+    assert list(found.x) == pytest.approx([swing.at(t)[0] for t in found.times], abs=1e-11)
+    assert [mode for _, mode in found.events] == [mode for _, mode in swing.events]
+
+
+def test_the_smooth_sled_makes_no_energy_of_its_own():
+    """Radau against the balance of power: d(kinetic energy) is the work of pull and friction."""
+    values = defaults("pacejka")
+    found = truth("pacejka", [(0.0, 16.0, values)], Grid(0.0, 16.0, 16000))
+    curve, pull = Curve(values), values["k"] * (values["v_driver"] * found.times - found.x)
+    power = [(f - curve.mu(v) * values["m"] * values["g"]) * v for f, v in zip(pull, found.v, strict=True)]
+    work = np.concatenate([[0.0], np.cumsum(np.diff(found.times) * (np.array(power[1:]) + power[:-1]) / 2)])
+    np.testing.assert_allclose(0.5 * values["m"] * found.v**2, work, atol=3e-4)
+
+
+# ---- the bounds
+
+
+def test_a_hang_is_a_sentence():
+    with pytest.raises(HarnessError, match=r"no answer after 0\.5 s"):
+        bounded(0.5, time.sleep, 60)
+
+
+def test_a_crash_is_a_sentence():
+    with pytest.raises(HarnessError, match="the process died with exit code 7"):
+        bounded(30.0, os._exit, 7)
+
+
+def test_what_is_raised_comes_through():
+    with pytest.raises(ValueError, match="invalid literal"):
+        bounded(30.0, int, "x")
+
+
+# ---- the judgement
+
+
+CASE = Case("rest", "coulomb", "exact", setting=None, grid=Grid(0.0, 1.0, 2), spans=[], finish=1e-3)
+REST = Truth(np.array([0.0, 0.5, 1.0]), np.ones(3), np.zeros(3), ((0.5, 0),))
+GOOD = Motion(np.ones(3), np.zeros(3), np.zeros(3), 0.5, Counts(1, 2, 0, 3), 0.1)
+
+
+@pytest.fixture
+def case():
+    """A case that nothing drives."""
+    return replace(CASE, setting=type("Setting", (), {"values": {}})())
+
+
+def test_a_true_motion_is_finished(case):
+    assert finished(case, GOOD, REST).ended == FINISHED
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"x": np.array([1.0, 1.0, 1.01])}, "error 0.01"),
+        ({"v": np.array([0.0, nan, 0.0])}, "error nan"),
+        ({"energy": np.array([1.0, 0.5, 0.6])}, "energy rises by 0.1"),
+        ({"t_last": 0.6}, "error 0.1"),
+        ({"counts": Counts(2, 2, 0, 3)}, "2 events, not 1"),
+    ],
+    ids=["far", "not a number", "energy out of nothing", "late", "one event too many"],
+)
+def test_a_plausible_wrong_motion_is_wrong(case, changed, said):
+    row = finished(case, replace(GOOD, **changed), REST)
+    assert row.ended == WRONG
+    assert not row.well
+    assert said in row.text
+
+
+def test_a_refusal_says_the_words_and_leaves_no_numbers(case):
+    expecting = replace(case, finish=None, refuse="mu_d is")
+    assert refused(expecting, Refusal("mu_d is 1.0, above", silent=True)).ended == REFUSED
+    for wrong in (Refusal("", True), Refusal("mu_d is 1.0", False), Refusal("something else", True)):
+        assert refused(expecting, wrong).ended == WRONG
+    assert refused(case, Refusal("mu_d is 1.0", True)).ended == WRONG
+    assert all_refused(expecting, Refusals(6, ("m = nan was taken",))).ended == WRONG
+
+
+def test_the_slope_is_that_of_the_stiff_end(case):
+    rows = [
+        Row(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=Counts(0, n, 0, 0)))
+        for x, n in ((1e-4, 1000), (1e-3, 100), (1e-2, 50))
+    ]
+    (found,) = regions(rows)
+    assert found.slope == pytest.approx(-1.0)
+    assert found.steps.tolist() == [50, 100, 1000]
+
+
+# ---- the table
+
+
+def test_every_scene_says_how_it_ends_for_a_model_that_there_is():
+    found, finish = scenes()
+    assert set(finish) == {"exact", "tolerances", "least"}
+    assert {scene["model"] for scene in found} == set(MODELS)
+    for scene in found:
+        assert not ("refuse" in scene and "finish" in scene), scene["title"]
+        assert "{" not in scene["title"], scene["title"]
+
+
+def test_a_scene_is_spread_over_models_and_values():
+    scene = {"title": "rtol = {}", "models": ["smd", "coulomb"], "each": {"rtol": [0.1, 0.2]}}
+    assert [(one["model"], one["title"], one["rtol"]) for one in spread(scene)] == [
+        ("smd", "rtol = 0.1", 0.1),
+        ("smd", "rtol = 0.2", 0.2),
+        ("coulomb", "rtol = 0.1", 0.1),
+        ("coulomb", "rtol = 0.2", 0.2),
+    ]
+
+
+def test_a_part_of_the_table_ends_as_it_should(place, tmp_path, monkeypatch):
+    monkeypatch.chdir(place)
+    rows, (*_, region) = survey(
+        tmp_path, silent, all_cases(lambda scene: scene["pattern"] in QUICK or scene.get("varied") in (0.1, 0.03))
+    )
+    assert [f"{row.case.label}: {row.text}" for row in rows if not row.well] == []
+    assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas"}
+    assert {row.case.model for row in rows} == set(MODELS)
+    with (tmp_path / "stability" / "stability.csv").open(encoding="utf-8", newline="") as file:
+        assert len(list(csv.DictReader(file))) == len(rows) > 100
+    assert region.method == "rodas"
+    assert region.stiff.tolist() == [0.1, 0.03]
+    assert endings(rows).row_count > 20
+    assert refusals(rows).row_count > 5
+    assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as they should.")
