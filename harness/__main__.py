@@ -1,29 +1,20 @@
 """The command line: parse, one call, print."""
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
 import click
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from . import job
+from .answers import COMMANDS, STOP, TOLERANCE, run_any
 from .errors import HarnessError
 from .scene import load, shipped
 from .table import comparison
-
-OUT = click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results"),
-    show_default=True,
-    help="Folder that receives one folder for each scene.",
-)
-QUIET = click.option("--quiet", is_flag=True, help="Print errors only.")
+from .terminal import JSON, OUT, QUIET, as_text, progress
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -42,7 +33,8 @@ def commands(context: click.Context, out: Path, quiet: bool) -> None:
       python -m harness run my-scene.toml --out elsewhere
       python -m harness list
     """
-    context.default_map = {"run": {"out": out, "quiet": quiet}}  # given before the command, they hold for it too
+    given = {"out": out, "quiet": quiet}  # before the command, they hold for it too
+    context.default_map = dict.fromkeys(commands.commands, given)  # given before the command, they hold for it too
     if context.invoked_subcommand is None:
         names = job.published()
         with progress(quiet, len(names)) as report:
@@ -54,21 +46,146 @@ def commands(context: click.Context, out: Path, quiet: bool) -> None:
 
 
 @commands.command()
-@click.argument("scene")
+@click.argument("scene", required=False)
+@click.option("--fmu", type=click.Path(path_type=Path), help="Run this FMU, of any origin, instead of a scene.")
+@click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="With --fmu: a value to set.")
+@STOP
+@TOLERANCE
 @OUT
 @QUIET
-def run(scene: str, out: Path, quiet: bool) -> None:
-    """Run one SCENE: a shipped name (see list) or the path of a TOML file.
+@JSON
+def run(
+    scene: str | None,
+    fmu: Path | None,
+    values: tuple[str, ...],
+    stop: float | None,
+    tolerance: float,
+    out: Path,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Run one SCENE: a shipped name (see list) or the path of a TOML file.  Or run an FMU of any origin.
+
+    An FMU that does not show its solver's steps is run with ever shorter communication steps, until halving them
+    changes no output by more than the tolerance.
 
     \b
     Examples:
       python -m harness run pendulum
       python -m harness run ./my-scene.toml --out elsewhere
+      python -m harness run --fmu theirs.fmu --set mass=2 --stop 10 --tolerance 1e-4
     """
+    if fmu is not None and scene is None:
+        run_any(fmu, stop, tolerance, values, out, quiet, as_json)
+        return
+    if scene is None or fmu is not None or values or stop is not None:
+        raise click.UsageError("name one SCENE, or --fmu PATH; --set and --stop go with --fmu")
     chosen = load(scene)
-    with progress(quiet, 1) as report:
+    with progress(quiet or as_json, 1) as report:
         outcome = job.perform(chosen, out, partial(report, chosen.name))
-    show(quiet, comparison([outcome], everything=True), out / chosen.name)
+    if as_json:
+        click.echo(as_text({"scene": chosen.name, "quantities": [asdict(each) for each in outcome.quantities]}))
+    else:
+        show(quiet, comparison([outcome], everything=True), out / chosen.name)
+
+
+@commands.command()
+@click.argument("models", metavar="[MODEL]...", nargs=-1)
+@OUT
+@QUIET
+@click.option("--quick", is_flag=True, help="Three tolerances only, and little patience.")
+def precision(models: tuple[str, ...], out: Path, quiet: bool, quick: bool) -> None:
+    """Show what accuracy costs: error against run time and right-hand sides, for each MODEL (without one: all).
+
+    \b
+    Examples:
+      python -m harness precision
+      python -m harness precision pacejka --quick
+    """
+    from .precision import table as tables
+    from .precision.study import FULL, QUICK
+    from .precision.survey import FOLDER, MODELS, survey
+
+    with progress(quiet, len(models or MODELS) + 1) as report:
+        found = survey(models or MODELS, QUICK if quick else FULL, out, report)
+    if not quiet:
+        for table in (*map(tables.work, found.studies), tables.laws(found.laws), tables.anchors(found.anchors)):
+            Console().print(table, "")
+        for sentence in (*found.advice, *found.missing):
+            Console().print(sentence, highlight=False)
+        Console().print(f"Results in {out / FOLDER}", highlight=False)
+
+
+@commands.command()
+@OUT
+@QUIET
+def stability(out: Path, quiet: bool) -> None:
+    """Run stiff and extreme scenes with every method: each ends right, or is refused with a sentence.
+
+    Exit status 1 if one ends otherwise.
+
+    \b
+    Example:
+      python -m harness stability
+    """
+    from .stability import table as tables
+    from .stability.study import FOLDER, all_cases, survey
+
+    chosen = all_cases()
+    with progress(quiet, sum(map(len, chosen))) as report:
+        rows, regions = survey(out, report, chosen)
+    if not quiet:
+        Console().print(tables.endings(rows), "", tables.refusals(rows), "")
+        Console().print(tables.summary(rows, regions), f"Results in {out / FOLDER}", sep="\n", highlight=False)
+    wrong = [f"{row.case.label}: {row.text}" for row in rows if not row.well]
+    if wrong:
+        raise HarnessError("\n".join(wrong))
+
+
+@commands.command()
+@OUT
+@QUIET
+def bench(out: Path, quiet: bool) -> None:
+    """Measure the numbers to reach, each beside what it is compared with in the same run.
+
+    \b
+    Example:
+      python -m harness bench
+    """
+    from .bench import study as work
+    from .bench.table import numbers
+
+    chosen = work.measures()
+    with progress(quiet, len(chosen)) as report:
+        found = work.bench(chosen, out, report)
+    show(quiet, numbers(found), out / work.FOLDER)
+
+
+@commands.command()
+@click.option("--fmus", type=click.Path(file_okay=False, path_type=Path), default=Path("fmus"), show_default=True)
+@OUT
+@QUIET
+def importers(fmus: Path, out: Path, quiet: bool) -> None:
+    """Run the FMUs of a folder in tools that others wrote, and set their answers beside fmpy's.
+
+    Exit status 1 if a check fails.  A tool that is not installed is named.
+
+    \b
+    Examples:
+      python -m harness importers
+      python -m harness importers --fmus fmus/native
+    """
+    from .importers import table as work
+    from .importers.checks import IMPORTERS
+
+    with progress(quiet, len(IMPORTERS)) as report:
+        rows = work.rows(fmus, report)
+    work.save(rows, out)
+    if not quiet:
+        Console().print(work.table(rows))
+    failed = [f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed]
+    if failed:
+        raise HarnessError("\n".join(failed))
 
 
 @commands.command("list")
@@ -81,30 +198,16 @@ def list_() -> None:
     Console().print(table)
 
 
-@contextmanager
-def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
-    """A bar on standard error, gone at the end; yields what tells it the present scene and its share done."""
-    console = Console(file=sys.stderr)  # this very stream: runs redirect sys.stderr
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    hidden = quiet or not console.is_terminal
-    with Progress(*columns, console=console, transient=True, redirect_stderr=False, disable=hidden) as bar:
-        task = bar.add_task("", total=total)
-        done: list[str] = []
-
-        def report(name: str, share: float) -> None:
-            if name not in done:
-                done.append(name)
-            bar.update(task, description=name, completed=len(done) - 1 + share)
-
-        yield report
-
-
 def show(quiet: bool, table: Table, where: Path) -> None:
     """Print the table and where the results are."""
     if not quiet:
         console = Console()
         console.print(table)
         console.print(f"Results in {where}", highlight=False)
+
+
+for command in COMMANDS:
+    commands.add_command(command)
 
 
 def main() -> None:

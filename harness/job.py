@@ -16,7 +16,7 @@ from .quantity import Quantity
 from .run import Run
 from .scene import Scene, check_built, load, shipped
 
-FILES = ("trajectory.csv", "steps.csv", "events.csv", "figure.png")  # all that a result folder may hold
+FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.png")  # all that a result folder may hold
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,12 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     quantities += run.cost.quantities
     check_published(scene, quantities)
     run.save(folder)
+    if scene.published:
+        from .table import save
+
+        save(quantities, scene.published, folder / "figures.csv")
     if scene.plots:
-        from .plots import draw
+        from .plots.run import draw
 
         draw(run, results, folder / "figure.png")
     return Outcome(scene.name, scene, run, quantities, None)

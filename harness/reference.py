@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from .answer import Answer
-from .problem import Coulomb, Pacejka, Pendulum, Problem, Reaction, Smd, Stickslip
+from .precision.answer import Answer
+from .precision.problem import Coulomb, Pacejka, Pendulum, Problem, Reaction, Smd, Stickslip
 
 FOLDER = Path(__file__).with_name("references")
 POINTS = 401  # common points of every run, start and stop included

@@ -1,6 +1,9 @@
 """The table that sets measured figures beside published ones."""
 
+import csv
 from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -57,3 +60,14 @@ def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
             value, unit = 1e3 * value, "ms"
     measured = str(value) if isinstance(value, int) else f"{value:.{digits}g}"
     return f"  {quantity.text}", measured, published, "" if unit == "1" else unit, difference
+
+
+def save(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) -> None:
+    """Write what the table shows of a scene as CSV, with the source of the published figures in its heading."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["", "measured", f"published ({published['source']})", "unit", "difference"])
+        for quantity in quantities:
+            if quantity.name in published or quantity.name in ALWAYS:
+                text, measured, figure, unit, difference = row(quantity, published.get(quantity.name))
+                writer.writerow([text.strip(), measured, figure, unit, difference])

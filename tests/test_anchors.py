@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from harness import anchors, peers
-from harness.inside import Inside, offered
-from harness.problem import Belt, Classic, Plain, Smoothed
+from harness.precision import anchors, peers
+from harness.precision.inside import Inside, offered
+from harness.precision.problem import Belt, Classic, Plain, Smoothed
 
 BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as published
 ROWS = list(anchors.analyse())

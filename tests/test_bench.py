@@ -7,12 +7,12 @@ from math import inf, nan
 
 import pytest
 
-from harness import bench_speed
-from harness.bench import FILE, FOLDER, bench, measures
-from harness.bench_accuracy import default, drift, exact, late
-from harness.bench_measure import Beside, Measure, best
-from harness.bench_speed import communication_step, inside_python, many_runs, step
-from harness.bench_table import numbers, words
+from harness.bench import speed as bench_speed
+from harness.bench.accuracy import default, drift, exact, late
+from harness.bench.measure import Beside, Measure, best
+from harness.bench.speed import communication_step, inside_python, many_runs, step
+from harness.bench.study import FILE, FOLDER, bench, measures
+from harness.bench.table import numbers, words
 
 FAST = Measure("a step", 2e-6, "s", 3e-6, (Beside("theirs", 5e-6), Beside("absent is not installed")))
 

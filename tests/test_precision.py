@@ -11,11 +11,11 @@ from time import sleep
 import numpy as np
 import pytest
 
-from harness import advice, laws, peers
-from harness.answer import Answer
 from harness.errors import HarnessError
-from harness.inside import Inside, embedded, offered
-from harness.precision import FMPY, FMU, QUICK, Extent, Job, Point, Study, jobs, sweep
+from harness.precision import advice, laws, peers
+from harness.precision.answer import Answer
+from harness.precision.inside import Inside, embedded, offered
+from harness.precision.study import FMPY, FMU, QUICK, Extent, Job, Point, Study, jobs, sweep
 from harness.reference import CASES, errors, load
 
 ROOT = Path(__file__).parent.parent

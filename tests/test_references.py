@@ -9,8 +9,8 @@ import pytest
 from evidence import Piece, Trajectory
 from mpmath import mpf
 
-from harness.answer import Answer
-from harness.problem import Belt, Plain, Smoothed
+from harness.precision.answer import Answer
+from harness.precision.problem import Belt, Plain, Smoothed
 from harness.reference import CASES, POINTS, errors, late, load
 from harness.references.linear import coulomb, sampled, smd, stickslip, threshold
 

@@ -12,14 +12,25 @@ import numpy as np
 import pytest
 from models import MODELS, declared
 
-from harness.bounded import bounded
 from harness.errors import HarnessError
-from harness.probe import Counts, Motion, Refusal, Refusals
-from harness.stability import FINISHED, REFUSED, WRONG, Row, all_cases, all_refused, finished, refused, regions, survey
-from harness.stability_cases import Case, scenes, spans, spread
-from harness.stability_table import endings, refusals, summary
-from harness.truth import Grid, Truth, truth
-from harness.truth_smooth import Curve
+from harness.stability.bounded import bounded
+from harness.stability.cases import Case, scenes, spans, spread
+from harness.stability.probe import Counts, Motion, Refusal, Refusals
+from harness.stability.study import (
+    FINISHED,
+    REFUSED,
+    WRONG,
+    Row,
+    all_cases,
+    all_refused,
+    finished,
+    refused,
+    regions,
+    survey,
+)
+from harness.stability.table import endings, refusals, summary
+from harness.stability.truth import Grid, Truth, truth
+from harness.stability.truth_smooth import Curve
 
 QUICK = (
     "c = {} N.s/m: damping ratio c/20",

@@ -32,7 +32,7 @@ class DryFriction(Oscillator):
     """An oscillator that sticks: hold(t, x) tells the load on the body at rest, its rate and the holding limit."""
 
     dry = True
-    rules = (
+    rules: tuple[str, ...] = (
         "friction = {friction} with solver.method = 1 (exact): the closed form holds for the hybrid law only; "
         "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
     )

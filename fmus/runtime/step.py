@@ -176,6 +176,8 @@ class Step(Declaring):
         else:
             self.a1 = model.acceleration(self.t1, self.x1, self.v1, self.mode1)
             self.called += 1
+            if self.sticks and self.v1 == 0.0 and self.mode1 * self.a1 < 0.0:
+                self.a1 = 0.0  # the last bit at a break-away without a jump: no body starts against its mode
 
     def begin_anew(self, model):
         """The step has been cut: forget the slope, but keep the step size of the last slide, if there was one."""

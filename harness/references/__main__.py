@@ -7,9 +7,9 @@ magic formula           DOP853, which is explicit, and Radau, which is implicit
 
 import numpy as np
 
-from ..answer import Answer
-from ..peers import solve
-from ..problem import Pendulum
+from ..precision.answer import Answer
+from ..precision.peers import solve
+from ..precision.problem import Pendulum
 from ..reference import CASES, FOLDER, POINTS, Case, late, relative
 from ..run import heading, write
 from .linear import Events, Motion, coulomb, sampled, smd, stickslip, threshold

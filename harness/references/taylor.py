@@ -2,7 +2,7 @@
 
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
-from ..problem import Pendulum, Reaction
+from ..precision.problem import Pendulum, Reaction
 from .linear import Events, Motion
 
 DIGITS = 25

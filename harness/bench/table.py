@@ -1,0 +1,41 @@
+"""The table of the benchmark."""
+
+from collections.abc import Iterable
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from rich.text import Text
+
+from .measure import Beside, Measure
+
+
+def numbers(found: Iterable[Measure]) -> Table:
+    """Measured, to reach, reached or not, and what stands beside it."""
+    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    table.add_column("what")
+    table.add_column("measured", justify="right", no_wrap=True)
+    table.add_column("to reach", justify="right", no_wrap=True)
+    table.add_column("")
+    table.add_column("beside")
+    for measure in found:
+        verdict = Text("reached") if measure.reached else Text("missed", style="bold red")
+        beside = "\n".join(words(measure, each) for each in measure.beside)
+        figures = (figure(number, measure.unit) for number in (measure.value, measure.reach))
+        table.add_row(measure.what, *figures, verdict, beside)
+    return table
+
+
+def words(measure: Measure, beside: Beside) -> str:
+    """What stands beside, and how many times the measured number it is."""
+    if beside.value is None:
+        return beside.name
+    ratio = "" if measure.unit == "1" or not measure.value else f", {beside.value / measure.value:.3g} times"
+    return f"{beside.name}: {figure(beside.value, 's')}{ratio}"
+
+
+def figure(value: float, unit: str) -> str:
+    """A number in its unit, seconds in one of a handy size."""
+    if unit == "s":
+        size, name = next((s, n) for s, n in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (0.0, "ns")) if value >= s)
+        return f"{value / (size or 1e-9):.3g} {name}"
+    return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"

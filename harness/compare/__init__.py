@@ -1,0 +1,1 @@
+"""Two results, or two FMUs of anyone's, side by side."""

@@ -1,0 +1,86 @@
+"""A trajectory, wherever it comes from: a result folder, a CSV file, or a run of any FMU."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import HarnessError, SceneError
+from ..identify.record import HEADING, TIMES, parse
+from ..run import Run, heading, write
+
+POINTS = 500  # communication steps of a run from which nothing else is asked
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """`columns` name to (n,) over `time` (n,) in s, with their units; the times of `events` and the modes that begin
+    there (m, 2), the start included, where they are known.  `note` says how it came about."""
+
+    name: str
+    time: np.ndarray
+    columns: dict[str, np.ndarray]
+    units: dict[str, str]
+    events: np.ndarray | None = None
+    note: str = ""
+
+    def save(self, path: Path) -> None:
+        """Write it as CSV."""
+        names = list(self.columns)
+        write(
+            path, ["t [s]", *(heading(name, self.units[name]) for name in names)], [self.time, *self.columns.values()]
+        )
+
+
+def of_run(run: Run) -> Trajectory:
+    """The trajectory of a run of one of our FMUs."""
+    events = None if run.events is None else np.column_stack([run.events.t, run.events.mode])
+    return Trajectory(run.scene.fmu.stem, run.time, run.columns, run.units, events, f"solver: {run.setting}")
+
+
+def read(path: Path) -> Trajectory:
+    """The trajectory in a CSV file or a result folder; SceneError in one sentence if there is none."""
+    file = path / "trajectory.csv" if path.is_dir() else path
+    if path.is_dir() and not file.is_file():
+        raise SceneError(f"{path} is no result folder: it has no trajectory.csv")
+    heads, table = parse(file)
+    names, units = zip(*(HEADING.match(head).groups() for head in heads), strict=True)  # type: ignore[union-attr]
+    if units[0] not in (None, *TIMES):
+        raise SceneError(f"{file.name}: the first column must be the time, and its unit is '{units[0]}'")
+    time = table[:, 0] * TIMES[units[0] or "s"]
+    if not (np.isfinite(time).all() and (np.diff(time) >= 0).all()):
+        raise SceneError(f"{file.name}: the time in its first column must rise")
+    last = np.append(np.diff(time) > 0, True)  # where a time stands twice, what holds after the event
+    columns = {name: table[last, i] for i, name in enumerate(names) if i}
+    events = path / "events.csv" if path.is_dir() else None
+    known = parse(events)[1] if events and events.is_file() else None
+    return Trajectory(path.stem, time[last], columns, dict(zip(names, (u or "" for u in units), strict=True)), known)
+
+
+def load(source: str, stop: float | None, tolerance: float, report: Callable[[float], None]) -> Trajectory:
+    """The trajectory of a folder, a CSV file, an FMU's path or a shipped scene's name."""
+    from ..fmu import simulate
+    from ..scene import check_built
+    from ..scene import load as load_scene
+    from .any_fmu import own, run
+
+    path = Path(source)
+    if path.suffix == ".fmu":
+        scene = own(path, stop)
+        return of_run(simulate(scene, report)) if scene else run(path, stop, tolerance, {}, report)
+    if path.exists() and path.suffix != ".toml":
+        return read(path)
+    if path.suffix in (".csv", ".txt"):
+        raise SceneError(f"there is no {path}")
+    scene = load_scene(source)
+    check_built(scene)
+    return of_run(simulate(scene, report))
+
+
+def common(one: Trajectory, two: Trajectory) -> tuple[float, float]:
+    """The stretch of time in s that both cover; HarnessError if there is none."""
+    begin, end = max(one.time[0], two.time[0]), min(one.time[-1], two.time[-1])
+    if not end > begin:
+        raise HarnessError(f"{one.name} and {two.name} have no time in common")
+    return float(begin), float(end)

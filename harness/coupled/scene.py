@@ -1,0 +1,166 @@
+"""A coupled scene: parts, and the springs and connections between them.  Read from a TOML file:
+
+    title = "..."                      one line for people
+    stop = 4.0                         s
+    steps = [0.02, 0.01, 0.005]        communication steps in s, the finest one is drawn
+    [parts.left]                       one table for each part
+    model = "smd"                      smd, coulomb or stickslip
+    values = {m = 2.0, x0 = 0.1}       its parameters, SI units
+    [[springs]]                        a linear spring between two parts, without force at equal positions
+    between = ["left", "right"]
+    k = 40.0                           N/m
+    [[connections]]                    an output that drives the F_ext of another part, times a factor
+    from = "left.x"
+    to = "right"
+    factor = 40.0
+
+The force k (x_other - x) of a spring is one connection each way with the factor k, and k more stiffness in each part.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import SceneError, unknown
+from ..scene import find, is_number, is_positive, is_text
+
+FOLDER = Path(__file__).with_name("scenes")
+MODELS = ("smd", "coulomb", "stickslip")
+SOURCES = ("x", "v", "F_spring")  # outputs that a connection may come from
+
+
+@dataclass(frozen=True)
+class Part:
+    """One FMU of the scene, and the values that differ from its own, `k` with the springs already in it."""
+
+    name: str
+    model: str
+    fmu: Path
+    values: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Connection:
+    """`factor` times the `output` of the part `source` is a share of the outer force on the part `sink`."""
+
+    source: str
+    output: str
+    sink: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Coupled:
+    """The scene."""
+
+    name: str
+    title: str
+    stop: float
+    steps: tuple[float, ...]
+    parts: tuple[Part, ...]
+    connections: tuple[Connection, ...]
+
+
+def shipped() -> list[Path]:
+    """The coupled scenes that come with the harness."""
+    return sorted(FOLDER.glob("*.toml"))
+
+
+def load(source: str, stiffness: dict[str, float]) -> Coupled:
+    """The scene of a shipped name or a file; `stiffness` of each model where a scene does not set it.
+
+    SceneError in one sentence if it is not one.
+    """
+    path = Path(source)
+    if path.suffix != ".toml":
+        names = {file.stem: file for file in shipped()}
+        if source not in names:
+            raise SceneError(f"{unknown('coupled scene', source, names)}, or the path of a .toml file")
+        path = names[source]
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SceneError(f"cannot read the scene {path}: {error.strerror}") from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SceneError(f"scene {path.stem}: not valid TOML: {error}") from None
+    try:
+        return build(path, table, stiffness)
+    except SceneError as error:
+        raise SceneError(f"scene {path.stem}: {error}") from None
+
+
+def build(path: Path, table: dict[str, Any], stiffness: dict[str, float]) -> Coupled:
+    """The scene in a table."""
+    check(
+        table, {"title": is_text, "stop": is_positive, "steps": is_steps, "parts": is_table}, "springs", "connections"
+    )
+    parts: dict[str, dict[str, Any]] = {}
+    for name, part in table["parts"].items():
+        check(part, {"model": is_text}, "values")
+        if part["model"] not in MODELS:
+            raise SceneError(f"part {name}: {unknown('model', part['model'], MODELS)}")
+        values = part.get("values", {})
+        for key, value in values.items():
+            if not is_number(value):
+                raise SceneError(f"part {name}: {key} = {value!r} is not a finite number")
+        parts[name] = {"model": part["model"], "values": {key: float(value) for key, value in values.items()}}
+    connections = []
+    for spring in table.get("springs", []):
+        check(spring, {"between": is_pair, "k": is_positive})
+        one, two = (known(name, parts) for name in spring["between"])
+        connections += [Connection(one, "x", two, float(spring["k"])), Connection(two, "x", one, float(spring["k"]))]
+        for name in (one, two):
+            if parts[name]["model"] == "stickslip":
+                raise SceneError(
+                    f"part {name}: more stiffness of a stickslip sled would pull at its driver; take coulomb"
+                )
+            values = parts[name]["values"]
+            values["k"] = values.get("k", stiffness[parts[name]["model"]]) + float(spring["k"])
+    for each in table.get("connections", []):
+        check(each, {"from": is_text, "to": is_text, "factor": is_number})
+        source, _, output = each["from"].partition(".")
+        if output not in SOURCES:
+            raise SceneError(f"from = {each['from']!r}: {unknown('output', output, SOURCES)}")
+        connections.append(Connection(known(source, parts), output, known(each["to"], parts), float(each["factor"])))
+    driven = [each.sink for each in connections]
+    twice = [name for name in parts if driven.count(name) > 1]
+    if twice:
+        raise SceneError(f"part {twice[0]} is driven twice; an input takes one connection")
+    steps = tuple(sorted((float(h) for h in table["steps"]), reverse=True))
+    whole = tuple(
+        Part(name, part["model"], find(path, {"model": part["model"]})[1], part["values"])
+        for name, part in parts.items()
+    )
+    return Coupled(path.stem, table["title"], float(table["stop"]), steps, whole, tuple(connections))
+
+
+def check(table: dict[str, Any], needed: dict[str, Any], *more: str) -> None:
+    """The keys needed are there and of their kind, and there are no others."""
+    for key in table:
+        if key not in needed and key not in more:
+            raise SceneError(unknown("key", key, (*needed, *more)))
+    for key, accepts in needed.items():
+        if key not in table:
+            raise SceneError(f"the key '{key}' is missing")
+        if not accepts(table[key]):
+            raise SceneError(f"{key} = {table[key]!r} cannot be used; see the examples in harness/coupled/scenes")
+
+
+def is_table(value: object) -> bool:
+    return isinstance(value, dict) and all(isinstance(part, dict) for part in value.values())
+
+
+def is_steps(value: object) -> bool:
+    return isinstance(value, list) and len(value) > 0 and all(map(is_positive, value))
+
+
+def is_pair(value: object) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(map(is_text, value)) and value[0] != value[1]
+
+
+def known(name: str, parts: dict[str, Any]) -> str:
+    """The name of a part that there is."""
+    if name not in parts:
+        raise SceneError(unknown("part", name, parts))
+    return name

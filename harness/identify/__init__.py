@@ -1,0 +1,1 @@
+"""Damping and friction from a decay, measured or simulated."""

@@ -1,0 +1,1 @@
+"""Stiff and extreme scenes, each with the ending it must have."""

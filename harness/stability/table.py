@@ -1,0 +1,66 @@
+"""The tables of the stiff and extreme scenes: those that end, and those that are refused."""
+
+from collections.abc import Iterable
+from itertools import groupby
+
+from rich.table import Table
+from rich.text import Text
+
+from ..precision.table import grid
+from .study import FINISHED, Region, Row
+
+METHODS = ("exact", "ode23", "ode45", "dop853", "rodas")
+
+
+def endings(rows: Iterable[Row]) -> Table:
+    """Largest error and internal steps of every run that should end; a line for each scene."""
+    table = grid("largest error, as a share of the largest value, and internal steps", "scene")
+    for method in METHODS:
+        table.add_column(method, justify="right", no_wrap=True)
+    rows = sorted((row for row in rows if row.case.finish is not None), key=lambda row: row.case.model)
+    for model, of_model in groupby(rows, lambda row: row.case.model):
+        table.add_section()
+        table.add_row(Text(model, style="bold"))
+        for title, group in groupby(of_model, lambda row: row.case.title):
+            cells = {row.case.method: cell(row) for row in group}
+            table.add_row(f"  {title}", *(cells.get(method, Text("")) for method in METHODS))
+    return table
+
+
+def cell(row: Row) -> Text:
+    """The end of one run."""
+    if not row.well or row.ended != FINISHED or row.motion is None:
+        return Text("wrong", style="bold red")
+    return Text(f"{f'{row.error:.0e}' if row.error else '0'} {row.motion.counts.steps:>7}")
+
+
+def refusals(rows: Iterable[Row]) -> Table:
+    """The sentence of every run that should be refused; where the models say the same, that of one."""
+    table = grid("refused, each with its sentence", "scene")
+    table.add_column("models")
+    table.add_column("sentence")
+    found: dict[str, list[Row]] = {}
+    for row in rows:
+        if row.case.finish is None:
+            found.setdefault(row.case.title, []).append(row)
+    for title, group in found.items():
+        models = ", ".join(dict.fromkeys(row.case.model for row in group))
+        wrong = [row for row in group if not row.well]
+        table.add_row(title, models, Text((wrong or group)[0].text, style="red" if wrong else ""))
+    return table
+
+
+def summary(rows: list[Row], found: Iterable[Region]) -> str:
+    """How many ended as they should, what energy did, and where stability bounds the steps."""
+    well = sum(row.well for row in rows)
+    lines = [f"{well} of {len(rows)} ended as they should."]
+    exact = [row.rise for row in rows if row.case.method == "exact" and row.rise >= 0.0]
+    others = [row.rise / row.case.rtol for row in rows if row.case.method != "exact" and row.rise >= 0.0]
+    if exact and others:
+        words = f"by {max(exact):.1g} of the largest with exact, by {max(others):.2g} rtol with the other methods"
+        lines.append(f"Energy that nobody puts in rises {words}, at most.")
+    for region in found:
+        bound = "bounded by stability" if region.slope < -0.5 else "not bounded by stability"
+        growth = f"steps grow as x_m^{region.slope:+.2f} at x_m = {region.stiff[-1]:g} m/s"
+        lines.append(f"{region.method}: {growth}, {bound}.")
+    return "\n".join(lines)

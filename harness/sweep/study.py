@@ -1,0 +1,194 @@
+"""What happens over many parameters: one FMU, many points, workers by Dask, and a journal that survives a kill.
+
+A worker keeps one instance and runs it again and again.  Every block of runs that is finished is written to the
+journal beside the results, so the same command after an interruption does only what is left.  The rows do not depend
+on who ran them, nor in which order.
+"""
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+from signal import SIG_IGN, SIGINT, signal
+from tempfile import TemporaryDirectory
+from threading import Lock
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..errors import HarnessError
+from .rerun import Rerun, Row, Runs, ready
+from .space import Axis
+
+LONGEST_BLOCK = 200  # runs
+BLOCKS = 20  # for each worker at least, so that progress shows and no worker waits for the last one
+BUSY = Lock()  # an FMU of pythonfmu is one thread's at a time
+LOADED: dict[tuple[str, bytes], Rerun] = {}  # in a worker: its instances
+HELD = ExitStack()  # what frees them
+EXTRA = "python -m pip install 'friction-fmus[sweep]'"
+
+
+class Interrupted(HarnessError):
+    """The user stopped it."""
+
+    status = 130  # as of a shell command that SIGINT ends
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The `runs` at `points` (n, len(varied)): a grid over `axes`, or a sample of `random` points with its `seed`."""
+
+    runs: Runs
+    axes: tuple[Axis, ...]
+    points: np.ndarray
+    random: int | None
+    seed: int
+    fmu: bytes
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the FMU, in hexadecimal."""
+        return sha256(self.fmu).hexdigest()
+
+    @property
+    def key(self) -> str:
+        """What tells this sweep from any other."""
+        whole = [asdict(self.runs), [asdict(axis) for axis in self.axes], self.random, self.seed, self.digest]
+        return sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def perform(
+    sweep: Sweep, folder: Path, scheduler: str | None, workers: int, report: Callable[[float], None]
+) -> tuple[list[Row], int, float]:
+    """The rows of all points, in their order; how many of them an earlier, interrupted sweep had finished; and the
+    seconds that the others took, once the workers were there.
+
+    `folder` receives the journal; it is removed by `forget` once the results are written.
+    """
+    kept = Journal(folder / f".{sweep.key}.jsonl")
+    before, seconds = len(kept.rows), 0.0
+    left = [i for i in range(len(sweep.points)) if i not in kept.rows]
+    if left:
+        with client(scheduler, workers) as dask, kept.open():
+            begun = perf_counter()
+            try:
+                for block in finished(dask, sweep, left):
+                    kept.add(block)
+                    report(len(kept.rows) / len(sweep.points))
+                    seconds = perf_counter() - begun
+            except KeyboardInterrupt:
+                state = f"{len(kept.rows)} of {len(sweep.points)} runs are kept"
+                raise Interrupted(f"interrupted: {state}; the same command does the rest") from None
+    return [kept.rows[i] for i in range(len(sweep.points))], before, seconds
+
+
+def finished(dask: Any, sweep: Sweep, left: list[int]) -> Iterator[list[tuple[int, Row]]]:
+    """The blocks of runs as workers finish them."""
+    from distributed import as_completed
+
+    hands = max(1, sum(dask.nthreads().values()))
+    size = max(1, min(LONGEST_BLOCK, len(left) // (BLOCKS * hands)))
+    blocks = [[(i, sweep.points[i].tolist()) for i in left[at : at + size]] for at in range(0, len(left), size)]
+    fmu = dask.scatter(sweep.fmu, broadcast=True)
+    futures = dask.map(work, blocks, runs=sweep.runs, fmu=fmu, pure=False)
+    try:
+        for future in as_completed(futures):
+            try:
+                block = future.result()
+            except HarnessError:
+                raise
+            except Exception as error:  # whatever kept a worker from working: no harness there, no memory, killed
+                raise HarnessError(f"a worker failed: {type(error).__name__}: {error}") from None
+            yield block
+    finally:
+        dask.cancel(futures)
+        dask.run(unload)
+
+
+def work(block: list[tuple[int, list[float]]], runs: Runs, fmu: bytes) -> list[tuple[int, Row]]:
+    """Run a block in a worker, with the instance that it keeps."""
+    with BUSY:
+        key = (json.dumps(asdict(runs), sort_keys=True), sha256(fmu).digest())
+        if key not in LOADED:
+            folder = HELD.enter_context(TemporaryDirectory(prefix="sweep-"))
+            file = Path(folder) / f"{runs.model}.fmu"
+            file.write_bytes(fmu)
+            LOADED[key] = HELD.enter_context(ready(runs, file))
+        return [(i, LOADED[key].run(point)) for i, point in block]
+
+
+def unload() -> None:
+    """Let a worker free its instances and remove their files."""
+    with BUSY:
+        LOADED.clear()
+        HELD.close()
+
+
+@contextmanager
+def client(scheduler: str | None, workers: int) -> Iterator[Any]:
+    """A client of the scheduler at an address, or of a local cluster with so many processes."""
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError:
+        raise HarnessError(f"a sweep needs Dask: {EXTRA}") from None
+    dask.config.set({"logging.distributed": "error"})
+    if scheduler is None:
+        before = signal(SIGINT, SIG_IGN)  # workers inherit it: an interrupt is for this process, which ends them
+        try:
+            cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50)
+        finally:
+            signal(SIGINT, before)
+        with cluster, Client(cluster) as local:
+            yield local
+        return
+    try:
+        remote = Client(scheduler, timeout=10)
+    except (OSError, ValueError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise HarnessError(f"no scheduler answers at {scheduler}: {reason}") from None
+    with remote:
+        if not remote.nthreads():
+            raise HarnessError(f"the scheduler at {scheduler} has no workers; start one: dask worker {scheduler}")
+        yield remote
+
+
+class Journal:
+    """The finished runs of one sweep, a line for each, in a file that is complete up to its last whole line."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.rows: dict[int, Row] = {}
+        if path.exists():
+            for line in path.read_text(encoding="utf-8").splitlines():
+                try:
+                    i, values, error = json.loads(line)
+                except ValueError:
+                    break  # cut off by a kill
+                self.rows[i] = (values, error)
+
+    @contextmanager
+    def open(self) -> Iterator[None]:
+        """Keep the file open for writing, without what was cut off."""
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = self.path.with_suffix(".new")
+        with fresh.open("w", encoding="utf-8") as self.file:
+            self.write(self.rows.items())
+            fresh.replace(self.path)
+            yield
+
+    def add(self, block: list[tuple[int, Row]]) -> None:
+        self.rows.update(block)
+        self.write(block)
+
+    def write(self, rows: Iterable[tuple[int, Row]]) -> None:
+        self.file.writelines(json.dumps([i, *row]) + "\n" for i, row in rows)
+        self.file.flush()
+
+
+def forget(sweep: Sweep, folder: Path) -> None:
+    """Remove the journal."""
+    (folder / f".{sweep.key}.jsonl").unlink(missing_ok=True)

@@ -1,0 +1,222 @@
+"""Runs and comparisons of FMUs that are not ours, built with plain pythonfmu, and of ours."""
+
+import json
+import os
+import subprocess
+import sys
+from math import cos, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.compare.difference import compare
+from harness.compare.trajectory import Trajectory
+from harness.errors import HarnessError
+
+ROOT = Path(__file__).parent.parent
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "120"}
+FOREIGN = '''
+from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+
+class {name}(Fmi2Slave):
+    """An undamped oscillator by the midpoint rule, one step for each communication step."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.default_experiment = DefaultExperiment(0.0, 1.0, 0.01)
+        self.x, self.v, self.k, self.limit = 1.0, 0.0, 40.0, 1e9
+        for output in ("x", "v"):
+            self.register_variable(Real(output, causality=Fmi2Causality.output))
+        for parameter in ("k", "limit"):
+            self.register_variable(
+                Real(parameter, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+            )
+
+    def do_step(self, t, h):
+        x, v = self.x + h / 2 * self.v, self.v - h / 2 * {factor} * self.k * self.x
+        self.x, self.v = self.x + h * v, self.v - h * {factor} * self.k * x
+        return t < self.limit
+'''
+
+
+FOREIGN_3 = """
+from pythonfmu3 import DefaultExperiment, Float64, Fmi3Causality, Fmi3Slave, Fmi3Variability
+
+
+class Third(Fmi3Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.default_experiment = DefaultExperiment(0.0, 1.0, 0.01)
+        self.time, self.x, self.v = 0.0, 1.0, 0.0
+        continuous = Fmi3Variability.continuous
+        self.register_variable(Float64("time", causality=Fmi3Causality.independent, variability=continuous))
+        self.register_variable(Float64("x", causality=Fmi3Causality.output))
+        self.register_variable(Float64("v", causality=Fmi3Causality.output))
+
+    def do_step(self, t, h):
+        x, v = self.x + h / 2 * self.v, self.v - h / 2 * 40.0 * self.x
+        self.x, self.v = self.x + h * v, self.v - h * 40.0 * x
+        return True
+"""
+
+
+@pytest.fixture(scope="module")
+def foreign(tmp_path_factory):
+    """The folder of Theirs.fmu and Other.fmu; the second has a spring stiffer by 1 %."""
+    folder = tmp_path_factory.mktemp("foreign")
+    for name, factor in (("Theirs", 1.0), ("Other", 1.01)):
+        (folder / f"{name}.py").write_text(FOREIGN.format(name=name, factor=factor))
+        command = [sys.executable, "-m", "pythonfmu", "build", "-f", f"{name}.py"]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=60)
+    return folder
+
+
+@pytest.fixture
+def harness(fmus, tmp_path):
+    (tmp_path / "fmus").symlink_to(fmus)
+
+    def run(*arguments):
+        command = [sys.executable, "-m", "harness", *map(str, arguments)]
+        return subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+
+    return run
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def test_an_fmu_that_hides_its_steps_is_run_until_two_results_agree(harness, foreign, tmp_path, tolerance):
+    done = harness("run", "--fmu", foreign / "Theirs.fmu", "--set", "k=50", "--tolerance", tolerance)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "half of it changes no output by more than" in done.stdout
+    table = np.loadtxt(tmp_path / "results/Theirs/trajectory.csv", delimiter=",", skiprows=1)
+    assert table[-1, 0] == pytest.approx(1.0)
+    assert table[-1, 1] == pytest.approx(cos(sqrt(50)), abs=2 * tolerance)
+
+
+def test_an_fmu_of_fmi_3_gives_what_that_of_fmi_2_gives(harness, foreign, tmp_path):
+    pytest.importorskip("pythonfmu3", reason="pythonfmu3 is not installed")
+    (tmp_path / "Third.py").write_text(FOREIGN_3)
+    command = [sys.executable, "-m", "pythonfmu3", "build", "-f", "Third.py"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=60)
+    done = harness("compare", "Third.fmu", foreign / "Theirs.fmu", "--tolerance", 1e-4, "--within", 1e-15)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Third: communication step" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "sentence"),
+    [
+        (["--set", "limit=0.5"], 1, "stopped at t = "),
+        (["--tolerance", "1e-16"], 1, "the last halving still changes an output by"),
+        (["--set", "mass=1"], 2, "unknown variable to set 'mass'"),
+        (["--stop", "-1"], 2, "stop = -1.0 s is not after start"),
+    ],
+)
+def test_what_an_fmu_cannot_do_is_one_sentence(harness, foreign, arguments, status, sentence):
+    done = harness("run", "--fmu", foreign / "Theirs.fmu", *arguments)
+    assert done.returncode == status
+    assert sentence in done.stderr
+    assert done.stderr.count("Error") == 1
+    assert "Traceback" not in done.stderr
+
+
+def test_one_of_ours_is_run_at_its_own_steps(harness, tmp_path):
+    values = ("--set", "f=1", "--set", "solver.method=ode45")
+    done = harness("run", "--fmu", "fmus/coulomb.fmu", *values)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "solver: ode45, hybrid" in done.stdout
+    assert (tmp_path / "results/coulomb/trajectory.csv").exists()
+
+
+def test_a_run_as_json_is_json_and_nothing_else(harness, foreign):
+    done = harness("run", "--fmu", foreign / "Theirs.fmu", "--tolerance", 1e-3, "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["final"]["x"] == pytest.approx(cos(sqrt(40)), abs=2e-3)
+    done = harness("run", "coulomb", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    found = {each["name"]: each["value"] for each in json.loads(done.stdout)["quantities"]}
+    assert found["f"] == pytest.approx(0.5, rel=1e-12)
+
+
+def test_two_fmus_are_compared_as_their_closed_forms_differ(harness, foreign, tmp_path):
+    arguments = (foreign / "Theirs.fmu", foreign / "Other.fmu", "--tolerance", 1e-5)
+    done = harness("compare", *arguments, "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    found = json.loads(done.stdout)
+    times = np.linspace(0, 1, 1001)
+    off = np.abs(np.cos(sqrt(40) * times) - np.cos(sqrt(40.4) * times))
+    (x,) = (each for each in found["variables"] if each["name"] == "x")
+    assert x["largest"] == pytest.approx(off.max(), rel=1e-2)
+    assert x["rms"] == pytest.approx(np.sqrt(np.mean(off * off)), rel=1e-2)
+    folder = tmp_path / "results/compare/Theirs-Other"
+    assert {file.name for file in folder.iterdir()} == {"compare.json", "figure.png"}
+    assert harness("compare", *arguments, "--within", 0.1, "--quiet").returncode == 0
+    done = harness("compare", *arguments, "--within", 0.01, "--quiet")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "more than 0.01" in done.stderr
+
+
+def test_a_result_agrees_with_a_new_run_of_its_fmu_events_included(harness):
+    assert harness("run", "stickslip", "--quiet").returncode == 0
+    done = harness("compare", "results/stickslip", "fmus/stickslip.fmu", "--within", 1e-12)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "8 changes of mode in both, at most 0 s apart" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "sentence"),
+    [
+        (["fmus/smd.fmu", "nosuch.csv"], 2, "there is no nosuch.csv"),
+        (["fmus/smd.fmu", "nosuch.fmu"], 2, "there is no nosuch.fmu"),
+        (["fmus", "fmus/smd.fmu"], 2, "has no trajectory.csv"),
+        (["nosuch", "fmus/smd.fmu"], 2, "unknown scene 'nosuch'"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_sentence(harness, arguments, status, sentence):
+    done = harness("compare", *arguments)
+    assert done.returncode == status
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def path(name, times, **columns):
+    return Trajectory(name, times, columns, {"x": "m", "y": "m", "mode": ""})
+
+
+def test_times_that_are_not_common_are_met_by_a_spline():
+    one, two = np.linspace(0, 6, 1001), np.linspace(0.0005, 5.9, 400)
+    found = compare(path("one", one, x=np.sin(one)), path("two", two, x=np.sin(two)))
+    assert found.interpolated
+    assert len(found.time) == 400
+    assert found.worst < 1e-9
+
+
+def test_modes_are_not_interpolated():
+    one, two = np.arange(30.0), np.arange(30.0) + 0.5
+    found = compare(path("one", one, mode=one // 10), path("two", two, mode=two // 10))
+    assert found.differences[0].largest in (0.0, 1.0)
+
+
+def test_what_shares_no_variable_is_refused():
+    t = np.arange(20.0)
+    with pytest.raises(HarnessError, match="have no variable in common"):
+        compare(path("one", t, x=t), path("two", t, y=t))
+    with pytest.raises(HarnessError, match="have no time in common"):
+        compare(path("one", t, x=t), path("two", t + 50, x=t))
+
+
+@pytest.mark.parametrize(
+    ("second", "sentence", "shift"),
+    [
+        ([[0, 0], [1, 1], [2.5, 0]], "2 changes of mode in both, at most 0.5 s apart", 0.5),
+        ([[0, 0], [1, 1]], "2 changes of mode in one, 1 in two", np.nan),
+        ([[0, 0], [1, -1], [2, 0]], "change of mode 1 is to 1 in one and to -1 in two", np.nan),
+    ],
+)
+def test_changes_of_mode_are_paired(second, sentence, shift):
+    t = np.arange(20.0)
+    one = Trajectory("one", t, {"x": t}, {"x": "m"}, np.array([[0, 0], [1, 1], [2, 0.0]]))
+    found = compare(one, Trajectory("two", t, {"x": t}, {"x": "m"}, np.array(second, float)))
+    assert found.events == sentence
+    assert found.shift == pytest.approx(shift, nan_ok=True)
