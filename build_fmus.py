@@ -1,4 +1,4 @@
-"""Build the FMUs: python build_fmus.py [NAME ...] [--out DIR]"""
+"""Build the FMUs: python build_fmus.py [NAME ...] [--native] [--method M] [--law L] [--platform P] [--out DIR]"""
 
 from hashlib import sha256
 from pathlib import Path
@@ -8,23 +8,60 @@ import click
 from fmus.packaging import BuildError
 from fmus.packaging.archive import build
 from fmus.packaging.catalogue import names
+from fmus.packaging.lean import LAWS, METHODS
+from fmus.packaging.weigh import import_time
+
+FMUS = Path(__file__).parent / "fmus"
 
 
 @click.command()
 @click.argument("models", metavar="[NAME]...", nargs=-1)
-@click.option("--out", type=click.Path(path_type=Path), default=Path(__file__).parent / "fmus", help="Folder for them.")
-def main(models: tuple[str, ...], out: Path) -> None:
-    """Build the FMU of every model NAME (without one: of all models); print its size and sha256 digest."""
+@click.option("--native", "compiled", is_flag=True, help="Compiled to machine code: no Python in the FMU.")
+@click.option("--method", "methods", multiple=True, type=click.Choice(list(METHODS)), help="Offer this; repeatable.")
+@click.option("--law", "laws", multiple=True, type=click.Choice(list(LAWS)), help="Offer this law; repeatable.")
+@click.option("--platform", "platforms", multiple=True, help="For this only, as linux64; repeatable.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for them; fmus, or fmus/native, without.")
+def main(
+    models: tuple[str, ...],
+    compiled: bool,
+    methods: tuple[str, ...],
+    laws: tuple[str, ...],
+    platforms: tuple[str, ...],
+    out: Path | None,
+) -> None:
+    """Build the FMU of every model NAME (without one: of all models).
+
+    Prints the size, the time that Python takes to import it, and the sha256 digest.
+    """
     known = names()
     for name in models:
         if name not in known:
             raise UnknownName(f"There is no model {name!r}; known are {', '.join(known)}.")
     for name in models or known:
         try:
-            content = build(name, out).read_bytes()
+            if compiled:
+                path = native(name, out or FMUS / "native", methods, laws, platforms)
+                weight = ""
+            else:
+                path = build(name, out or FMUS, methods, laws, platforms)
+                weight = f"  {1000 * import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
-        click.echo(f"{name}.fmu  {len(content) / 1000:4.0f} kB  {sha256(content).hexdigest()[:16]}")
+        content = path.read_bytes()
+        click.echo(f"{name}.fmu  {len(content) / 1000:4.0f} kB{weight}  {sha256(content).hexdigest()[:16]}")
+
+
+def native(
+    name: str, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...]
+) -> Path:
+    """The native FMU; what builds it needs more than the others do."""
+    from fmus.packaging.native import build
+    from fmus.packaging.native.compiler import PLATFORMS, USUAL
+
+    for platform in platforms:
+        if platform not in PLATFORMS:
+            raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
+    return build(name, folder, methods, laws, platforms or USUAL)
 
 
 class UnknownName(click.ClickException):

@@ -34,7 +34,7 @@ def commands(context: click.Context, out: Path, quiet: bool) -> None:
       python -m harness list
     """
     given = {"out": out, "quiet": quiet}  # before the command, they hold for it too
-    context.default_map = dict.fromkeys(commands.commands, given)  # given before the command, they hold for it too
+    context.default_map = dict.fromkeys(commands.commands, given)
     if context.invoked_subcommand is None:
         names = job.published()
         with progress(quiet, len(names)) as report:

@@ -71,7 +71,8 @@ def probe(*fmus, folder):
 def other_checkout(folder):
     """A copy of the project in another place."""
     ignored = shutil.ignore_patterns("*.fmu", "__pycache__")
-    shutil.copytree(ROOT / "fmus", folder / "fmus", ignore=ignored)
+    for part in ("fmus", "harness/references"):
+        shutil.copytree(ROOT / part, folder / part, ignore=ignored)
     for file in ("build_fmus.py", "LICENSE"):
         shutil.copy(ROOT / file, folder)
     return folder
@@ -108,11 +109,12 @@ def fmu(building):
     return lambda name: building[0] / f"{name}.fmu"
 
 
-def test_the_command_prints_name_size_and_digest_of_every_model(building):
+def test_the_command_prints_name_size_import_time_and_digest_of_every_model(building):
     out, printed = building
     for name, line in zip(names(), printed.splitlines(), strict=True):
         content = (out / f"{name}.fmu").read_bytes()
-        assert line.split() == [f"{name}.fmu", f"{len(content) / 1000:.0f}", "kB", sha256(content).hexdigest()[:16]]
+        size, digest = f"{len(content) / 1000:.0f}", sha256(content).hexdigest()[:16]
+        assert re.fullmatch(rf"{name}.fmu +{size} kB +\d+ ms  {digest}", line)
     assert {path.name for path in out.iterdir()} == {f"{name}.fmu" for name in names()}
 
 
@@ -245,7 +247,7 @@ def test_two_builds_in_different_folders_are_byte_identical(building, tmp_path):
     for path in checkout.rglob("*"):
         os.utime(path, (1.0e9, 1.0e9))
     run = command("--out", tmp_path / "out", root=checkout, PYTHONHASHSEED="7", TZ="Pacific/Auckland")
-    assert run.stdout == building[1]
+    assert run.returncode == 0, run.stderr
     for name in names():
         assert (tmp_path / f"out/{name}.fmu").read_bytes() == (building[0] / f"{name}.fmu").read_bytes()
 

@@ -5,14 +5,18 @@
     resources/slavemodule.txt               names the entry script
     resources/<entry>.py                    imports the class; runs for every instance (guard.py says why)
     resources/<package>/                    the model and what it needs (modules.py)
-    documentation/licenses/
+    documentation/                          the page (page.py) and licences
+    model.png                               the icon
+    extra/org.fmi-standard.fmi-ls-ref/      the certified result (reference.py)
 
 Python finds modules by bare name in the process of the host.  So package and entry carry a digest of their
 content, and two versions of an FMU live side by side.
 """
 
 import os
+from collections.abc import Sequence
 from datetime import UTC, datetime
+from functools import partial
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -21,7 +25,9 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from . import BuildError
 from .catalogue import load
-from .description import describe
+from .companions import companions
+from .description import declared_by, describe
+from .lean import imported, offer, reduced
 from .modules import pythonfmu_folder, travelling
 
 ENTRY = """\
@@ -32,19 +38,29 @@ hold(globals())
 EARLIEST, LATEST = datetime(1980, 1, 1, tzinfo=UTC), datetime(2107, 12, 31, tzinfo=UTC)  # that a zip can tell
 
 
-def build(name: str, folder: Path) -> Path:
-    """Write `<name>.fmu` into `folder`; an older one is replaced whole or not at all."""
-    model, sources, date = load(name), travelling(name), build_date()
+def build(
+    name: str, folder: Path, methods: Sequence[str] = (), laws: Sequence[str] = (), platforms: Sequence[str] = ()
+) -> Path:
+    """Write `<name>.fmu` into `folder`; an older one is replaced whole or not at all.
+
+    Methods, friction laws and platforms may be chosen (lean.py); without a choice it has all there are.
+    """
+    model, date = load(name), build_date()
+    offered = offer(model, name, methods, laws)
+    sources = travelling(name, edit=partial(reduced, offered=offered)) if offered else travelling(name)
     content = "".join(f"{path}\0{text}\0" for path, text in sorted(sources.items()))
     code = sha256((ENTRY + content).encode()).hexdigest()
     package = f"{name}_{code[:12]}"
-    entries = {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
+    if offered:
+        model = imported(sources, name, package)
+    entries = companions(model, name, declared_by(model))
+    entries |= {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
     entries |= {
         "modelDescription.xml": describe(model, name, code, date),
         "resources/slavemodule.txt": f"{package}_fmu".encode(),
         f"resources/{package}_fmu.py": ENTRY.format(package=package, model=model.__name__).encode(),
     }
-    return write(folder / f"{name}.fmu", zipped(entries | _binaries(name) | licenses(), date))
+    return write(folder / f"{name}.fmu", zipped(entries | _binaries(name, platforms) | licenses(), date))
 
 
 def build_date() -> datetime:
@@ -56,13 +72,18 @@ def build_date() -> datetime:
     return max(EARLIEST, datetime.fromtimestamp(int(epoch), UTC))
 
 
-def _binaries(name: str) -> dict[str, bytes]:
-    """The native layer for every platform that pythonfmu comes with."""
+def _binaries(name: str, platforms: Sequence[str]) -> dict[str, bytes]:
+    """The native layer for the platforms, or for every one that pythonfmu comes with."""
     folder = pythonfmu_folder() / "resources" / "binaries"
     found = [path for path in folder.glob("*/*") if path.suffix in (".so", ".dll", ".dylib")]
     if not found:
         raise BuildError("The installed pythonfmu has no binaries: try 'pip install --force-reinstall pythonfmu'.")
-    return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in found}
+    there = sorted({path.parent.name for path in found})
+    for platform in platforms:
+        if platform not in there:
+            raise BuildError(f"pythonfmu has no binary for {platform}, only for {', '.join(there)}: add --native.")
+    chosen = [path for path in found if path.parent.name in (platforms or there)]
+    return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in chosen}
 
 
 def licenses() -> dict[str, bytes]:

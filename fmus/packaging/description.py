@@ -1,11 +1,13 @@
 """The model description: `modelDescription.xml` from the declared variables (FMI 2.0.4, sections 2.2 and 4.3)."""
 
+import sys
 from datetime import datetime
 from math import isfinite
+from typing import cast
 from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from ..runtime.declare import Declared, Declaring, Output, variables
+from ..runtime.declare import Declared, Declaring, Output
 from . import BuildError, __version__
 from .units import UNITS, unit_of
 
@@ -40,7 +42,7 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     root.attrib |= {"author": "friction-fmus", "version": __version__, "license": "MIT"}
     root.attrib |= {"generationTool": f"friction-fmus {__version__}", "variableNamingConvention": "structured"}
     SubElement(root, "CoSimulation", CAPABILITIES, modelIdentifier=name)
-    declared = variables(model())
+    declared = declared_by(model)
     _define_units(root, declared)
     _define_types(root, declared)
     categories = SubElement(root, "LogCategories")
@@ -57,6 +59,12 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     root.set("generationDateAndTime", date.strftime("%Y-%m-%dT%H:%M:%SZ"))
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n'.encode()
+
+
+def declared_by(model: type[Declaring]) -> list[tuple[str, Declared]]:
+    """The variables of a model by the runtime that it was written with: ours, or one that travels (lean.py)."""
+    runtime = next(base.__module__ for base in model.__mro__ if base.__name__ == Declaring.__name__)
+    return sys.modules[runtime].variables(model())
 
 
 def _define_units(root: Element, declared: list[tuple[str, Declared]]) -> None:
@@ -124,6 +132,6 @@ def _structure(root: Element, meanings: list[Declared]) -> None:
     structure = SubElement(root, "ModelStructure")
     outputs, unknowns = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
     for place, meaning in places:
-        if isinstance(meaning, Output):
-            SubElement(outputs, "Unknown", index=place, dependencies=inputs if meaning.direct else "")
+        if meaning.causality == "output":
+            SubElement(outputs, "Unknown", index=place, dependencies=inputs if cast(Output, meaning).direct else "")
             SubElement(unknowns, "Unknown", index=place)

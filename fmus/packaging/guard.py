@@ -18,8 +18,8 @@ from contextlib import suppress
 from ctypes import PYFUNCTYPE, PyDLL, c_void_p, cast
 from glob import escape, glob
 
-lent = []
-libraries = {}  # path -> address of its finalizePythonInterpreter
+lent: list = []
+libraries: dict = {}  # path -> address of its finalizePythonInterpreter
 
 
 def hold(names):
@@ -28,9 +28,10 @@ def hold(names):
     if len(lent) == 1:
         return
     script = names["__name__"] + ".py"
-    for place, folder in enumerate(sys.path):
+    for folder in list(sys.path):
         if isinstance(folder, str) and os.path.isfile(os.path.join(folder, script)):
-            del sys.path[place]
+            with suppress(ValueError):  # by value: another thread may have moved the places meanwhile
+                sys.path.remove(folder)
             watch(folder)
             return
 

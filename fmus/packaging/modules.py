@@ -6,7 +6,7 @@ travels inside as `<package>/pythonfmu`, so the FMU never meets the pythonfmu of
 
 import ast
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 
@@ -24,6 +24,7 @@ from .runtime.slave import slave_for
 
 {model} = slave_for(Model)
 '''
+Edit = Callable[[str, str], str]  # of the text of the file at a path
 GUARD = "guard.py"  # travels beside the model
 
 
@@ -35,13 +36,13 @@ def pythonfmu_folder() -> Path:
     return Path(spec.origin).parent
 
 
-def travelling(name: str, root: Path = FMUS) -> dict[str, str]:
-    """Path inside the package and source text of every file that the model `name` in `root` needs."""
+def travelling(name: str, root: Path = FMUS, edit: Edit = lambda path, text: text) -> dict[str, str]:
+    """Path inside the package and source text, after `edit`, of every file that the model `name` in `root` needs."""
     files = dict(zip(ROOTS, (INIT.format(name=name, model=name.capitalize()), ""), strict=True))
     waiting = [f"{name}.py", GUARD, "runtime/slave.py"]
     for path in waiting:  # which grows on the way
         if path not in files:
-            files[path], needed = _embed(path, root)
+            files[path], needed = _embed(path, root, edit)
             waiting += needed
     return files
 
@@ -53,10 +54,10 @@ def _on_disk(path: str, root: Path) -> Path:
     return pythonfmu_folder().parent / path if path.startswith("pythonfmu/") else root / path
 
 
-def _embed(path: str, root: Path) -> tuple[str, list[str]]:
+def _embed(path: str, root: Path, edit: Edit) -> tuple[str, list[str]]:
     """The text of a file as it travels, and the paths of the files that it needs in turn."""
     # Text mode turns any line end into "\n", so that checkouts on all systems build the same bytes.
-    lines = _on_disk(path, root).read_text(encoding="utf-8").splitlines(keepends=True)
+    lines = edit(path, _on_disk(path, root).read_text(encoding="utf-8")).splitlines(keepends=True)
     inside = PurePosixPath(path).parts
     needed = ["/".join((*inside[:depth], "__init__.py")) for depth in range(1, len(inside))]
     for node in _imports(path, "".join(lines)):

@@ -1,0 +1,66 @@
+"""The binaries of a native FMU, for every platform on any machine, by the compiler in the package ziglang."""
+
+import math
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from .. import BuildError
+from .expressions import PARTIAL, TOTAL
+from .sources import COMPILED
+from .universal import universal
+
+# One rounding for each operation, and every function of libm from the machine that runs the FMU: the compiler would
+# replace those of constants by values that are right in one more digit, and not the same.
+BUILT_IN = {math.fabs, math.copysign, math.sqrt}  # instructions of the processor, and exact
+LIBM = [function.__name__ for function in (*TOTAL, *PARTIAL) if function not in BUILT_IN]
+SAME_BITS = ("-O2", "-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM))
+LEFT_OUT = ("-Wno-unused-parameter", "-Wno-unused-but-set-variable")  # by a branch of the numerics that is not needed
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *LEFT_OUT)
+LIBRARY = ("-shared", "-fPIC", "-fvisibility=hidden")
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A folder of binaries/: the suffix there, and the compiler's names for the processors that it serves."""
+
+    suffix: str
+    targets: tuple[str, ...]
+    options: tuple[str, ...] = ()
+
+
+PLATFORMS = {
+    "linux64": Platform(".so", ("x86_64-linux-gnu.2.17",)),
+    "win64": Platform(".dll", ("x86_64-windows-gnu",)),
+    "darwin64": Platform(
+        ".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0"), ("-Wl,-install_name,@rpath/{name}.dylib",)
+    ),
+    "aarch64-linux": Platform(".so", ("aarch64-linux-gnu.2.17",)),
+}
+USUAL = ("linux64", "win64", "darwin64")
+
+
+def compiled(name: str, files: Mapping[str, str], platform: str) -> bytes:
+    """The binary of the FMU `name` from its sources, which depends on nothing else."""
+    if find_spec("ziglang") is None:
+        raise BuildError("Native FMUs need the compiler in the package ziglang: try pip install -e '.[native]'.")
+    chosen = PLATFORMS[platform]
+    options = [option.format(name=name) for option in chosen.options]
+    with TemporaryDirectory() as folder:
+        for file, text in files.items():
+            (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
+        slices = []
+        for target in chosen.targets:
+            # Names without a folder, so that none gets into the binary.
+            out = f"{name}{chosen.suffix}"
+            command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *LIBRARY, "-s"]
+            command += [*options, COMPILED, "-o", out, "-lm"]
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+            if done.returncode:
+                raise BuildError(f"{name} does not compile for {target}:\n{done.stderr.strip()}")
+            slices.append((Path(folder) / out).read_bytes())
+    return slices[0] if len(slices) == 1 else universal(slices)

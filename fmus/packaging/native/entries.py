@@ -1,0 +1,52 @@
+"""What the FMI layer asks of a model: translated like the numerics, and called by these names in fmi2.c."""
+
+from .kinds import FLOAT
+
+
+def prepare(model):
+    """0, or the number of the broken rule."""
+    return model.prepare()
+
+
+def start(model, t, t_end, tolerance):
+    x, v = model.initial(t)
+    model.solver.start(model, t, x, v, t_end, tolerance)
+
+
+def restart(model):
+    model.solver.restart(model)
+
+
+def rebase(model):
+    model.rebase(model.solver.t)
+
+
+def advance(model, t):
+    """0, or what keeps the motion from reaching t."""
+    return model.solver.advance(model, t)
+
+
+def look_ahead(model):
+    model.solver.look_ahead(model)
+
+
+def observe(model):
+    march = model.solver
+    model.observe(march.t, march.x, march.v, march.mode)
+
+
+def report(model):
+    model.solver.report(model.events)
+
+
+# Every entry, with the numbers that it takes.
+ENTRIES: dict = {
+    prepare: [],
+    start: [FLOAT, FLOAT, FLOAT],
+    restart: [],
+    rebase: [],
+    advance: [FLOAT],
+    look_ahead: [],
+    observe: [],
+    report: [],
+}

@@ -1,0 +1,75 @@
+"""The native FMU in a file: the same description, no Python inside, the same bytes for the same content.
+
+modelDescription.xml
+binaries/<platform>/<name>.{so,dll,dylib}
+sources/                                  what they were made from, for any other platform
+documentation/, model.png, extra/         page and licence, icon, certified result
+"""
+
+import inspect
+import linecache
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from xml.etree.ElementTree import SubElement, fromstring, indent, tostring
+
+from ...runtime.declare import Declaring
+from ..archive import build_date, licenses, write, zipped
+from ..catalogue import load
+from ..companions import companions
+from ..description import declared_by, describe
+from ..lean import Offer, imported, offer, reduced
+from ..modules import travelling
+from .compiler import PLATFORMS, USUAL, compiled
+from .sources import COMPILED, build_description, digest, guid_header, sources
+
+LICENSE = "documentation/licenses/license.txt"
+
+
+def build(
+    name: str, folder: Path, methods: Sequence[str] = (), laws: Sequence[str] = (), platforms: Sequence[str] = USUAL
+) -> Path:
+    """Write `<name>.fmu` for the platforms into `folder`; an older one is replaced whole or not at all.
+
+    Methods and friction laws may be chosen, as for the Python FMU.
+    """
+    date = build_date()
+    model = load(name)
+    if offered := offer(model, name, methods, laws):
+        model = lean(name, offered)
+    files, description = frozen(model, name, date)
+    entries = companions(model, name, declared_by(model))
+    entries |= {"modelDescription.xml": description, LICENSE: licenses()[LICENSE]}
+    entries |= {f"sources/{file}": text.encode() for file, text in files.items()}
+    entries["sources/buildDescription.xml"] = build_description(name).encode()
+    with ThreadPoolExecutor() as pool:
+        binaries = pool.map(lambda platform: compiled(name, files, platform), platforms)
+    for platform, content in zip(platforms, binaries, strict=True):
+        entries[f"binaries/{platform}/{name}{PLATFORMS[platform].suffix}"] = content
+    return write(folder / f"{name}.fmu", zipped(entries, date))
+
+
+def lean(name: str, offered: Offer) -> type[Declaring]:
+    """The model without what is not offered; `inspect` still finds its source, whose files are gone."""
+    texts = travelling(name, edit=partial(reduced, offered=offered))
+    code = sha256("".join(f"{path}\0{text}\0" for path, text in sorted(texts.items())).encode()).hexdigest()
+    model = imported(texts, name, f"frozen_{name}_{code[:12]}")
+    root = Path(inspect.getfile(model)).parent
+    for path, text in texts.items():
+        linecache.cache[str(root / path)] = (len(text), None, text.splitlines(keepends=True), str(root / path))
+    return model
+
+
+def frozen(model: type[Declaring], name: str, date: datetime) -> tuple[dict[str, str], bytes]:
+    """The C sources of a model, and the description that goes with them."""
+    files = sources(model)
+    root = fromstring(describe(model, name, digest(files), date))
+    interface = root.find("CoSimulation")
+    assert interface is not None
+    SubElement(SubElement(interface, "SourceFiles"), "File", name=COMPILED)
+    indent(root)
+    files["guid.h"] = guid_header(root.attrib["guid"])
+    return files, f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n'.encode()

@@ -1,0 +1,132 @@
+"""The page inside each FMU, documentation/index.html: what the model is, read from its declaration."""
+
+import re
+from html import escape
+from inspect import cleandoc
+from pathlib import Path
+
+from ..runtime.declare import Declared, Declaring
+from . import __version__
+from .chart import chart
+from .reference import INSIDE, Reference
+from .units import UNITS
+
+GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "pi": "pi"}
+STYLE = Path(__file__).with_name("page.css")
+WAYS = """\
+<p>Parameters may be changed at every communication point, those marked <i>fixed</i> only before initialisation ends.
+The solver runs free: its steps do not depend on the communication steps. Read <code>solver.t_next</code> and step to
+it, and every internal step and every event shows.</p>
+<p>A value that cannot be used, or a run that cannot go on, is told in one sentence, in the log and on standard error;
+<code>doStep</code> fails, and every calculated Real reads NaN from then on. Reset recovers.</p>
+"""
+FREE = Declared("", "").allowed  # in words, where every finite number is
+Variables = list[tuple[str, Declared]]
+
+
+def page(model: type[Declaring], name: str, declared: Variables, found: Reference | None) -> bytes:
+    """The page of the FMU `name`, as HTML that needs nothing but the icon beside it."""
+    first, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
+    title = f"<h1>{escape(name)}</h1><p>{escape(first)}</p>"
+    parts = [f"<header><img src='../model.png' alt=''><div>{title}</div></header>", "<h2>Equations</h2>"]
+    parts += map(_block, blocks)
+    if found is not None:
+        parts += _figure(found, declared)
+    choices = [(variable, meaning) for variable, meaning in declared if meaning.items]
+    for variable, meaning in choices:
+        parts.append(_choice(variable, meaning))
+    plain = [(variable, meaning) for variable, meaning in declared if not meaning.items]
+    for title, chosen in (
+        ("Parameters", [pair for pair in plain if pair[1].causality == "parameter" and "." not in pair[0]]),
+        ("Input", [pair for pair in plain if pair[1].causality == "input"]),
+        ("Outputs", [pair for pair in plain if pair[1].causality == "output"]),
+        ("Solver and events", [pair for pair in plain if "." in pair[0]]),
+    ):
+        parts += [f"<h2>{title}</h2>", _table(chosen)]
+    parts += ["<h2>Use</h2>", WAYS, _footer(model, found)]
+    head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(name)}</title>"
+    style = STYLE.read_text(encoding="utf-8")
+    begin = f"<!doctype html>\n<html lang='en'><head>{head}<style>\n{style}</style></head><body>"
+    return "\n".join((begin, *parts, "</body></html>\n")).encode()
+
+
+def _block(block: str) -> str:
+    """A paragraph of the docstring; what is indented there is equations."""
+    if block.startswith("    "):
+        return f"<pre>{typeset(cleandoc(block))}</pre>"
+    return f"<p>{typeset(block)}</p>"
+
+
+def typeset(text: str) -> str:
+    """Names with an underscore get an index, powers are raised, Greek letters are written as such.
+
+    >>> typeset("m a^2 = F_ext - mu_s m g")
+    'm a<sup>2</sup> = F<sub>ext</sub> &minus; &mu;<sub>s</sub> m g'
+    """
+    text = re.sub(rf"\b(\w|{'|'.join(GREEK)})_(\w+)", r"\1<sub>\2</sub>", escape(text, quote=False))
+    text = re.sub(r"\^(\w+)", r"<sup>\1</sup>", text).replace(" - ", " &minus; ")
+    return re.sub(rf"\b({'|'.join(GREEK)})\b", lambda word: f"&{GREEK[word[0]]};", text)
+
+
+def readable(unit: str) -> str:
+    """A unit, or words with one, as people write it.
+
+    >>> readable("kg.m2")
+    'kg·m²'
+    """
+    return re.sub(r"(?<=[a-z])2", "²", re.sub(r"(?<=[A-Za-z])\.", "·", unit)) if unit != "1" else ""
+
+
+def _figure(found: Reference, declared: Variables) -> list[str]:
+    """Position and speed over time."""
+    times, *columns = ([float(word) for word in column] for column in zip(*found.rows, strict=True))
+    outputs = [(variable, meaning) for variable, meaning in declared if meaning.causality == "output"]
+    parts = ["<h2>Default run</h2>", "<figure>"]
+    for values, (variable, meaning) in zip(columns, outputs, strict=False):
+        shown, factor = meaning.unit, 1.0
+        if meaning.display:
+            shown, factor = meaning.display, UNITS[meaning.unit].factor
+        parts.append(chart(times, [factor * value for value in values], f"{variable} in {readable(shown)}"))
+    return [*parts, f"<figcaption>{escape(found.told)}</figcaption></figure>"]
+
+
+def _choice(variable: str, meaning: Declared) -> str:
+    """The items of an enumeration."""
+    title = meaning.text[0].upper() + meaning.text[1:]
+    items: tuple[tuple[str, int, str], ...] = meaning.items
+    rows = "".join(
+        f"<tr><td><code>{value}</code></td><td><b>{escape(label)}</b>{' (default)' if value == meaning.start else ''}"
+        f"</td><td>{escape(sentence)}</td></tr>"
+        for label, value, sentence in items
+    )
+    head = "<thead><tr><th>value</th><th>name</th><th>what it is</th></tr></thead>"
+    return f"<h2>{escape(title)}: <code>{escape(variable)}</code></h2>\n<table>{head}{rows}</table>"
+
+
+def _table(chosen: Variables) -> str:
+    """Name, start, unit, what it is and what is allowed, of each variable."""
+    rows = []
+    for variable, meaning in chosen:
+        unit = readable(meaning.unit)
+        settable = meaning.causality in ("parameter", "input")
+        value = f"{meaning.start:.10g}" if settable else ""
+        if settable and meaning.display:
+            value = f"{meaning.start * UNITS[meaning.unit].factor:.10g} {readable(meaning.display)} = {value}"
+        notes = [readable(meaning.allowed)] if settable and meaning.allowed != FREE else []
+        if meaning.variability == "fixed":
+            notes.append("fixed")
+        text = escape(meaning.text) + (f" <small>({escape('; '.join(notes))})</small>" if notes else "")
+        cells = (f"<code>{escape(variable)}</code>", f"{value} {escape(unit)}".strip(), text)
+        rows.append("<tr><td>{}</td><td class='number'>{}</td><td>{}</td></tr>".format(*cells))
+    set_ = [meaning.causality in ("parameter", "input") for _, meaning in chosen]
+    value = "default" if all(set_) else "default, unit" if any(set_) else "unit"
+    head = f"<thead><tr><th>name</th><th>{value}</th><th>what it is</th></tr></thead>"
+    return f"<table>{head}{''.join(rows)}</table>"
+
+
+def _footer(model: type[Declaring], found: Reference | None) -> str:
+    """The default experiment, licences and version."""
+    run = f"Default run: 0 to {model.stop_time:g} s, tolerance {model.tolerance:g}."  # type: ignore[attr-defined]
+    certified = f" Certified result: <a href='../{INSIDE}/'>{INSIDE}</a>." if found else ""
+    licences = " Licences: <a href='licenses/'>licenses</a>."
+    return f"<footer>{run}{certified}{licences} friction-fmus {__version__}.</footer>"

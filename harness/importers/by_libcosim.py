@@ -1,0 +1,53 @@
+"""A request carried out by libcosim (package libcosimpy).  It has no reset: a second run is a second execution."""
+
+from importlib.metadata import version
+
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+from libcosimpy.CosimManipulator import CosimManipulator
+from libcosimpy.CosimObserver import CosimObserver
+from libcosimpy.CosimSlave import CosimLocalSlave
+
+from .request import Answer, Request, serve
+
+NANO = 1e9  # libcosim counts time in whole ns
+
+
+def play(request: Request) -> Answer:
+    log_output_level(CosimLogLevel.ERROR)
+    rows, accepted = run(request, request.values, request.change)
+    again = run(request, {}, {})[0] if request.again else []
+    return Answer(version("libcosimpy"), rows, again, accepted)
+
+
+def run(request: Request, values: dict[str, float], change: dict[str, float]) -> tuple[list[list[float]], int]:
+    """The rows of one run, the last one repeated where libcosim refuses to go on, and how many steps it took."""
+    references = request.references
+    execution = CosimExecution.from_step_size(round(request.step * NANO))
+    slaves = [CosimLocalSlave(request.fmu, name) for name in request.instances]
+    places = [execution.add_local_slave(slave) for slave in slaves]
+    observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
+    execution.add_observer(observer)
+    execution.add_manipulator(manipulator)
+    for name, value in values.items():
+        execution.real_initial_value(places[0], references[name], value)
+    if request.connect:
+        source, sink = (references[name] for name in request.connect)
+        execution.connect_real_variables(places[0], source, places[1], sink)
+    wanted = [references[name] for name in request.read]
+
+    def row() -> list[float]:
+        return [value for place in places for value in observer.last_real_values(place, wanted)]
+
+    rows, accepted = [row()], 0
+    for i in range(request.steps):
+        if i == request.steps // 2 and change:
+            names, new = list(change), list(change.values())
+            manipulator.slave_real_values(places[0], [references[name] for name in names], new)
+        accepted += execution.step(1)
+        rows.append(row())
+    return rows, accepted
+
+
+if __name__ == "__main__":
+    serve(play)

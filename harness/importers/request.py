@@ -1,0 +1,49 @@
+"""What a player is asked, and how it answers: JSON over standard input and output.
+
+A player prints the FMU's log to standard error, if the tool hands it on, and what is returned here to standard output.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Request:
+    """Equal communication steps of `step` s from t = 0 on, with instances of one FMU; Reals are written and read."""
+
+    fmu: str
+    references: dict[str, int]  # of the variables named below
+    step: float
+    steps: int
+    read: list[str]
+    instances: list[str] = field(default_factory=lambda: ["a"])
+    values: dict[str, float] = field(default_factory=dict)  # of the first instance, before the run
+    change: dict[str, float] = field(default_factory=dict)  # of the first instance, after half of the steps
+    connect: list[str] = field(default_factory=list)  # an output of the first instance, an input of the second
+    again: bool = False  # afterwards run once more, from a reset, with the start values
+    lives: int = 0  # the C program only: so many lives of one instance instead, three last rows of each
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Rows of values, one a point in time, instance after instance; those of the run after a reset; how many steps the
+    tool accepted.  Version of the tool."""
+
+    version: str
+    rows: list[list[float]]
+    again: list[list[float]]
+    accepted: int
+
+
+def serve(play: Callable[[Request], Answer]) -> None:
+    """Answer the one request on standard input; what a tool prints goes to standard error."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    wanted: dict[str, Any] = json.load(sys.stdin)
+    answer = play(Request(**wanted))
+    json.dump(asdict(answer), answers)
+    answers.close()

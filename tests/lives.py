@@ -1,0 +1,192 @@
+"""Many lives of FMUs in one process: a test names a function here and what to give it; the answer is JSON.
+
+python lives.py FUNCTION '[ARGUMENTS]'
+"""
+
+import json
+import multiprocessing
+import os
+import sys
+import threading
+from functools import cache
+from itertools import pairwise
+from shutil import rmtree
+
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+TIMES = [0.25 * i for i in range(9)]
+
+
+describe = cache(read_model_description)
+
+
+class Life:
+    """An instance of the FMU in a folder."""
+
+    def __init__(self, folder, name="life"):
+        description = describe(folder)
+        self.fmu = FMU2Slave(
+            guid=description.guid, unzipDirectory=folder, modelIdentifier=description.modelName, instanceName=name
+        )
+        declared = description.modelVariables
+        self.outputs = [v.valueReference for v in declared if v.causality == "output" and v.type == "Real"]
+        self.fmu.instantiate()
+
+    def begin(self):
+        self.fmu.setupExperiment(startTime=TIMES[0], stopTime=TIMES[-1])
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+        return self
+
+    def step(self, t, ahead):
+        self.fmu.doStep(t, ahead - t)
+        return self.read()
+
+    def read(self):
+        return [value.hex() for value in self.fmu.getReal(self.outputs)]
+
+    def run(self):
+        return [self.step(t, ahead) for t, ahead in pairwise(TIMES)]
+
+    def end(self):
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+def memory():
+    """Resident memory, in kB; Linux."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1000
+
+
+def one_after_another(paths, number):
+    """Create, run, reset, run, free, one FMU after another: the runs that came of it, the memory after a tenth of the
+    lives and after all, and what sys.path gained."""
+    folders, before, after = [extract(path) for path in paths], list(sys.path), []
+    rows = {folder: set() for folder in folders}
+    for i in range(number):
+        folder = folders[i % len(folders)]
+        life = Life(folder)
+        rows[folder].add(repr(life.begin().run()))
+        life.fmu.reset()
+        rows[folder].add(repr(life.begin().run()))
+        life.end()
+        if i + 1 in (number // 10, number):
+            after.append(memory())
+    path = [entry for entry in sys.path if entry not in before]
+    return {"runs": [len(found) for found in rows.values()], "memory": after, "path": path}
+
+
+def side_by_side(paths, number):
+    """All alive at once, stepped in turns: how many different runs each FMU gave, and the memory a life took."""
+    folders = [extract(path) for path in paths]
+    fleet = [[Life(folder, str(i)).begin() for i in range(5)] for folder in folders]
+    before = memory()
+    for lives, folder in zip(fleet, folders, strict=True):
+        lives += [Life(folder, str(i)).begin() for i in range(number)]
+    each = (memory() - before) / (number * len(paths))
+    rows = {}
+    for t, ahead in pairwise(TIMES):
+        for name, lives in enumerate(fleet):
+            rows.setdefault((name, t), set()).update(repr(life.step(t, ahead)) for life in lives)
+    for lives in reversed(fleet):
+        for life in reversed(lives):
+            life.end()
+    return {"runs": max(map(len, rows.values())), "each": each}
+
+
+def unpacked_anew(path, number):
+    """Unpacked, run and removed, as fmpy's simulate_fmu does: memory early and late, libraries and sys.path then."""
+    before, after = list(sys.path), []
+    for i in range(number):
+        folder = extract(path)
+        Life(folder).begin().end()
+        describe.cache_clear()
+        rmtree(folder)
+        if i + 1 in (number // 10, number):
+            after.append(memory())
+    with open("/proc/self/maps") as maps:
+        libraries = len({line.split(maxsplit=5)[5] for line in maps if "/binaries/" in line})
+    return {"memory": after, "libraries": libraries, "path": [entry for entry in sys.path if entry not in before]}
+
+
+def in_threads(paths, threads, turns):
+    """Each thread takes lives of every FMU, one after another: the different runs that came of it."""
+    folders = [extract(path) for path in paths]
+    rows, errors = {folder: set() for folder in folders}, []
+
+    def work():
+        try:
+            for _ in range(turns):
+                for folder in folders:
+                    life = Life(folder)
+                    rows[folder].add(repr(life.begin().run()))
+                    life.end()
+        except BaseException as error:
+            errors.append(repr(error))
+
+    workers = [threading.Thread(target=work) for _ in range(threads)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    return {"runs": [len(found) for found in rows.values()], "errors": errors}
+
+
+def carried_on(life, folder, answers):
+    """In a child: what an instance it was given says next, if it was given one, and a whole life of its own."""
+    told = [life.step(TIMES[1], TIMES[2])] if life else []
+    answers.put((told, Life(folder).begin().run()))
+
+
+def in_processes(path, method):
+    """An instance carried into forked children, or none into spawned ones; the children against the parent."""
+    folder = extract(path)
+    life = Life(folder).begin()
+    life.step(TIMES[0], TIMES[1])
+    context = multiprocessing.get_context(method)
+    answers = context.Queue()
+    children = [
+        context.Process(target=carried_on, args=(life if method == "fork" else None, folder, answers)) for _ in range(4)
+    ]
+    for child in children:
+        child.start()
+    told = [answers.get(timeout=60) for _ in children]
+    for child in children:
+        child.join(60)
+    expected = [life.step(TIMES[1], TIMES[2])] if method == "fork" else []
+    same = all(answer == (expected, Life(folder).begin().run()) for answer in told)
+    return {"same": same, "codes": [child.exitcode for child in children]}
+
+
+def beside_sources(root, paths):
+    """The FMUs in a host that has imported the sources and another pythonfmu: the files their code came from."""
+    sys.path.insert(0, root)
+    import pythonfmu
+
+    import fmus.runtime.slave
+
+    assert fmus.runtime.slave.Fmi2Slave is pythonfmu.fmi2slave.Fmi2Slave
+    pythonfmu.fmi2slave.Fmi2Slave.do_step = None  # whoever leaned on it would notice
+    mine = set(sys.modules)
+    rows = []
+    for path in paths:
+        life = Life(extract(path))
+        rows.append(life.begin().run())
+        life.end()
+    new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - mine}
+    return {"rows": rows, "foreign": [file for file in new if file and file.startswith(root)]}
+
+
+def in_folder(path, folder):
+    """A run of the FMU unpacked into this very folder."""
+    life = Life(extract(path, folder))
+    rows = life.begin().run()
+    life.end()
+    return rows
+
+
+if __name__ == "__main__":
+    function, arguments = sys.argv[1], json.loads(sys.argv[2])
+    print(json.dumps(globals()[function](*arguments)))

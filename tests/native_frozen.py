@@ -1,0 +1,100 @@
+"""Methods of two floats frozen to C and called beside CPython, with values that find the edges."""
+
+import copy
+import ctypes
+import math
+import random
+import struct
+import subprocess
+from itertools import product
+from pathlib import Path
+
+from native_host import compiler
+
+import fmus.packaging.native as native
+from fmus.packaging.native.compiler import SAME_BITS, STRICT
+from fmus.packaging.native.kinds import FLOAT, Group, Object, Row
+from fmus.packaging.native.program import Program
+
+RAISED = (ArithmeticError, ValueError, IndexError)  # for which C raises the fault flag
+VALUES = [0.0, -0.0, 1.0, -1.0, 0.3, -2.5, 7.0, 1e-5, 1e5, 710.0, 5e-324, 1e-300, 1e300, math.inf, -math.inf, math.nan]
+VALUES += [random.Random(1).uniform(-4.0, 4.0) for _ in range(6)]
+PAIRS = [*product(VALUES, VALUES)]
+
+
+def flat(thing):
+    """All numbers of an object, in order."""
+    for value in vars(thing).values():
+        if hasattr(value, "__dict__"):
+            yield from flat(value)
+        elif isinstance(value, list):
+            yield from value
+        else:
+            yield value
+
+
+def places(layout, cls, prefix):
+    """The same numbers in C."""
+    for name, kind in layout.fields[cls].items():
+        if isinstance(kind, Object):
+            yield from places(layout, kind.cls, f"{prefix}{name}.")
+        elif isinstance(kind, Row):
+            yield from (f"{prefix}{name}[{i}]" for i in range(kind.length))
+        else:
+            yield prefix + name
+
+
+def bits(values):
+    """Numbers as bits; any NaN is like any other."""
+    return [struct.pack("<d", math.nan if value != value else float(value)) for value in values]
+
+
+class Frozen:
+    """Methods of two floats of an object, in C: each call begins with a fresh object."""
+
+    def __init__(self, thing, methods, folder, warnings=STRICT):
+        program = Program(thing)
+        cls = type(thing)
+        state = list(places(program.layout, cls, "it."))
+        calls, self.widths = [], {}
+        for name in methods:
+            result = program.entry(f"run_{name}", getattr(cls, name), FLOAT, FLOAT).result
+            parts = [f"r._{i}" for i in range(len(result.parts))] if isinstance(result, Group) else ["r"]
+            self.widths[name] = len(parts)
+            calls.append(
+                f"int {name}(double x, double y, double *out) {{\n"
+                f"    struct {cls.__name__} it = image;\n    bool fault = false;\n"
+                f"    {result.c} r = run_{name}(&it, x, y, &fault);\n"
+                + "".join(f"    *out++ = (double){part};\n" for part in parts + state)
+                + "    return fault;\n}\n"
+            )
+        image = f"static const struct {cls.__name__} image = {program.layout.image(thing)};\n"
+        text = '#include "numerics.h"\n' + program.text() + image + "".join(calls)
+        (folder / "frozen.c").write_text(text)
+        header = Path(native.__file__).parent
+        command = [compiler(), *warnings, *SAME_BITS, "-shared", "-fPIC", f"-I{header}"]
+        subprocess.run([*command, "frozen.c", "-o", "frozen.so", "-lm"], cwd=folder, check=True)
+        self.library, self.size = ctypes.CDLL(str(folder / "frozen.so")), 16 + len(state)
+
+    def call(self, name, x, y):
+        """Whether the fault flag was raised, and what was returned and left behind, as long as Python's answer is."""
+        out = (ctypes.c_double * self.size)()
+        fault = getattr(self.library, name)(ctypes.c_double(x), ctypes.c_double(y), out)
+        return bool(fault), list(out)
+
+
+def compare(frozen, thing, name, pairs):
+    """A method in C and in CPython: results, objects afterwards, and exceptions as faults."""
+    for x, y in pairs:
+        it = copy.deepcopy(thing)
+        try:
+            result = getattr(it, name)(x, y)
+        except RAISED as error:
+            result = error
+        fault, out = frozen.call(name, x, y)
+        assert fault == isinstance(result, Exception), f"{name}({x!r}, {y!r}): {result!r}"
+        left = list(flat(it))
+        values = [] if fault else [*result] if isinstance(result, tuple) else [result]
+        if fault:  # nothing is returned, but what was done before stays done
+            out = out[frozen.widths[name] :]
+        assert bits(out[: len(values) + len(left)]) == bits(values + left), f"{name}({x!r}, {y!r})"

@@ -1,0 +1,331 @@
+"""What FMI and physics ask of each FMU beyond what fmpy validates, by walking over all its variables."""
+
+import re
+from math import isfinite, isnan
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+import dimensions
+import native_fmus
+import pytest
+from dimensions import DimensionError, Quantity
+from driver import Refused
+from models import CASES, MODELS, ODE23, combinations, declared, label, model_class, outputs, push, tunable
+
+from fmus.runtime.declare import Choice
+from fmus.runtime.dop853 import Dop853
+from fmus.runtime.ode23 import Ode23
+from fmus.runtime.ode45 import Ode45
+from fmus.runtime.rodas import Rodas
+
+EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+FOLDERS = ("binaries", "documentation", "extra", "resources", "sources")  # FMI 2.0.4, section 2.3
+
+
+@pytest.fixture(scope="module", params=["python", "native"])
+def fmus(request, fmus):
+    """The folder of the FMUs of one kind."""
+    return fmus if request.param == "python" else native_fmus.built()
+
+
+@pytest.fixture
+def description(fmus):
+    """The root of a model description."""
+
+    def read(name):
+        with ZipFile(fmus / f"{name}.fmu") as archive:
+            return ElementTree.fromstring(archive.read("modelDescription.xml"))
+
+    return read
+
+
+# ---- the description
+
+
+@EVERY_MODEL
+def test_the_archive_holds_what_fmi_names_and_nothing_else(fmus, name):
+    with ZipFile(fmus / f"{name}.fmu") as archive:
+        assert archive.testzip() is None
+        top = {path.split("/")[0] for path in archive.namelist()}
+        assert top - set(FOLDERS) <= {"modelDescription.xml", "model.png"}
+        assert all(path.isascii() and ".." not in path and not path.startswith("/") for path in archive.namelist())
+        assert len(set(archive.namelist())) == len(archive.namelist())
+
+
+@EVERY_MODEL
+def test_every_reference_in_the_xml_finds_what_it_names(description, name):
+    root = description(name)
+    scalars = root.findall("ModelVariables/ScalarVariable")
+    units = {unit.get("name"): unit for unit in root.findall("UnitDefinitions/Unit")}
+    types = {kind.get("name"): kind[0] for kind in root.findall("TypeDefinitions/SimpleType")}
+    assert len({scalar.get("name") for scalar in scalars}) == len(scalars)
+    assert len({scalar.get("valueReference") for scalar in scalars}) == len(scalars)
+    for scalar in scalars:
+        kind = scalar[0]
+        assert re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", scalar.get("name"))
+        assert scalar.get("description")
+        if kind.tag == "Real":
+            shown = [unit.get("name") for unit in units[kind.get("unit")].findall("DisplayUnit")]
+            assert kind.get("displayUnit") in [None, *shown]
+            assert types[kind.get("declaredType")].get("unit") == kind.get("unit")
+        if kind.tag in ("Real", "Enumeration"):
+            assert types[kind.get("declaredType")].tag == kind.tag
+    used = {scalar[0].get("unit") for scalar in scalars}, {scalar[0].get("declaredType") for scalar in scalars}
+    assert set(units) == used[0] - {None}
+    assert set(types) == used[1] - {None}
+
+
+@EVERY_MODEL
+def test_a_start_value_stands_where_fmi_wants_one_and_lies_in_its_range(description, name):
+    """FMI 2.0.4, section 2.2.7: calculated variables have none, all others one."""
+    root = description(name)
+    types = {kind.get("name"): kind[0] for kind in root.findall("TypeDefinitions/SimpleType")}
+    for scalar in root.findall("ModelVariables/ScalarVariable"):
+        kind, start = scalar[0], scalar[0].get("start")
+        assert (start is None) == (scalar.get("initial") == "calculated")
+        assert (scalar.get("initial") is None) == (scalar.get("causality") == "input")
+        if kind.tag != "Real":
+            assert scalar.get("variability") != "continuous"
+        if start is None:
+            continue
+        assert float(kind.get("min", "-inf")) <= float(start) <= float(kind.get("max", "inf"))
+        if kind.tag == "Enumeration":
+            assert start in [item.get("value") for item in types[kind.get("declaredType")]]
+
+
+@EVERY_MODEL
+def test_the_structure_lists_every_output_once_and_in_order(description, name):
+    root = description(name)
+    scalars = root.findall("ModelVariables/ScalarVariable")
+    expected = [str(i) for i, scalar in enumerate(scalars, 1) if scalar.get("causality") == "output"]
+    for part in ("Outputs", "InitialUnknowns"):
+        assert [unknown.get("index") for unknown in root.findall(f"ModelStructure/{part}/Unknown")] == expected
+
+
+# ---- the units
+
+
+@pytest.fixture
+def physics(monkeypatch):
+    """A model whose values carry their declared dimension, a time, and a motion forward."""
+    dimensions.teach(monkeypatch)
+
+    def equip(name, values):
+        model = model_class(name)()
+        for variable, d in declared(name).items():
+            if d.type == "Real" and d.causality in ("parameter", "input") and "." not in variable:
+                setattr(model, variable, Quantity.of(d.start or 0.1, d.unit))
+        for variable, value in values.items():
+            if "." not in variable:
+                setattr(model, variable, value)
+        model.solver.method = ODE23
+        t, x, v = (Quantity.of(0.7, unit) for unit in ("s", *(declared(name)[v].unit for v in outputs(name)[:2])))
+        assert model.prepare() == 0
+        model.initial(t)
+        model.rebase(t)
+        return model, t, x, v
+
+    return equip
+
+
+def has(quantity, expected):
+    """A value is of the dimension of another; zero is of every dimension."""
+    return quantity == 0.0 if not isinstance(quantity, Quantity) else quantity.powers == expected.powers
+
+
+PHYSICS = [(name, values) for name in MODELS for values in combinations(name) if values["solver.method"] == ODE23]
+
+
+@pytest.mark.parametrize(("name", "values"), PHYSICS, ids=[label((*case, 0)) for case in PHYSICS])
+def test_the_equations_agree_with_the_declared_units(physics, name, values):
+    """Position, speed and acceleration, loads, derivatives and outputs, in every mode: the very code that runs."""
+    model, t, x, v = physics(name, values)
+    for mode in (-1, 0, 1):
+        a = model.acceleration(t, x, v, mode)
+        assert has(a, Quantity.of(1.0, declared(name)[outputs(name)[2]].unit))
+        assert has(a, v / t)
+        assert has(v, x / t)
+        for slope, by in zip(model.jacobian(t, x, v, mode), (t, x, v), strict=True):
+            assert has(slope, a / by)
+        if model.linear:
+            assert has(model.push(t, mode), a)
+        if model.dry:
+            load, rate, limit = model.hold(t, x)
+            assert has(rate, load / t)
+            assert has(limit, load)
+        model.observe(t, x, v, mode)
+        for output in outputs(name):
+            if declared(name)[output].type == "Real":
+                assert has(getattr(model, output), Quantity.of(1.0, declared(name)[output].unit)), output
+
+
+@EVERY_MODEL
+def test_the_methods_keep_the_dimensions(physics, name):
+    """One step of each method, its error estimates, and its interpolant; the closed form too."""
+    model, t, x, v = physics(name, {})
+    a, h = model.acceleration(t, x, v, 1), Quantity(1e-4, 0, 0, 1)
+    for method in (Ode23(), Ode45(), Dop853(), Rodas()):
+        x1, v1, a1, e_x, e_v = method.step(model, 1, t, x, v, a, h)
+        assert [has(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [True] * 5
+        method.expand(model, 1, t, x, v, a, h, x1, v1, a1)
+        assert [has(*pair) for pair in zip(method.at(0.3), (x, v), strict=True)] == [True] * 2
+    if model.linear:
+        model.exact.begin(x, v, a, model.push(t, 1))
+        assert [has(*pair) for pair in zip(model.exact.at(h), (x, v), strict=True)] == [True] * 2
+        if model.dry:
+            model.exact.begin(x, v, -a, model.push(t, 1))
+            assert has(model.exact.standstill(1), t)
+
+
+@EVERY_MODEL
+def test_a_wrong_unit_would_be_noticed(physics, name):
+    """Each parameter of the motion, given in another unit than its own."""
+    for variable, d in tunable(name).items():
+        model, t, x, v = physics(name, {})
+        setattr(model, variable, Quantity.of(1.0, d.unit) * Quantity(1.0, 1, 2, 3))
+
+        def move(model=model, t=t, x=x, v=v):
+            model.prepare()
+            a = model.acceleration(t, x, v, 1), model.acceleration(t, x, v, 0)
+            assert all(has(value, v / t) for value in a)
+
+        if variable == "eps":
+            continue
+        with pytest.raises((DimensionError, AssertionError)):
+            move()
+
+
+# ---- the values
+
+
+def numbers(fmu, name):
+    """Every variable, read."""
+    return dict(zip(declared(name), fmu.get(*declared(name)), strict=True))
+
+
+def unexpected(values, name):
+    """The variables that do not read as a number, but for events.t_last before the first event."""
+    return [v for v, x in values.items() if not isfinite(x) and (v != "events.t_last" or values.get("events.count", 0))]
+
+
+@EVERY_MODEL
+def test_every_variable_reads_in_every_state(worker, fmus, name):
+    fmu = worker.instantiate(fmus / f"{name}.fmu")
+    assert set(numbers(fmu, name)) == set(declared(name))
+    fmu.setup(0.0, 1.0, None)
+    assert unexpected(numbers(fmu, name), name) == []
+    fmu.enter()
+    ahead = numbers(fmu, name)
+    assert unexpected(ahead, name) == []
+    fmu.exit()
+    assert unexpected(numbers(fmu, name), name) == []
+    assert {v: ahead[v] for v in outputs(name)} == {v: numbers(fmu, name)[v] for v in outputs(name)}
+    fmu.step(0.0, 0.5)
+    running = numbers(fmu, name)
+    assert unexpected(running, name) == []
+    fmu.terminate()
+    assert repr(numbers(fmu, name)) == repr(running)
+    fmu.reset()
+    assert set(numbers(fmu, name)) == set(declared(name))
+    fmu.begin({next(iter(tunable(name))): float("nan")})
+    with pytest.raises(Refused):
+        fmu.step(0.0, 0.1)
+    failed = numbers(fmu, name)
+    calculated = [v for v, d in declared(name).items() if d.type == "Real" and d.causality in ("output", "local")]
+    assert [v for v in calculated if not isnan(failed[v])] == []
+    fmu.free()
+
+
+@EVERY_MODEL
+def test_start_values_are_read_back_to_the_last_bit(worker, fmus, description, name):
+    """Before the run, after it was initialised, and after a reset."""
+    starts = {}
+    for scalar in description(name).findall("ModelVariables/ScalarVariable"):
+        start, number = scalar[0].get("start"), float if scalar[0].tag == "Real" else int
+        if start is not None:
+            starts[scalar.get("name")] = number(start)
+    fmu = worker.instantiate(fmus / f"{name}.fmu")
+    for state in (lambda: None, fmu.begin, fmu.reset):
+        state()
+        assert dict(zip(starts, fmu.get(*starts), strict=True)) == starts
+    fmu.free()
+
+
+def another(declaration):
+    """An allowed value that is not the start value."""
+    if declaration.items:
+        return next((value for _, value, _ in declaration.items if value != declaration.start), declaration.start)
+    return next(
+        value
+        for value in (1.25 * declaration.start, 0.8 * declaration.start, 0.0123)
+        if value != declaration.start and declaration.accepts(value)
+    )
+
+
+@EVERY_MODEL
+def test_every_settable_variable_is_set_one_by_one(launch, name):
+    """It reads back, before the run and where it is tunable in mid-run, and the run goes on."""
+    for variable, d in declared(name).items():
+        if d.causality not in ("parameter", "input"):
+            continue
+        value = another(d)
+        choices = {"solver.method": 2} if variable == "friction" else {}
+        if name == "stickslip" and variable == "mu_d":
+            choices = {"mu_s": 1.0}
+        fmu = launch(name, {**choices, variable: value}, stop=0.2)
+        fmu.step(0.0, 0.1)
+        assert fmu.get(variable) == value
+        fmu.reset()
+        fmu.begin(choices, stop=0.2)
+        fmu.step(0.0, 0.1)
+        fmu.set({variable: value})
+        assert fmu.get(variable) == (d.start if d.variability == "fixed" else value)
+        if d.variability == "fixed":
+            with pytest.raises(Refused):
+                fmu.step(0.1, 0.1)
+        else:
+            fmu.step(0.1, 0.1)
+        fmu.reset()
+        assert fmu.get(variable) == d.start
+
+
+@EVERY_MODEL
+def test_outputs_follow_the_input_as_the_dependencies_say(launch, description, name):
+    """The declared ones follow at once, in some state; the others keep every bit, in every state."""
+    root = description(name)
+    scalars = root.findall("ModelVariables/ScalarVariable")
+    names = [scalar.get("name") for scalar in scalars]
+    entry, size = push(name)
+    told = {}
+    for unknown in root.findall("ModelStructure/Outputs/Unknown"):
+        indices = unknown.get("dependencies").split()
+        assert [names[int(i) - 1] for i in indices] in ([], [entry])
+        told[names[int(unknown.get("index")) - 1]] = bool(indices)
+    followed = set()
+    for case in CASES:
+        if case[0] != name:
+            continue
+        fmu = launch(name, case[1], stop=case[2])
+        for turn in range(6):
+            t = turn * case[2] / 8
+            before = fmu.get(*told)
+            for value in (0.1 * size, -3.0 * size, 3.0 * size):
+                fmu.set({entry: value})
+                after = fmu.get(*told)
+                changed = {v for v, a, b in zip(told, before, after, strict=True) if repr(a) != repr(b)}
+                assert not [v for v in changed if not told[v]], label(case)
+                followed |= changed
+            fmu.set({entry: 0.0})
+            assert repr(fmu.get(*told)) == repr(before)
+            fmu.step(t, case[2] / 8)
+    assert followed == {v for v, direct in told.items() if direct}
+
+
+@EVERY_MODEL
+def test_every_choice_has_its_sentence_and_its_place(name):
+    """Items count from 1, or from where the method has its number everywhere."""
+    for d in declared(name).values():
+        if isinstance(d, Choice):
+            values = [value for _, value, _ in d.items]
+            assert values == sorted(set(values))
+            assert all(sentence for _, _, sentence in d.items)

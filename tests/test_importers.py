@@ -1,0 +1,38 @@
+"""The built FMUs in tools that others wrote: what `python -m harness importers` prints, row by row.
+
+Tools that are not installed are skipped with the reason; they are in the extra `importers`.
+"""
+
+import native_fmus
+import pytest
+from models import MODELS
+
+from harness.importers import table
+from harness.importers.checks import CHECKS, IMPORTERS
+
+
+@pytest.fixture(scope="module", params=["python", "native"])
+def rows(request, fmus):
+    """Every row of the table for one kind of FMU."""
+    folder = fmus if request.param == "python" else native_fmus.built()
+    return table.rows(folder, lambda name, share: None)
+
+
+@pytest.mark.parametrize("check", CHECKS)
+@pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
+def test_the_importer_passes(rows, importer, check):
+    mine = [row for row in rows if row.importer.startswith(importer.name)]
+    if mine[0].reason:
+        pytest.skip(mine[0].reason)
+    (row,) = [row for row in mine if row.check == check]
+    assert row.failed == ()
+    assert len(row.cells) == len(MODELS)
+
+
+def test_the_table_lists_every_model():
+    assert sorted(table.MODELS) == MODELS
+
+
+def test_a_tool_that_is_not_asked_is_named_with_the_reason():
+    shown = table.table([table.Row("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")])
+    assert r"Ecos was not asked: it is not installed: pip install -e '.\[importers]'" in shown.caption
