@@ -1,7 +1,6 @@
 """The command line: parse, one call, print."""
 
 import sys
-from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
@@ -20,8 +19,9 @@ from .terminal import JSON, OUT, QUIET, as_text, progress
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @OUT
 @QUIET
+@JSON
 @click.pass_context
-def commands(context: click.Context, out: Path, quiet: bool) -> None:
+def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> None:
     """Run the built FMUs, measure what they do, and set it beside what was published.
 
     Without a command: every published case.  Exit status 0: all well, 1: a run failed, 2: wrong usage.
@@ -33,13 +33,16 @@ def commands(context: click.Context, out: Path, quiet: bool) -> None:
       python -m harness run my-scene.toml --out elsewhere
       python -m harness list
     """
-    given = {"out": out, "quiet": quiet}  # before the command, they hold for it too
+    given = {"out": out, "quiet": quiet, "as_json": as_json}  # before the command, they hold for it too
     context.default_map = dict.fromkeys(commands.commands, given)
     if context.invoked_subcommand is None:
         names = job.published()
-        with progress(quiet, len(names)) as report:
+        with progress(quiet or as_json, len(names)) as report:
             outcomes = list(job.main_job(names, out, report))
-        show(quiet, comparison(outcomes, everything=False), out)
+        if as_json:
+            click.echo(as_text([figures(outcome) for outcome in outcomes]))
+        else:
+            show(quiet, comparison(outcomes, everything=False), out)
         failed = [outcome.error for outcome in outcomes if outcome.error]
         if failed:
             raise HarnessError("\n".join(failed))
@@ -84,7 +87,7 @@ def run(
     with progress(quiet or as_json, 1) as report:
         outcome = job.perform(chosen, out, partial(report, chosen.name))
     if as_json:
-        click.echo(as_text({"scene": chosen.name, "quantities": [asdict(each) for each in outcome.quantities]}))
+        click.echo(as_text(figures(outcome)))
     else:
         show(quiet, comparison([outcome], everything=True), out / chosen.name)
 
@@ -93,8 +96,9 @@ def run(
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
 @OUT
 @QUIET
+@JSON
 @click.option("--quick", is_flag=True, help="Three tolerances only, and little patience.")
-def precision(models: tuple[str, ...], out: Path, quiet: bool, quick: bool) -> None:
+def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, quick: bool) -> None:
     """Show what accuracy costs: error against run time and right-hand sides, for each MODEL (without one: all).
 
     \b
@@ -106,9 +110,13 @@ def precision(models: tuple[str, ...], out: Path, quiet: bool, quick: bool) -> N
     from .precision.study import FULL, QUICK
     from .precision.survey import FOLDER, MODELS, survey
 
-    with progress(quiet, len(models or MODELS) + 1) as report:
+    with progress(quiet or as_json, len(models or MODELS) + 1) as report:
         found = survey(models or MODELS, QUICK if quick else FULL, out, report)
-    if not quiet:
+    if as_json:
+        points = {study.model: study.points for study in found.studies}
+        rest = {"laws": found.laws, "anchors": found.anchors, "advice": found.advice, "missing": found.missing}
+        click.echo(as_text({"points": points} | rest))
+    elif not quiet:
         for table in (*map(tables.work, found.studies), tables.laws(found.laws), tables.anchors(found.anchors)):
             Console().print(table, "")
         for sentence in (*found.advice, *found.missing):
@@ -119,7 +127,8 @@ def precision(models: tuple[str, ...], out: Path, quiet: bool, quick: bool) -> N
 @commands.command()
 @OUT
 @QUIET
-def stability(out: Path, quiet: bool) -> None:
+@JSON
+def stability(out: Path, quiet: bool, as_json: bool) -> None:
     """Run stiff and extreme scenes with every method: each ends right, or is refused with a sentence.
 
     Exit status 1 if one ends otherwise.
@@ -132,9 +141,11 @@ def stability(out: Path, quiet: bool) -> None:
     from .stability.study import FOLDER, all_cases, survey
 
     chosen = all_cases()
-    with progress(quiet, sum(map(len, chosen))) as report:
+    with progress(quiet or as_json, sum(map(len, chosen))) as report:
         rows, regions = survey(out, report, chosen)
-    if not quiet:
+    if as_json:
+        click.echo(as_text([{"scene": row.case.label, "well": row.well, "ended": row.ended} for row in rows]))
+    elif not quiet:
         Console().print(tables.endings(rows), "", tables.refusals(rows), "")
         Console().print(tables.summary(rows, regions), f"Results in {out / FOLDER}", sep="\n", highlight=False)
     wrong = [f"{row.case.label}: {row.text}" for row in rows if not row.well]
@@ -145,7 +156,8 @@ def stability(out: Path, quiet: bool) -> None:
 @commands.command()
 @OUT
 @QUIET
-def bench(out: Path, quiet: bool) -> None:
+@JSON
+def bench(out: Path, quiet: bool, as_json: bool) -> None:
     """Measure the numbers to reach, each beside what it is compared with in the same run.
 
     \b
@@ -156,16 +168,20 @@ def bench(out: Path, quiet: bool) -> None:
     from .bench.table import numbers
 
     chosen = work.measures()
-    with progress(quiet, len(chosen)) as report:
+    with progress(quiet or as_json, len(chosen)) as report:
         found = work.bench(chosen, out, report)
-    show(quiet, numbers(found), out / work.FOLDER)
+    if as_json:
+        click.echo(as_text(found))
+    else:
+        show(quiet, numbers(found), out / work.FOLDER)
 
 
 @commands.command()
 @click.option("--fmus", type=click.Path(file_okay=False, path_type=Path), default=Path("fmus"), show_default=True)
 @OUT
 @QUIET
-def importers(fmus: Path, out: Path, quiet: bool) -> None:
+@JSON
+def importers(fmus: Path, out: Path, quiet: bool, as_json: bool) -> None:
     """Run the FMUs of a folder in tools that others wrote, and set their answers beside fmpy's.
 
     Exit status 1 if a check fails.  A tool that is not installed is named.
@@ -178,10 +194,12 @@ def importers(fmus: Path, out: Path, quiet: bool) -> None:
     from .importers import table as work
     from .importers.checks import IMPORTERS
 
-    with progress(quiet, len(IMPORTERS)) as report:
+    with progress(quiet or as_json, len(IMPORTERS)) as report:
         rows = work.rows(fmus, report)
     work.save(rows, out)
-    if not quiet:
+    if as_json:
+        click.echo(as_text(rows))
+    elif not quiet:
         Console().print(work.table(rows))
     failed = [f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed]
     if failed:
@@ -196,6 +214,11 @@ def list_() -> None:
         scene = load(file)
         table.add_row(scene.name, scene.model, scene.title)
     Console().print(table)
+
+
+def figures(outcome: job.Outcome) -> dict[str, object]:
+    """What a scene gave, for JSON."""
+    return {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error}
 
 
 def show(quiet: bool, table: Table, where: Path) -> None:

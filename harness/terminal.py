@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -42,12 +43,14 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
 
 
 def as_text(result: Any) -> str:
-    """A result of dicts, lists, texts and numbers as JSON; what is not finite is null there."""
+    """A result of dataclasses, dicts, lists, texts and numbers as JSON; what is not finite is null there."""
     return json.dumps(finite(result), indent=1, ensure_ascii=False, allow_nan=False)
 
 
 def finite(result: Any) -> Any:
     """The result with None for numbers that JSON does not know."""
+    if is_dataclass(result):
+        return {each.name: finite(getattr(result, each.name)) for each in fields(result)}
     if isinstance(result, dict):
         return {name: finite(value) for name, value in result.items()}
     if isinstance(result, list | tuple):
