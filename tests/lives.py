@@ -176,7 +176,8 @@ def beside_sources(root, paths):
         rows.append(life.begin().run())
         life.end()
     new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - mine}
-    return {"rows": rows, "foreign": [file for file in new if file and file.startswith(root)]}
+    places = (os.path.join(root, "fmus", ""), os.path.join(os.path.dirname(pythonfmu.__file__), ""))
+    return {"rows": rows, "foreign": [file for file in new if file and file.startswith(places)]}
 
 
 def in_folder(path, folder):

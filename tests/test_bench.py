@@ -6,13 +6,16 @@ from functools import partial
 from math import inf, nan
 
 import pytest
+from native_fmus import built as native_built
 
+from harness.bench import in_c, native
 from harness.bench import speed as bench_speed
 from harness.bench.accuracy import default, drift, exact, late
 from harness.bench.measure import Beside, Measure, best
 from harness.bench.speed import communication_step, inside_python, many_runs, step
 from harness.bench.study import FILE, FOLDER, bench, measures
 from harness.bench.table import numbers, words
+from harness.errors import HarnessError
 
 FAST = Measure("a step", 2e-6, "s", 3e-6, (Beside("theirs", 5e-6), Beside("absent is not installed")))
 
@@ -31,6 +34,20 @@ def all_measures(place, monkeypatch):
     monkeypatch.chdir(place)
     monkeypatch.setattr(bench_speed, "RUNS", 20)
     return measures()
+
+
+@pytest.fixture
+def both_kinds(fmus, tmp_path, monkeypatch):
+    """A folder with the FMUs in Python and the native ones, where nothing has been measured yet."""
+    (tmp_path / "fmus").mkdir()
+    for file in fmus.glob("*.fmu"):
+        (tmp_path / "fmus" / file.name).symlink_to(file)
+    (tmp_path / "fmus" / "native").symlink_to(native_built())
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(native, "REPEAT", 3)
+    for measured in (native.of_fmu, native.of_cvode, native.through_fmpy):
+        measured.cache_clear()
+    return tmp_path / "fmus"
 
 
 def of(all_measures, function):
@@ -88,3 +105,48 @@ def test_the_csv_holds_every_number(tmp_path):
     with (tmp_path / FOLDER / FILE).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [(row["measured"], row["its value"]) for row in rows] == [("2e-06", "5e-06"), ("2e-06", "")]
+
+
+@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_one_in_python(both_kinds):
+    found = [native.run_in_c("stickslip"), native.step_in_c("stickslip")]
+    found += [native.run_through_fmpy("stickslip"), native.step_through_fmpy("stickslip")]
+    for measure in found:
+        assert 0.0 < measure.value < measure.beside[0].value
+    assert native.off("stickslip", native.of_fmu("stickslip", "native")) < 1e-12
+
+
+@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+@pytest.mark.parametrize("case", native.REACH)
+def test_the_cvode_fmu_gets_better_with_its_tolerance_and_the_native_one_is_better_still(case, both_kinds):
+    try:
+        errors = [native.off(case, native.of_cvode(case, rtol)) for rtol in (1e-4, 1e-6, 1e-8)]
+    except in_c.NotHereError as error:
+        pytest.skip(str(error))
+    assert 0.1 > errors[0] > 5 * errors[1] > 25 * errors[2] > 0.0
+    measure = native.against_cvode(case)
+    assert measure.value >= native.off(case, native.of_fmu(case, "native")) / min(errors)
+    assert len(measure.beside) == 4
+
+
+def test_what_a_machine_lacks_is_told_in_its_row_and_fails_nothing(both_kinds, monkeypatch):
+    monkeypatch.setattr(in_c, "COMPILER", None)
+    (both_kinds / "native").unlink()
+    in_c.host.cache_clear()
+    in_c.cvode.cache_clear()
+    found = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.against_cvode("smd")]
+    assert [measure.reached for measure in found] == [False, False, False]
+    assert [measure.beside[0].name.split(":")[0] for measure in found] == ["not built"] * 3
+    with pytest.raises(in_c.NotHereError, match="not installed: a C compiler"):
+        native.of_cvode("smd", 1e-6)
+    monkeypatch.setattr(in_c, "COMPILER", "false")  # one that finds no header
+    with pytest.raises(in_c.NotHereError, match="not installed: SUNDIALS"):
+        native.of_cvode("smd", 1e-6)
+    assert "not measured" in "".join(str(cell) for cell in numbers(found).columns[3].cells)
+
+
+@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+def test_a_run_that_an_fmu_refuses_in_c_gives_its_sentence(both_kinds):
+    library = in_c.built(both_kinds / "native" / "stickslip.fmu")
+    with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
+        in_c.runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)

@@ -12,12 +12,13 @@ FOLDER, FILE = "bench", "bench.csv"
 
 
 def measures() -> list[Callable[[], Measure]]:
-    """All that is measured: run times, then errors."""
+    """All that is measured: run times, then those of the native FMUs, then errors."""
     check()
     from .accuracy import accuracy
+    from .native import native
     from .speed import speed
 
-    return [*speed(), *accuracy()]
+    return [*speed(), *native(), *accuracy()]
 
 
 def bench(chosen: list[Callable[[], Measure]], out: Path, report: Callable[[str, float], None]) -> list[Measure]:

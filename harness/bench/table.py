@@ -1,6 +1,7 @@
 """The table of the benchmark."""
 
 from collections.abc import Iterable
+from math import isnan
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -18,7 +19,8 @@ def numbers(found: Iterable[Measure]) -> Table:
     table.add_column("")
     table.add_column("beside")
     for measure in found:
-        verdict = Text("reached") if measure.reached else Text("missed", style="bold red")
+        missed = Text("not measured", style="dim") if isnan(measure.value) else Text("missed", style="bold red")
+        verdict = Text("reached") if measure.reached else missed
         beside = "\n".join(words(measure, each) for each in measure.beside)
         figures = (figure(number, measure.unit) for number in (measure.value, measure.reach))
         table.add_row(measure.what, *figures, verdict, beside)
@@ -34,7 +36,9 @@ def words(measure: Measure, beside: Beside) -> str:
 
 
 def figure(value: float, unit: str) -> str:
-    """A number in its unit, seconds in one of a handy size."""
+    """A number in its unit, seconds in one of a handy size; nothing for what was not measured."""
+    if isnan(value):
+        return ""
     if unit == "s":
         size, name = next((s, n) for s, n in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (0.0, "ns")) if value >= s)
         return f"{value / (size or 1e-9):.3g} {name}"
