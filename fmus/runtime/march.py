@@ -109,21 +109,27 @@ class March(Step):
 
     def advance(self, model, t):
         """Take the present point to t; OK or the reason why not."""
-        left = MOST_STEPS
-        while self.t1 < t:
-            status = self.take(model)
+        if self.t1 < t:
+            status = self.cover(model, t)
             if status != OK:
                 return status
-            left -= 1
-            if left == 0:
-                return ENDLESS
         self.t, self.renewed = t, False
-        if t == self.t1:
-            self.x, self.v, self.mode = self.x1, self.v1, self.mode1
-        else:
+        if t < self.t1:
             self.x, self.v = self.at(model, t)
             self.mode = self.mode0
-        return OK if fabs(self.x) + fabs(self.v) < HUGE else DIVERGED
+            if self.t1 == inf and not fabs(self.x) + fabs(self.v) < HUGE:
+                return DIVERGED  # a step without end has not been judged at its end
+        else:
+            self.x, self.v, self.mode = self.x1, self.v1, self.mode1
+        return OK
+
+    def cover(self, model, t):
+        """Take internal steps until one of them covers t."""
+        for _ in range(MOST_STEPS):
+            status = self.take(model)
+            if status != OK or self.t1 >= t:
+                return status
+        return ENDLESS
 
     def look_ahead(self, model):
         """Where the internal step that covers the time after the present point ends; NaN if it fails."""
