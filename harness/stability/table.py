@@ -3,18 +3,18 @@
 from collections.abc import Iterable
 from itertools import groupby
 
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from ..precision.table import grid
 from .study import FINISHED, Region, Row
 
 METHODS = ("exact", "ode23", "ode45", "dop853", "rodas")
 
 
 def endings(rows: Iterable[Row]) -> Table:
-    """Largest error and internal steps of every run that should end; a line for each scene."""
-    table = grid("largest error, as a share of the largest value, and internal steps", "scene")
+    """Largest error and, below it, internal steps of every run that should end."""
+    table = scenes("largest error, as a share of the largest value, and below it internal steps")
     for method in METHODS:
         table.add_column(method, justify="right", no_wrap=True)
     rows = sorted((row for row in rows if row.case.finish is not None), key=lambda row: row.case.model)
@@ -27,18 +27,25 @@ def endings(rows: Iterable[Row]) -> Table:
     return table
 
 
+def scenes(title: str) -> Table:
+    """A table that begins with the scene, and breaks its lines rather than cut them off."""
+    table = Table(title=title, box=SIMPLE_HEAD, show_edge=False, title_justify="left", expand=True)
+    table.add_column("scene", ratio=1, overflow="fold")
+    return table
+
+
 def cell(row: Row) -> Text:
     """The end of one run."""
     if not row.well or row.ended != FINISHED or row.motion is None:
         return Text("wrong", style="bold red")
-    return Text(f"{f'{row.error:.0e}' if row.error else '0'} {row.motion.counts.steps:>7}")
+    return Text(f"{f'{row.error:.0e}' if row.error else '0'}\n{row.motion.counts.steps}")
 
 
 def refusals(rows: Iterable[Row]) -> Table:
     """The sentence of every run that should be refused; where the models say the same, that of one."""
-    table = grid("refused, each with its sentence", "scene")
+    table = scenes("refused, each with its sentence")
     table.add_column("models")
-    table.add_column("sentence")
+    table.add_column("sentence", ratio=3)
     found: dict[str, list[Row]] = {}
     for row in rows:
         if row.case.finish is None:
