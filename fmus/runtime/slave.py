@@ -70,8 +70,9 @@ class Slave(Fmi2Slave):
 
     def exit_initialization_mode(self):
         try:
-            if self.objection():
-                self.fail(self.objection())
+            sentence = self.objection()
+            if sentence:
+                self.fail(sentence)
             else:
                 self.apply()
         except BaseException as error:  # an exception that left Python would crash the host
