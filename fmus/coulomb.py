@@ -66,12 +66,14 @@ class Coulomb(DryFriction):
         return self.F_ext - self.k * x, 0.0, self.f
 
     def observe(self, t, x, v, mode):
-        self.x, self.v = x, v
-        self.F_spring = -self.k * x
-        if self.friction == HYBRID and mode == 0:
-            self.mode, self.F_friction, self.a = 0, self.F_ext + self.F_spring, 0.0
+        spring = -self.k * x
+        pull = self.F_ext + spring
+        self.x, self.v, self.F_spring = x, v, spring
+        if mode == 0 and self.friction == HYBRID:
+            self.mode, self.F_friction, self.a = 0, pull, 0.0
         else:
-            self.mode = mode if mode != 0 else sign(v)
-            self.F_friction = self.mode * self.f
-            self.a = (self.F_ext + self.F_spring - self.c * v - self.F_friction) / self.m
-        self.energy = 0.5 * (self.m * v * v + self.k * x * x)
+            if mode == 0:
+                mode = sign(v)
+            friction = mode * self.f
+            self.mode, self.F_friction, self.a = mode, friction, (pull - self.c * v - friction) / self.m
+        self.energy = 0.5 * (self.m * v * v - spring * x)

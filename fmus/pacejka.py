@@ -54,7 +54,7 @@ class Pacejka(Oscillator):
         super().__init__()
         self.solver = Solver()
         self.t_base = self.x_base = 0.0  # the driver stood at x_base at the time t_base
-        self.B = self.C = self.D = self.E = 0.0
+        self.B = self.C = self.D = self.E = self.weight = 0.0
 
     def initial(self, t):
         self.t_base, self.x_base = t, 0.0
@@ -66,6 +66,7 @@ class Pacejka(Oscillator):
     def prepare(self):
         if self.mu_d >= self.mu_s:
             return 1
+        self.weight = self.m * self.g
         self.D = self.mu_s
         self.C = 2.0 - 2.0 * asin(self.mu_d / self.D) / pi
         self.B = 2.0 * self.mu_s / (self.x_m * self.C * self.D)
@@ -93,7 +94,9 @@ class Pacejka(Oscillator):
 
     def observe(self, t, x, v, mode):
         driver = self.x_base + self.v_driver * (t - self.t_base)
-        spring, drag = self.k * (driver - x), self.mu(v) * self.m * self.g
-        self.x, self.v, self.x_driver, self.F_spring, self.F_friction = x, v, driver, spring, drag
+        stretch, drag = driver - x, self.mu(v) * self.weight
+        spring = self.k * stretch
+        self.x, self.v, self.x_driver = x, v, driver
+        self.F_spring, self.F_friction = spring, drag
         self.a = (self.F_ext + spring - drag) / self.m
-        self.energy = 0.5 * (self.m * v * v + spring * (driver - x))
+        self.energy = 0.5 * (self.m * v * v + spring * stretch)

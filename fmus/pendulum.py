@@ -79,10 +79,8 @@ class Pendulum(DryFriction):
             return 3
         return super().prepare()
 
-    def pin(self, load, x, v, mode):
-        """Load on the pin, N, while it slides; the reaction obeys N^2 = R^2 + (b - mode share N)^2."""
-        if self.pin_load == WEIGHT:
-            return self.weight
+    def reaction(self, load, x, v, mode):
+        """Reaction of the pin, N, while it slides: it obeys N^2 = R^2 + (b - mode share N)^2."""
         radial = self.weight * cos(x) + self.m * self.a * v * v
         b = self.weight * sin(x) + self.m * self.a * load / self.J
         rest = 1.0 - self.share * self.share
@@ -92,7 +90,8 @@ class Pendulum(DryFriction):
         if mode == 0:
             mode = sign(v)
         load = self.T_ext - self.moment * sin(x)
-        return (load - mode * self.arm * self.pin(load, x, v, mode)) / self.J
+        pin = self.weight if self.pin_load == WEIGHT else self.reaction(load, x, v, mode)
+        return (load - mode * self.arm * pin) / self.J
 
     def jacobian(self, t, x, v, mode):
         if mode == 0:
@@ -117,11 +116,13 @@ class Pendulum(DryFriction):
     def observe(self, t, x, v, mode):
         load = self.T_ext - self.moment * sin(x)
         self.theta, self.omega = x, v
-        if self.friction == HYBRID and mode == 0:
+        if mode == 0 and self.friction == HYBRID:
             self.mode, self.T_friction, self.alpha = 0, load, 0.0
         else:
-            self.mode = mode if mode != 0 else sign(v)
-            self.T_friction = self.mode * self.arm * self.pin(load, x, v, self.mode)
-            self.alpha = (load - self.T_friction) / self.J
+            if mode == 0:
+                mode = sign(v)
+            pin = self.weight if self.pin_load == WEIGHT else self.reaction(load, x, v, mode)
+            friction = mode * self.arm * pin
+            self.mode, self.T_friction, self.alpha = mode, friction, (load - friction) / self.J
         half = sin(0.5 * x)
         self.energy = 0.5 * self.J * v * v + 2.0 * self.moment * half * half

@@ -56,7 +56,8 @@ class Smd(Oscillator):
         return self.F_ext / self.m
 
     def observe(self, t, x, v, mode):
+        spring, damper = -self.k * x, -self.c * v
         self.x, self.v = x, v
-        self.a = self.acceleration(t, x, v, mode)
-        self.F_spring, self.F_damper = -self.k * x, -self.c * v
-        self.energy = 0.5 * (self.m * v * v + self.k * x * x)
+        self.F_spring, self.F_damper = spring, damper
+        self.a = (self.F_ext + spring + damper) / self.m
+        self.energy = 0.5 * (self.m * v * v - spring * x)

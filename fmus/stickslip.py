@@ -100,7 +100,8 @@ class Stickslip(DryFriction):
         driver = self.x_base + self.v_driver * (t - self.t_base)
         spring = self.k * (driver - x)
         pull = self.F_ext + spring
-        self.x, self.v, self.x_driver, self.F_spring, self.mode = x, v, driver, spring, mode
+        self.x, self.v, self.x_driver = x, v, driver
+        self.F_spring, self.mode = spring, mode
         if mode != 0:
             self.F_friction = mode * self.sliding
         elif self.friction == HYBRID:

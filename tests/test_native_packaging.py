@@ -93,7 +93,7 @@ def test_what_is_in_the_file(smd):
 
 def test_only_what_the_model_needs_is_compiled():
     text = entries(built() / "smd.fmu")["sources/model.h"].decode()
-    assert "Exact_underdamped" in text
+    assert "Exact_overdamped" in text
     assert "DryFriction" not in text
     text = entries(built() / "pacejka.fmu")["sources/model.h"].decode()
     assert "Exact" not in text

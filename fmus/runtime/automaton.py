@@ -62,16 +62,16 @@ class DryFriction(Oscillator):
         wait = (limit - direction * load) / fabs(rate)
         return t + (wait if wait > 0.0 else 0.0), direction
 
-    def reversal(self, march):
+    def reversal(self, step):
         """When the speed leaves the direction of the mode within the step, to the last bit; inf if it does not."""
-        mode = march.mode0
-        low, high = march.t0, march.t1
-        ahead, behind = mode * march.v0, mode * march.v1
+        mode = step.mode0
+        low, high = step.t0, step.t1
+        ahead, behind = mode * step.v0, mode * step.v1
         if behind > 0.0:
-            high = self.dip(march)
+            high = self.dip(step)
             if not high < inf:
                 return inf
-            _, v = march.at(self, high)
+            _, v = step.at(self, high)
             behind = mode * v
         kept = 0  # the end of the bracket that the last secant left where it was
         for _ in range(MOST_HALVINGS):
@@ -82,7 +82,7 @@ class DryFriction(Oscillator):
                 secant = low + (high - low) * (ahead / (ahead - behind))
                 if low < secant < high:
                     middle = secant
-            _, v = march.at(self, middle)
+            _, v = step.at(self, middle)
             v *= mode
             if v > 0.0:
                 low, ahead = middle, v
@@ -96,16 +96,16 @@ class DryFriction(Oscillator):
                 kept = -1
         return high
 
-    def dip(self, march):
+    def dip(self, step):
         """When the speed is found against the mode within a step that it enters falling and leaves rising; else inf."""
-        mode = march.mode0
-        if mode * march.a0 >= 0.0 or mode * march.a1 <= 0.0:
+        mode = step.mode0
+        if mode * step.a0 >= 0.0 or mode * step.a1 <= 0.0:
             return inf
-        low, high = march.t0, march.t1
+        low, high = step.t0, step.t1
         for _ in range(MOST_THIRDS):
             third = (high - low) / 3.0
-            _, left = march.at(self, low + third)
-            _, right = march.at(self, high - third)
+            _, left = step.at(self, low + third)
+            _, right = step.at(self, high - third)
             if mode * left <= 0.0:
                 return low + third
             if mode * right <= 0.0:

@@ -61,8 +61,6 @@ class Dop853:
     def __init__(self):
         self.v6 = self.v7 = self.v8 = self.v9 = self.v10 = self.v11 = self.v12 = 0.0  # speeds and accelerations
         self.a6 = self.a7 = self.a8 = self.a9 = self.a10 = self.a11 = self.a12 = 0.0  # at the stages
-        self.p0 = self.p1 = self.p2 = self.p3 = self.p4 = self.p5 = self.p6 = self.p7 = 0.0  # the interpolant's
-        self.q0 = self.q1 = self.q2 = self.q3 = self.q4 = self.q5 = self.q6 = self.q7 = 0.0  # coefficients
 
     def step(self, model, mode, t, x, v, a, h):
         """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
@@ -117,8 +115,8 @@ class Dop853:
         )
         return x1, v1, a1, e_x, e_v
 
-    def expand(self, model, mode, t, x, v, a, h, x1, v1, a1):
-        """Coefficients of the interpolant of the step just taken."""
+    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+        """The interpolant of the step just taken."""
         v6, v7, v8, v9, v10, v11, v12 = self.v6, self.v7, self.v8, self.v9, self.v10, self.v11, self.v12
         a6, a7, a8, a9, a10, a11, a12 = self.a6, self.a7, self.a8, self.a9, self.a10, self.a11, self.a12
         y = A141 * v + A147 * v7 + A148 * v8 + A149 * v9
@@ -135,33 +133,24 @@ class Dop853:
         v16 = A161 * a + A166 * a6 + A167 * a7 + A168 * a8
         v16 = v + h * (v16 + A169 * a9 + A1613 * a1 + A1614 * a14 + A1615 * a15)
         a16 = model.acceleration(t + C16 * h, y, v16, mode)
-        p = x1 - x
-        self.p0, self.p1, self.p2, self.p3 = x, p, h * v - p, 2.0 * p - h * (v + v1)
+        inside.meet(h, x, v, a, x1, v1, a1)
+        inside.degree = 7
         p = D41 * v + D46 * v6 + D47 * v7 + D48 * v8 + D49 * v9 + D410 * v10
-        self.p4 = h * (p + D411 * v11 + D412 * v12 + D413 * v1 + D414 * v14 + D415 * v15 + D416 * v16)
+        inside.p4 = h * (p + D411 * v11 + D412 * v12 + D413 * v1 + D414 * v14 + D415 * v15 + D416 * v16)
         p = D51 * v + D56 * v6 + D57 * v7 + D58 * v8 + D59 * v9 + D510 * v10
-        self.p5 = h * (p + D511 * v11 + D512 * v12 + D513 * v1 + D514 * v14 + D515 * v15 + D516 * v16)
+        inside.p5 = h * (p + D511 * v11 + D512 * v12 + D513 * v1 + D514 * v14 + D515 * v15 + D516 * v16)
         p = D61 * v + D66 * v6 + D67 * v7 + D68 * v8 + D69 * v9 + D610 * v10
-        self.p6 = h * (p + D611 * v11 + D612 * v12 + D613 * v1 + D614 * v14 + D615 * v15 + D616 * v16)
+        inside.p6 = h * (p + D611 * v11 + D612 * v12 + D613 * v1 + D614 * v14 + D615 * v15 + D616 * v16)
         p = D71 * v + D76 * v6 + D77 * v7 + D78 * v8 + D79 * v9 + D710 * v10
-        self.p7 = h * (p + D711 * v11 + D712 * v12 + D713 * v1 + D714 * v14 + D715 * v15 + D716 * v16)
-        p = v1 - v
-        self.q0, self.q1, self.q2, self.q3 = v, p, h * a - p, 2.0 * p - h * (a + a1)
+        inside.p7 = h * (p + D711 * v11 + D712 * v12 + D713 * v1 + D714 * v14 + D715 * v15 + D716 * v16)
         p = D41 * a + D46 * a6 + D47 * a7 + D48 * a8 + D49 * a9 + D410 * a10
-        self.q4 = h * (p + D411 * a11 + D412 * a12 + D413 * a1 + D414 * a14 + D415 * a15 + D416 * a16)
+        inside.q4 = h * (p + D411 * a11 + D412 * a12 + D413 * a1 + D414 * a14 + D415 * a15 + D416 * a16)
         p = D51 * a + D56 * a6 + D57 * a7 + D58 * a8 + D59 * a9 + D510 * a10
-        self.q5 = h * (p + D511 * a11 + D512 * a12 + D513 * a1 + D514 * a14 + D515 * a15 + D516 * a16)
+        inside.q5 = h * (p + D511 * a11 + D512 * a12 + D513 * a1 + D514 * a14 + D515 * a15 + D516 * a16)
         p = D61 * a + D66 * a6 + D67 * a7 + D68 * a8 + D69 * a9 + D610 * a10
-        self.q6 = h * (p + D611 * a11 + D612 * a12 + D613 * a1 + D614 * a14 + D615 * a15 + D616 * a16)
+        inside.q6 = h * (p + D611 * a11 + D612 * a12 + D613 * a1 + D614 * a14 + D615 * a15 + D616 * a16)
         p = D71 * a + D76 * a6 + D77 * a7 + D78 * a8 + D79 * a9 + D710 * a10
-        self.q7 = h * (p + D711 * a11 + D712 * a12 + D713 * a1 + D714 * a14 + D715 * a15 + D716 * a16)
-
-    def at(self, s):
-        """Position and speed at the fraction s of the step."""
-        r = 1.0 - s
-        p = self.p3 + r * (self.p4 + s * (self.p5 + r * (self.p6 + s * self.p7)))
-        q = self.q3 + r * (self.q4 + s * (self.q5 + r * (self.q6 + s * self.q7)))
-        return self.p0 + s * (self.p1 + r * (self.p2 + s * p)), self.q0 + s * (self.q1 + r * (self.q2 + s * q))
+        inside.q7 = h * (p + D711 * a11 + D712 * a12 + D713 * a1 + D714 * a14 + D715 * a15 + D716 * a16)
 
 
 def combine(fifth, third):

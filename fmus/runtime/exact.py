@@ -57,22 +57,23 @@ class Exact:
             )
         if self.kind == FREE:
             return self.x0 + (self.v0 + 0.5 * self.a0 * t) * t, self.v0 + self.a0 * t
-        g, slope, integral = self.underdamped(t) if self.kind == UNDERDAMPED else self.overdamped(t)
+        if self.kind == UNDERDAMPED:
+            half = 0.5 * self.w * t
+            e, s, c = exp(-self.z * t), sin(half), cos(half)
+            g, fall = 2.0 * s * c / self.w, 2.0 * s * s
+            zg = self.z * g
+            # 1 - e cos is split so that it keeps its digits at small t; without a force nobody asks for it
+            integral = (e * (fall - zg) - expm1(-self.z * t)) / self.n2 if self.p != 0.0 else 0.0
+            g, slope = e * g, e * (1.0 - fall - zg)
+        else:
+            g, slope, integral = self.overdamped(t)
         return (
             self.x0 * (slope + 2.0 * self.z * g) + self.v0 * g + self.p * integral,
             (self.p - self.n2 * self.x0) * g + self.v0 * slope,
         )
 
-    def underdamped(self, t):
-        """G, G' and the integral of G; 1 - e cos is split so that it keeps its digits at small t."""
-        half = 0.5 * self.w * t
-        e, s, c = exp(-self.z * t), sin(half), cos(half)
-        g, fall = 2.0 * s * c / self.w, 2.0 * s * s
-        zg = self.z * g
-        return e * g, e * (1.0 - fall - zg), (e * (fall - zg) - expm1(-self.z * t)) / self.n2
-
     def overdamped(self, t):
-        """The same from the two real roots, which coincide at critical damping."""
+        """G, G' and I from the two real roots, which coincide at critical damping."""
         z, w, slow = self.z, self.w, self.slow
         e = exp(slow * t)
         u = expm1(-2.0 * w * t)

@@ -6,7 +6,7 @@ beyond it, because somebody looked ahead, does not show.
 
 from math import fabs, inf, nan
 
-from .declare import Choice, Count, Fixed, Local
+from .declare import Choice, Count, Declaring, Fixed, Local
 from .methods import ITEMS, ODE23
 from .step import DIVERGED, HUGE, HYBRID, OK, STUCK, Step
 
@@ -14,7 +14,7 @@ ENDLESS = 3
 MOST_STEPS = 2_000_000  # within one communication step: half a minute at most, then a sentence
 
 
-class March(Step):
+class March(Declaring):
     """Solver settings, counts, and the present point."""
 
     method = Choice(ODE23, "integration method", ITEMS)
@@ -34,10 +34,11 @@ class March(Step):
 
     def __init__(self):
         super().__init__()
+        self.step = Step()
         self.t = self.x = self.v = 0.0
         self.mode = STUCK
         # what the present point was before its values were renewed
-        self.renewed = False
+        self.renewed_at = nan
         self.called_then = self.happened_then = self.mode_then = 0
         self.size_then = 0.0
         self.t_event_then = nan
@@ -46,107 +47,108 @@ class March(Step):
 
     def start(self, model, t, x, v, t_end, tolerance):
         """Begin a run at t; t_end is inf where the importer does not know it."""
+        step = self.step
         run = t_end - t if t_end < inf else model.stop_time
-        self.tolerance = self.rtol if self.rtol > 0.0 else tolerance
-        self.longest = self.h_max if self.h_max > 0.0 else 0.1 * run
-        self.t_end = t_end
-        self.methods.choose(self.method)
-        self.taken = self.refused = self.called = self.happened = self.idle = 0
-        self.size = self.last_size = 0.0
-        self.t_event = nan
-        self.event = self.renewed = False
+        step.tolerance = self.rtol if self.rtol > 0.0 else tolerance
+        step.longest = self.h_max if self.h_max > 0.0 else 0.1 * run
+        step.t_end = t_end
+        step.methods.choose(self.method)
         if model.dry:
-            self.sticks = model.friction == HYBRID
-        self.t1, self.x1, self.v1 = t, x, v
+            step.sticks = model.friction == HYBRID
         self.scale(model)
-        self.settle(model)
-        self.stand()
+        step.begin(model, t, x, v)
+        self.renewed_at = nan
+        self.arrive()
 
     def restart(self, model):
         """Discard what lies beyond the present point, and go on from there with the values that now hold.
 
         Whoever sets two values at one point may read between them: the second time starts from where the first did.
         """
-        if self.t > self.t0:
-            self.last_size = self.t1 - self.t0
-            if self.event and self.t >= self.t1:
-                self.note_event()
+        step = self.step
+        if self.t > step.t0:
+            step.before.length = step.t1 - step.t0
+            if step.event and self.t >= step.t1:
+                step.note_event()
         else:
-            self.taken, self.refused, self.called = self.taken0, self.refused0, self.called0
-            self.size = self.size0
-        self.event = False
-        if self.renewed:
-            self.called, self.happened, self.size = self.called_then, self.happened_then, self.size_then
-            self.t_event = self.t_event_then
+            step.go_back()
+        step.event = False
+        if self.renewed_at == self.t:
+            step.called, step.happened, step.size = self.called_then, self.happened_then, self.size_then
+            step.t_event = self.t_event_then
         else:
-            self.renewed = True
-            self.called_then, self.happened_then, self.size_then = self.called, self.happened, self.size
-            self.t_event_then, self.mode_then = self.t_event, self.mode
-        self.t1, self.x1, self.v1 = self.t, self.x, self.v
+            self.renewed_at = self.t
+            self.called_then, self.happened_then, self.size_then = step.called, step.happened, step.size
+            self.t_event_then, self.mode_then = step.t_event, self.mode
         self.scale(model)
-        self.settle(model)
-        if self.mode1 != self.mode_then:
-            self.note_event()
-        self.stand()
+        step.stand(model, self.t, self.x, self.v)
+        if step.mode1 != self.mode_then:
+            step.note_event()
+        self.arrive()
 
     def scale(self, model):
         """The sizes of position and speed below which the tolerance is absolute."""
-        size = self.atol / self.tolerance if self.atol > 0.0 else 1e-3
-        self.least_x = self.least_v = size if size > 1e-300 else 1e-300  # divisors
+        step = self.step
+        size = self.atol / step.tolerance if self.atol > 0.0 else 1e-3
+        step.least_x = step.least_v = size if size > 1e-300 else 1e-300  # divisors
         finest = model.finest()
-        if self.atol == 0.0 and finest < self.least_v:
-            self.least_v = finest
-
-    def stand(self):
-        """The present point is both ends of an empty step, and a step size is at hand unless the body is stuck."""
-        if self.size == 0.0 and not (self.sticks and self.mode1 == STUCK):
-            self.size = self.first_size()
-        self.t, self.x, self.v, self.mode = self.t1, self.x1, self.v1, self.mode1
-        self.t0 = self.t1
-        self.taken0, self.refused0, self.called0, self.size0 = self.taken, self.refused, self.called, self.size
+        if self.atol == 0.0 and finest < step.least_v:
+            step.least_v = finest
 
     # ---- the present point
 
     def advance(self, model, t):
         """Take the present point to t; OK or the reason why not."""
-        if self.t1 < t:
-            status = self.cover(model, t)
+        step = self.step
+        if step.t1 < t:
+            status = step.take(model)
+            if status == OK and step.t1 < t:
+                status = self.cover(model, t)
             if status != OK:
                 return status
-        self.t, self.renewed = t, False
-        if t < self.t1:
-            self.x, self.v = self.at(model, t)
-            self.mode = self.mode0
-            if self.t1 == inf and not fabs(self.x) + fabs(self.v) < HUGE:
+        if t < step.t1:
+            self.t, self.mode = t, step.mode0
+            self.x, self.v = step.at(model, t)
+            if step.t1 == inf and not fabs(self.x) + fabs(self.v) < HUGE:
                 return DIVERGED  # a step without end has not been judged at its end
         else:
-            self.x, self.v, self.mode = self.x1, self.v1, self.mode1
+            self.arrive()
         return OK
+
+    def arrive(self):
+        """The present point is the end of the step."""
+        step = self.step
+        self.t, self.mode = step.t1, step.mode1
+        self.x, self.v = step.x1, step.v1
 
     def cover(self, model, t):
         """Take internal steps until one of them covers t."""
+        step = self.step
         for _ in range(MOST_STEPS):
-            status = self.take(model)
-            if status != OK or self.t1 >= t:
+            status = step.take(model)
+            if status != OK or step.t1 >= t:
                 return status
         return ENDLESS
 
     def look_ahead(self, model):
         """Where the internal step that covers the time after the present point ends; NaN if it fails."""
-        while self.t >= self.t1 and self.t1 < self.t_end:
-            if self.take(model) != OK:
+        step = self.step
+        while self.t >= step.t1 and step.t1 < step.t_end:
+            if step.take(model) != OK:
                 self.t_next = nan
                 return
-        self.t_next = self.t1
+        self.t_next = step.t1
 
     def report(self, events):
         """The declared counts, up to the present point."""
-        here = self.event and self.t >= self.t1
-        events.count = self.happened + 1 if here else self.happened
-        events.t_last = self.t1 if here else self.t_event
-        if self.t > self.t0:
-            self.steps, self.rejected, self.evaluations = self.taken, self.refused, self.called
-            self.h = self.t1 - self.t0
+        step = self.step
+        here = step.event and self.t >= step.t1
+        events.count = step.happened + 1 if here else step.happened
+        events.t_last = step.t1 if here else step.t_event
+        if self.t > step.t0:
+            self.steps, self.rejected, self.evaluations = step.taken, step.refused, step.called
+            self.h = step.t1 - step.t0
         else:
-            self.steps, self.rejected, self.evaluations = self.taken0, self.refused0, self.called0
-            self.h = self.last_size
+            before = step.before
+            self.steps, self.rejected, self.evaluations = before.taken, before.refused, before.called
+            self.h = before.length

@@ -51,23 +51,13 @@ class Methods:
             return self.dop853.step(model, mode, t, x, v, a, h)
         return self.ode45.step(model, mode, t, x, v, a, h)
 
-    def expand(self, model, mode, t, x, v, a, h, x1, v1, a1):
-        """Coefficients of the interpolant of the step just taken."""
+    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+        """The interpolant of the step just taken."""
         if self.chosen == RODAS:
-            self.rodas.expand(model, mode, t, x, v, a, h, x1, v1, a1)
+            self.rodas.expand(inside, model, mode, t, x, v, a, h, x1, v1, a1)
         elif self.chosen == DOP853:
-            self.dop853.expand(model, mode, t, x, v, a, h, x1, v1, a1)
+            self.dop853.expand(inside, model, mode, t, x, v, a, h, x1, v1, a1)
         elif self.chosen == ODE45:
-            self.ode45.expand(model, mode, t, x, v, a, h, x1, v1, a1)
+            self.ode45.expand(inside, model, mode, t, x, v, a, h, x1, v1, a1)
         else:
-            self.ode23.expand(model, mode, t, x, v, a, h, x1, v1, a1)
-
-    def at(self, s):
-        """Position and speed at the fraction s of the step."""
-        if self.chosen == RODAS:
-            return self.rodas.at(s)
-        if self.chosen == DOP853:
-            return self.dop853.at(s)
-        if self.chosen == ODE45:
-            return self.ode45.at(s)
-        return self.ode23.at(s)
+            self.ode23.expand(inside, model, mode, t, x, v, a, h, x1, v1, a1)

@@ -12,10 +12,6 @@ POWER, SAFETY, SHRINK, GROW = 1.0 / 3.0, 0.8, 0.5, 5.0
 class Ode23:
     """One step, and the cubic through values and slopes of both its ends."""
 
-    def __init__(self):
-        self.x0 = self.x1 = self.x2 = self.x3 = 0.0
-        self.v0 = self.v1 = self.v2 = self.v3 = 0.0
-
     def step(self, model, mode, t, x, v, a, h):
         """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
         v2 = v + 0.5 * h * a
@@ -33,16 +29,6 @@ class Ode23:
             (-5.0 * a + 6.0 * a2 + 8.0 * a3 - 9.0 * a1) / 72.0,
         )
 
-    def expand(self, model, mode, t, x, v, a, h, x1, v1, a1):
-        """Coefficients of the interpolant of the step just taken."""
-        rise, p, q = x1 - x, h * v, h * v1
-        self.x0, self.x1, self.x2, self.x3 = x, p, 3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise
-        rise, p, q = v1 - v, h * a, h * a1
-        self.v0, self.v1, self.v2, self.v3 = v, p, 3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise
-
-    def at(self, s):
-        """Position and speed at the fraction s of the step."""
-        return (
-            self.x0 + s * (self.x1 + s * (self.x2 + s * self.x3)),
-            self.v0 + s * (self.v1 + s * (self.v2 + s * self.v3)),
-        )
+    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+        """The interpolant of the step just taken."""
+        inside.meet(h, x, v, a, x1, v1, a1)

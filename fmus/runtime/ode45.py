@@ -28,8 +28,6 @@ class Ode45:
     def __init__(self):
         self.v3 = self.v4 = self.v5 = self.v6 = 0.0  # speeds and accelerations at the stages
         self.a3 = self.a4 = self.a5 = self.a6 = 0.0
-        self.p0 = self.p1 = self.p2 = self.p3 = self.p4 = 0.0  # coefficients of position and speed
-        self.q0 = self.q1 = self.q2 = self.q3 = self.q4 = 0.0
 
     def step(self, model, mode, t, x, v, a, h):
         """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
@@ -58,20 +56,9 @@ class Ode45:
             E1 * a + E3 * a3 + E4 * a4 + E5 * a5 + E6 * a6 + E7 * a1,
         )
 
-    def expand(self, model, mode, t, x, v, a, h, x1, v1, a1):
-        """Coefficients of the interpolant of the step just taken: the cubic of ode23 and D s^2 (1 - s)^2."""
-        rise, p, q = x1 - x, h * v, h * v1
-        bulge = h * (D1 * v + D3 * self.v3 + D4 * self.v4 + D5 * self.v5 + D6 * self.v6 + D7 * v1)
-        self.p0, self.p1, self.p4 = x, p, bulge
-        self.p2, self.p3 = 3.0 * rise - 2.0 * p - q + bulge, p + q - 2.0 * (rise + bulge)
-        rise, p, q = v1 - v, h * a, h * a1
-        bulge = h * (D1 * a + D3 * self.a3 + D4 * self.a4 + D5 * self.a5 + D6 * self.a6 + D7 * a1)
-        self.q0, self.q1, self.q4 = v, p, bulge
-        self.q2, self.q3 = 3.0 * rise - 2.0 * p - q + bulge, p + q - 2.0 * (rise + bulge)
-
-    def at(self, s):
-        """Position and speed at the fraction s of the step."""
-        return (
-            self.p0 + s * (self.p1 + s * (self.p2 + s * (self.p3 + s * self.p4))),
-            self.q0 + s * (self.q1 + s * (self.q2 + s * (self.q3 + s * self.q4))),
-        )
+    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+        """The interpolant of the step just taken: the cubic of ode23 and D s^2 (1 - s)^2."""
+        inside.meet(h, x, v, a, x1, v1, a1)
+        inside.degree = 4
+        inside.p4 = h * (D1 * v + D3 * self.v3 + D4 * self.v4 + D5 * self.v5 + D6 * self.v6 + D7 * v1)
+        inside.q4 = h * (D1 * a + D3 * self.a3 + D4 * self.a4 + D5 * self.a5 + D6 * self.a6 + D7 * a1)

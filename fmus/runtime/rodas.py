@@ -42,13 +42,10 @@ H34, H35 = 18.104410789349338, -3.516963011559032
 
 
 class Rodas:
-    """One step, and the cubic that bends between its ends as the stages say."""
+    """One step, and between its ends a cubic: Hermite's for the position, as the stages say for the speed."""
 
     def __init__(self):
-        self.p1 = self.p2 = self.p3 = self.p4 = self.p5 = 0.0  # the u_i of position and speed, over h
-        self.q1 = self.q2 = self.q3 = self.q4 = self.q5 = 0.0
-        self.x0 = self.x1 = self.x2 = self.x3 = 0.0  # coefficients of the interpolant
-        self.v0 = self.v1 = self.v2 = self.v3 = 0.0
+        self.q1 = self.q2 = self.q3 = self.q4 = self.q5 = 0.0  # the u_i of the speed, over h
 
     def step(self, model, mode, t, x, v, a, h):
         """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
@@ -90,26 +87,14 @@ class Rodas:
         q6 = (model.acceleration(t + h, xs, vs, mode) + q) * w
         p6 = GAMMA * (r + h * q6)
 
-        self.p1, self.p2, self.p3, self.p4, self.p5 = p1, p2, p3, p4, p5
-        self.q1, self.q2, self.q3, self.q4, self.q5 = q1, q2, q3, q4, q5
+        self.q1, self.q2, self.q3 = q1, q2, q3
+        self.q4, self.q5 = q4, q5
         xs, vs = xs + h * p6, vs + h * q6
         return xs, vs, model.acceleration(t + h, xs, vs, mode), p6, q6
 
-    def expand(self, model, mode, t, x, v, a, h, x1, v1, a1):
-        """Coefficients of the interpolant of the step just taken."""
-        p1, p2, p3, p4, p5 = self.p1, self.p2, self.p3, self.p4, self.p5
-        self.x0, self.x1 = x, x1 - x
-        self.x2 = h * (H21 * p1 + H22 * p2 + H23 * p3 + H24 * p4 + H25 * p5)
-        self.x3 = h * (H31 * p1 + H32 * p2 + H33 * p3 + H34 * p4 + H35 * p5)
-        p1, p2, p3, p4, p5 = self.q1, self.q2, self.q3, self.q4, self.q5
-        self.v0, self.v1 = v, v1 - v
-        self.v2 = h * (H21 * p1 + H22 * p2 + H23 * p3 + H24 * p4 + H25 * p5)
-        self.v3 = h * (H31 * p1 + H32 * p2 + H33 * p3 + H34 * p4 + H35 * p5)
-
-    def at(self, s):
-        """Position and speed at the fraction s of the step."""
-        r = 1.0 - s
-        return (
-            self.x0 + s * (self.x1 + r * (self.x2 + s * self.x3)),
-            self.v0 + s * (self.v1 + r * (self.v2 + s * self.v3)),
-        )
+    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+        """The interpolant of the step just taken; slopes of the speed are of no use where the curve is stiff."""
+        q1, q2, q3, q4, q5 = self.q1, self.q2, self.q3, self.q4, self.q5
+        inside.meet_values(h, x, v, x1, v1)
+        inside.q2 = h * (H21 * q1 + H22 * q2 + H23 * q3 + H24 * q4 + H25 * q5)
+        inside.q3 = h * (H31 * q1 + H32 * q2 + H33 * q3 + H34 * q4 + H35 * q5)

@@ -7,7 +7,7 @@ ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci
 
 from math import fabs, inf, nan
 
-from .declare import Declaring
+from .interpolant import Interpolant
 from .methods import EXACT, Methods
 
 OK, DIVERGED, STALLED = 0, 1, 2
@@ -19,11 +19,22 @@ MOST_TRIES = 200  # of one step, which halves each time
 MOST_IDLE = 100  # steps in a row that hardly move the time
 
 
-class Step(Declaring):
-    """The internal step in force, and the counts up to both its ends."""
+class Before:
+    """The beginning of the step: counts up to there, the step size to try there, and the length of the step before."""
 
     def __init__(self):
-        super().__init__()
+        self.taken = self.refused = self.called = 0
+        self.size = self.length = 0.0
+
+
+class Step:
+    """The internal step in force, and the counts up to both its ends.
+
+    CPython 3.11 has the attributes of an object at hand while they are fewer than thirty; with more, a step of ode23
+    takes a tenth longer.
+    """
+
+    def __init__(self):
         self.methods = Methods()
         # the run: tolerances in force, largest step, stop time (inf where unknown), whether zero speed is a mode
         self.tolerance = self.longest = self.least_x = self.least_v = 0.0
@@ -34,28 +45,58 @@ class Step(Declaring):
         self.t1 = self.x1 = self.v1 = self.a1 = 0.0
         self.mode0 = self.mode1 = STUCK
         self.waiting = self.event = False
-        # the interpolant: the length of the step before an event cut it, and whether it has been worked out
+        # the length of the step before an event cut it, and what holds within
         self.span = 0.0
-        self.expanded = False
-        # counts up to t1 and up to t0; the size to try next, then and before
+        self.interpolant = Interpolant()
+        # counts up to t1, and the size to try next; the same at t0
         self.taken = self.refused = self.called = self.happened = self.idle = 0
-        self.taken0 = self.refused0 = self.called0 = 0
-        self.size = self.size0 = self.last_size = 0.0
+        self.size = 0.0
         self.t_event = nan
+        self.before = Before()
+
+    def begin(self, model, t, x, v):
+        """The empty step at the start of a run."""
+        self.taken = self.refused = self.called = self.happened = self.idle = 0
+        self.size = self.before.length = 0.0
+        self.t_event = nan
+        self.event = False
+        self.stand(model, t, x, v)
+
+    def stand(self, model, t, x, v):
+        """The empty step at t: both its ends are there, and a step size is at hand unless the body is stuck."""
+        self.t1, self.x1, self.v1 = t, x, v
+        self.settle(model)
+        if self.size == 0.0 and not (self.sticks and self.mode1 == STUCK):
+            self.size = self.first_size()
+        self.t0 = t
+        self.keep_counts()
+
+    def keep_counts(self):
+        """What holds at t1, where the next step begins."""
+        before = self.before
+        before.taken, before.refused = self.taken, self.refused
+        before.called, before.size = self.called, self.size
+
+    def go_back(self):
+        """Forget what the step that began at t0 has counted."""
+        before = self.before
+        self.taken, self.refused = before.taken, before.refused
+        self.called, self.size = before.called, before.size
 
     def take(self, model):
         """The internal step from t1 on; OK or the reason why not."""
         if self.event:
             self.note_event()
             self.event = False
-        self.last_size = self.t1 - self.t0
-        self.taken0, self.refused0, self.called0, self.size0 = self.taken, self.refused, self.called, self.size
-        self.t0, self.x0, self.v0, self.a0, self.mode0 = self.t1, self.x1, self.v1, self.a1, self.mode1
-        self.waiting = False
+        self.before.length = self.t1 - self.t0
+        self.keep_counts()
+        self.t0, self.x0, self.v0 = self.t1, self.x1, self.v1
+        self.a0, self.mode0 = self.a1, self.mode1
+        self.waiting = self.interpolant.ready = False
         status = OK
-        if model.dry and self.sticks and self.mode0 == STUCK:
+        if self.sticks and self.mode0 == STUCK and model.dry:
             self.wait(model)
-        elif model.linear and self.method == EXACT:
+        elif self.methods.chosen == EXACT and model.linear:
             status = self.take_piece(model)
         else:
             status = self.take_step(model)
@@ -112,7 +153,7 @@ class Step(Declaring):
         left = self.t_end - t
         last = 1.1 * size >= left
         h = left if last else size
-        size_x, size_v = fabs(x), fabs(v)
+        size_x, size_v = x if x > 0.0 else -x, v if v > 0.0 else -v  # a third of the time of fabs, here in each step
         if size_x < self.least_x:
             size_x = self.least_x
         if size_v < self.least_v:
@@ -122,7 +163,7 @@ class Step(Declaring):
         while True:
             x1, v1, a1, e_x, e_v = methods.step(model, mode, t, x, v, a, h)
             self.called += methods.stages
-            y, w = fabs(x1), fabs(v1)
+            y, w = x1 if x1 > 0.0 else -x1, v1 if v1 > 0.0 else -v1
             p = fabs(e_x) / (y if y > size_x else size_x)
             q = fabs(e_v) / (w if w > size_v else size_v)
             error = h * (p if p > q else q) / tolerance
@@ -143,11 +184,11 @@ class Step(Declaring):
             grow = methods.safety * error**-methods.power if error > 1e-9 else methods.grow
             size = h * (grow if grow < methods.grow else methods.grow)
         self.size = size
-        self.span, self.expanded = h, False
+        self.span = h
         self.t1, self.x1, self.v1, self.a1 = self.t_end if last else t + h, x1, v1, a1
-        if model.dry and mode != STUCK:
+        if mode != STUCK and model.dry:
             end = model.reversal(self)
-            if self.expanded:  # the search had to look inside
+            if self.interpolant.ready:  # the search had to look inside
                 self.called += self.methods.extra
             if end <= self.t1:
                 self.t1 = end
@@ -165,7 +206,7 @@ class Step(Declaring):
     def settle(self, model):
         """The mode and the acceleration that hold from t1 on."""
         self.mode1 = STUCK
-        if model.dry and self.sticks:
+        if self.sticks and model.dry:
             self.mode1 = model.settle(self.t1, self.x1, self.v1)
         self.arrive(model)
 
@@ -197,13 +238,14 @@ class Step(Declaring):
 
     def at(self, model, t):
         """Position and speed at t inside the step."""
-        if self.waiting:
-            return self.x0, 0.0
-        if model.linear and self.method == EXACT:
-            return model.exact.at(t - self.t0)
-        if not self.expanded:
+        inside = self.interpolant
+        if not inside.ready:
+            if self.waiting:
+                return self.x0, 0.0
+            if self.methods.chosen == EXACT and model.linear:
+                return model.exact.at(t - self.t0)
+            h = self.span
             self.methods.expand(
-                model, self.mode0, self.t0, self.x0, self.v0, self.a0, self.span, self.x1, self.v1, self.a1
+                inside, model, self.mode0, self.t0, self.x0, self.v0, self.a0, h, self.x1, self.v1, self.a1
             )
-            self.expanded = True
-        return self.methods.at((t - self.t0) / self.span)
+        return inside.at(t - self.t0)

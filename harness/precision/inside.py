@@ -70,12 +70,12 @@ class Inside:
         try:
             for t in times[1:]:
                 if march.advance(model, t) != OK:
-                    raise HarnessError(f"the solver gave up at t = {march.t0:.6g} s")
+                    raise HarnessError(f"the solver gave up at t = {march.step.t0:.6g} s")
                 found.append((march.x, march.v))
                 if late and perf_counter() > late:
                     raise HarnessError(f"at t = {t:.3g} s after {patience:g} s of run time")
         except (ArithmeticError, ValueError):
-            raise HarnessError(f"the motion left the range of numbers after t = {march.t0:.6g} s") from None
+            raise HarnessError(f"the motion left the range of numbers after t = {march.step.t0:.6g} s") from None
         return found
 
     def answer(self, times: list[float], patience: float | None = None) -> Answer:
@@ -84,7 +84,7 @@ class Inside:
         model = self.model
         model.solver.report(model.events)
         evaluations = model.solver.evaluations
-        return Answer(motion, self.events(times[-1]) if model.dry and model.solver.sticks else None, evaluations)
+        return Answer(motion, self.events(times[-1]) if model.dry and model.solver.step.sticks else None, evaluations)
 
     def events(self, stop: float) -> list[tuple[float, int]]:
         """Changes of mode up to the stop, seen by following the solver's own steps."""

@@ -264,8 +264,10 @@ class Expressions(ast.NodeVisitor):
             if isinstance(value.kind, Known):
                 if value.kind.value is not last:
                     continue
-                if not parts:
-                    return value
+                if not any(
+                    isinstance(inner, ast.Call) for before in node.values[: len(parts)] for inner in ast.walk(before)
+                ):
+                    return value  # whatever the parts before say: they do nothing but look
                 parts.append(self.at_run_time(part, value))
                 break
             parts.append(value)

@@ -177,7 +177,7 @@ static void fail(Instance *it, const Text *text)
 static void fail_by_status(Instance *it, int64_t status, double start)
 {
     Text text = {0};
-    tell_failure(status, it->state.model.solver.t0, start, &text);
+    tell_failure(status, it->state.model.solver.step.t0, start, &text);
     fail(it, &text);
 }
 
@@ -520,7 +520,7 @@ static void fail_by_step(Instance *it, double t, double h)
     add(&text, " s is refused: it must be above zero, begin at the present point, t = ");
     add_real(&text, it->state.model.solver.t);
     add(&text, " s, and end by the stop time, t = ");
-    add_real(&text, it->state.model.solver.t_end);
+    add_real(&text, it->state.model.solver.step.t_end);
     add(&text, " s");
     fail(it, &text);
 }
@@ -529,11 +529,11 @@ static void fail_by_step(Instance *it, double t, double h)
 static bool advance_by(Instance *it, double t, double h)
 {
     Model *model = &it->state.model;
-    double now = model->solver.t, stop = model->solver.t_end, end = t + h;
+    double now = model->solver.t, stop = model->solver.step.t_end, end = t + h;
     bool fault = false, begins_here = fabs(t - now) <= 1e-6 * h + 1e-12 * fabs(now);
     int64_t status;
-    if (fabs(end - model->solver.t1) <= 1e-15 * fabs(end) && fabs(end) < INFINITY) {
-        end = model->solver.t1; /* the end of an internal step, but for the rounding of the sum */
+    if (fabs(end - model->solver.step.t1) <= 1e-15 * fabs(end) && fabs(end) < INFINITY) {
+        end = model->solver.step.t1; /* the end of an internal step, but for the rounding of the sum */
     } else if (stop < end && end < INFINITY && end <= stop + 1e-9 * h + 1e-12 * fabs(stop)) {
         end = stop;
     }

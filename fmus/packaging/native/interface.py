@@ -5,7 +5,7 @@ from string import Formatter
 from typing import Any
 
 from ...runtime.declare import Declared, Declaring
-from ...runtime.slave import CALCULATED, SENTENCES
+from ...runtime.hosted import CALCULATED, SENTENCES
 from ...runtime.step import DIVERGED, OK
 from ..description import declared_by
 from .entries import ENTRIES

@@ -3,6 +3,8 @@
 from .kinds import FLOAT, WORDS_OF_C, Kind, Object, Row, Scalar, declare, kind_of, literal
 from .refusal import Refused
 
+NOTHING = "nothing"  # the member of a struct that has no other, for C has no empty ones
+
 
 class Layout:
     """The fields of every class, owned classes first."""
@@ -39,7 +41,9 @@ class Layout:
         """The structs."""
         texts = []
         for cls, fields in self.fields.items():
-            members = "".join(f"    {_member(kind, name)};\n" for name, kind in fields.items())
+            members = (
+                "".join(f"    {_member(kind, name)};\n" for name, kind in fields.items()) or f"    char {NOTHING};\n"
+            )
             texts.append(f"struct {cls.__name__} {{\n{members}}};\n")
         return "\n".join(texts)
 
@@ -56,7 +60,7 @@ class Layout:
             else:
                 text = self.image(value, deeper)
             rows.append(f"{indent}.{name} = {text},\n")
-        return "{\n" + "".join(rows) + indent[4:] + "}"
+        return "{\n" + ("".join(rows) or f"{indent}.{NOTHING} = 0,\n") + indent[4:] + "}"
 
 
 def _member(kind: Kind, name: str) -> str:
