@@ -165,7 +165,7 @@ def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
     def record(t: float) -> None:
         if get_real(component, real_references, n_reals, reals) > WARNING:
             raise FMICallException("fmi2GetReal", ERROR)
-        if get_integer(component, integer_references, n_integers, integers) > WARNING:
+        if n_integers and get_integer(component, integer_references, n_integers, integers) > WARNING:
             raise FMICallException("fmi2GetInteger", ERROR)
         trace.time.append(t)
         trace.reals.frombytes(row_of_reals)

@@ -1,8 +1,4 @@
-"""The native FMUs beside those in Python, through fmpy and in a host in C, and beside one that integrates with CVODE.
-
-A communication step is what the steps of a run add to it: the difference between a run in 1600 steps and one in a
-single step, shared among them.
-"""
+"""The native FMUs beside those in Python, through fmpy and in a host in C, and beside one that uses CVODE."""
 
 from collections.abc import Callable
 from functools import cache, partial
@@ -15,7 +11,7 @@ from ..scene import Scene
 from ..stability.probe import plain
 from .in_c import NotHereError, Runs, built, cvode, runs
 from .measure import Beside, Measure
-from .speed import MODELS, POINTS, file
+from .speed import MODELS, POINTS, file, shared
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
 
@@ -114,11 +110,6 @@ def row(what: str, unit: str, figures: Callable[[], Figures]) -> Measure:
     except NotHereError as error:
         return Measure(what, nan, unit, nan, (Beside(str(error)),))
     return Measure(what, value, unit, reach, others)
-
-
-def shared(many: float, one: float) -> float:
-    """The time of a communication step, from that of a run in many and of a run in one."""
-    return (many - one) / (POINTS - 1)
 
 
 def fmu(model: str, kind: str) -> Path:
