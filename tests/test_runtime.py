@@ -176,6 +176,7 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
     for read_alien in ("get_real", "get_integer", "get_boolean", "get_string"):
         made = slave(name)
         assert len(getattr(made, read_alien)([10**6])) == 1
+        assert "value reference 1000000 is refused" in capfd.readouterr().err
         assert made.do_step(0.0, 0.1) is False
     for write_alien in ("set_real", "set_integer", "set_boolean", "set_string"):
         made = slave(name)

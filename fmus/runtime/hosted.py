@@ -26,6 +26,10 @@ ERROR = 3  # a status of FMI, in all its versions
 CALCULATED = ("output", "local")
 
 
+class NotThere(LookupError):
+    """A value reference that no variable of the kind has."""
+
+
 def hosting(slave, model):
     """The class of slaves of a model class, under its name.
 
@@ -227,7 +231,10 @@ class Hosted:
             name, declared = self.variables[reference]
             if kind == ("Real" if declared.type == "Real" else "Integer"):
                 return name, declared
-        raise LookupError(f"value reference {reference} is not that of a variable of type {kind}")
+        raise NotThere(
+            f"value reference {reference} is refused: it is not that of a variable of type {kind}; "
+            "the model description of this very FMU has those that are"
+        )
 
     def observe(self):
         """Bring the outputs to the present point; NaN while the values cannot be used."""
@@ -321,6 +328,8 @@ def take_over(thing, state):
 
 def unforeseen(error, model):
     """The sentence for an exception; plain floats raise where C gives infinity or NaN."""
+    if isinstance(error, NotThere):
+        return str(error)
     if isinstance(error, (ArithmeticError, ValueError)) and not isinstance(error, UnicodeError):
         return SENTENCES[DIVERGED].format(t=model.solver.step.t0)
     return f"unforeseen {type(error).__name__}: {error}; please report it with the values of the run"

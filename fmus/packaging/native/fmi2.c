@@ -274,11 +274,11 @@ static bool is_one(fmi2ValueReference reference, bool is_real)
 static fmi2Status fail_by_reference(Instance *it, fmi2ValueReference reference, const char *type)
 {
     Text text = {0};
-    add(&text, "unforeseen LookupError: value reference ");
+    add(&text, "value reference ");
     add_integer(&text, reference);
-    add(&text, " is not that of a variable of type ");
+    add(&text, " is refused: it is not that of a variable of type ");
     add(&text, type);
-    add(&text, "; please report it with the values of the run");
+    add(&text, "; the model description of this very FMU has those that are");
     fail(it, &text);
     return fmi2Error;
 }
