@@ -114,6 +114,8 @@ def unpacked_anew(path, number):
 def in_threads(paths, threads, turns):
     """Each thread takes lives of every FMU, one after another: the different runs that came of it."""
     folders = [extract(path) for path in paths]
+    for folder in folders:
+        describe(folder)  # now: the XML parser behind it fails now and then when two threads meet in it
     rows, errors = {folder: set() for folder in folders}, []
 
     def work():
