@@ -1,4 +1,4 @@
-"""Build the FMUs: python build_fmus.py [NAME ...] [--native] [--method M] [--law L] [--platform P] [--out DIR]"""
+"""Build the FMUs: python build_fmus.py [NAME ...] [--fmi 3] [--native] [--method M] [--law L] ..."""
 
 from hashlib import sha256
 from pathlib import Path
@@ -8,6 +8,7 @@ import click
 from fmus.packaging import BuildError
 from fmus.packaging.archive import build
 from fmus.packaging.catalogue import names
+from fmus.packaging.edition import FMI2, FMI3
 from fmus.packaging.lean import LAWS, METHODS
 from fmus.packaging.weigh import import_time
 
@@ -16,13 +17,15 @@ FMUS = Path(__file__).parent / "fmus"
 
 @click.command()
 @click.argument("models", metavar="[NAME]...", nargs=-1)
+@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="Version; 3 has model exchange as well.")
 @click.option("--native", "compiled", is_flag=True, help="Compiled to machine code: no Python in the FMU.")
 @click.option("--method", "methods", multiple=True, type=click.Choice(list(METHODS)), help="Offer this; repeatable.")
 @click.option("--law", "laws", multiple=True, type=click.Choice(list(LAWS)), help="Offer this law; repeatable.")
 @click.option("--platform", "platforms", multiple=True, help="For this only, as linux64; repeatable.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for them; fmus, or fmus/native, without.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder; fmus, fmus/fmi3 or fmus/native, without.")
 def main(
     models: tuple[str, ...],
+    fmi: str,
     compiled: bool,
     methods: tuple[str, ...],
     laws: tuple[str, ...],
@@ -36,14 +39,17 @@ def main(
     known = names()
     for name in models:
         if name not in known:
-            raise UnknownName(f"There is no model {name!r}; known are {', '.join(known)}.")
+            raise Mistake(f"There is no model {name!r}; known are {', '.join(known)}.")
+    if compiled and fmi == "3":
+        raise Mistake("There are no native FMUs of FMI 3.0: leave out --native, or --fmi 3.")
+    edition, folder = (FMI3, FMUS / "fmi3") if fmi == "3" else (FMI2, FMUS)
     for name in models or known:
         try:
             if compiled:
                 path = native(name, out or FMUS / "native", methods, laws, platforms)
                 weight = ""
             else:
-                path = build(name, out or FMUS, methods, laws, platforms)
+                path = build(name, out or folder, methods, laws, platforms, edition)
                 weight = f"  {1000 * import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
@@ -64,7 +70,7 @@ def native(
     return build(name, folder, methods, laws, platforms or USUAL)
 
 
-class UnknownName(click.ClickException):
+class Mistake(click.ClickException):
     """A mistake in the command line, told in one sentence without the usage lines."""
 
     exit_code = 2

@@ -42,6 +42,7 @@ class Pacejka(Oscillator):
     F_friction = Output("N", "force of friction, against the motion")
     energy = Output("J", "kinetic and potential energy", low=0.0)
 
+    driven = True
     stop_time = 16.0
     step_size = 0.016
     tolerance = 2e-7  # a position error shifts the next break-away: the speed loses a digit more
@@ -53,15 +54,12 @@ class Pacejka(Oscillator):
     def __init__(self):
         super().__init__()
         self.solver = Solver()
-        self.t_base = self.x_base = 0.0  # the driver stood at x_base at the time t_base
+        self.t_base = self.x_base = 0.0
         self.B = self.C = self.D = self.E = self.weight = 0.0
 
     def initial(self, t):
         self.t_base, self.x_base = t, 0.0
         return self.x0, self.v0
-
-    def rebase(self, t):
-        self.t_base, self.x_base = t, self.x_base + self.v_driver * (t - self.t_base)
 
     def prepare(self):
         if self.mu_d >= self.mu_s:

@@ -44,6 +44,7 @@ class Stickslip(DryFriction):
     mode = Mode("-1 sliding backward, 0 stuck, 1 sliding forward")
 
     linear = True
+    driven = True
     stop_time = 16.0
     step_size = 0.016
     rules = (
@@ -56,15 +57,12 @@ class Stickslip(DryFriction):
         super().__init__()
         self.solver = Solver()
         self.exact = Exact()
-        self.t_base = self.x_base = 0.0  # the driver stood at x_base at the time t_base
+        self.t_base = self.x_base = 0.0
         self.sliding = self.holding = 0.0
 
     def initial(self, t):
         self.t_base, self.x_base = t, 0.0
         return self.x0, self.v0
-
-    def rebase(self, t):
-        self.t_base, self.x_base = t, self.x_base + self.v_driver * (t - self.t_base)
 
     def prepare(self):
         self.sliding, self.holding = self.mu_d * self.m * self.g, self.mu_s * self.m * self.g

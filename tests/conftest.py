@@ -24,29 +24,35 @@ def fmus(tmp_path_factory):
     return build(ROOT, tmp_path_factory.mktemp("fmus"))
 
 
-@pytest.fixture(scope="session")
-def _workers():
-    workers = [Worker()]
-    yield workers
-    for worker in workers:
-        worker.close()
+def processes(kind, scope):
+    """The fixtures `_workers`, `worker` and `fresh` for processes of a kind, under these names."""
+
+    @pytest.fixture(scope=scope)
+    def _workers():
+        workers = [kind()]
+        yield workers
+        for worker in workers:
+            worker.close()
+
+    @pytest.fixture
+    def worker(_workers):
+        """The process that runs FMUs; a new one when the last test killed it."""
+        if not _workers[-1].alive:
+            _workers.append(kind())
+        _workers[-1].complaints()
+        return _workers[-1]
+
+    @pytest.fixture
+    def fresh():
+        """A process of the test's own, which must end well: late damage to memory shows at the exit."""
+        worker = kind()
+        yield worker
+        assert worker.close() == 0
+
+    return _workers, worker, fresh
 
 
-@pytest.fixture
-def worker(_workers):
-    """The process that runs FMUs; a new one when the last test killed it."""
-    if not _workers[-1].alive:
-        _workers.append(Worker())
-    _workers[-1].complaints()
-    return _workers[-1]
-
-
-@pytest.fixture
-def fresh():
-    """A process of the test's own, which must end well: late damage to memory shows at the exit."""
-    worker = Worker()
-    yield worker
-    assert worker.close() == 0
+_workers, worker, fresh = processes(Worker, "session")
 
 
 @pytest.fixture

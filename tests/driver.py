@@ -12,6 +12,15 @@ from pathlib import Path
 PATIENCE = 120.0  # s, for one request
 
 
+def host(script, function, *arguments):
+    """What a function of a script here answers, in a process that must end well and say nothing."""
+    call = [sys.executable, "-I", str(Path(__file__).with_name(script)), function, json.dumps(arguments)]
+    done = subprocess.run(call, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, f"exit status {done.returncode}: {done.stderr}"
+    assert done.stderr == ""
+    return json.loads(done.stdout)
+
+
 class Refused(Exception):
     """An FMI call did not return OK."""
 
@@ -23,9 +32,11 @@ class Refused(Exception):
 class Worker:
     """A process that runs FMUs; `alive` until it is closed, crashes or hangs."""
 
+    script = "worker.py"
+
     def __init__(self):
         self.noise = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - lives as long as the process
-        command = [sys.executable, "-I", Path(__file__).with_name("worker.py")]
+        command = [sys.executable, "-I", Path(__file__).with_name(self.script)]
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.noise, cwd=tempfile.gettempdir()
         )

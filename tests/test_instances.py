@@ -4,11 +4,9 @@ Both kinds of FMU; every host is a process of its own (lives.py), which must end
 /proc tells it, on Linux.
 """
 
-import json
-import subprocess
-import sys
-from pathlib import Path
+from functools import partial
 
+import driver
 import native_fmus
 import pytest
 from conftest import ROOT
@@ -30,13 +28,7 @@ def paths(folder):
     return [str(folder / f"{name}.fmu") for name in MODELS]
 
 
-def host(function, *arguments):
-    """What a function of lives.py answers, in a process that must end well and say nothing."""
-    call = [sys.executable, "-I", str(Path(__file__).with_name("lives.py")), function, json.dumps(arguments)]
-    done = subprocess.run(call, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, f"exit status {done.returncode}: {done.stderr}"
-    assert done.stderr == ""
-    return json.loads(done.stdout)
+host = partial(driver.host, "lives.py")
 
 
 def test_a_thousand_lives_leave_little_behind(paths, record_property):

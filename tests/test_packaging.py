@@ -22,7 +22,7 @@ from fmus.packaging import BuildError
 from fmus.packaging.archive import write
 from fmus.packaging.catalogue import load, names
 from fmus.packaging.description import describe
-from fmus.packaging.modules import pythonfmu_folder, travelling
+from fmus.packaging.modules import installed, travelling
 from fmus.runtime.declare import Declaring, Fixed, Output, Parameter, variables
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -230,7 +230,7 @@ def test_entry_script_and_package_carry_the_digest_of_their_content(fmu, name):
 
 @EVERY_MODEL
 def test_nothing_tells_where_it_was_built(fmu, name):
-    places = [str(place).encode() for place in (ROOT, fmu(name).parent, pythonfmu_folder())]
+    places = [str(place).encode() for place in (ROOT, fmu(name).parent, installed("pythonfmu"))]
     for path, content in entries(fmu(name)).items():
         assert not [place for place in places if place in content], path
 

@@ -10,7 +10,7 @@ from fmus.runtime import march
 from fmus.runtime.declare import variables
 from fmus.runtime.slave import slave_for
 
-FMI_SIDE = {"__init__.py", "declare.py", "hosted.py", "slave.py", "slave3.py"}
+FMI_SIDE = {"__init__.py", "beside.py", "declare.py", "hosted.py", "slave.py", "slave3.py"}
 NUMERICS = sorted(
     [path for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.name not in FMI_SIDE]
     + [ROOT / "fmus" / f"{name}.py" for name in MODELS]

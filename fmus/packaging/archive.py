@@ -1,12 +1,12 @@
-"""The zip: binaries, sources and description under their FMI 2.0 names, the same bytes for the same content.
+"""The zip: binaries, sources and description under the names that FMI gives them, the same bytes for the same content.
 
     modelDescription.xml
-    binaries/<platform>/<name>.{so,dll}     the native layer of pythonfmu
+    binaries/<platform>/<name>.{so,dll}     the native layer of pythonfmu, or of pythonfmu3
     resources/slavemodule.txt               names the entry script
-    resources/<entry>.py                    imports the class; runs for every instance (guard.py says why)
+    resources/<entry>.py                    imports the class; guard.py says what else it does, and why
     resources/<package>/                    the model and what it needs (modules.py)
-    documentation/                          the page (page.py) and licences
-    model.png                               the icon
+    documentation/                          the page (page.py), licences, what the host must have
+    model.png                               the icon; FMI 3.0: terminalsAndIcons/icon.png
     extra/org.fmi-standard.fmi-ls-ref/      the certified result (reference.py)
 
 Python finds modules by bare name in the process of the host.  So package and entry carry a digest of their
@@ -26,20 +26,27 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from . import BuildError
 from .catalogue import load
 from .companions import companions
-from .description import declared_by, describe
+from .description import declared_by
+from .edition import FMI2, Edition
 from .lean import imported, offer, reduced
-from .modules import pythonfmu_folder, travelling
+from .modules import installed, travelling, unchanged
 
-ENTRY = """\
-from {package} import {model}, hold
+NEEDED = """\
+CPython 3.9 or newer, 64 bit, with its standard library and nothing else.
 
-hold(globals())
+Linux     libpython3 in the process: a host that is Python has it, any other is started with it in LD_PRELOAD.
+Windows   the folder of python3.dll in PATH.
 """
 EARLIEST, LATEST = datetime(1980, 1, 1, tzinfo=UTC), datetime(2107, 12, 31, tzinfo=UTC)  # that a zip can tell
 
 
 def build(
-    name: str, folder: Path, methods: Sequence[str] = (), laws: Sequence[str] = (), platforms: Sequence[str] = ()
+    name: str,
+    folder: Path,
+    methods: Sequence[str] = (),
+    laws: Sequence[str] = (),
+    platforms: Sequence[str] = (),
+    edition: Edition = FMI2,
 ) -> Path:
     """Write `<name>.fmu` into `folder`; an older one is replaced whole or not at all.
 
@@ -47,20 +54,23 @@ def build(
     """
     model, date = load(name), build_date()
     offered = offer(model, name, methods, laws)
-    sources = travelling(name, edit=partial(reduced, offered=offered)) if offered else travelling(name)
+    edit = partial(reduced, offered=offered) if offered else unchanged
+    sources = travelling(name, edit=edit, edition=edition)
     content = "".join(f"{path}\0{text}\0" for path, text in sorted(sources.items()))
-    code = sha256((ENTRY + content).encode()).hexdigest()
+    code = sha256((edition.entry + content).encode()).hexdigest()
     package = f"{name}_{code[:12]}"
     if offered:
         model = imported(sources, name, package)
-    entries = companions(model, name, declared_by(model))
+    entries = companions(model, name, declared_by(model), edition)
     entries |= {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
     entries |= {
-        "modelDescription.xml": describe(model, name, code, date),
+        "documentation/externalDependencies.txt": NEEDED.encode(),
+        "modelDescription.xml": edition.describe(model, name, code, date),
         "resources/slavemodule.txt": f"{package}_fmu".encode(),
-        f"resources/{package}_fmu.py": ENTRY.format(package=package, model=model.__name__).encode(),
+        f"resources/{package}_fmu.py": edition.entry.format(package=package, model=model.__name__).encode(),
     }
-    return write(folder / f"{name}.fmu", zipped(entries | _binaries(name, platforms) | licenses(), date))
+    entries |= _binaries(name, platforms, edition) | licenses(edition)
+    return write(folder / f"{name}.fmu", zipped(entries, date))
 
 
 def build_date() -> datetime:
@@ -72,26 +82,28 @@ def build_date() -> datetime:
     return max(EARLIEST, datetime.fromtimestamp(int(epoch), UTC))
 
 
-def _binaries(name: str, platforms: Sequence[str]) -> dict[str, bytes]:
-    """The native layer for the platforms, or for every one that pythonfmu comes with."""
-    folder = pythonfmu_folder() / "resources" / "binaries"
-    found = [path for path in folder.glob("*/*") if path.suffix in (".so", ".dll", ".dylib")]
+def _binaries(name: str, platforms: Sequence[str], edition: Edition) -> dict[str, bytes]:
+    """The native layer for the platforms, or for every one that it comes for."""
+    layer = edition.layer
+    files = (installed(layer) / "resources" / "binaries").glob("*/*")
+    found = [(path.parent.name, path) for path in files if path.suffix in (".so", ".dll", ".dylib")]
     if not found:
-        raise BuildError("The installed pythonfmu has no binaries: try 'pip install --force-reinstall pythonfmu'.")
-    there = sorted({path.parent.name for path in found})
+        raise BuildError(f"The installed {layer} has no binaries: try 'pip install --force-reinstall {layer}'.")
+    there = {edition.platforms.get(folder, folder): (folder, path) for folder, path in sorted(found)}
     for platform in platforms:
         if platform not in there:
-            raise BuildError(f"pythonfmu has no binary for {platform}, only for {', '.join(there)}: add --native.")
-    chosen = [path for path in found if path.parent.name in (platforms or there)]
-    return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in chosen}
+            known = ", ".join(there)
+            raise BuildError(f"{layer} has no binary for {platform}, only for {known}: {edition.otherwise}.")
+    chosen = [there[platform] for platform in platforms or there]
+    return {f"binaries/{folder}/{name}{path.suffix}": path.read_bytes() for folder, path in chosen}
 
 
-def licenses() -> dict[str, bytes]:
-    """The licence of the FMU, and that of the part of pythonfmu inside it."""
-    texts = {}
+def licenses(edition: Edition = FMI2) -> dict[str, bytes]:
+    """The licence of the FMU, and that of the native layer inside it."""
+    texts, layer = {}, edition.layer
     for path, folder, pattern in (
         ("license.txt", Path(__file__).resolve().parents[2], "LICENSE"),
-        ("pythonfmu.txt", pythonfmu_folder().parent, "pythonfmu-*.dist-info/**/LICENSE"),
+        (f"{layer}.txt", installed(layer).parent, f"{layer}-*.dist-info/**/LICENSE"),
     ):
         found = sorted(folder.glob(pattern))
         if not found:

@@ -1,4 +1,7 @@
-"""The model description: `modelDescription.xml` from the declared variables (FMI 2.0.4, sections 2.2 and 4.3)."""
+"""The model description: `modelDescription.xml` from the declared variables (FMI 2.0.4, sections 2.2 and 4.3).
+
+What does not depend on the version of FMI is shared with description3.py.
+"""
 
 import sys
 from datetime import datetime
@@ -8,6 +11,7 @@ from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..runtime.declare import Declared, Declaring, Output
+from ..runtime.hosted import SETTABLE
 from . import BuildError, __version__
 from .units import UNITS, unit_of
 
@@ -21,12 +25,13 @@ CAPABILITIES = {
 }
 EXPERIMENT = {"stopTime": "stop_time", "tolerance": "tolerance", "stepSize": "step_size"}
 LOG_CATEGORIES = {
-    "logStatusWarning": "Messages with status fmi2Warning.",
-    "logStatusDiscard": "Messages with status fmi2Discard.",
-    "logStatusError": "Messages with status fmi2Error: what was wrong, and what is allowed.",
-    "logStatusFatal": "Messages with status fmi2Fatal.",
+    "logStatusWarning": "Messages with status {fmi}Warning.",
+    "logStatusDiscard": "Messages with status {fmi}Discard.",
+    "logStatusError": "Messages with status {fmi}Error: what was wrong, and what is allowed.",
+    "logStatusFatal": "Messages with status {fmi}Fatal.",
     "logAll": "All messages.",
 }
+Variables = list[tuple[str, Declared]]
 
 
 def describe(model: type[Declaring], name: str, code: str, date: datetime) -> bytes:
@@ -35,39 +40,55 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     `code` is the digest of the source that travels inside.  The guid follows from it and from all of the
     description but the date: equal guids mean equal content.
     """
-    if not model.__doc__:
-        raise BuildError(f"{model.__name__} has no docstring; its first line is the description of the FMU.")
-    root = Element("fmiModelDescription", fmiVersion="2.0", modelName=name, guid="")
-    root.set("description", model.__doc__.strip().splitlines()[0])
-    root.attrib |= {"author": "friction-fmus", "version": __version__, "license": "MIT"}
-    root.attrib |= {"generationTool": f"friction-fmus {__version__}", "variableNamingConvention": "structured"}
+    root = opened(model, name, "2.0", "guid")
     SubElement(root, "CoSimulation", CAPABILITIES, modelIdentifier=name)
     declared = declared_by(model)
-    _define_units(root, declared)
+    define_units(root, declared)
     _define_types(root, declared)
-    categories = SubElement(root, "LogCategories")
-    for category, text in LOG_CATEGORIES.items():
-        SubElement(categories, "Category", name=category, description=text)
-    experiment = SubElement(root, "DefaultExperiment", startTime="0.0")
-    for key, attribute in EXPERIMENT.items():
-        experiment.set(key, repr(float(getattr(model, attribute))))
+    log_and_experiment(root, model, "fmi2")
     scalars = SubElement(root, "ModelVariables")
     for reference, (variable, meaning) in enumerate(declared):
         scalars.append(_scalar(variable, meaning, reference))
     _structure(root, [meaning for _, meaning in declared])
-    root.set("guid", f"{{{uuid5(NAMESPACE_OID, code + tostring(root, 'unicode'))}}}")
+    return closed(root, "guid", code, date)
+
+
+def opened(model: type[Declaring], name: str, version: str, key: str) -> Element:
+    """The root; the attribute `key` is the last to be known."""
+    if not model.__doc__:
+        raise BuildError(f"{model.__name__} has no docstring; its first line is the description of the FMU.")
+    root = Element("fmiModelDescription", {"fmiVersion": version, "modelName": name, key: ""})
+    root.set("description", model.__doc__.strip().splitlines()[0])
+    root.attrib |= {"author": "friction-fmus", "version": __version__, "license": "MIT"}
+    root.attrib |= {"generationTool": f"friction-fmus {__version__}", "variableNamingConvention": "structured"}
+    return root
+
+
+def closed(root: Element, key: str, code: str, date: datetime) -> bytes:
+    """The text; all but the date goes into the attribute `key`."""
+    root.set(key, f"{{{uuid5(NAMESPACE_OID, code + tostring(root, 'unicode'))}}}")
     root.set("generationDateAndTime", date.strftime("%Y-%m-%dT%H:%M:%SZ"))
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n'.encode()
 
 
-def declared_by(model: type[Declaring]) -> list[tuple[str, Declared]]:
+def log_and_experiment(root: Element, model: type[Declaring], fmi: str) -> None:
+    """LogCategories, with the prefix of the status names, and DefaultExperiment."""
+    categories = SubElement(root, "LogCategories")
+    for category, text in LOG_CATEGORIES.items():
+        SubElement(categories, "Category", name=category, description=text.format(fmi=fmi))
+    experiment = SubElement(root, "DefaultExperiment", startTime="0.0")
+    for key, attribute in EXPERIMENT.items():
+        experiment.set(key, repr(float(getattr(model, attribute))))
+
+
+def declared_by(model: type[Declaring]) -> Variables:
     """The variables of a model by the runtime that it was written with: ours, or one that travels (lean.py)."""
     runtime = next(base.__module__ for base in model.__mro__ if base.__name__ == Declaring.__name__)
     return sys.modules[runtime].variables(model())
 
 
-def _define_units(root: Element, declared: list[tuple[str, Declared]]) -> None:
+def define_units(root: Element, declared: Variables) -> None:
     """UnitDefinitions: every unit that a variable has, in the order of the table."""
     used = {meaning.unit: unit_of(name, meaning.unit) for name, meaning in declared if meaning.type == "Real"}
     definitions = SubElement(root, "UnitDefinitions")
@@ -80,49 +101,72 @@ def _define_units(root: Element, declared: list[tuple[str, Declared]]) -> None:
             SubElement(element, "DisplayUnit", name=unit.display, factor=repr(unit.factor))
 
 
-def _define_types(root: Element, declared: list[tuple[str, Declared]]) -> None:
+def _define_types(root: Element, declared: Variables) -> None:
     """TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
-    used = {meaning.unit for _, meaning in declared if meaning.type == "Real"}
     types = SubElement(root, "TypeDefinitions")
-    for symbol, unit in UNITS.items():
-        if symbol in used:
-            element = SubElement(types, "SimpleType", name=unit.quantity)
-            attributes = {"quantity": unit.quantity, "unit": symbol, "displayUnit": unit.display}
-            SubElement(element, "Real", {key: value for key, value in attributes.items() if value})
+    for quantity in quantities(declared):
+        element = SubElement(types, "SimpleType", name=quantity["quantity"])
+        SubElement(element, "Real", quantity)
     for name, meaning in declared:
         if meaning.items:
-            element = SubElement(types, "SimpleType", name=_type_name(name), description=meaning.text)
-            items = SubElement(element, "Enumeration")
-            for label, value, text in meaning.items:
-                SubElement(items, "Item", name=label, value=str(value), description=text)
+            element = SubElement(types, "SimpleType", name=type_name(name), description=meaning.text)
+            add_items(SubElement(element, "Enumeration"), meaning)
 
 
-def _type_name(variable: str) -> str:
+def quantities(declared: Variables) -> list[dict[str, str]]:
+    """What is measured and in which unit, for every unit that a variable has."""
+    used = {meaning.unit for _, meaning in declared if meaning.type == "Real"}
+    found = []
+    for symbol in filter(used.__contains__, UNITS):
+        unit = UNITS[symbol]
+        attributes = {"quantity": unit.quantity, "unit": symbol, "displayUnit": unit.display}
+        found.append({key: value for key, value in attributes.items() if value})
+    return found
+
+
+def add_items(element: Element, meaning: Declared) -> None:
+    """The items of an enumeration."""
+    items: tuple[tuple[str, int, str], ...] = meaning.items
+    for label, value, text in items:
+        SubElement(element, "Item", name=label, value=str(value), description=text)
+
+
+def type_name(variable: str) -> str:
     """The name of an enumeration: `solver.method` is of the type SolverMethod."""
     return "".join(word.capitalize() for word in variable.replace(".", "_").split("_"))
 
 
 def _scalar(name: str, meaning: Declared, reference: int) -> Element:
-    """One ScalarVariable.  FMI has no open bounds, so a value `above` or `below` a bound gets that bound."""
-    scalar = Element("ScalarVariable", name=name, valueReference=str(reference), description=meaning.text)
-    scalar.attrib |= {"causality": meaning.causality, "variability": meaning.variability}
-    if meaning.initial:
-        scalar.set("initial", meaning.initial)
-    value = SubElement(scalar, meaning.type)
+    """One ScalarVariable."""
+    scalar = Element("ScalarVariable", part_of_all(name, meaning, reference))
+    SubElement(scalar, meaning.type, part_of_type(name, meaning))
+    return scalar
+
+
+def part_of_all(name: str, meaning: Declared, reference: int) -> dict[str, str]:
+    """The attributes that a variable of any type has."""
+    attributes = {"name": name, "valueReference": str(reference), "description": meaning.text}
+    attributes |= {"causality": meaning.causality, "variability": meaning.variability}
+    return attributes | ({"initial": meaning.initial} if meaning.initial else {})
+
+
+def part_of_type(name: str, meaning: Declared) -> dict[str, str]:
+    """The others.  FMI has no open bounds, so a value `above` or `below` a bound gets that bound."""
+    attributes: dict[str, str] = {}
     if meaning.items:
-        value.set("declaredType", _type_name(name))
+        attributes["declaredType"] = type_name(name)
     if meaning.type == "Real":
         unit = unit_of(name, meaning.unit, meaning.display)
-        value.attrib |= {"declaredType": unit.quantity, "unit": meaning.unit}
+        attributes |= {"declaredType": unit.quantity, "unit": meaning.unit}
         if display := meaning.display or unit.display:
-            value.set("displayUnit", display)
+            attributes["displayUnit"] = display
     number = float if meaning.type == "Real" else int
     for key, bound in ("min", max(meaning.low, meaning.above)), ("max", min(meaning.high, meaning.below)):
         if isfinite(bound):
-            value.set(key, repr(number(bound)))
-    if meaning.initial != "calculated":
-        value.set("start", repr(number(meaning.start)))
-    return scalar
+            attributes[key] = repr(number(bound))
+    if meaning.causality in SETTABLE:
+        attributes["start"] = repr(number(meaning.start))
+    return attributes
 
 
 def _structure(root: Element, meanings: list[Declared]) -> None:

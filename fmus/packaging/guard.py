@@ -1,6 +1,7 @@
 """What keeps the native layer of pythonfmu from freeing twice, and from leaving its mark; travels inside every FMU.
 
-Seen with pythonfmu 0.7.0, the first in reference counts, the second with valgrind:
+Seen with pythonfmu 0.7.0, the first in reference counts, the second with valgrind; the layer for FMI 3.0 runs the
+entry script once only and shares the last two:
 
 1. Every instance releases one reference to the names of the entry script, which was only lent.  A script without
    functions of its own loses its names under the second instance.  So each run of the script keeps one more.
@@ -30,17 +31,22 @@ def hold(names):
     script = names["__name__"] + ".py"
     for folder in list(sys.path):
         if isinstance(folder, str) and os.path.isfile(os.path.join(folder, script)):
-            with suppress(ValueError):  # by value: another thread may have moved the places meanwhile
-                sys.path.remove(folder)
-            watch(folder)
+            leave_path(folder)
             return
+
+
+def leave_path(resources):
+    """Called when an instance is made: its folder of resources is read, and needs to be found no more."""
+    with suppress(ValueError):  # by value: another thread may have moved the places meanwhile
+        sys.path.remove(resources)
+    watch(resources)
 
 
 def watch(resources):
     """Note where the library of the FMU in this folder has its last function."""
     if sys.platform != "linux":
         return
-    for path in glob(os.path.join(escape(resources), "../binaries/linux64/*.so")):
+    for path in glob(os.path.join(escape(resources), "../binaries/*linux*/*.so")):
         with suppress(OSError, AttributeError):  # a host that loaded a copy of the file: out of reach
             library = PyDLL(path, os.RTLD_NOLOAD | os.RTLD_LAZY)
             libraries[os.path.realpath(path)] = cast(library.finalizePythonInterpreter, c_void_p).value

@@ -1,6 +1,6 @@
 """Which source files travel inside an FMU: those that a model reaches through its imports, and no others.
 
-They become one package that leans on nothing but the standard library.  The part of pythonfmu that is needed
+They become one package that leans on nothing but the standard library.  The part of pythonfmu that is needed, if any,
 travels inside as `<package>/pythonfmu`, so the FMU never meets the pythonfmu of its host.
 """
 
@@ -12,36 +12,34 @@ from pathlib import Path, PurePosixPath
 
 from . import BuildError
 from .catalogue import FMUS
+from .edition import FMI2, Edition
 
-# The two package roots are written here: what stands in the originals does not travel.
-ROOTS = ("__init__.py", "pythonfmu/__init__.py")
-INIT = '''\
-"""{name} as an FMI 2.0 co-simulation slave."""
-
-from .{name} import {model} as Model
-from .guard import hold
-from .runtime.slave import slave_for
-
-{model} = slave_for(Model)
-'''
+ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # what stands in the originals of these does not travel
 Edit = Callable[[str, str], str]  # of the text of the file at a path
 GUARD = "guard.py"  # travels beside the model
 
 
-def pythonfmu_folder() -> Path:
-    """Where pythonfmu is installed; it is found without being imported."""
-    spec = find_spec("pythonfmu")
+def unchanged(path: str, text: str) -> str:
+    """The edit that is none."""
+    return text
+
+
+def installed(layer: str) -> Path:
+    """Where the package that brings a native layer is installed; it is found without being imported."""
+    spec = find_spec(layer)
     if spec is None or spec.origin is None:
-        raise BuildError("pythonfmu is not installed, and an FMU carries a part of it: try 'pip install pythonfmu'.")
+        raise BuildError(f"{layer} is not installed, and an FMU carries a part of it: try 'pip install {layer}'.")
     return Path(spec.origin).parent
 
 
-def travelling(name: str, root: Path = FMUS, edit: Edit = lambda path, text: text) -> dict[str, str]:
+def travelling(name: str, root: Path = FMUS, edit: Edit = unchanged, edition: Edition = FMI2) -> dict[str, str]:
     """Path inside the package and source text, after `edit`, of every file that the model `name` in `root` needs."""
-    files = dict(zip(ROOTS, (INIT.format(name=name, model=name.capitalize()), ""), strict=True))
-    waiting = [f"{name}.py", GUARD, "runtime/slave.py"]
+    files = {ROOT: edition.init.format(name=name, model=name.capitalize())}
+    waiting = [f"{name}.py", GUARD, edition.slave]
     for path in waiting:  # which grows on the way
-        if path not in files:
+        if path == VENDORED:
+            files[path] = ""
+        elif path not in files:
             files[path], needed = _embed(path, root, edit)
             waiting += needed
     return files
@@ -51,7 +49,7 @@ def _on_disk(path: str, root: Path) -> Path:
     """The source of a path inside the package."""
     if path == GUARD:
         return Path(__file__).with_name(path)
-    return pythonfmu_folder().parent / path if path.startswith("pythonfmu/") else root / path
+    return installed("pythonfmu").parent / path if path.startswith("pythonfmu/") else root / path
 
 
 def _embed(path: str, root: Path, edit: Edit) -> tuple[str, list[str]]:
@@ -98,6 +96,6 @@ def _resolve(path: str, base: tuple[str, ...], name: str, root: Path) -> str:
     """The file that `from base import name` reads: the module `base.name` or, for a name inside it, `base`."""
     for parts in ((*base, name), base):
         for candidate in ("/".join(parts) + ".py", "/".join((*parts, "__init__.py"))):
-            if candidate not in ROOTS and _on_disk(candidate, root).is_file():
+            if candidate not in (ROOT, VENDORED) and _on_disk(candidate, root).is_file():
                 return candidate
     raise BuildError(f"{path} imports {name} from {'.'.join(base) or 'the package itself'}, which no FMU carries.")

@@ -8,6 +8,7 @@ from pathlib import Path
 from ..runtime.declare import Declared, Declaring
 from . import __version__
 from .chart import chart
+from .edition import FMI2, Edition
 from .reference import INSIDE, Reference
 from .units import UNITS
 
@@ -24,11 +25,13 @@ FREE = Declared("", "").allowed  # in words, where every finite number is
 Variables = list[tuple[str, Declared]]
 
 
-def page(model: type[Declaring], name: str, declared: Variables, found: Reference | None) -> bytes:
+def page(
+    model: type[Declaring], name: str, declared: Variables, found: Reference | None, edition: Edition = FMI2
+) -> bytes:
     """The page of the FMU `name`, as HTML that needs nothing but the icon beside it."""
     first, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
     title = f"<h1>{escape(name)}</h1><p>{escape(first)}</p>"
-    parts = [f"<header><img src='../model.png' alt=''><div>{title}</div></header>", "<h2>Equations</h2>"]
+    parts = [f"<header><img src='../{edition.icon}' alt=''><div>{title}</div></header>", "<h2>Equations</h2>"]
     parts += map(_block, blocks)
     if found is not None:
         parts += _figure(found, declared)
@@ -43,7 +46,7 @@ def page(model: type[Declaring], name: str, declared: Variables, found: Referenc
         ("Solver and events", [pair for pair in plain if "." in pair[0]]),
     ):
         parts += [f"<h2>{title}</h2>", _table(chosen)]
-    parts += ["<h2>Use</h2>", WAYS, _footer(model, found)]
+    parts += ["<h2>Use</h2>", WAYS + edition.use, _footer(model, found)]
     head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(name)}</title>"
     style = STYLE.read_text(encoding="utf-8")
     begin = f"<!doctype html>\n<html lang='en'><head>{head}<style>\n{style}</style></head><body>"

@@ -36,6 +36,7 @@ class DryFriction(Oscillator):
         "friction = {friction} with solver.method = 1 (exact): the closed form holds for the hybrid law only; "
         "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
     )
+    own_solver = 1
 
     def prepare(self):
         return 1 if self.friction != HYBRID and self.solver.method == EXACT else 0

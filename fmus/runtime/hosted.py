@@ -23,7 +23,8 @@ SENTENCES = {
 
 SETTING_UP, RUNNING = 0, 1
 ERROR = 3  # a status of FMI, in all its versions
-CALCULATED = ("output", "local")
+CALCULATED, SETTABLE = ("output", "local"), ("parameter", "input")
+KEPT = ("phase", "start_time", "stop_time", "given_tolerance", "changed", "failure")
 
 
 class NotThere(LookupError):
@@ -52,9 +53,7 @@ def getter(kind, blank):
             if not slave.observed and not slave.failure:
                 slave.observe()
             if counts and slave.observed:
-                slave.model.solver.report(slave.model.events)
-                if ahead:
-                    slave.model.solver.look_ahead(slave.model)
+                slave.recount(ahead)
             return values(slave.model)
         except BaseException as error:  # an exception that left Python would crash the host
             slave.fail(unforeseen(error, slave.model))
@@ -83,6 +82,7 @@ class Hosted:
     """
 
     Model = variables = shape = None  # of the subclass that hosting() makes
+    kept: tuple[str, ...] = KEPT  # what a state holds beside the model
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
@@ -97,10 +97,14 @@ class Hosted:
         self.observed = False  # the outputs are those of the present point
         self.failure = ""
 
+    def place(self, name):
+        """Where in the model a variable is."""
+        return name
+
     def owner(self, name):
         """The object that holds a variable, and the name of the attribute there."""
         thing = self.model
-        *path, last = name.split(".")
+        *path, last = self.place(name).split(".")
         for part in path:
             thing = getattr(thing, part)
         return thing, last
@@ -182,8 +186,12 @@ class Hosted:
             return (
                 f"stop time = {self.stop_time!r} s is refused: it must be above the start time, {self.start_time!r} s"
             )
-        rule = self.model.prepare()
+        rule = self.broken_rule()
         return self.model.rules[rule - 1].format_map(vars(self.model)) if rule else ""
+
+    def broken_rule(self):
+        """The number of the rule that the values break, or 0."""
+        return self.model.prepare()
 
     def apply(self):
         """Let the motion begin, or go on from the present point, with values that have been found good."""
@@ -218,10 +226,10 @@ class Hosted:
         """The references, what reads them, whether they tell of the solver, and whether it must look ahead first."""
         key = kind, *references
         if key not in self.readers:
-            names = [self.variable(kind, reference)[0] for reference in references]
-            values = eval(f"lambda model: [{', '.join('model.' + name for name in names)}]")  # no other way is as fast
-            solver = any("." in name for name in names)
-            self.readers[key] = list(references), values, solver, "solver.t_next" in names
+            places = [self.place(self.variable(kind, reference)[0]) for reference in references]
+            values = eval(f"lambda model: [{', '.join('model.' + place for place in places)}]")  # no other is as fast
+            solver = any("." in place for place in places)
+            self.readers[key] = list(references), values, solver, "solver.t_next" in places
         self.asked[kind] = self.readers[key]
         return self.readers[key]
 
@@ -235,6 +243,13 @@ class Hosted:
             f"value reference {reference} is refused: it is not that of a variable of type {kind}; "
             "the model description of this very FMU has those that are"
         )
+
+    def recount(self, ahead):
+        """Bring what is told of solver and events to the present point; `ahead`: also where the next step ends."""
+        model = self.model
+        model.solver.report(model.events)
+        if ahead:
+            model.solver.look_ahead(model)
 
     def observe(self):
         """Bring the outputs to the present point; NaN while the values cannot be used."""
@@ -256,7 +271,7 @@ class Hosted:
             return
         self.observed = False
         self.refused.pop(name, None)
-        if declared.causality in CALCULATED:
+        if declared.causality not in SETTABLE:
             self.refused[name] = f"{name} = {value!r} is refused: {declared.text} is calculated, not set"
         elif self.phase == RUNNING and declared.variability == "fixed":
             self.refused[name] = (
@@ -274,7 +289,7 @@ class Hosted:
     # ---- state
 
     def _get_fmu_state(self):
-        kept = {name: getattr(self, name) for name in KEPT}
+        kept = {name: getattr(self, name) for name in self.kept}
         return kept | {"origin": __name__, "refused": dict(self.refused), "model": numbers(self.model, self.shape)}
 
     @staticmethod
@@ -291,16 +306,13 @@ class Hosted:
             if origin != __name__:
                 self.fail(f"a state of {origin} is refused: it must be of {__name__}; take it from this very FMU")
                 return
-            for name in KEPT:
+            for name in self.kept:
                 setattr(self, name, state[name])
             self.refused = dict(state["refused"])
             take_over(self.model, state["model"])
             self.observed = False
         except BaseException as error:  # as above
             self.fail(unforeseen(error, self.model))
-
-
-KEPT = ("phase", "start_time", "stop_time", "given_tolerance", "changed", "failure")
 
 
 def shape(thing):

@@ -24,8 +24,10 @@ class Oscillator(Declaring):
     """
 
     dry = False  # friction with modes: see automaton.py
+    driven = False  # it follows a driver, who stood at x_base at the time t_base and moves at v_driver
     linear = False  # piecewise linear: it owns `exact` and has push(t, mode); see exact.py
     rules: tuple[str, ...] = ()  # one sentence for each rule that binds several values, in their names
+    own_solver = 0  # the number of the rule that is about our solver, and does not bind an importer's
     stop_time = 4.0
     step_size = 0.004
     tolerance = 1e-6
@@ -39,4 +41,6 @@ class Oscillator(Declaring):
         return inf
 
     def rebase(self, t):
-        """Fix at time t what is integrated in closed form, before a value changes."""
+        """Fix at time t what is integrated in closed form, before a value changes: where the driver is."""
+        if self.driven:
+            self.t_base, self.x_base = t, self.x_base + self.v_driver * (t - self.t_base)

@@ -1,0 +1,223 @@
+"""The FMI 3.0 side: co-simulation and model exchange in one, as the native layer calls it.
+
+The native layer does not tell what an instance was made for, nor start, stop and tolerance, nor the mode of the FMI
+state machine.  So an instance is undecided until a step is asked for (co-simulation) or a time, a state or an event
+comes (model exchange), and the run begins where the first step does.
+"""
+
+import json
+from math import fabs, nan
+
+from . import exchange
+from .beside import PLACES, beside
+from .hosted import ERROR, KEPT, RUNNING, SENTENCES, SETTING_UP, Hosted, getter, hosting, setter, unforeseen
+from .step import DIVERGED, HUGE
+
+UNDECIDED, STEPPING, EXCHANGED = 0, 1, 2
+INTEGRATED = (
+    "a communication step from t = {t!r} s is refused: the importer integrates this instance (model exchange); "
+    "instantiate the FMU once more for co-simulation"
+)
+
+
+def slave_for(model):
+    """The slave of a model class, under its name."""
+    made = hosting(Slave, type(model.__name__, (exchange.Exchanging, model), {}))
+    made.variables = made.variables + beside(model, made.variables)
+    return made
+
+
+class Message:
+    """What the native layer reads of one."""
+
+    def __init__(self, status, category, msg):
+        self.status, self.category, self.msg, self.debug = status, category, msg, False
+
+
+class Stepped:
+    """What it reads after a communication step."""
+
+    def __init__(self, status):
+        self.status, self.terminateSimulation = status, False
+
+
+class Updated:
+    """What it reads after an event: by these names."""
+
+    discreteStatesNeedUpdate = nextEventTimeDefined = False
+    nextEventTime = 0.0
+
+    def __init__(self, terminate=False, states=False, nominals=False):
+        self.terminateSimulation = terminate
+        self.valuesOfContinuousStatesChanged, self.nominalContinuousStatesChanged = states, nominals
+
+
+class Blank:
+    """What it reads for an unsigned number; no variable is one."""
+
+    value = 0
+
+
+DONE, FAILED = Stepped(0), Stepped(ERROR)
+
+
+class Instance:
+    """What the native layer asks of every instance."""
+
+    def __init__(self, instance_name="", resources="", logger=0, visible=False):
+        self.instance_name, self.messages = instance_name, []
+
+    def log(self, sentence, status):
+        self.messages.append(Message(status, "logStatusError", sentence))
+
+    def _get_log_queue(self):
+        return self.messages
+
+    @staticmethod
+    def _fmu_state_to_bytes(state):
+        return json.dumps(state).encode()
+
+    def enter_initialization_mode(self):
+        """Nothing arrives here, neither tolerance nor start nor stop time."""
+
+    def terminate(self):
+        """Nothing is open."""
+
+
+class Slave(Hosted, Instance):
+    """One instance of a model, for co-simulation or for model exchange."""
+
+    kept = (*KEPT, "kind")
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.kind = UNDECIDED
+        self.nominals = exchange.nominals(self.model)
+
+    get_float64, set_float64 = getter("Real", nan), setter("Real")
+    get_int32 = get_int64 = getter("Integer", 0)
+    set_int32 = set_int64 = setter("Integer")
+
+    # No variable is of these types; a host that asks all the same is told so, and not crashed.
+
+    get_uint64, set_uint64 = getter("Boolean", Blank), setter("Boolean")
+    get_boolean, set_boolean = getter("Boolean", False), setter("Boolean")
+    get_string, set_string = getter("String", ""), setter("String")
+
+    def place(self, name):
+        return PLACES.get(name, name)
+
+    def recount(self, ahead):
+        super().recount(ahead)
+        self.model.exchange.show(self.model, self.model.solver)
+
+    def broken_rule(self):
+        """The rule for our own solver binds as soon as that is what solves."""
+        rule = super().broken_rule()
+        return rule if self.kind == STEPPING or rule != self.model.own_solver else 0
+
+    # ---- co-simulation
+
+    def do_step(self, current_time, step_size):
+        if self.kind != STEPPING:
+            self.begin_stepping(current_time)
+        return DONE if Hosted.do_step(self, current_time, step_size) else FAILED
+
+    def begin_stepping(self, current_time):
+        """The start time is that of the first step."""
+        try:
+            if self.kind == EXCHANGED:
+                self.fail(INTEGRATED.format(t=current_time))
+                return
+            self.kind = STEPPING
+            if self.phase == RUNNING and not self.failure:
+                if current_time != self.model.solver.t:
+                    self.start_time, self.phase = current_time, SETTING_UP
+                elif sentence := self.objection():
+                    self.fail(sentence)
+        except BaseException as error:  # as in hosted.py
+            self.fail(unforeseen(error, self.model))
+
+    # ---- model exchange
+
+    def get_number_of_continuous_states(self):
+        return 3 if self.model.driven else 2
+
+    def get_number_of_event_indicators(self):
+        return 2 if self.model.dry else 0
+
+    def set_time(self, t):
+        self.begin_exchange()
+        exchange.move_to(self.model, self.model.solver, t)
+
+    def set_continuous_states(self, states):
+        self.begin_exchange()
+        exchange.put(self.model, self.model.solver, states)
+
+    def get_continuous_states(self):
+        return self.evaluated(exchange.states, self.get_number_of_continuous_states())
+
+    def get_nominals_of_continuous_states(self, number):
+        return exchange.nominals(self.model)[:number]
+
+    def get_continuous_state_derivatives(self):
+        return self.evaluated(exchange.rates, self.get_number_of_continuous_states())
+
+    def get_event_indicators(self):
+        return self.evaluated(exchange.indicators, 2) if self.model.dry else []
+
+    def update_discrete_states(self):
+        try:
+            self.begin_exchange()
+            model, march = self.model, self.model.solver
+            if self.ready():
+                if fabs(march.x) + fabs(march.v) < HUGE:
+                    before, self.nominals = self.nominals, exchange.nominals(model)
+                    return Updated(states=exchange.update(model, march), nominals=self.nominals != before)
+                self.fail(SENTENCES[DIVERGED].format(t=march.t))
+        except BaseException as error:  # as above
+            self.fail(unforeseen(error, self.model))
+        return Updated(terminate=True)
+
+    def begin_exchange(self):
+        self.observed = False
+        if self.kind != EXCHANGED:
+            self.kind = EXCHANGED
+            exchange.begin(self.model.solver)
+
+    def evaluated(self, function, number):
+        """What a function makes of the present point; NaN where there is nothing to compute with."""
+        try:
+            if self.ready():
+                return function(self.model, self.model.solver)
+        except (ArithmeticError, ValueError):
+            pass  # a state that the importer's solver only tries may be anything
+        except BaseException as error:  # as above
+            self.fail(unforeseen(error, self.model))
+        return [nan] * number
+
+    def ready(self):
+        """Whether the values can be used; a run that has begun fails if they cannot."""
+        if self.phase == SETTING_UP:
+            if not self.observed:
+                self.observe()
+            return self.observed
+        try:
+            return self.prepared()
+        except BaseException as error:  # as above
+            return self.fail(unforeseen(error, self.model))
+
+    def apply(self):
+        """In model exchange nothing starts anew: the mode follows at the next event."""
+        if self.kind == EXCHANGED and self.phase == RUNNING:
+            self.changed = self.observed = False
+        else:
+            super().apply()
+
+    def observe(self):
+        try:
+            super().observe()
+        except (ArithmeticError, ValueError):
+            if self.kind != EXCHANGED:
+                raise
+            self.silence()

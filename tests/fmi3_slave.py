@@ -1,0 +1,50 @@
+"""fmpy's FMI 3.0 instances under the names of its FMI 2.0 slave, so that the same helpers lead both."""
+
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+
+
+class Names:
+    """The calls of FMI 2.0 whose name or place is another in FMI 3.0."""
+
+    experiment = {}  # noqa: RUF012 - replaced, never changed
+
+    def setupExperiment(self, **experiment):
+        self.experiment = experiment
+
+    def enterInitializationMode(self):
+        super().enterInitializationMode(**self.experiment)
+
+    def getReal(self, references):
+        return self.getFloat64(references)
+
+    def setReal(self, references, values):
+        self.setFloat64(references, values)
+
+    def getInteger(self, references):
+        return self.getInt64(references)
+
+    def setInteger(self, references, values):
+        self.setInt64(references, values)
+
+    def getFMUstate(self):
+        return self.getFMUState()
+
+    def setFMUstate(self, state):
+        self.setFMUState(state)
+
+    def freeFMUstate(self, state):
+        self.freeFMUState(state)
+
+    def serializeFMUstate(self, state):
+        return self.serializeFMUState(state)
+
+    def deSerializeFMUstate(self, content):
+        return self.deserializeFMUState(content)
+
+
+class Slave(Names, FMU3Slave):
+    """An instance for co-simulation."""
+
+
+class Model(Names, FMU3Model):
+    """An instance for model exchange."""

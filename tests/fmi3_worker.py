@@ -1,0 +1,191 @@
+"""worker.py for FMI 3.0: instances for co-simulation and for model exchange, and whole runs by fmpy, in one process.
+
+FMI 2.0 FMUs are welcome beside them.
+"""
+
+import os
+import sys
+import tempfile
+from ctypes import c_double
+from unittest.mock import patch
+
+import fmpy
+import numpy as np
+from fmpy.fmi3 import FMU3Model
+from scipy.integrate import solve_ivp
+
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
+
+import worker
+from fmi3_slave import Model, Slave
+
+FLAGS = ("again", "terminate", "nominals", "states", "timed")  # of fmi3UpdateDiscreteStates, in its order
+
+
+class CoSimulation(worker.Instance):
+    """An FMI 3.0 instance that solves by itself."""
+
+    interface = Slave
+
+    def __init__(self, fmu, name):
+        directory, description = fmu
+        kinds = {"Float64": "Real"}  # as its parent calls it
+        self.variables = {v.name: (v.valueReference, kinds.get(v.type, v.type)) for v in description.modelVariables}
+        self.states, self.log = [], []
+        self.slave = self.interface(
+            guid=description.guid,
+            modelIdentifier=description.modelName,
+            unzipDirectory=directory,
+            instanceName=name,
+        )
+        self.slave.instantiate(loggingOn=True, logMessage=self._note)
+
+    def _note(self, environment, status, category, message):
+        self._hear(environment, None, status, category, message)
+
+    def ask(self, kind, reference):
+        """Read one variable as a type of FMI 3.0, also one that it is not of."""
+        getattr(self.slave, f"get{kind}")([reference])
+
+    def tell(self, kind, reference, value):
+        """Write one likewise."""
+        getattr(self.slave, f"set{kind}")([reference], [value])
+
+
+class ModelExchange(CoSimulation):
+    """An FMI 3.0 instance that a solver of the importer leads."""
+
+    interface = Model
+
+    def sizes(self):
+        """The numbers of continuous states and of event indicators."""
+        return self.slave.getNumberOfContinuousStates(), self.slave.getNumberOfEventIndicators()
+
+    def _vector(self, get, size):
+        values = (c_double * size)()
+        get(values, size)
+        return list(values)
+
+    def at(self, t):
+        self.slave.setTime(t)
+
+    def put(self, states):
+        self.slave.setContinuousStates((c_double * len(states))(*states), len(states))
+
+    def place(self, t, states):
+        self.at(t)
+        self.put(states)
+
+    def where(self):
+        return self._vector(self.slave.getContinuousStates, self.sizes()[0])
+
+    def rates(self):
+        return self._vector(self.slave.getContinuousStateDerivatives, self.sizes()[0])
+
+    def indicators(self):
+        return self._vector(self.slave.getEventIndicators, self.sizes()[1])
+
+    def nominals(self):
+        return self._vector(self.slave.getNominalsOfContinuousStates, self.sizes()[0])
+
+    def event(self):
+        self.slave.enterEventMode()
+
+    def update(self):
+        """The flags that are raised."""
+        return [name for name, flag in zip(FLAGS, self.slave.updateDiscreteStates(), strict=False) if flag]
+
+    def go_on(self):
+        self.slave.enterContinuousTimeMode()
+
+    def solve(self, times, names, method, rtol, ramp):
+        """Rows at the times by scipy, a second importer, and the number of evaluations of the derivatives.
+
+        The instance is at times[0], in continuous-time mode.  `ramp` is {name: [value at time 0, rate]}: inputs for
+        all time.  An event is taken where an indicator is no more above zero, as SUNDIALS does.
+        """
+        read, t, rows, evaluations = self._reader(names), times[0], [], 0
+
+        def place(t, y):
+            self.set({name: value + rate * t for name, (value, rate) in ramp.items()})
+            self.place(t, list(y))
+
+        def rates(t, y):
+            place(t, y)
+            return self.rates()
+
+        def indicator(i):
+            def root(t, y):
+                place(t, y)
+                return self.indicators()[i]
+
+            root.terminal, root.direction = True, -1
+            return root
+
+        roots = [indicator(i) for i in range(self.sizes()[1])]
+        absolute = [rtol * nominal for nominal in self.nominals()]
+        for _ in range(500):  # more events than any run has
+            options = {"rtol": rtol, "atol": absolute, "events": roots, "dense_output": True}
+            run = solve_ivp(rates, (t, times[-1]), self.where(), method, **options)
+            evaluations += run.nfev
+            ahead = run.t[-1]
+            if run.status == 1:  # at the root, give or take the last digits
+                near = (ahead + i * np.spacing(ahead) for i in range(1000))
+                ahead = next(t for t in near if min(root(t, run.sol(t)) for root in roots) <= 0.0)
+            while len(rows) < len(times) and (times[len(rows)] < ahead or run.status == 0):
+                place(times[len(rows)], run.sol(times[len(rows)]))
+                rows.append(read())
+            if run.status != 1:
+                return rows, evaluations
+            t = ahead
+            place(t, run.sol(t))
+            self.event()
+            self.update()
+            self.go_on()
+        raise RuntimeError(f"events without end near t = {t!r} s")
+
+
+class Worker(worker.Worker):
+    """The extracted FMUs and their instances."""
+
+    def instantiate(self, path, name):
+        return self._new(path, name, CoSimulation)
+
+    def exchange(self, path, name):
+        return self._new(path, name, ModelExchange)
+
+    def _new(self, path, name, kind):
+        if path not in self.fmus:
+            folder = fmpy.extract(path, tempfile.mkdtemp(dir=self.room))
+            self.fmus[path] = folder, fmpy.read_model_description(path)
+        if self.fmus[path][1].fmiVersion == "2.0":
+            kind = worker.Instance
+        self.instances.append(kind(self.fmus[path], name))
+        return len(self.instances) - 1
+
+    def simulate(self, path, options):
+        """What fmpy.simulate_fmu gives: {"columns": ..., "evaluations": of the derivatives} or {"error": text}.
+
+        An `input` is given as [names, rows].
+        """
+        if "input" in options:
+            names, rows = options["input"]
+            rows = [tuple(row) for row in rows]
+            options["input"] = np.array(rows, dtype=[(name, float) for name in ("time", *names)])
+        plain, count = FMU3Model.getContinuousStateDerivatives, [0]
+
+        def counted(*arguments):
+            count[0] += 1
+            return plain(*arguments)
+
+        try:
+            with patch.object(FMU3Model, "getContinuousStateDerivatives", counted):
+                table = fmpy.simulate_fmu(path, **options)
+        except Exception as error:
+            return {"error": str(error)}
+        return {"columns": {name: table[name].tolist() for name in table.dtype.names}, "evaluations": count[0]}
+
+
+if __name__ == "__main__":
+    worker.Worker = Worker
+    worker.main()

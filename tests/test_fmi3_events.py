@@ -1,0 +1,153 @@
+"""Model exchange call by call: what happens at an event, and what does not happen without one."""
+
+from math import isfinite
+
+import fmi3_by_hand
+import pytest
+from fmi3_by_hand import BREAK_AWAY, DRIVER, HOLD, SLIDE, G, K, M, at_event, sentence
+from models import EXACT, SIGN, THRESHOLD, declared
+
+fmus, worker, _workers, launch, _ = fmi3_by_hand.FIXTURES
+
+
+def test_the_sled_breaks_away_slides_and_sticks_again(launch):
+    fmu = launch("stickslip")
+    assert fmu.update() == []
+    fmu.go_on()
+    assert fmu.indicators() == pytest.approx([1.0, HOLD])
+    assert fmu.rates() == [0.0, 0.0, DRIVER]
+
+    before = BREAK_AWAY * (1.0 - 1e-12)
+    assert at_event(fmu, before, [0.0, 0.0, DRIVER * before]) == []  # too early: nothing happens
+    fmu.go_on()
+    assert fmu.get("mode", "events.count") == [0, 0]
+    to_rest, to_break_away = fmu.indicators()
+    assert to_rest == 1.0
+    assert 0.0 < to_break_away < 1e-9
+
+    after = BREAK_AWAY * (1.0 + 1e-12)
+    fmu.place(after, [0.0, 0.0, DRIVER * after])
+    assert fmu.indicators()[1] < 0.0
+    assert fmu.rates() == [0.0, 0.0, DRIVER]  # the mode is the old one until the event is handled
+    fmu.event()
+    assert fmu.update() == []
+    assert fmu.update() == []  # a slide just begun is not taken for one that ends
+    fmu.go_on()
+    assert fmu.get("mode", "events.count", "events.t_last") == [1, 1, after]
+    assert fmu.rates() == pytest.approx([0.0, (HOLD - SLIDE) / M, DRIVER])
+    assert fmu.indicators() == [0.0, 1.0]
+
+    fmu.place(4.6, [0.05, 0.2, DRIVER * 4.6])
+    assert fmu.indicators() == [0.2, 1.0]
+    assert fmu.rates()[1] == pytest.approx((K * (DRIVER * 4.6 - 0.05) - SLIDE) / M)
+
+    assert at_event(fmu, 4.8, [0.1, -1e-9, DRIVER * 4.8]) == ["states"]
+    assert fmu.where() == [0.1, 0.0, DRIVER * 4.8]
+    assert fmu.update() == []
+    fmu.go_on()
+    assert fmu.get("mode", "events.count", "events.t_last") == [0, 2, 4.8]
+    assert fmu.rates() == [0.0, 0.0, DRIVER]
+    assert fmu.indicators() == pytest.approx([1.0, HOLD - K * (DRIVER * 4.8 - 0.1)])
+
+
+@pytest.mark.parametrize("ulps", range(-9, 10))
+def test_an_event_acts_where_the_indicator_is_no_more_above_zero(launch, ulps):
+    """So a solver that stops at the root or a little beyond never stops for nothing, and a load of just the limit is
+    held.  Between the two, a few units in the last place, an event that comes all the same acts."""
+    values = {"m": 1.0, "g": 1.0, "mu_s": 0.5, "mu_d": 0.25, "k": 1.0, "v_driver": 1.0}
+    fmu = launch("stickslip", values)
+    fmu.update()
+    fmu.go_on()
+    here = 0.5 * (1.0 + ulps * 2.0**-52)
+    fmu.place(here, [0.0, 0.0, here])
+    to_break_away = fmu.indicators()[1]
+    assert to_break_away > 0.0 or ulps > 0
+    assert to_break_away <= 0.0 or ulps < 9
+    assert at_event(fmu, here, [0.0, 0.0, here]) == []
+    mode = fmu.get("mode")
+    assert mode == 1 or to_break_away > 0.0
+    assert mode == 0 or ulps > 0
+    fmu.go_on()
+    if mode == 1:
+        assert at_event(fmu, 1.0, [0.75, 1e-300, 1.0]) == []
+        assert fmu.get("mode") == 1  # it only just moves, but it does
+        fmu.go_on()
+        assert at_event(fmu, 1.0, [0.9, 0.0, 1.0]) == []
+        assert fmu.get("mode", "events.count") == [0, 2]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_mass_that_friction_cannot_hold_turns_without_a_stop(launch, direction):
+    """The mass with Coulomb friction, far out: from one slide to the other in one event."""
+    fmu = launch("coulomb", {"x0": 0.1 * direction})
+    fmu.update()
+    fmu.go_on()
+    assert fmu.get("mode") == -direction
+    assert at_event(fmu, 0.25, [-0.09 * direction, 1e-12 * direction]) == ["states"]
+    assert fmu.get("mode", "events.count") == [direction, 1]
+    assert fmu.where() == [-0.09 * direction, 0.0]
+    assert fmu.rates()[1] == pytest.approx(direction * (157.9 * 0.09 - 0.5))
+    fmu.go_on()
+    assert at_event(fmu, 0.5, [0.003 * direction, -1e-12 * direction]) == ["states"]
+    assert fmu.get("mode", "events.count") == [0, 2]
+
+
+@pytest.mark.parametrize(("variable", "value"), [("mu_s", 0.1), ("k", 5000.0), ("F_ext", 200.0), ("g", 1.0)])
+def test_what_changes_in_event_mode_can_set_a_stuck_sled_free(launch, variable, value):
+    fmu = launch("stickslip", {"mu_d": 0.05})
+    fmu.update()
+    fmu.go_on()
+    fmu.place(2.0, [0.0, 0.0, DRIVER * 2.0])
+    fmu.event()
+    fmu.set({variable: value})
+    assert fmu.update() == []
+    assert fmu.get("mode", "events.count", "events.t_last") == [1, 1, 2.0]
+    given = {"k": K, "mu_d": 0.05, "g": G, "F_ext": 0.0, variable: value}
+    net = given["F_ext"] + given["k"] * DRIVER * 2.0 - given["mu_d"] * M * given["g"]
+    assert fmu.rates()[1] == pytest.approx(net / M)
+
+
+def test_what_changes_in_continuous_time_waits_for_the_event(launch):
+    """An input that goes on growing between two evaluations: the motion stays smooth, the indicator tells."""
+    fmu = launch("stickslip")
+    fmu.update()
+    fmu.go_on()
+    fmu.place(2.0, [0.0, 0.0, DRIVER * 2.0])
+    for force in (20.0, 200.0):
+        fmu.set({"F_ext": force})
+        assert fmu.rates() == [0.0, 0.0, DRIVER]
+        assert fmu.indicators() == pytest.approx([1.0, HOLD - force - K * DRIVER * 2.0])
+        assert fmu.get("mode") == 0
+    fmu.event()
+    fmu.update()
+    assert fmu.get("mode") == 1
+
+
+def test_a_changed_driver_speed_moves_nothing_suddenly(launch):
+    fmu = launch("stickslip")
+    fmu.update()
+    fmu.go_on()
+    fmu.place(2.0, [0.0, 0.0, DRIVER * 2.0])
+    before = fmu.get("x", "v", "x_driver", "F_spring", "energy")
+    fmu.event()
+    fmu.set({"v_driver": -1.0})
+    assert fmu.update() == []
+    fmu.go_on()
+    assert fmu.get("x", "v", "x_driver", "F_spring", "energy") == before
+    assert fmu.rates() == [0.0, 0.0, -1.0]
+
+
+@pytest.mark.parametrize(("name", "law"), [("coulomb", SIGN), ("pendulum", SIGN), ("stickslip", THRESHOLD)])
+def test_the_other_laws_know_no_events_and_no_method(launch, name, law):
+    values = {"friction": law}
+    if any(value == EXACT for _, value, _ in declared(name)["solver.method"].items):
+        values["solver.method"] = EXACT
+    fmu = launch(name, values)
+    assert fmu.update() == []
+    fmu.go_on()
+    assert fmu.indicators() == [1.0, 1.0]
+    x, *rest = fmu.where()
+    assert at_event(fmu, 1.0, [x, 0.0, *rest[1:]]) == []
+    assert fmu.get("events.count") == 0
+    assert all(isfinite(rate) for rate in fmu.rates())
+    assert sentence(fmu) == ""
