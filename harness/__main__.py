@@ -117,7 +117,8 @@ def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, qu
         rest = {"laws": found.laws, "anchors": found.anchors, "advice": found.advice, "missing": found.missing}
         click.echo(as_text({"points": points} | rest))
     elif not quiet:
-        for table in (*map(tables.work, found.studies), tables.laws(found.laws), tables.anchors(found.anchors)):
+        errors = (tables.exchange(found.studies), tables.laws(found.laws), tables.anchors(found.anchors))
+        for table in (*map(tables.work, found.studies), *errors):
             Console().print(table, "")
         for sentence in (*found.advice, *found.missing):
             Console().print(sentence, highlight=False)

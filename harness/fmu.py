@@ -1,4 +1,4 @@
-"""Runs a built FMU through fmpy; the only file that knows it.
+"""Runs a built FMI 2.0 FMU through fmpy, as a scene says.
 
 The FMU's solver runs free of the communication points.  A step to `solver.t_next` ends where the solver's own step
 ends, so following it shows every step and event through the standard interface alone.

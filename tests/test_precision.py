@@ -15,7 +15,7 @@ from harness.errors import HarnessError
 from harness.precision import advice, laws, peers
 from harness.precision.answer import Answer
 from harness.precision.inside import Inside, embedded, offered
-from harness.precision.study import FMPY, FMU, QUICK, Extent, Job, Point, Study, jobs, sweep
+from harness.precision.study import FMPY, FMU, QUICK, WAYS, Extent, Job, Point, Study, jobs, sweep
 from harness.reference import CASES, errors, load
 
 ROOT = Path(__file__).parent.parent
@@ -170,8 +170,11 @@ def test_the_command_writes_every_point_and_says_what_to_use(place, tmp_path):
     assert {path.name for path in folder.iterdir()} == {"smd.csv", "smd.png", "smd.txt", "anchors.csv"}
     with (folder / "smd.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    tools = {FMU, FMPY, "scipy", "cvode"} - peers.missing().keys()
+    tools = {FMU, FMPY, *WAYS, "scipy", "cvode"} - peers.missing().keys()
     assert {row["tool"] for row in rows} == tools
+    unbuilt = "not built: fmus/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
+    assert [row["failure"] for row in rows if row["tool"] in WAYS] == [unbuilt, unbuilt]
+    assert done.stdout.count(unbuilt) == 1
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
     assert len(inside) == 1 + 4 * len(QUICK.tolerances)
     assert float(inside[0]["largest [1]"]) < 1e-13

@@ -10,20 +10,25 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..precision.laws import Law
-from ..precision.study import FMPY, FMU, Study
+from ..precision.study import CS, FMPY, FMU, ME, Study
 from ..reference import Case
 from .style import FAMILIES, STYLE, WIDTH
 
 TOOLS: dict[str, dict[str, Any]] = {
     FMU: {"linestyle": "-", "marker": "o", "markersize": 4},
     FMPY: {"linestyle": ":", "marker": ".", "markersize": 4},
+    CS: {"linestyle": "", "marker": "P", "markersize": 8, "fillstyle": "none"},
+    ME: {"linestyle": "-.", "marker": "D", "markersize": 4},
     "scipy": {"linestyle": "--", "marker": "s", "markersize": 4, "fillstyle": "none"},
     "cvode": {"linestyle": "--", "marker": "^", "markersize": 5, "fillstyle": "none"},
 }
 COSTS = {"seconds": "run time [s]", "evaluations": "right-hand sides and Jacobians"}
 CHATTERING: dict[str, Any] = {"linestyle": "-", "marker": "x", "markersize": 4, "linewidth": 0.7}
 FILL = {FMU: "full"}  # of the star that stands for a closed form
-LEGEND = "FMU: its own code in this process; fmpy: the FMU through fmpy"
+LEGEND = (
+    "FMU: its own code in this process; fmpy: the FMU through fmpy\n"
+    "FMI 3.0 through fmpy: co-simulation (CS) with the FMU's defaults, model exchange (ME) by fmpy's CVode"
+)
 FLOOR = 2.0**-53  # errors below what a double can tell are drawn there
 
 
@@ -59,13 +64,14 @@ def draw(study: Study, laws: Sequence[Law], path: Path) -> None:
 def curves(axes: Axes, study: Study, case: Case, cost: str) -> None:
     """Every solver of a case, log-log; a failed run is a gap."""
     for tool, method in study.solvers(case):
-        same = tool == FMPY and (cost != "seconds" or case.chatters)  # through fmpy the right-hand sides are the same
+        same = tool in (FMPY, CS) and (cost != "seconds" or case.chatters)  # the same right-hand sides
         if same or not study.curve(case, tool, method):
             continue
         mine = [p for p in study.points if (p.case, p.tool, p.method) == (case.name, tool, method)]
         errors = [max(p.beside_dry if case.chatters and p.beside_dry is not None else p.largest, FLOOR) for p in mine]
         style = CHATTERING if case.chatters else TOOLS[tool]
         text = f"{method}, law '{case.law}'" if case.chatters else f"{tool}: {method}"
-        size = {"markersize": 9, "marker": "*", "fillstyle": FILL.get(tool, "none")} if method == "exact" else {}
+        star = {"markersize": 9, "marker": "*", "fillstyle": FILL.get(tool, "none")}
+        shape = {**style, **(star if method == "exact" and tool != CS else {})}
         costs = [np.nan if p.failure else getattr(p, cost) for p in mine]
-        axes.loglog(errors, costs, color=FAMILIES[method], label=text, **{**style, **size})
+        axes.loglog(errors, costs, color=FAMILIES[method], label=text, **shape)

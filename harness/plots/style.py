@@ -14,7 +14,7 @@ FAMILIES = {
     **dict.fromkeys(("dop853", "DOP853"), GREEN),
     **dict.fromkeys(("rodas", "Radau"), "#CC79A7"),
     "LSODA": "#56B4E9",
-    **dict.fromkeys(("Adams", "BDF"), "#E69F00"),
+    **dict.fromkeys(("Adams", "BDF", "fmpy's CVode"), "#E69F00"),
 }
 STYLE: dict[Any, Any] = {
     "font.size": 9,

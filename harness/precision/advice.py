@@ -6,7 +6,7 @@ from math import isnan
 
 from ..reference import Case
 from .laws import Law
-from .study import FMPY, FMU, Point, Study
+from .study import FMPY, FMU, WAYS, Point, Study
 
 TARGET = 1e-6
 TARGETS = (1e-3, TARGET, 1e-9)
@@ -20,8 +20,8 @@ def needed(curve: Iterable[Point], target: float, beside_dry: bool = False) -> P
 
 
 def ranking(study: Study, case: Case, target: float) -> list[Point]:
-    """The fastest point of every solver that meets the target, fastest first; FMUs without the way through fmpy."""
-    curves = [study.curve(case, tool, method) for tool, method in study.solvers(case) if tool != FMPY]
+    """The fastest point of every solver that meets the target, fastest first; FMUs without the ways through fmpy."""
+    curves = [study.curve(case, *solver) for solver in study.solvers(case) if solver[0] not in (FMPY, *WAYS)]
     found = [point for curve in curves if (point := needed(curve, target))]
     return sorted(found, key=lambda point: point.seconds)
 

@@ -15,6 +15,7 @@ from time import perf_counter
 
 import numpy as np
 
+from .. import fmi3
 from ..errors import HarnessError
 from ..fmu import simulate
 from ..reference import CASES, Case, errors, load
@@ -26,6 +27,8 @@ from .inside import Inside, embedded, offered
 MOST = 20  # timed runs of one point
 
 FMU, FMPY = "FMU", "fmpy"  # the FMU's own code in this process; the FMU through fmpy
+CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # the FMI 3.0 FMU through fmpy, in co-simulation and in model exchange
+WAYS = {CS: fmi3.COSIMULATION, ME: fmi3.EXCHANGE}
 
 
 @dataclass(frozen=True)
@@ -44,7 +47,7 @@ QUICK = Extent((1e-3, 1e-6, 1e-9), 0.1, 0.005)
 
 @dataclass(frozen=True)
 class Point:
-    """One solver at one tolerance (rtol NaN for a closed form, atol NaN for the FMU's own choice): run time in s,
+    """One solver at one tolerance (rtol NaN for a closed form; either NaN for the FMU's own choice): run time in s,
     right-hand sides and Jacobians, errors as in reference.Errors, the largest error beside dry friction; or the
     failure, and no numbers."""
 
@@ -67,13 +70,14 @@ class Point:
 class Job:
     """How one solver is asked: `run(rtol, extent)` gives its answer and the run time in s, None if there is nothing
     to ask.  `absolute` is atol as a share of rtol, NaN for the FMU's own choice; to fail is an error where `must` is
-    set, else a gap."""
+    set, else a gap.  Where it is not `swept` it is asked once, with rtol 0."""
 
     tool: str
     method: str
     absolute: float
     run: Callable[[float, Extent], tuple[Answer, float] | None]
     must: bool = False
+    swept: bool = True
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,15 @@ class Study:
     def solvers(self, case: Case) -> list[tuple[str, str]]:
         """Tool and method of every curve of a case, in order."""
         return list(dict.fromkeys((point.tool, point.method) for point in self.points if point.case == case.name))
+
+    def exchanged(self) -> dict[float, dict[str, float]]:
+        """By relative tolerance, the largest error of every case in model exchange, NaN where that failed; nothing
+        where the FMI 3.0 FMU is not built."""
+        found: dict[float, dict[str, float]] = {}
+        for point in self.points:
+            if point.tool == ME and not isnan(point.rtol):
+                found.setdefault(point.rtol, {})[point.case] = point.largest
+        return found
 
 
 def study(model: str, extent: Extent, report: Callable[[float], None]) -> Study:
@@ -113,9 +126,15 @@ def jobs(case: Case, carried: type, file: Path) -> Iterator[Job]:
     for method in offered(carried):
         if not (method == "exact" and case.chatters):
             taken: dict[float, float] = {}  # run time in s by rtol, from the first of the two for the second
-            yield Job(FMU, method, nan, partial(inside, case, carried, method, times.tolist(), taken))
-            yield Job(FMPY, method, nan, partial(through_fmpy, case, file, method, times, taken), must=True)
+            swept = method != "exact"
+            own = partial(inside, case, carried, method, times.tolist(), taken)
+            yield Job(FMU, method, nan, own, swept=swept)
+            yield Job(FMPY, method, nan, partial(through_fmpy, case, file, method, times, taken), True, swept)
     if not case.chatters:
+        three = fmi3.beside(file)
+        usual = {number: name for name, number in offered(carried).items()}[carried().solver.method]
+        for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", three.is_file())):
+            yield Job(tool, method, nan, partial(by_importer, case, three, WAYS[tool], times), swept=swept)
         absent = peers.missing()
         for peer, methods in (("scipy", peers.SCIPY), ("cvode", ("BDF",) if case.problem.stiff else ("Adams",))):
             for method in methods:
@@ -127,7 +146,7 @@ def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
     """One solver over all tolerances, from loose to tight."""
     truth, dry = load(case.truth), load(case.dry) if case.dry else None
     given_up = ""
-    for rtol in (nan,) if job.method == "exact" else extent.tolerances:
+    for rtol in extent.tolerances if job.swept else (nan,):
         point = partial(Point, case.name, job.tool, job.method, rtol, job.absolute * rtol)
         if given_up:
             yield point(failure=f"not tried: {given_up}")
@@ -185,13 +204,12 @@ def through_fmpy(
     """The FMU through fmpy, position and speed recorded; only where it did not fail without fmpy, then it must not."""
     if rtol not in taken:
         return None
-    outputs = ("theta", "omega") if case.problem.unit == "rad" else ("x", "v")
     scene = Scene(
         name="precision",
         title=case.name,
         model=case.model,
         fmu=file,
-        outputs=outputs,
+        outputs=motion(case),
         method=method,
         rtol=rtol or None,
         grid=float(times[1]),
@@ -200,8 +218,27 @@ def through_fmpy(
         values=case.values,
     )
     run = simulate(scene)
-    motion = np.column_stack([run.columns[name] for name in outputs])
-    return Answer(motion, None, run.cost.evaluations), run.cost.seconds
+    columns = np.column_stack([run.columns[name] for name in motion(case)])
+    return Answer(columns, None, run.cost.evaluations), run.cost.seconds
+
+
+def by_importer(
+    case: Case, file: Path, way: str, times: np.ndarray, rtol: float, extent: Extent
+) -> tuple[Answer, float]:
+    """The FMI 3.0 FMU through fmpy, position and speed recorded, and in model exchange every change of mode; the run
+    time is that of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
+    marks = ("mode",) if way == fmi3.EXCHANGE and case.problem.dry else ()
+    with fmi3.instance(file, way) as fmu:
+        run = partial(fmu.simulate, case.values, motion(case) + marks, float(times[-1]), float(times[1]), rtol or None)
+        found = run(extent.patience)
+        seconds = best(run, extent.budget)
+    events = found.changes(*marks) if marks else None
+    return Answer(found.at(times, motion(case)), events, found.evaluations), seconds
+
+
+def motion(case: Case) -> tuple[str, str]:
+    """The outputs that are position and speed."""
+    return ("theta", "omega") if case.problem.unit == "rad" else ("x", "v")
 
 
 def by_peer(case: Case, peer: str, method: str, times: np.ndarray, rtol: float, extent: Extent) -> tuple[Answer, float]:

@@ -4,8 +4,9 @@ import csv
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import partial
+from math import isnan
 from pathlib import Path
-from shutil import copytree
+from shutil import copytree, ignore_patterns
 
 from ..errors import SceneError, unknown
 from ..folder import replacing
@@ -26,7 +27,9 @@ UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and r
     **dict.fromkeys(("atol", "error"), "SI"),
     "creep": "m/s",
 }
-FILES = ("anchors.csv", *(f"{model}{end}" for model in MODELS for end in (".csv", ".png", ".txt", "-laws.csv")))
+EXCHANGED = "model exchange by fmpy's CVode: largest error at rtol [1]"
+ENDS = (".csv", ".png", ".txt", "-exchange.csv", "-laws.csv")
+FILES = ("anchors.csv", *(f"{model}{end}" for model in MODELS for end in ENDS))
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,8 @@ def survey(models: Sequence[str], extent: Extent, out: Path, report: Callable[[s
             raise SceneError(unknown("model", model, MODELS))
     with replacing(out / FOLDER, FILES) as folder:
         if (out / FOLDER).exists():
-            copytree(out / FOLDER, folder, dirs_exist_ok=True)
+            stale = ignore_patterns(*(f"{model}[.-]*" for model in models))
+            copytree(out / FOLDER, folder, ignore=stale, dirs_exist_ok=True)
         found = gather(models, extent, report)
         write(found, folder)
     return found
@@ -67,7 +71,11 @@ def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float],
         tuple(told),
         rows,
         tuple(advise(each, [law for law in told if law.model == each.model]) for each in studies),
-        (*map(gaps, studies), *(f"{peer} is left out: pip install {package}" for peer, package in missing().items())),
+        (
+            *map(gaps, studies),
+            *reasons(studies),
+            *(f"{peer} is left out: pip install {package}" for peer, package in missing().items()),
+        ),
     )
 
 
@@ -77,6 +85,11 @@ def gaps(found: Study) -> str:
     return f"{found.model}: {failed} of {len(found.points)} runs are gaps; {found.model}.csv has the reasons"
 
 
+def reasons(found: Iterable[Study]) -> Iterable[str]:
+    """Why what is asked once has no answer."""
+    return dict.fromkeys(p.failure for study in found for p in study.points if p.failure and isnan(p.rtol))
+
+
 def write(found: Survey, folder: Path) -> None:
     """Tables and figures of what was found."""
     from ..plots.precision import draw
@@ -84,6 +97,11 @@ def write(found: Survey, folder: Path) -> None:
     for each, sentence in zip(found.studies, found.advice, strict=True):
         (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
         save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
+        exchanged = each.exchanged()
+        if exchanged:
+            cases = next(iter(exchanged.values()))
+            rows = [[rtol, *errors.values()] for rtol, errors in exchanged.items()]
+            save(folder / f"{each.model}-exchange.csv", [EXCHANGED, *(f"{case} [1]" for case in cases)], rows)
         mine = [law for law in found.laws if law.model == each.model]
         draw(each, mine, folder / f"{each.model}.png")
         if mine:

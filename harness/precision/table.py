@@ -1,6 +1,7 @@
 """Tables of the work-precision studies, the laws and the anchors."""
 
 from collections.abc import Iterable
+from math import isnan
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -25,7 +26,21 @@ def work(study: Study) -> Table:
             for target in TARGETS:
                 point = needed(study.curve(case, tool, method), target)
                 cells += [f"{1e3 * point.seconds:.3g}", f"{point.evaluations}"] if point else ["-", "-"]
-            table.add_row(f"  {tool} {method}", *cells)
+            table.add_row(f"  {tool}: {method}", *cells)
+    return table
+
+
+def exchange(studies: Iterable[Study]) -> Table:
+    """The largest error in model exchange at every relative tolerance."""
+    table = grid("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol", "rtol")
+    found: dict[float, dict[str, float]] = {}
+    for study in studies:
+        for rtol, errors in study.exchanged().items():
+            found.setdefault(rtol, {}).update(errors)
+    for case in next(iter(found.values()), {}):
+        table.add_column(case.replace("-", "\n"), justify="right")
+    for rtol, errors in found.items():
+        table.add_row(power(rtol), *("-" if isnan(error) else power(error) for error in errors.values()))
     return table
 
 
@@ -59,7 +74,8 @@ def anchors(rows: Iterable[Row]) -> Table:
 
 
 def grid(title: str, first: str) -> Table:
-    """An empty table with its first column."""
+    """An empty table with its first column, wide enough for the title."""
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    table.min_width = len(title)
     table.add_column(first, no_wrap=True)
     return table

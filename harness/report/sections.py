@@ -142,7 +142,11 @@ def precision(results: Path) -> Section:
         if picture:
             text = results / "precision" / f"{model}.txt"
             said = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
-            parts.append(Part(model, said, None, picture))
+            exchanged = table(results / "precision" / f"{model}-exchange.csv")
+            parts.append(Part(model, said, exchanged, picture))
+            if not exchanged:
+                again = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
+                missing.append((f"{model} in model exchange", again))
         else:
             missing.append((model, f"python -m harness precision {model}"))
     anchors = table(results / "precision" / "anchors.csv")

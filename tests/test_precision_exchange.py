@@ -1,0 +1,155 @@
+"""Work-precision of the FMI 3.0 FMUs through fmpy: its own solver in model exchange, and theirs in co-simulation."""
+
+import csv
+import subprocess
+import sys
+from html import unescape
+from math import isnan
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmi3_hosts import built
+
+from harness import fmi3
+from harness.errors import HarnessError
+from harness.precision import advice
+from harness.precision.inside import embedded
+from harness.precision.study import CS, ME, Extent, jobs, sweep
+from harness.reference import CASES, load
+
+ROOT = Path(__file__).parent.parent
+CASE = {case.name: case for case in CASES}
+SMOOTH = [case for case in CASES if not case.chatters]
+TOLERANCES = (1e-4, 1e-6, 1e-8)
+
+
+@pytest.fixture(scope="module")
+def both(fmus, tmp_path_factory):
+    """A folder as a user's would be, with the FMUs for FMI 2.0 and 3.0 in it."""
+    folder = tmp_path_factory.mktemp("both")
+    (folder / "fmus").mkdir()
+    for file in fmus.glob("*.fmu"):
+        (folder / "fmus" / file.name).symlink_to(file)
+    (folder / "fmus" / "fmi3").symlink_to(built())
+    return folder
+
+
+def points(both, name, tool, tolerances=TOLERANCES):
+    """What the study finds about a case with a tool."""
+    file = both / "fmus" / f"{CASE[name].model}.fmu"
+    asked = [job for job in jobs(CASE[name], embedded(file), file) if job.tool == tool]
+    return [point for job in asked for point in sweep(CASE[name], job, Extent(tolerances, 5.0, 0.0))]
+
+
+def amplification(case):
+    """What an error of position at a break-away may become, relative to the motion: with it comes one in time, of its
+    size over the speed of the driver, and one in speed, that times the largest acceleration."""
+    if case.model not in ("stickslip", "pacejka"):
+        return 1.0
+    x, v = np.abs(load("stickslip").motion).max(axis=0)
+    return 2.9546 / 0.034 * x / v
+
+
+@pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
+def test_errors_in_model_exchange_fall_with_the_tolerance_and_stay_below_the_sum_of_those_of_its_steps(both, case):
+    loose, middle, tight = found = points(both, case.name, ME)
+    assert [point.rtol for point in found] == list(TOLERANCES)
+    assert loose.largest > 4 * middle.largest > 16 * tight.largest
+    assert loose.evaluations < middle.evaluations < tight.evaluations  # at least one a step
+    for point in (middle, tight):
+        assert point.largest < amplification(case) * point.evaluations * point.rtol
+
+
+@pytest.mark.parametrize("case", [case for case in SMOOTH if case.problem.dry], ids=lambda case: case.name)
+def test_every_change_of_mode_is_seen_in_model_exchange(both, case):
+    *_, middle, tight = points(both, case.name, ME)
+    assert tight.events < 0.1 * middle.events < 1e-4
+
+
+@pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
+def test_co_simulation_is_one_point_with_the_fmus_own_method(both, case):
+    (point,) = points(both, case.name, CS)
+    assert isnan(point.rtol)
+    assert point.method == {"pacejka": "rodas", "pendulum": "dop853"}.get(case.model, "exact")
+    assert point.largest < {"pacejka": 1e-6, "pendulum": 1e-9}.get(case.model, 1e-13)
+    assert point.evaluations > 0
+
+
+def test_where_cvode_may_take_no_more_steps_there_is_a_gap_with_fmpys_reason(both, capfd):
+    (point,) = points(both, "pacejka-0.01", ME, (1e-12,))
+    assert point.failure.startswith("fmpy's CVode (500 steps from point to point at most): At t = ")
+    assert "mxstep steps taken" in point.failure
+    assert capfd.readouterr() == ("", "")
+
+
+def test_each_run_of_an_instance_begins_anew(both):
+    with fmi3.instance(both / "fmus/fmi3/stickslip.fmu", fmi3.EXCHANGE) as fmu:
+        first, again = (fmu.simulate({"mu_s": 0.8}, ("x", "v", "mode"), 16.0, 0.5, 1e-6) for _ in range(2))
+        other = fmu.simulate({}, ("x", "v", "mode"), 16.0, 0.5, 1e-6)
+    assert np.array_equal(first.rows, again.rows)
+    assert first.evaluations == again.evaluations > 100
+    assert other.rows["x"][-1] != first.rows["x"][-1]
+
+
+@pytest.mark.parametrize("way", [fmi3.EXCHANGE, fmi3.COSIMULATION])
+def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
+    def refused(file, values=None, patience=None):
+        with pytest.raises(HarnessError) as error, fmi3.instance(file, way) as fmu:
+            fmu.simulate(values or {}, ("x",), 16.0, 0.01, 1e-6, patience)
+        return str(error.value)
+
+    sled, missing, broken = both / "fmus/fmi3/stickslip.fmu", tmp_path / "missing.fmu", tmp_path / "broken.fmu"
+    broken.write_bytes(b"no archive")
+    assert "m = -1.0 kg is refused" in refused(sled, {"m": -1.0})
+    unknown = "stickslip.fmu: The start values for the following variables could not be set: mess"
+    assert refused(sled, {"mess": 1.0}) == unknown
+    assert refused(sled, patience=1e-3).endswith(" s after 0.001 s of run time")
+    assert refused(missing) == f"not built: {missing} (python build_fmus.py --fmi 3)"
+    assert refused(broken) == "broken.fmu: File is not a zip file"
+    assert capfd.readouterr() == ("", "")
+
+
+def harness(folder, *arguments):
+    """The finished process of a command in a folder."""
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "80"}
+    line = [sys.executable, "-m", "harness", *map(str, arguments)]
+    return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
+
+
+def test_the_command_shows_both_ways_beside_the_others_and_error_against_tolerance(both, tmp_path):
+    done = harness(both, "precision", "stickslip", "--quick", "--out", tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "  FMI 3.0 CS: exact  " in done.stdout
+    assert "  FMI 3.0 ME: fmpy's CVode  " in done.stdout
+    with (tmp_path / "precision/stickslip.csv").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["tool"] in (CS, ME)]
+    assert [(row["case"], row["tool"], row["rtol [1]"]) for row in rows] == [
+        ("stickslip", CS, ""),
+        *(("stickslip", ME, rtol) for rtol in ("0.001", "1e-06", "1e-09")),
+    ]
+    assert all(float(row["seconds [s]"]) > 0 for row in rows)
+    with (tmp_path / "precision/stickslip-exchange.csv").open(newline="") as file:
+        heads, *table = csv.reader(file)
+    assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "stickslip [1]"]
+    assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
+    printed = done.stdout.partition("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol")[2]
+    told = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
+    assert told == [[advice.power(float(number)) for number in row] for row in table]
+
+
+def test_the_page_has_error_against_tolerance_or_names_the_commands_that_make_it(both, fmus, tmp_path):
+    def page(folder):
+        assert harness(folder, "precision", "smd", "--quick", "--quiet", "--out", tmp_path).returncode == 0
+        assert harness(folder, "report", "--quiet", "--out", tmp_path).returncode == 0
+        return unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
+
+    without = tmp_path / "without"
+    without.mkdir()
+    (without / "fmus").symlink_to(fmus)
+    head = "model exchange by fmpy's CVode: largest error at rtol"
+    commands = "python build_fmus.py smd --fmi 3 && python -m harness precision smd"
+    assert head in (shown := page(both))
+    assert commands not in shown
+    assert head not in (shown := page(without))  # what was there of another build is gone
+    assert commands in shown
