@@ -14,10 +14,10 @@ from models import CASES, MODELS, ODE23, combinations, declared, label, model_cl
 
 from fmus.runtime.declare import Choice
 from fmus.runtime.dop853 import Dop853
-from fmus.runtime.interpolant import Interpolant
 from fmus.runtime.ode23 import Ode23
 from fmus.runtime.ode45 import Ode45
 from fmus.runtime.rodas import Rodas
+from fmus.runtime.step import Step
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 FOLDERS = ("binaries", "documentation", "extra", "resources", "sources")  # FMI 2.0.4, section 2.3
@@ -168,9 +168,11 @@ def test_the_methods_keep_the_dimensions(physics, name):
     for method in (Ode23(), Ode45(), Dop853(), Rodas()):
         x1, v1, a1, e_x, e_v = method.step(model, 1, t, x, v, a, h)
         assert [has(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [True] * 5
-        inside = Interpolant()
-        method.expand(inside, model, 1, t, x, v, a, h, x1, v1, a1)
-        assert [has(*pair) for pair in zip(inside.at(0.3 * h), (x, v), strict=True)] == [True] * 2
+        step = Step()
+        step.t0, step.x0, step.v0, step.a0, step.mode0, step.span = t, x, v, a, 1, h
+        step.x1, step.v1, step.a1 = x1, v1, a1
+        method.expand(model, step)
+        assert [has(*pair) for pair in zip(step.interpolant.at(0.3 * h), (x, v), strict=True)] == [True] * 2
     if model.linear:
         model.exact.begin(x, v, a, model.push(t, 1))
         assert [has(*pair) for pair in zip(model.exact.at(h), (x, v), strict=True)] == [True] * 2

@@ -10,7 +10,7 @@ import scipy.integrate
 from models import MODELS, ROOT, combinations, model_class
 
 from fmus.runtime import rodas
-from fmus.runtime.interpolant import Interpolant
+from fmus.runtime.step import Step
 
 # the order of a method, the order of its interpolant, and a step in the range where halving shows them
 METHODS = {"ode23": (3, 3, 0.05), "ode45": (5, 4, 0.1), "dop853": (8, 7, 0.25), "rodas": (4, 3, 0.05)}
@@ -58,13 +58,17 @@ class Solver:
         self.numbers = import_module(f"fmus.runtime.{name}")
         self.order, self.inner, self.h = METHODS[name]
         self.method = getattr(self.numbers, name.capitalize())()
-        self.inside = Interpolant()
+        self.inside = None
 
     def step(self, model, t, x, v, h):
         """New x, v and acceleration, and the rates of the error; the interpolant is ready."""
         a = model.acceleration(t, x, v, 0)
         new = self.method.step(model, 0, t, x, v, a, h)
-        self.method.expand(self.inside, model, 0, t, x, v, a, h, *new[:3])
+        step = Step()
+        step.t0, step.x0, step.v0, step.a0, step.span = t, x, v, a, h
+        step.x1, step.v1, step.a1 = new[:3]
+        self.method.expand(model, step)
+        self.inside = step.interpolant
         return new
 
 

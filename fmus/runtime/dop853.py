@@ -115,8 +115,12 @@ class Dop853:
         )
         return x1, v1, a1, e_x, e_v
 
-    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+    def expand(self, model, step):
         """The interpolant of the step just taken."""
+        inside = step.interpolant
+        h, mode = step.span, step.mode0
+        t, x, v, a = step.t0, step.x0, step.v0, step.a0
+        v1, a1 = step.v1, step.a1
         v6, v7, v8, v9, v10, v11, v12 = self.v6, self.v7, self.v8, self.v9, self.v10, self.v11, self.v12
         a6, a7, a8, a9, a10, a11, a12 = self.a6, self.a7, self.a8, self.a9, self.a10, self.a11, self.a12
         y = A141 * v + A147 * v7 + A148 * v8 + A149 * v9
@@ -133,7 +137,7 @@ class Dop853:
         v16 = A161 * a + A166 * a6 + A167 * a7 + A168 * a8
         v16 = v + h * (v16 + A169 * a9 + A1613 * a1 + A1614 * a14 + A1615 * a15)
         a16 = model.acceleration(t + C16 * h, y, v16, mode)
-        inside.meet(h, x, v, a, x1, v1, a1)
+        inside.meet(step)
         inside.degree = 7
         p = D41 * v + D46 * v6 + D47 * v7 + D48 * v8 + D49 * v9 + D410 * v10
         inside.p4 = h * (p + D411 * v11 + D412 * v12 + D413 * v1 + D414 * v14 + D415 * v15 + D416 * v16)

@@ -19,16 +19,17 @@ class Interpolant:
         self.p0 = self.p1 = self.p2 = self.p3 = self.p4 = self.p5 = self.p6 = self.p7 = 0.0
         self.q0 = self.q1 = self.q2 = self.q3 = self.q4 = self.q5 = self.q6 = self.q7 = 0.0
 
-    def meet(self, h, x, v, a, x1, v1, a1):
-        """The cubic with the values and slopes of both ends."""
-        self.meet_values(h, x, v, x1, v1)
-        q = self.q1
-        self.q2, self.q3 = h * a - q, 2.0 * q - h * (a + a1)
+    def meet(self, step):
+        """The cubic with the values and slopes of both ends of a step."""
+        self.meet_values(step)
+        h, q = step.span, self.q1
+        self.q2, self.q3 = h * step.a0 - q, 2.0 * q - h * (step.a0 + step.a1)
 
-    def meet_values(self, h, x, v, x1, v1):
+    def meet_values(self, step):
         """The same but for the slopes of the speed, q2 and q3."""
+        h, x, v, v1 = step.span, step.x0, step.v0, step.v1
         self.ready, self.span, self.degree = True, h, 3
-        p = x1 - x
+        p = step.x1 - x
         self.p0, self.p1 = x, p
         self.p2, self.p3 = h * v - p, 2.0 * p - h * (v + v1)
         self.q0, self.q1 = v, v1 - v

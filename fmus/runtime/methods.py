@@ -51,13 +51,13 @@ class Methods:
             return self.dop853.step(model, mode, t, x, v, a, h)
         return self.ode45.step(model, mode, t, x, v, a, h)
 
-    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+    def expand(self, model, step):
         """The interpolant of the step just taken."""
         if self.chosen == RODAS:
-            self.rodas.expand(inside, model, mode, t, x, v, a, h, x1, v1, a1)
+            self.rodas.expand(model, step)
         elif self.chosen == DOP853:
-            self.dop853.expand(inside, model, mode, t, x, v, a, h, x1, v1, a1)
+            self.dop853.expand(model, step)
         elif self.chosen == ODE45:
-            self.ode45.expand(inside, model, mode, t, x, v, a, h, x1, v1, a1)
+            self.ode45.expand(model, step)
         else:
-            self.ode23.expand(inside, model, mode, t, x, v, a, h, x1, v1, a1)
+            self.ode23.expand(model, step)

@@ -29,6 +29,6 @@ class Ode23:
             (-5.0 * a + 6.0 * a2 + 8.0 * a3 - 9.0 * a1) / 72.0,
         )
 
-    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+    def expand(self, model, step):
         """The interpolant of the step just taken."""
-        inside.meet(h, x, v, a, x1, v1, a1)
+        step.interpolant.meet(step)

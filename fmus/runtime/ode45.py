@@ -56,9 +56,11 @@ class Ode45:
             E1 * a + E3 * a3 + E4 * a4 + E5 * a5 + E6 * a6 + E7 * a1,
         )
 
-    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+    def expand(self, model, step):
         """The interpolant of the step just taken: the cubic of ode23 and D s^2 (1 - s)^2."""
-        inside.meet(h, x, v, a, x1, v1, a1)
+        inside = step.interpolant
+        h, v, a, v1, a1 = step.span, step.v0, step.a0, step.v1, step.a1
+        inside.meet(step)
         inside.degree = 4
         inside.p4 = h * (D1 * v + D3 * self.v3 + D4 * self.v4 + D5 * self.v5 + D6 * self.v6 + D7 * v1)
         inside.q4 = h * (D1 * a + D3 * self.a3 + D4 * self.a4 + D5 * self.a5 + D6 * self.a6 + D7 * a1)

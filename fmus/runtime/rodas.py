@@ -92,9 +92,11 @@ class Rodas:
         xs, vs = xs + h * p6, vs + h * q6
         return xs, vs, model.acceleration(t + h, xs, vs, mode), p6, q6
 
-    def expand(self, inside, model, mode, t, x, v, a, h, x1, v1, a1):
+    def expand(self, model, step):
         """The interpolant of the step just taken; slopes of the speed are of no use where the curve is stiff."""
+        inside = step.interpolant
+        h = step.span
         q1, q2, q3, q4, q5 = self.q1, self.q2, self.q3, self.q4, self.q5
-        inside.meet_values(h, x, v, x1, v1)
+        inside.meet_values(step)
         inside.q2 = h * (H21 * q1 + H22 * q2 + H23 * q3 + H24 * q4 + H25 * q5)
         inside.q3 = h * (H31 * q1 + H32 * q2 + H33 * q3 + H34 * q4 + H35 * q5)
