@@ -39,9 +39,10 @@ class Interpolant:
         s = elapsed / self.span
         r = 1.0 - s
         p, q = self.p3, self.q3
-        if self.degree > 4:
-            p += r * (self.p4 + s * (self.p5 + r * (self.p6 + s * self.p7)))
-            q += r * (self.q4 + s * (self.q5 + r * (self.q6 + s * self.q7)))
-        elif self.degree > 3:
-            p, q = p + r * self.p4, q + r * self.q4
+        if self.degree > 3:
+            if self.degree > 4:
+                p += r * (self.p4 + s * (self.p5 + r * (self.p6 + s * self.p7)))
+                q += r * (self.q4 + s * (self.q5 + r * (self.q6 + s * self.q7)))
+            else:
+                p, q = p + r * self.p4, q + r * self.q4
         return self.p0 + s * (self.p1 + r * (self.p2 + s * p)), self.q0 + s * (self.q1 + r * (self.q2 + s * q))

@@ -5,13 +5,11 @@ from functools import cache, partial
 from math import nan
 from pathlib import Path
 
-from ..fmu import callbacks, instance, simulate
 from ..reference import CASES, load, relative
-from ..scene import Scene
-from ..stability.probe import plain
 from .in_c import NotHereError, Runs, built, cvode, runs
+from .loops import POINTS, lean, shared
 from .measure import Beside, Measure
-from .speed import MODELS, POINTS, file, shared
+from .speed import MODELS, file
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
 
@@ -66,7 +64,7 @@ def step_in_c(case: str) -> Measure:
 def run_through_fmpy(model: str) -> Measure:
     """One run with 1600 points through fmpy, all outputs recorded."""
     seconds = partial(through_fmpy, model, steps=POINTS)
-    return row(f"{model}, native: {POINTS} points through fmpy", "s", partial(duel, seconds))
+    return row(f"{model}, native: {POINTS} points through fmpy, harness's loop", "s", partial(duel, seconds))
 
 
 def step_through_fmpy(model: str) -> Measure:
@@ -75,7 +73,7 @@ def step_through_fmpy(model: str) -> Measure:
     def seconds(kind: str) -> float:
         return shared(through_fmpy(model, kind, steps=POINTS), through_fmpy(model, kind, steps=1))
 
-    return row(f"{model}, native: communication step through fmpy", "s", partial(duel, seconds))
+    return row(f"{model}, native: communication step through fmpy, harness's loop", "s", partial(duel, seconds))
 
 
 def against_cvode(case: str) -> Measure:
@@ -144,15 +142,8 @@ def of_cvode(case: str, rtol: float) -> Runs:
 
 @cache
 def through_fmpy(model: str, kind: str, steps: int) -> float:
-    """Run time in s of a built FMU through fmpy, from its initialisation on."""
-    path = fmu(model, kind)
-    with instance(plain(model), callbacks()[0]) as (description, _):
-        stop = float(description.defaultExperiment.stopTime)
-        outputs = tuple(v.name for v in description.modelVariables if v.causality == "output")
-    grid = stop / steps
-    return simulate(
-        Scene(model, model, model, path, outputs, stop=stop, grid=grid, follow=False, repeat=10)
-    ).cost.seconds
+    """Run time in s of a built FMU in the harness's loop through fmpy."""
+    return lean(fmu(model, kind), steps)
 
 
 def off(case: str, found: Runs) -> float:

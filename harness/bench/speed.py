@@ -1,8 +1,4 @@
-"""The benchmark's run times: the best of several after a warm-up, peers in the same run and the same process.
-
-A communication step is what the steps of a run add to it: the difference between a run in 1600 steps and one in a
-single step, shared among them.  The solver's own steps do not depend on it; they are in the rows of whole runs.
-"""
+"""The benchmark's run times: the best of several after a warm-up, peers in the same run and the same process."""
 
 from collections.abc import Callable
 from functools import partial
@@ -12,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from ..fmu import callbacks, instance, simulate
+from ..fmu import callbacks, instance
 from ..precision import peers
 from ..precision.inside import Inside, embedded
 from ..precision.problem import Pacejka, Problem, Smd, Stickslip
-from ..scene import Scene, find
+from ..scene import find
 from ..stability.probe import plain
 from . import empty as bench_empty
+from . import loops
+from .loops import POINTS
 from .measure import Beside, Measure, best, timed
 
-POINTS = 1600
 RTOL, ATOL = 1e-6, 1e-9
 RUNS = 10_000
 STEPS = 500  # of a peer, to take the mean of
@@ -91,34 +88,27 @@ def step(carried: type) -> Measure:
 
 def communication_step(model: str) -> Measure:
     """A communication step through fmpy with all outputs recorded, as a multiple of that of an empty FMU."""
+    mine = file(model)
     with TemporaryDirectory(prefix="fmu-") as folder:
         with instance(plain(model), callbacks()[0]) as (description, _):
             stop = float(description.defaultExperiment.stopTime)
             variables = description.modelVariables
-            outputs = tuple(v.name for v in variables if v.causality == "output")
             kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
             traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
         nothing = bench_empty.build(f"Empty{model.capitalize()}", traits, stop, Path(folder))
-
-        def seconds(fmu: Path, steps: int) -> float:
-            scene = Scene(model, model, model, fmu, outputs, stop=stop, grid=stop / steps, follow=False, repeat=10)
-            return simulate(scene).cost.seconds
-
-        kinds_of_run = [(fmu, steps) for fmu in (file(model), nothing) for steps in (POINTS, 1)]
-        turns = [[seconds(*kind) for kind in kinds_of_run] for _ in range(3)]  # in turns: what else runs hits all
-    many, one, many_empty, one_empty = map(min, zip(*turns, strict=True))
-    mine, theirs = shared(many, one), shared(many_empty, one_empty)
+        ways = [(loop, fmu) for loop in (loops.usual, loops.lean) for fmu in (mine, nothing)]
+        turns = []
+        for _ in range(3):  # in turns: what else runs on the machine hits all
+            turns.append([loops.shared(loop(fmu, POINTS), loop(fmu, 1)) for loop, fmu in ways])
+    usual, empty, lean, lean_empty = map(min, zip(*turns, strict=True))
     beside = (
-        Beside("this FMU", mine),
-        Beside("empty pythonfmu FMU", theirs),
-        Beside("this FMU, the solver's own steps included", many / POINTS),
+        Beside("this FMU", usual),
+        Beside("empty pythonfmu FMU", empty),
+        Beside("this FMU in the harness's loop", lean),
+        Beside("empty pythonfmu FMU there", lean_empty),
     )
-    return Measure(f"{model}: communication step through fmpy, ratio to an empty one", mine / theirs, "1", 1.25, beside)
-
-
-def shared(many: float, one: float) -> float:
-    """The time of a communication step, from that of a run in 1600 and of a run in one."""
-    return (many - one) / (POINTS - 1)
+    what = f"{model}: communication step through fmpy, ratio to an empty one"
+    return Measure(what, usual / empty, "1", 1.25, beside)
 
 
 def many_runs(carried: type) -> Measure:
