@@ -3,10 +3,12 @@
 Tools that are not installed are skipped with the reason; they are in the extra `importers`.
 """
 
+import fmi3_hosts
 import native_fmus
 import pytest
 from models import MODELS
 
+from harness.errors import HarnessError
 from harness.importers import table
 from harness.importers.checks import CHECKS, IMPORTERS
 
@@ -36,3 +38,8 @@ def test_the_table_lists_every_model():
 def test_a_tool_that_is_not_asked_is_named_with_the_reason():
     shown = table.table([table.Row("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")])
     assert r"Ecos was not asked: it is not installed: pip install -e '.\[importers]'" in shown.caption
+
+
+def test_fmus_of_another_version_of_fmi_are_refused_in_one_sentence():
+    with pytest.raises(HarnessError, match=r"\.fmu is of FMI 3\.0; the importers are asked with FMUs of FMI 2\.0"):
+        table.rows(fmi3_hosts.built(), lambda name, share: None)

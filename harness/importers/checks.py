@@ -120,6 +120,8 @@ def subject(fmu: Path) -> Subject:
     if not fmu.is_file():
         raise HarnessError(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another folder")
     description = fmpy.read_model_description(fmu)
+    if description.fmiVersion != "2.0":
+        raise HarnessError(f"{fmu} is of FMI {description.fmiVersion}; the importers are asked with FMUs of FMI 2.0")
     reals = {v.name: v for v in description.modelVariables if v.type == "Real"}
     outputs = [name for name, v in reals.items() if v.causality == "output"]
     entry = next(name for name, v in reals.items() if v.causality == "input")
