@@ -1,0 +1,23 @@
+"""The FMI 3.0 FMUs in a tool that others wrote; the other tools of test_importers.py do not know FMI 3.0."""
+
+from dataclasses import replace
+
+import fmi3_hosts
+import pytest
+from models import MODELS
+
+from harness.importers.checks import IMPORTERS, absent, play, subject
+
+ECOS = next(importer for importer in IMPORTERS if importer.name == "Ecos")
+
+
+@pytest.mark.skipif(bool(absent(ECOS)), reason=absent(ECOS))
+@pytest.mark.parametrize("name", MODELS)
+def test_ecos_runs_it_in_co_simulation_as_it_runs_that_of_fmi_2(name, fmus):
+    """The same value references, the same grid; only the stop time, which never arrives, may move an internal step."""
+    older = subject(fmus / f"{name}.fmu").basis
+    newer = replace(older, fmu=str(fmi3_hosts.built() / f"{name}.fmu"))
+    found, expected = play(ECOS, newer).answer, play(ECOS, older).answer
+    assert len(found.rows) == len(expected.rows) > 100
+    for mine, theirs in zip(found.rows, expected.rows, strict=True):
+        assert mine == pytest.approx(theirs, rel=1e-6, abs=1e-7)
