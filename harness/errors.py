@@ -16,6 +16,11 @@ class SceneError(HarnessError):
     status = 2
 
 
+def reason(error: Exception) -> str:
+    """The first line of somebody else's exception, or its kind where it says nothing."""
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
+
+
 def unknown(kind: str, word: object, allowed: Iterable[str]) -> str:
     """The sentence about a word that is not among the allowed ones, with the nearest of them."""
     names = sorted(allowed)

@@ -18,7 +18,7 @@ import fmpy
 import numpy as np
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from .errors import HarnessError
+from .errors import HarnessError, reason
 
 EXCHANGE, COSIMULATION = "ModelExchange", "CoSimulation"
 COUNT = "solver.evaluations"  # of the FMU's own solver
@@ -132,5 +132,4 @@ def instance(file: Path, way: str) -> Iterator[Instance]:
         said = spoken.getvalue().strip().splitlines()
         if isinstance(error, HarnessError) and not said:
             raise
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise HarnessError(said[-1] if said else f"{file.name}: {reason}") from None
+        raise HarnessError(said[-1] if said else f"{file.name}: {reason(error)}") from None

@@ -6,7 +6,7 @@ ends, so following it shows every step and event through the standard interface 
 
 import io
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, redirect_stderr
 from ctypes import byref, c_double, c_int, c_uint, c_void_p
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
-from .errors import HarnessError, SceneError
+from .errors import HarnessError, SceneError, reason
 from .run import Cost, Events, Run, Steps
 from .scene import Scene
 from .settings import check_fmu, labels, settings
@@ -68,14 +68,32 @@ def simulate(scene: Scene, report: Report = lambda share: None) -> Run:
 
 
 @contextmanager
+def loading(scene: Scene) -> Iterator[None]:
+    """Whatever is wrong with the file of a scene's FMU becomes one sentence."""
+    try:
+        yield
+    except HarnessError:
+        raise
+    except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
+        raise HarnessError(f"{scene.fmu.name} cannot be loaded: {reason(error)}") from None
+
+
+def described(scene: Scene) -> Any:
+    """What the FMU says of itself; HarnessError if it cannot be read, SceneError if it does not fit the scene."""
+    with loading(scene):
+        description = fmpy.read_model_description(scene.fmu)
+        if description.fmiVersion != "2.0" or description.coSimulation is None:
+            raise HarnessError(f"{scene.fmu.name} is not an FMI 2.0 co-simulation FMU")
+        check_fmu(scene, {variable.name: variable for variable in description.modelVariables})
+        return description
+
+
+@contextmanager
 def instance(scene: Scene, functions: fmi2.fmi2CallbackFunctions) -> Iterator[tuple[Any, Any]]:
     """The description and a fresh instance of the FMU; its files and its library are gone afterwards."""
     with TemporaryDirectory(prefix="fmu-") as folder:
-        try:
-            description = fmpy.read_model_description(scene.fmu)
-            if description.fmiVersion != "2.0" or description.coSimulation is None:
-                raise HarnessError(f"{scene.fmu.name} is not an FMI 2.0 co-simulation FMU")
-            check_fmu(scene, {variable.name: variable for variable in description.modelVariables})
+        description = described(scene)
+        with loading(scene):
             fmpy.extract(scene.fmu, folder)
             fmu = fmi2.FMU2Slave(
                 guid=description.guid,
@@ -84,11 +102,6 @@ def instance(scene: Scene, functions: fmi2.fmi2CallbackFunctions) -> Iterator[tu
                 instanceName=scene.name,
             )
             fmu.instantiate(callbacks=functions, loggingOn=True)
-        except HarnessError:
-            raise
-        except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
-            reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise HarnessError(f"{scene.fmu.name} cannot be loaded: {reason}") from None
         try:
             yield description, fmu
         finally:
@@ -138,16 +151,28 @@ def passes(plan: Plan, fmu: Any, report: Report) -> Run:
     for turn in range(repeat):
         if turn:
             fmu.reset()
-        for variable, value in values:
-            write = fmu.setReal if variable.type == "Real" else fmu.setInteger
-            write([variable.valueReference], [value])
-        fmu.setupExperiment(startTime=plan.start, stopTime=plan.stop)
-        fmu.enterInitializationMode()
-        fmu.exitInitializationMode()
+        begin(fmu, values, plan.start, plan.stop)
         begun = perf_counter()
         trace = march(plan, fmu, report, turn)
         seconds.append(perf_counter() - begun)
     return gather(plan, fmu, trace, min(seconds))
+
+
+def begin(fmu: Any, values: Iterable[tuple[Any, float]], start: float, stop: float | None) -> None:
+    """Set the values of variables, and initialise; times in s."""
+    for variable, value in values:
+        put(fmu, variable, value)
+    fmu.setupExperiment(startTime=start, stopTime=stop)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+
+
+def put(fmu: Any, variable: Any, value: float) -> None:
+    """Set one variable."""
+    if variable.type == "Real":
+        fmu.setReal([variable.valueReference], [value])
+    else:
+        fmu.setInteger([variable.valueReference], [int(value)])
 
 
 def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
@@ -157,8 +182,8 @@ def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
     """
     component = c_void_p(fmu.component)
     do_step, get_real, get_integer = fmu.dll.fmi2DoStep, fmu.dll.fmi2GetReal, fmu.dll.fmi2GetInteger
-    n_reals, real_references, reals = buffer(plan, plan.reals, c_double)
-    n_integers, integer_references, integers = buffer(plan, plan.integers, c_int)
+    n_reals, real_references, reals = buffer(plan.variables, plan.reals, c_double)
+    n_integers, integer_references, integers = buffer(plan.variables, plan.integers, c_int)
     trace = Trace()
     row_of_reals, row_of_integers = memoryview(reals).cast("B"), memoryview(integers).cast("B")
 
@@ -200,10 +225,10 @@ def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
     return trace
 
 
-def buffer(plan: Plan, names: list[str], kind: Any) -> tuple[int, Any, Any]:
+def buffer(variables: dict[str, Any], names: list[str], kind: Any) -> tuple[int, Any, Any]:
     """Number, value references and room for the values of the named variables."""
     n = len(names)
-    return n, (c_uint * n)(*(plan.variables[name].valueReference for name in names)), (kind * n)()
+    return n, (c_uint * n)(*(variables[name].valueReference for name in names)), (kind * n)()
 
 
 def gather(plan: Plan, fmu: Any, trace: Trace, seconds: float) -> Run:

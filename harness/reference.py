@@ -36,6 +36,11 @@ class Case:
         """Whether friction jumps within a step, with no event: nothing that a peer is good for."""
         return "friction" in self.values
 
+    @property
+    def outputs(self) -> tuple[str, str]:
+        """The outputs that are position and speed."""
+        return ("theta", "omega") if self.problem.unit == "rad" else ("x", "v")
+
 
 def magic(x_m: str) -> Case:
     """The sled with the magic formula."""
@@ -53,6 +58,7 @@ CASES = (
     Case("pendulum", "pendulum", "hybrid, pin load weight", "pendulum", Pendulum()),
     Case("pendulum-reaction", "pendulum", "hybrid, pin load reaction", "reaction", Reaction(), {"pin_load": 2}),
 )
+MODELS = tuple(dict.fromkeys(case.model for case in CASES))
 
 
 @dataclass(frozen=True)

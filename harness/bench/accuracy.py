@@ -10,13 +10,13 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..precision.inside import Inside, embedded
+from ..reference import MODELS
 from ..scene import find
 from ..stability.probe import Card, Motion, Setting, card, run
 from ..stability.truth import Grid, truth
 from .measure import Beside, Measure
 
 EXACT = ("smd", "coulomb", "stickslip")
-MODELS = (*EXACT, "pacejka", "pendulum")
 POINTS = 1600
 CLOSED = Beside("closed form in 120 digits")
 

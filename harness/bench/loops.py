@@ -9,7 +9,7 @@ from pathlib import Path
 
 import fmpy
 
-from ..fmu import callbacks, instance, simulate
+from ..fmu import callbacks, described, instance, simulate
 from ..scene import Scene
 from .measure import best
 
@@ -37,9 +37,9 @@ def usual(file: Path, steps: int) -> float:
 
 def lean(file: Path, steps: int) -> float:
     """Run time in s of the harness's loop, from initialisation on, the shortest of several runs of one instance."""
-    with instance(_scene(file), callbacks()[0]) as (description, _):
-        stop = float(description.defaultExperiment.stopTime)
-        outputs = tuple(v.name for v in description.modelVariables if v.causality == "output")
+    description = described(_scene(file))
+    stop = float(description.defaultExperiment.stopTime)
+    outputs = tuple(v.name for v in description.modelVariables if v.causality == "output")
     return simulate(_scene(file, outputs, stop, stop / steps)).cost.seconds
 
 

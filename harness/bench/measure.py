@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
+
+from ..clock import timed
 
 
 @dataclass(frozen=True)
@@ -32,10 +33,3 @@ def best(call: Callable[[], object], times: int) -> float:
     """Run time in s of the fastest of several calls, after one to warm up."""
     call()
     return min(timed(call) for _ in range(times))
-
-
-def timed(call: Callable[[], object]) -> float:
-    """Run time in s of one call."""
-    begun = perf_counter()
-    call()
-    return perf_counter() - begun

@@ -5,11 +5,11 @@ from functools import cache, partial
 from math import nan
 from pathlib import Path
 
-from ..reference import CASES, load, relative
+from ..reference import CASES, MODELS, load, relative
 from .in_c import NotHereError, Runs, built, cvode, runs
 from .loops import POINTS, lean, shared
 from .measure import Beside, Measure
-from .speed import MODELS, file
+from .speed import file
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
 
@@ -128,8 +128,8 @@ def of_fmu(case: str, kind: str, steps: int = POINTS) -> Runs:
     """A built FMU with its own method and tolerance in the host in C."""
     its = CASE[case]
     library = built(fmu(its.model, kind))
-    read = ("theta", "omega") if its.model == "pendulum" else ("x", "v")
-    return runs(library, its.values, read, its.problem.stop, steps, REPEAT if kind == "native" else REPEAT_PYTHON)
+    repeat = REPEAT if kind == "native" else REPEAT_PYTHON
+    return runs(library, its.values, its.outputs, its.problem.stop, steps, repeat)
 
 
 @cache

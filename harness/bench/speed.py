@@ -8,21 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from ..fmu import callbacks, instance
+from ..clock import timed
+from ..fmu import described
 from ..precision import peers
 from ..precision.inside import Inside, embedded
 from ..precision.problem import Pacejka, Problem, Smd, Stickslip
+from ..reference import MODELS
 from ..scene import find
 from ..stability.probe import plain
 from . import empty as bench_empty
 from . import loops
 from .loops import POINTS
-from .measure import Beside, Measure, best, timed
+from .measure import Beside, Measure, best
 
 RTOL, ATOL = 1e-6, 1e-9
 RUNS = 10_000
 STEPS = 500  # of a peer, to take the mean of
-MODELS = ("smd", "coulomb", "stickslip", "pacejka", "pendulum")
 
 
 def file(model: str) -> Path:
@@ -90,11 +91,11 @@ def communication_step(model: str) -> Measure:
     """A communication step through fmpy with all outputs recorded, as a multiple of that of an empty FMU."""
     mine = file(model)
     with TemporaryDirectory(prefix="fmu-") as folder:
-        with instance(plain(model), callbacks()[0]) as (description, _):
-            stop = float(description.defaultExperiment.stopTime)
-            variables = description.modelVariables
-            kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
-            traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
+        description = described(plain(model))
+        stop = float(description.defaultExperiment.stopTime)
+        variables = description.modelVariables
+        kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
+        traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
         nothing = bench_empty.build(f"Empty{model.capitalize()}", traits, stop, Path(folder))
         ways = [(loop, fmu) for loop in (loops.usual, loops.lean) for fmu in (mine, nothing)]
         turns = []

@@ -10,7 +10,7 @@ from typing import Any
 import fmpy
 import numpy as np
 
-from ..errors import HarnessError, SceneError, unknown
+from ..errors import HarnessError, SceneError, reason, unknown
 from ..scene import Scene
 from ..settings import NEEDED
 from .trajectory import POINTS, Trajectory
@@ -27,8 +27,7 @@ def description(path: Path) -> Any:
     try:
         return fmpy.read_model_description(path)
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise HarnessError(f"{path.name} cannot be read: {reason}") from None
+        raise HarnessError(f"{path.name} cannot be read: {reason(error)}") from None
 
 
 def own(path: Path, stop: float | None, values: dict[str, Any] | None = None) -> Scene | None:
@@ -103,11 +102,10 @@ def once(path: Path, start: float, stop: float, steps: int, outputs: list[str], 
             debug_logging=True,
         )
     except Exception as error:  # as above
-        reason = said[-1] if said else str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise HarnessError(f"{path.name}: {reason}") from None
+        raise HarnessError(f"{path.name}: {said[-1] if said else reason(error)}") from None
     if not abs(rows["time"][-1] - stop) < 0.01 * h or len(rows) != steps + 1:
-        reason = said[-1] if said else "it gives no reason"
-        raise HarnessError(f"{path.name} stopped at t = {rows['time'][-1]!r} s, before {stop!r} s: {reason}")
+        last = said[-1] if said else "it gives no reason"
+        raise HarnessError(f"{path.name} stopped at t = {rows['time'][-1]!r} s, before {stop!r} s: {last}")
     for name in outputs:
         if not np.isfinite(rows[name].astype(float)).all():
             raise HarnessError(f"{path.name}: {name} is not finite")

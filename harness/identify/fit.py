@@ -23,6 +23,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
+from ..decay import damping_ratio, friction
 from ..errors import HarnessError
 from .record import Record
 from .swing import Swing, motion
@@ -128,7 +129,7 @@ def identify(record: Record, known: Known, drag: bool = False, terms: Iterable[s
         record,
         used,
         turns,
-        by_turning_points(record, turns, best.terms, known, best),
+        by_turning_points(record, turns, known, best),
         tuple(fits),
         as_published(record, turns, known, best),
         remarks(record, used, turns, best),
@@ -170,14 +171,12 @@ def sequence(turns: Turns, terms: tuple[str, ...]) -> tuple[np.ndarray, np.ndarr
     return solve(off, start, np.array([size, size, *(size if term == "r" else 1.0 for term in terms)]))
 
 
-def by_turning_points(
-    record: Record, turns: Turns, terms: tuple[str, ...], known: Known, best: Fit
-) -> tuple[Estimate, ...]:
+def by_turning_points(record: Record, turns: Turns, known: Known, best: Fit) -> tuple[Estimate, ...]:
     """What the turning points alone say; they cannot tell drag."""
-    if "b" in best.terms or len(turns.x) < 2 + len(terms):
+    if "b" in best.terms or len(turns.x) < 2 + len(best.terms):
         return ()
-    p, covariance = sequence(turns, terms)
-    names = ("rest", "amplitude", *terms)
+    p, covariance = sequence(turns, best.terms)
+    names = ("rest", "amplitude", *best.terms)
     free = len(turns.x) - len(p)
     return figures(names, p, covariance, free, record.unit, known, best.omega)
 
@@ -188,8 +187,7 @@ def as_published(record: Record, turns: Turns, known: Known, best: Fit) -> tuple
     cycles = (len(turns.x) - 1) / 2
     if not first > last > 0:
         return ()
-    delta = log(first / last) / cycles
-    values = {"zeta": delta / sqrt(4 * pi * pi + delta * delta), "r": (first - last) / (4 * cycles)}
+    values = {"zeta": damping_ratio(first, last, cycles), "r": friction(first, last, cycles, 1.0)}
     none = np.full((2, 2), np.nan)
     return figures(tuple(values), np.array(list(values.values())), none, 0, record.unit, known, best.omega)
 

@@ -11,9 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from ..folder import replacing
+from ..reference import MODELS
 from .checks import CHECKS, IMPORTERS, Importer, Subject, Wrong, absent, play, subject
 
-MODELS = ("smd", "coulomb", "stickslip", "pacejka", "pendulum")
 WORKERS = 2
 FOLDER, FILES = "importers", ("importers.csv",)
 

@@ -18,7 +18,6 @@ from .answer import Answer
 from .problem import Problem, Rates, State
 
 SCIPY = ("RK23", "RK45", "DOP853", "Radau", "LSODA")
-CVODE = ("Adams", "BDF")
 IMPLICIT = ("Radau", "LSODA", "BDF")  # those that ask for a Jacobian
 PACKAGES = {"scipy": ("scipy", "scipy"), "cvode": ("sksundae", "scikit-sundae")}  # module, and name to install
 

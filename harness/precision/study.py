@@ -16,6 +16,7 @@ from time import perf_counter
 import numpy as np
 
 from .. import fmi3
+from ..clock import timed
 from ..errors import HarnessError
 from ..fmu import simulate
 from ..reference import CASES, Case, errors, load
@@ -209,7 +210,7 @@ def through_fmpy(
         title=case.name,
         model=case.model,
         fmu=file,
-        outputs=motion(case),
+        outputs=case.outputs,
         method=method,
         rtol=rtol or None,
         grid=float(times[1]),
@@ -218,7 +219,7 @@ def through_fmpy(
         values=case.values,
     )
     run = simulate(scene)
-    columns = np.column_stack([run.columns[name] for name in motion(case)])
+    columns = np.column_stack([run.columns[name] for name in case.outputs])
     return Answer(columns, None, run.cost.evaluations), run.cost.seconds
 
 
@@ -229,16 +230,11 @@ def by_importer(
     time is that of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
     marks = ("mode",) if way == fmi3.EXCHANGE and case.problem.dry else ()
     with fmi3.instance(file, way) as fmu:
-        run = partial(fmu.simulate, case.values, motion(case) + marks, float(times[-1]), float(times[1]), rtol or None)
+        run = partial(fmu.simulate, case.values, case.outputs + marks, float(times[-1]), float(times[1]), rtol or None)
         found = run(extent.patience)
         seconds = best(run, extent.budget)
     events = found.changes(*marks) if marks else None
-    return Answer(found.at(times, motion(case)), events, found.evaluations), seconds
-
-
-def motion(case: Case) -> tuple[str, str]:
-    """The outputs that are position and speed."""
-    return ("theta", "omega") if case.problem.unit == "rad" else ("x", "v")
+    return Answer(found.at(times, case.outputs), events, found.evaluations), seconds
 
 
 def by_peer(case: Case, peer: str, method: str, times: np.ndarray, rtol: float, extent: Extent) -> tuple[Answer, float]:
@@ -257,10 +253,3 @@ def best(call: Callable[[], object], budget: float) -> float:
 def repeats(once: float, budget: float) -> int:
     """How often to run what takes `once` s within the budget in s."""
     return 1 if once > 4 * budget else max(2, min(MOST, int(budget / once)))
-
-
-def timed(call: Callable[[], object]) -> float:
-    """Run time in s."""
-    begun = perf_counter()
-    call()
-    return perf_counter() - begun

@@ -10,7 +10,7 @@ from shutil import copytree, ignore_patterns
 
 from ..errors import SceneError, unknown
 from ..folder import replacing
-from ..reference import CASES
+from ..reference import CASES, MODELS
 from ..run import heading
 from ..scene import find
 from . import anchors, laws
@@ -19,7 +19,6 @@ from .inside import embedded
 from .peers import missing
 from .study import Extent, Point, Study, study
 
-MODELS = tuple(dict.fromkeys(case.model for case in CASES))
 FOLDER = "precision"
 UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and rad/s
     **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry"), "1"),

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..fmu import WARNING, FMICallException, callbacks, instance
+from ..fmu import WARNING, FMICallException, begin, callbacks, described, instance, put
 from ..scene import Scene, build
 from ..settings import labels
 
@@ -97,20 +97,20 @@ def plain(model: str) -> Scene:
 
 def card(model: str) -> Card:
     """The card of a model's FMU."""
-    with instance(plain(model), callbacks()[0]) as (description, _):
-        experiment, variables = description.defaultExperiment, description.modelVariables
-        settable = [variable for variable in variables if variable.causality in ("parameter", "input")]
-        enumerations = {v.name: v for v in settable if v.type == "Enumeration"}
-        choices = {name: {label: number for number, label in labels(v).items()} for name, v in enumerations.items()}
-        defaults = {v.name: int(v.start) if v.name in choices else float(v.start) for v in settable}
-        methods = {number: label for label, number in choices["solver.method"].items()}
-        return Card(
-            methods=tuple(methods.values()),
-            default=methods[int(defaults["solver.method"])],
-            defaults=defaults,
-            choices=choices,
-            stop=float(experiment.stopTime),
-        )
+    description = described(plain(model))
+    experiment, variables = description.defaultExperiment, description.modelVariables
+    settable = [variable for variable in variables if variable.causality in ("parameter", "input")]
+    enumerations = {v.name: v for v in settable if v.type == "Enumeration"}
+    choices = {name: {label: number for number, label in labels(v).items()} for name, v in enumerations.items()}
+    defaults = {v.name: int(v.start) if v.name in choices else float(v.start) for v in settable}
+    methods = {number: label for label, number in choices["solver.method"].items()}
+    return Card(
+        methods=tuple(methods.values()),
+        default=methods[int(defaults["solver.method"])],
+        defaults=defaults,
+        choices=choices,
+        stop=float(experiment.stopTime),
+    )
 
 
 class Slave:
@@ -121,16 +121,12 @@ class Slave:
         self.variables = {variable.name: variable for variable in description.modelVariables}
 
     def begin(self, setting: Setting) -> None:
-        self.set(setting.values)
-        self.fmu.setupExperiment(startTime=setting.start, stopTime=setting.stop)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
+        values = ((self.variables[name], value) for name, value in setting.values.items())
+        begin(self.fmu, values, setting.start, setting.stop)
 
     def set(self, values: dict[str, float]) -> None:
         for name, value in values.items():
-            variable = self.variables[name]
-            write = self.fmu.setReal if variable.type == "Real" else self.fmu.setInteger
-            write([variable.valueReference], [value])
+            put(self.fmu, self.variables[name], value)
 
     def reals(self, *causalities: str) -> list[str]:
         """The names of the Reals of some causalities."""

@@ -1,10 +1,9 @@
 """One instance of an FMU run again and again by reset: what a sweep does in each of its workers."""
 
 import io
-from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr
-from ctypes import c_double, c_int, c_uint, c_void_p
+from ctypes import c_double, c_int, c_void_p
 from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
@@ -12,7 +11,7 @@ from time import perf_counter
 from typing import Any
 
 from ..errors import HarnessError
-from ..fmu import WARNING, FMICallException, callbacks, gather, instance, march, parameters, planned
+from ..fmu import WARNING, FMICallException, begin, buffer, callbacks, gather, instance, march, parameters, planned
 from ..scene import Scene
 from ..settings import settings
 from .measures import AT_END, ON_PATH, PIECES, roles
@@ -51,8 +50,8 @@ class Rerun:
                 planned(replace(self.plan.scene, grid=grid, follow=True), description), stop=self.plan.stop
             )
         self.ends = [AT_END[name][1] for name in runs.measures if name in AT_END]
-        self.n_whole, self.whole_at, self.whole = room(variables, self.ends, c_int)
-        self.n_real, self.real_at, self.real = room(variables, list(self.plan.scene.outputs), c_double)
+        self.n_whole, self.whole_at, self.whole = buffer(variables, self.ends, c_int)
+        self.n_real, self.real_at, self.real = buffer(variables, list(self.plan.scene.outputs), c_double)
         self.component = c_void_p(fmu.component)
         self.messages = callbacks()[1]
 
@@ -79,16 +78,9 @@ class Rerun:
 
     def begin(self, point: list[float]) -> None:
         """Reset, set and initialise."""
-        fmu, plan = self.fmu, self.plan
-        fmu.reset()
-        for variable, value in (*self.fixed, *zip(self.varied, point, strict=True)):
-            if variable.type == "Real":
-                fmu.setReal([variable.valueReference], [value])
-            else:
-                fmu.setInteger([variable.valueReference], [int(value)])
-        fmu.setupExperiment(startTime=plan.start, stopTime=plan.stop)
-        fmu.enterInitializationMode()
-        fmu.exitInitializationMode()
+        self.fmu.reset()
+        values = (*self.fixed, *zip(self.varied, point, strict=True))
+        begin(self.fmu, values, self.plan.start, self.plan.stop)
 
     def leap(self) -> dict[str, float]:
         """One communication step to the stop: nothing along the path."""
@@ -121,12 +113,6 @@ class Rerun:
             else:
                 row.append(along.get(name, nan))
         return row
-
-
-def room(variables: dict[str, Any], names: list[str], kind: Any) -> tuple[int, Any, Any]:
-    """Number, value references and room for the values of the named variables."""
-    references = array("I", [variables[name].valueReference for name in names])
-    return len(names), (c_uint * len(names))(*references), (kind * len(names))()
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import HarnessError
+from ..errors import HarnessError, reason
 from .rerun import Rerun, Row, Runs, ready
 from .space import Axis
 
@@ -148,8 +148,7 @@ def client(scheduler: str | None, workers: int) -> Iterator[Any]:
     try:
         remote = Client(scheduler, timeout=10)
     except (OSError, ValueError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise HarnessError(f"no scheduler answers at {scheduler}: {reason}") from None
+        raise HarnessError(f"no scheduler answers at {scheduler}: {reason(error)}") from None
     with remote:
         if not remote.nthreads():
             raise HarnessError(f"the scheduler at {scheduler} has no workers; start one: dask worker {scheduler}")
