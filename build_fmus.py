@@ -62,12 +62,8 @@ def native(
 ) -> Path:
     """The native FMU; what builds it needs more than the others do."""
     from fmus.packaging.native import build
-    from fmus.packaging.native.compiler import PLATFORMS, USUAL
 
-    for platform in platforms:
-        if platform not in PLATFORMS:
-            raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
-    return build(name, folder, methods, laws, platforms or USUAL)
+    return build(name, folder, methods, laws, platforms)
 
 
 class Mistake(click.ClickException):

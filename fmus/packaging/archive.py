@@ -17,7 +17,6 @@ import os
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from functools import partial
-from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from stat import S_IFREG
@@ -29,7 +28,7 @@ from .companions import companions
 from .description import declared_by
 from .edition import FMI2, Edition
 from .lean import imported, offer, reduced
-from .modules import installed, travelling, unchanged
+from .modules import digest, installed, travelling, unchanged
 
 NEEDED = """\
 CPython 3.9 or newer, 64 bit, with its standard library and nothing else.
@@ -56,8 +55,7 @@ def build(
     offered = offer(model, name, methods, laws)
     edit = partial(reduced, offered=offered) if offered else unchanged
     sources = travelling(name, edit=edit, edition=edition)
-    content = "".join(f"{path}\0{text}\0" for path, text in sorted(sources.items()))
-    code = sha256((edition.entry + content).encode()).hexdigest()
+    code = digest(sources, edition.entry)
     package = f"{name}_{code[:12]}"
     if offered:
         model = imported(sources, name, package)

@@ -8,11 +8,12 @@ from datetime import datetime
 from math import isfinite
 from typing import cast
 from uuid import NAMESPACE_OID, uuid5
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement, tostring
 
 from ..runtime.declare import Declared, Declaring, Output
 from ..runtime.hosted import SETTABLE
 from . import BuildError, __version__
+from .document import document
 from .units import UNITS, unit_of
 
 CAPABILITIES = {
@@ -68,8 +69,7 @@ def closed(root: Element, key: str, code: str, date: datetime) -> bytes:
     """The text; all but the date goes into the attribute `key`."""
     root.set(key, f"{{{uuid5(NAMESPACE_OID, code + tostring(root, 'unicode'))}}}")
     root.set("generationDateAndTime", date.strftime("%Y-%m-%dT%H:%M:%SZ"))
-    indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n'.encode()
+    return document(root)
 
 
 def log_and_experiment(root: Element, model: type[Declaring], fmi: str) -> None:

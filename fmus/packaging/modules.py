@@ -7,6 +7,7 @@ travels inside as `<package>/pythonfmu`, so the FMU never meets the pythonfmu of
 import ast
 import sys
 from collections.abc import Callable, Iterator
+from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
 
@@ -43,6 +44,12 @@ def travelling(name: str, root: Path = FMUS, edit: Edit = unchanged, edition: Ed
             files[path], needed = _embed(path, root, edit)
             waiting += needed
     return files
+
+
+def digest(files: dict[str, str], first: str = "") -> str:
+    """What the files hold, after `first`, in 64 letters."""
+    content = "".join(f"{path}\0{text}\0" for path, text in sorted(files.items()))
+    return sha256((first + content).encode()).hexdigest()
 
 
 def _on_disk(path: str, root: Path) -> Path:

@@ -6,8 +6,10 @@ from inspect import cleandoc
 from pathlib import Path
 
 from ..runtime.declare import Declared, Declaring
+from ..runtime.hosted import SETTABLE
 from . import __version__
 from .chart import chart
+from .description import Variables
 from .edition import FMI2, Edition
 from .reference import INSIDE, Reference
 from .units import UNITS
@@ -22,7 +24,6 @@ it, and every internal step and every event shows.</p>
 <code>doStep</code> fails, and every calculated Real reads NaN from then on. Reset recovers.</p>
 """
 FREE = Declared("", "").allowed  # in words, where every finite number is
-Variables = list[tuple[str, Declared]]
 
 
 def page(
@@ -111,7 +112,7 @@ def _table(chosen: Variables) -> str:
     rows = []
     for variable, meaning in chosen:
         unit = readable(meaning.unit)
-        settable = meaning.causality in ("parameter", "input")
+        settable = meaning.causality in SETTABLE
         value = f"{meaning.start:.10g}" if settable else ""
         if settable and meaning.display:
             value = f"{meaning.start * UNITS[meaning.unit].factor:.10g} {readable(meaning.display)} = {value}"
@@ -121,7 +122,7 @@ def _table(chosen: Variables) -> str:
         text = escape(meaning.text) + (f" <small>({escape('; '.join(notes))})</small>" if notes else "")
         cells = (f"<code>{escape(variable)}</code>", f"{value} {escape(unit)}".strip(), text)
         rows.append("<tr><td>{}</td><td class='number'>{}</td><td>{}</td></tr>".format(*cells))
-    set_ = [meaning.causality in ("parameter", "input") for _, meaning in chosen]
+    set_ = [meaning.causality in SETTABLE for _, meaning in chosen]
     value = "default" if all(set_) else "default, unit" if any(set_) else "unit"
     head = f"<thead><tr><th>name</th><th>{value}</th><th>what it is</th></tr></thead>"
     return f"<table>{head}{''.join(rows)}</table>"

@@ -10,9 +10,10 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 from ..runtime.declare import Declared
+from .document import document
 
 FOLDER = Path(__file__).resolve().parents[2] / "harness" / "references"
 INSIDE = "extra/org.fmi-standard.fmi-ls-ref"
@@ -65,6 +66,4 @@ def files(name: str, found: Reference, declared: list[tuple[str, Declared]]) -> 
         root.set(f"fmi-ls:fmi-ls-{key}", text)
     related = {"source": f"{name}_out.csv", "role": "result", "type": "text/csv", "description": found.told}
     SubElement(root, "Related", related)
-    indent(root)
-    manifest = f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n'
-    return {f"{INSIDE}/{name}_out.csv": result.encode(), f"{INSIDE}/fmi-ls-manifest.xml": manifest.encode()}
+    return {f"{INSIDE}/{name}_out.csv": result.encode(), f"{INSIDE}/fmi-ls-manifest.xml": document(root)}

@@ -11,12 +11,11 @@ An importer finds an event where an indicator falls to zero:
 
 from math import fabs, nan
 
+from .march import NOMINAL
 from .step import STUCK, ULP
 
 # A load of just the limit is held.  So the indicator is zero a little beyond it: at its root friction does let go.
 BEYOND, LEAST = 4.0 * ULP, 1e-300
-
-NOMINAL = 1e-3  # in SI units
 
 
 def begin(march):

@@ -113,11 +113,7 @@ class Hosted:
 
     def exit_initialization_mode(self):
         try:
-            sentence = self.objection()
-            if sentence:
-                self.fail(sentence)
-            else:
-                self.apply()
+            self.settle()
         except BaseException as error:  # as above
             self.fail(unforeseen(error, self.model))
         self.phase = RUNNING
@@ -150,11 +146,14 @@ class Hosted:
             self.exit_initialization_mode()
         if self.failure:
             return False
-        if self.changed or self.refused:
-            sentence = self.objection()
-            if sentence:
-                return self.fail(sentence)
-            self.apply()
+        return self.settle() if self.changed or self.refused else True
+
+    def settle(self):
+        """Take over what was set, or fail."""
+        sentence = self.objection()
+        if sentence:
+            return self.fail(sentence)
+        self.apply()
         return True
 
     def judged(self, current_time, step_size):

@@ -11,6 +11,7 @@ from .methods import ITEMS, ODE23
 from .step import DIVERGED, HUGE, HYBRID, OK, STUCK, Step
 
 ENDLESS = 3
+NOMINAL = 1e-3  # size of a position or a speed, in SI units, where nobody sets one
 MOST_STEPS = 2_000_000  # within one communication step: half a minute at most, then a sentence
 
 
@@ -89,7 +90,7 @@ class March(Declaring):
     def scale(self, model):
         """The sizes of position and speed below which the tolerance is absolute."""
         step = self.step
-        size = self.atol / step.tolerance if self.atol > 0.0 else 1e-3
+        size = self.atol / step.tolerance if self.atol > 0.0 else NOMINAL
         step.least_x = step.least_v = size if size > 1e-300 else 1e-300  # divisors
         finest = model.finest()
         if self.atol == 0.0 and finest < step.least_v:

@@ -1,6 +1,6 @@
 /* FMI 2.0 co-simulation of the model in model.h.
  *
- * Every call does what it does in the Python FMU of the same model (fmus/runtime/slave.py there), with the same
+ * Every call does what it does in the Python FMU of the same model (fmus/runtime/hosted.py there), with the same
  * sentences: a value that cannot be used is remembered and told by the next step; a step that fails is discarded, and
  * every calculated Real reads NaN from then on.  On top, calls out of order are refused.
  *

@@ -12,30 +12,36 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
 from functools import partial
-from hashlib import sha256
 from pathlib import Path
-from xml.etree.ElementTree import SubElement, fromstring, indent, tostring
+from xml.etree.ElementTree import SubElement, fromstring
 
 from ...runtime.declare import Declaring
+from .. import BuildError
 from ..archive import build_date, licenses, write, zipped
 from ..catalogue import load
 from ..companions import companions
 from ..description import declared_by, describe
+from ..document import document
 from ..lean import Offer, imported, offer, reduced
-from ..modules import travelling
+from ..modules import digest, travelling
 from .compiler import PLATFORMS, USUAL, compiled
-from .sources import COMPILED, build_description, digest, guid_header, sources
+from .sources import COMPILED, build_description, guid_header, sources
 
 LICENSE = "documentation/licenses/license.txt"
 
 
 def build(
-    name: str, folder: Path, methods: Sequence[str] = (), laws: Sequence[str] = (), platforms: Sequence[str] = USUAL
+    name: str, folder: Path, methods: Sequence[str] = (), laws: Sequence[str] = (), platforms: Sequence[str] = ()
 ) -> Path:
-    """Write `<name>.fmu` for the platforms into `folder`; an older one is replaced whole or not at all.
+    """Write `<name>.fmu` for the platforms (none: the usual ones) into `folder`; an older one is replaced whole or not
+    at all.
 
     Methods and friction laws may be chosen, as for the Python FMU.
     """
+    platforms = platforms or USUAL
+    for platform in platforms:
+        if platform not in PLATFORMS:
+            raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
     date = build_date()
     model = load(name)
     if offered := offer(model, name, methods, laws):
@@ -44,7 +50,7 @@ def build(
     entries = companions(model, name, declared_by(model))
     entries |= {"modelDescription.xml": description, LICENSE: licenses()[LICENSE]}
     entries |= {f"sources/{file}": text.encode() for file, text in files.items()}
-    entries["sources/buildDescription.xml"] = build_description(name).encode()
+    entries["sources/buildDescription.xml"] = build_description(name)
     with ThreadPoolExecutor() as pool:
         binaries = pool.map(lambda platform: compiled(name, files, platform), platforms)
     for platform, content in zip(platforms, binaries, strict=True):
@@ -55,8 +61,7 @@ def build(
 def lean(name: str, offered: Offer) -> type[Declaring]:
     """The model without what is not offered; `inspect` still finds its source, whose files are gone."""
     texts = travelling(name, edit=partial(reduced, offered=offered))
-    code = sha256("".join(f"{path}\0{text}\0" for path, text in sorted(texts.items())).encode()).hexdigest()
-    model = imported(texts, name, f"frozen_{name}_{code[:12]}")
+    model = imported(texts, name, f"frozen_{name}_{digest(texts)[:12]}")
     root = Path(inspect.getfile(model)).parent
     for path, text in texts.items():
         linecache.cache[str(root / path)] = (len(text), None, text.splitlines(keepends=True), str(root / path))
@@ -70,6 +75,5 @@ def frozen(model: type[Declaring], name: str, date: datetime) -> tuple[dict[str,
     interface = root.find("CoSimulation")
     assert interface is not None
     SubElement(SubElement(interface, "SourceFiles"), "File", name=COMPILED)
-    indent(root)
     files["guid.h"] = guid_header(root.attrib["guid"])
-    return files, f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n'.encode()
+    return files, document(root)

@@ -1,12 +1,12 @@
 """The folder sources/ of a native FMU: all that a C compiler needs, the FMI headers included."""
 
-from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 from ...runtime.declare import Declaring
 from .. import BuildError
+from ..document import document
 from .interface import header
 
 COMPILED = "fmi2.c"  # includes all the others
@@ -22,25 +22,19 @@ def sources(model: type[Declaring]) -> dict[str, str]:
     return written | headers | {"model.h": header(model)}
 
 
-def digest(files: dict[str, str]) -> str:
-    """What the sources are, in 64 letters."""
-    return sha256("".join(f"{name}\0{text}\0" for name, text in sorted(files.items())).encode()).hexdigest()
-
-
 def guid_header(guid: str) -> str:
     """guid.h: states and descriptions of other builds are told by it."""
     return f'#define MODEL_GUID "{guid}"\n'
 
 
-def build_description(name: str) -> str:
+def build_description(name: str) -> bytes:
     """buildDescription.xml: how to compile the sources (FMI 3.0, section 2.5.2; FMI 2.0 has no such file)."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=name)
     files = SubElement(configuration, "SourceFileSet", language="C99")
     SubElement(files, "SourceFile", name=COMPILED)
     SubElement(configuration, "Library", name="m", external="true", description="the C library of mathematics")
-    indent(root)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}\n'
+    return document(root)
 
 
 def _fmi_folder() -> Path:
