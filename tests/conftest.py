@@ -10,10 +10,10 @@ from driver import Worker
 ROOT = Path(__file__).parent.parent
 
 
-def build(root, out, *names):
+def build(root, out, *names, timeout=120):
     """Build FMUs from the sources under `root` in a process of their own."""
     command = [sys.executable, "build_fmus.py", *names, "--out", str(out)]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=timeout)
     assert done.returncode == 0, done.stderr
     return out
 
@@ -22,6 +22,14 @@ def build(root, out, *names):
 def fmus(tmp_path_factory):
     """The folder of the built FMUs."""
     return build(ROOT, tmp_path_factory.mktemp("fmus"))
+
+
+@pytest.fixture(scope="module")
+def place(fmus, tmp_path_factory):
+    """A folder with the built FMUs in it, as a user's would be."""
+    folder = tmp_path_factory.mktemp("place")
+    (folder / "fmus").symlink_to(fmus)
+    return folder
 
 
 def processes(kind, scope):

@@ -12,10 +12,11 @@ from pathlib import Path
 PATIENCE = 120.0  # s, for one request
 
 
-def host(script, function, *arguments):
+def host(script, function, *arguments, folder=None, timeout=300):
     """What a function of a script here answers, in a process that must end well and say nothing."""
-    call = [sys.executable, "-I", str(Path(__file__).with_name(script)), function, json.dumps(arguments)]
-    done = subprocess.run(call, capture_output=True, text=True, timeout=300)
+    script, asked = Path(__file__).with_name(script), json.dumps(arguments, default=str)
+    call = [sys.executable, "-I", str(script), function, asked]
+    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=timeout)
     assert done.returncode == 0, f"exit status {done.returncode}: {done.stderr}"
     assert done.stderr == ""
     return json.loads(done.stdout)

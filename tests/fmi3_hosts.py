@@ -3,13 +3,13 @@
 A test module takes them over by assignment: `fmus, worker, _workers = fmi3_hosts.FIXTURES`; `launch` follows.
 """
 
-import tempfile
 from functools import cache
 from pathlib import Path
 
 import driver
 import pytest
 from conftest import ROOT, build, processes
+from native_fmus import room
 
 
 class Worker(driver.Worker):
@@ -35,12 +35,6 @@ class Worker(driver.Worker):
 
 class Failed(Exception):
     """fmpy gave up a run."""
-
-
-@cache
-def room():
-    """A folder that lasts as long as the tests."""
-    return tempfile.TemporaryDirectory()
 
 
 @cache

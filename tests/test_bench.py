@@ -20,14 +20,6 @@ from harness.errors import HarnessError
 FAST = Measure("a step", 2e-6, "s", 3e-6, (Beside("theirs", 5e-6), Beside("absent is not installed")))
 
 
-@pytest.fixture(scope="session")
-def place(fmus, tmp_path_factory):
-    """A folder with the built FMUs in it, as a user's would be."""
-    folder = tmp_path_factory.mktemp("place")
-    (folder / "fmus").symlink_to(fmus)
-    return folder
-
-
 @pytest.fixture
 def all_measures(place, monkeypatch):
     """What the benchmark measures."""

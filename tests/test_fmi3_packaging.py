@@ -1,20 +1,27 @@
 """What a built FMI 3.0 FMU carries, what it says about itself, and that both are true and the same everywhere."""
 
-import json
-import re
 import subprocess
 import sys
-from hashlib import sha256
+from functools import partial
 from html.parser import HTMLParser
 from math import inf
 from pathlib import Path
 from zipfile import ZipFile
 
+import driver
 import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from models import ROOT
-from test_packaging import EVERY_MODEL, command, described, entries, other_checkout
+from test_packaging import (  # noqa: F401
+    EVERY_MODEL,
+    command,
+    described,
+    entries,
+    other_checkout,
+    test_the_command_prints_name_size_import_time_and_digest_of_every_model,
+    test_validation_finds_nothing,
+)
 
 from fmus.packaging.catalogue import load, names
 from fmus.packaging.modules import installed
@@ -44,12 +51,7 @@ def fmu(building):
     return lambda name: building[0] / f"{name}.fmu"
 
 
-def look(function, *arguments, folder):
-    """The answer of a function of fmi3_look.py in a process of its own, somewhere else."""
-    call = [sys.executable, str(HERE / "fmi3_look.py"), function, json.dumps(arguments, default=str)]
-    run = subprocess.run(call, capture_output=True, text=True, cwd=folder, timeout=120)
-    assert (run.returncode, run.stderr) == (0, ""), run.stderr
-    return json.loads(run.stdout)
+look = partial(driver.host, "fmi3_look.py", timeout=120)  # where the FMU is all there is to see
 
 
 def beside(name):
@@ -65,20 +67,6 @@ def structure(root, kind):
         (int(u.get("valueReference")), [int(r) for r in u.get("dependencies", "").split()], u.get("dependenciesKind"))
         for u in found
     ]
-
-
-def test_the_command_prints_name_size_import_time_and_digest_of_every_model(building):
-    out, printed = building
-    for name, line in zip(names(), printed.splitlines(), strict=True):
-        content = (out / f"{name}.fmu").read_bytes()
-        size, digest = f"{len(content) / 1000:.0f}", sha256(content).hexdigest()[:16]
-        assert re.fullmatch(rf"{name}.fmu +{size} kB +\d+ ms  {digest}", line)
-    assert {path.name for path in out.iterdir()} == {f"{name}.fmu" for name in names()}
-
-
-@EVERY_MODEL
-def test_validation_finds_nothing(fmu, name):
-    assert validate_fmu(str(fmu(name))) == []
 
 
 @EVERY_MODEL

@@ -1,13 +1,12 @@
 """Failure in co-simulation by FMI 3.0: the claims of test_refusals.py, where a refused step has status 3 (error)."""
 
 import re
-from math import inf, isfinite, isnan, nan
+from math import inf, isfinite, nan
 
 import fmi3_hosts
 import pytest
 import test_refusals
 from compare import identical
-from driver import Refused
 from fmi3_hosts import Failed
 from models import EXACT, MODELS, ODE23, SIGN, declared, model_class, outputs, push
 from test_refusals import (  # noqa: F401
@@ -27,25 +26,12 @@ from test_refusals import (  # noqa: F401
 fmus, worker, _workers = fmi3_hosts.FIXTURES
 fresh = fmi3_hosts.fresh
 ERROR = 3
-REALS = test_refusals.REALS
-
-
-def refuses(fmu, name, t, h, *words):
-    """The step from t fails, all outputs read NaN, and one sentence says `words`: in the log and on standard error."""
-    with pytest.raises(Refused) as refusal:
-        fmu.step(t, h)
-    assert (refusal.value.function, refusal.value.status) == ("fmi3DoStep", ERROR)
-    assert all(isnan(value) for value in fmu.get(*REALS[name], "solver.t_next"))
-    ((status, category, sentence),) = [message for message in fmu.messages() if message[0] != 0]
-    assert (status, category) == (ERROR, "logStatusError")
-    assert [w for w in words if w not in sentence] == [], sentence
-    (line,) = fmu.worker.complaints().splitlines()
-    assert line.endswith(sentence)
+REALS, refuses = test_refusals.REALS, test_refusals.refuses
 
 
 @pytest.fixture(autouse=True)
 def _as_fmi_3_refuses(monkeypatch):
-    monkeypatch.setattr(test_refusals, "refuses", refuses)
+    monkeypatch.setattr(test_refusals, "REFUSED", ("fmi3DoStep", ERROR))
 
 
 STEPS = {

@@ -19,14 +19,6 @@ def python(folder, *arguments, **environment):
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
 
 
-@pytest.fixture(scope="session")
-def place(fmus, tmp_path_factory):
-    """A folder with the built FMUs in it, as a user's would be."""
-    folder = tmp_path_factory.mktemp("place")
-    (folder / "fmus").symlink_to(fmus)
-    return folder
-
-
 @pytest.fixture
 def scene(place, tmp_path):
     """scene(text, option, ...): the finished process, and the folder of results."""
@@ -46,7 +38,7 @@ def table(path):
     return head, np.array(rows, float).T
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def main_job(place):
     """The finished main job and its results."""
     done = python(place, "-m", "harness")

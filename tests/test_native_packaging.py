@@ -19,6 +19,7 @@ from fmpy.validation import validate_fmu
 from models import MODELS, ROOT
 from native_fmus import built
 from native_host import compiler, unpacked
+from test_packaging import entries
 
 from fmus.packaging import native
 from fmus.packaging.native.compiler import PLATFORMS, USUAL
@@ -37,11 +38,6 @@ def run(*arguments, cwd=ROOT, **environment):
     return subprocess.run(
         command, cwd=cwd, capture_output=True, text=True, timeout=600, env={**os.environ, **environment}
     )
-
-
-def entries(fmu):
-    with zipfile.ZipFile(fmu) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
 
 
 @pytest.fixture(scope="module")

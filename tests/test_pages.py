@@ -8,11 +8,11 @@ import subprocess
 from html.parser import HTMLParser
 from io import StringIO
 from xml.etree import ElementTree
-from zipfile import ZipFile
 
 import native_fmus
 import pytest
 from models import MODELS, declared, model_class, outputs
+from test_packaging import entries
 
 from fmus.packaging.chart import ticks
 from fmus.packaging.description import declared_by
@@ -24,22 +24,16 @@ VOID = {"meta", "img"}
 NAMESPACE = "{http://fmi-standard.org/fmi-ls-manifest}"
 
 
-def files(fmu):
-    """The content of every file in an FMU."""
-    with ZipFile(fmu) as archive:
-        return {path: archive.read(path) for path in archive.namelist()}
-
-
 @pytest.fixture
 def content(fmus):
     """content(name): the files of an FMU."""
-    return lambda name: files(fmus / f"{name}.fmu")
+    return lambda name: entries(fmus / f"{name}.fmu")
 
 
 @EVERY_MODEL
 def test_a_native_fmu_tells_the_same(content, name):
     told = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
-    native = files(native_fmus.built() / f"{name}.fmu")
+    native = entries(native_fmus.built() / f"{name}.fmu")
     assert len(told) == 4
     assert told == {path: native.get(path) for path in told}
 

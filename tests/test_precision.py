@@ -23,14 +23,6 @@ CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.chatters]
 
 
-@pytest.fixture(scope="session")
-def place(fmus, tmp_path_factory):
-    """A folder with the built FMUs in it, as a user's would be."""
-    folder = tmp_path_factory.mktemp("place")
-    (folder / "fmus").symlink_to(fmus)
-    return folder
-
-
 def command(place, *arguments):
     """The finished process of `python -m harness precision` in a folder."""
     line = [sys.executable, "-m", "harness", "precision", *map(str, arguments)]

@@ -49,14 +49,6 @@ def silent(name, share):
     """Progress that nobody watches."""
 
 
-@pytest.fixture(scope="session")
-def place(fmus, tmp_path_factory):
-    """A folder with the built FMUs in it, as a user's would be."""
-    folder = tmp_path_factory.mktemp("place")
-    (folder / "fmus").symlink_to(fmus)
-    return folder
-
-
 def defaults(name):
     """The values of a model, SI units."""
     return {variable: d.start for variable, d in declared(name).items() if d.causality in ("parameter", "input")}
