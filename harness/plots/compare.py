@@ -3,11 +3,9 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ..compare.difference import Comparison
-from .style import BLUE, GREEN, HEIGHT, ORANGE, STYLE, WIDTH, label
+from .style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
 
 MOST = 8  # variables drawn, those that differ most
 
@@ -15,8 +13,7 @@ MOST = 8  # variables drawn, those that differ most
 def draw(found: Comparison, path: Path) -> None:
     """Save the figure as PNG."""
     chosen = sorted(found.differences, key=lambda each: -each.relative)[:MOST]
-    with rc_context(STYLE):
-        figure = Figure(figsize=(2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(chosen)), dpi=130, layout="constrained")
+    with sheet(path, 2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(chosen)) as figure:
         figure.suptitle(f"{found.one.name} and {found.two.name}", fontsize=11)
         panels = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)
         for (both, off), each in zip(panels, chosen, strict=True):
@@ -28,9 +25,8 @@ def draw(found: Comparison, path: Path) -> None:
             off.plot(found.time, each.left - each.right, color=GREEN, linewidth=0.8)
             off.set_title(f"difference: largest {each.largest:.3g}, rms {each.rms:.3g} {each.unit}")
             off.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
-            off.axvline(each.at, color="#777777", linestyle=":", linewidth=0.8)
+            off.axvline(each.at, color=GREY, linestyle=":", linewidth=0.8)
         panels[0, 0].legend()
         for axes in panels[-1]:
             axes.set_xlabel("t [s]")
             axes.set_xlim(np.min(found.time), np.max(found.time))
-        figure.savefig(path)

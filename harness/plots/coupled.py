@@ -3,17 +3,14 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ..coupled.study import Study
-from .style import BLUE, GREEN, HEIGHT, ORANGE, STYLE, WIDTH
+from .style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, sheet
 
 
 def draw(found: Study, path: Path) -> None:
     """Save the figure as PNG."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(2 * WIDTH, 1.6 * HEIGHT), dpi=130, layout="constrained")
+    with sheet(path, 2 * WIDTH, 1.6 * HEIGHT) as figure:
         figure.suptitle(found.scene.title, fontsize=11)
         motion, error = figure.subplots(1, 2, width_ratios=(3, 2))
         for part, x, truth, color in zip(
@@ -28,11 +25,10 @@ def draw(found: Study, path: Path) -> None:
         motion.legend()
         h = np.array(found.steps)
         error.loglog(h, found.errors, "o-", color=ORANGE, label="largest error of a position")
-        error.loglog(h, found.errors[0] * h / h[0], color="#777777", linestyle="--", label="in proportion to the step")
+        error.loglog(h, found.errors[0] * h / h[0], color=GREY, linestyle="--", label="in proportion to the step")
         error.set_title(f"error against the reference (order {found.order:.2f})")
         error.set_xticks(h, [f"{1e3 * step:g}" for step in h])
         error.minorticks_off()
         error.set_xlabel("communication step [ms]")
         error.set_ylabel("error [m]")
         error.legend()
-        figure.savefig(path)

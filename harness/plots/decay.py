@@ -3,20 +3,17 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from ..identify.fit import Identified
 from ..identify.swing import value
-from .style import BLUE, GREEN, HEIGHT, ORANGE, STYLE, WIDTH, label
+from .style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, label, sheet
 
 
 def draw(found: Identified, path: Path) -> None:
     """Save the figure as PNG."""
     record, best, turns = found.record, found.best, found.turns
     t, x = record.t[found.used], record.x[found.used]
-    with rc_context(STYLE):
-        figure = Figure(figsize=(1.8 * WIDTH, 2.6 * HEIGHT), dpi=130, layout="constrained")
+    with sheet(path, 1.8 * WIDTH, 2.6 * HEIGHT) as figure:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
         above.plot(record.t, record.x, ".", color=BLUE, markersize=2.5, label="record")
         above.plot(t, best.x, color=ORANGE, linewidth=0.9, label=f"fit: {best.words}")
@@ -32,7 +29,6 @@ def draw(found: Identified, path: Path) -> None:
         below.set_title(f"residuals (rms {best.rms:.3g} {record.unit})")
         below.set_ylabel(label("record - fit", record.unit))
         below.set_xlabel("t [s]")
-        figure.savefig(path)
 
 
 def envelope(found: Identified, end: float) -> tuple[np.ndarray, np.ndarray]:

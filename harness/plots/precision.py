@@ -5,14 +5,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ..precision.laws import Law
 from ..precision.study import CS, FMPY, FMU, ME, Study
 from ..reference import Case
-from .style import FAMILIES, STYLE, WIDTH
+from .style import FAMILIES, GREY, WIDTH, sheet
 
 TOOLS: dict[str, dict[str, Any]] = {
     FMU: {"linestyle": "-", "marker": "o", "markersize": 4},
@@ -39,8 +37,7 @@ def draw(study: Study, laws: Sequence[Law], path: Path) -> None:
     """
     cases = [case for case in study.cases if not case.chatters]
     shortcuts = [case for case in study.cases if case.chatters]
-    with rc_context(STYLE):
-        figure = Figure(figsize=(2 * WIDTH + 1.5, 0.8 + 3.6 * len(cases)), dpi=130, layout="constrained")
+    with sheet(path, 2 * WIDTH + 1.5, 0.8 + 3.6 * len(cases)) as figure:
         figure.suptitle(f"{study.model}: what accuracy costs\n{LEGEND}", fontsize=11)
         panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
         for case, row in zip(cases, panels, strict=True):
@@ -50,7 +47,7 @@ def draw(study: Study, laws: Sequence[Law], path: Path) -> None:
                     curves(axes, study, each, cost)
                 for law in laws:
                     if law.largest and law.case in [each.name for each in drawn]:
-                        axes.axvline(law.largest, color="#777777", linestyle="-.", label="error of the law itself")
+                        axes.axvline(law.largest, color=GREY, linestyle="-.", label="error of the law itself")
                 axes.set_title(case.law)
                 axes.set_ylabel(name)
                 axes.tick_params(labelbottom=True)
@@ -58,7 +55,6 @@ def draw(study: Study, laws: Sequence[Law], path: Path) -> None:
             axes.set_xlabel("largest error, relative to the largest of the motion")
         lines = {line.get_label(): line for axes in panels.flat for line in axes.lines}
         figure.legend(lines.values(), lines.keys(), loc="outside right upper")
-        figure.savefig(path)
 
 
 def curves(axes: Axes, study: Study, case: Case, cost: str) -> None:

@@ -5,12 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ..run import Run
-from .style import BLUE, HEIGHT, ORANGE, STYLE, WIDTH, label
+from .style import BLUE, HEIGHT, ORANGE, WIDTH, label, sheet
 
 OVER_TIME = ("position", "velocity", "acceleration")  # left, one below the other; the others stand on the right
 EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
@@ -26,15 +24,13 @@ def draw(run: Run, results: Results, path: Path) -> None:
         if any((name in OVER_TIME) == left for name in run.scene.plots)
     ]
     height = HEIGHT * max(2, *map(len, columns), 2)
-    with rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH * len(columns), height), dpi=130, layout="constrained")
+    with sheet(path, WIDTH * len(columns), height) as figure:
         figure.suptitle(f"{run.scene.title}\n{run.setting}", fontsize=11)
         parts = figure.subfigures(1, len(columns), squeeze=False)[0]
         for part, names in zip(parts, columns, strict=True):
             over_time = names[0] in OVER_TIME
             for axes, name in zip(part.subplots(len(names), sharex=over_time, squeeze=False)[:, 0], names, strict=True):
                 PANELS[name](axes, run, results)
-        figure.savefig(path)
 
 
 def history(axes: Axes, run: Run, role: str) -> None:

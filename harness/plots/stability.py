@@ -3,17 +3,13 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from matplotlib import rc_context
-from matplotlib.figure import Figure
-
 from ..stability.study import Region
-from .style import FAMILIES, HEIGHT, STYLE, WIDTH
+from .style import FAMILIES, HEIGHT, WIDTH, sheet
 
 
 def draw(regions: Iterable[Region], path: Path) -> None:
     """Save the steps of each method as PNG; a line of slope -1 is bounded by stability."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(1.3 * WIDTH, 2 * HEIGHT), dpi=130, layout="constrained")
+    with sheet(path, 1.3 * WIDTH, 2 * HEIGHT) as figure:
         axes = figure.subplots()
         for each in regions:
             text = f"{each.method}: {each.slope:+.2f}"
@@ -23,4 +19,3 @@ def draw(regions: Iterable[Region], path: Path) -> None:
         axes.set_ylabel("internal steps")
         axes.invert_xaxis()  # stiffer to the right
         axes.legend(title="slope at the stiff end")
-        figure.savefig(path)

@@ -1,11 +1,18 @@
 """The look of every figure: colours, sizes, headings of axes."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from ..run import heading
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
+GREY = "#777777"  # of what is only there to compare with
 # Methods of one family have one colour.
 FAMILIES = {
     "exact": "#000000",
@@ -29,6 +36,15 @@ STYLE: dict[Any, Any] = {
     "legend.fontsize": 8,
 }
 WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
+
+
+@contextmanager
+def sheet(path: Path, width: float, height: float) -> Iterator[Figure]:
+    """A figure in this look, of a size in inches; saved as PNG when all has been drawn."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(width, height), dpi=130, layout="constrained")
+        yield figure
+        figure.savefig(path)
 
 
 def label(name: str, unit: str) -> str:

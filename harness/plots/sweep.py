@@ -5,12 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import xarray
-from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ..sweep.boundaries import known
-from .style import BLUE, GREEN, HEIGHT, ORANGE, STYLE, WIDTH, label
+from .style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, label, sheet
 
 FAILED = "#bbbbbb"
 LINES = (ORANGE, "#CC79A7", GREEN)  # of known boundaries
@@ -23,9 +21,8 @@ def draw(data: xarray.Dataset, path: Path) -> None:
     grid = "run" not in data.dims
     across = len(varied) if not grid or len(varied) > 2 else min(len(measures), 2)
     down = len(measures) if not grid or len(varied) > 2 else -(-len(measures) // 2)
-    with rc_context(STYLE):
-        height = HEIGHT * (1.7 if grid and len(varied) == 2 else 1.2)
-        figure = Figure(figsize=(max(1.2, across) * WIDTH, height * down + 0.6), dpi=130, layout="constrained")
+    height = HEIGHT * (1.7 if grid and len(varied) == 2 else 1.2)
+    with sheet(path, max(1.2, across) * WIDTH, height * down + 0.6) as figure:
         failed = int((data["error"] != "").sum())
         figure.suptitle(f"{data.attrs['title']}{f' ({failed} runs failed)' if failed else ''}", fontsize=11)
         panels = figure.subplots(down, across, squeeze=False)
@@ -41,7 +38,6 @@ def draw(data: xarray.Dataset, path: Path) -> None:
         lines = {line.get_label(): line for axes in figure.axes for line in axes.lines if line.get_linestyle() == "--"}
         if lines:
             figure.legend(list(lines.values()), list(map(str, lines)), loc="outside lower center", ncols=1)
-        figure.savefig(path)
 
 
 def words(data: xarray.Dataset, name: str) -> str:
