@@ -43,7 +43,7 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     """Run and analyse a scene, and write its results into an empty folder."""
     from .fmu import simulate
 
-    check_built(scene)
+    check_built(scene.fmu)
     run = simulate(scene, report)
     results: dict[str, Any] = {}
     for name in scene.analyses:
@@ -83,7 +83,7 @@ def published() -> list[str]:
     """The names of the shipped scenes that have figures to stand beside; HarnessError if an FMU is not built."""
     scenes = [scene for scene in map(load, shipped()) if scene.published]
     for scene in scenes:
-        check_built(scene)
+        check_built(scene.fmu)
     return [scene.name for scene in scenes]
 
 

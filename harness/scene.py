@@ -225,7 +225,11 @@ def find(path: Path, table: dict) -> tuple[str, Path]:
     if "fmu" in table:
         file = path.parent / table["fmu"]
         return file.stem, file
-    name = table["model"]
+    return table["model"], fmu_of(table["model"])
+
+
+def fmu_of(name: str) -> Path:
+    """Where the FMU of a model is, or will be once it is built."""
     folders = (Path("fmus"), Path(__file__).parents[1] / "fmus")
     files = [file for folder in folders for file in folder.glob("*.fmu")]
     sources = [file for folder in folders for file in folder.glob("[!_]*.py")]
@@ -234,10 +238,10 @@ def find(path: Path, table: dict) -> tuple[str, Path]:
         raise SceneError("there are no models here: run from the folder of the project, or name fmu = 'a/file.fmu'")
     if name not in names:
         raise SceneError(unknown("model", name, names))
-    return name, next((file for file in files if file.stem == name), Path("fmus") / f"{name}.fmu")
+    return next((file for file in files if file.stem == name), Path("fmus") / f"{name}.fmu")
 
 
-def check_built(scene: Scene) -> None:
-    """The scene's FMU is there."""
-    if not scene.fmu.is_file():
-        raise HarnessError(f"there is no {scene.fmu}: build the FMUs with `python build_fmus.py`, or name another file")
+def check_built(fmu: Path) -> None:
+    """The FMU is there."""
+    if not fmu.is_file():
+        raise HarnessError(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another file")

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
-from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from ..errors import HarnessError
 from ..precision.inside import Inside, embedded
 from ..reference import MODELS
-from ..scene import find
+from ..scene import fmu_of
 from ..stability.probe import Card, Motion, Setting, card, run
 from ..stability.truth import Grid, truth
 from .measure import Beside, Measure
@@ -64,7 +63,7 @@ def default(model: str, its: Card, name: str, value: float | str, reach: float) 
 def late(model: str, its: Card) -> Measure:
     """The largest error of the time of an event, relative to it."""
     answer = truth(model, [(0.0, its.stop, its.defaults)], Grid(0.0, its.stop, 1))
-    found = Inside.prepared(embedded(find(Path("bench"), {"model": model})[1]), {}, "exact", 0.0).events(its.stop)
+    found = Inside.prepared(embedded(fmu_of(model)), {}, "exact", 0.0).events(its.stop)
     if [mode for _, mode in found] != [mode for _, mode in answer.events]:
         raise HarnessError(f"{model}: the modes after its events are not the true ones")
     off = max(abs(t / true - 1) for (t, _), (true, _) in zip(found, answer.events, strict=True))

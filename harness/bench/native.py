@@ -6,10 +6,10 @@ from math import nan
 from pathlib import Path
 
 from ..reference import CASES, MODELS, load, relative
+from ..scene import fmu_of
 from .in_c import NotHereError, Runs, built, cvode, runs
 from .loops import POINTS, lean, shared
 from .measure import Beside, Measure
-from .speed import file
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
 
@@ -112,7 +112,7 @@ def row(what: str, unit: str, figures: Callable[[], Figures]) -> Measure:
 
 def fmu(model: str, kind: str) -> Path:
     """The built FMU in Python or the native one."""
-    path, option = file(model), ""
+    path, option = fmu_of(model), ""
     if kind == "native":
         path, option = path.parent / "native" / path.name, " --native"
     if not path.is_file():

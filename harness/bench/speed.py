@@ -14,7 +14,7 @@ from ..precision import peers
 from ..precision.inside import Inside, embedded
 from ..precision.problem import Pacejka, Problem, Smd, Stickslip
 from ..reference import MODELS
-from ..scene import find
+from ..scene import fmu_of
 from ..stability.probe import plain
 from . import empty as bench_empty
 from . import loops
@@ -26,19 +26,14 @@ RUNS = 10_000
 STEPS = 500  # of a peer, to take the mean of
 
 
-def file(model: str) -> Path:
-    """The FMU of a model."""
-    return find(Path("bench"), {"model": model})[1]
-
-
 def speed() -> list[Callable[[], Measure]]:
     """What to measure, in the order of the design's table."""
-    sled = embedded(file("stickslip"))
-    pacejka = partial(inside_python, "pacejka", embedded(file("pacejka")), "rodas", 8e-3, ("Radau", "BDF"))
+    sled = embedded(fmu_of("stickslip"))
+    pacejka = partial(inside_python, "pacejka", embedded(fmu_of("pacejka")), "rodas", 8e-3, ("Radau", "BDF"))
     return [
         partial(inside_python, "stickslip", sled, "exact", 0.5e-3, ("RK23", "Adams"), Stickslip(), {}),
         *(partial(pacejka, Pacejka(x_m), {"x_m": x_m}) for x_m in (1e-2, 1e-3)),
-        partial(step, embedded(file("smd"))),
+        partial(step, embedded(fmu_of("smd"))),
         *(partial(communication_step, model) for model in MODELS),
         partial(many_runs, sled),
     ]
@@ -89,7 +84,7 @@ def step(carried: type) -> Measure:
 
 def communication_step(model: str) -> Measure:
     """A communication step through fmpy with all outputs recorded, as a multiple of that of an empty FMU."""
-    mine = file(model)
+    mine = fmu_of(model)
     with TemporaryDirectory(prefix="fmu-") as folder:
         description = described(plain(model))
         stop = float(description.defaultExperiment.stopTime)

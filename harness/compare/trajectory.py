@@ -74,7 +74,7 @@ def load(source: str, stop: float | None, tolerance: float, report: Callable[[fl
     if path.suffix in (".csv", ".txt"):
         raise SceneError(f"there is no {path}")
     scene = load_scene(source)
-    check_built(scene)
+    check_built(scene.fmu)
     return of_run(simulate(scene, report))
 
 

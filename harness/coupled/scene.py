@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import SceneError, unknown
-from ..scene import find, is_number, is_positive, is_text
+from ..scene import fmu_of, is_number, is_positive, is_text
 
 FOLDER = Path(__file__).with_name("scenes")
 MODELS = ("smd", "coulomb", "stickslip")
@@ -128,10 +128,7 @@ def build(path: Path, table: dict[str, Any], stiffness: dict[str, float]) -> Cou
     if twice:
         raise SceneError(f"part {twice[0]} is driven twice; an input takes one connection")
     steps = tuple(sorted((float(h) for h in table["steps"]), reverse=True))
-    whole = tuple(
-        Part(name, part["model"], find(path, {"model": part["model"]})[1], part["values"])
-        for name, part in parts.items()
-    )
+    whole = tuple(Part(name, part["model"], fmu_of(part["model"]), part["values"]) for name, part in parts.items())
     return Coupled(path.stem, table["title"], float(table["stop"]), steps, whole, tuple(connections))
 
 

@@ -13,7 +13,7 @@ from ..compare.any_fmu import description
 from ..errors import HarnessError
 from ..folder import replacing
 from ..run import write as write_csv
-from ..scene import find
+from ..scene import fmu_of
 from .monolith import bodies, solve
 from .scene import MODELS, Coupled, load
 
@@ -50,7 +50,7 @@ def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[St
         raise HarnessError(f"a coupled scene needs {error.name}: {EXTRA}") from None
     from ..plots.coupled import draw
 
-    defaults = {model: starts(find(Path("coupled"), {"model": model})[1]) for model in MODELS}
+    defaults = {model: starts(fmu_of(model)) for model in MODELS}
     scene = load(source, {model: values["k"] for model, values in defaults.items()})
     for part in scene.parts:
         unknown = sorted(set(part.values) - set(defaults[part.model]))

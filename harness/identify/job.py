@@ -44,7 +44,7 @@ def load_record(source: str, columns: Columns, known: Known, report: Callable[[f
     from ..fmu import simulate
 
     scene = load(source)
-    check_built(scene)
+    check_built(scene.fmu)
     for role in ("position", "velocity"):
         if role not in scene.motion:
             raise SceneError(f"scene {scene.name}: a decay needs the {role} among the outputs")

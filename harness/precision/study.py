@@ -20,7 +20,7 @@ from ..clock import timed
 from ..errors import HarnessError
 from ..fmu import simulate
 from ..reference import CASES, Case, errors, load
-from ..scene import Scene, find
+from ..scene import Scene, fmu_of
 from . import peers
 from .answer import Answer
 from .inside import Inside, embedded, offered
@@ -111,7 +111,7 @@ class Study:
 def study(model: str, extent: Extent, report: Callable[[float], None]) -> Study:
     """Sweep every case of a model; told how far it is as a share."""
     cases = tuple(case for case in CASES if case.model == model)
-    _, file = find(Path("precision"), {"model": model})
+    file = fmu_of(model)
     carried = embedded(file)
     work = [(case, job) for case in cases for job in jobs(case, carried, file)]
     points: list[Point] = []

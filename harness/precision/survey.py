@@ -12,7 +12,7 @@ from ..errors import SceneError, unknown
 from ..folder import replacing
 from ..reference import CASES, MODELS
 from ..run import heading
-from ..scene import find
+from ..scene import fmu_of
 from . import anchors, laws
 from .advice import advise
 from .inside import embedded
@@ -61,7 +61,7 @@ def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float],
     studies = []
     for model in models:
         studies.append(study(model, extent, partial(report, model)))
-    carried = {model: embedded(find(Path(FOLDER), {"model": model})[1]) for model in models}
+    carried = {model: embedded(fmu_of(model)) for model in models}
     told = [laws.analyse(case, carried[case.model]) for case in CASES if case.dry and case.model in models]
     report("anchors", 0.0)
     rows = tuple(anchors.analyse())

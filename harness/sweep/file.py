@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import xarray
 
-from ..errors import HarnessError, SceneError, unknown
+from ..errors import SceneError, unknown
 from ..folder import replacing
 from ..run import heading
-from ..scene import find
+from ..scene import check_built, fmu_of
 from .measures import columns
 from .rerun import Runs, ready
 from .space import Axis, assigned, axis, points
@@ -73,9 +73,8 @@ def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, repo
 
 def fmu_file(model: str) -> Path:
     """The FMU of a model's name, or of a path."""
-    file = Path(model) if model.endswith(".fmu") else find(Path("sweep"), {"model": model})[1]
-    if not file.is_file():
-        raise HarnessError(f"there is no {file}: build the FMUs with `python build_fmus.py`, or name another file")
+    file = Path(model) if model.endswith(".fmu") else fmu_of(model)
+    check_built(file)
     return file
 
 
