@@ -50,7 +50,8 @@ def motion(name, columns):
 
 def events(columns):
     """Time and new mode of every event, each seen at the recorded points that follow it."""
-    return sorted({(t, mode) for t, mode in zip(columns["events.t_last"], columns["mode"], strict=True) if t == t})
+    rows = zip(*(columns[v] for v in (*EVENTS, "mode")), strict=True)
+    return sorted({(t, mode) for count, t, mode in rows if count})
 
 
 def bound(name, evaluations, rtol):

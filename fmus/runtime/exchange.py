@@ -7,15 +7,17 @@ An importer finds an event where an indicator falls to zero:
 
     to_rest          mode v while sliding, 1 while stuck
     to_break_away    limit - |load| while stuck, 1 while sliding
+
+At an event that has been handled neither is zero, for solvers take a root there for one that stays: both fall to zero
+just beyond the event.
 """
 
 from math import fabs, nan
 
 from .march import NOMINAL
-from .step import STUCK, ULP
+from .step import NEARLY, STUCK, ULP
 
-# A load of just the limit is held.  So the indicator is zero a little beyond it: at its root friction does let go.
-BEYOND, LEAST = 4.0 * ULP, 1e-300
+BEYOND, LEAST = 4.0 * ULP, 1e-300  # of the limit; of a speed and a force
 
 
 def begin(march):
@@ -64,15 +66,16 @@ def indicators(model, march):
     if not march.step.sticks:
         return [1.0, 1.0]
     if march.mode != STUCK:
-        return [march.mode * march.v, 1.0]
+        return [march.mode * march.v + LEAST, 1.0]
     load, _, limit = model.hold(march.t, march.x)
     return [1.0, limit + BEYOND * limit + LEAST - fabs(load)]
 
 
 def update(model, march):
-    """Let the mode follow the present point; whether the speed had to be changed, to zero.
+    """Let the mode follow the present point; whether the motion is another from here on, as solvers must know.
 
-    Without a reason for an event nothing changes, nor does it the second time.
+    The speed is set to zero where the slide has ended.  Without a reason for an event nothing changes, nor does it the
+    second time.
     """
     step, mode = march.step, march.mode
     if not step.sticks or mode * march.v > 0.0:
@@ -80,11 +83,13 @@ def update(model, march):
     stopped = mode != STUCK and march.v != 0.0
     if stopped:
         march.v = 0.0
-    march.mode = model.settle(march.t, march.x, march.v)
-    if march.mode != mode:
-        step.happened += 1
-        step.t_event = march.t
-    return stopped
+    tolerance = march.rtol if march.rtol > 0.0 else model.tolerance
+    march.mode = model.settle(march.t, march.x, march.v, NEARLY * tolerance)
+    changed = march.mode != mode
+    if changed:
+        step.before.happened += 1
+        step.before.t_event = march.t
+    return stopped or changed
 
 
 class Exchange:
