@@ -1,5 +1,7 @@
 """Spring and mass with Coulomb friction."""
 
+from math import fabs
+
 from .runtime.automaton import HYBRID, HYBRID_LAW, SIGN_LAW, DryFriction, sign
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
 from .runtime.exact import Exact
@@ -64,6 +66,9 @@ class Coulomb(DryFriction):
 
     def hold(self, t, x):
         return self.F_ext - self.k * x, 0.0, self.f
+
+    def terms(self, t, x):
+        return fabs(self.F_ext) + self.k * fabs(x)
 
     def observe(self, t, x, v, mode):
         spring = -self.k * x

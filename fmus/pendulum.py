@@ -1,6 +1,6 @@
 """Compound pendulum with friction in its pin."""
 
-from math import cos, radians, sin, sqrt
+from math import cos, fabs, radians, sin, sqrt
 
 from .runtime.automaton import HYBRID, HYBRID_LAW, SIGN_LAW, DryFriction, sign
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
@@ -112,6 +112,9 @@ class Pendulum(DryFriction):
 
     def hold(self, t, x):
         return self.T_ext - self.moment * sin(x), 0.0, self.arm * self.weight
+
+    def terms(self, t, x):
+        return fabs(self.T_ext) + self.moment * fabs(x)
 
     def observe(self, t, x, v, mode):
         load = self.T_ext - self.moment * sin(x)

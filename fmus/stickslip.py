@@ -94,6 +94,13 @@ class Stickslip(DryFriction):
     def hold(self, t, x):
         return self.pull(t, x), self.k * self.v_driver, self.holding
 
+    def terms(self, t, x):
+        ways = fabs(x) + fabs(self.x_base) + fabs(self.v_driver) * (fabs(t) + fabs(self.t_base))
+        return fabs(self.F_ext) + self.k * ways
+
+    def departure(self, t, x, mode):
+        return mode * (self.holding - self.sliding) / self.m
+
     def observe(self, t, x, v, mode):
         driver = self.x_base + self.v_driver * (t - self.t_base)
         spring = self.k * (driver - x)

@@ -20,7 +20,7 @@ from itertools import count, takewhile
 from mpmath import atan2, atanh, exp, factorial, findroot, mp, mpf, pi, re, sign, sqrt
 
 mp.dps = 80
-GRAZE = mpf(10) ** -40  # a speed that only touches zero is no turning point
+GRAZE = mpf(10) ** -40  # a speed this near to zero only touches it; a load this near to the limit is the limit
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,11 @@ class System:
     def load(self, x, drive):
         """What the mass would feel without friction and damping."""
         return mpf(self.push) + mpf(self.k) * (drive - x)
+
+    @property
+    def rate(self):
+        """Of the load, while the mass rests."""
+        return mpf(self.k) * mpf(self.speed)
 
 
 def smd(m=1.0, k=157.9, c=2.0, F_ext=0.0):
@@ -59,7 +64,7 @@ class Piece:
 
     def __init__(self, system, net, v):
         self.m, self.c, self.k = mpf(system.m), mpf(system.c), mpf(system.k)
-        self.net, self.rate, self.v = mpf(net), self.k * mpf(system.speed), mpf(v)
+        self.net, self.rate, self.v = mpf(net), system.rate, mpf(v)
         spread = sqrt(self.c**2 - 4 * self.m * self.k)
         self.nodes = [(-self.c - spread) / (2 * self.m), (-self.c + spread) / (2 * self.m), mpf(0), mpf(0)]
 
@@ -100,10 +105,15 @@ class Piece:
             elif w == 0 < -a / b:
                 yield -a / b
 
-    def turning_point(self, mode, horizon):
-        """The first s in (0, horizon] where the speed leaves the sign of `mode`, or None."""
+    def turning_point(self, mode, horizon, catches):
+        """The first s in (0, horizon] where the speed leaves the sign of `mode`, or None.
+
+        `catches`: static friction is larger, so that a speed which only touches zero stays there.
+        """
         low = mpf(0)
         for high in [*takewhile(lambda s: s < horizon, self.flats()), mpf(horizon)]:
+            if catches and abs(self.at(high)[1]) <= GRAZE:
+                return high
             if mode * self.at(high)[1] < -GRAZE:
                 return findroot(lambda s: self.at(s)[1], (low, high), solver="anderson", tol=GRAZE**3, maxsteps=200)
             low = high
@@ -133,8 +143,8 @@ class Trajectory:
 
     def span(self, system, end):
         """Append the pieces from the present point to `end`."""
-        load = system.load(self.x, self.drive)
-        mode = (int(sign(self.v)) or direction(load, system.hold)) if system.dry else 1
+        load, rate = system.load(self.x, self.drive), system.rate
+        mode = (int(sign(self.v)) or direction(load, rate, system.hold)) if system.dry else 1
         net = load - mode * system.slide
         while True:
             stuck = system.dry and mode == 0
@@ -143,16 +153,16 @@ class Trajectory:
             if not system.dry:
                 s = None
             elif stuck:
-                s = time_to_yield(load, system)
+                s = None if rate == 0 else (sign(rate) * system.hold - load) / rate
             else:
-                s = piece.turning_point(mode, end - self.t)
+                s = piece.turning_point(mode, end - self.t, catches=system.hold > system.slide)
             if s is None or self.t + s >= end:
                 self.move(system, piece, end - self.t)
                 return
             self.move(system, piece, s)
             self.v, load = mpf(0), system.load(self.x, self.drive)
             # at a break-away the load equals the limit by definition: no rounding decides the direction
-            mode = int(sign(system.speed)) if stuck else direction(load, system.hold)
+            mode = int(sign(rate)) if stuck else direction(load, rate, system.hold)
             net = mode * (system.hold - system.slide) if stuck else load - mode * system.slide
 
     def append(self, mode, piece):
@@ -174,12 +184,12 @@ class Trajectory:
         return x + y, v
 
 
-def direction(load, limit):
-    """Where a mass at rest goes: nowhere while friction can hold the load."""
-    return int(sign(load)) if abs(load) > limit else 0
+def direction(load, rate, limit):
+    """Where a mass at rest goes: nowhere while friction can hold the load.
 
-
-def time_to_yield(load, system):
-    """Time until the load on a stuck mass reaches the limit, or None."""
-    rate = mpf(system.k) * mpf(system.speed)
-    return None if rate == 0 else (sign(rate) * system.hold - load) / rate
+    Just the limit is held, unless the load is about to exceed it.
+    """
+    for way in (-1, 1):
+        if way * load > limit + GRAZE or (way * rate > 0 and way * load > limit - GRAZE):
+            return way
+    return 0

@@ -8,7 +8,7 @@ from fmus.runtime.declare import Choice, Input, Output, Parameter, variables
 
 ROOT = Path(__file__).parent.parent
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
-EXACT, ODE23 = 1, 2
+EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
 HYBRID, SIGN, THRESHOLD = 1, 2, 3
 
 

@@ -185,7 +185,7 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
 
 
 def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
-    monkeypatch.setattr(march, "MOST_STEPS", 50)
+    monkeypatch.setattr(march, "ROUNDS", 2)
     made = slave("pacejka", {"solver.method": 2}, stop=16.0)
     assert made.do_step(0.0, 16.0) is False
     assert "internal steps" in capfd.readouterr().err

@@ -8,6 +8,7 @@ based on the synchronous data flow principle, CACSD 1999).
 
 from math import fabs, inf
 
+from .exact import NEAR
 from .methods import EXACT
 from .oscillator import Oscillator
 from .step import HYBRID, STUCK
@@ -29,7 +30,11 @@ def sign(v):
 
 
 class DryFriction(Oscillator):
-    """An oscillator that sticks: hold(t, x) tells the load on the body at rest, its rate and the holding limit."""
+    """An oscillator that sticks.
+
+    hold(t, x) tells the load on the body at rest, its rate and the holding limit; terms(t, x) the sum of the sizes of
+    what the load is made of, of which rounding takes its share.  While the body rests, the load is linear in time.
+    """
 
     dry = True
     rules: tuple[str, ...] = (
@@ -41,18 +46,46 @@ class DryFriction(Oscillator):
     def prepare(self):
         return 1 if self.friction != HYBRID and self.solver.method == EXACT else 0
 
-    def settle(self, t, x, v):
-        """The mode that holds from here on."""
+    def settle(self, t, x, v, near):
+        """The mode that holds from here on.
+
+        A load of the limit is a tie, which its rate decides: outward it lets go, inward or without a rate it is held.
+        The load is known but for the rounding of its terms, and, where it moves inward, the share `near` of the limit.
+        """
         if v > 0.0:
             return FORWARD
         if v < 0.0:
             return BACKWARD
-        load, _, limit = self.hold(t, x)
-        if load > limit:
+        load, rate, limit = self.hold(t, x)
+        slack = NEAR * (self.terms(t, x) + limit)
+        if rate > 0.0 and load >= limit - slack:
             return FORWARD
-        if load < -limit:
+        if rate < 0.0 and load <= slack - limit:
             return BACKWARD
-        return STUCK
+        if rate != 0.0:
+            slack += near * limit
+        if fabs(load) <= limit + slack:
+            return STUCK
+        return FORWARD if load > 0.0 else BACKWARD
+
+    def touches(self, t, x, mode, near):
+        """Whether a slide whose speed comes to zero here only touches it: friction lets go so soon that a speed which
+        is off by the share `near` would not have come to zero.
+
+        After the wait s the speed grows as v = u (1 - cos(w s)), with the load's rate m w^2 u.
+        """
+        load, rate, limit = self.hold(t, x)
+        if rate == 0.0:
+            return load == 0.0 and limit == 0.0  # nothing stops it: what is left of the speed is the method's error
+        if mode * rate < 0.0:
+            return False
+        wait = (limit - mode * load) / fabs(rate)
+        _, stiffness, _ = self.jacobian(t, x, 0.0, mode)
+        return -0.5 * stiffness * wait * wait < near
+
+    def departure(self, t, x, mode):
+        """The acceleration at a break-away, where the load is just the limit."""
+        return self.acceleration(t, x, 0.0, mode)
 
     def release(self, t, x):
         """When a body at rest at x breaks away, and in which direction; inf if it never does."""
@@ -75,6 +108,7 @@ class DryFriction(Oscillator):
             _, v = step.at(self, high)
             behind = mode * v
         kept = 0  # the end of the bracket that the last secant left where it was
+        looks = 0
         for _ in range(MOST_HALVINGS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
@@ -84,6 +118,7 @@ class DryFriction(Oscillator):
                 if low < secant < high:
                     middle = secant
             _, v = step.at(self, middle)
+            looks += 1
             v *= mode
             if v > 0.0:
                 low, ahead = middle, v
@@ -95,6 +130,7 @@ class DryFriction(Oscillator):
                 if kept == -1:
                     ahead *= 0.5
                 kept = -1
+        step.looked += looks
         return high
 
     def dip(self, step):
@@ -103,6 +139,7 @@ class DryFriction(Oscillator):
         if mode * step.a0 >= 0.0 or mode * step.a1 <= 0.0:
             return inf
         low, high = step.t0, step.t1
+        step.looked += MOST_THIRDS
         for _ in range(MOST_THIRDS):
             third = (high - low) / 3.0
             _, left = step.at(self, low + third)

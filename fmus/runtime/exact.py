@@ -14,6 +14,8 @@ oscillator here has both.
 from math import atan2, copysign, cos, exp, expm1, fabs, inf, log1p, pi, sin, sqrt
 
 UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE = 1, 2, 3, 4
+ULP = 2.220446049250313e-16
+NEAR = 64.0 * ULP  # how far rounding may carry a closed form from a tie, as a share
 
 
 class Exact:
@@ -23,7 +25,7 @@ class Exact:
         self.kind = UNDAMPED
         self.z = self.n2 = self.drift = 0.0
         self.w = self.slow = 0.0
-        self.x0 = self.v0 = self.a0 = self.p = 0.0
+        self.x0 = self.v0 = self.a0 = self.p = self.lost = 0.0
 
     def prepare(self, m, c, k, drift):
         """Take over mass (kg), damping (N.s/m), stiffness (N/m) and the speed of the resting point (m/s)."""
@@ -40,9 +42,10 @@ class Exact:
             self.kind = OVERDAMPED
             self.slow = -self.n2 / (z + self.w)  # the slow root of s^2 + 2 z s + n^2, without cancellation
 
-    def begin(self, x, v, a, p):
-        """A piece from x, v with the acceleration a, of which p is due to the constant force."""
-        self.x0, self.v0, self.a0, self.p = x, v, a, p
+    def begin(self, x, v, a, p, lost):
+        """A piece from x, v with the acceleration a, of which p is due to the constant force; x lacks what it lost to
+        rounding."""
+        self.x0, self.v0, self.a0, self.p, self.lost = x, v, a, p, lost
 
     def at(self, t):
         """Position and speed t seconds after the beginning of the piece."""
@@ -52,7 +55,7 @@ class Exact:
             g, fall = 2.0 * s * c / self.w, 2.0 * s * s
             lag = t - g if half > 0.25 else t * early_lag(4.0 * half * half)
             return (
-                self.x0 + self.v0 * g + self.a0 * fall / self.n2 + self.drift * lag,
+                self.x0 + (self.v0 * g + self.a0 * fall / self.n2 + self.drift * lag + self.lost),
                 self.v0 * (1.0 - fall) + self.a0 * g + self.drift * fall,
             )
         if self.kind == FREE:
@@ -71,6 +74,20 @@ class Exact:
             self.x0 * (slope + 2.0 * self.z * g) + self.v0 * g + self.p * integral,
             (self.p - self.n2 * self.x0) * g + self.v0 * slope,
         )
+
+    def end(self, t):
+        """Position t seconds after the beginning, and what it lacks.
+
+        Only a body that goes on for ever, behind its driver, comes far enough for that to matter.
+        """
+        if self.kind != UNDAMPED:
+            x, _ = self.at(t)
+            return x, 0.0
+        x0, self.x0 = self.x0, 0.0
+        way, _ = self.at(t)
+        self.x0, x = x0, x0 + way
+        moved = x - x0
+        return x, (x0 - (x - moved)) + (way - moved)
 
     def overdamped(self, t):
         """G, G' and I from the two real roots, which coincide at critical damping."""
@@ -108,18 +125,22 @@ class Exact:
         w = self.w
         if self.kind == UNDERDAMPED:
             return atan2(v * w, -b) / w
-        if v == 0.0 or b + w * v >= 0.0:
+        # the share of the slow root in the speed; without a spring that is the speed which the force keeps up
+        slow = b + w * v if self.n2 > 0.0 else mode * self.p
+        if v == 0.0 or slow >= 0.0:
             return inf
         if w == 0.0:
             return -v / b
-        return -0.5 * log1p(2.0 * w * v / (b - w * v)) / w
+        return -0.5 * log1p(2.0 * w * v / (slow - 2.0 * w * v)) / w
 
     def undamped_standstill(self, v, q, u):
-        """First root of u + (v - u) cos y + q sin y, a quadratic in T = tan(y/2), over w."""
+        """First root of u + (v - u) cos y + q sin y, a quadratic in T = tan(y/2), over w; it may be a double one."""
         lead = 2.0 * u - v
         square = q * q - v * lead
         if square < 0.0:
-            return inf
+            if square < -NEAR * q * q:
+                return inf
+            square = 0.0
         s = -(q + copysign(sqrt(square), q))
         first, second = half_angle(s, lead), half_angle(v, s)
         return 2.0 * (first if first < second else second) / self.w

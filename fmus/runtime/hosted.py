@@ -10,15 +10,15 @@ import sys
 from math import fabs, inf, isfinite, nan
 
 from .declare import variables
-from .march import ENDLESS, MOST_STEPS
+from .march import ENDLESS, MOST_CALLS, MOST_STEPS
 from .step import DIVERGED, OK, STALLED
 
 SENTENCES = {
     DIVERGED: "the motion leaves the range of numbers after t = {t!r} s; lower what drives it or check the parameters",
     STALLED: "the solver makes no headway after t = {t!r} s, its step is as small as the time axis can hold; "
     "raise solver.rtol or choose another solver.method",
-    ENDLESS: f"more than {MOST_STEPS} internal steps within one communication step, from t = {{start!r}} s on; "
-    "choose another solver.method, raise solver.rtol or take shorter communication steps",
+    ENDLESS: f"more than {MOST_STEPS} internal steps or {MOST_CALLS} right-hand sides within one communication step, "
+    "from t = {start!r} s on; choose another solver.method, raise solver.rtol or take shorter communication steps",
 }
 
 SETTING_UP, RUNNING = 0, 1

@@ -12,7 +12,10 @@ from .step import DIVERGED, HUGE, HYBRID, OK, STUCK, Step
 
 ENDLESS = 3
 NOMINAL = 1e-3  # size of a position or a speed, in SI units, where nobody sets one
-MOST_STEPS = 2_000_000  # within one communication step: half a minute at most, then a sentence
+# Within one communication step, so that a sentence comes after half a minute at most, on a slow machine too:
+ROUNDS, ROUND = 2000, 1000  # the calls are counted after each round
+MOST_STEPS = ROUNDS * ROUND  # internal steps
+MOST_CALLS = 8_000_000  # right-hand sides, and looks inside a step for its events
 
 
 class March(Declaring):
@@ -38,6 +41,7 @@ class March(Declaring):
         self.step = Step()
         self.t = self.x = self.v = 0.0
         self.mode = STUCK
+        self.run = 1.0  # length of the default run
         # what the present point was before its values were renewed
         self.renewed_at = nan
         self.called_then = self.happened_then = self.mode_then = 0
@@ -53,6 +57,7 @@ class March(Declaring):
         step.tolerance = self.rtol if self.rtol > 0.0 else tolerance
         step.longest = self.h_max if self.h_max > 0.0 else 0.1 * run
         step.t_end = t_end
+        self.run = model.stop_time
         step.methods.choose(self.method)
         if model.dry:
             step.sticks = model.friction == HYBRID
@@ -74,15 +79,18 @@ class March(Declaring):
         else:
             step.go_back()
         step.event = False
+        before = step.before
         if self.renewed_at == self.t:
-            step.called, step.happened, step.size = self.called_then, self.happened_then, self.size_then
-            step.t_event = self.t_event_then
+            step.called, before.happened, step.size = self.called_then, self.happened_then, self.size_then
+            before.t_event = self.t_event_then
         else:
             self.renewed_at = self.t
-            self.called_then, self.happened_then, self.size_then = step.called, step.happened, step.size
-            self.t_event_then, self.mode_then = step.t_event, self.mode
+            self.called_then, self.happened_then, self.size_then = step.called, before.happened, step.size
+            self.t_event_then, self.mode_then = before.t_event, self.mode
         self.scale(model)
-        step.stand(model, self.t, self.x, self.v)
+        if step.sticks and self.mode_then * self.v < 0.0:
+            self.v = 0.0  # within a slide a speed against its mode is rounding
+        step.stand(model, self.t, self.x, self.v, self.mode_then)
         if step.mode1 != self.mode_then:
             step.note_event()
         self.arrive()
@@ -129,31 +137,43 @@ class March(Declaring):
     def cover(self, model, t):
         """Take internal steps until one of them covers t."""
         step = self.step
-        for _ in range(MOST_STEPS):
-            status = step.take(model)
-            if status != OK or step.t1 >= t:
-                return status
+        most = step.called + step.looked + MOST_CALLS
+        for _ in range(ROUNDS):
+            for _ in range(ROUND):
+                status = step.take(model)
+                if status != OK or step.t1 >= t:
+                    return status
+            if step.called + step.looked > most:
+                break
         return ENDLESS
 
     def look_ahead(self, model):
-        """Where the internal step that covers the time after the present point ends; NaN if it fails."""
+        """Where the internal step that covers the time after the present point ends; NaN if it fails.
+
+        One without an end is told as if it ended a default run after the present point.
+        """
         step = self.step
         while self.t >= step.t1 and step.t1 < step.t_end:
             if step.take(model) != OK:
                 self.t_next = nan
                 return
-        self.t_next = step.t1
+        self.t_next = self.told_end()
+
+    def told_end(self):
+        """The end of the internal step in force, made finite."""
+        end = self.step.t1
+        return end if end < inf else self.t + self.run
 
     def report(self, events):
         """The declared counts, up to the present point."""
         step = self.step
+        before = step.before
         here = step.event and self.t >= step.t1
-        events.count = step.happened + 1 if here else step.happened
-        events.t_last = step.t1 if here else step.t_event
+        events.count = before.happened + 1 if here else before.happened
+        events.t_last = step.t1 if here else before.t_event
         if self.t > step.t0:
             self.steps, self.rejected, self.evaluations = step.taken, step.refused, step.called
-            self.h = step.t1 - step.t0
+            self.h = self.told_end() - step.t0
         else:
-            before = step.before
             self.steps, self.rejected, self.evaluations = before.taken, before.refused, before.called
             self.h = before.length

@@ -9,7 +9,7 @@ class Events(Declaring):
     """Changes of mode up to the present point."""
 
     count = Count("changes of mode up to the present point")
-    t_last = Local("s", "time of the last change of mode; NaN before the first")
+    t_last = Local("s", "time of the last change of mode; the start time before the first")
 
 
 class Oscillator(Declaring):

@@ -5,8 +5,9 @@ step of a method that meets the tolerance.  Its size is controlled as the public
 ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22).
 """
 
-from math import fabs, inf, nan
+from math import fabs, inf
 
+from .exact import NEAR, ULP
 from .interpolant import Interpolant
 from .methods import EXACT, Methods
 
@@ -14,17 +15,33 @@ OK, DIVERGED, STALLED = 0, 1, 2
 
 STUCK, HYBRID = 0, 1
 HUGE = 1e100  # beyond it squares, as of an energy, would overflow
-ULP = 2.220446049250313e-16
 MOST_TRIES = 200  # of one step, which halves each time
 MOST_IDLE = 100  # steps in a row that hardly move the time
+NEARLY = 30.0  # how far a method may be from a tie, over its tolerance
 
 
 class Before:
-    """The beginning of the step: counts up to there, the step size to try there, and the length of the step before."""
+    """The beginning of the step: counts up to there, the step size to try there, the length of the step before, how
+    many steps before it hardly moved the time, and when the mode last changed (without a change, the start)."""
 
     def __init__(self):
-        self.taken = self.refused = self.called = 0
-        self.size = self.length = 0.0
+        self.taken = self.refused = self.called = self.happened = self.idle = 0
+        self.size = self.length = self.t_event = 0.0
+
+
+class Lost:
+    """What the doubles t0, x0, t1, x1 of a step lack.
+
+    Closed forms carry it on, so that the rounding of one event does not add to that of the others.
+    """
+
+    def __init__(self):
+        self.t0 = self.x0 = self.t1 = self.x1 = 0.0
+
+    def carry(self):
+        """The step begins where the last one ended."""
+        self.t0, self.x0 = self.t1, self.x1
+        self.t1 = 0.0
 
 
 class Step:
@@ -44,28 +61,34 @@ class Step:
         self.t0 = self.x0 = self.v0 = self.a0 = 0.0
         self.t1 = self.x1 = self.v1 = self.a1 = 0.0
         self.mode0 = self.mode1 = STUCK
-        self.waiting = self.event = False
+        # it stands still; the mode changes at its end; the speed only touches zero there, and the slide goes on
+        self.waiting = self.event = self.touches = False
         # the length of the step before an event cut it, and what holds within
         self.span = 0.0
         self.interpolant = Interpolant()
         # counts up to t1, and the size to try next; the same at t0
-        self.taken = self.refused = self.called = self.happened = self.idle = 0
+        self.taken = self.refused = self.called = self.looked = 0
         self.size = 0.0
-        self.t_event = nan
         self.before = Before()
+        self.lost = Lost()
 
     def begin(self, model, t, x, v):
         """The empty step at the start of a run."""
-        self.taken = self.refused = self.called = self.happened = self.idle = 0
-        self.size = self.before.length = 0.0
-        self.t_event = nan
+        before = self.before
+        self.taken = self.refused = self.called = before.happened = before.idle = 0
+        self.size = before.length = 0.0
+        before.t_event = t
         self.event = False
-        self.stand(model, t, x, v)
+        self.stand(model, t, x, v, STUCK)
 
-    def stand(self, model, t, x, v):
-        """The empty step at t: both its ends are there, and a step size is at hand unless the body is stuck."""
+    def stand(self, model, t, x, v, mode):
+        """The empty step at t, after a mode: both its ends are there, and a step size is at hand unless the body is
+        stuck."""
+        lost = self.lost
+        lost.t1 = lost.x1 = 0.0
         self.t1, self.x1, self.v1 = t, x, v
-        self.settle(model)
+        self.settle(model, mode)
+        self.arrive(model)
         if self.size == 0.0 and not (self.sticks and self.mode1 == STUCK):
             self.size = self.first_size()
         self.t0 = t
@@ -88,13 +111,14 @@ class Step:
         if self.event:
             self.note_event()
             self.event = False
-        self.before.length = self.t1 - self.t0
+        before = self.before
+        before.length = self.t1 - self.t0
         self.keep_counts()
         self.t0, self.x0, self.v0 = self.t1, self.x1, self.v1
         self.a0, self.mode0 = self.a1, self.mode1
         self.waiting = self.interpolant.ready = False
         status = OK
-        if self.sticks and self.mode0 == STUCK and model.dry:
+        if self.sticks and (self.mode0 == STUCK or self.touches) and model.dry:
             self.wait(model)
         elif self.methods.chosen == EXACT and model.linear:
             status = self.take_piece(model)
@@ -103,41 +127,50 @@ class Step:
         self.taken += 1
         t = self.t0
         if self.t1 - t > 16.0 * ULP * (t if t > 0.0 else -t):
-            self.idle = 0
+            before.idle = 0
         else:
-            self.idle += 1
-            if self.idle > MOST_IDLE:
+            before.idle += 1
+            if before.idle > MOST_IDLE:
                 return STALLED
         return status
 
     def note_event(self):
-        self.happened += 1
-        self.t_event = self.t1
+        self.before.happened += 1
+        self.before.t_event = self.t1
 
     def wait(self, model):
         """Stand still until the load exceeds what friction holds."""
-        self.waiting = True
+        self.lost.carry()
+        self.waiting, self.touches = True, False
         self.x1, self.v1 = self.x0, 0.0
         release, direction = model.release(self.t0, self.x0)
         if release <= self.t_end and release < inf:
             self.t1, self.mode1 = release, direction
             self.begin_anew(model)
+            self.a1 = model.departure(release, self.x1, direction)
         else:
             self.t1, self.a1 = self.t_end, 0.0
 
     def take_piece(self, model):
         """One closed form, up to the next standstill or to the end of the run."""
-        model.exact.begin(self.x0, self.v0, self.a0, model.push(self.t0, self.mode0))
+        lost = self.lost
+        lost.carry()
+        model.exact.begin(self.x0, self.v0, self.a0, model.push(self.t0, self.mode0), lost.x0)
         self.t1 = self.t_end
         if model.dry:
-            end = self.t0 + model.exact.standstill(self.mode0)
+            ahead = model.exact.standstill(self.mode0)
+            elapsed = ahead + lost.t0
+            end = self.t0 + elapsed
             if end <= self.t_end and end < inf:
+                moved = end - self.t0
+                lost.t1 = (self.t0 - (end - moved)) + (elapsed - moved)
                 self.t1 = end
-                self.x1, _ = model.exact.at(end - self.t0)
+                self.x1, lost.x1 = model.exact.end(ahead)
                 self.v1 = 0.0
                 return self.stop(model)
         if self.t1 < inf:
-            self.x1, self.v1 = model.exact.at(self.t1 - self.t0)
+            lost.x1 = 0.0
+            self.x1, self.v1 = model.exact.at(self.t1 - self.t0 - lost.t0)
             self.a1 = model.acceleration(self.t1, self.x1, self.v1, self.mode1)
             if not fabs(self.x1) + fabs(self.v1) < HUGE:
                 return DIVERGED
@@ -199,17 +232,19 @@ class Step:
         return OK
 
     def stop(self, model):
-        """The speed has come to zero at t1: stick, or slide the other way."""
-        self.mode1 = model.settle(self.t1, self.x1, 0.0)
+        """The speed has come to zero at t1: stick, or slide the other way, or go on if it only touches zero."""
+        self.settle(model, self.mode0)
         self.begin_anew(model)
         return OK if fabs(self.x1) < HUGE else DIVERGED
 
-    def settle(self, model):
-        """The mode and the acceleration that hold from t1 on."""
-        self.mode1 = STUCK
+    def settle(self, model, mode):
+        """The mode that holds from t1 on, after another."""
+        self.mode1, self.touches = STUCK, False
         if self.sticks and model.dry:
-            self.mode1 = model.settle(self.t1, self.x1, self.v1)
-        self.arrive(model)
+            near = NEAR if self.methods.chosen == EXACT and model.linear else NEARLY * self.tolerance
+            self.mode1 = model.settle(self.t1, self.x1, self.v1, near)
+            if self.v1 == 0.0 and self.mode1 != mode != STUCK and model.touches(self.t1, self.x1, mode, near):
+                self.mode1, self.touches = mode, True
 
     def arrive(self, model):
         """The acceleration in the mode that holds from t1 on."""
@@ -244,6 +279,6 @@ class Step:
             if self.waiting:
                 return self.x0, 0.0
             if self.methods.chosen == EXACT and model.linear:
-                return model.exact.at(t - self.t0)
+                return model.exact.at(t - self.t0 - self.lost.t0)
             self.methods.expand(model, self)
         return inside.at(t - self.t0)

@@ -9,7 +9,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from math import sqrt
+from math import fabs, sqrt
 
 import numpy as np
 
@@ -61,6 +61,9 @@ class Block(DryFriction):
 
     def hold(self, t, x):
         return -(x + self.belt * t), -self.belt, 1.0
+
+    def terms(self, t, x):
+        return fabs(x) + fabs(self.belt * t)
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class Counts:
 class Motion:
     """A run that came to its end: `x`, `v`, `energy` (n,) after each communication step, the start included.
 
-    `t_last` is the time of the last event in s, NaN where there was none.
+    `t_last` is the time of the last event in s, the start where there was none.
     """
 
     x: np.ndarray

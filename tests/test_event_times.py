@@ -1,0 +1,72 @@
+"""The rounding of one event does not add to that of the others: the last of 300 000 is where the closed form has it."""
+
+from math import ulp
+
+import pytest
+from mpmath import atan2, cos, mpf, pi, sign, sqrt, workdps
+from native_fmus import built
+
+DIGITS = 50
+PLACES = 4  # units in the last place of the time
+
+
+@pytest.fixture(params=["python", "native"])
+def kind(request, fmus):
+    """The folder of the FMUs of a kind."""
+    return fmus if request.param == "python" else built()
+
+
+def late(fmu, values, start, stop):
+    """The FMU at the time stop, in a few communication steps."""
+    fmu.begin(values, start=start)
+    times = [start + (stop - start) * i / 10 for i in range(10)] + [stop]
+    return fmu.run(times, ["events.count", "events.t_last", "x"])[-1]
+
+
+def close(t, true):
+    return abs(mpf(t) - true) <= PLACES * ulp(t)
+
+
+@pytest.mark.parametrize(("f", "values"), [(1e-6, {}), (1e-7, {}), (1e-7, {"m": 0.7, "k": 1233.1})], ids=str)
+def test_half_swings_of_a_mass_with_little_friction(worker, kind, f, values):
+    """Each lasts half a period and loses 2 f/k."""
+    with workdps(DIGITS):
+        number = int(0.03 / f)
+        m, k = mpf(values.get("m", 1.0)), mpf(values.get("k", 157.9))
+        half, loss = pi * sqrt(m / k), 2 * mpf(f) / k
+        stop = float((number + mpf("0.25")) * half)
+        fmu = worker.instantiate(kind / "coulomb.fmu")
+        count, t, x = late(fmu, {"f": f, **values}, 0.0, stop)
+        fmu.free()
+        assert count == number
+        assert close(t, number * half)
+        turned = (-1) ** number * (mpf(0.1) - number * loss)
+        rest = sign(turned) * loss / 2
+        assert abs(x - (rest + (turned - rest) * cos((mpf(stop) - number * half) * pi / half))) < 1e-9 * 0.1
+
+
+SLEDS = {"default": {}, "to the other limit": {"mu_d": 0.0}, "backward": {"mu_s": 0.7, "mu_d": 0.3, "v_driver": -0.5}}
+
+
+@pytest.mark.parametrize("start", [0.0, -77.7])
+@pytest.mark.parametrize("values", SLEDS.values(), ids=SLEDS)
+def test_slips_of_the_sled(worker, kind, values, start):
+    """It sticks while the spring is stretched from d - (h - d) to h, and slips through the angle 2 (pi - phi) with
+    tan(phi) = w (h - d)/u, where h and d are the stretches that friction holds, and that it slides at."""
+    with workdps(DIGITS):
+        number = 100_000
+        given = {"m": 12.5, "k": 742.5, "g": 9.81, "mu_s": 0.9, "mu_d": 0.6, "v_driver": 0.034, **values}
+        m, k, g, mu_s, mu_d, v = (mpf(value) for value in given.values())
+        h, d, w, u = mu_s * m * g / k, mu_d * m * g / k, sqrt(k / m), abs(v)
+        slip, stick = 2 * (pi - atan2(w * (h - d), u)) / w, 2 * (h - d) / u
+        first = mpf(start) + h / u
+        last = first + (number - 1) * (slip + stick)
+        stop = float(last + slip + stick / 2)
+        fmu = worker.instantiate(kind / "stickslip.fmu")
+        count, t, x = late(fmu, values, start, stop)
+        fmu.free()
+        assert count == 2 * number
+        assert close(t, last + slip)
+        way = number * (slip + stick) * v
+        assert abs(x - way) < 1e-9 * 0.1
+        assert close(x, way)
