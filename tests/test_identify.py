@@ -1,5 +1,6 @@
 """Identification from decays whose answer is known: exact on clean signals, inside its intervals on noisy ones."""
 
+import contextlib
 import csv
 import json
 import os
@@ -97,14 +98,29 @@ def test_it_matters_not_where_the_record_begins_nor_how_it_is_sampled(turn):
     )
 
 
-def test_a_late_clock_and_a_far_origin_take_no_digits():
+@pytest.mark.parametrize("origin", [2.0**4, 2.0**8, -(2.0**9), 2.0**10, 2.0**12])
+def test_a_late_clock_and_a_far_origin_take_no_digits(origin):
     """As of seconds since 1970, binary fractions so that the times themselves are exact."""
     times = np.arange(1000) / 256
     x = swung(0.02, 0.003, t=times).x
-    found = identify(Record("late", times + 2.0**30, x + 2.0**10, None, "m"), Known())
+    found = identify(Record("late", times + 2.0**30, x + origin, None, "m"), Known())
     assert values(found.best.estimates) == pytest.approx(
-        {"zeta": 0.02, "r": 0.003, "omega": 12.566, "rest": 1024.02}, rel=1e-9
+        {"zeta": 0.02, "r": 0.003, "omega": 12.566, "rest": origin + 0.02}, rel=1e-9
     )
+
+
+@pytest.mark.parametrize("swing", [Swing(-0.9), Swing(-1.0, sine=True), Swing(b=-2.0), Swing(b=-2.0, sine=True)])
+@pytest.mark.filterwarnings("ignore:.*encountered in")
+def test_a_motion_that_grows_beyond_all_numbers_is_not_finite_and_no_error(swing):
+    for part in motion(swing, 1e3, 0.0, 0.1, T):
+        assert not np.isfinite(part[-1])
+
+
+def test_whatever_a_fit_tries_a_record_ends_in_a_fit_or_in_one_sentence():
+    """A walk at random, on which free fits try motions that grow beyond all numbers."""
+    walk = np.random.default_rng(29).standard_normal(60).cumsum()
+    with contextlib.suppress(HarnessError):
+        assert identify(Record("walk", np.linspace(0, 1, 60), walk, None, "m"), Known(), drag=True)
 
 
 def test_a_hold_before_and_a_rest_after_the_motion_are_left_out():

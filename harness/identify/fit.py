@@ -31,6 +31,7 @@ from .turning import Turns, find
 
 WORDS = {"zeta": "viscous damping", "r": "dry friction", "b": "quadratic drag"}
 CLOSE = 1e-13  # where least squares stops
+MOST = {"zeta": 1.0, "r": 1.0, "b": 100.0}  # that a fit may try, lengths in amplitudes; beyond it nothing swings
 FLOOR = 1e-14  # share of the range: no record is exact beyond
 CLEAR = 6.0  # of BIC: odds of 20 to 1
 ASIDE = 0.96  # of a half cycle before the first and after the last turning point belongs to the fit
@@ -156,7 +157,8 @@ def amplitudes(count: int, a: float, e: float, r: float) -> np.ndarray:
 
 def sequence(turns: Turns, terms: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Rest, first amplitude and the terms (zeta, r) that fit the turning points best; with their covariance."""
-    x = turns.x
+    middle = (turns.x[0] + 2 * turns.x[1] + turns.x[2]) / 4
+    x = turns.x - middle
     side = np.where(np.arange(len(x)) % 2, -1.0, 1.0) * np.sign(x[0] - x[1])
     size = np.abs(np.diff(x)).max() / 2
 
@@ -166,9 +168,11 @@ def sequence(turns: Turns, terms: tuple[str, ...]) -> tuple[np.ndarray, np.ndarr
         e = exp(-pi * ratio / sqrt(1 - min(ratio * ratio, 0.99)))
         return p[0] + side * amplitudes(len(x), p[1], e, law.get("r", 0.0)) - x / size
 
-    middle = (x[0] + 2 * x[1] + x[2]) / 4
-    start = np.array([middle, abs(x[0] - middle), *(0.0 for _ in terms)]) / size
-    return solve(off, start, np.array([size, size, *(size if term == "r" else 1.0 for term in terms)]))
+    start = np.array([0.0, abs(x[0]) / size, *(0.0 for _ in terms)])
+    scale = np.array([size, size, *(size if term == "r" else 1.0 for term in terms)])
+    p, covariance = solve(off, start, scale, terms)
+    p[0] += middle
+    return p, covariance
 
 
 def by_turning_points(record: Record, turns: Turns, known: Known, best: Fit) -> tuple[Estimate, ...]:
@@ -237,7 +241,7 @@ def fit(
 
     size = abs(start[1])
     scale = np.array([1 / start[3], size, size, start[3], *({"zeta": 1, "r": size, "b": 1 / size}[s] for s in terms)])
-    p, covariance = solve(off, (start - origin) / scale, scale)
+    p, covariance = solve(off, (start - origin) / scale, scale, terms)
     left = off(p / scale)
     n = len(left)
     places, _ = moved(p, terms, known, t)
@@ -272,11 +276,16 @@ def scatter(
 
 
 def solve(
-    off: Callable[[np.ndarray], np.ndarray], start: np.ndarray, scale: np.ndarray
+    off: Callable[[np.ndarray], np.ndarray], start: np.ndarray, scale: np.ndarray, terms: tuple[str, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The values of least squares and their covariance, both times `scale`; NaN covariance without freedom."""
-    found = least_squares(off, start, method="lm" if len(off(start)) >= len(start) else "trf", xtol=CLOSE, ftol=CLOSE)
-    if not (found.success and np.isfinite(found.cost)):
+    """The values of least squares, of which the last are `terms` within MOST, and their covariance, both times `scale`;
+    NaN covariance without freedom."""
+    most = np.array([*(np.inf for _ in start[len(terms) :]), *(MOST[term] for term in terms)])
+    start = np.clip(start, -most, most)
+    stop = {"xtol": CLOSE, "ftol": CLOSE, "gtol": CLOSE}
+    with np.errstate(over="ignore", invalid="ignore"):  # a trial that grows beyond all numbers is given up, not told
+        found = least_squares(off, start, bounds=(-most, most), **stop) if np.isfinite(off(start)).all() else None
+    if found is None or not (found.success and np.isfinite(found.cost)):
         raise HarnessError("the motion cannot be fitted to the record: it is no free decay of one oscillator")
     free = len(found.fun) - len(start)
     variance = 2 * found.cost / free if free > 0 else np.nan

@@ -11,7 +11,7 @@ known to rounding error whatever the law (A. Jorba, M. Zou, Experimental Mathema
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import copysign, cos, inf, pi, sin
+from math import copysign, cos, inf, isfinite, nan, pi, sin
 from operator import mul
 
 import numpy as np
@@ -39,6 +39,7 @@ class Swing:
         sin y has a series that grows along: (sin y)' = y' cos y, (cos y)' = -y' sin y.
         """
         damping, drag, sine = 2 * self.zeta, s * self.b, self.sine
+        y = y if isfinite(y) else nan  # a law that a fit tries may grow beyond all numbers
         terms, speeds, sines, cosines = [y, v], [v], [sin(y)], [cos(y)]
         for k in range(ORDER - 1):
             force = (sines if sine else terms)[k] + damping * speeds[k]
@@ -56,7 +57,7 @@ class Swing:
 
     def sticks(self, y: float) -> bool:
         """Whether the motion ends at a turning point y."""
-        return abs(sin(y) if self.sine else y) <= self.r
+        return abs(sin(y) if self.sine and isfinite(y) else y) <= self.r
 
     def halves(self, y: float) -> Iterator[list[Piece]]:
         """The stretches of each half cycle from the turning point y at theta = 0 on, until the motion ends."""
