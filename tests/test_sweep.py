@@ -1,9 +1,11 @@
 """Sweeps on the built FMUs: the runs they should do, whoever does them, and none of them twice."""
 
+import contextlib
 import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -180,7 +182,8 @@ def test_what_a_kill_left_is_kept_and_only_the_rest_is_run(harness, tmp_path, st
 
 def test_an_existing_scheduler_and_its_worker_do_the_same(harness, tmp_path):
     options = {"cwd": tmp_path, "env": ENVIRONMENT, "stderr": subprocess.PIPE, "text": True}
-    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", "0", "--no-dashboard"]
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0"]
+    command += ["--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
     with subprocess.Popen(command, **options) as scheduler:
         try:
             address = next(found[0] for line in scheduler.stderr if (found := re.findall(r"tcp://\S+", line)))
@@ -205,6 +208,25 @@ def test_an_existing_scheduler_and_its_worker_do_the_same(harness, tmp_path):
     assert harness(*MAP, "--workers", 1, "--out", "near").returncode == 0
     near, far = (tmp_path / place / "sweep/stickslip-mu_d-v_driver/sweep.nc" for place in ("near", "far"))
     assert near.read_bytes() == far.read_bytes()
+
+
+def test_a_sweep_asks_for_no_port_of_its_own_and_listens_to_this_machine_only(harness, tmp_path):
+    """Dask's own, 8787, is taken."""
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys\n"
+        "def note(event, arguments):\n"
+        "    if event == 'socket.bind':\n"
+        "        print(*arguments[1][:2], file=open('bound', 'a'))\n"
+        "sys.addaudithook(note)\n"
+    )
+    with socket.socket() as taken, pytest.MonkeyPatch.context() as patch:
+        with contextlib.suppress(OSError):  # taken already: so much the better
+            taken.bind(("127.0.0.1", 8787))
+            taken.listen()
+        patch.setitem(ENVIRONMENT, "PYTHONPATH", f"{tmp_path}{os.pathsep}{ROOT}")
+        done = harness(*MAP, "--workers", 2, "--quiet")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert set((tmp_path / "bound").read_text().splitlines()) == {"127.0.0.1 0"}
 
 
 def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(harness, tmp_path):

@@ -28,6 +28,8 @@ BLOCKS = 20  # for each worker at least, so that progress shows and no worker wa
 BUSY = Lock()  # an FMU of pythonfmu is one thread's at a time
 LOADED: dict[tuple[str, bytes], Rerun] = {}  # in a worker: its instances
 HELD = ExitStack()  # what frees them
+# without an address Dask's scheduler would serve its health at port 8787, and warn where that is taken
+UNSEEN = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
 EXTRA = "python -m pip install 'friction-fmus[sweep]'"
 
 
@@ -139,7 +141,7 @@ def client(scheduler: str | None, workers: int) -> Iterator[Any]:
     if scheduler is None:
         before = signal(SIGINT, SIG_IGN)  # workers inherit it: an interrupt is for this process, which ends them
         try:
-            cluster = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=50)
+            cluster = LocalCluster(n_workers=workers, threads_per_worker=1, silence_logs=50, **UNSEEN)
         finally:
             signal(SIGINT, before)
         with cluster, Client(cluster) as local:
