@@ -14,6 +14,7 @@ from test_refusals import (  # noqa: F401
     test_a_calculated_value_cannot_be_set,
     test_a_motion_out_of_all_range_fails_in_one_sentence_or_stays_finite,
     test_a_state_that_is_not_of_this_fmu_is_refused_and_the_process_lives,
+    test_a_step_that_begins_elsewhere_is_refused_also_at_zero,
     test_a_value_out_of_range_is_refused_by_its_name,
     test_a_value_that_turns_bad_in_mid_run_stops_the_run_and_reset_recovers,
     test_an_unknown_choice_is_refused_with_those_there_are,
@@ -21,6 +22,7 @@ from test_refusals import (  # noqa: F401
     test_percent_signs_in_the_name_of_an_instance_do_no_harm,
     test_t_next_announces_a_run_that_will_fail,
     test_values_that_do_not_go_together_are_refused,
+    test_whatever_is_right_within_rounding_is_taken_wherever_zero_lies,
 )
 
 fmus, worker, _workers = fmi3_hosts.FIXTURES
@@ -42,6 +44,8 @@ STEPS = {
     "from the past": (0.5, 0.1),
     "from the future": (1.5, 0.1),
     "from nowhere": (nan, 0.1),
+    "from a little too late": (1.0 + 3e-7, 0.1),
+    "from a little too early": (1.0 - 3e-7, 0.1),
 }
 
 

@@ -134,6 +134,9 @@ STEPS = {
     "from the future": (1.5, 0.1),
     "from nowhere": (nan, 0.1),
     "past the stop": (1.0, 3.2),
+    "past the stop by a little": (1.0, 3.0 + 3e-5),
+    "from a little too late": (1.0 + 3e-7, 0.1),
+    "from a little too early": (1.0 - 3e-7, 0.1),
 }
 
 
@@ -143,6 +146,62 @@ def test_a_step_that_cannot_be_taken_is_refused(launch, name, step):
     fmu = launch(name, stop=4.0)
     fmu.step(0.0, 1.0)
     refuses(fmu, name, *step, "step", *(repr(part) for part in step), "1.0 s", "4.0 s")
+
+
+ARITHMETICS = {  # of hosts: what they take for the time of the n-th step, and for its size
+    "products": lambda start, h: lambda n: (start + n * h, h),
+    "quotients": lambda start, h: lambda n: (start + n / (1.0 / h), h),
+    "differences": lambda start, h: lambda n: (start + n * h, start + (n + 1) * h - (start + n * h)),
+    "an even grid": lambda start, h: lambda n: (start + n * ((start + 1000 * h - start) / 1000), h),
+    "ticks": lambda start, h: lambda n: ((round(start * 1e12) + n * round(h * 1e12)) * 1e-12, round(h * 1e12) / 1e12),
+}
+
+
+@pytest.mark.parametrize("start", [-2.0, -0.3, 0.0, 1.0, 1e6])
+@pytest.mark.parametrize("arithmetic", ARITHMETICS.values(), ids=ARITHMETICS)
+def test_whatever_is_right_within_rounding_is_taken_wherever_zero_lies(launch, arithmetic, start):
+    """Near t = 0 times carry the rounding of the start; sizes down to 1e-10 s, around the start, 0 and 1e-5."""
+    for h in (0.1, 1e-3, 7e-6, 1e-10):
+        if h < 1e-12 * abs(start):
+            continue
+        step = arithmetic(start, h)
+        for place in {start, 0.0, 1e-5} if start <= 0.0 else {start}:
+            first = max(0, round((place - start) / h) - 5)
+            fmu = launch("smd", start=start)
+            if first:
+                fmu.step(start, step(first)[0] - start)
+            for n in range(first, first + 12):
+                fmu.step(*step(n))
+            fmu.free()
+
+
+def test_a_million_steps_that_were_added_up_may_end_at_the_stop(launch):
+    """They end 7.9e-12 beyond it, eight millionths of a step."""
+    t, h = 0.0, 1e-6
+    for _ in range(999_999):
+        t += h
+    fmu = launch("smd", stop=1.0)
+    fmu.step(0.0, t)
+    assert t + h > 1.0
+    fmu.step(t, h)
+    assert fmu.get("x") == launch("smd", stop=1.0).run([0.0, 1.0], ["x"])[1][0]
+
+
+@pytest.mark.parametrize("late", [3e-6, -3e-6])
+def test_a_step_that_begins_elsewhere_is_refused_also_at_zero(launch, late):
+    fmu = launch("smd", start=-2.0)
+    fmu.step(-2.0, 2.0)
+    refuses(fmu, "smd", late * 0.01, 0.01, "t = 0.0 s")
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1.0, 2.0, nan, inf])
+def test_a_tolerance_that_is_none_is_overlooked(launch, tolerance):
+    """As the solver shows, whose error would be as large as the motion."""
+    names, times = ["x", "solver.steps"], [0.0, 1.0, 2.0]
+    expected = launch("smd", {"solver.method": ODE23}, stop=2.0).run(times, names)
+    fmu = launch("smd", {"solver.method": ODE23}, stop=2.0, tolerance=tolerance)
+    identical(fmu.run(times, names), expected, names)
+    assert launch("smd", {"solver.method": ODE23}, stop=2.0, tolerance=0.9).run(times, names) != expected
 
 
 def test_a_stop_before_the_start_and_a_start_at_no_time_are_refused(launch):

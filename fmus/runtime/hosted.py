@@ -127,7 +127,7 @@ class Hosted:
             march = model.solver
             step = march.step
             beside = (1.0 - 1e-14) * step.t1 <= end <= (1.0 + 1e-14) * step.t1
-            if beside or not 0.0 <= current_time == march.t < end < step.t_end:  # else there is nothing to judge
+            if beside or not 0.0 <= self.start_time <= current_time == march.t < end < step.t_end:
                 end = self.judged(current_time, step_size)
             start = march.t
             if end > start:
@@ -162,11 +162,12 @@ class Hosted:
         step = march.step
         now, stop = march.t, step.t_end
         end = current_time + step_size
-        if fabs(end - step.t1) <= 1e-15 * fabs(end) < inf:
+        size = max(fabs(self.start_time), fabs(now), fabs(end))  # a time near 0 carries the rounding of the start
+        if fabs(end - step.t1) <= 1e-15 * size < inf:
             end = step.t1  # the end of an internal step, but for the rounding of the sum
-        elif stop < end < inf and end <= stop + 1e-9 * step_size + 1e-12 * fabs(stop):
-            end = stop
-        begins_here = fabs(current_time - now) <= 1e-6 * step_size + 1e-12 * fabs(now)
+        elif stop < end < inf and end <= stop + 1e-6 * step_size + 1e-11 * size:
+            end = stop  # a million steps that were added up end as far beyond it
+        begins_here = fabs(current_time - now) <= 1e-6 * step_size + 4e-15 * size
         if not (step_size > 0.0 and begins_here and now <= end <= stop and end < inf):
             self.fail(
                 f"a communication step of {step_size!r} s from t = {current_time!r} s is refused: it must be above "
