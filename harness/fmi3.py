@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import fmpy
@@ -19,6 +18,7 @@ import numpy as np
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from .errors import HarnessError, reason
+from .unpacked import unpacked
 
 EXCHANGE, COSIMULATION = "ModelExchange", "CoSimulation"
 COUNT = "solver.evaluations"  # of the FMU's own solver
@@ -117,15 +117,14 @@ def instance(file: Path, way: str) -> Iterator[Instance]:
     os.environ |= dict.fromkeys(QUIET, os.devnull)
     spoken = io.StringIO()
     try:
-        with redirect_stderr(spoken), TemporaryDirectory(prefix="fmu-") as folder:
+        with redirect_stderr(spoken), unpacked(file) as folder:
             description = fmpy.read_model_description(file)
-            fmpy.extract(file, folder)
             fmu = (Counted if way == EXCHANGE else FMU3Slave)(
-                guid=description.guid, unzipDirectory=folder, modelIdentifier=file.stem, instanceName=file.stem
+                guid=description.guid, unzipDirectory=str(folder), modelIdentifier=file.stem, instanceName=file.stem
             )
             fmu.instantiate(logMessage=lambda *message: None)  # the FMU says it on standard error as well
             try:
-                yield Instance(way, fmu, description, folder)
+                yield Instance(way, fmu, description, str(folder))
             finally:
                 fmu.freeInstance()
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers

@@ -7,11 +7,10 @@ ends, so following it shows every step and event through the standard interface 
 import io
 from array import array
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, redirect_stderr
+from contextlib import ExitStack, contextmanager, redirect_stderr
 from ctypes import byref, c_double, c_int, c_uint, c_void_p
 from dataclasses import dataclass, field
 from functools import cache
-from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
 
@@ -24,6 +23,7 @@ from .errors import HarnessError, SceneError, reason
 from .run import Cost, Events, Run, Steps
 from .scene import Scene
 from .settings import check_fmu, labels, settings
+from .unpacked import unpacked
 
 Report = Callable[[float], None]  # told how far the run is, as a share of it
 
@@ -91,13 +91,13 @@ def described(scene: Scene) -> Any:
 @contextmanager
 def instance(scene: Scene, functions: fmi2.fmi2CallbackFunctions) -> Iterator[tuple[Any, Any]]:
     """The description and a fresh instance of the FMU; its files and its library are gone afterwards."""
-    with TemporaryDirectory(prefix="fmu-") as folder:
+    with ExitStack() as files:
         description = described(scene)
         with loading(scene):
-            fmpy.extract(scene.fmu, folder)
+            folder = files.enter_context(unpacked(scene.fmu))
             fmu = fmi2.FMU2Slave(
                 guid=description.guid,
-                unzipDirectory=folder,
+                unzipDirectory=str(folder),
                 modelIdentifier=description.coSimulation.modelIdentifier,
                 instanceName=scene.name,
             )

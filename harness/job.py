@@ -12,6 +12,7 @@ from typing import Any
 
 from .errors import HarnessError, SceneError, unknown
 from .folder import replacing
+from .interrupt import check
 from .quantity import Quantity
 from .run import Run
 from .scene import Scene, check_built, load, shipped
@@ -93,4 +94,5 @@ def main_job(names: Iterable[str], out: Path, report: Callable[[str, float], Non
         try:
             yield perform(load(name), out, partial(report, name))
         except HarnessError as error:
+            check()  # an FMU in Python may have swallowed the interrupt that made it fail
             yield Outcome(name, None, None, (), str(error))

@@ -1,10 +1,13 @@
 """What the commands share at the terminal: options, the progress bar, numbers as JSON."""
 
 import json
+import os
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
+from io import TextIOWrapper
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -12,6 +15,9 @@ from typing import Any
 import click
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from .interrupt import check
+from .unpacked import temporary
 
 OUT = click.option(
     "--out",
@@ -22,6 +28,18 @@ OUT = click.option(
 )
 QUIET = click.option("--quiet", is_flag=True, help="Print errors only.")
 JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
+
+
+def prepare() -> None:
+    """Let standard output take every letter, a closed stream take everything, and temporary files lie where every
+    library finds them."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - as long as the process
+        elif isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    tempfile.tempdir = os.environ["TMPDIR"] = str(temporary())
 
 
 @contextmanager
@@ -35,6 +53,7 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
         done: list[str] = []
 
         def report(name: str, share: float) -> None:
+            check()
             if name not in done:
                 done.append(name)
             bar.update(task, description=name, completed=len(done) - 1 + share)
@@ -43,8 +62,9 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
 
 
 def as_text(result: Any) -> str:
-    """A result of dataclasses, dicts, lists, texts and numbers as JSON; what is not finite is null there."""
-    return json.dumps(finite(result), indent=1, ensure_ascii=False, allow_nan=False)
+    """A result of dataclasses, dicts, lists, texts and numbers as JSON in ASCII, which every terminal and file takes;
+    what is not finite is null there."""
+    return json.dumps(finite(result), indent=1, allow_nan=False)
 
 
 def finite(result: Any) -> Any:

@@ -3,20 +3,22 @@ both on the spot."""
 
 import atexit
 import os
-import subprocess
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory, mkdtemp
 from xml.etree import ElementTree
-from zipfile import ZipFile
 
 import numpy as np
 
+from ..child import ask
 from ..errors import HarnessError
 from ..importers.by_c import COMPILER, EMBEDDED, HEADERS
+from ..unpacked import in_python, room, unpacked
 
 HERE = Path(__file__).parent
+HELD = ExitStack()  # folders that last as long as the process
+atexit.register(HELD.close)
 
 
 class NotHereError(HarnessError):
@@ -50,7 +52,7 @@ def runs(
     words += [str(library.references[name]) for name in read]
     numbers = [str(repeat), repr(stop), str(steps)]
     command = [str(host()), str(library.file), library.guid, library.resources, *numbers, *words]
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **library.loaded})
+    done = ask(command, environment={**os.environ, **library.loaded})
     if done.returncode:
         raise HarnessError((done.stderr.splitlines() or [f"{library.file.name} ends the host in C"])[0])
     seconds, *rows = done.stdout.splitlines()
@@ -59,12 +61,12 @@ def runs(
 
 def built(fmu: Path) -> Library:
     """That of a built FMU for Linux; with one in Python its interpreter is loaded too."""
-    folder = unpacked(fmu)
+    folder = files(fmu)
     libraries = list((folder / "binaries" / "linux64").glob("*.so"))
     if len(libraries) != 1:
         raise NotHereError(f"not built: {fmu.name} for linux64")
     loaded = {}
-    if (folder / "resources" / "slavemodule.txt").is_file():
+    if in_python(folder):
         if not EMBEDDED.is_file():
             raise NotHereError("not installed: Python as a shared library")
         loaded["LD_PRELOAD"] = str(EMBEDDED)
@@ -78,7 +80,7 @@ def cvode(model: str) -> Library:
     """That of the CVODE FMU, compiled for a model."""
     needed = "#include <cvode/cvode.h>\n"
     looking = [compiler(), "-E", "-x", "c", "-", "-o", os.devnull]
-    if subprocess.run(looking, input=needed, text=True, capture_output=True).returncode:
+    if ask(looking, needed).returncode:
         raise NotHereError("not installed: SUNDIALS for C (on Debian libsundials-dev)")
     options = (f"-DMODEL={model.upper()}", "-shared", "-fPIC")
     file = compiled("cvode.c", f"{model}-cvode.so", options, ("-lsundials_cvode", "-lsundials_nvecserial", "-lm"))
@@ -93,9 +95,9 @@ def host() -> Path:
 
 def compiled(source: str, name: str, options: tuple[str, ...], libraries: tuple[str, ...]) -> Path:
     """A program or a library from one source."""
-    file = room() / name
+    file = programs() / name
     command = [compiler(), "-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", *options, "-I", str(HEADERS)]
-    done = subprocess.run([*command, str(HERE / source), "-o", str(file), *libraries], capture_output=True, text=True)
+    done = ask([*command, str(HERE / source), "-o", str(file), *libraries])
     if done.returncode:
         lines = [line for line in done.stderr.splitlines() if "error" in line] or [f"{command[0]} gives no reason"]
         raise NotHereError(f"{source} does not compile here: {lines[0]}")
@@ -110,17 +112,12 @@ def compiler() -> str:
 
 
 @cache
-def unpacked(fmu: Path) -> Path:
-    """The folder of an extracted FMU."""
-    folder = Path(mkdtemp(dir=room()))
-    with ZipFile(fmu) as archive:
-        archive.extractall(folder)
-    return folder
+def files(fmu: Path) -> Path:
+    """The folder of an unpacked FMU."""
+    return HELD.enter_context(unpacked(fmu))
 
 
 @cache
-def room() -> Path:
-    """A folder that lasts as long as the process."""
-    folder = TemporaryDirectory(prefix="bench-")
-    atexit.register(folder.cleanup)
-    return Path(folder.name)
+def programs() -> Path:
+    """The folder of what was compiled."""
+    return HELD.enter_context(room("bench-"))

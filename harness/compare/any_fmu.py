@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import HarnessError, SceneError, reason, unknown
 from ..scene import Scene
 from ..settings import NEEDED
+from ..unpacked import unpacked
 from .trajectory import POINTS, Trajectory
 
 COARSEST = 64  # communication steps of the first run
@@ -63,27 +64,33 @@ def run(
     end = float(experiment.stopTime) if stop is None else stop
     if not end > start:
         raise SceneError(f"stop = {end!r} s is not after start = {start!r} s")
-    steps, before, difference = COARSEST, None, np.inf
-    while steps <= FINEST:
-        now = once(path, start, end, steps, outputs, values)
-        if before is not None:
-            difference = apart(before, now, outputs, steps // COARSEST)
-            if difference <= tolerance:
-                units = {name: unit(variables[name]) for name in outputs}
-                columns = {name: now[name].astype(float) for name in outputs}
-                h = (end - start) / steps
-                note = f"communication step {h:.4g} s; half of it changes no output by more than {difference:.2g}"
-                return Trajectory(path.stem, now["time"], columns, units, None, note)
-        before, steps = now, 2 * steps
-        report(np.log2(steps / COARSEST) / np.log2(FINEST / COARSEST))
+    with unpacked(path) as folder:
+        steps, before, difference = COARSEST, None, np.inf
+        while steps <= FINEST:
+            now = once(path, folder, start, end, steps, outputs, values)
+            if before is not None:
+                difference = apart(before, now, outputs, steps // COARSEST)
+                if difference <= tolerance:
+                    units = {name: unit(variables[name]) for name in outputs}
+                    columns = {name: now[name].astype(float) for name in outputs}
+                    h = (end - start) / steps
+                    note = f"communication step {h:.4g} s; half of it changes no output by more than {difference:.2g}"
+                    return Trajectory(path.stem, now["time"], columns, units, None, note)
+            before, steps = now, 2 * steps
+            report(np.log2(steps / COARSEST) / np.log2(FINEST / COARSEST))
     raise HarnessError(
         f"{path.name}: with {steps // 2} communication steps the last halving still changes an output by "
         f"{difference:.2g} of its largest value, more than the tolerance of {tolerance:g}; raise --tolerance"
     )
 
 
-def once(path: Path, start: float, stop: float, steps: int, outputs: list[str], values: dict[str, Any]) -> np.ndarray:
-    """The recorded outputs, a structured array (steps + 1,), of one run; HarnessError with the FMU's own words."""
+def once(
+    path: Path, folder: Path, start: float, stop: float, steps: int, outputs: list[str], values: dict[str, Any]
+) -> np.ndarray:
+    """The recorded outputs, a structured array (steps + 1,), of one run of the FMU that is unpacked in a folder.
+
+    HarnessError with the FMU's own words if it fails.
+    """
     said: list[str] = []
 
     def keep(component: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
@@ -92,7 +99,7 @@ def once(path: Path, start: float, stop: float, steps: int, outputs: list[str], 
     h = (stop - start) / steps
     try:
         rows = fmpy.simulate_fmu(
-            str(path),
+            str(folder),
             start_time=start,
             stop_time=stop,
             output_interval=h,

@@ -1,19 +1,21 @@
 """A coupled scene from its file to its archive, its runs and their error against the communication step."""
 
 import json
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from shutil import copy
 
 import numpy as np
 
+from ..child import ask
 from ..compare.any_fmu import description
 from ..errors import HarnessError
 from ..folder import replacing
 from ..run import write as write_csv
 from ..scene import fmu_of
+from ..unpacked import room
 from .monolith import bodies, solve
 from .scene import MODELS, Coupled, load
 
@@ -58,9 +60,10 @@ def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[St
             raise HarnessError(f"scene {scene.name}: part {part.name} ({part.model}) has no parameter {unknown[0]}")
     files = (f"{scene.name}.ssp", "trajectory.csv", "error.csv", "figure.png")
     folder = out / FOLDER / scene.name
-    with replacing(folder, files) as fresh:
-        archive.write(scene, fresh / files[0])
-        found = study(scene, fresh / files[0], defaults, report)
+    with replacing(folder, files) as fresh, room("ssp-") as plain:
+        archive.write(scene, plain / files[0])
+        copy(plain / files[0], fresh)
+        found = study(scene, plain / files[0], defaults, report)
         names = [f"{part.name}.x" for part in scene.parts]
         heads = [f"{name} [m]" for name in (*names, *(f"{name} reference" for name in names))]
         write_csv(fresh / "trajectory.csv", ["t [s]", *heads], [found.time, *found.x.T, *found.truth.T])
@@ -99,7 +102,7 @@ def ecos(archive: Path, step: float, count: int, read: list[str]) -> list[list[f
     """The rows that Ecos gives; HarnessError with its last words if it gives none."""
     request = json.dumps({"archive": str(archive), "step": step, "count": count, "read": read})
     command = [sys.executable, "-m", f"{__package__}.ecos"]
-    done = subprocess.run(command, input=request, capture_output=True, text=True, timeout=PATIENCE)
+    done = ask(command, request, patience=PATIENCE)
     if done.returncode or not done.stdout:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
         hint = f"; {EXTRA}" if "ModuleNotFoundError" in last else ""

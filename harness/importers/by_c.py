@@ -6,12 +6,11 @@ import shutil
 import subprocess
 import sysconfig
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
-from zipfile import ZipFile
 
 import fmpy
 
+from ..unpacked import in_python, room, unpacked
 from .request import Answer, Request, serve
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
@@ -72,20 +71,17 @@ def told(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
 
 def host(fmu: str, calls: list[str]) -> list[str]:
     """What the C program prints when it plays the calls on the FMU; its log goes to standard error."""
-    with TemporaryDirectory(prefix="host-") as folder:
-        program = Path(folder, "host")
+    with room("host-") as folder, unpacked(Path(fmu)) as files:
+        program = folder / "host"
         source = Path(__file__).with_name("host.c")
         options = ["-std=c99", "-Wall", "-Werror", "-I", str(HEADERS)]
         subprocess.run([COMPILER or "cc", *options, str(source), "-o", str(program), "-ldl"], check=True)
-        unpacked = Path(folder, "fmu")
-        with ZipFile(fmu) as archive:
-            archive.extractall(unpacked)
-        root = ElementTree.parse(unpacked / "modelDescription.xml").getroot()
-        (library,) = (unpacked / "binaries" / "linux64").glob("*.so")
+        root = ElementTree.parse(files / "modelDescription.xml").getroot()
+        (library,) = (files / "binaries" / "linux64").glob("*.so")
         environment = dict(os.environ)
-        if (unpacked / "resources" / "slavemodule.txt").is_file():  # an FMU in Python
+        if in_python(files):
             environment["LD_PRELOAD"] = str(EMBEDDED)
-        command = [str(program), str(library), root.attrib["guid"], (unpacked / "resources").as_uri()]
+        command = [str(program), str(library), root.attrib["guid"], (files / "resources").as_uri()]
         text = "".join(f"{call}\n" for call in calls)
         done = subprocess.run(command, input=text, stdout=subprocess.PIPE, text=True, env=environment, check=True)
         return done.stdout.splitlines()

@@ -2,6 +2,7 @@
 
 import ctypes
 import sys
+from pathlib import Path
 from typing import Any
 
 import fmpy
@@ -9,11 +10,18 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 
+from ..unpacked import unpacked
 from .request import Answer, Request, serve
 
 
 def play(request: Request) -> Answer:
-    folder, description = fmpy.extract(request.fmu), fmpy.read_model_description(request.fmu)
+    with unpacked(Path(request.fmu)) as folder:
+        return played(request, str(folder))
+
+
+def played(request: Request, folder: str) -> Answer:
+    """The answer, from the FMU's files in a folder."""
+    description = fmpy.read_model_description(request.fmu)
     callbacks = logging()
     instances = []
     for name in request.instances:

@@ -6,7 +6,6 @@ its own way, and a change in mid-run that comes an instant later makes other int
 
 import json
 import os
-import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -17,6 +16,7 @@ from pathlib import Path
 
 import fmpy
 
+from ..child import Hangs, ask
 from ..errors import HarnessError
 from .request import Answer, Request
 
@@ -85,18 +85,9 @@ def play(importer: Importer, request: Request) -> Played:
 def asked(player: str, request: str) -> Played:
     """The same, asked once."""
     command = [sys.executable, "-m", f"{__package__}.{player}"]
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
     try:
-        done = subprocess.run(
-            command,
-            input=request,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=PATIENCE,
-            env=environment,
-        )
-    except subprocess.TimeoutExpired:
+        done = ask(command, request, os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}, PATIENCE)
+    except Hangs:
         raise Wrong(f"hangs for {PATIENCE} s") from None
     if done.returncode:
         last = done.stderr.strip().splitlines()[-1:] or ["nothing said"]

@@ -4,14 +4,13 @@ import sys
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from time import perf_counter
 from typing import Any
-from zipfile import ZipFile
 
 import numpy as np
 
 from ..errors import HarnessError
+from ..unpacked import LAYER, unpacked
 from .answer import Answer
 
 OK = 0  # status of the march
@@ -19,10 +18,9 @@ OK = 0  # status of the march
 
 def embedded(fmu: Path) -> type:
     """The model class inside an FMU; its package bears a name of its own, so that several live side by side."""
-    with TemporaryDirectory(prefix="fmu-") as folder, ZipFile(fmu) as archive:
-        archive.extractall(folder, [name for name in archive.namelist() if name.startswith("resources/")])
-        resources = Path(folder) / "resources"
-        package = (resources / "slavemodule.txt").read_text(encoding="utf-8").removesuffix("_fmu")
+    with unpacked(fmu) as folder:
+        resources = folder / "resources"
+        package = (resources / LAYER).read_text(encoding="utf-8").removesuffix("_fmu")
         sys.path.insert(0, str(resources))
         try:
             return import_module(package).Model

@@ -1,12 +1,18 @@
 """A function in a process of its own, with a time limit: a hang or a crash there is a sentence here."""
 
 import multiprocessing
+import tempfile
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from signal import SIG_IGN, SIGINT, signal
 from threading import Lock
+from time import monotonic
 from typing import Any
 
+from ..child import OFTEN
 from ..errors import HarnessError
+from ..interrupt import check
+from ..unpacked import room
 
 METHODS = multiprocessing.get_all_start_methods()
 ALONE = Lock()  # a start looks after all processes there are, and may take the exit code of one that is waited for
@@ -22,20 +28,24 @@ def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
 
     The function, which may not return None, must be known to pickle by name; any other exception of its comes through.
     """
-    here, there = CONTEXT.Pipe(duplex=False)
-    process = CONTEXT.Process(target=work, args=(there, function, arguments), daemon=True)
-    with ALONE:
-        process.start()
-    there.close()
-    try:
-        result = here.recv() if here.poll(limit) else HarnessError(f"no answer after {limit:g} s")
-    except EOFError:
-        result = None
-    finally:
-        here.close()
+    late = monotonic() + limit
+    with room("bounded-") as folder:
+        here, there = CONTEXT.Pipe(duplex=False)
+        process = CONTEXT.Process(target=work, args=(there, str(folder), function, arguments), daemon=True)
         with ALONE:
-            process.kill()
-            process.join()
+            process.start()
+        there.close()
+        try:
+            while not (known := here.poll(OFTEN)) and monotonic() < late:
+                check()
+            result = here.recv() if known else HarnessError(f"no answer after {limit:g} s")
+        except EOFError:
+            result = None
+        finally:
+            here.close()
+            with ALONE:
+                process.kill()
+                process.join()
     if result is None:
         raise HarnessError(f"the process died with exit code {process.exitcode}")
     if isinstance(result, BaseException):
@@ -43,8 +53,10 @@ def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
     return result
 
 
-def work(there: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-    """Send the result, or the exception."""
+def work(there: Connection, folder: str, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    """Send the result, or the exception; temporary files go into a folder that whoever waits for it removes."""
+    signal(SIGINT, SIG_IGN)  # a Ctrl-C is for the process that waits, which ends this one
+    tempfile.tempdir = folder
     try:
         result = function(*arguments)
     except Exception as error:

@@ -11,8 +11,6 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
-from signal import SIG_IGN, SIGINT, signal
-from tempfile import TemporaryDirectory
 from threading import Lock
 from time import perf_counter
 from typing import Any
@@ -20,6 +18,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import HarnessError, reason
+from ..interrupt import Interrupted, deaf_children
+from ..unpacked import room
 from .rerun import Rerun, Row, Runs, ready
 from .space import Axis
 
@@ -31,12 +31,6 @@ HELD = ExitStack()  # what frees them
 # without an address Dask's scheduler would serve its health at port 8787, and warn where that is taken
 UNSEEN = {"dashboard_address": "127.0.0.1:0", "scheduler_kwargs": {"dashboard": False}}
 EXTRA = "python -m pip install 'friction-fmus[sweep]'"
-
-
-class Interrupted(HarnessError):
-    """The user stopped it."""
-
-    status = 130  # as of a shell command that SIGINT ends
 
 
 @dataclass(frozen=True)
@@ -82,6 +76,8 @@ def perform(
                     report(len(kept.rows) / len(sweep.points))
                     seconds = perf_counter() - begun
             except KeyboardInterrupt:
+                if not kept.rows:
+                    forget(sweep, folder)
                 state = f"{len(kept.rows)} of {len(sweep.points)} runs are kept"
                 raise Interrupted(f"interrupted: {state}; the same command does the rest") from None
     return [kept.rows[i] for i in range(len(sweep.points))], before, seconds
@@ -115,8 +111,7 @@ def work(block: list[tuple[int, list[float]]], runs: Runs, fmu: bytes) -> list[t
     with BUSY:
         key = (json.dumps(asdict(runs), sort_keys=True), sha256(fmu).digest())
         if key not in LOADED:
-            folder = HELD.enter_context(TemporaryDirectory(prefix="sweep-"))
-            file = Path(folder) / f"{runs.model}.fmu"
+            file = HELD.enter_context(room("sweep-")) / f"{runs.model}.fmu"
             file.write_bytes(fmu)
             LOADED[key] = HELD.enter_context(ready(runs, file))
         return [(i, LOADED[key].run(point)) for i, point in block]
@@ -139,12 +134,20 @@ def client(scheduler: str | None, workers: int) -> Iterator[Any]:
         raise HarnessError(f"a sweep needs Dask: {EXTRA}") from None
     dask.config.set({"logging.distributed": "error"})
     if scheduler is None:
-        before = signal(SIGINT, SIG_IGN)  # workers inherit it: an interrupt is for this process, which ends them
-        try:
-            cluster = LocalCluster(n_workers=workers, threads_per_worker=1, silence_logs=50, **UNSEEN)
-        finally:
-            signal(SIGINT, before)
-        with cluster, Client(cluster) as local:
+        with ExitStack() as held:
+            folder = str(held.enter_context(room("dask-")))
+            held.enter_context(dask.config.set({"temporary-directory": folder}))
+            with deaf_children():
+                cluster = held.enter_context(
+                    LocalCluster(
+                        n_workers=workers,
+                        threads_per_worker=1,
+                        silence_logs=50,
+                        env={"TMPDIR": folder},
+                        **UNSEEN,
+                    )
+                )
+                local = held.enter_context(Client(cluster))
             yield local
         return
     try:

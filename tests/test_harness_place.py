@@ -1,0 +1,95 @@
+"""The harness runs wherever it is: no letter of a path, and nothing that an FMU lacks, makes it crash."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+from harness import unpacked
+from harness.errors import HarnessError
+from harness.unpacked import plain, room
+
+ROOT = Path(__file__).parent.parent
+ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
+
+
+def harness(folder, *arguments, **environment):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)} | environment
+    command = [sys.executable, "-m", "harness", *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
+
+
+@pytest.fixture
+def odd(tmp_path, fmus):
+    """A user's folder with every letter that has a meaning somewhere in its path, the built FMUs in it."""
+    folder = tmp_path / ODD
+    folder.mkdir()
+    (folder / "fmus").symlink_to(fmus)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("run", "coulomb"),
+        ("run", "--fmu", "fmus/smd.fmu"),
+        ("compare", "fmus/smd.fmu", "fmus/coulomb.fmu"),
+        ("sweep", "smd", "--vary", "m=1:2:2", "--workers", "1"),
+        ("couple", "two-masses"),
+    ],
+)
+def test_any_letter_may_stand_in_the_path_of_temporary_files_of_fmus_and_of_results(odd, command):
+    temporary = odd / "temporary"
+    temporary.mkdir()
+    done = harness(odd, *command, "--out", odd / "out", "--quiet", TMPDIR=str(temporary))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert list(temporary.iterdir()) == []
+    assert any((odd / "out").rglob("*.png")) or any((odd / "out").rglob("*.csv"))
+
+
+def test_without_a_plain_folder_an_fmu_in_python_is_refused_and_another_one_runs(odd, fmus, monkeypatch):
+    monkeypatch.setattr(unpacked, "SHARED", ())
+    monkeypatch.setattr(tempfile, "tempdir", str(odd))
+    refused = pytest.raises(HarnessError, match=r"smd\.fmu is an FMU in Python, which cannot be run from .*TMPDIR")
+    with refused, unpacked.unpacked(fmus / "smd.fmu"):
+        pass
+    compiled = without(fmus / "smd.fmu", odd / "c.fmu", lambda name: name.startswith("binaries/"))
+    with unpacked.unpacked(compiled) as folder:
+        assert folder.parent == odd
+    assert sorted(file.name for file in odd.iterdir()) == ["c.fmu", "fmus"]
+
+
+@pytest.mark.parametrize("part", ["resources/", "resources/slavemodule.txt", "_fmu.py"])
+def test_an_fmu_in_python_that_lacks_what_its_library_looks_for_is_refused(fmus, tmp_path, part):
+    broken = without(fmus / "smd.fmu", tmp_path / "broken.fmu", lambda name: part in name)
+    done = harness(tmp_path, "run", "--fmu", broken)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("Error: ")
+    assert "broken.fmu lacks resources/" in done.stderr
+
+
+def test_a_temporary_folder_that_cannot_be_written_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with pytest.raises(HarnessError, match="cannot write into the temporary folder"), room():
+        pass
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"), [("/a b/c-d.e_~", True), ("/a/%20", False), ("/é", False), ("/+", False)]
+)
+def test_a_path_is_plain_whose_uri_escapes_nothing_but_blanks(path, expected):
+    assert plain(Path(path)) is expected
+
+
+def without(fmu, copy, left_out):
+    """A copy of an FMU without some of its files."""
+    with ZipFile(fmu) as whole, ZipFile(copy, "w") as part:
+        for name in whole.namelist():
+            if not left_out(name):
+                part.writestr(name, whole.read(name))
+    return copy
