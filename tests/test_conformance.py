@@ -1,6 +1,7 @@
 """What FMI and physics ask of each FMU beyond what fmpy validates, by walking over all its variables."""
 
 import re
+from contextlib import suppress
 from math import isfinite, isnan
 from xml.etree import ElementTree
 from zipfile import ZipFile
@@ -249,7 +250,8 @@ def test_every_variable_reads_in_every_state(worker, fmus, name):
     assert repr(numbers(fmu, name)) == repr(running)
     fmu.reset()
     assert set(numbers(fmu, name)) == set(declared(name))
-    fmu.begin({next(iter(tunable(name))): float("nan")})
+    with suppress(Refused):  # of the native kind, here already
+        fmu.begin({next(iter(tunable(name))): float("nan")})
     with pytest.raises(Refused):
         fmu.step(0.0, 0.1)
     failed = numbers(fmu, name)

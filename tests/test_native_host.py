@@ -238,4 +238,4 @@ def test_a_step_with_too_many_internal_steps_ends_with_a_sentence():
     ]
     answers, _ = play(fmu, script)
     assert f"more than {MOST_STEPS} internal steps or {MOST_CALLS} right-hand sides within one" in answers[-3]
-    assert answers[-2:] == [DISCARD, "0 nan"]
+    assert answers[-2:] == [ERROR, "0 nan"]

@@ -58,7 +58,7 @@ def ask(importer: Importer, check: str, subject: Subject) -> str:
 def table(found: list[Row]) -> Table:
     """The rows for reading; below them what the words mean, and which tools were not asked."""
     notes = [f"{row.importer} was not asked: {row.reason}" for row in found if row.reason]
-    words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers"
+    words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers, or the tool ends"
     caption = escape("\n".join([words, *notes]))
     shown = Table("importer", "check", *MODELS, box=None, caption=caption, caption_justify="left")
     last = ""

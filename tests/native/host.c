@@ -140,9 +140,10 @@ static void unsupported(Player *player, fmi2Component c)
 static void values(Player *player, fmi2Component c, const char *command, char **words, int count)
 {
     fmi2ValueReference wanted[WORDS];
-    fmi2Real reals[WORDS];
+    fmi2Real reals[WORDS]; /* what a refused call leaves as it was is seen */
     fmi2Integer integers[WORDS];
     fmi2String strings[WORDS];
+    for (int i = 0; i < WORDS; i++) reals[i] = 77.0, integers[i] = 77, strings[i] = "untouched";
     bool get = command[0] == 'g';
     size_t size = get ? (size_t)references(words, count, wanted) : (size_t)references(words, 1, wanted);
     fmi2Status status;

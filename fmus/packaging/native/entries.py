@@ -39,6 +39,15 @@ def report(model):
     model.solver.report(model.events)
 
 
+def holds_together(model):
+    """Whether a run that goes on can be in this state; what is not, may have no end."""
+    march = model.solver
+    step = march.step
+    within = step.t0 <= march.t <= step.t1 <= step.t_end
+    modes = -1 <= march.mode <= 1 and -1 <= step.mode0 <= 1 and -1 <= step.mode1 <= 1
+    return within and modes and step.methods.chosen == march.method
+
+
 # Every entry, with the numbers that it takes.
 ENTRIES: dict = {
     prepare: [],
@@ -49,4 +58,5 @@ ENTRIES: dict = {
     look_ahead: [],
     observe: [],
     report: [],
+    holds_together: [],
 }

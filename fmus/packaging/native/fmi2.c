@@ -1,72 +1,32 @@
 /* FMI 2.0 co-simulation of the model in model.h.
  *
  * Every call does what it does in the Python FMU of the same model (fmus/runtime/hosted.py there), with the same
- * sentences: a value that cannot be used is remembered and told by the next step; a step that fails is discarded, and
- * every calculated Real reads NaN from then on.  On top, calls out of order are refused.
+ * sentences: a value that cannot be used is remembered and told by the next step; a run that cannot begin or go on
+ * answers fmi2Error, and every calculated Real reads NaN from then on.  On top, calls out of order, wrong references
+ * and missing addresses are refused: such a call changes nothing.
  *
  * All that an instance changes is in one struct, and nothing is shared: instances may run side by side in threads.
  */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#define _POSIX_C_SOURCE 200809L /* beside C99: signal masks */
 
 #include "fmi2Functions.h"
 #include "model.h"
-
-/* The phases of an instance, as bits. */
-enum { INSTANTIATED = 1, INITIALISING = 2, RUNNING = 4, TERMINATED = 8 };
-enum { SETTING_UP = INSTANTIATED | INITIALISING, ANY = SETTING_UP | RUNNING | TERMINATED };
-
-typedef enum { NONE, CALCULATED, FIXED, OUT_OF_RANGE } Reason;
-
-/* A value that was set and cannot be used; the earliest is told first. */
-typedef struct {
-    Reason reason;
-    double value;
-    int64_t turn;
-} Refusal;
-
-/* What a saved state holds. */
-typedef struct {
-    int phase;
-    double start_time, stop_time, tolerance;
-    bool changed; /* values were set since the motion was last settled */
-    bool failed;
-    int refusals; /* how many values are refused */
-    int64_t turns;
-    Refusal refused[VARIABLES];
-    Model model;
-} State;
+#include "say.h"
+#include "state.h"
 
 typedef struct {
     State state;
     bool observed; /* the outputs are those of the present point */
-    double last_time;
     bool logging;
     fmi2CallbackFunctions functions;
     char name[];
 } Instance;
 
-/* A state as bytes: whose it is, and what it is. */
-typedef struct {
-    char guid[sizeof MODEL_GUID];
-    State state;
-} Sealed;
-
 /* ---- saying what is wrong */
 
-static void announce(const fmi2CallbackFunctions *functions, const char *instance, bool logging, const Text *text)
+static void say(const Instance *instance, const Text *text)
 {
-    if (logging && functions->logger) {
-        Text format = {0}; /* the message is taken for a printf format */
-        for (const char *c = text->line; *c; c++) {
-            char piece[3] = {*c, *c == '%' ? '%' : '\0', '\0'};
-            add(&format, piece);
-        }
-        functions->logger(functions->componentEnvironment, instance, fmi2Error, "logStatusError", format.line);
-    }
-    fprintf(stderr, "%s (%s): %s\n", MODEL_NAME, instance, text->line);
-    fflush(stderr);
+    announce(&instance->functions, instance->name, instance->logging, text);
 }
 
 /* A mistake of the importer, which leaves the motion as it is. */
@@ -75,7 +35,7 @@ static fmi2Status refuse(const Instance *instance, const char *function, const c
     Text text = {0};
     add(&text, function);
     add(&text, why);
-    announce(&instance->functions, instance->name, instance->logging, &text);
+    say(instance, &text);
     return fmi2Error;
 }
 
@@ -98,37 +58,33 @@ static fmi2Status refuse_order(const Instance *instance, int phases, const char 
     return refuse(instance, function, why.line);
 }
 
+static fmi2Status refuse_reference(const Instance *instance, fmi2ValueReference reference, const char *type)
+{
+    Text text = {0};
+    add(&text, "value reference ");
+    add_integer(&text, reference);
+    add(&text, " is refused: it is not that of a variable of type ");
+    add(&text, type);
+    add(&text, "; the model description of this very FMU has those that are");
+    say(instance, &text);
+    return fmi2Error;
+}
+
 /* The instance, if the call is allowed in its phase. */
 #define ENTER(phases)         \
     Instance *it = component; \
     if (!it || !(it->state.phase & (phases))) return refuse_order(it, (phases), __func__)
 
+/* An address that the call cannot do without. */
+#define NEED(address) \
+    if (!(address)) return refuse(it, __func__, " is refused: an address is missing, " #address " is NULL")
+
 /* ---- values */
-
-static void *place(Model *model, const Variable *variable) { return (char *)model + variable->offset; }
-
-static double value_of(const Model *model, const Variable *variable)
-{
-    const void *value = (const char *)model + variable->offset;
-    return variable->is_real ? *(const double *)value : (double)*(const int64_t *)value;
-}
 
 static void add_value(Text *text, const Variable *variable, double value)
 {
     if (variable->is_real) add_real(text, value);
     else add_integer(text, (int64_t)value);
-}
-
-static bool accepts(const Variable *variable, double value)
-{
-    if (variable->items) {
-        for (const int64_t *item = variable->items; item < variable->end_of_items; item++) {
-            if ((double)*item == value) return true;
-        }
-        return false;
-    }
-    return isfinite(value) && variable->low <= value && value <= variable->high && variable->above < value &&
-           value < variable->below;
 }
 
 static void tell_refusal(const Variable *variable, const Refusal *refusal, Text *text)
@@ -171,7 +127,7 @@ static void fail(Instance *it, const Text *text)
     it->state.failed = true;
     it->observed = false;
     silence(&it->state.model);
-    announce(&it->functions, it->name, it->logging, text);
+    say(it, text);
 }
 
 static void fail_by_status(Instance *it, int64_t status, double start)
@@ -271,26 +227,27 @@ static bool is_one(fmi2ValueReference reference, bool is_real)
     return reference < VARIABLES && variables[reference].is_real == is_real;
 }
 
-static fmi2Status fail_by_reference(Instance *it, fmi2ValueReference reference, const char *type)
+/* Refuse a call unless every reference is that of a variable of the type, and there is room for the values. */
+static fmi2Status check(const Instance *it, bool is_real, const fmi2ValueReference vr[], size_t nvr, const void *value,
+                        const char *function)
 {
-    Text text = {0};
-    add(&text, "value reference ");
-    add_integer(&text, reference);
-    add(&text, " is refused: it is not that of a variable of type ");
-    add(&text, type);
-    add(&text, "; the model description of this very FMU has those that are");
-    fail(it, &text);
-    return fmi2Error;
+    if (nvr && (!vr || !value)) return refuse(it, function, " is refused: an address is missing, vr or value is NULL");
+    for (size_t i = 0; i < nvr; i++) {
+        if (!is_one(vr[i], is_real)) return refuse_reference(it, vr[i], is_real ? "Real" : "Integer");
+    }
+    return fmi2OK;
 }
 
 /* Make the values ready to be read; fmi2Discard after a fault. */
-static fmi2Status ready(Instance *it, bool is_real, const fmi2ValueReference references[], size_t count)
+static fmi2Status ready(Instance *it, bool is_real, const fmi2ValueReference vr[], size_t nvr, const void *value,
+                        const char *function)
 {
     bool reported = false, ahead = false, fault = false;
-    for (size_t i = 0; i < count; i++) {
-        if (!is_one(references[i], is_real)) return fail_by_reference(it, references[i], is_real ? "Real" : "Integer");
-        reported |= variables[references[i]].is_reported;
-        ahead |= references[i] == T_NEXT;
+    if (!vr || !value) return check(it, is_real, vr, nvr, value, function);
+    for (size_t i = 0; i < nvr; i++) {
+        if (!is_one(vr[i], is_real)) return check(it, is_real, vr, nvr, value, function);
+        reported |= variables[vr[i]].is_reported;
+        ahead |= vr[i] == T_NEXT;
     }
     if (!it->observed && !it->state.failed && !bring_up(it)) return fmi2Discard;
     if (reported && it->observed) report(&it->state.model, &fault);
@@ -298,6 +255,9 @@ static fmi2Status ready(Instance *it, bool is_real, const fmi2ValueReference ref
     if (fault) fail_by_fault(it);
     return fault ? fmi2Discard : fmi2OK;
 }
+
+/* As much of a count as an fmi2Integer can hold. */
+static fmi2Integer integer_of(double value) { return value < 2147483647.0 ? (fmi2Integer)value : 2147483647; }
 
 static Reason objection(const State *state, const Variable *variable, double value)
 {
@@ -338,71 +298,75 @@ static bool write_one(Instance *it, fmi2ValueReference reference, double value)
 fmi2Status fmi2GetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
     ENTER(ANY);
-    fmi2Status status = ready(it, true, vr, nvr);
+    fmi2Status status = ready(it, true, vr, nvr, value, __func__);
+    if (status == fmi2Error) return fmi2Error;
     for (size_t i = 0; i < nvr; i++) {
         value[i] = status ? NAN : *(const double *)place(&it->state.model, &variables[vr[i]]);
     }
-    return status == fmi2Error ? fmi2Error : fmi2OK;
+    return fmi2OK;
 }
 
 fmi2Status fmi2GetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2Integer value[])
 {
     ENTER(ANY);
-    fmi2Status status = ready(it, false, vr, nvr);
+    fmi2Status status = ready(it, false, vr, nvr, value, __func__);
+    if (status == fmi2Error) return fmi2Error;
     for (size_t i = 0; i < nvr; i++) {
-        value[i] = status ? 0 : (fmi2Integer)value_of(&it->state.model, &variables[vr[i]]);
+        value[i] = status ? 0 : integer_of(value_of(&it->state.model, &variables[vr[i]]));
     }
-    return status == fmi2Error ? fmi2Error : fmi2OK;
+    return fmi2OK;
 }
 
 fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
 {
     ENTER(SETTING_UP | RUNNING);
-    for (size_t i = 0; i < nvr; i++) {
-        if (!is_one(vr[i], true)) return fail_by_reference(it, vr[i], "Real");
-        if (!write_one(it, vr[i], value[i])) break;
-    }
+    if (check(it, true, vr, nvr, value, __func__)) return fmi2Error;
+    for (size_t i = 0; i < nvr && write_one(it, vr[i], value[i]); i++) continue;
     return fmi2OK;
 }
 
 fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
 {
     ENTER(SETTING_UP | RUNNING);
-    for (size_t i = 0; i < nvr; i++) {
-        if (!is_one(vr[i], false)) return fail_by_reference(it, vr[i], "Integer");
-        if (!write_one(it, vr[i], value[i])) break;
-    }
+    if (check(it, false, vr, nvr, value, __func__)) return fmi2Error;
+    for (size_t i = 0; i < nvr && write_one(it, vr[i], value[i]); i++) continue;
     return fmi2OK;
 }
 
 /* No variable is a Boolean or a String. */
+static fmi2Status refuse_all(const Instance *it, const fmi2ValueReference vr[], size_t nvr, const char *type)
+{
+    if (!nvr) return fmi2OK;
+    NEED(vr);
+    return refuse_reference(it, vr[0], type);
+}
 
 fmi2Status fmi2GetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[])
 {
     ENTER(ANY);
-    for (size_t i = 0; i < nvr; i++) value[i] = fmi2False;
-    return nvr ? fail_by_reference(it, vr[0], "Boolean") : fmi2OK;
+    (void)value;
+    return refuse_all(it, vr, nvr, "Boolean");
 }
 
 fmi2Status fmi2GetString(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
 {
     ENTER(ANY);
-    for (size_t i = 0; i < nvr; i++) value[i] = "";
-    return nvr ? fail_by_reference(it, vr[0], "String") : fmi2OK;
+    (void)value;
+    return refuse_all(it, vr, nvr, "String");
 }
 
 fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])
 {
     ENTER(SETTING_UP | RUNNING);
     (void)value;
-    return nvr ? fail_by_reference(it, vr[0], "Boolean") : fmi2OK;
+    return refuse_all(it, vr, nvr, "Boolean");
 }
 
 fmi2Status fmi2SetString(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
     ENTER(SETTING_UP | RUNNING);
     (void)value;
-    return nvr ? fail_by_reference(it, vr[0], "String") : fmi2OK;
+    return refuse_all(it, vr, nvr, "String");
 }
 
 /* ---- from instantiation to the end */
@@ -419,7 +383,6 @@ static void begin(Instance *it)
     it->state.tolerance = TOLERANCE;
     it->state.model = initial;
     it->observed = false;
-    it->last_time = NAN;
 }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
@@ -428,27 +391,28 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 {
     static const fmi2CallbackFunctions silent = {0};
     const char *name = instanceName ? instanceName : "";
-    Instance *it = NULL;
+    Instance *it = calloc(1, sizeof *it + 4 * strlen(name) + 1);
     Text why = {0};
     (void)fmuResourceLocation, (void)visible;
+    if (!functions) functions = &silent;
+    if (!it) {
+        add(&why, "fmi2Instantiate failed: no memory is left");
+        announce(functions, "", loggingOn, &why);
+        return NULL;
+    }
+    copy_name(it->name, name);
+    it->functions = *functions;
+    it->logging = loggingOn;
+    begin(it);
     if (fmuType != fmi2CoSimulation) {
         add(&why, "fmi2Instantiate is refused: this FMU is for co-simulation only");
     } else if (!fmuGUID || strcmp(fmuGUID, MODEL_GUID)) {
-        add(&why, "fmi2Instantiate is refused: the GUID must be ");
-        add(&why, MODEL_GUID);
-        add(&why, ", that of modelDescription.xml");
-    } else if (!(it = calloc(1, sizeof *it + strlen(name) + 1))) {
-        add(&why, "fmi2Instantiate failed: there is no memory left");
+        add(&why, "fmi2Instantiate is refused: the GUID must be " MODEL_GUID ", that of modelDescription.xml");
     }
-    if (!it) {
-        announce(functions ? functions : &silent, name, loggingOn, &why);
-        return NULL;
-    }
-    memcpy(it->name, name, strlen(name));
-    it->functions = functions ? *functions : silent;
-    it->logging = loggingOn;
-    begin(it);
-    return it;
+    if (!why.length) return it;
+    say(it, &why);
+    free(it);
+    return NULL;
 }
 
 void fmi2FreeInstance(fmi2Component component) { free(component); }
@@ -458,10 +422,11 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, s
                                const fmi2String categories[])
 {
     ENTER(ANY);
+    if (nCategories) NEED(categories);
     it->logging = loggingOn && nCategories == 0;
     for (size_t i = 0; i < nCategories; i++) {
-        bool wanted = !strcmp(categories[i], "logStatusError") || !strcmp(categories[i], "logAll");
-        it->logging |= loggingOn && wanted;
+        const char *category = categories[i] ? categories[i] : "";
+        it->logging |= loggingOn && (!strcmp(category, "logStatusError") || !strcmp(category, "logAll"));
     }
     return fmi2OK;
 }
@@ -485,13 +450,12 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component component)
     return fmi2OK;
 }
 
-/* What is wrong is told here, and the first step is discarded. */
 fmi2Status fmi2ExitInitializationMode(fmi2Component component)
 {
     ENTER(INITIALISING);
-    settle(it);
+    bool good = settle(it) && !it->state.failed;
     it->state.phase = RUNNING;
-    return fmi2OK;
+    return good ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2Terminate(fmi2Component component)
@@ -525,16 +489,18 @@ static void fail_by_step(Instance *it, double t, double h)
     fail(it, &text);
 }
 
-/* One communication step, which must begin at the present point and end by the stop time. */
+/* One communication step, which must begin at the present point and end by the stop time.  An importer's times are sums
+ * at the size of the start, so that near zero they may be off by more than the last place of the time itself. */
 static bool advance_by(Instance *it, double t, double h)
 {
     Model *model = &it->state.model;
     double now = model->solver.t, stop = model->solver.step.t_end, end = t + h;
-    bool fault = false, begins_here = fabs(t - now) <= 1e-6 * h + 1e-12 * fabs(now);
+    double size = greater(greater(fabs(it->state.start_time), fabs(now)), fabs(end));
+    bool fault = false, begins_here = fabs(t - now) <= 1e-6 * h + 4e-15 * size;
     int64_t status;
-    if (fabs(end - model->solver.step.t1) <= 1e-15 * fabs(end) && fabs(end) < INFINITY) {
+    if (fabs(end - model->solver.step.t1) <= 1e-15 * size && fabs(end) < INFINITY) {
         end = model->solver.step.t1; /* the end of an internal step, but for the rounding of the sum */
-    } else if (stop < end && end < INFINITY && end <= stop + 1e-9 * h + 1e-12 * fabs(stop)) {
+    } else if (stop < end && end < INFINITY && end <= stop + 1e-6 * h + 1e-11 * size) {
         end = stop;
     }
     if (!(h > 0.0 && begins_here && now <= end && end <= stop && end < INFINITY)) {
@@ -555,45 +521,60 @@ fmi2Status fmi2DoStep(fmi2Component component, fmi2Real currentCommunicationPoin
     ENTER(RUNNING);
     State *state = &it->state;
     (void)noSetFMUStatePriorToCurrentPoint;
-    it->last_time = currentCommunicationPoint;
-    if (state->failed) return fmi2Discard;
-    if ((state->changed || state->refusals) && !settle(it)) return fmi2Discard;
-    if (!advance_by(it, currentCommunicationPoint, communicationStepSize)) return fmi2Discard;
-    it->last_time = currentCommunicationPoint + communicationStepSize;
-    return fmi2OK;
+    if (state->failed) return fmi2Error;
+    if ((state->changed || state->refusals) && !settle(it)) return fmi2Error;
+    return advance_by(it, currentCommunicationPoint, communicationStepSize) ? fmi2OK : fmi2Error;
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind s, fmi2Real *value)
 {
     ENTER(ANY);
+    NEED(value);
     if (s != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = it->last_time;
+    *value = it->state.phase & SETTING_UP ? NAN : it->state.model.solver.t;
     return fmi2OK;
 }
 
+/* The motion never ends by itself. */
 fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s, fmi2Boolean *value)
 {
     ENTER(ANY);
+    NEED(value);
     if (s != fmi2Terminated) return fmi2Discard;
-    *value = it->state.failed;
+    *value = fmi2False;
     return fmi2OK;
 }
 
 /* ---- state */
 
+static fmi2Status refuse_state(const Instance *it)
+{
+    return refuse(it, "a saved state", " is refused: it is not, to the last bit, one that this very FMU wrote; save a "
+                                       "state anew and pass it on unchanged");
+}
+
+/* Keep a state in memory, in place of an older one if there is one. */
+static fmi2Status keep(const Instance *it, const State *state, fmi2FMUstate *FMUstate, const char *function)
+{
+    if (*FMUstate && !is_ours(*FMUstate)) return refuse_state(it);
+    if (!*FMUstate && !(*FMUstate = malloc(sizeof(Sealed)))) return refuse(it, function, " failed: no memory is left");
+    seal(*FMUstate, state);
+    return fmi2OK;
+}
+
 fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *FMUstate)
 {
     ENTER(ANY);
-    if (!*FMUstate && !(*FMUstate = malloc(sizeof(State)))) return refuse(it, __func__, " failed: no memory is left");
-    memcpy(*FMUstate, &it->state, sizeof(State));
-    return fmi2OK;
+    NEED(FMUstate);
+    return keep(it, &it->state, FMUstate, __func__);
 }
 
 fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate)
 {
     ENTER(ANY);
-    if (!FMUstate) return refuse(it, __func__, " is refused: there is no state");
-    memcpy(&it->state, FMUstate, sizeof(State));
+    const State *state = unsealed(FMUstate);
+    if (!state) return refuse_state(it);
+    memcpy(&it->state, state, sizeof *state);
     it->observed = false;
     return fmi2OK;
 }
@@ -601,17 +582,18 @@ fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate)
 fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *FMUstate)
 {
     ENTER(ANY);
-    if (FMUstate) {
-        free(*FMUstate);
-        *FMUstate = NULL;
-    }
+    if (!FMUstate || !*FMUstate) return fmi2OK;
+    if (!is_ours(*FMUstate)) return refuse_state(it);
+    free(*FMUstate);
+    *FMUstate = NULL;
     return fmi2OK;
 }
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component component, fmi2FMUstate FMUstate, size_t *size)
 {
     ENTER(ANY);
-    (void)FMUstate;
+    NEED(size);
+    if (!is_ours(FMUstate)) return refuse_state(it);
     *size = sizeof(Sealed);
     return fmi2OK;
 }
@@ -620,10 +602,11 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate FMUstate,
                                  size_t size)
 {
     ENTER(ANY);
-    if (!FMUstate || size < sizeof(Sealed)) return refuse(it, __func__, " is refused: no state, or too few bytes");
+    NEED(serializedState);
+    if (!unsealed(FMUstate)) return refuse_state(it);
+    if (size < sizeof(Sealed)) return refuse(it, __func__, " is refused: a state does not fit into so few bytes");
     memset(serializedState, 0, size);
-    memcpy(serializedState + offsetof(Sealed, guid), MODEL_GUID, sizeof MODEL_GUID);
-    memcpy(serializedState + offsetof(Sealed, state), FMUstate, sizeof(State));
+    memcpy(serializedState, FMUstate, sizeof(Sealed));
     return fmi2OK;
 }
 
@@ -631,12 +614,16 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte seria
                                    fmi2FMUstate *FMUstate)
 {
     ENTER(ANY);
-    if (size != sizeof(Sealed) || memcmp(serializedState, MODEL_GUID, sizeof MODEL_GUID)) {
-        return refuse(it, __func__, " is refused: the bytes are not a state of this FMU");
-    }
-    if (!*FMUstate && !(*FMUstate = malloc(sizeof(State)))) return refuse(it, __func__, " failed: no memory is left");
-    memcpy(*FMUstate, serializedState + offsetof(Sealed, state), sizeof(State));
-    return fmi2OK;
+    NEED(serializedState);
+    NEED(FMUstate);
+    if (size != sizeof(Sealed)) return refuse_state(it);
+    Sealed *sealed = malloc(sizeof *sealed); /* for bytes may lie where a state cannot */
+    if (!sealed) return refuse(it, __func__, " failed: no memory is left");
+    memcpy(sealed, serializedState, size);
+    const State *state = unsealed(sealed);
+    fmi2Status status = state ? keep(it, state, FMUstate, __func__) : refuse_state(it);
+    free(sealed);
+    return status;
 }
 
 /* ---- what this FMU does not offer, as its description says */

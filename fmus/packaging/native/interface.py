@@ -9,7 +9,7 @@ from ...runtime.hosted import CALCULATED, SENTENCES
 from ...runtime.step import DIVERGED, OK
 from ..description import declared_by
 from .entries import ENTRIES
-from .kinds import FLOAT, Kind, literal
+from .kinds import BOOL, FLOAT, INT, Kind, literal
 from .program import Program
 
 HEADER = """\
@@ -40,6 +40,11 @@ enum {{ VARIABLES = {count}, T_NEXT = {ahead} }};
 
 static const Variable variables[VARIABLES] = {{
 {table}}};
+
+enum {{ MEMBERS = {count_of_members} }};
+
+static const Member members[MEMBERS] = {{
+{members}}};
 
 /* Why the motion ended at t, in a communication step from start on. */
 static void tell_failure(int64_t status, double t, double start, Text *text)
@@ -73,6 +78,7 @@ def header(model: type[Declaring]) -> str:
     fields: dict[str, tuple[Kind, str]] = {
         name: (kind, f"self->{name}") for name, kind in program.layout.fields[model].items()
     }
+    members = [(path, kind) for path, kind in program.layout.scalars(model) if kind in (INT, BOOL)]
     rules = dict(enumerate(thing.rules, 1))
     return HEADER.format(
         sentence=(inspect.getdoc(model) or "").splitlines()[0],
@@ -86,6 +92,8 @@ def header(model: type[Declaring]) -> str:
         items="".join(_items(name, meaning) for name, meaning in declared if meaning.items),
         count=len(names),
         ahead=names.index("solver.t_next"),
+        count_of_members=len(members),
+        members="".join(f"    {{offsetof(Model, {path}), {literal(kind is BOOL)}}},\n" for path, kind in members),
         table="".join(_row(name, meaning) for name, meaning in declared),
         failures=_told("status", SENTENCES, {name: (FLOAT, name) for name in ("t", "start")}),
         rules=_told("rule", rules, fields),

@@ -1,5 +1,7 @@
 """The live model object as C data: a struct for each class of object that it owns, and its initial image."""
 
+from collections.abc import Iterator
+
 from .kinds import FLOAT, WORDS_OF_C, Kind, Object, Row, Scalar, declare, kind_of, literal
 from .refusal import Refused
 
@@ -36,6 +38,14 @@ class Layout:
         if hasattr(value, "__dict__") and not callable(value):
             return self._add(value, path)
         raise Refused(f"{path} is {value!r}; an attribute is a float, int, bool, list of floats or an object.")
+
+    def scalars(self, cls: type, prefix: str = "") -> Iterator[tuple[str, Scalar]]:
+        """Dotted name and kind of every number, but for those in lists, of a class and of what it owns."""
+        for name, kind in self.fields[cls].items():
+            if isinstance(kind, Object):
+                yield from self.scalars(kind.cls, f"{prefix}{name}.")
+            elif isinstance(kind, Scalar):
+                yield prefix + name, kind
 
     def definitions(self) -> str:
         """The structs."""

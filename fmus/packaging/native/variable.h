@@ -17,4 +17,10 @@ typedef struct {
     const char *refusal;                /* what is said behind a value out of range */
 } Variable;
 
+/* A member of the model, or of what it owns, that is an int or a bool of the numerics. */
+typedef struct {
+    size_t offset;
+    bool is_bool; /* otherwise an int64_t */
+} Member;
+
 #endif
