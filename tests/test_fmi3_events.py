@@ -52,6 +52,18 @@ def test_the_sled_breaks_away_slides_and_sticks_again(launch):
     assert fmu.indicators() == pytest.approx([1.0, HOLD - K * (DRIVER * 4.8 - 0.1)])
 
 
+@pytest.mark.parametrize("values", [{}, {"mu_d": 0.9}, {"mu_d": 0.0}, {"g": 0.0}], ids=str)
+def test_no_indicator_is_zero_once_the_event_is_handled(launch, values):
+    """A solver would take it for a root that stays (CVODE: root found at and very near t)."""
+    fmu = launch("stickslip", values)
+    fmu.update()
+    t = 0.0 if values.get("g") == 0.0 else BREAK_AWAY * (1.0 + 1e-12)
+    for t, x, v in ((t, 0.0, 0.0), (t + 0.5, 0.02, -1e-15), (t + 0.6, 0.02, 0.0)):
+        at_event(fmu, t, [x, v, DRIVER * t])
+        fmu.go_on()
+        assert all(indicator > 0.0 for indicator in fmu.indicators())
+
+
 @pytest.mark.parametrize("ulps", range(-9, 10))
 def test_an_event_acts_where_the_indicator_is_no_more_above_zero(launch, ulps):
     """So a solver that stops at the root or a little beyond never stops for nothing.  An event that comes a few units

@@ -281,6 +281,28 @@ def test_a_solver_that_gives_up_on_the_sign_law_leaves_the_fmu_well(worker, fmus
     assert exchange(worker, fmus / "pendulum.fmu", "pendulum")[0]["time"][-1] == 5.0
 
 
+TIES = [
+    ("stickslip", {"mu_d": 0.0}, 32.0),  # the slip ends at the other limit
+    ("stickslip", {"mu_s": 0.6}, 16.0),  # the speed touches zero, here and below
+    ("stickslip", {"mu_s": 0.0, "mu_d": 0.0}, 16.0),
+    ("stickslip", {"g": 0.0}, 16.0),
+    ("coulomb", {"k": 0.0, "f": 0.0, "c": 1.0}, 60.0),  # nothing stops it
+]
+
+
+@pytest.mark.parametrize("rtol", TOLERANCES)
+@pytest.mark.parametrize(("name", "values", "stop"), TIES)
+def test_ties_under_cvode_are_decided_by_physics(worker, fmus, name, values, stop, rtol):
+    start = {"v0": 1.0} if name == "coulomb" else {}
+    given = {"start_values": {**values, **start}, "stop_time": stop, "output_interval": stop / 20}
+    columns, _ = exchange(worker, fmus / f"{name}.fmu", name, relative_tolerance=rtol, **given)
+    truth = Trajectory(
+        [(0.0, getattr(evidence, name)(**values))], 0.1 * (name == "coulomb"), start.get("v0", 0.0), stop
+    )
+    assert columns["events.count"][-1] == len(truth.events)
+    assert columns["x"][-1] == pytest.approx(float(truth.at(stop)[0]), rel=2000.0 * rtol)
+
+
 # ---- failure, as fmpy tells it
 
 

@@ -18,6 +18,7 @@ from .march import NOMINAL
 from .step import NEARLY, STUCK, ULP
 
 BEYOND, LEAST = 4.0 * ULP, 1e-300  # of the limit; of a speed and a force
+TOLERANCE = 1e-4  # taken for the importer's, which nobody tells, where solver.rtol is 0
 
 
 def begin(march):
@@ -83,8 +84,9 @@ def update(model, march):
     stopped = mode != STUCK and march.v != 0.0
     if stopped:
         march.v = 0.0
-    tolerance = march.rtol if march.rtol > 0.0 else model.tolerance
-    march.mode = model.settle(march.t, march.x, march.v, NEARLY * tolerance)
+    tolerance = march.rtol if march.rtol > 0.0 else TOLERANCE
+    if not model.touches(march.t, march.x, mode, 0.0):
+        march.mode = model.settle(march.t, march.x, march.v, NEARLY * tolerance)
     changed = march.mode != mode
     if changed:
         step.before.happened += 1
