@@ -59,6 +59,17 @@ class Instance:
     def get(self, names):
         return self._reader(names)()
 
+    def each(self, values, changes, names):
+        """A row of the values of names with `values` set, and one with each of the changes alone beside them."""
+        self.set(values)
+        read = self._reader(names)
+        rows = [read()]
+        for name, value in changes.items():
+            self.set({name: value})
+            rows.append(read())
+            self.set({name: values[name]})
+        return rows
+
     def _reader(self, names):
         """A function that reads the named variables with one call per type."""
         reals = [i for i, name in enumerate(names) if self.variables[name][1] == "Real"]

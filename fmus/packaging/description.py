@@ -13,6 +13,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 from ..runtime.declare import Declared, Declaring, Output
 from ..runtime.hosted import SETTABLE
 from . import BuildError, __version__
+from .dependencies import at_start
 from .document import document
 from .units import UNITS, unit_of
 
@@ -50,7 +51,7 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     scalars = SubElement(root, "ModelVariables")
     for reference, (variable, meaning) in enumerate(declared):
         scalars.append(_scalar(variable, meaning, reference))
-    _structure(root, [meaning for _, meaning in declared])
+    _structure(root, declared, at_start(model, declared))
     return closed(root, "guid", code, date)
 
 
@@ -169,13 +170,17 @@ def part_of_type(name: str, meaning: Declared) -> dict[str, str]:
     return attributes
 
 
-def _structure(root: Element, meanings: list[Declared]) -> None:
-    """ModelStructure: which outputs follow an input at once; at the start all outputs may depend on everything."""
-    places = [(str(place), meaning) for place, meaning in enumerate(meanings, 1)]
-    inputs = " ".join(place for place, meaning in places if meaning.causality == "input")
+def _structure(root: Element, declared: Variables, followed: dict[str, list[str]]) -> None:
+    """ModelStructure: which outputs follow an input at once, and what each follows from at the start.
+
+    Without the latter an importer must assume that it is everything, and sees loops where there are none.
+    """
+    places = {name: str(place) for place, (name, _) in enumerate(declared, 1)}
+    inputs = " ".join(places[name] for name, meaning in declared if meaning.causality == "input")
     structure = SubElement(root, "ModelStructure")
     outputs, unknowns = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
-    for place, meaning in places:
+    for name, meaning in declared:
         if meaning.causality == "output":
-            SubElement(outputs, "Unknown", index=place, dependencies=inputs if cast(Output, meaning).direct else "")
-            SubElement(unknowns, "Unknown", index=place)
+            at_once, first = inputs if cast(Output, meaning).direct else "", (places[known] for known in followed[name])
+            SubElement(outputs, "Unknown", index=places[name], dependencies=at_once)
+            SubElement(unknowns, "Unknown", index=places[name], dependencies=" ".join(first))

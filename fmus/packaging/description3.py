@@ -8,9 +8,10 @@ from datetime import datetime
 from typing import Any, cast
 from xml.etree.ElementTree import Element, SubElement
 
-from ..runtime.beside import TO_BREAK_AWAY, TO_REST, beside
+from ..runtime.beside import TO_BREAK_AWAY, TO_DRIVER, TO_REST, beside
 from ..runtime.declare import Declaring, Output
 from ..runtime.exchange import nominals
+from .dependencies import at_start
 from .description import (
     Variables,
     add_items,
@@ -94,7 +95,7 @@ def _tell_states(elements: list[Element], model: type[Declaring], rates: dict[in
 
 
 def _structure(root: Element, model: Any, declared: Variables, rates: dict[int, int]) -> None:
-    """ModelStructure: what follows from which states and inputs; at the start all may depend on everything.
+    """ModelStructure: what follows from which states and inputs, and at the start from which parameters.
 
     A state follows from itself.  Of a smooth model some factors are known: one, and those that parameters make.
     """
@@ -110,8 +111,11 @@ def _structure(root: Element, model: Any, declared: Variables, rates: dict[int, 
     _unknown(structure, "ContinuousStateDerivative", to_acceleration, states + inputs, factors)
     for reference in to_driver:
         _unknown(structure, "ContinuousStateDerivative", reference, [])
+    references = {name: reference for reference, (name, _) in enumerate(declared)}
+    followed = at_start(model, declared) | {TO_DRIVER: ["v_driver"]}
     for reference in sorted({*outputs, *rates}):
-        SubElement(structure, "InitialUnknown", valueReference=str(reference))
+        name, _ = declared[reference]
+        _unknown(structure, "InitialUnknown", reference, [references[known] for known in followed[name]])
     at_rest = [state for state in states if state != speed]
     for reference, (name, _) in enumerate(declared):
         if name in (TO_REST, TO_BREAK_AWAY):

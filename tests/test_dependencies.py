@@ -1,0 +1,105 @@
+"""What the model descriptions say of the start: which outputs follow from which parameters and inputs.
+
+The build finds it by trying on the model's class; here built FMUs are tried, in other situations.
+"""
+
+import random
+from math import isfinite
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+import fmi3_hosts
+import pytest
+from models import MODELS, declared, model_class, outputs, push
+
+EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+SITUATIONS = 800
+LADDER = (1e-7, 1e-3, 1.0)  # of what starts at zero, in its unit or in what overcomes friction
+LOADS = (-1.1, -0.9, 0.9, 1.1)  # of a body at rest, in holding limits
+
+
+def structure(fmu):
+    """The element ModelStructure of an FMU."""
+    with ZipFile(fmu) as archive:
+        return ElementTree.fromstring(archive.read("modelDescription.xml")).find("ModelStructure")
+
+
+def followed(unknowns, names):
+    """For each of the unknowns the names that it follows from; FMI 2.0 counts variables from 1."""
+    found = {}
+    for unknown in unknowns:
+        known = {names[int(i) - 1] for i in unknown.get("dependencies").split()}
+        found[names[int(unknown.get("index")) - 1]] = known
+    return found
+
+
+@pytest.fixture
+def at_the_start(fmus):
+    """What the description of a model says."""
+    return lambda name: followed(
+        structure(fmus / f"{name}.fmu").findall("InitialUnknowns/Unknown"), list(declared(name))
+    )
+
+
+def some(name, variable, draw):
+    """An allowed value."""
+    d = declared(name)[variable]
+    if d.items:
+        return draw.choice(d.items)[1]
+    if d.start == 0.0 and draw.random() < 0.5:
+        return 0.0
+    size = push(name)[1] if d.causality == "input" else d.start or 1.0
+    steps = (0.0, 0.5, 1.0, 2.0) if d.start else LADDER
+    return draw.choice([value for step in steps for value in (step * size, -step * size) if d.accepts(value)])
+
+
+def situation(name, known, draw):
+    """A value for each of the known; half of them of a body at rest that is about to break away, or just has."""
+    values = {v: some(name, v, draw) for v in known}
+    model, (x, v, *_), (entry, _) = model_class(name)(), outputs(name), push(name)
+    if model.dry and draw.random() < 0.5:
+        values[f"{v}0"] = 0.0
+        for variable in (each for each in values if "." not in each):
+            setattr(model, variable, values[variable])
+        model.prepare()
+        load, _, limit = model.hold(0.0, values[f"{x}0"])
+        values[entry] += draw.choice(LOADS) * limit - load
+    return values
+
+
+@EVERY_MODEL
+def test_outputs_follow_at_the_start_what_the_dependencies_say_and_nothing_else(worker, fmus, at_the_start, name):
+    """Each known changed on its own: only those follow that are said to, and each of them does in some situation."""
+    draw, told = random.Random(name), at_the_start(name)
+    known = [v for v, d in declared(name).items() if d.causality in ("parameter", "input")]
+    seen = {v: set() for v in told}
+    fmu = worker.instantiate(fmus / f"{name}.fmu")
+    for _ in range(SITUATIONS):
+        values = situation(name, known, draw)
+        before, *rows = fmu.each(values, {v: some(name, v, draw) for v in known}, list(told))
+        for v, after in zip(known, rows, strict=True):
+            if all(map(isfinite, before + after)):  # else values do not go together
+                for output, old, new in zip(told, before, after, strict=True):
+                    seen[output] |= {v} if old != new else set()
+    fmu.free()
+    assert seen == told
+
+
+@EVERY_MODEL
+def test_no_output_follows_the_input_at_the_start_that_does_not_always(fmus, at_the_start, name):
+    """Two FMUs that are coupled by such outputs close no algebraic loop, then or ever."""
+    entry = push(name)[0]
+    always = followed(structure(fmus / f"{name}.fmu").findall("Outputs/Unknown"), list(declared(name)))
+    assert [v for v, known in at_the_start(name).items() if entry in known] == [v for v in always if always[v]]
+
+
+@EVERY_MODEL
+def test_fmi_3_says_the_same_and_of_the_driver_that_it_follows_its_speed(at_the_start, name):
+    """The declared variables have the same places, which FMI 3.0 counts from 0."""
+    names, told = list(declared(name)), {}
+    for unknown in structure(fmi3_hosts.built() / f"{name}.fmu").findall("InitialUnknown"):
+        told[int(unknown.get("valueReference"))] = {names[int(i)] for i in unknown.get("dependencies").split()}
+    expected = {names.index(v): known for v, known in at_the_start(name).items()}
+    beside = {place: known for place, known in told.items() if place not in expected}
+    assert told == expected | beside
+    assert list(beside.values()) == [{"v_driver"}] * model_class(name).driven
