@@ -57,8 +57,8 @@ def test_no_indicator_is_zero_once_the_event_is_handled(launch, values):
     """A solver would take it for a root that stays (CVODE: root found at and very near t)."""
     fmu = launch("stickslip", values)
     fmu.update()
-    t = 0.0 if values.get("g") == 0.0 else BREAK_AWAY * (1.0 + 1e-12)
-    for t, x, v in ((t, 0.0, 0.0), (t + 0.5, 0.02, -1e-15), (t + 0.6, 0.02, 0.0)):
+    begin = 0.0 if values.get("g") == 0.0 else BREAK_AWAY * (1.0 + 1e-12)
+    for t, x, v in ((begin, 0.0, 0.0), (begin + 0.5, 0.02, -1e-15), (begin + 0.6, 0.02, 0.0)):
         at_event(fmu, t, [x, v, DRIVER * t])
         fmu.go_on()
         assert all(indicator > 0.0 for indicator in fmu.indicators())
