@@ -43,14 +43,6 @@ class CoSimulation(worker.Instance):
     def _note(self, environment, status, category, message):
         self._hear(environment, None, status, category, message)
 
-    def ask(self, kind, reference):
-        """Read one variable as a type of FMI 3.0, also one that it is not of."""
-        getattr(self.slave, f"get{kind}")([reference])
-
-    def tell(self, kind, reference, value):
-        """Write one likewise."""
-        getattr(self.slave, f"set{kind}")([reference], [value])
-
 
 class ModelExchange(CoSimulation):
     """An FMI 3.0 instance that a solver of the importer leads."""

@@ -13,16 +13,18 @@ from test_refusals import (  # noqa: F401
     test_a_bad_value_may_be_mended_before_it_is_used,
     test_a_calculated_value_cannot_be_set,
     test_a_motion_out_of_all_range_fails_in_one_sentence_or_stays_finite,
-    test_a_state_that_is_not_of_this_fmu_is_refused_and_the_process_lives,
     test_a_step_that_begins_elsewhere_is_refused_also_at_zero,
     test_a_value_out_of_range_is_refused_by_its_name,
     test_a_value_that_turns_bad_in_mid_run_stops_the_run_and_reset_recovers,
+    test_a_wrong_read_ends_the_call_and_not_the_instance,
+    test_a_wrong_write_is_refused_by_the_next_step,
     test_an_unknown_choice_is_refused_with_those_there_are,
     test_friction_may_turn_bad_in_mid_run_only_as_a_pair,
     test_percent_signs_in_the_name_of_an_instance_do_no_harm,
     test_t_next_announces_a_run_that_will_fail,
     test_values_that_do_not_go_together_are_refused,
     test_whatever_is_right_within_rounding_is_taken_wherever_zero_lies,
+    wrong_calls,
 )
 
 fmus, worker, _workers = fmi3_hosts.FIXTURES
@@ -76,26 +78,12 @@ def test_what_concerns_co_simulation_only_is_not_said_before_the_first_step(laun
     refuses(fmu, "coulomb", 0.0, 0.1, "friction = 2", "exact", "hybrid")
 
 
-WRONG = [
-    (kind, reference, value)
-    for kind, value in {"Float64": 1.0, "Int32": 1, "Int64": 1, "UInt64": 1, "Boolean": True, "String": "1"}.items()
-    for reference in ((18, 10**6) if kind == "Float64" else (0, 10**6))
-]
+WRONG_TYPES = ("Int32", "Int64", "UInt64", "Boolean", "String")
 
 
-@pytest.mark.parametrize("calls", ["ask", "tell"])
-@pytest.mark.parametrize(("kind", "reference", "value"), WRONG)
-def test_a_variable_that_is_not_of_that_type_is_refused_and_the_process_lives(launch, calls, kind, reference, value):
-    """In the sled reference 0 is the mass and 18 the mode.  UInt64, Boolean and String no variable is."""
-    fmu = launch("stickslip")
-    assert list(declared("stickslip"))[18] == "mode"
-    if calls == "ask":
-        fmu.ask(kind, reference)
-    else:
-        fmu.tell(kind, reference, value)
-    refuses(fmu, "stickslip", 0.0, 0.1, f"value reference {reference}", "type")
-    fmu.reset()
-    fmu.begin().step(0.0, 0.1)
+@pytest.fixture(params=wrong_calls(("Float64", *WRONG_TYPES), WRONG_TYPES), ids=str)
+def wrong(request):
+    return request.param
 
 
 # ---- as fmpy tells it

@@ -1,5 +1,6 @@
 """Whatever cannot be used is refused in one sentence, and answers NaN; the process lives on and reset recovers."""
 
+import itertools
 from math import inf, isfinite, isnan, nan, nextafter
 
 import pytest
@@ -243,25 +244,58 @@ def test_a_calculated_value_cannot_be_set(launch):
     refuses(fmu, "smd", 0.0, 0.1, "x", "calculated")
 
 
-ALIEN = {
-    "of another FMU": lambda own: own.replace(b'"origin": "', b'"origin": "100 %s %n '),
-    "of nothing": lambda own: b"{}",
-    "of another kind": lambda own: b"[1, 2]",
-    "cut short": lambda own: own[:50],
-    "not even text": lambda own: b"\xff\x00\xfe",
-}
+WRONG_TYPES = ("Integer", "Boolean", "String")  # for a Real
+EVERY_TYPE = ("Real", *WRONG_TYPES)
+FIRST = {"Boolean": True, "String": "1"}  # a value of a type; 1 of the others
 
 
-@pytest.mark.parametrize("alien", ALIEN.values(), ids=ALIEN)
-def test_a_state_that_is_not_of_this_fmu_is_refused_and_the_process_lives(fresh, fmus, alien):
-    """Percent signs and all: the native layer takes a message for a printf format."""
-    fmu = fresh.instantiate(fmus / "smd.fmu").begin(stop=1.0)
-    text = alien(bytes.fromhex(fmu.serialize(fmu.save())))
-    fmu.restore(fmu.deserialize(text.hex()))
-    refuses(fmu, "smd", 0.0, 0.1, "state", *(["100 %s %n "] if b"%" in text else []))
+def wrong_calls(types, wrong):
+    """Type and reference: no variable at all, or one that is not of the type; in the sled 0 is the mass."""
+    assert next(iter(declared("stickslip"))) == "m"
+    return [(kind, reference) for kind in types for reference in (10**6, 2**31, 2**32 - 1)] + [(k, 0) for k in wrong]
+
+
+@pytest.fixture(params=wrong_calls(EVERY_TYPE, WRONG_TYPES), ids=str)
+def wrong(request):
+    return request.param
+
+
+def test_a_wrong_read_ends_the_call_and_not_the_instance(launch, wrong):
+    """It answers nothing that could be taken for a value, says so once a call, and all else reads and runs on."""
+    kind, reference = wrong
+    times, names = [0.0, 0.1, 0.2, 0.3], list(declared("stickslip"))
+    expected, fmu = launch("stickslip").run(times, names), launch("stickslip")
+    rows = [fmu.get(*names)]
+    for t, ahead in itertools.pairwise(times):
+        value = fmu.ask(kind, reference)
+        assert isnan(value) if kind in ("Real", "Float64") else not value
+        ((status, category, sentence),) = fmu.messages()
+        assert (status, category) == (ERROR, "logStatusError")
+        assert f"value reference {reference} is refused" in sentence
+        assert fmu.worker.complaints().splitlines() == [f"Stickslip (test): {sentence}"]
+        fmu.step(t, ahead - t)
+        rows.append(fmu.get(*names))
+    identical(rows, expected, names)
+
+
+def test_a_wrong_write_is_refused_by_the_next_step(launch, wrong):
+    kind, reference = wrong
+    fmu = launch("stickslip")
+    fmu.step(0.0, 0.1)
+    mass = fmu.get("m")
+    fmu.tell(kind, reference, FIRST.get(kind, 1))
+    assert fmu.get("m") == mass
+    assert all(isnan(value) for value in fmu.get(*REALS["stickslip"]))
+    refuses(fmu, "stickslip", 0.1, 0.1, "value reference", "type")
     fmu.reset()
-    fmu.begin(stop=1.0).step(0.0, 0.5)
-    fmu.free()
+    fmu.begin().step(0.0, 0.1)
+
+
+def test_among_good_references_a_wrong_one_reads_alone_as_nothing(launch):
+    fmu = launch("stickslip")
+    a, nothing, b = fmu.read("Real", [0, 10**6, 1])
+    assert [a, b] == fmu.get(*list(declared("stickslip"))[:2])
+    assert isnan(nothing)
 
 
 def test_percent_signs_in_the_name_of_an_instance_do_no_harm(worker, fmus):

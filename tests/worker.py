@@ -87,6 +87,19 @@ class Instance:
 
         return read
 
+    def read(self, kind, references):
+        """Read variables as those of a type of FMI, also of one that they are not."""
+        values = getattr(self.slave, f"get{kind}")(references)
+        return [value.decode() if isinstance(value, bytes) else value for value in values]
+
+    def ask(self, kind, reference):
+        """The same for one."""
+        return self.read(kind, [reference])[0]
+
+    def tell(self, kind, reference, value):
+        """Write it likewise."""
+        getattr(self.slave, f"set{kind}")([reference], [value])
+
     def setup(self, start, stop, tolerance):
         self.slave.setupExperiment(startTime=start, stopTime=stop, tolerance=tolerance)
 

@@ -5,12 +5,15 @@ Python would abort.  What is wrong is remembered and said in one sentence, in th
 then returns False and every calculated Real reads NaN.
 """
 
-import json
 import sys
+from contextlib import suppress
 from math import fabs, inf, isfinite, nan
+from weakref import WeakSet
 
+from .boundary import guarded, pass_on, pay
 from .declare import variables
 from .march import ENDLESS, MOST_CALLS, MOST_STEPS
+from .state import REFUSED, fits, numbers, sealed, shape, take_over, unsealed
 from .step import DIVERGED, OK, STALLED
 
 SENTENCES = {
@@ -20,15 +23,21 @@ SENTENCES = {
     ENDLESS: f"more than {MOST_STEPS} internal steps or {MOST_CALLS} right-hand sides within one communication step, "
     "from t = {start!r} s on; choose another solver.method, raise solver.rtol or take shorter communication steps",
 }
+INTERRUPTED = "the run was interrupted after t = {t!r} s; reset the FMU to run again"
 
 SETTING_UP, RUNNING = 0, 1
 ERROR = 3  # a status of FMI, in all its versions
 CALCULATED, SETTABLE = ("output", "local"), ("parameter", "input")
 KEPT = ("phase", "start_time", "stop_time", "given_tolerance", "changed", "failure")
+NOWHERE = ""  # among the values that cannot be used: one for a variable that is not there
+MOST_READERS = 64  # an importer that asks for other lists all the time costs time, not memory
 
 
-class NotThere(LookupError):
-    """A value reference that no variable of the kind has."""
+class Foreign(ValueError):
+    """What is not a saved state of this FMU; the layer tells the host what it reads here."""
+
+    def __repr__(self):
+        return REFUSED
 
 
 def hosting(slave, model):
@@ -39,24 +48,28 @@ def hosting(slave, model):
     """
     spare = model()
     about = {"Model": model, "variables": variables(spare), "shape": shape(spare), "__module__": __name__}
-    return type(model.__name__, (slave,), about)
+    about["living"] = WeakSet()
+    made = type(model.__name__, (slave,), about)
+    made.bare = made  # an entry script may derive from it
+    return made
 
 
 def getter(kind, blank):
     """The method that reads variables of a kind; `blank` answers for those that are not there."""
 
+    @guarded
     def get(slave, references):
         try:
             asked, values, counts, ahead = slave.asked[kind]
             if asked != references:
-                asked, values, counts, ahead = slave.reader(kind, references)
+                asked, values, counts, ahead = slave.reader(kind, references, blank)
             if not slave.observed and not slave.failure:
                 slave.observe()
             if counts and slave.observed:
                 slave.recount(ahead)
             return values(slave.model)
         except BaseException as error:  # an exception that left Python would crash the host
-            slave.fail(unforeseen(error, slave.model))
+            slave.rescue(error)
             return [blank for _ in references]
 
     return get
@@ -65,12 +78,17 @@ def getter(kind, blank):
 def setter(kind):
     """The method that writes variables of a kind."""
 
+    @guarded
     def put(slave, references, values):
         try:
-            for reference, value in zip(references, values):
-                slave.write(kind, reference, value)
+            for i, reference in enumerate(references):
+                if slave.is_one(kind, reference):
+                    slave.write(reference, values[i])
+                else:  # and its value is not touched: a text that is not UTF-8 is no object at all
+                    slave.refused.setdefault(NOWHERE, no_variable(kind, reference))
+                    slave.observed = False
         except BaseException as error:  # as above
-            slave.fail(unforeseen(error, slave.model))
+            slave.rescue(error)
 
     return put
 
@@ -81,11 +99,23 @@ class Hosted:
     A base class after this one has `instance_name` and log(sentence, status).
     """
 
-    Model = variables = shape = None  # of the subclass that hosting() makes
+    Model = variables = shape = living = bare = None  # of the subclass that hosting() makes
     kept: tuple[str, ...] = KEPT  # what a state holds beside the model
 
+    @guarded
     def __init__(self, **kwargs):
+        try:
+            self.begin(**kwargs)
+        except Exception:
+            raise
+        except BaseException as error:  # the layer that resets an instance needs the new one
+            self.begin(**kwargs)
+            self.rescue(error)
+
+    def begin(self, **kwargs):
+        """As after instantiation."""
         super().__init__(**kwargs)
+        self.living.add(self)
         self.model = self.Model()
         self.owners = [self.owner(name) for name, _ in self.variables]
         self.readers = {}  # kind and value references -> what reads them; the same by kind, for those last asked for
@@ -111,13 +141,16 @@ class Hosted:
 
     # ---- the run
 
+    @guarded
     def exit_initialization_mode(self):
         try:
             self.settle()
+            self.phase = RUNNING
         except BaseException as error:  # as above
-            self.fail(unforeseen(error, self.model))
-        self.phase = RUNNING
+            self.rescue(error)
+            self.phase = RUNNING
 
+    @guarded
     def do_step(self, current_time, step_size):
         try:
             known = self.observed and self.phase == RUNNING  # nothing was set since the last point was read
@@ -138,7 +171,7 @@ class Hosted:
                     model.observe(march.t, march.x, march.v, march.mode)
             return not self.failure
         except BaseException as error:  # as above
-            return self.fail(unforeseen(error, self.model))
+            return self.rescue(error)
 
     def prepared(self):
         """Whether the run can go on; values that were set are judged first."""
@@ -209,9 +242,22 @@ class Hosted:
         """Say the sentence, and answer NaN from now on."""
         self.failure, self.observed = sentence, False
         self.silence()
-        self.log(sentence, ERROR)
-        if sys.stderr is not None:
-            print(f"{type(self).__name__} ({self.instance_name}): {sentence}", file=sys.stderr, flush=True)
+        self.say(sentence)
+        return False
+
+    def say(self, sentence):
+        """In the log and on standard error."""
+        self.log(printable(sentence), ERROR)
+        announce(f"{type(self).__name__} ({self.instance_name}): {sentence}")
+
+    def rescue(self, error):
+        """Fail by an exception; one that is the host's, as an interrupt, reaches it when the call is over."""
+        with suppress(Exception):
+            if isinstance(error, Exception):
+                self.fail(unforeseen(error, self.model))
+            else:
+                self.fail(INTERRUPTED.format(t=self.model.solver.t))
+                self.passing = pass_on(error, self._get_log_queue()[-1])
         return False
 
     def silence(self):
@@ -222,27 +268,30 @@ class Hosted:
 
     # ---- reading and writing
 
-    def reader(self, kind, references):
+    def reader(self, kind, references, blank):
         """The references, what reads them, whether they tell of the solver, and whether it must look ahead first."""
         key = kind, *references
-        if key not in self.readers:
-            places = [self.place(self.variable(kind, reference)[0]) for reference in references]
-            values = eval(f"lambda model: [{', '.join('model.' + place for place in places)}]")  # no other is as fast
-            solver = any("." in place for place in places)
-            self.readers[key] = list(references), values, solver, "solver.t_next" in places
-        self.asked[kind] = self.readers[key]
-        return self.readers[key]
+        if key in self.readers:
+            self.asked[kind] = self.readers[key]
+            return self.readers[key]
+        there = [self.is_one(kind, reference) for reference in references]
+        places = [self.place(self.variables[r][0]) if is_one else "" for r, is_one in zip(references, there)]
+        terms = ["model." + place if place else "blank" for place in places]
+        values = eval(f"lambda model: [{', '.join(terms)}]", {"blank": blank})  # no other is as fast
+        found = list(references), values, any("." in place for place in places), "solver.t_next" in places
+        if not all(there):
+            self.say(no_variable(kind, references[there.index(False)]))
+            return found
+        if len(self.readers) == MOST_READERS:
+            self.readers.clear()
+        self.asked[kind] = self.readers[key] = found
+        return found
 
-    def variable(self, kind, reference):
-        """Name and declaration of a reference."""
-        if 0 <= reference < len(self.variables):
-            name, declared = self.variables[reference]
-            if kind == ("Real" if declared.type == "Real" else "Integer"):
-                return name, declared
-        raise NotThere(
-            f"value reference {reference} is refused: it is not that of a variable of type {kind}; "
-            "the model description of this very FMU has those that are"
-        )
+    def is_one(self, kind, reference):
+        """Whether a reference is that of a variable of the kind."""
+        if not 0 <= reference < len(self.variables):
+            return False
+        return kind == ("Real" if self.variables[reference][1].type == "Real" else "Integer")
 
     def recount(self, ahead):
         """Bring what is told of solver and events to the present point; `ahead`: also where the next step ends."""
@@ -263,9 +312,9 @@ class Hosted:
         model.observe(march.t, march.x, march.v, march.mode)
         self.observed = True
 
-    def write(self, kind, reference, value):
+    def write(self, reference, value):
         """Take over a value; one that cannot be used is remembered, and told by the next step."""
-        name, declared = self.variable(kind, reference)
+        name, declared = self.variables[reference]
         thing, attribute = self.owners[reference]
         if value == getattr(thing, attribute) and name not in self.refused:
             return
@@ -288,60 +337,131 @@ class Hosted:
 
     # ---- state
 
+    @guarded
     def _get_fmu_state(self):
-        kept = {name: getattr(self, name) for name in self.kept}
-        return kept | {"origin": __name__, "refused": dict(self.refused), "model": numbers(self.model, self.shape)}
-
-    @staticmethod
-    def _fmu_state_from_bytes(state):
-        """The state in the bytes; what cannot be read becomes a state of no FMU, which is refused when it is set."""
         try:
-            return json.loads(state)
-        except ValueError:
+            kept = {name: getattr(self, name) for name in self.kept}
+            return kept | {"origin": __name__, "refused": dict(self.refused), "model": numbers(self.model, self.shape)}
+        except BaseException as error:  # as above
+            self.rescue(error)
             return {}
 
+    @classmethod
+    @guarded
+    def _fmu_state_to_bytes(cls, state):
+        try:
+            return sealed(state)
+        except BaseException:
+            cls.settle_up()
+            raise
+
+    @classmethod
+    @guarded
+    def _fmu_state_from_bytes(cls, content):
+        try:
+            state = unsealed(content)
+            if state is None or not cls.is_own(state, content):
+                announce(f"{cls.__name__}: {REFUSED}")
+                raise Foreign
+            return state
+        except BaseException:
+            cls.settle_up()
+            raise
+
+    @classmethod
+    def settle_up(cls):
+        """Pay for an exception that leaves a method of the class; which instance will be let go is not told."""
+        for slave in cls.living:
+            pay(slave, slave._get_log_queue())
+        pay(cls)
+
+    @classmethod
+    def is_own(cls, state, content):
+        """Whether an instance can be in a state, and would write it so."""
+        spare = cls.bare(instance_name="")
+        cls.living.discard(spare)
+        try:
+            if not fits(dict(state, refused={}), spare._get_fmu_state()):
+                return False
+            spare.be(state)
+            return spare.is_sound() and sealed(spare._get_fmu_state()) == content
+        except (ArithmeticError, LookupError, TypeError, ValueError):
+            return False
+
+    def is_sound(self):
+        """Whether phase, settings and sentences are such as can come about."""
+        names = {NOWHERE, *(name for name, _ in self.variables)}
+        texts = [self.failure, *self.refused.values()]
+        return (
+            self.phase in (SETTING_UP, RUNNING)
+            and 0.0 < self.given_tolerance < 1.0
+            and names.issuperset(self.refused)
+            and all(type(text) is str and text == printable(text) for text in texts)
+            and all(
+                declared.accepts(getattr(thing, name))
+                for (_, declared), (thing, name) in zip(self.variables, self.owners)
+                if declared.causality in SETTABLE or declared.type != "Real"
+            )
+        )
+
+    @guarded
     def _set_fmu_state(self, state):
         try:
-            origin = state.get("origin") if isinstance(state, dict) else None
-            if origin != __name__:
-                self.fail(f"a state of {origin} is refused: it must be of {__name__}; take it from this very FMU")
-                return
-            for name in self.kept:
-                setattr(self, name, state[name])
-            self.refused = dict(state["refused"])
-            take_over(self.model, state["model"])
-            self.observed = False
+            own = type(state) is dict and state.get("origin") == __name__
+            if own:
+                self.be(state)
         except BaseException as error:  # as above
-            self.fail(unforeseen(error, self.model))
-
-
-def shape(thing):
-    """The name of every number of an object with None, and of every object it owns with the shape of that."""
-    return {name: shape(value) if hasattr(value, "__dict__") else None for name, value in vars(thing).items()}
-
-
-def numbers(thing, names):
-    """All numbers of an object and of the objects it owns, as its shape names them: a flat copy that JSON can hold."""
-    kept = {}
-    for name, inner in names.items():
-        value = getattr(thing, name)
-        kept[name] = numbers(value, inner) if inner is not None else list(value) if isinstance(value, list) else value
-    return kept
-
-
-def take_over(thing, state):
-    """Put the numbers back."""
-    for name, value in state.items():
-        if isinstance(value, dict):
-            take_over(getattr(thing, name), value)
+            self.rescue(error)
         else:
-            setattr(thing, name, list(value) if isinstance(value, list) else value)
+            if not own:
+                announce(f"{type(self).__name__} ({self.instance_name}): {REFUSED}")
+                pay(self, self._get_log_queue(), type(self))
+                raise Foreign
+
+    def be(self, state):
+        """Take over a state that has been found good."""
+        for name in self.kept:
+            setattr(self, name, state[name])
+        self.refused = dict(state["refused"])
+        take_over(self.model, self.shape, state["model"])
+        self.observed = False
+        if self.failure:
+            self.silence()
+
+
+def no_variable(kind, reference):
+    """The sentence about a value reference, which the layer hands over as if it had a sign."""
+    return (
+        f"value reference {reference & 0xFFFFFFFF} is refused: it is not that of a variable of type {kind}; "
+        "the model description of this very FMU has those that are"
+    )
+
+
+def printable(text):
+    """A text that can be handed over as UTF-8, and ends where it ends in C."""
+    return text.replace("\0", "").encode("utf-8", "backslashreplace").decode()
+
+
+def announce(line):
+    """On standard error, whatever has become of it.
+
+    Past its buffer, where there is one: what cannot be written would wait there, and Python end with status 120.
+    """
+    with suppress(Exception):
+        stream = sys.stderr
+        encoding = getattr(stream, "encoding", None) or "utf-8"
+        content = (line + "\n").encode(encoding, "backslashreplace")
+        raw = getattr(getattr(stream, "buffer", None), "raw", None)
+        if raw is None:
+            stream.write(content.decode(encoding))
+            stream.flush()
+        else:
+            stream.flush()
+            raw.write(content)
 
 
 def unforeseen(error, model):
     """The sentence for an exception; plain floats raise where C gives infinity or NaN."""
-    if isinstance(error, NotThere):
-        return str(error)
     if isinstance(error, (ArithmeticError, ValueError)) and not isinstance(error, UnicodeError):
         return SENTENCES[DIVERGED].format(t=model.solver.step.t0)
     return f"unforeseen {type(error).__name__}: {error}; please report it with the values of the run"

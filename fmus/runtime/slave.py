@@ -4,6 +4,7 @@ from math import inf, nan
 
 from pythonfmu.fmi2slave import Fmi2Slave, Fmi2Status
 
+from .boundary import guarded
 from .hosted import Hosted, getter, hosting, setter
 
 
@@ -15,12 +16,16 @@ def slave_for(model):
 class Slave(Hosted, Fmi2Slave):
     """One instance of a model as pythonfmu's native layer calls it."""
 
+    @guarded
     def setup_experiment(self, start_time, stop_time=None, tolerance=None):
-        self.start_time = start_time
-        self.stop_time = inf if stop_time is None else stop_time
-        if tolerance is not None and 0.0 < tolerance < 1.0:
-            self.given_tolerance = tolerance
-        self.changed, self.observed = True, False
+        try:
+            self.start_time = start_time
+            self.stop_time = inf if stop_time is None else stop_time
+            if tolerance is not None and 0.0 < tolerance < 1.0:
+                self.given_tolerance = tolerance
+            self.changed, self.observed = True, False
+        except BaseException as error:  # as in hosted.py
+            self.rescue(error)
 
     # No variable is a Boolean or a String; a host that asks all the same is told so, and not crashed.
 

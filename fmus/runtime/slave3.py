@@ -5,12 +5,12 @@ state machine.  So an instance is undecided until a step is asked for (co-simula
 comes (model exchange), and the run begins where the first step does.
 """
 
-import json
 from math import fabs, nan
 
 from . import exchange
 from .beside import PLACES, beside
-from .hosted import ERROR, KEPT, RUNNING, SENTENCES, SETTING_UP, Hosted, getter, hosting, setter, unforeseen
+from .boundary import guarded
+from .hosted import ERROR, KEPT, RUNNING, SENTENCES, SETTING_UP, Hosted, getter, hosting, setter
 from .step import DIVERGED, HUGE
 
 UNDECIDED, STEPPING, EXCHANGED = 0, 1, 2
@@ -73,10 +73,6 @@ class Instance:
     def _get_log_queue(self):
         return self.messages
 
-    @staticmethod
-    def _fmu_state_to_bytes(state):
-        return json.dumps(state).encode()
-
     def enter_initialization_mode(self):
         """Nothing arrives here, neither tolerance nor start nor stop time."""
 
@@ -84,13 +80,30 @@ class Instance:
         """Nothing is open."""
 
 
+def asker(function, number):
+    """The method that tells what `function` makes of the present point; NaN where there is nothing to compute with."""
+
+    @guarded
+    def ask(slave):
+        try:
+            if number(slave) and slave.ready():
+                return function(slave.model, slave.model.solver)
+        except (ArithmeticError, ValueError):
+            pass  # a state that the importer's solver only tries may be anything
+        except BaseException as error:  # as in hosted.py
+            slave.rescue(error)
+        return [nan] * number(slave)
+
+    return ask
+
+
 class Slave(Hosted, Instance):
     """One instance of a model, for co-simulation or for model exchange."""
 
     kept = (*KEPT, "kind")
 
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
+    def begin(self, **kwargs):
+        super().begin(**kwargs)
         self.kind = UNDECIDED
         self.nominals = exchange.nominals(self.model)
 
@@ -111,6 +124,9 @@ class Slave(Hosted, Instance):
         super().recount(ahead)
         self.model.exchange.show(self.model, self.model.solver)
 
+    def is_sound(self):
+        return self.kind in (UNDECIDED, STEPPING, EXCHANGED) and super().is_sound()
+
     def broken_rule(self):
         """The rule for our own solver binds as soon as that is what solves."""
         rule = super().broken_rule()
@@ -118,25 +134,27 @@ class Slave(Hosted, Instance):
 
     # ---- co-simulation
 
+    @guarded
     def do_step(self, current_time, step_size):
-        if self.kind != STEPPING:
-            self.begin_stepping(current_time)
-        return DONE if Hosted.do_step(self, current_time, step_size) else FAILED
+        try:
+            if self.kind != STEPPING:
+                self.begin_stepping(current_time)
+            return DONE if Hosted.do_step(self, current_time, step_size) else FAILED
+        except BaseException as error:  # as in hosted.py
+            self.rescue(error)
+            return FAILED
 
     def begin_stepping(self, current_time):
         """The start time is that of the first step."""
-        try:
-            if self.kind == EXCHANGED:
-                self.fail(INTEGRATED.format(t=current_time))
-                return
-            self.kind = STEPPING
-            if self.phase == RUNNING and not self.failure:
-                if current_time != self.model.solver.t:
-                    self.start_time, self.phase = current_time, SETTING_UP
-                elif sentence := self.objection():
-                    self.fail(sentence)
-        except BaseException as error:  # as in hosted.py
-            self.fail(unforeseen(error, self.model))
+        if self.kind == EXCHANGED:
+            self.fail(INTEGRATED.format(t=current_time))
+            return
+        self.kind = STEPPING
+        if self.phase == RUNNING and not self.failure:
+            if current_time != self.model.solver.t:
+                self.start_time, self.phase = current_time, SETTING_UP
+            elif sentence := self.objection():
+                self.fail(sentence)
 
     # ---- model exchange
 
@@ -146,26 +164,30 @@ class Slave(Hosted, Instance):
     def get_number_of_event_indicators(self):
         return 2 if self.model.dry else 0
 
+    @guarded
     def set_time(self, t):
-        self.begin_exchange()
-        exchange.move_to(self.model, self.model.solver, t)
+        try:
+            self.begin_exchange()
+            exchange.move_to(self.model, self.model.solver, t)
+        except BaseException as error:  # as above
+            self.rescue(error)
 
+    @guarded
     def set_continuous_states(self, states):
-        self.begin_exchange()
-        exchange.put(self.model, self.model.solver, states)
-
-    def get_continuous_states(self):
-        return self.evaluated(exchange.states, self.get_number_of_continuous_states())
+        try:
+            self.begin_exchange()
+            exchange.put(self.model, self.model.solver, states)
+        except BaseException as error:  # as above
+            self.rescue(error)
 
     def get_nominals_of_continuous_states(self, number):
         return exchange.nominals(self.model)[:number]
 
-    def get_continuous_state_derivatives(self):
-        return self.evaluated(exchange.rates, self.get_number_of_continuous_states())
+    get_continuous_states = asker(exchange.states, get_number_of_continuous_states)
+    get_continuous_state_derivatives = asker(exchange.rates, get_number_of_continuous_states)
+    get_event_indicators = asker(exchange.indicators, get_number_of_event_indicators)
 
-    def get_event_indicators(self):
-        return self.evaluated(exchange.indicators, 2) if self.model.dry else []
-
+    @guarded
     def update_discrete_states(self):
         try:
             self.begin_exchange()
@@ -176,7 +198,7 @@ class Slave(Hosted, Instance):
                     return Updated(states=exchange.update(model, march), nominals=self.nominals != before)
                 self.fail(SENTENCES[DIVERGED].format(t=march.t))
         except BaseException as error:  # as above
-            self.fail(unforeseen(error, self.model))
+            self.rescue(error)
         return Updated(terminate=True)
 
     def begin_exchange(self):
@@ -184,17 +206,6 @@ class Slave(Hosted, Instance):
         if self.kind != EXCHANGED:
             self.kind = EXCHANGED
             exchange.begin(self.model.solver)
-
-    def evaluated(self, function, number):
-        """What a function makes of the present point; NaN where there is nothing to compute with."""
-        try:
-            if self.ready():
-                return function(self.model, self.model.solver)
-        except (ArithmeticError, ValueError):
-            pass  # a state that the importer's solver only tries may be anything
-        except BaseException as error:  # as above
-            self.fail(unforeseen(error, self.model))
-        return [nan] * number
 
     def ready(self):
         """Whether the values can be used; a run that has begun fails if they cannot."""
@@ -205,7 +216,7 @@ class Slave(Hosted, Instance):
         try:
             return self.prepared()
         except BaseException as error:  # as above
-            return self.fail(unforeseen(error, self.model))
+            return self.rescue(error)
 
     def apply(self):
         """In model exchange nothing starts anew: the mode follows at the next event."""

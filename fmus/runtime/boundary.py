@@ -1,0 +1,61 @@
+"""What may cross from Python into the native layer that called it: no exception, unless it is paid for.
+
+After an exception the layer gives back its references to the class, the instance and the log; freed or reset, it gives
+them back once more.
+"""
+
+from ctypes import c_ulong, py_object, pythonapi
+from functools import partial
+from threading import get_ident
+from weakref import ref
+
+
+def guarded(function):
+    """The function, all of which is one try statement, such that this holds from its first instruction on.
+
+    Since Python 3.11 a signal that has come meanwhile is handled when a function is entered: before the first line of
+    it, hence outside of any try.  The table of handlers (Objects/exception_handling_notes.txt of CPython) begins with
+    the start and the length of what the outermost covers, in 6 bits a byte.
+    """
+    table = getattr(function.__code__, "co_exceptiontable", b"")
+    if table:
+        start, at = _number(table, 0)
+        length, at = _number(table, at)
+        covered = bytes([0x80]) + _written(start + length)
+        function.__code__ = function.__code__.replace(co_exceptiontable=covered + table[at:])
+    return function
+
+
+def _number(table, at):
+    number = table[at] & 63
+    while table[at] & 64:
+        at += 1
+        number = number << 6 | table[at] & 63
+    return number, at + 1
+
+
+def _written(number):
+    digits = [number & 63]
+    while number > 63:
+        number >>= 6
+        digits.append(number & 63 | 64)
+    return bytes(reversed(digits))
+
+
+def pass_on(error, message):
+    """Raise the exception in this thread again as soon as the message is gone.
+
+    The layer hands the messages to the host, who may run Python for it, and drops them when the call has no more to do:
+    what it returns to is the host.  Until then nothing of ours may run, so all that listens is made in C.
+    """
+    error.__traceback__ = None
+    again = type(type(error).__name__, (type(error),), {"__new__": lambda cls: error})
+    raise_in = pythonapi["PyThreadState_SetAsyncExc"]
+    raise_in.argtypes = c_ulong, py_object, py_object  # the last is the reference that died, which C overlooks
+    return ref(message, partial(raise_in, get_ident(), again))
+
+
+def pay(*things):
+    """Take the references that the layer will give back once too often."""
+    for thing in things:
+        pythonapi["Py_IncRef"](py_object(thing))

@@ -1,0 +1,94 @@
+"""A host in Python that is interrupted while its FMU computes: python interrupted.py FUNCTION '[ARGUMENTS]'."""
+
+import json
+import os
+import signal
+import sys
+import tempfile
+import threading
+from math import isnan
+
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
+
+import fmi3_worker
+
+
+class Stop(BaseException):
+    """What a host may have its handler raise."""
+
+    def __init__(self, why, when):
+        super().__init__(why, when)
+
+
+def stop(*_):
+    raise Stop("enough", 3)
+
+
+HANDLERS = {
+    "KeyboardInterrupt": signal.default_int_handler,
+    "SystemExit": lambda *_: sys.exit(143),
+    "Stop": stop,
+}
+
+
+def begun(path):
+    worker = fmi3_worker.Worker(tempfile.mkdtemp())
+    fmu = worker.instances[worker.instantiate(path, "interrupted")]
+    begin(fmu)
+    return fmu
+
+
+def begin(fmu):
+    fmu.set({"solver.method": 2, "solver.rtol": 1e-9})  # ode23: seconds and seconds of work
+    fmu.setup(0.0, None, None)
+    fmu.init()
+
+
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def long(path, handler):
+    """One step of minutes: what reaches the host, what the log says, what is read, and whether a reset recovers."""
+    signal.signal(signal.SIGINT, HANDLERS[handler])
+    fmu = begun(path)
+    threading.Timer(0.3, interrupt).start()
+    try:
+        fmu.step(0.0, 1e7)
+    except BaseException as error:
+        reached = type(error).__name__, error.args
+    answer = {"reached": reached, "log": fmu.messages(), "x": isnan(fmu.get(["x"])[0])}
+    fmu.reset()
+    begin(fmu)
+    fmu.step(0.0, 0.1)
+    answer["recovers"] = not isnan(fmu.get(["x"])[0])
+    fmu.free()
+    return answer
+
+
+def short(path, times):
+    """So often in short steps, most of them at the very entry or exit of a call: what reaches the host."""
+    fmu, reached = begun(path), []
+
+    def ring(*_):
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGALRM, ring)
+    for i in range(times):
+        t = 0.0
+        try:
+            signal.setitimer(signal.ITIMER_REAL, 0.001 + 1.37e-5 * i)
+            while True:
+                fmu.step(t, 1e-5)
+                t += 1e-5
+                fmu.get(["x", "v"])
+        except BaseException as error:
+            reached.append(type(error).__name__)
+        fmu.reset()
+        begin(fmu)
+    fmu.free()
+    return sorted(set(reached)), len(reached)
+
+
+if __name__ == "__main__":
+    print(json.dumps(globals()[sys.argv[1]](*json.loads(sys.argv[2]))))
