@@ -3,11 +3,13 @@
 import json
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import fmi3_hosts
 import pytest
 from interrupted import HANDLERS
+from test_hosting import PYTHONS, interpreter
 
 
 @pytest.fixture(params=[2, 3], ids=["FMI 2.0", "FMI 3.0"])
@@ -43,3 +45,21 @@ def test_an_interrupt_at_any_moment_of_any_call_reaches_the_host(fmu):
     answer, said = host("short", fmu, 300)
     assert answer == [["KeyboardInterrupt"], 300]
     assert all("was interrupted" in line for line in said)
+
+
+@pytest.mark.parametrize("version", PYTHONS)
+def test_every_entry_is_guarded_from_its_first_instruction_on_every_python(fmu, tmp_path, version):
+    python = interpreter(version)
+    if python is None:
+        pytest.skip(f"there is no Python {version} here")
+    with zipfile.ZipFile(fmu.with_name("stickslip.fmu")) as archive:
+        archive.extractall(tmp_path)
+    script = Path(__file__).with_name("interrupted_embedded.py")
+    command = [python, "-I", script, tmp_path / "resources"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    answers = json.loads(done.stdout)
+    assert len(answers) >= 7
+    for entry, (error, arguments, sentence) in answers.items():
+        assert (error, arguments) == ("Stop", ["enough", 3]), entry
+        assert "the run was interrupted" in sentence, entry

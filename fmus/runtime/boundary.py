@@ -1,9 +1,11 @@
-"""What may cross from Python into the native layer that called it: no exception, unless it is paid for.
+"""What may cross from Python into the native layer that called it: text, and no exception unless it is paid for.
 
 After an exception the layer gives back its references to the class, the instance and the log; freed or reset, it gives
 them back once more.
 """
 
+import sys
+from contextlib import suppress
 from ctypes import c_ulong, py_object, pythonapi
 from functools import partial
 from threading import get_ident
@@ -15,7 +17,8 @@ def guarded(function):
 
     Since Python 3.11 a signal that has come meanwhile is handled when a function is entered: before the first line of
     it, hence outside of any try.  The table of handlers (Objects/exception_handling_notes.txt of CPython) begins with
-    the start and the length of what the outermost covers, in 6 bits a byte.
+    the start and the length of what the outermost covers, in 6 bits a byte.  Before, a function that begins with its
+    try is safe as it is, if that is no longer than 127 instructions.
     """
     table = getattr(function.__code__, "co_exceptiontable", b"")
     if table:
@@ -59,3 +62,26 @@ def pay(*things):
     """Take the references that the layer will give back once too often."""
     for thing in things:
         pythonapi["Py_IncRef"](py_object(thing))
+
+
+def printable(text):
+    """A text that can be handed over as UTF-8, and ends where it ends in C."""
+    return text.replace("\0", "").encode("utf-8", "backslashreplace").decode()
+
+
+def announce(line):
+    """On standard error, whatever has become of it.
+
+    Past its buffer, where there is one: what cannot be written would wait there, and Python end with status 120.
+    """
+    with suppress(Exception):
+        stream = sys.stderr
+        encoding = getattr(stream, "encoding", None) or "utf-8"
+        content = (line + "\n").encode(encoding, "backslashreplace")
+        raw = getattr(getattr(stream, "buffer", None), "raw", None)
+        if raw is None:
+            stream.write(content.decode(encoding))
+            stream.flush()
+        else:
+            stream.flush()
+            raw.write(content)

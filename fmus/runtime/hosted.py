@@ -5,12 +5,11 @@ Python would abort.  What is wrong is remembered and said in one sentence, in th
 then returns False and every calculated Real reads NaN.
 """
 
-import sys
 from contextlib import suppress
 from math import fabs, inf, isfinite, nan
 from weakref import WeakSet
 
-from .boundary import guarded, pass_on, pay
+from .boundary import announce, guarded, pass_on, pay, printable
 from .declare import variables
 from .march import ENDLESS, MOST_CALLS, MOST_STEPS
 from .state import REFUSED, fits, numbers, sealed, shape, take_over, unsealed
@@ -156,22 +155,27 @@ class Hosted:
             known = self.observed and self.phase == RUNNING  # nothing was set since the last point was read
             if not known and not self.prepared():
                 return False
-            model, end = self.model, current_time + step_size
+            end = current_time + step_size
+            model = self.model
             march = model.solver
             step = march.step
             beside = (1.0 - 1e-14) * step.t1 <= end <= (1.0 + 1e-14) * step.t1
             if beside or not 0.0 <= self.start_time <= current_time == march.t < end < step.t_end:
                 end = self.judged(current_time, step_size)
-            start = march.t
-            if end > start:
+            if end > march.t:
                 status = march.advance(model, end)
                 if status != OK:
-                    return self.fail(SENTENCES[status].format(t=step.t0, start=start))
+                    return self.give_up(status)
                 if known:  # who has read the last point will read this one too
                     model.observe(march.t, march.x, march.v, march.mode)
             return not self.failure
         except BaseException as error:  # as above
             return self.rescue(error)
+
+    def give_up(self, status):
+        """Fail: an internal step could not be taken."""
+        march = self.model.solver
+        return self.fail(SENTENCES[status].format(t=march.step.t0, start=march.t))
 
     def prepared(self):
         """Whether the run can go on; values that were set are judged first."""
@@ -435,29 +439,6 @@ def no_variable(kind, reference):
         f"value reference {reference & 0xFFFFFFFF} is refused: it is not that of a variable of type {kind}; "
         "the model description of this very FMU has those that are"
     )
-
-
-def printable(text):
-    """A text that can be handed over as UTF-8, and ends where it ends in C."""
-    return text.replace("\0", "").encode("utf-8", "backslashreplace").decode()
-
-
-def announce(line):
-    """On standard error, whatever has become of it.
-
-    Past its buffer, where there is one: what cannot be written would wait there, and Python end with status 120.
-    """
-    with suppress(Exception):
-        stream = sys.stderr
-        encoding = getattr(stream, "encoding", None) or "utf-8"
-        content = (line + "\n").encode(encoding, "backslashreplace")
-        raw = getattr(getattr(stream, "buffer", None), "raw", None)
-        if raw is None:
-            stream.write(content.decode(encoding))
-            stream.flush()
-        else:
-            stream.flush()
-            raw.write(content)
 
 
 def unforeseen(error, model):

@@ -1,0 +1,59 @@
+"""The code inside an FMU, interrupted as a function of it is entered, in whatever Python runs this file (3.9 or newer).
+
+python interrupted_embedded.py RESOURCES: prints for every entry what reaches the caller, and what the FMU says of it.
+"""
+
+import ctypes
+import io
+import json
+import signal
+import sys
+from functools import partial
+from importlib import import_module
+from operator import methodcaller
+from pathlib import Path
+
+
+class Stop(BaseException):
+    """What a host may have its handler raise."""
+
+
+def stop(*_):
+    raise Stop("enough", 3)
+
+
+def interrupted(slave, name, arguments):
+    """Nothing here is Python from the interrupt to the end of the call, as in the native layer."""
+    trip, queue = ctypes.pythonapi["PyErr_SetInterrupt"], slave._get_log_queue()
+    calls = trip, partial(getattr(slave, name), *arguments), queue.clear
+    try:
+        list(map(methodcaller("__call__"), calls))
+    except BaseException as error:
+        return [type(error).__name__, error.args, slave.failure]
+
+
+FMI2 = {"get_real": [[0]], "set_real": [[0], [1.0]], "get_integer": [[0]], "setup_experiment": [0.0]}
+FMI3 = {
+    **{"get_float64": [[0]], "set_float64": [[0], [1.0]], "set_time": [1.0], "get_continuous_states": []},
+    **{"get_event_indicators": [], "update_discrete_states": []},
+}
+BOTH = {"do_step": [0.0, 0.1], "exit_initialization_mode": [], "_get_fmu_state": []}
+
+
+def main(resources):
+    sys.path.insert(0, resources)
+    entry = import_module(Path(resources, "slavemodule.txt").read_text().strip())
+    signal.signal(signal.SIGINT, stop)
+    sys.stderr = io.StringIO()
+
+    def born():
+        slave = entry.Stickslip(instance_name="embedded", resources=resources, logger=None, visible=False)
+        slave.exit_initialization_mode()
+        return slave
+
+    entries = {**BOTH, **(FMI2 if hasattr(entry.Stickslip, "get_real") else FMI3)}
+    return {name: interrupted(born(), name, arguments) for name, arguments in entries.items()}
+
+
+if __name__ == "__main__":
+    print(json.dumps(main(sys.argv[1])))
