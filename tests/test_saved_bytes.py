@@ -15,7 +15,8 @@ from compare import identical
 from driver import Refused, Worker
 from models import MODELS, declared, model_class, outputs
 
-from fmus.runtime import hosted, slave, slave3
+from fmus.runtime import slave, slave3
+from fmus.runtime.state import Foreign
 
 BOTH = pytest.mark.parametrize("kind", [slave, slave3], ids=["FMI 2.0", "FMI 3.0"])
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
@@ -55,7 +56,7 @@ def taken(made, content):
     """Whether the bytes are taken for a state."""
     try:
         made._fmu_state_from_bytes(content)
-    except hosted.Foreign:
+    except Foreign:
         return False
     return True
 

@@ -9,10 +9,10 @@ from contextlib import suppress
 from math import fabs, inf, isfinite, nan
 from weakref import WeakSet
 
-from .boundary import announce, guarded, pass_on, pay, printable
+from .boundary import announce, guarded, pass_on, printable
 from .declare import variables
 from .march import ENDLESS, MOST_CALLS, MOST_STEPS
-from .state import REFUSED, fits, numbers, sealed, shape, take_over, unsealed
+from .state import NOWHERE, RUNNING, SETTABLE, SETTING_UP, Saved, shape
 from .step import DIVERGED, OK, STALLED
 
 SENTENCES = {
@@ -24,19 +24,9 @@ SENTENCES = {
 }
 INTERRUPTED = "the run was interrupted after t = {t!r} s; reset the FMU to run again"
 
-SETTING_UP, RUNNING = 0, 1
 ERROR = 3  # a status of FMI, in all its versions
-CALCULATED, SETTABLE = ("output", "local"), ("parameter", "input")
-KEPT = ("phase", "start_time", "stop_time", "given_tolerance", "changed", "failure")
-NOWHERE = ""  # among the values that cannot be used: one for a variable that is not there
+CALCULATED = ("output", "local")
 MOST_READERS = 64  # an importer that asks for other lists all the time costs time, not memory
-
-
-class Foreign(ValueError):
-    """What is not a saved state of this FMU; the layer tells the host what it reads here."""
-
-    def __repr__(self):
-        return REFUSED
 
 
 def hosting(slave, model):
@@ -92,14 +82,13 @@ def setter(kind):
     return put
 
 
-class Hosted:
+class Hosted(Saved):
     """One instance of the model `Model`; a value reference is a place in `variables(model)`.
 
     A base class after this one has `instance_name` and log(sentence, status).
     """
 
-    Model = variables = shape = living = bare = None  # of the subclass that hosting() makes
-    kept: tuple[str, ...] = KEPT  # what a state holds beside the model
+    Model = variables = None  # of the subclass that hosting() makes
 
     @guarded
     def __init__(self, **kwargs):
@@ -338,99 +327,6 @@ class Hosted:
                 self.model.rebase(self.model.solver.t)
             self.changed = True
             setattr(thing, attribute, value)
-
-    # ---- state
-
-    @guarded
-    def _get_fmu_state(self):
-        try:
-            kept = {name: getattr(self, name) for name in self.kept}
-            return kept | {"origin": __name__, "refused": dict(self.refused), "model": numbers(self.model, self.shape)}
-        except BaseException as error:  # as above
-            self.rescue(error)
-            return {}
-
-    @classmethod
-    @guarded
-    def _fmu_state_to_bytes(cls, state):
-        try:
-            return sealed(state)
-        except BaseException:
-            cls.settle_up()
-            raise
-
-    @classmethod
-    @guarded
-    def _fmu_state_from_bytes(cls, content):
-        try:
-            state = unsealed(content)
-            if state is None or not cls.is_own(state, content):
-                announce(f"{cls.__name__}: {REFUSED}")
-                raise Foreign
-            return state
-        except BaseException:
-            cls.settle_up()
-            raise
-
-    @classmethod
-    def settle_up(cls):
-        """Pay for an exception that leaves a method of the class; which instance will be let go is not told."""
-        for slave in cls.living:
-            pay(slave, slave._get_log_queue())
-        pay(cls)
-
-    @classmethod
-    def is_own(cls, state, content):
-        """Whether an instance can be in a state, and would write it so."""
-        spare = cls.bare(instance_name="")
-        cls.living.discard(spare)
-        try:
-            if not fits(dict(state, refused={}), spare._get_fmu_state()):
-                return False
-            spare.be(state)
-            return spare.is_sound() and sealed(spare._get_fmu_state()) == content
-        except (ArithmeticError, LookupError, TypeError, ValueError):
-            return False
-
-    def is_sound(self):
-        """Whether phase, settings and sentences are such as can come about."""
-        names = {NOWHERE, *(name for name, _ in self.variables)}
-        texts = [self.failure, *self.refused.values()]
-        return (
-            self.phase in (SETTING_UP, RUNNING)
-            and 0.0 < self.given_tolerance < 1.0
-            and names.issuperset(self.refused)
-            and all(type(text) is str and text == printable(text) for text in texts)
-            and all(
-                declared.accepts(getattr(thing, name))
-                for (_, declared), (thing, name) in zip(self.variables, self.owners)
-                if declared.causality in SETTABLE or declared.type != "Real"
-            )
-        )
-
-    @guarded
-    def _set_fmu_state(self, state):
-        try:
-            own = type(state) is dict and state.get("origin") == __name__
-            if own:
-                self.be(state)
-        except BaseException as error:  # as above
-            self.rescue(error)
-        else:
-            if not own:
-                announce(f"{type(self).__name__} ({self.instance_name}): {REFUSED}")
-                pay(self, self._get_log_queue(), type(self))
-                raise Foreign
-
-    def be(self, state):
-        """Take over a state that has been found good."""
-        for name in self.kept:
-            setattr(self, name, state[name])
-        self.refused = dict(state["refused"])
-        take_over(self.model, self.shape, state["model"])
-        self.observed = False
-        if self.failure:
-            self.silence()
 
 
 def no_variable(kind, reference):

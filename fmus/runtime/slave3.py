@@ -10,7 +10,8 @@ from math import fabs, nan
 from . import exchange
 from .beside import PLACES, beside
 from .boundary import guarded
-from .hosted import ERROR, KEPT, RUNNING, SENTENCES, SETTING_UP, Hosted, getter, hosting, setter
+from .hosted import ERROR, SENTENCES, Hosted, getter, hosting, setter
+from .state import KEPT, RUNNING, SETTING_UP
 from .step import DIVERGED, HUGE
 
 UNDECIDED, STEPPING, EXCHANGED = 0, 1, 2

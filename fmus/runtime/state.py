@@ -1,7 +1,14 @@
-"""A saved state as bytes: a checksum, then JSON; and whether the numbers in it may be taken over."""
+"""Saved states: what one holds, what its bytes are (a checksum, then JSON), and whether they may be taken over."""
 
 import json
 from binascii import crc32
+
+from .boundary import announce, guarded, pay, printable
+
+SETTING_UP, RUNNING = 0, 1
+SETTABLE = ("parameter", "input")
+KEPT = ("phase", "start_time", "stop_time", "given_tolerance", "changed", "failure")
+NOWHERE = ""  # among the values that cannot be used: one for a variable that is not there
 
 LONGEST = 1 << 20  # bytes; a state has some thousand
 DEEPEST = 400  # brackets: what they nest must not overflow the parser
@@ -68,3 +75,108 @@ def take_over(thing, names, kept):
             take_over(getattr(thing, name), inner, value)
         else:
             setattr(thing, name, list(value) if isinstance(value, list) else value)
+
+
+class Foreign(ValueError):
+    """What is not a saved state of this FMU; the layer tells the host what it reads here."""
+
+    def __repr__(self):
+        return REFUSED
+
+
+class Saved:
+    """The part of an instance that saves and restores its state."""
+
+    shape = living = bare = None  # of the subclass that hosting() makes
+    kept: tuple[str, ...] = KEPT  # what a state holds beside the model
+
+    @guarded
+    def _get_fmu_state(self):
+        try:
+            kept = {name: getattr(self, name) for name in self.kept}
+            return kept | {"origin": __name__, "refused": dict(self.refused), "model": numbers(self.model, self.shape)}
+        except BaseException as error:  # as in hosted.py
+            self.rescue(error)
+            return {}
+
+    @classmethod
+    @guarded
+    def _fmu_state_to_bytes(cls, state):
+        try:
+            return sealed(state)
+        except BaseException:
+            cls.settle_up()
+            raise
+
+    @classmethod
+    @guarded
+    def _fmu_state_from_bytes(cls, content):
+        try:
+            state = unsealed(content)
+            if state is None or not cls.is_own(state, content):
+                announce(f"{cls.__name__}: {REFUSED}")
+                raise Foreign
+            return state
+        except BaseException:
+            cls.settle_up()
+            raise
+
+    @classmethod
+    def settle_up(cls):
+        """Pay for an exception that leaves a method of the class; which instance will be let go is not told."""
+        for slave in cls.living:
+            pay(slave, slave._get_log_queue())
+        pay(cls)
+
+    @classmethod
+    def is_own(cls, state, content):
+        """Whether an instance can be in a state, and would write it so."""
+        spare = cls.bare(instance_name="")
+        cls.living.discard(spare)
+        try:
+            if not fits(dict(state, refused={}), spare._get_fmu_state()):
+                return False
+            spare.be(state)
+            return spare.is_sound() and sealed(spare._get_fmu_state()) == content
+        except (ArithmeticError, LookupError, TypeError, ValueError):
+            return False
+
+    def is_sound(self):
+        """Whether phase, settings and sentences are such as can come about."""
+        names = {NOWHERE, *(name for name, _ in self.variables)}
+        texts = [self.failure, *self.refused.values()]
+        return (
+            self.phase in (SETTING_UP, RUNNING)
+            and 0.0 < self.given_tolerance < 1.0
+            and names.issuperset(self.refused)
+            and all(type(text) is str and text == printable(text) for text in texts)
+            and all(
+                declared.accepts(getattr(thing, name))
+                for (_, declared), (thing, name) in zip(self.variables, self.owners)
+                if declared.causality in SETTABLE or declared.type != "Real"
+            )
+        )
+
+    @guarded
+    def _set_fmu_state(self, state):
+        try:
+            own = type(state) is dict and state.get("origin") == __name__
+            if own:
+                self.be(state)
+        except BaseException as error:  # as in hosted.py
+            self.rescue(error)
+        else:
+            if not own:
+                announce(f"{type(self).__name__} ({self.instance_name}): {REFUSED}")
+                pay(self, self._get_log_queue(), type(self))
+                raise Foreign
+
+    def be(self, state):
+        """Take over a state that has been found good."""
+        for name in self.kept:
+            setattr(self, name, state[name])
+        self.refused = dict(state["refused"])
+        take_over(self.model, self.shape, state["model"])
+        self.observed = False
+        if self.failure:
+            self.silence()
