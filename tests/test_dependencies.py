@@ -15,7 +15,7 @@ from models import MODELS, declared, model_class, outputs, push
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 SITUATIONS = 800
 LADDER = (1e-7, 1e-3, 1.0)  # of what starts at zero, in its unit or in what overcomes friction
-LOADS = (-1.1, -0.9, 0.9, 1.1)  # of a body at rest, in holding limits
+LOADS = (-1.1, -1.0, -0.9, 0.9, 1.0, 1.1)  # of a body at rest, in holding limits
 
 
 def structure(fmu):

@@ -1,7 +1,7 @@
 """What every output follows from at the start, found by trying: one value is changed, and who follows is seen.
 
 A dependency may show in few situations only, as that on what holds a body that is about to break away.  So many are
-tried: zeros, both signs, all sizes, every choice, and loads about as large as friction can hold.
+tried: zeros, both signs, all sizes, every choice, and loads about as large as friction can hold, or just so large.
 """
 
 from collections.abc import Sequence
@@ -12,9 +12,9 @@ from typing import Any
 from ..runtime.declare import Declared, Declaring
 from ..runtime.state import SETTABLE
 
-SITUATIONS = 1000
+SITUATIONS = 2000
 SIZES = 2.0  # powers of ten above and below a start value
-LOADS = 1.5  # times the holding limit
+LOADS = (-1.5, -1.0, -0.5, 0.5, 1.0, 1.5)  # of a body at rest, in holding limits
 TRIES = 100  # to meet a range
 
 
@@ -39,7 +39,7 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
         put(thing, values)
         if thing.dry and begun(thing, outputs):
             load, _, limit = thing.hold(0.0, thing.solver.x)
-            values[entry] += LOADS * (2.0 * chance.random() - 1.0) * limit - load
+            values[entry] += one(LOADS, chance) * limit - load
             put(thing, values)
         before = begun(thing, outputs)
         for name in (name for name in known if "." not in name and before):
