@@ -2,19 +2,32 @@
 
 import os
 from functools import partial
+from math import isfinite, isnan
 from pathlib import Path
+from typing import Any
 
 import click
 from rich.console import Console
 
-from .errors import HarnessError
+from .errors import LONGEST, HarnessError
 from .run import heading
 from .terminal import JSON, OUT, QUIET, as_text, progress
 
-NUMBER = click.FLOAT
+
+class Number(click.FloatRange):
+    """A finite number, in a range or not; click lets NaN through, which is in no range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if not isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
+        return number
+
+
+NUMBER, POSITIVE, WORKERS = Number(), Number(min=0, min_open=True), click.IntRange(1, 1024)
 TOLERANCE = click.option(
     "--tolerance",
-    type=click.FloatRange(min=0, min_open=True),
+    type=POSITIVE,
     default=1e-6,
     show_default=True,
     help="To which an FMU that does not show its steps is run, relative.",
@@ -29,12 +42,10 @@ STOP = click.option("--stop", type=NUMBER, help="Stop time in s (the FMU's own).
 @click.option("--velocity", help="Heading of the speed, if one is to be used (v, omega, ...).")
 @click.option("--unit", help="Unit of the position where the heading has none, as in mm or deg.")
 @click.option("--time-unit", help="Unit of the time where the heading has none (s).")
-@click.option("--from", "begin", type=NUMBER, default=float("-inf"), help="Leave out what is before, in s.")
-@click.option("--until", "end", type=NUMBER, default=float("inf"), help="Leave out what is after, in s.")
-@click.option(
-    "--k", type=click.FloatRange(min=0, min_open=True), help="Stiffness, N/m (N.m/rad): gives friction force."
-)
-@click.option("--m", type=click.FloatRange(min=0, min_open=True), help="Mass, kg (kg.m2), in place of k.")
+@click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Leave out what is before, in s.")
+@click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Leave out what is after, in s.")
+@click.option("--k", type=POSITIVE, help="Stiffness, N/m (N.m/rad): gives friction force.")
+@click.option("--m", type=POSITIVE, help="Mass, kg (kg.m2), in place of k.")
 @click.option("--pendulum", is_flag=True, help="The restoring torque is k sin(theta), k = m g a.")
 @click.option("--drag", is_flag=True, help="Try quadratic drag as well.")
 @OUT
@@ -94,12 +105,10 @@ def decay(
 @click.option(
     "--random", type=click.IntRange(min=1), help="So many points of a Latin hypercube; then --vary NAME=LO:HI."
 )
-@click.option("--seed", type=int, default=1, show_default=True, help="Of the Latin hypercube.")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the Latin hypercube.")
 @click.option("--measure", default="final,events", show_default=True, help="What to measure, with commas between.")
 @STOP
-@click.option(
-    "--workers", type=click.IntRange(min=1), default=lambda: os.cpu_count() or 1, help="Processes on this machine."
-)
+@click.option("--workers", type=WORKERS, default=lambda: os.cpu_count() or 1, help="Processes on this machine.")
 @click.option("--scheduler", metavar="ADDRESS", help="An existing Dask cluster, as in tcp://host:8786.")
 @click.option("--name", help="Name of the result folder.")
 @OUT
@@ -131,6 +140,8 @@ def sweep(
       python -m harness sweep pacejka --vary x_m=0.001:0.1:40:log --measure unsteady,steps
       python -m harness sweep coulomb --vary f=0.1:2 --vary k=50:500 --random 1000 --scheduler tcp://host:8786
     """
+    if name is not None and (name.startswith(".") or Path(name).name != name):
+        raise click.UsageError(f"--name {name[:LONGEST]}: the name of one folder, without dots before it")
     try:
         from .sweep import file as sweep_file
     except ImportError as error:
@@ -143,6 +154,7 @@ def sweep(
     told = {
         "runs": runs,
         "done before": swept.before,
+        "damaged": swept.damaged,
         "failed": swept.failed,
         "seconds": swept.seconds,
         "folder": str(swept.folder),
@@ -152,6 +164,8 @@ def sweep(
     elif not quiet:
         fresh = runs - swept.before
         click.echo(f"{runs} runs, {swept.before} of them done before, {swept.failed} failed")
+        if swept.damaged:
+            click.echo(f"{swept.damaged} damaged lines of the earlier sweep's journal were left out, and run again")
         if fresh:
             click.echo(f"{fresh} runs in {swept.seconds:.3g} s: {fresh / swept.seconds:.4g} runs/s")
         click.echo(f"Results in {swept.folder}")
@@ -162,7 +176,7 @@ def sweep(
 @click.argument("two", metavar="B")
 @STOP
 @TOLERANCE
-@click.option("--within", type=click.FloatRange(min=0), help="Exit status 1 if a relative difference is larger.")
+@click.option("--within", type=Number(min=0), help="Exit status 1 if a relative difference is larger.")
 @OUT
 @QUIET
 @JSON
@@ -196,6 +210,8 @@ def compare(
         for sentence in (*anyones.sentences(found), f"Results in {folder}"):
             console.print(sentence, highlight=False)
     if within is not None and not (found.worst <= within and (found.shift is None or found.shift == found.shift)):
+        if isnan(found.worst):
+            raise HarnessError(f"{one} or {two} holds what is not a finite number, which is in no bound")
         raise HarnessError(f"{one} and {two} differ by {found.worst:.3g} of the largest value, more than {within:g}")
 
 

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+LONGEST = 100  # letters of a value in a sentence
+
 
 class HarnessError(Exception):
     """A run or an analysis that failed; its text is one sentence for the user."""
@@ -21,9 +23,18 @@ def reason(error: Exception) -> str:
     return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
+def shown(value: object) -> str:
+    """A value as a sentence can hold it."""
+    try:
+        text = repr(value)
+    except (RecursionError, ValueError):  # an integer of thousands of digits, too, is more than Python writes out
+        return "what stands there"
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}... ({len(text)} letters)"
+
+
 def unknown(kind: str, word: object, allowed: Iterable[str]) -> str:
     """The sentence about a word that is not among the allowed ones, with the nearest of them."""
-    names = sorted(allowed)
-    close = get_close_matches(str(word), names, n=1)
+    names, text = sorted(allowed), shown(word)
+    close = get_close_matches(text.strip("'"), names, n=1)
     hint = f" (nearest: '{close[0]}')" if close else ""
-    return f"unknown {kind} '{word}'{hint}; allowed: {', '.join(names) or 'none'}"
+    return f"unknown {kind} {text}{hint}; allowed: {', '.join(names) or 'none'}"

@@ -28,6 +28,7 @@ from .unpacked import unpacked
 Report = Callable[[float], None]  # told how far the run is, as a share of it
 
 WARNING, ERROR = 1, 3  # fmi2Status; above a warning it is a failure
+MOST_POINTS = 10_000_000  # of a grid
 REPORT_EVERY = 4096  # communication points
 
 
@@ -135,6 +136,9 @@ def planned(scene: Scene, description: Any) -> Plan:
     stop = float(experiment.stopTime) if scene.stop is None else scene.stop
     if not stop > start:
         raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
+    if scene.grid is not None and (points := (stop - start) / scene.grid) > MOST_POINTS:
+        sentence = f"grid = {scene.grid!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
+        raise SceneError(f"{sentence}; at most {MOST_POINTS}: take a larger one")
     wanted = list(scene.outputs)
     if scene.follow:
         extra = ("solver.t_next", "solver.rejected", "events.count", "events.t_last", "mode")

@@ -25,9 +25,12 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from .errors import HarnessError, SceneError, unknown
+from .errors import HarnessError, SceneError, shown, unknown
 
 SHIPPED = Path(__file__).with_name("scenes")
+LONGEST_TITLE = 200  # letters
+MOST_REPEATS = 1000
+LARGEST = 1_000_000  # bytes of a file that somebody wrote
 
 # The outputs that play a role, in the models of a sled or mass and in those of a pendulum.
 ROLES = {"position": ("x", "theta"), "velocity": ("v", "omega"), "acceleration": ("a", "alpha")}
@@ -78,8 +81,16 @@ def is_text(value: object) -> bool:
     return isinstance(value, str) and bool(value)
 
 
+def is_title(value: object) -> bool:
+    text = str(value)
+    return is_text(value) and len(text) <= LONGEST_TITLE and text.splitlines() == [text] and "\0" not in text
+
+
 def is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    except OverflowError:  # an integer beyond all floats
+        return False
 
 
 def is_positive(value: Any) -> bool:
@@ -87,7 +98,7 @@ def is_positive(value: Any) -> bool:
 
 
 def is_count(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= 1
+    return isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= MOST_REPEATS
 
 
 def is_natural(value: object) -> bool:
@@ -123,13 +134,14 @@ NAMES: Kind = (is_names, "a list of different names")
 TABLE: Kind = (is_table, "a table")
 
 KEYS: dict[str, Kind] = {
-    **dict.fromkeys(("title", "model", "fmu", "method", "law"), TEXT),
+    "title": (is_title, f"a text of one line and at most {LONGEST_TITLE} letters"),
+    **dict.fromkeys(("model", "fmu", "method", "law"), TEXT),
     **dict.fromkeys(("start", "stop"), NUMBER),
     **dict.fromkeys(("rtol", "atol", "h_max", "grid"), POSITIVE),
     **dict.fromkeys(("outputs", "analyses", "plots"), NAMES),
     **dict.fromkeys(("values", "decay", "published"), TABLE),
     "follow": (is_flag, "true or false"),
-    "repeat": (is_count, "a whole number of at least 1"),
+    "repeat": (is_count, f"a whole number from 1 to {MOST_REPEATS}"),
 }
 DECAY: dict[str, Kind] = {
     "gives": (lambda value: value in ("zeta", "f", "T_f"), "'zeta', 'f' or 'T_f'"),
@@ -151,18 +163,31 @@ def load(scene: str | Path) -> Scene:
         if path not in shipped():
             names = [file.stem for file in shipped()]
             raise SceneError(f"{unknown('scene', scene, names)}, or the path of a .toml file")
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"cannot read the scene {path}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise SceneError(f"scene {path.stem}: not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"scene {path.stem}: not valid TOML: {error}") from None
+    table = read(path)
     try:
         return build(path, table)
     except SceneError as error:
         raise SceneError(f"scene {path.stem}: {error}") from None
+
+
+def read(path: Path) -> dict[str, Any]:
+    """The table in a TOML file; SceneError in one sentence if there is none."""
+    try:
+        if path.exists() and not path.is_file():
+            raise SceneError(f"cannot read the scene {path}: not a file")
+        if path.stat().st_size > LARGEST:
+            raise SceneError(f"scene {path.stem}: more than {LARGEST} bytes are no scene")
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise SceneError(f"cannot read the scene {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise SceneError(f"scene {path.stem}: not a text file in UTF-8") from None
+    except RecursionError:
+        raise SceneError(f"scene {path.stem}: not valid TOML: brackets too deep in each other") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"scene {path.stem}: not valid TOML: {error}") from None
+    except ValueError:
+        raise SceneError(f"scene {path.stem}: an integer of thousands of digits") from None
 
 
 def build(path: Path, table: dict) -> Scene:
@@ -192,7 +217,7 @@ def check(table: dict, kinds: dict[str, Kind], what: str) -> None:
             raise SceneError(unknown(what, key, kinds))
         accepts, words = kinds[key]
         if not accepts(value):
-            raise SceneError(f"{key} = {value!r} is not {words}")
+            raise SceneError(f"{key} = {shown(value)} is not {words}")
 
 
 def check_needs(scene: Scene) -> None:
@@ -215,7 +240,7 @@ def check_needs(scene: Scene) -> None:
         raise SceneError("[published] needs a source, as in source = 'MATLAB ode23'")
     for key, value in scene.published.items():
         if not is_published(value):
-            raise SceneError(f"published {key} = {value!r} is not a number, [number, 'unit'] or a text")
+            raise SceneError(f"published {key} = {shown(value)} is not a number, [number, 'unit'] or a text")
 
 
 def find(path: Path, table: dict) -> tuple[str, Path]:

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from .errors import SceneError, unknown
+from .errors import SceneError, shown, unknown
 from .scene import Scene, is_number
 
 # Keys of a scene that are short for a variable of the FMU.
@@ -33,7 +33,8 @@ def settings(scene: Scene, variables: dict[str, Any]) -> list[tuple[Any, float |
     for name in wanted:
         if name not in variables:
             key = next(key for key, short in SHORT.items() if short == name)
-            raise SceneError(f"{key} = {wanted[name]!r}: {scene.model} has nothing to choose there; leave {key} out")
+            given = shown(wanted[name])
+            raise SceneError(f"{key} = {given}: {scene.model} has nothing to choose there; leave {key} out")
     settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
     for name, value in scene.values.items():
         if name not in settable:
@@ -49,8 +50,8 @@ def accepted(variable: Any, value: Any) -> float | int:
     if variable.type == "Enumeration":
         items = labels(variable)
         numbers = {label: number for number, label in items.items()}
-        number = numbers.get(value, value) if isinstance(value, str) else value
-        if isinstance(number, bool) or number not in items:
+        number = numbers.get(value) if isinstance(value, str) else value
+        if not is_number(number) or number not in items:
             raise SceneError(unknown(f"value of {variable.name}", value, numbers))
         return number
     low, high = bound(variable.min), bound(variable.max)
@@ -58,7 +59,7 @@ def accepted(variable: Any, value: Any) -> float | int:
         words = [f"{word} {limit!r}" for word, limit in (("at least", low), ("at most", high)) if limit is not None]
         unit = f" {variable.unit}" if variable.unit not in (None, "1") else ""
         allowed = " and ".join(words) + unit if words else "any finite number"
-        raise SceneError(f"{variable.name} = {value!r} is outside its range; allowed: {allowed}")
+        raise SceneError(f"{variable.name} = {shown(value)} is outside its range; allowed: {allowed}")
     return float(value)
 
 

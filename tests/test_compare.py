@@ -228,3 +228,48 @@ def test_changes_of_mode_are_paired(second, sentence, shift):
     found = compare(one, Trajectory("two", t, {"x": t}, {"x": "m"}, np.array(second, float)))
     assert found.events == sentence
     assert found.shift == pytest.approx(shift, nan_ok=True)
+
+
+@pytest.mark.parametrize("lost", [np.nan, np.inf])
+@pytest.mark.parametrize("where", ["left", "right", "both"])
+@pytest.mark.parametrize("at", [1, 7, 18])
+@pytest.mark.parametrize("shift", [0.0, 0.013])
+def test_what_is_not_finite_on_either_side_is_a_difference_beyond_any_bound(lost, where, at, shift):
+    """Also beside a variable that agrees, before and after it, and where times have to be interpolated."""
+    t = np.linspace(0, 1, 20)
+    good, bad = np.sin(t), np.where(np.arange(20) == at, lost, np.cos(t))
+    left = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}
+    right = {"a": good, "x": bad if where != "left" else np.cos(t), "z": good}
+    units = dict.fromkeys(left, "m")
+    found = compare(Trajectory("one", t, left, units), Trajectory("two", t + shift, right, units))
+    assert np.isnan(found.worst)
+    assert not found.worst <= 1e300
+
+
+def test_within_fails_on_what_is_not_a_number(tmp_path):
+    (tmp_path / "good.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
+    (tmp_path / "bad.csv").write_text("t [s],x [m]\n0,1\n1,nan\n2,3\n")
+    for pair in (("good.csv", "bad.csv"), ("bad.csv", "good.csv"), ("bad.csv", "bad.csv")):
+        command = [sys.executable, "-m", "harness", "compare", *pair, "--within", "1e9"]
+        done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+        assert done.returncode == 1
+        assert "x is not a finite number at t = 1 s" in done.stdout
+        assert done.stderr.count("\n") == 1
+        assert "which is in no bound" in done.stderr
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_difference_is_relative_to_the_larger_side(turned):
+    t = np.linspace(0, 1, 20)
+    small, large = ({"x": np.full(20, size)} for size in (1.0, 4.0))
+    pair = [Trajectory(name, t, columns, {"x": "m"}) for name, columns in (("small", small), ("large", large))]
+    (found,) = compare(*(reversed(pair) if turned else pair)).differences
+    assert found.relative == 0.75
+    assert found.largest == 3.0
+
+
+def test_differences_near_the_end_of_the_range_of_numbers_have_a_share():
+    t = np.linspace(0, 1, 20)
+    one, two = ({"x": np.full(20, value)} for value in (1e308, -1e308))
+    found = compare(Trajectory("one", t, one, {"x": "m"}), Trajectory("two", t, two, {"x": "m"}))
+    assert found.worst == 2.0

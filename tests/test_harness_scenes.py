@@ -56,7 +56,7 @@ def test_a_grid_does_not_follow_the_solver_unless_asked(tmp_path):
         ({"stop": '"soon"'}, "stop = 'soon' is not a finite number"),
         ({"stop": "inf"}, "stop = inf is not a finite number"),
         ({"rtol": "0"}, "rtol = 0 is not a finite number above 0"),
-        ({"repeat": "true"}, "repeat = True is not a whole number of at least 1"),
+        ({"repeat": "true"}, "repeat = True is not a whole number from 1 to 1000"),
         ({"follow": "false"}, "follow = false needs a grid"),
         ({"grid": "0.1", "analyses": '["steps"]'}, "the analysis 'steps' needs follow = true"),
         ({"outputs": '["x"]', "plots": '["phase"]'}, "the plot 'phase' needs the velocity: add v or omega"),

@@ -9,6 +9,7 @@ import socket
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 from math import sqrt
 from pathlib import Path
@@ -20,10 +21,10 @@ xarray = pytest.importorskip("xarray", reason="the extra 'sweep' is not installe
 pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
 pandas = pytest.importorskip("pandas", reason="the extra 'sweep' is not installed")
 
-from harness.errors import SceneError  # noqa: E402
+from harness.errors import HarnessError, SceneError  # noqa: E402
 from harness.sweep.rerun import Runs, ready  # noqa: E402
-from harness.sweep.space import axis, points  # noqa: E402
-from harness.sweep.study import Journal  # noqa: E402
+from harness.sweep.space import Axis, axis, points  # noqa: E402
+from harness.sweep.study import Journal, Sweep  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -166,7 +167,7 @@ def test_what_a_kill_left_is_kept_and_only_the_rest_is_run(harness, tmp_path, st
     if stop == signal.SIGINT:
         assert said.startswith("Error: interrupted: ")
         assert said.count("\n") == 1
-    kept = len(Journal(journals[0]).rows)
+    kept = len(Journal(journals[0], 300, 1).rows)
     assert 0 < kept < 300
     with journals[0].open("a") as file:
         file.write("[299, [0.1")  # cut off in the middle of a line
@@ -264,3 +265,94 @@ def test_what_a_sweep_gets_wrong_is_one_sentence(harness, tmp_path, arguments, s
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "results/sweep").exists() or list((tmp_path / "results/sweep").iterdir()) == []
+
+
+def test_the_fmu_belongs_to_what_tells_a_sweep_from_any_other():
+    runs = Runs("smd", ("m",), {}, None, ("final",))
+    one, two = (
+        Sweep(runs, (Axis("m", (1.0, 2.0)),), np.array([[1.0], [2.0]]), None, 1, fmu, 2) for fmu in (b"a", b"b")
+    )
+    assert one.key != two.key
+    assert one.key == replace(two, fmu=b"a").key
+
+
+DAMAGED = (
+    *(
+        b"",
+        b"7",
+        b"null",
+        b"[]",
+        b'[1, [0.5], ""',
+        b'{"a": 1}',
+        b"\xff\xfe",
+        b"\0",
+        b"[" * 5000,
+        b'[0, [0.5, 1.5], "x"]',
+    ),
+    *(b'[0, [0.5], ""]', b'[-1, [0.5, 1.5], ""]', b'[99, [0.5, 1.5], ""]', b'[0.5, [0.5, 1.5], ""]'),
+    b'[true, [0.5, 1.5], ""]',
+    *(b'[0, ["a", 1.5], ""]', b"[0, [0.5, 1.5], 3]", b'[0, [0.5, 1.5], "", 4]', b"9" * 5000),
+)
+
+
+@pytest.mark.parametrize("line", DAMAGED)
+def test_a_damaged_line_of_a_journal_is_left_out_and_counted(tmp_path, line):
+    good = b'[3, [0.5, NaN], ""]\n'
+    (tmp_path / "journal").write_bytes(good + line + b"\n" + b'[4, [], "failed"]\n')
+    kept = Journal(tmp_path / "journal", 10, 2)
+    assert sorted(kept.rows) == [3, 4]
+    assert kept.damaged == 1
+    (tmp_path / "journal").write_bytes(good + b'[4, [], "fai')
+    kept = Journal(tmp_path / "journal", 10, 2)
+    assert (sorted(kept.rows), kept.damaged) == ([3], 0)  # a kill cut it off
+
+
+def test_a_damaged_journal_is_told_and_the_runs_are_done_again(harness, tmp_path):
+    arguments = ("sweep", "smd", "--vary", "m=1:2:4", "--workers", 1)
+    assert harness(*arguments, "--out", "whole").returncode == 0
+    (tmp_path / "results/sweep").mkdir(parents=True)
+    fmu = (tmp_path / "fmus/smd.fmu").read_bytes()
+    runs, values = Runs("smd", ("m",), {}, None, ("final", "events")), (1.0, 4 / 3, 5 / 3, 2.0)
+    varied = Axis("m", tuple(np.linspace(1, 2, 4).tolist()))
+    key = Sweep(runs, (varied,), np.array(values)[:, None], None, 1, fmu, 3).key
+    (tmp_path / f"results/sweep/.{key}.jsonl").write_bytes(b'garbage\n[0, [1.0], ""]\n')
+    done = harness(*arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "4 runs, 0 of them done before, 0 failed" in done.stdout
+    assert "2 damaged lines" in done.stdout
+    name = "sweep/smd-m/sweep.csv"
+    assert (tmp_path / "results" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_journal_that_cannot_be_used_is_told(tmp_path):
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(HarnessError, match=r"journal .*folder cannot be used: Is a directory"):
+        Journal(tmp_path / "folder", 1, 1)
+    (tmp_path / "file").write_text("")
+    below = Journal(tmp_path / "file/journal", 1, 1)
+    with pytest.raises(HarnessError, match=r"journal .* cannot be used"), below.open():
+        pass
+
+
+def test_a_full_disk_is_told_and_what_was_kept_stays(tmp_path):
+    kept = Journal(tmp_path / "journal", 3, 1)
+
+    def fill():
+        with open("/dev/full", "w") as full, kept.open():
+            kept.add([(0, ([0.5], ""))])
+            kept.file.close()
+            kept.file = full
+            kept.add([(1, ([0.5], ""))])
+
+    with pytest.raises(HarnessError, match=r"journal .* cannot be used: No space left on device"):
+        fill()
+    assert sorted(Journal(tmp_path / "journal", 3, 1).rows) == [0]
+
+
+def test_a_place_that_cannot_be_written_is_told_before_the_runs(harness, tmp_path):
+    (tmp_path / "results/sweep").mkdir(parents=True)
+    (tmp_path / "results/sweep/smd-m").write_text("a file")
+    done = harness("sweep", "smd", "--vary", "m=1:2:4", "--workers", 1)
+    assert done.returncode == 1
+    assert "smd-m holds a file of that name" in done.stderr
+    assert [file.name for file in (tmp_path / "results/sweep").iterdir()] == ["smd-m"]

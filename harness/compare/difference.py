@@ -15,7 +15,8 @@ SAME = 1e-9  # share of the stretch: times this close are one
 @dataclass(frozen=True)
 class Difference:
     """One variable: the `largest` difference and where it is (`at`, s), the root mean square, in `unit`; `relative`:
-    the largest over the largest value of either.  `left`, `right` (n,): the two at the times compared."""
+    the largest over the largest value of either.  `left`, `right` (n,): the two at the times compared.  Where one of
+    them is not a finite number, which is then at `at`, the differences are NaN."""
 
     name: str
     unit: str
@@ -43,8 +44,8 @@ class Comparison:
 
     @property
     def worst(self) -> float:
-        """The largest relative difference."""
-        return max(each.relative for each in self.differences)
+        """The largest relative difference; NaN if any is."""
+        return float(np.max([each.relative for each in self.differences]))
 
 
 def compare(one: Trajectory, two: Trajectory) -> Comparison:
@@ -62,15 +63,24 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
             left_out.append(f"{name} is in {units[0]} in {one.name} and in {units[1]} in {two.name}")
             continue
         left, right = first(one.columns[name]), second(two.columns[name])
-        off = np.abs(left - right)
-        i, size = int(np.argmax(off)), float(max(np.abs(left).max(), np.abs(right).max()))
-        relative = float(off[i]) / size if size else 0.0
-        rms = float(np.sqrt(np.mean(off * off)))
-        differences.append(Difference(name, max(units), float(off[i]), float(time[i]), rms, relative, left, right))
+        differences.append(difference(name, max(units), time, left, right))
     if not differences:
         raise HarnessError(f"nothing to compare: {'; '.join(left_out)}")
     said, shift = events(one, two, begin, end)
     return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), said, shift)
+
+
+def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: np.ndarray) -> Difference:
+    """The difference of one variable; reckoned in shares of the largest value, which near 1e308 has no square."""
+    lost = ~(np.isfinite(left) & np.isfinite(right))
+    if lost.any():
+        at = float(time[int(np.argmax(lost))])
+        return Difference(name, unit, np.nan, at, np.nan, np.nan, left, right)
+    size = float(max(np.abs(left).max(), np.abs(right).max()))
+    off = np.abs(left / size - right / size) if size else np.zeros(len(time))
+    i, rms = int(np.argmax(off)), float(np.sqrt(np.mean(off * off)))
+    relative = float(off[i])
+    return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, left, right)
 
 
 def aligned(one: Trajectory, two: Trajectory, begin: float, end: float):  # type: ignore[no-untyped-def]
@@ -95,6 +105,8 @@ def aligned(one: Trajectory, two: Trajectory, begin: float, end: float):  # type
 
 def between(t: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
     """The values y (n,) over t (n,) at other times; whole numbers, as modes, hold until the next."""
+    if not np.isfinite(y).all():
+        return np.full(len(at), np.nan)  # no spline knows what lies between
     if (y == np.rint(y)).all():
         return y[np.searchsorted(t, at, "right") - 1]
     return CubicSpline(t, y)(at)

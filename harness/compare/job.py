@@ -1,6 +1,7 @@
 """Runs and comparisons of anyone's FMUs and results, in folders of results."""
 
 from collections.abc import Callable
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -23,10 +24,9 @@ def perform_run(
     path: Path, stop: float | None, tolerance: float, values: dict[str, Any], out: Path, report: Report
 ) -> tuple[Trajectory, Path]:
     """Run an FMU, and write its outputs to out/<name of the file>."""
-    scene = own(path, stop, values)
-    found = trajectory.of_run(simulate(scene, report)) if scene else run(path, stop, tolerance, values, report)
-    folder = out / path.stem
+    folder, scene = out / path.stem, own(path, stop, values)
     with replacing(folder, FILES) as fresh:
+        found = trajectory.of_run(simulate(scene, report)) if scene else run(path, stop, tolerance, values, report)
         found.save(fresh / "trajectory.csv")
     return found, folder
 
@@ -90,6 +90,11 @@ def sentences(found: Comparison) -> list[str]:
     return [
         *said,
         f"Compared at {len(found.time)} times ({how}).",
+        *(
+            f"{each.name} is not a finite number at t = {each.at:g} s"
+            for each in found.differences
+            if isnan(each.largest)
+        ),
         *found.left_out,
         *([found.events] if found.events else []),
     ]

@@ -17,16 +17,18 @@
 The force k (x_other - x) of a spring is one connection each way with the factor k, and k more stiffness in each part.
 """
 
-import tomllib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..errors import SceneError, unknown
-from ..scene import fmu_of, is_number, is_positive, is_text
+from ..errors import SceneError, shown, unknown
+from ..scene import fmu_of, is_number, is_positive, is_text, is_title, read
 
 FOLDER = Path(__file__).with_name("scenes")
 MODELS = ("smd", "coulomb", "stickslip")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+MOST_STEPS = 1_000_000
 SOURCES = ("x", "v", "F_spring")  # outputs that a connection may come from
 
 
@@ -78,12 +80,7 @@ def load(source: str, stiffness: dict[str, float]) -> Coupled:
         if source not in names:
             raise SceneError(f"{unknown('coupled scene', source, names)}, or the path of a .toml file")
         path = names[source]
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise SceneError(f"cannot read the scene {path}: {error.strerror}") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SceneError(f"scene {path.stem}: not valid TOML: {error}") from None
+    table = read(path)
     try:
         return build(path, table, stiffness)
     except SceneError as error:
@@ -93,17 +90,24 @@ def load(source: str, stiffness: dict[str, float]) -> Coupled:
 def build(path: Path, table: dict[str, Any], stiffness: dict[str, float]) -> Coupled:
     """The scene in a table."""
     check(
-        table, {"title": is_text, "stop": is_positive, "steps": is_steps, "parts": is_table}, "springs", "connections"
+        table, {"title": is_title, "stop": is_positive, "steps": is_steps, "parts": is_table}, "springs", "connections"
     )
+    for key in ("springs", "connections"):
+        if not is_tables(table.get(key, [])):
+            raise SceneError(f"{key} = {shown(table[key])} cannot be used; write each of them as [[{key}]]")
     parts: dict[str, dict[str, Any]] = {}
     for name, part in table["parts"].items():
+        if not NAME.fullmatch(name):
+            raise SceneError(f"part {shown(name)}: a name has letters, digits and _, and begins with a letter")
         check(part, {"model": is_text}, "values")
         if part["model"] not in MODELS:
             raise SceneError(f"part {name}: {unknown('model', part['model'], MODELS)}")
         values = part.get("values", {})
+        if not isinstance(values, dict):
+            raise SceneError(f"part {name}: values = {shown(values)} is not a table, as in {{m = 2.0}}")
         for key, value in values.items():
             if not is_number(value):
-                raise SceneError(f"part {name}: {key} = {value!r} is not a finite number")
+                raise SceneError(f"part {name}: {key} = {shown(value)} is not a finite number")
         parts[name] = {"model": part["model"], "values": {key: float(value) for key, value in values.items()}}
     connections = []
     for spring in table.get("springs", []):
@@ -121,13 +125,19 @@ def build(path: Path, table: dict[str, Any], stiffness: dict[str, float]) -> Cou
         check(each, {"from": is_text, "to": is_text, "factor": is_number})
         source, _, output = each["from"].partition(".")
         if output not in SOURCES:
-            raise SceneError(f"from = {each['from']!r}: {unknown('output', output, SOURCES)}")
+            raise SceneError(f"from = {shown(each['from'])}: {unknown('output', output, SOURCES)}")
         connections.append(Connection(known(source, parts), output, known(each["to"], parts), float(each["factor"])))
     driven = [each.sink for each in connections]
     twice = [name for name in parts if driven.count(name) > 1]
     if twice:
         raise SceneError(f"part {twice[0]} is driven twice; an input takes one connection")
     steps = tuple(sorted((float(h) for h in table["steps"]), reverse=True))
+    for step in steps:
+        if not 1 <= float(table["stop"]) / step <= MOST_STEPS:
+            count = f"{float(table['stop']) / step:.6g}"
+            raise SceneError(
+                f"steps: {step!r} s makes {count} steps up to the stop; from 1 to {MOST_STEPS} are allowed"
+            )
     whole = tuple(Part(name, part["model"], fmu_of(part["model"]), part["values"]) for name, part in parts.items())
     return Coupled(path.stem, table["title"], float(table["stop"]), steps, whole, tuple(connections))
 
@@ -141,11 +151,15 @@ def check(table: dict[str, Any], needed: dict[str, Any], *more: str) -> None:
         if key not in table:
             raise SceneError(f"the key '{key}' is missing")
         if not accepts(table[key]):
-            raise SceneError(f"{key} = {table[key]!r} cannot be used; see the examples in harness/coupled/scenes")
+            raise SceneError(f"{key} = {shown(table[key])} cannot be used; see the examples in harness/coupled/scenes")
 
 
 def is_table(value: object) -> bool:
-    return isinstance(value, dict) and all(isinstance(part, dict) for part in value.values())
+    return isinstance(value, dict) and len(value) > 0 and all(isinstance(part, dict) for part in value.values())
+
+
+def is_tables(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(each, dict) for each in value)
 
 
 def is_steps(value: object) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ..compare.difference import Comparison
-from .style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
+from .style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
 
 MOST = 8  # variables drawn, those that differ most
 
@@ -17,12 +17,16 @@ def draw(found: Comparison, path: Path) -> None:
         figure.suptitle(f"{found.one.name} and {found.two.name}", fontsize=11)
         panels = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)
         for (both, off), each in zip(panels, chosen, strict=True):
-            both.plot(found.one.time, found.one.columns[each.name], color=BLUE, label=found.one.name)
+            both.plot(found.one.time, drawable(found.one.columns[each.name]), color=BLUE, label=found.one.name)
             both.plot(
-                found.two.time, found.two.columns[each.name], color=ORANGE, linestyle="--", label=f"{found.two.name} "
+                found.two.time,
+                drawable(found.two.columns[each.name]),
+                color=ORANGE,
+                linestyle="--",
+                label=f"{found.two.name} ",
             )
             both.set_ylabel(label(each.name, each.unit))
-            off.plot(found.time, each.left - each.right, color=GREEN, linewidth=0.8)
+            off.plot(found.time, drawable(each.left) - drawable(each.right), color=GREEN, linewidth=0.8)
             off.set_title(f"difference: largest {each.largest:.3g}, rms {each.rms:.3g} {each.unit}")
             off.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
             off.axvline(each.at, color=GREY, linestyle=":", linewidth=0.8)

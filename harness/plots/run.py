@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..run import Run
-from .style import BLUE, HEIGHT, ORANGE, WIDTH, label, sheet
+from .style import BLUE, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
 
 OVER_TIME = ("position", "velocity", "acceleration")  # left, one below the other; the others stand on the right
 EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
@@ -36,7 +36,7 @@ def draw(run: Run, results: Results, path: Path) -> None:
 def history(axes: Axes, run: Run, role: str) -> None:
     """One output over time."""
     name = run.scene.motion[role]
-    axes.plot(run.time, run.columns[name], color=BLUE, label=name)
+    axes.plot(run.time, drawable(run.columns[name]), color=BLUE, label=name)
     axes.set_title(run.descriptions[name])
     axes.set_ylabel(label(name, run.units[name]))
     axes.set_xlabel("t [s]")
@@ -67,7 +67,7 @@ def acceleration(axes: Axes, run: Run, results: Results) -> None:
 def phase(axes: Axes, run: Run, results: Results) -> None:
     """Velocity over position."""
     x, v = run.scene.motion["position"], run.scene.motion["velocity"]
-    axes.plot(run.columns[x], run.columns[v], color=BLUE)
+    axes.plot(drawable(run.columns[x]), drawable(run.columns[v]), color=BLUE)
     axes.set_title("phase plane")
     axes.set_xlabel(label(x, run.units[x]))
     axes.set_ylabel(label(v, run.units[v]))

@@ -30,14 +30,14 @@ class Report:
 def write(results: Path) -> Report:
     """Write the page of all results below a folder into it; HarnessError if there are none."""
     found = sections(results)
-    if not any(part.grid or part.pictures for section in found for part in section.parts):
+    if not any(part.grid or part.pictures or part.lost for section in found for part in section.parts):
         raise HarnessError(
             f"there are no results in {results}: make some with `python -m harness`, or name another --out"
         )
     path = results / FILE
     fresh = path.with_suffix(".new")
     try:
-        fresh.write_text(page(found), encoding="utf-8")
+        fresh.write_text(page(found), encoding="utf-8", errors="replace")
         fresh.replace(path)
     except OSError as error:
         raise HarnessError(f"cannot write {path}: {error.strerror}") from None

@@ -4,8 +4,12 @@ import csv
 import json
 from base64 import b64encode
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+
+from ..errors import reason
 
 MODELS = {
     "smd": "Spring, mass and viscous damper. Every swing loses the same share: the envelope is an exponential.",
@@ -24,6 +28,7 @@ CASES = {  # what the published scenes are about
     "pacejka": ("pacejka-0.01", "pacejka-0.001"),
     "pendulum": ("pendulum",),
 }
+PNG, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 SHORTEST = 12  # decimals cut from long numbers in cells
 
 
@@ -45,12 +50,14 @@ class Grid:
 
 @dataclass(frozen=True)
 class Part:
-    """A piece of a section: heading, sentences, table and pictures, as far as there are any."""
+    """A piece of a section: heading, sentences, table and pictures, as far as there are any; `lost` if its results
+    could not be read, which a sentence says."""
 
     title: str
     sentences: tuple[str, ...] = ()
     grid: Grid | None = None
     pictures: tuple[Picture, ...] = ()
+    lost: bool = False
 
 
 @dataclass(frozen=True)
@@ -72,6 +79,16 @@ def sections(results: Path) -> list[Section]:
     ]
 
 
+def read(place: Path, make: Callable[[Path], Part]) -> Part:
+    """What is made of a file or folder of results; a sentence in its place if that holds something else."""
+    try:
+        return make(place)
+    except Exception as error:  # it may hold anything: half of a file, another version's, somebody else's
+        return Part(
+            place.name, (f"{place} cannot be shown ({type(error).__name__}: {reason(error)[:100]}).",), lost=True
+        )
+
+
 def oscillators(results: Path) -> Section:
     parts, missing = [], []
     for model, text in MODELS.items():
@@ -80,158 +97,180 @@ def oscillators(results: Path) -> Section:
         if not present:
             parts.append(Part(model, (text,)))
         for i, case in enumerate(present):
-            grid = table(results / case / "figures.csv")
-            picture = drawn(results / case / "figure.png", f"{case}: position, velocity and phase plane of the run")
-            parts.append(Part(case, () if i else (text,), grid, picture))
+            parts.append(read(results / case, partial(oscillator, "" if i else text)))
     intro = "What each of the five does, with figures measured here beside those that were published."
     return Section("oscillators", "The five oscillators", intro, tuple(parts), tuple(missing))
 
 
+def oscillator(text: str, folder: Path) -> Part:
+    picture = drawn(folder / "figure.png", f"{folder.name}: position, velocity and phase plane of the run")
+    return Part(folder.name, (text,) if text else (), table(folder / "figures.csv"), picture)
+
+
 def decays(results: Path) -> Section:
-    parts = []
-    for folder in folders(results / "decay", "decay.json"):
-        found = json.loads((folder / "decay.json").read_text(encoding="utf-8"))
-        turns = {each["name"]: each for each in found["turning_points"]}
-        peaks = {each["name"]: each for each in found["published"]}
-        rows = tuple(
-            (
-                each["text"],
-                interval(each),
-                interval(turns.get(each["name"])),
-                interval(peaks.get(each["name"])),
-                unit(each),
-            )
-            for each in found["fit"]
-        )
-        grid = Grid(("", "whole signal", "turning points", "first and last peak", "unit"), rows)
-        alternative = (
-            f"Decay of {found['record']}: signal, turning points, envelope and fit, and residuals. {found['sentence']}"
-        )
-        sentences = (found["sentence"], *found["remarks"])
-        parts.append(Part(found["record"], sentences, grid, drawn(folder / "figure.png", alternative)))
+    parts = [read(folder, decay) for folder in folders(results / "decay", "decay.json")]
     missing = () if parts else (("a decay", "python -m harness decay coulomb"),)
     intro = "Damping and dry friction told apart, by the whole signal and by its turning points, with 95 % margins."
     return Section("decay", "Decay", intro, tuple(parts), missing)
 
 
+def decay(folder: Path) -> Part:
+    found = json.loads((folder / "decay.json").read_text(encoding="utf-8"))
+    turns = {each["name"]: each for each in found["turning_points"]}
+    peaks = {each["name"]: each for each in found["published"]}
+    rows = tuple(
+        (
+            each["text"],
+            interval(each),
+            interval(turns.get(each["name"])),
+            interval(peaks.get(each["name"])),
+            unit(each),
+        )
+        for each in found["fit"]
+    )
+    grid = Grid(("", "whole signal", "turning points", "first and last peak", "unit"), rows)
+    alternative = (
+        f"Decay of {found['record']}: signal, turning points, envelope and fit, and residuals. {found['sentence']}"
+    )
+    sentences = (found["sentence"], *found["remarks"])
+    return Part(found["record"], sentences, grid, drawn(folder / "figure.png", alternative))
+
+
 def steps(results: Path) -> Section:
-    rows = []
-    for case in (case for cases in CASES.values() for case in cases):
-        found = table(results / case / "steps.csv", cut=False)
-        if found and found.rows:
-            sizes = [float(cells[1]) for cells in found.rows]
-            refused = sum(float(cells[2]) for cells in found.rows)
-            figures = (f"{1e3 * size:.4g}" for size in (min(sizes), sum(sizes) / len(sizes), max(sizes)))
-            rows.append((case, str(len(sizes)), *figures, f"{refused:g}"))
+    cases = [case for cases in CASES.values() for case in cases if (results / case / "steps.csv").is_file()]
+    made = [read(results / case, sizes) for case in cases]
+    rows = [row for part in made if part.grid for row in part.grid.rows]
     heads = ("case", "steps", "smallest [ms]", "mean [ms]", "largest [ms]", "refused")
-    parts = (Part("The solver's own steps", (), Grid(heads, tuple(rows))),) if rows else ()
+    parts = [Part("The solver's own steps", (), Grid(heads, tuple(rows)))] if rows else []
+    parts += [part for part in made if not part.grid]
     intro = (
         "Seen through solver.t_next, whatever the communication step. Where friction is a jump that the solver is not "
         "told of, its steps collapse at every reversal; where stick and slip are modes, they do not."
     )
-    return Section("steps", "Steps", intro, parts, () if rows else (("steps", "python -m harness"),))
+    return Section("steps", "Steps", intro, tuple(parts), () if rows else (("steps", "python -m harness"),))
+
+
+def sizes(folder: Path) -> Part:
+    """The row of one case."""
+    rows = table(folder / "steps.csv", cut=False).rows
+    h = [float(cells[1]) for cells in rows]
+    figures = (f"{1e3 * size:.4g}" for size in (min(h), sum(h) / len(h), max(h)))
+    row = (folder.name, str(len(h)), *figures, f"{sum(float(cells[2]) for cells in rows):g}")
+    return Part(folder.name, grid=Grid((), (row,)))
 
 
 def precision(results: Path) -> Section:
-    parts, missing = [], []
+    parts, missing, folder = [], [], results / "precision"
     for model in MODELS:
-        picture = drawn(
-            results / "precision" / f"{model}.png",
-            f"{model}: run time and right-hand sides over the largest error, by method",
-        )
-        if picture:
-            text = results / "precision" / f"{model}.txt"
-            said = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
-            exchanged = table(results / "precision" / f"{model}-exchange.csv")
-            parts.append(Part(model, said, exchanged, picture))
-            if not exchanged:
-                again = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
-                missing.append((f"{model} in model exchange", again))
-        else:
+        if not (folder / f"{model}.png").is_file():
             missing.append((model, f"python -m harness precision {model}"))
-    anchors = table(results / "precision" / "anchors.csv")
-    if anchors:
-        parts.append(Part("Anchors from the literature", (), anchors))
+            continue
+        parts.append(read(folder / model, tradeoff))
+        if not (folder / f"{model}-exchange.csv").is_file():
+            again = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
+            missing.append((f"{model} in model exchange", again))
+    parts += whole(folder / "anchors.csv", "Anchors from the literature")
     intro = "Error against run time and against right-hand sides; lower left is better. References are certified."
     return Section("precision", "Error against run time", intro, tuple(parts), tuple(missing))
 
 
+def tradeoff(place: Path) -> Part:
+    """One model's, whose files begin with its name."""
+    picture = drawn(
+        place.with_suffix(".png"), f"{place.name}: run time and right-hand sides over the largest error, by method"
+    )
+    text, exchanged = place.with_suffix(".txt"), place.with_name(f"{place.name}-exchange.csv")
+    said = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
+    return Part(place.name, said, table(exchanged) if exchanged.is_file() else None, picture)
+
+
 def stability(results: Path) -> Section:
-    file, parts = results / "stability/stability.csv", []
-    found = table(file, cut=False)
-    if found:
-        at = {name: i for i, name in enumerate(found.heads)}
-        endings = Counter((row[at["model"]], row[at["method"]], row[at["ended"]]) for row in found.rows)
-        kinds = sorted({ending for _, _, ending in endings})
-        pairs = sorted(
-            {(model, method) for model, method, _ in endings}, key=lambda pair: (list(MODELS).index(pair[0]), pair)
-        )
-        rows = tuple((*pair, *(str(endings[(*pair, kind)]) for kind in kinds)) for pair in pairs)
-        picture = drawn(
-            results / "stability/region.png", "Steps of each method over the speed at the peak of the friction curve"
-        )
-        text = f"{len(found.rows)} stiff and extreme cases; how each ended:"
-        parts.append(Part("Endings", (text,), Grid(("model", "method", *kinds), rows), picture))
+    file = results / "stability/stability.csv"
+    parts = [read(file, endings)] if file.is_file() else []
     intro = "Every case either finishes within its error bound or is refused with a sentence: none hangs, none lies."
     missing = () if parts else (("stability", "python -m harness stability"),)
     return Section("stability", "Stability", intro, tuple(parts), missing)
 
 
+def endings(file: Path) -> Part:
+    found = table(file, cut=False)
+    at = {name: i for i, name in enumerate(found.heads)}
+    counts = Counter((row[at["model"]], row[at["method"]], row[at["ended"]]) for row in found.rows)
+    kinds = sorted({ending for _, _, ending in counts})
+    pairs = sorted(
+        {(model, method) for model, method, _ in counts}, key=lambda pair: (list(MODELS).index(pair[0]), pair)
+    )
+    rows = tuple((*pair, *(str(counts[(*pair, kind)]) for kind in kinds)) for pair in pairs)
+    picture = drawn(
+        file.with_name("region.png"), "Steps of each method over the speed at the peak of the friction curve"
+    )
+    text = f"{len(found.rows)} stiff and extreme cases; how each ended:"
+    return Part("Endings", (text,), Grid(("model", "method", *kinds), rows), picture)
+
+
 def importers(results: Path) -> Section:
-    found = table(results / "importers/importers.csv")
-    parts = (Part("Checks", (), found),) if found else ()
-    missing = () if found else (("importers", "python -m harness importers"),)
-    return Section("importers", "Importers", "The same FMUs in other tools, beside fmpy.", parts, missing)
+    parts = whole(results / "importers/importers.csv", "Checks")
+    missing = () if parts else (("importers", "python -m harness importers"),)
+    return Section("importers", "Importers", "The same FMUs in other tools, beside fmpy.", tuple(parts), missing)
 
 
 def sweeps(results: Path) -> Section:
-    parts = []
-    for folder in folders(results / "sweep", "sweep.csv"):
-        found = table(folder / "sweep.csv", cut=False)
-        assert found is not None
-        failed = sum(bool(row[found.heads.index("error")]) for row in found.rows)
-        measured = [head for head in found.heads if head != "error"]
-        text = f"{len(found.rows)} runs, {failed} failed. Columns: {', '.join(measured)}."
-        parts.append(Part(folder.name, (text,), None, drawn(folder / "figure.png", f"Sweep {folder.name}. {text}")))
+    parts = [read(folder, swept) for folder in folders(results / "sweep", "sweep.csv")]
     command = "python -m harness sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measure slips"
     intro = "What happens over many parameters; known boundaries are dashed."
     return Section("sweeps", "Sweeps", intro, tuple(parts), () if parts else (("a sweep", command),))
 
 
+def swept(folder: Path) -> Part:
+    found = table(folder / "sweep.csv", cut=False)
+    failed = sum(bool(row[found.heads.index("error")]) for row in found.rows)
+    measured = [head for head in found.heads if head != "error"]
+    text = f"{len(found.rows)} runs, {failed} failed. Columns: {', '.join(measured)}."
+    return Part(folder.name, (text,), None, drawn(folder / "figure.png", f"Sweep {folder.name}. {text}"))
+
+
 def comparisons(results: Path) -> Section:
-    parts = []
-    for folder in folders(results / "compare", "compare.json"):
-        found = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
-        rows = tuple(
-            (each["name"], f"{each['largest']:.3g}", f"{each['rms']:.3g}", f"{each['relative']:.2g}", each["unit"])
-            for each in found["variables"]
-        )
-        grid = Grid(("variable", "largest", "rms", "relative", "unit"), rows)
-        said = tuple(filter(None, (found["one"]["note"], found["two"]["note"], found["events"])))
-        picture = drawn(
-            folder / "figure.png", f"{found['one']['name']} and {found['two']['name']}, and their difference"
-        )
-        parts.append(Part(f"{found['one']['name']} and {found['two']['name']}", said, grid, picture))
+    parts = [read(folder, comparison) for folder in folders(results / "compare", "compare.json")]
     command = "python -m harness compare results/coulomb results/coulomb-sign"
     intro = "How far two results or two FMUs are apart."
     return Section("compare", "Comparisons", intro, tuple(parts), () if parts else (("a comparison", command),))
 
 
+def comparison(folder: Path) -> Part:
+    found = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
+    rows = tuple(
+        (each["name"], digits(each["largest"], 3), digits(each["rms"], 3), digits(each["relative"], 2), each["unit"])
+        for each in found["variables"]
+    )
+    grid = Grid(("variable", "largest", "rms", "relative", "unit"), rows)
+    title = f"{found['one']['name']} and {found['two']['name']}"
+    said = tuple(filter(None, (found["one"]["note"], found["two"]["note"], found["events"])))
+    return Part(title, said, grid, drawn(folder / "figure.png", f"{title}, and their difference"))
+
+
 def coupled(results: Path) -> Section:
-    parts = []
-    for folder in folders(results / "coupled", "error.csv"):
-        alternative = f"Coupled scene {folder.name}: positions beside the monolithic reference, and error over the step"
-        parts.append(Part(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.png", alternative)))
+    parts = [read(folder, pair) for folder in folders(results / "coupled", "error.csv")]
     missing = () if parts else (("a coupled scene", "python -m harness couple two-masses"),)
     intro = "Several FMUs joined, run by an existing engine, beside one model of the whole."
     return Section("coupled", "Coupled", intro, tuple(parts), missing)
 
 
+def pair(folder: Path) -> Part:
+    alternative = f"Coupled scene {folder.name}: positions beside the monolithic reference, and error over the step"
+    return Part(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.png", alternative))
+
+
 def bench(results: Path) -> Section:
-    found = table(results / "bench/bench.csv")
-    parts = (Part("Reached and seen", (), found),) if found else ()
-    missing = () if found else (("numbers", "python -m harness bench"),)
-    return Section("bench", "Numbers", "What was to be reached, and what was measured beside it.", parts, missing)
+    parts = whole(results / "bench/bench.csv", "Reached and seen")
+    missing = () if parts else (("numbers", "python -m harness bench"),)
+    return Section(
+        "bench", "Numbers", "What was to be reached, and what was measured beside it.", tuple(parts), missing
+    )
+
+
+def whole(file: Path, title: str) -> list[Part]:
+    """The part that shows all of a table, if there is one."""
+    return [read(file, lambda place: Part(title, (), table(place)))] if file.is_file() else []
 
 
 def folders(parent: Path, file: str) -> list[Path]:
@@ -243,15 +282,18 @@ def drawn(file: Path, text: str) -> tuple[Picture, ...]:
     """The picture in a file, if there is one."""
     if not file.is_file():
         return ()
-    return (Picture(f"data:image/png;base64,{b64encode(file.read_bytes()).decode()}", text),)
+    data = file.read_bytes()
+    if not (data.startswith(PNG) and PNG_END in data[-len(PNG_END) :]):
+        raise ValueError(f"{file.name} is not a whole PNG picture")
+    return (Picture(f"data:image/png;base64,{b64encode(data).decode()}", text),)
 
 
-def table(file: Path, cut: bool = True) -> Grid | None:
-    """The table in a CSV file, if there is one; `cut`: long numbers to four digits."""
-    if not file.is_file():
-        return None
+def table(file: Path, cut: bool = True) -> Grid:
+    """The table in a CSV file; `cut`: long numbers to four digits."""
     with file.open(encoding="utf-8", newline="") as text:
         heads, *rows = csv.reader(text)
+    if any(len(row) != len(heads) for row in rows):
+        raise ValueError(f"a row of {file.name} has more or fewer cells than its heading")
     return Grid(tuple(heads), tuple(tuple(shortened(cell) if cut else cell for cell in row) for row in rows))
 
 
@@ -263,10 +305,17 @@ def shortened(cell: str) -> str:
         return cell
 
 
+def digits(number: float | None, count: int) -> str:
+    """A number with so many digits; none where JSON had no number for it."""
+    return "not finite" if number is None else f"{number:.{count}g}"
+
+
 def interval(each: dict | None) -> str:
     """Value and half of its 95 % interval, where there is one."""
     if each is None:
         return ""
+    if each["value"] is None:
+        return "not finite"
     if each["high"] is None:
         return f"{each['value']:.5g}"
     return f"{each['value']:.7g} ± {each['high'] - each['value']:.1g}"

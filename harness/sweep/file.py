@@ -20,7 +20,6 @@ from .study import Sweep, forget, perform
 
 FOLDER = "sweep"
 FILES = ("sweep.nc", "sweep.csv", "figure.png")
-MOST = 10_000_000  # runs
 
 
 @dataclass(frozen=True)
@@ -39,12 +38,13 @@ class Asked:
 
 @dataclass(frozen=True)
 class Swept:
-    """The finished sweep: its `data`, where its files are, how many runs were done before, how many of all failed, and
-    the seconds that the new ones took without the start of the workers."""
+    """The finished sweep: its `data`, where its files are, how many runs were done before, how many lines about them
+    were damaged, how many of all failed, and the seconds that the new ones took without the start of the workers."""
 
     data: xarray.Dataset
     folder: Path
     before: int
+    damaged: int
     failed: int
     seconds: float
 
@@ -59,16 +59,14 @@ def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, repo
     runs = Runs(file.stem, names, dict(map(assigned, asked.values)), asked.stop, asked.measures)
     described = describe(runs, axes, file)
     places = points(axes, asked.random, asked.seed)
-    if len(places) > MOST:
-        raise SceneError(f"{len(places)} runs are more than {MOST}; take fewer values")
-    sweep = Sweep(runs, axes, places, asked.random, asked.seed, file.read_bytes())
+    sweep = Sweep(runs, axes, places, asked.random, asked.seed, file.read_bytes(), len(described["columns"]))
     folder = out / FOLDER / (asked.name or "-".join((runs.model, *names)))
-    rows, before, seconds = perform(sweep, out / FOLDER, scheduler, workers, report)
-    data = dataset(sweep, rows, described)
-    with replacing(folder, FILES) as fresh:
+    with replacing(folder, FILES) as fresh:  # from before the runs on: a place that cannot be written is told at once
+        rows, before, damaged, seconds = perform(sweep, out / FOLDER, scheduler, workers, report)
+        data = dataset(sweep, rows, described)
         save(data, fresh)
     forget(sweep, out / FOLDER)
-    return Swept(data, folder, before, sum(1 for _, error in rows if error), seconds)
+    return Swept(data, folder, before, damaged, sum(1 for _, error in rows if error), seconds)
 
 
 def fmu_file(model: str) -> Path:

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 from itertools import product
-from math import isfinite, log
+from math import isfinite, log, prod
 
 import numpy as np
 
-from ..errors import SceneError
+from ..errors import LONGEST, SceneError
 
+MOST = 10_000_000  # runs
 HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --random, m=1:2"
 
 
@@ -24,7 +25,7 @@ def axis(text: str, random: bool) -> Axis:
     """The axis that a text names; SceneError if it does not name one."""
     name, _, span = text.partition("=")
     name = name.strip()
-    wrong = SceneError(f"--vary {text} is not understood; write it {HELP}")
+    wrong = SceneError(f"--vary {text[:LONGEST]} is not understood; write it {HELP}")
     words = span.split(":")
     ratio = words[-1] == "log"
     words = words[: len(words) - ratio]
@@ -50,11 +51,12 @@ def axis(text: str, random: bool) -> Axis:
 
 def spread(low: float, high: float, count: int, ratio: bool) -> tuple[float, ...]:
     """`count` values from low to high, both included."""
-    if count < 1:
+    if not 1 <= count <= MOST:
         raise ValueError
     if ratio and low > 0 and high > 0:
         return tuple(np.geomspace(low, high, count).tolist())
-    return tuple(np.linspace(low, high, count).tolist())
+    with np.errstate(all="ignore"):  # what is not finite then is refused
+        return tuple(np.linspace(low, high, count).tolist())
 
 
 def points(axes: tuple[Axis, ...], random: int | None, seed: int) -> np.ndarray:
@@ -62,6 +64,9 @@ def points(axes: tuple[Axis, ...], random: int | None, seed: int) -> np.ndarray:
 
     M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979).
     """
+    count = prod(len(each.values) for each in axes) if random is None else random
+    if count > MOST:
+        raise SceneError(f"{count} runs are more than {MOST}; take fewer values")
     if random is None:
         return np.array(list(product(*(each.values for each in axes))))
     from scipy.stats import qmc
@@ -70,7 +75,7 @@ def points(axes: tuple[Axis, ...], random: int | None, seed: int) -> np.ndarray:
     columns = []
     for each, column in zip(axes, share.T, strict=True):
         low, high = each.values
-        columns.append(low * np.exp(column * log(high / low)) if each.log else low + column * (high - low))
+        columns.append(np.exp(log(low) + column * (log(high) - log(low))) if each.log else low + column * (high - low))
     return np.array(columns).T
 
 
@@ -78,7 +83,7 @@ def assigned(text: str) -> tuple[str, float | str]:
     """Name and value of a text like k=100 or solver.method=ode23."""
     name, mark, value = text.partition("=")
     if not mark or not name.strip() or not value.strip():
-        raise SceneError(f"--set {text} is not understood; write it as in k=100 or solver.method=ode23")
+        raise SceneError(f"--set {text[:LONGEST]} is not understood; write it as in k=100 or solver.method=ode23")
     try:
         return name.strip(), float(value)
     except ValueError:

@@ -7,7 +7,7 @@ on who ran them, nor in which order.
 
 import json
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -35,7 +35,8 @@ EXTRA = "python -m pip install 'friction-fmus[sweep]'"
 
 @dataclass(frozen=True)
 class Sweep:
-    """The `runs` at `points` (n, len(varied)): a grid over `axes`, or a sample of `random` points with its `seed`."""
+    """The `runs` at `points` (n, len(varied)): a grid over `axes`, or a sample of `random` points with its `seed`.  A
+    row has so many `columns`."""
 
     runs: Runs
     axes: tuple[Axis, ...]
@@ -43,6 +44,7 @@ class Sweep:
     random: int | None
     seed: int
     fmu: bytes
+    columns: int
 
     @property
     def digest(self) -> str:
@@ -58,13 +60,13 @@ class Sweep:
 
 def perform(
     sweep: Sweep, folder: Path, scheduler: str | None, workers: int, report: Callable[[float], None]
-) -> tuple[list[Row], int, float]:
-    """The rows of all points, in their order; how many of them an earlier, interrupted sweep had finished; and the
-    seconds that the others took, once the workers were there.
+) -> tuple[list[Row], int, int, float]:
+    """The rows of all points, in their order; how many of them an earlier, interrupted sweep had finished; how many
+    lines of its journal were damaged; and the seconds that the others took, once the workers were there.
 
     `folder` receives the journal; it is removed by `forget` once the results are written.
     """
-    kept = Journal(folder / f".{sweep.key}.jsonl")
+    kept = Journal(folder / f".{sweep.key}.jsonl", len(sweep.points), sweep.columns)
     before, seconds = len(kept.rows), 0.0
     left = [i for i in range(len(sweep.points)) if i not in kept.rows]
     if left:
@@ -80,7 +82,7 @@ def perform(
                     forget(sweep, folder)
                 state = f"{len(kept.rows)} of {len(sweep.points)} runs are kept"
                 raise Interrupted(f"interrupted: {state}; the same command does the rest") from None
-    return [kept.rows[i] for i in range(len(sweep.points))], before, seconds
+    return [kept.rows[i] for i in range(len(sweep.points))], before, kept.damaged, seconds
 
 
 def finished(dask: Any, sweep: Sweep, left: list[int]) -> Iterator[list[tuple[int, Row]]]:
@@ -161,36 +163,63 @@ def client(scheduler: str | None, workers: int) -> Iterator[Any]:
 
 
 class Journal:
-    """The finished runs of one sweep, a line for each, in a file that is complete up to its last whole line."""
+    """The finished runs of one sweep, a line for each, in a file; what is no such line is left out.
 
-    def __init__(self, path: Path) -> None:
+    `damaged` counts those, but for the last: a kill cut it off.
+    """
+
+    def __init__(self, path: Path, points: int, columns: int) -> None:
         self.path = path
-        self.rows: dict[int, Row] = {}
-        if path.exists():
-            for line in path.read_text(encoding="utf-8").splitlines():
-                try:
-                    i, values, error = json.loads(line)
-                except ValueError:
-                    break  # cut off by a kill
-                self.rows[i] = (values, error)
+        with self.told():
+            lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
+        found = [kept(line, points, columns) for line in lines]
+        self.rows: dict[int, Row] = dict(filter(None, found))
+        self.damaged = found[:-1].count(None) + (bool(found) and not found[-1] and lines[-1].endswith(b"\n"))
+
+    @contextmanager
+    def told(self) -> Iterator[None]:
+        """What the file system refuses becomes one sentence."""
+        try:
+            yield
+        except OSError as error:
+            raise HarnessError(f"the journal {self.path} cannot be used: {error.strerror}") from None
 
     @contextmanager
     def open(self) -> Iterator[None]:
         """Keep the file open for writing, without what was cut off."""
-        self.path.parent.mkdir(parents=True, exist_ok=True)
         fresh = self.path.with_suffix(".new")
-        with fresh.open("w", encoding="utf-8") as self.file:
+        with self.told():
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.file = fresh.open("w", encoding="utf-8")
+        try:
             self.write(self.rows.items())
-            fresh.replace(self.path)
+            with self.told():
+                fresh.replace(self.path)
             yield
+        finally:
+            with suppress(OSError):  # of a full disk, which was told
+                self.file.close()
+            fresh.unlink(missing_ok=True)
 
     def add(self, block: list[tuple[int, Row]]) -> None:
         self.rows.update(block)
         self.write(block)
 
     def write(self, rows: Iterable[tuple[int, Row]]) -> None:
-        self.file.writelines(json.dumps([i, *row]) + "\n" for i, row in rows)
-        self.file.flush()
+        with self.told():
+            self.file.writelines(json.dumps([i, *row]) + "\n" for i, row in rows)
+            self.file.flush()
+
+
+def kept(line: bytes, points: int, columns: int) -> tuple[int, Row] | None:
+    """The number of a run and its row, None if a line holds none."""
+    try:
+        i, values, error = json.loads(line)
+        numbers = isinstance(values, list) and all(isinstance(value, float) for value in values)
+        whole = numbers and isinstance(error, str) and len(values) == (0 if error else columns)
+        return (i, (values, error)) if whole and type(i) is int and 0 <= i < points else None
+    except (ValueError, TypeError, RecursionError):
+        return None
 
 
 def forget(sweep: Sweep, folder: Path) -> None:
