@@ -47,8 +47,10 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
     """A bar on standard error, gone at the end; yields what tells it the present scene and its share done."""
     console = Console(file=sys.stderr)  # this very stream: runs redirect sys.stderr
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    hidden = quiet or not console.is_terminal
-    with Progress(*columns, console=console, transient=True, redirect_stderr=False, disable=hidden) as bar:
+    if quiet or not console.is_terminal:  # a bar that is told to be silent writes an empty line, until rich 14.2
+        yield lambda name, share: None
+        return
+    with Progress(*columns, console=console, transient=True, redirect_stderr=False) as bar:
         task = bar.add_task("", total=total)
         done: list[str] = []
 
