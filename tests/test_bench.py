@@ -10,7 +10,7 @@ from native_fmus import built as native_built
 
 from harness.bench import in_c, native
 from harness.bench import speed as bench_speed
-from harness.bench.accuracy import default, drift, exact, late
+from harness.bench.accuracy import default, drift, exact, last, late
 from harness.bench.measure import Beside, Measure, best
 from harness.bench.speed import communication_step, inside_python, many_runs, step
 from harness.bench.study import FILE, FOLDER, bench, measures
@@ -53,10 +53,10 @@ def of(all_measures, function):
 
 
 def test_exact_and_its_events_and_the_pendulum_reach_their_numbers_and_a_stuck_body_stays(all_measures):
-    chosen = [call for function in (exact, late, drift) for call in of(all_measures, function)]
+    chosen = [call for function in (exact, late, last, drift) for call in of(all_measures, function)]
     chosen += [call for call in of(all_measures, default) if call.args[0] == "pendulum"]
     found = [call() for call in chosen]
-    assert len(found) == 3 + 2 + 3 + 2
+    assert len(found) == 3 + 2 + 2 + 3 + 2
     assert [measure.what for measure in found if not measure.reached] == []
 
 

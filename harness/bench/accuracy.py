@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
+from math import ulp
 from random import Random
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +15,7 @@ from ..reference import MODELS
 from ..scene import fmu_of
 from ..stability.probe import Card, Motion, Setting, card, run
 from ..stability.truth import Grid, truth
+from ..stability.truth_linear import mp
 from .measure import Beside, Measure
 
 EXACT = ("smd", "coulomb", "stickslip")
@@ -27,6 +30,8 @@ def accuracy() -> list[Callable[[], Measure]]:
     return [
         *(partial(exact, model, cards[model]) for model in EXACT),
         *(partial(late, model, cards[model]) for model in EXACT[1:]),
+        partial(last, "coulomb", {"f": 1e-7}, 300_000, swings),
+        partial(last, "stickslip", {}, 200_000, slips),
         *(partial(default, "pendulum", cards["pendulum"], "pin_load", load, 1e-9) for load in ("weight", "reaction")),
         *(partial(default, "pacejka", cards["pacejka"], "x_m", 10.0**-n, 1e-6) for n in range(2, 7)),
         *(partial(between_grids, model, cards[model]) for model in MODELS),
@@ -68,6 +73,37 @@ def late(model: str, its: Card) -> Measure:
         raise HarnessError(f"{model}: the modes after its events are not the true ones")
     off = max(abs(t / true - 1) for (t, _), (true, _) in zip(found, answer.events, strict=True))
     return Measure(f"{model}, exact: times of {len(found)} events", off, "1", 1e-14, (CLOSED,))
+
+
+def last(model: str, values: dict[str, float], number: int, law: Callable[[Any, int], Any]) -> Measure:
+    """How far off the time of the last of many events is, in units of its last place."""
+    inside = Inside.prepared(embedded(fmu_of(model)), values, "exact", 0.0)
+    true, next_one = (law(inside.model, n) for n in (number, number + 1))
+    stop = float((true + next_one) / 2)
+    inside.motion([stop * i / 10 for i in range(10)] + [stop])
+    inside.model.solver.report(inside.model.events)
+    events = inside.model.events
+    if events.count != number:
+        raise HarnessError(f"{model}: {events.count} events, not {number}")
+    off = float(abs(events.t_last - true)) / ulp(events.t_last)
+    what = f"{model}, exact: the last of {number} events, units in the last place"
+    return Measure(what, off, "1", 4.0, (CLOSED,))
+
+
+def swings(model: Any, number: int) -> Any:
+    """When a mass on a spring turns for the n-th time: after as many half periods."""
+    return number * mp.pi * mp.sqrt(mp.mpf(model.m) / mp.mpf(model.k))
+
+
+def slips(model: Any, number: int) -> Any:
+    """When the sled breaks away (odd) or sticks (even) for the n-th time.
+
+    It sticks while the stretch of its spring grows from 2 d - h to h, which friction holds, and slips about d.
+    """
+    k, u, w = mp.mpf(model.k), mp.mpf(model.v_driver), mp.sqrt(mp.mpf(model.k) / mp.mpf(model.m))
+    h, d = (mp.mpf(mu) * mp.mpf(model.m) * mp.mpf(model.g) / k for mu in (model.mu_s, model.mu_d))
+    slip, stick = 2 * (mp.pi - mp.atan2(w * (h - d), u)) / w, 2 * (h - d) / u
+    return h / u + (number - 1) // 2 * (slip + stick) + (0 if number % 2 else slip)
 
 
 def between_grids(model: str, its: Card) -> Measure:
