@@ -233,7 +233,7 @@ class Hosted(Saved):
 
     def fail(self, sentence):
         """Say the sentence, and answer NaN from now on."""
-        self.failure, self.observed = sentence, False
+        self.failure, self.observed = printable(sentence), False
         self.silence()
         self.say(sentence)
         return False
