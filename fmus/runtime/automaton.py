@@ -8,9 +8,9 @@ based on the synchronous data flow principle, CACSD 1999).
 
 from math import fabs, inf
 
-from .exact import NEAR
 from .methods import EXACT
 from .oscillator import Oscillator
+from .rounding import NEAR
 from .step import HYBRID, STUCK
 
 BACKWARD, FORWARD = -1, 1

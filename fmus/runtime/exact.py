@@ -13,9 +13,9 @@ oscillator here has both.
 
 from math import atan2, copysign, cos, exp, expm1, fabs, inf, log1p, pi, sin, sqrt
 
+from .rounding import NEAR
+
 UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE = 1, 2, 3, 4
-ULP = 2.220446049250313e-16
-NEAR = 64.0 * ULP  # how far rounding may carry a closed form from a tie, as a share
 
 
 class Exact:

@@ -15,7 +15,8 @@ just beyond the event.
 from math import fabs, nan
 
 from .march import NOMINAL
-from .step import NEARLY, STUCK, ULP
+from .rounding import ULP
+from .step import NEARLY, STUCK
 
 BEYOND, LEAST = 4.0 * ULP, 1e-300  # of the limit; of a speed and a force
 TOLERANCE = 1e-4  # taken for the importer's, which nobody tells, where solver.rtol is 0

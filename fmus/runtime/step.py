@@ -7,9 +7,9 @@ ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci
 
 from math import fabs, inf
 
-from .exact import NEAR, ULP
 from .interpolant import Interpolant
 from .methods import EXACT, Methods
+from .rounding import NEAR, ULP
 
 OK, DIVERGED, STALLED = 0, 1, 2
 
