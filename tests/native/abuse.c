@@ -199,6 +199,13 @@ static void refuses_forged(Instance *it, const State *forged, bool good)
     HOLDS(fmi2SetFMUstate(it, &sealed) == fmi2Error);
 }
 
+/* One more refused value. */
+static void refuse_in(State *state, fmi2ValueReference reference, Reason reason, double value)
+{
+    state->refused[reference] = (Refusal){reason, value, ++state->turns};
+    state->refusals++;
+}
+
 #define FORGED(change)                     \
     do {                                   \
         State state = good;                \
@@ -223,8 +230,9 @@ static void forged(void)
         FORGED(state.tolerance = NAN);
         FORGED(memset(&state.changed, 2, 1));
         FORGED(memset(&state.failed, 255, 1));
-        FORGED(state.refused[1].reason = (Reason)99; state.refusals++);
-        FORGED(state.refused[1].reason = FIXED; state.refused[1].turn = 1000; state.refusals += i != 6 && i != 7);
+        FORGED(refuse_in(&state, 1, (Reason)99, 1.0));
+        FORGED(refuse_in(&state, 1, FIXED, 1.0); state.turns--);
+        FORGED(refuse_in(&state, reference_of("solver.method"), OUT_OF_RANGE, 1e300));
         for (const Member *member = members; member < members + MEMBERS; member++) {
             FORGED(memset((char *)&state.model + member->offset, 0x7f, member->is_bool ? 1 : 8));
             FORGED(memset((char *)&state.model + member->offset, 0x80, member->is_bool ? 1 : 8));
@@ -291,6 +299,16 @@ static void reading(Instance *it, const fmi2ValueReference *references, size_t c
     }
 }
 
+/* Into a block of just the size, so that writing beyond it is seen. */
+static fmi2Status serialised(Instance *it, fmi2FMUstate state, char bytes[BYTES], size_t size)
+{
+    char *block = malloc(size ? size : 1);
+    fmi2Status status = fmi2SerializeFMUstate(it, state, block, size);
+    if (status == fmi2OK) memcpy(bytes, block, BYTES);
+    free(block);
+    return status;
+}
+
 static void calls(uint64_t seed, int turns)
 {
     enum { CROWD = 20 };
@@ -343,7 +361,7 @@ static void calls(uint64_t seed, int turns)
         case 21: status = fmi2SetFMUstate(it, states[k]); break;
         case 22: status = fmi2FreeFMUstate(it, draw(50) ? &states[k] : NULL); break;
         case 23: status = fmi2SerializedFMUstateSize(it, states[k], draw(50) ? &size : NULL); break;
-        case 24: status = fmi2SerializeFMUstate(it, states[k], bytes[i], draw(9) ? BYTES : draw(BYTES)); break;
+        case 24: status = serialised(it, states[k], bytes[i], draw(9) ? BYTES : draw(BYTES)); break;
         default: status = fmi2DeSerializeFMUstate(it, bytes[i], draw(9) ? BYTES : draw(BYTES), &states[k]); break;
         }
         HOLDS(status == fmi2OK || status == fmi2Error);
