@@ -238,6 +238,18 @@ def test_a_motion_out_of_all_range_fails_in_one_sentence_or_stays_finite(launch,
         assert all(isfinite(value) for value in fmu.get(*REALS[name]))
 
 
+@pytest.mark.parametrize("name", [name for name in MODELS if "k" in parameters(name)])
+def test_outputs_that_overflow_while_the_motion_does_not_are_told(launch, name):
+    fmu = launch(name, {"k": 1e300, "m": 1e300, "x0": 1e20, "solver.rtol": 1e-3})
+    assert all(isnan(value) for value in fmu.get(*REALS[name]))
+    assert "leaves the range of numbers" in fmu.worker.complaints()
+    with pytest.raises(Refused):
+        fmu.step(0.0, 1e-3)
+    fmu.reset()
+    fmu.begin().step(0.0, 0.1)
+    assert all(isfinite(value) for value in fmu.get(*REALS[name]))
+
+
 def test_a_calculated_value_cannot_be_set(launch):
     fmu = launch("smd")
     fmu.set({"x": 1.0})

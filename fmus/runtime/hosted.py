@@ -157,6 +157,8 @@ class Hosted(Saved):
                     return self.give_up(status)
                 if known:  # who has read the last point will read this one too
                     model.observe(march.t, march.x, march.v, march.mode)
+                    if not model.energy < inf:
+                        self.observed = False
             return not self.failure
         except BaseException as error:  # as above
             return self.rescue(error)
@@ -303,6 +305,8 @@ class Hosted(Saved):
             self.apply()
         march = model.solver
         model.observe(march.t, march.x, march.v, march.mode)
+        if not model.energy < inf:  # which overflows first: it has squares and products of the others
+            raise OverflowError
         self.observed = True
 
     def write(self, reference, value):

@@ -1,5 +1,7 @@
 """What the FMI layer asks of a model: translated like the numerics, and called by these names in fmi2.c."""
 
+from math import inf
+
 from .kinds import FLOAT
 
 
@@ -31,8 +33,10 @@ def look_ahead(model):
 
 
 def observe(model):
+    """Whether the outputs are numbers: the energy has squares and products of the others, and overflows first."""
     march = model.solver
     model.observe(march.t, march.x, march.v, march.mode)
+    return model.energy < inf
 
 
 def report(model):

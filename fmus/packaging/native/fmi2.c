@@ -214,10 +214,9 @@ static bool bring_up(Instance *it)
         }
         if (!apply(it)) return false;
     }
-    observe(&state->model, &fault);
-    if (fault) fail_by_fault(it);
-    it->observed = !fault;
-    return !fault;
+    it->observed = observe(&state->model, &fault) && !fault;
+    if (!it->observed) fail_by_fault(it);
+    return it->observed;
 }
 
 /* ---- reading and writing */
