@@ -1,0 +1,45 @@
+"""What a run may do when nobody limits it: the largest step, and the largest numbers."""
+
+from math import isnan
+
+import pytest
+from driver import Refused
+from models import CASES, EXACT, declared, label, model_class, outputs, push
+
+SMOOTH = [case for case in CASES if case[1]["solver.method"] != EXACT]
+REACTION = 2  # of a pendulum whose squared load overflows long before: many steps, then another sentence
+FORCES = ("k", "c", "f", "g", "mu")
+
+
+def adrift(name):
+    """Values without any force: a motion that every method would follow in one step."""
+    return dict.fromkeys(set(FORCES) & declared(name).keys(), 0.0)
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["stop known", "stop unknown"])
+@pytest.mark.parametrize("case", SMOOTH, ids=label)
+def test_the_largest_step_is_a_tenth_of_the_run(launch, case, known):
+    """Of the default run where the stop time is unknown; the last one may be stretched by a tenth, to end there."""
+    name, values, _ = case
+    v0 = f"{outputs(name)[1]}0"
+    for start, run in ((0.0, 3.0), (-50.0, 200.0), (7.3, 0.01)):
+        tenth = 0.1 * (run if known else model_class(name).stop_time)
+        stop = start + 20.0 * tenth if not known else start + run
+        fmu = launch(name, {**values, **adrift(name), v0: 1.0}, start=start, stop=stop if known else None)
+        _, rows = fmu.follow(start, stop, ["solver.h"])
+        sizes = [h for (h,) in rows[1:]]
+        assert max(sizes[:-1]) == pytest.approx(tenth, rel=1e-12)
+        assert sizes[-1] <= 1.1 * tenth * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["stop known", "stop unknown"])
+@pytest.mark.parametrize("case", [case for case in CASES if case[1].get("pin_load") != REACTION], ids=label)
+def test_a_run_that_diverges_is_refused_whether_its_end_is_known_or_not(launch, case, known):
+    name, values, _ = case
+    force, _ = push(name)
+    fmu = launch(name, {**values, **adrift(name), force: 1e99}, stop=40.0 if known else None)
+    with pytest.raises(Refused):
+        fmu.step(0.0, 20.0)
+    assert all(isnan(value) for value in fmu.get(*outputs(name)[:2]))
+    assert "the motion leaves the range of numbers" in fmu.messages()[-1][2]
+    fmu.worker.complaints()
