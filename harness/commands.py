@@ -35,7 +35,8 @@ class Commands(click.Group):
 def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> None:
     """Run the built FMUs, measure what they do, and set it beside what was published.
 
-    Without a command: every published case.  Exit status 0: all well, 1: a run failed, 2: wrong usage.
+    Without a command: every published case.  Exit status 0: all well, 1: a run failed, 2: wrong usage,
+    130 and 143: ended by Ctrl-C and by SIGTERM, with nothing left half done.
 
     \b
     Examples:

@@ -18,6 +18,7 @@ import numpy as np
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from .errors import HarnessError, reason
+from .interrupt import check
 from .unpacked import unpacked
 
 EXCHANGE, COSIMULATION = "ModelExchange", "CoSimulation"
@@ -91,6 +92,7 @@ class Instance:
                 timeout=patience,
                 model_description=self.description,
                 fmu_instance=self.fmu,
+                step_finished=heed,
             )
         except RuntimeError as error:  # the path of CVode's source stands before its sentence
             sentence = str(error).rpartition(": ")[2]
@@ -101,6 +103,12 @@ class Instance:
         evaluations = self.fmu.evaluations if self.way == EXCHANGE else int(rows[COUNT][-1])
         self.fmu.reset()
         return Record(rows, evaluations)
+
+
+def heed(time: float, recorder: Any) -> bool:
+    """Go on, unless a signal has come: CVode's callbacks swallow what it raises."""
+    check()
+    return True
 
 
 def beside(fmu: Path) -> Path:

@@ -106,7 +106,7 @@ def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
     assert refused(sled, {"mess": 1.0}) == unknown
     assert refused(sled, patience=1e-3).endswith(" s after 0.001 s of run time")
     assert refused(missing) == f"not built: {missing} (python build_fmus.py --fmi 3)"
-    assert refused(broken) == "broken.fmu: File is not a zip file"
+    assert refused(broken) == "broken.fmu cannot be unpacked: File is not a zip file"
     assert capfd.readouterr() == ("", "")
 
 
