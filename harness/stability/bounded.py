@@ -11,7 +11,7 @@ from typing import Any
 
 from ..child import OFTEN
 from ..errors import HarnessError
-from ..interrupt import check
+from ..interrupt import check, later
 from ..unpacked import room
 
 METHODS = multiprocessing.get_all_start_methods()
@@ -32,7 +32,7 @@ def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
     with room("bounded-") as folder:
         here, there = CONTEXT.Pipe(duplex=False)
         process = CONTEXT.Process(target=work, args=(there, str(folder), function, arguments), daemon=True)
-        with ALONE:
+        with ALONE, later():
             process.start()
         there.close()
         try:

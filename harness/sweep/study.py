@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import HarnessError, reason
-from ..interrupt import Interrupted, deaf_children
+from ..interrupt import HEARD, Interrupted, deaf_children
 from ..unpacked import room
 from .rerun import Rerun, Row, Runs, ready
 from .space import Axis
@@ -70,18 +70,20 @@ def perform(
     before, seconds = len(kept.rows), 0.0
     left = [i for i in range(len(sweep.points)) if i not in kept.rows]
     if left:
-        with client(scheduler, workers) as dask, kept.open():
-            begun = perf_counter()
-            try:
+        try:
+            with client(scheduler, workers) as dask, kept.open():
+                begun = perf_counter()
                 for block in finished(dask, sweep, left):
                     kept.add(block)
                     report(len(kept.rows) / len(sweep.points))
                     seconds = perf_counter() - begun
-            except KeyboardInterrupt:
-                if not kept.rows:
-                    forget(sweep, folder)
-                state = f"{len(kept.rows)} of {len(sweep.points)} runs are kept"
-                raise Interrupted(f"interrupted: {state}; the same command does the rest") from None
+        except BaseException as error:  # what an interrupt makes fail may say anything
+            if not (HEARD or isinstance(error, KeyboardInterrupt)):
+                raise
+            if not kept.rows:
+                forget(sweep, folder)
+            state = f"{len(kept.rows)} of {len(sweep.points)} runs are kept"
+            raise Interrupted(f"interrupted: {state}; the same command does the rest") from None
     return [kept.rows[i] for i in range(len(sweep.points))], before, kept.damaged, seconds
 
 
