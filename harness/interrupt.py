@@ -54,16 +54,17 @@ def note(number: int, frame: Any) -> None:
 @contextmanager
 def later() -> Iterator[None]:
     """Within, a signal waits until the end: for what must not be left half done."""
-    heard = current_thread() is main_thread() and [each for each in BOTH if signal.getsignal(each) == hear]
-    for number in heard or ():
+    listening = current_thread() is main_thread() and [each for each in BOTH if signal.getsignal(each) == hear]
+    before = len(HEARD)
+    for number in listening or ():
         signal.signal(number, note)
     try:
         yield
     finally:
-        for number in heard or ():
+        for number in listening or ():
             signal.signal(number, hear)
-    if heard:
-        check()
+    if listening and len(HEARD) > before:
+        raise KeyboardInterrupt
 
 
 @contextmanager

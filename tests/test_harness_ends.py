@@ -127,3 +127,22 @@ def test_a_program_that_a_thread_waits_for_ends_with_the_command(tmp_path, monke
     interrupt.HEARD.append(signal.SIGINT)
     thread.join(timeout=30)
     assert ended == ["here"]
+
+
+def test_a_sentence_about_the_interrupt_survives_the_clean_up(monkeypatch):
+    monkeypatch.setattr(interrupt, "HEARD", [signal.SIGTERM])
+    before = signal.signal(signal.SIGTERM, interrupt.hear)
+
+    def told():
+        try:
+            raise Interrupted("half of it is kept")
+        finally:
+            with later():
+                pass
+
+    try:
+        with pytest.raises(Interrupted, match="half of it is kept") as ended:
+            told()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert ended.value.status == 143
