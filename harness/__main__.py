@@ -3,12 +3,16 @@
 import os
 import sys
 
+import click
+
 from .errors import HarnessError
 from .interrupt import interruptible
 
+NAME = "python -m harness"
+
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line; not by click's own main, which has its own end for an interrupt."""
     try:
         with interruptible():
             from .commands import commands
@@ -16,9 +20,15 @@ def main() -> None:
 
             prepare()
             try:
-                commands()
+                with commands.make_context(NAME, sys.argv[1:]) as context:
+                    commands.invoke(context)
             finally:
                 sys.stdout.flush()
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except click.exceptions.Exit as end:
+        sys.exit(end.exit_code)
     except HarnessError as error:
         fail(str(error), error.status)
     except MemoryError:

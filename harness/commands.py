@@ -2,7 +2,6 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import click
 from rich.console import Console
@@ -11,23 +10,12 @@ from rich.table import Table
 from . import job
 from .answers import COMMANDS, STOP, TOLERANCE, run_any
 from .errors import HarnessError
-from .interrupt import Interrupted
 from .scene import load, shipped
 from .table import comparison
 from .terminal import JSON, OUT, QUIET, as_text, progress
 
 
-class Commands(click.Group):
-    """A group that leaves a Ctrl-C to whoever runs it; click would end with status 1."""
-
-    def invoke(self, context: click.Context) -> Any:
-        try:
-            return super().invoke(context)
-        except KeyboardInterrupt:
-            raise Interrupted from None
-
-
-@click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @OUT
 @QUIET
 @JSON

@@ -4,11 +4,13 @@ Both become KeyboardInterrupt, which takes everything down as an error does.  So
 function called from C or somebody else's FMU in Python does: what goes on for long asks `check` now and then.
 """
 
+import atexit
+import logging
+import os
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from multiprocessing import resource_tracker
 from signal import SIG_DFL, SIGINT, SIGTERM, default_int_handler
 from threading import current_thread, main_thread
 from typing import Any
@@ -30,7 +32,7 @@ class Interrupted(HarnessError):
 
 def hear(number: int, frame: Any) -> None:
     """The handler of both signals."""
-    HEARD.append(number)
+    note(number, frame)
     raise KeyboardInterrupt
 
 
@@ -49,6 +51,7 @@ def check() -> None:
 def note(number: int, frame: Any) -> None:
     """The handler of both while something is begun that could not be ended half begun."""
     HEARD.append(number)
+    logging.disable()  # what Dask would log of connections that end is no news
 
 
 @contextmanager
@@ -70,6 +73,8 @@ def later() -> Iterator[None]:
 @contextmanager
 def deaf_children() -> Iterator[None]:
     """Processes and threads that are started within never hear a Ctrl-C; the signal waits until the end."""
+    from multiprocessing import resource_tracker  # later than `finish` is registered, so that it cleans up before
+
     resource_tracker.ensure_running()  # which multiprocessing would start within, and unblock what is blocked here
     mask = getattr(signal, "pthread_sigmask", lambda how, signals: None)  # none on Windows
     with later():
@@ -80,6 +85,13 @@ def deaf_children() -> Iterator[None]:
             mask(signal.SIG_UNBLOCK, [SIGINT])
 
 
+def finish() -> None:
+    """The last of all that is done at the exit: Python would else tell, for any interrupt in the midst of an import,
+    that SIGINT killed it, and an FMU in Python that passes an interrupt on may do so late."""
+    if HEARD:
+        os._exit(128 + HEARD[0])
+
+
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Within, both signals are heard, unless they were to be ignored, and end in Interrupted."""
@@ -87,6 +99,7 @@ def interruptible() -> Iterator[None]:
         if signal.getsignal(number) == usual:
             signal.signal(number, hear)
     sys.unraisablehook = swallowed
+    atexit.register(finish)  # the first to be registered is the last to be called
     try:
         yield
         check()

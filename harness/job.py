@@ -91,6 +91,7 @@ def published() -> list[str]:
 def main_job(names: Iterable[str], out: Path, report: Callable[[str, float], None]) -> Iterator[Outcome]:
     """The outcome of each scene; one that fails does not lose the others."""
     for name in names:
+        check()
         try:
             yield perform(load(name), out, partial(report, name))
         except HarnessError as error:

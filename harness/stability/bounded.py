@@ -11,7 +11,7 @@ from typing import Any
 
 from ..child import OFTEN
 from ..errors import HarnessError
-from ..interrupt import check, later
+from ..interrupt import check, deaf_children
 from ..unpacked import room
 
 METHODS = multiprocessing.get_all_start_methods()
@@ -32,7 +32,7 @@ def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
     with room("bounded-") as folder:
         here, there = CONTEXT.Pipe(duplex=False)
         process = CONTEXT.Process(target=work, args=(there, str(folder), function, arguments), daemon=True)
-        with ALONE, later():
+        with ALONE, deaf_children():
             process.start()
         there.close()
         try:
@@ -42,10 +42,10 @@ def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
         except EOFError:
             result = None
         finally:
-            here.close()
             with ALONE:
                 process.kill()
                 process.join()
+            here.close()
     if result is None:
         raise HarnessError(f"the process died with exit code {process.exitcode}")
     if isinstance(result, BaseException):
