@@ -48,7 +48,7 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
     console = Console(file=sys.stderr)  # this very stream: runs redirect sys.stderr
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     if quiet or not console.is_terminal:  # a bar that is told to be silent writes an empty line, until rich 14.2
-        yield lambda name, share: None
+        yield lambda name, share: check()
         return
     with Progress(*columns, console=console, transient=True, redirect_stderr=False) as bar:
         task = bar.add_task("", total=total)

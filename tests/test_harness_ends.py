@@ -16,6 +16,7 @@ import pytest
 from harness import interrupt
 from harness.child import Hangs, ask
 from harness.interrupt import Interrupted, check, interruptible, later
+from harness.terminal import progress
 
 ROOT = Path(__file__).parent.parent
 SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
@@ -159,3 +160,13 @@ def test_a_sentence_about_the_interrupt_survives_the_clean_up(monkeypatch):
     finally:
         signal.signal(signal.SIGTERM, before)
     assert ended.value.status == 143
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_whoever_tells_its_progress_hears_of_an_interrupt_that_was_swallowed(monkeypatch, quiet):
+    monkeypatch.setattr(interrupt, "HEARD", [])
+    with progress(quiet, 2) as report:
+        report("one", 0.5)
+        interrupt.HEARD.append(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            report("one", 1.0)
