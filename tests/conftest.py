@@ -24,6 +24,14 @@ def fmus(tmp_path_factory):
     return build(ROOT, tmp_path_factory.mktemp("fmus"))
 
 
+@pytest.fixture(params=["python", "native"])
+def kind(request, fmus):
+    """The folder of the FMUs of a kind."""
+    from native_fmus import built  # which needs this file
+
+    return fmus if request.param == "python" else built()
+
+
 @pytest.fixture(scope="module")
 def place(fmus, tmp_path_factory):
     """A folder with the built FMUs in it, as a user's would be."""

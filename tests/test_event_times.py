@@ -4,16 +4,9 @@ from math import ulp
 
 import pytest
 from mpmath import atan2, cos, mpf, pi, sign, sqrt, workdps
-from native_fmus import built
 
 DIGITS = 50
 PLACES = 4  # units in the last place of the time
-
-
-@pytest.fixture(params=["python", "native"])
-def kind(request, fmus):
-    """The folder of the FMUs of a kind."""
-    return fmus if request.param == "python" else built()
 
 
 def late(fmu, values, start, stop):
