@@ -156,9 +156,7 @@ class Hosted(Saved):
                 if status != OK:
                     return self.give_up(status)
                 if known:  # who has read the last point will read this one too
-                    model.observe(march.t, march.x, march.v, march.mode)
-                    if not model.energy < inf:
-                        self.observed = False
+                    self.show(model, march)
             return not self.failure
         except BaseException as error:  # as above
             return self.rescue(error)
@@ -303,11 +301,14 @@ class Hosted(Saved):
                 self.silence()
                 return
             self.apply()
-        march = model.solver
-        model.observe(march.t, march.x, march.v, march.mode)
-        if not model.energy < inf:  # which overflows first: it has squares and products of the others
+        self.show(model, model.solver)
+        if not self.observed:
             raise OverflowError
-        self.observed = True
+
+    def show(self, model, march):
+        """Set the outputs; the energy overflows first, for it has squares and products of the others."""
+        model.observe(march.t, march.x, march.v, march.mode)
+        self.observed = model.energy < inf
 
     def write(self, reference, value):
         """Take over a value; one that cannot be used is remembered, and told by the next step."""

@@ -89,7 +89,7 @@ class Step:
         self.t1, self.x1, self.v1 = t, x, v
         self.settle(model, mode)
         self.arrive(model)
-        if self.size == 0.0 and not (self.sticks and self.mode1 == STUCK):
+        if self.size == 0.0 and self.methods.chosen != EXACT and not (self.sticks and self.mode1 == STUCK):
             self.size = self.first_size()
         self.t0 = t
         self.keep_counts()
@@ -260,7 +260,7 @@ class Step:
         """The step has been cut: forget the slope, but keep the step size of the last slide, if there was one."""
         self.event = self.mode1 != self.mode0  # a slide that only touches zero goes on
         self.arrive(model)
-        if self.size == 0.0:
+        if self.size == 0.0 and self.methods.chosen != EXACT:
             self.size = self.first_size()
 
     def first_size(self):
