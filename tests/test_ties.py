@@ -6,6 +6,7 @@ arithmetic and in the evidence's.
 
 import random
 from itertools import pairwise, product
+from operator import methodcaller
 
 import evidence
 import pytest
@@ -108,6 +109,29 @@ def test_a_speed_that_only_touches_zero_is_no_rest_and_no_event(pair, method, va
     values = {**values, "solver.method": method, "solver.rtol": 1e-5}
     seen = answers(pair, "stickslip", values, start, stop, lambda fmu: events(fmu, start, stop))
     assert [mode for _, mode in seen] == ([] if values.get("g") == 0.0 or values.get("mu_s") == 0.0 else [1])
+
+
+def any_sled(draw):
+    """Values without friction or with as much when it slides, a start time, and the end of twenty touches."""
+    mu, friction = draw.uniform(0.05, 2.0), draw.choice(("none", "weightless", "equal"))
+    values = {"m": 10.0 ** draw.uniform(-2.0, 3.0), "k": 10.0 ** draw.uniform(-1.0, 5.0), "g": draw.uniform(1.0, 30.0)}
+    values |= dict.fromkeys(("mu_s", "mu_d"), 0.0 if friction == "none" else mu)
+    values["v_driver"] = draw.choice([-1, 1]) * 10.0 ** draw.uniform(-3.0, 0.0)
+    if friction == "weightless":
+        values["g"] = 0.0
+    start = draw.choice([0.0, draw.uniform(-10.0, 100.0), 1e4, 1e6])
+    held = values["mu_s"] * values["m"] * values["g"] / (values["k"] * abs(values["v_driver"]))
+    return values, start, start + held + 20.3 * 6.283185307179586 * (values["m"] / values["k"]) ** 0.5
+
+
+def test_speeds_that_touch_zero_go_on_whatever_the_values(pair):
+    draw = random.Random(1)
+    for _ in range(150):
+        values, start, stop = any_sled(draw)
+        ends = methodcaller("run", [start, stop], ["events.count", "mode"])
+        _, (count, mode) = answers(pair, "stickslip", values, start, stop, ends)
+        assert count == (1 if values["mu_s"] * values["g"] else 0)
+        assert mode == (1 if values["v_driver"] > 0.0 else -1)
 
 
 @pytest.mark.parametrize("method", [EXACT, ODE23, ODE45, DOP853, RODAS])
