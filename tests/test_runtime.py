@@ -204,6 +204,17 @@ def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
     assert isnan(read(made, "x")[0])
 
 
+def test_what_many_events_cost_is_bounded_too(monkeypatch, capfd):
+    """A swing of the pendulum takes as many looks for its events as right-hand sides."""
+    monkeypatch.setattr(march, "MOST_CALLS", 20 * march.ROUND)
+    made = slave("pendulum", {"mu": 0.0}, stop=1e7)
+    assert made.do_step(0.0, 1e7) is False
+    assert "right-hand sides" in capfd.readouterr().err
+    step = made.model.solver.step
+    assert step.taken == 1 + 2 * march.ROUND  # of twelve right-hand sides and some looks each
+    assert step.looked > 0
+
+
 def test_a_solver_that_makes_no_headway_is_stopped_with_a_sentence(capfd):
     """At the tightest tolerances the sign law asks for steps below the rounding of the time."""
     made = slave("coulomb", {"friction": SIGN, "solver.method": 2, "solver.rtol": 1e-15})

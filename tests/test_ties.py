@@ -134,6 +134,18 @@ def test_speeds_that_touch_zero_go_on_whatever_the_values(pair):
         assert mode == (1 if values["v_driver"] > 0.0 else -1)
 
 
+def test_a_slide_that_only_touches_zero_sticks_where_static_friction_is_larger(pair):
+    """v = u (1 + 0.6 cos y + 0.8 sin y) with y = w t: whether rounding puts its least value above zero or below."""
+    draw, touch = random.Random(3), 3.141592653589793 + 0.9272952180016122
+    for _ in range(60):
+        m, k, u = draw.uniform(0.5, 20.0), draw.uniform(50.0, 900.0), draw.uniform(0.01, 0.5)
+        w = (k / m) ** 0.5
+        values = {"m": m, "k": k, "mu_s": 0.9, "mu_d": 0.6, "g": draw.uniform(1.0, 10.0), "v_driver": u, "v0": 1.6 * u}
+        values["x0"] = -(0.6 * m * values["g"] + 0.8 * u * m * w) / k
+        ends = methodcaller("run", [0.0, touch / w - 1e-3 / w, touch / w + 1e-6 / w], ["mode", "events.count"])
+        assert answers(pair, "stickslip", values, 0.0, 10.0 / w, ends) == [[1, 0], [1, 0], [0, 1]]
+
+
 @pytest.mark.parametrize("method", [EXACT, ODE23, ODE45, DOP853, RODAS])
 @pytest.mark.parametrize("direction", [-1, 1])
 def test_a_slip_that_ends_at_the_other_limit_sticks_as_the_load_moves_inward(pair, method, direction):
