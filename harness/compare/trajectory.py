@@ -1,14 +1,14 @@
 """A trajectory, wherever it comes from: a result folder, a CSV file, or a run of any FMU."""
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import HarnessError, SceneError, reason, shown
-from ..identify.record import HEADING, TIMES, parse
+from ..errors import HarnessError, SceneError, shown
+from ..identify.columns import numeric, split
+from ..identify.units import TIMES
 from ..run import Run, heading, write
 
 LATEST = 1e100  # s, either way
@@ -46,11 +46,8 @@ def read(path: Path) -> Trajectory:
     file = path / "trajectory.csv" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
         raise SceneError(f"{path} is no result folder: it has no trajectory.csv")
-    heads, table = table_of(file)
-    found = [HEADING.match(head) for head in heads]
-    if None in found:
-        raise SceneError(f"{file.name}: a heading goes over several lines; is there a quote that is not closed?")
-    names, units = zip(*(match.groups() for match in found if match), strict=True)
+    heads, table = numeric(file)
+    names, units = zip(*map(split, heads), strict=True)
     twice = [name for i, name in enumerate(names) if name in names[:i]]
     if twice:
         raise SceneError(f"{file.name}: two columns are named {shown(twice[0])}")
@@ -62,21 +59,10 @@ def read(path: Path) -> Trajectory:
     last = np.append(np.diff(time) > 0, True)  # where a time stands twice, what holds after the event
     columns = {name: table[last, i] for i, name in enumerate(names) if i}
     events = path / "events.csv" if path.is_dir() else None
-    known = table_of(events)[1] if events and events.is_file() else None
+    known = numeric(events)[1] if events and events.is_file() else None
     if known is not None and (known.shape[1] != 2 or not np.isfinite(known).all()):
         raise SceneError(f"{events} holds no times and modes")
     return Trajectory(path.stem, time[last], columns, dict(zip(names, (u or "" for u in units), strict=True)), known)
-
-
-def table_of(file: Path) -> tuple[list[str], np.ndarray]:
-    """Headings and numbers (rows, columns) of a file."""
-    try:
-        heads, table = parse(file)
-    except (csv.Error, ValueError) as error:  # a quote that is not closed, a zero byte
-        raise SceneError(f"{file.name} is no table: {reason(error)}") from None
-    if table.ndim != 2:
-        raise SceneError(f"{file.name} has no rows of numbers; is there a quote that is not closed?")
-    return heads, table
 
 
 def load(source: str, stop: float | None, tolerance: float, report: Callable[[float], None]) -> Trajectory:

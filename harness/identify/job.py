@@ -7,28 +7,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 
-from ..errors import SceneError
+from ..errors import HarnessError, SceneError
 from ..folder import replacing
 from ..run import heading, write
-from ..scene import check_built, load
 from ..terminal import as_text
-from .fit import Estimate, Identified, Known, identify
-from .record import Columns, Record, read
+from .columns import Columns, read
+from .figures import Known
+from .fit import Identified, identify
+from .law import AMPLITUDE, T0
+from .loss import Loss, losses_seen
+from .record import Record, check
 
 FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.png")
-RECORDS = (".csv", ".txt", ".dat", ".tsv")
 
 
 def perform(
-    source: str, columns: Columns, known: Known, drag: bool, out: Path, report: Callable[[float], None]
+    source: str,
+    columns: Columns,
+    known: Known,
+    drag: bool,
+    drift: bool,
+    out: Path,
+    report: Callable[[float], None],
 ) -> tuple[Identified, Path]:
     """Identify the decay of a record's file or of a scene; results go to out/decay/<name>."""
     record, known = load_record(source, columns, known, report)
-    found = identify(record, known, drag)
+    found = identify(record, known, drag, drift, report)
     folder = out / FOLDER / record.name
     with replacing(folder, FILES) as fresh:
         save(found, fresh)
@@ -37,24 +43,35 @@ def perform(
 
 def load_record(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> tuple[Record, Known]:
     """The record of a file, or of a run of a scene together with the stiffness that its model has."""
-    if Path(source).suffix.lower() in RECORDS:
-        return read(Path(source), columns), known
-    if Path(source).exists() and Path(source).suffix != ".toml":
-        raise SceneError(f"{source} is no record and no scene; a record ends in {', '.join(RECORDS)}, a scene in .toml")
+    path = Path(source)
+    if source == "-":
+        return read(source, columns, "stdin"), known
+    if path.suffix.lower() != ".toml" and (path.is_file() or path.suffix):
+        return read(source, columns, path.stem.encode("utf-8", "replace").decode()), known
+    if path.is_dir():
+        raise SceneError(f"{source} is a folder; name a file in it")
+    return of_scene(source, columns, known, report)
+
+
+def of_scene(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> tuple[Record, Known]:
+    """The positions in a run of a scene."""
     from ..fmu import simulate
+    from ..scene import check_built, load
 
     scene = load(source)
     check_built(scene.fmu)
-    for role in ("position", "velocity"):
-        if role not in scene.motion:
-            raise SceneError(f"scene {scene.name}: a decay needs the {role} among the outputs")
+    if "position" not in scene.motion:
+        raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
     run = simulate(scene, report)
     unit = run.units[scene.motion["position"]]
-    inside = (run.time >= columns.begin) & (run.time <= columns.end)
-    record = Record(scene.name, run.time[inside], run.motion("position")[inside], run.motion("velocity")[inside], unit)
+    record = Record(scene.name, run.time, run.motion("position"), unit, 0, unit).between(columns.begin, columns.end)
+    check(record)
     if known.k is None and known.m is None:
         names = ("m", "g", "a") if unit == "rad" else ("k",)
-        k = prod(run.parameter(name, "the decay of a scene") for name in names)
+        try:
+            k = prod(run.parameter(name, "the decay of a scene") for name in names)
+        except HarnessError:
+            return record, known  # a model without them has no force to tell
         known = Known(k=k, pendulum=unit == "rad")
     return record, known
 
@@ -64,53 +81,58 @@ def save(found: Identified, folder: Path) -> None:
     from ..plots.decay import draw
 
     unit = found.record.unit
-    (folder / "decay.json").write_text(as_text(numbers(found)) + "\n", encoding="utf-8")
-    write(folder / "turning-points.csv", ["t [s]", heading("x", unit)], [found.turns.t, found.turns.x])
-    t, x, fitted = found.record.t[found.used], found.record.x[found.used], found.best.x
-    heads = ["t [s]", heading("x", unit), heading("fit", unit), heading("residual", unit)]
-    write(folder / "fit.csv", heads, [t, x, fitted, x - fitted])
-    draw(found, folder / "figure.png")
+    loss = losses_seen(found)
+    (folder / "decay.json").write_text(as_text(numbers(found, loss)) + "\n", encoding="utf-8")
+    write(folder / "turning-points.csv", ["t [s]", heading("x", found.record.base)], [found.turns.t, found.turns.x])
+    fitted = found.signal(found.best, found.t)
+    name = ("x", "v", "a")[found.record.order]
+    heads = ["t [s]", heading(name, unit), heading("fit", unit), heading("residual", unit)]
+    write(folder / "fit.csv", heads, [found.t, found.x, fitted, found.x - fitted])
+    draw(found, loss, folder / "figure.png")
 
 
-def numbers(found: Identified) -> dict[str, Any]:
+def numbers(found: Identified, loss: Loss | None = None) -> dict[str, Any]:
     """Everything found, for JSON."""
+    problem, record, best = found.problem, found.record, found.best
+    loss = loss or losses_seen(found)
     return {
-        "record": found.record.name,
-        "unit": found.record.unit,
+        "record": record.name,
+        "quantity": record.quantity,
+        "unit": record.unit,
         "sentence": found.sentence,
         "remarks": list(found.remarks),
         "noise": found.turns.noise,
-        "residual": found.best.rms,
+        "residual": found.rms,
         "turning points": len(found.turns.t),
-        "fit": [asdict(each) for each in found.best.estimates],
+        "used": {
+            "from": float(found.t[0]),
+            "until": float(found.t[-1]),
+            "samples": len(found.t),
+            "of": len(record.t),
+            "time_unit": "s",
+        },
+        "release": {
+            "time": float(best.p[T0]) + problem.origin,
+            "amplitude": float(best.p[AMPLITUDE]) * problem.unit,
+            "unit": record.base,
+        },
+        "fit": [asdict(each) for each in found.estimates],
         "turning_points": [asdict(each) for each in found.by_turns],
         "published": [asdict(each) for each in found.published],
-        "laws": [{"terms": list(fit.terms), "bic": fit.bic, "residual": fit.rms} for fit in found.fits],
+        "why_empty": {name: why for name, why in found.why.items() if why},
+        "laws": [
+            {
+                "terms": list(law.terms),
+                "bic": law.bic,
+                "residual": float(np.sqrt(law.squares / len(found.t))) * problem.unit,
+            }
+            for law in found.laws
+        ],
+        "loss": {
+            "unit": record.base,
+            "amplitude": loss.amplitude.tolist(),
+            "share_of_energy": loss.share.tolist(),
+            "laws": {"+".join(law.terms): loss.curves[law.terms][1].tolist() for law in found.laws},
+            "laws_amplitude": {"+".join(law.terms): loss.curves[law.terms][0].tolist() for law in found.laws},
+        },
     }
-
-
-def table(found: Identified) -> Table:
-    """What was found, three ways side by side, each with half of its 95 % interval."""
-    shown = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), title=found.record.name, title_justify="left")
-    shown.add_column("")
-    for head in ("whole signal", "turning points", "two peaks"):
-        shown.add_column(head, justify="right", no_wrap=True)
-    shown.add_column("", no_wrap=True)
-    turns = {each.name: each for each in found.by_turns}
-    peaks = {each.name: each for each in found.published}
-    for each in found.best.estimates:
-        cells = [told(by[each.name]) if each.name in by else "" for by in (turns, peaks)]
-        unit = "" if each.unit == "1" else each.unit
-        shown.add_row(f"{each.text}, {each.name}", told(each), *cells, unit)
-    return shown
-
-
-def told(each: Estimate) -> str:
-    """Value, with the digits that its margin leaves, and margin; the value alone where there is none."""
-    margin = each.high - each.value
-    if not np.isfinite(margin):
-        return f"{each.value:.5g}"
-    digits = 8
-    if margin > 0 and each.value:
-        digits = int(np.clip(np.ceil(np.log10(abs(each.value) / margin)) + 1, 1, 8))
-    return f"{each.value:.{digits}g} ± {margin:.1e}"

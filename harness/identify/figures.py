@@ -1,0 +1,112 @@
+"""What is told of a fit: values with errors and intervals, in the units of the record and in newtons where k or m is
+known.
+
+The values are those of the chosen law; errors and intervals are those of the full law, for which terms are present is
+not known but found: the intervals of the chosen law alone are too narrow wherever the choice is not clear.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .choice import Law
+from .intervals import SIDE, Spread, interval
+from .law import DRIFT, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
+from .problem import Problem
+from .record import Record
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known beforehand: stiffness `k` or mass `m` (SI; of a rotation N.m/rad, kg.m2), and whether the
+    restoring torque is that of a pendulum, k sin(theta)."""
+
+    k: float | None = None
+    m: float | None = None
+    pendulum: bool = False
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with its standard error and the bounds of its 95 % interval; NaN where the data leave no freedom."""
+
+    name: str
+    value: float
+    error: float
+    low: float
+    high: float
+    unit: str
+    text: str
+
+    def times(self, size: float, name: str, unit: str, text: str, share: float = 0.0) -> "Estimate":
+        """The estimate `size` times this one, where `size` has the relative standard error `share`."""
+        value, more = size * self.value, SIDE * share * size * self.value
+        low, high = (value - np.hypot(value - size * self.low, more), value + np.hypot(size * self.high - value, more))
+        error = float(np.hypot(size * self.error, more / SIDE))
+        return Estimate(name, value, error, float(max(low, 0.0)), float(high), unit, text)
+
+
+def symbols(record: Record) -> dict[int, tuple[str, str, str]]:
+    """Name, unit and words of each unknown that is told."""
+    base, turning = record.base, record.base == "rad"
+    rest = "rest position" if record.order == 0 else f"offset of the {record.quantity}"
+    return {
+        OMEGA: ("omega", "rad/s", "natural frequency"),
+        ZETA: ("zeta", "1", "damping ratio"),
+        R: ("r", base, "friction over stiffness, T_f/k" if turning else "friction over stiffness, f/k"),
+        B: ("b", f"1/{base}", "drag over inertia" if turning else "drag over mass, q/m"),
+        REST: ("rest", record.unit, rest),
+        DRIFT: (
+            "drift",
+            f"{record.unit}/s",
+            "drift of the rest position" if record.order == 0 else "drift of the offset",
+        ),
+    }
+
+
+def sizes(problem: Problem) -> dict[int, float]:
+    """The unit of each unknown of the problem in that of the record."""
+    unit = problem.unit
+    return {OMEGA: 1.0, ZETA: 1.0, R: unit, B: 1 / unit, REST: unit, DRIFT: unit}
+
+
+def estimates(
+    record: Record, problem: Problem, law: Law, full: Law, spread: Spread, known: Known
+) -> tuple[Estimate, ...]:
+    """Everything that is told: of terms that the law has not, the largest value that the record allows."""
+    found = {}
+    bound = any(full.p[UNKNOWNS.index(term)] <= 0 for term in full.terms)  # elsewhere the fit is where it would be
+    for place, (name, unit, text) in symbols(record).items():
+        if place == DRIFT and not problem.drift:
+            continue
+        value, error, low, high = float(law.p[place]), 0.0, 0.0, 0.0
+        at = np.flatnonzero(spread.unknowns == place)
+        if len(at):
+            free, error = float(spread.free[at[0]] if bound else full.p[place]), float(spread.errors[at[0]])
+            low, high = interval(place, free, error, spread.freedom)
+            low, high = min(low, value), max(high, value)
+        elif UNKNOWNS[place] in TERMS:
+            continue  # was not to be tried
+        size, level = sizes(problem)[place], problem.level if place == REST else 0.0
+        found[place] = Estimate(
+            name, size * value + level, size * error, size * low + level, size * high + level, unit, text
+        )
+    return (*found.values(), *forces(record, found, known))
+
+
+def forces(record: Record, found: dict[int, Estimate], known: Known) -> tuple[Estimate, ...]:
+    """Friction force, damping and drag constants from k or m: f = k r, c = 2 zeta k/omega, q = b k/omega^2."""
+    if known.k is None and known.m is None:
+        return ()
+    omega = found[OMEGA]
+    share = omega.error / omega.value
+    k, k_share = (known.k, 0.0) if known.k is not None else (known.m * omega.value**2, 2 * share)  # type: ignore[operator]
+    m, m_share = (known.m, 0.0) if known.m is not None else (k / omega.value**2, 2 * share)
+    turning = record.base == "rad"
+    force, per = ("N.m", "rad") if turning else ("N", "m")
+    rows: tuple[tuple[int, float, str, str, str, float], ...] = (
+        (R, k, "T_f" if turning else "f", force, "friction torque" if turning else "friction force", k_share),
+        (ZETA, 2 * m * omega.value, "c", f"{force}.s/{per}", "damping constant", share),
+        (B, m, "q", f"{force}.s2/{per}2", "drag constant", m_share),
+    )
+    return tuple(found[row[0]].times(*row[1:]) for row in rows if row[0] in found)

@@ -1,0 +1,116 @@
+"""Half swings side by side: from a turning point down to the next, by Taylor series in theta.
+
+On the way down s = -1, and the law is smooth:
+
+    y'' = -g(y) - 2 zeta y' + b y'^2 + r,            g(y) = y or sin y
+
+With w = y' the coefficients of y = sum c_k h^k follow from each other, (k + 1)(k + 2) c_(k+2) being the k-th
+coefficient of the right-hand side, and those of S = sin y, C = cos y from S' = w C, C' = -w S (A. Jorba, M. Zou,
+Experimental Mathematics 14 (2005), section 3).  A half swing that goes up is the mirror image of one that goes down.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .law import at_rest
+
+ORDER = {False: 16, True: 22}  # the series of the pendulum has poles at complex times, that of the spring has none
+SMALL = {False: 1e-13, True: 1e-11}  # share of the series that its last terms may be
+LONGEST = 1.05  # of a series, in theta
+MOST = 100  # series in a half swing
+
+
+@dataclass(frozen=True)
+class Halves:
+    """L half swings: where they `end` (L,), their `duration` (L,) in theta, and their series (S, ORDER + 1, L), the
+    S-th of which holds from begins[S] on."""
+
+    end: np.ndarray
+    duration: np.ndarray
+    begins: np.ndarray
+    series: np.ndarray
+
+
+def product(one: np.ndarray, two: np.ndarray, k: int) -> np.ndarray:
+    """The k-th coefficients of the products of L pairs of series."""
+    return np.einsum("ij,ij->j", one[: k + 1], two[k::-1])
+
+
+def taylor(y: np.ndarray, w: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: bool) -> np.ndarray:
+    """The series (ORDER + 1, L) about the states y, w (L,) on the way down."""
+    order = ORDER[sine]
+    c, speed = np.empty((order + 1, len(y))), np.empty((order, len(y)))
+    c[0], c[1], speed[0] = y, w, w
+    restoring = c
+    if sine:
+        restoring, cosine = np.empty_like(speed), np.empty_like(speed)
+        restoring[0], cosine[0] = np.sin(y), np.cos(y)
+    drag = bool(b.any())
+    for k in range(order - 1):
+        force = restoring[k] + 2 * zeta * speed[k]
+        if k == 0:
+            force = force - r
+        if drag:
+            force = force - b * product(speed, speed, k)
+        if sine:
+            rise, fall = product(speed, cosine, k), product(speed, restoring, k)
+            restoring[k + 1], cosine[k + 1] = rise / (k + 1), -fall / (k + 1)
+        c[k + 2] = -force / ((k + 1) * (k + 2))
+        speed[k + 1] = (k + 2) * c[k + 2]
+    return c
+
+
+def slopes(series: np.ndarray) -> np.ndarray:
+    """The derivative of series whose coefficients run along the first axis."""
+    powers = np.arange(1, len(series)).reshape(-1, *(1,) * (series.ndim - 1))
+    return series[1:] * powers
+
+
+def value(series: np.ndarray, h: np.ndarray | float) -> np.ndarray:
+    """Series at h, by Horner's rule."""
+    total = series[-1].copy()
+    for term in series[-2::-1]:
+        total = total * h + term
+    return total
+
+
+def halves(a: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: bool) -> Halves:
+    """The half swings from rest at y = a; all arrays (L,).  NaN where one does not come back to rest."""
+    y, w, n = a.copy(), np.zeros_like(a), len(a)
+    end, duration, running = np.full(n, np.nan), np.full(n, np.nan), np.ones(n, bool)
+    still, at, begins, series = at_rest(r, sine), 0.0, [], []
+    for _ in range(MOST if n else 0):
+        c = taylor(y, w, zeta, r, b, sine)
+        h = reach(c[:, running], SMALL[sine])
+        begins.append(at)
+        series.append(c)
+        y, w = value(c, h), value(slopes(c), h)
+        ends = np.flatnonzero(running & (w >= 0))
+        if len(ends):
+            root = standstill(slopes(c[:, ends]), h)
+            duration[ends], end[ends], running[ends] = at + root, value(c[:, ends], root), False
+        if not running.any():
+            break
+        y[~running], w[~running] = still[~running], 0.0  # those that have ended wait where nothing moves
+        at += h
+    return Halves(end, duration, np.array(begins), np.array(series).reshape(len(series), ORDER[sine] + 1, n))
+
+
+def reach(c: np.ndarray, small: float) -> float:
+    """How far all these series are good: where their last two terms are small beside their first three."""
+    size = np.abs(c[:3]).max(axis=0)
+    last = np.abs(c[-2:]).max(axis=0)
+    return min(LONGEST, float(np.min((small * size / (last + 1e-300)) ** (1 / (len(c) - 1)))))
+
+
+def standstill(speed: np.ndarray, h: float) -> np.ndarray:
+    """Where in (0, h] series of speeds, negative before and not at h, are zero: Newton's method from h."""
+    bend, root = slopes(speed), np.full(speed.shape[1], h)
+    for _ in range(12):
+        slope = value(bend, root)
+        step = value(speed, root) / np.where(slope > 1e-300, slope, 1e-300)
+        root = np.clip(root - step, 0, h)
+        if np.abs(step).max() < 1e-14:
+            break
+    return root

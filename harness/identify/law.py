@@ -1,0 +1,44 @@
+"""The law of a free decay, its unknowns and its seven forms.
+
+In the time theta = omega (t - t0), with y the distance from rest and s = sign y',
+
+    y'' + 2 zeta y' + s b y'^2 + s r + y = 0         (a pendulum: sin y in place of y)
+
+zeta = c/(2 m omega), r = f/k (a length), b = q/m (1/length) for a drag q v |v|, omega^2 = k/m.  The motion begins at
+rest at y = A, held there before, and ends for good at the first turning point with |y| <= r.  Every loss is one:
+zeta, r and b are at least 0.
+"""
+
+from itertools import combinations
+
+import numpy as np
+
+UNKNOWNS = ("t0", "amplitude", "rest", "drift", "omega", "zeta", "r", "b")
+T0, AMPLITUDE, REST, DRIFT, OMEGA, ZETA, R, B = range(8)
+TERMS = ("zeta", "r", "b")
+LAWS = tuple(law for size in (3, 2, 1) for law in combinations(TERMS, size))  # the full law first
+WORDS = {"zeta": "viscous damping", "r": "dry friction", "b": "quadratic drag"}
+
+Terms = tuple[str, ...]
+
+
+def laws_of(terms: Terms) -> tuple[Terms, ...]:
+    """Every law of some of these terms, the full one first."""
+    return tuple(law for law in LAWS if set(law) <= set(terms))
+
+
+def unknowns_of(terms: Terms, drift: bool) -> np.ndarray:
+    """The places in UNKNOWNS of what a law with these terms leaves to find."""
+    basic = [T0, AMPLITUDE, REST, *([DRIFT] if drift else []), OMEGA]
+    return np.array(basic + [UNKNOWNS.index(term) for term in terms])
+
+
+def in_words(terms: Terms) -> str:
+    """A law by the names of its terms."""
+    *most, last = (WORDS[term] for term in terms)
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def at_rest(r: np.ndarray, sine: bool) -> np.ndarray:
+    """The largest distance from rest at which friction holds (same shape as r)."""
+    return np.arcsin(np.clip(r, 0.0, 1.0)) if sine else r

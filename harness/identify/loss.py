@@ -1,0 +1,49 @@
+"""The energy lost in a half swing against its amplitude: by its shape one sees which law it is.
+
+As a share of the energy, viscous damping takes the same at every amplitude, dry friction more of small swings (1/a),
+and drag more of large ones (a).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .fit import Identified
+from .law import OMEGA, T0, Terms
+
+
+@dataclass(frozen=True)
+class Loss:
+    """Mean amplitudes (n,) of half swings and the `share` (n,) of the energy they lost, as the turning points show it;
+    and the same for each law as `curves`."""
+
+    amplitude: np.ndarray
+    share: np.ndarray
+    curves: dict[Terms, tuple[np.ndarray, np.ndarray]]
+
+
+def losses_seen(found: Identified) -> Loss:
+    """The losses between the turning points of a record, and those of each law fitted to it."""
+    problem = found.problem
+    seen = np.zeros((2, 0))
+    if not found.record.order:
+        off = found.turns.x - found.rest(found.best, found.turns.t)
+        way = np.sign(off[0]) * (-1.0) ** np.arange(len(off))
+        seen = np.array(shares(way * off, problem.model.sine))
+    curves = {}
+    until = found.t[-1] - problem.origin
+    for law in found.laws:
+        amplitudes, begins = problem.half_swings(law.p, most=int(law.p[OMEGA] * (until - law.p[T0]) / 2.5) + 2)
+        curves[law.terms] = shares(amplitudes[begins <= until] * problem.unit, problem.model.sine)
+    return Loss(seen[0], seen[1], curves)
+
+
+def shares(a: np.ndarray, sine: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Mean amplitudes of successive ones a (n + 1,), and the share of the potential energy that is lost (n,).
+
+    Without the last half swing where it ends on the side it came from.
+    """
+    a = a[: int(np.argmin(a > 0))] if (a <= 0).any() else a
+    energy = 2 * np.sin(a / 2) ** 2 if sine else a * a / 2
+    middle = (energy[:-1] + energy[1:]) / 2
+    return (a[:-1] + a[1:]) / 2, (energy[:-1] - energy[1:]) / middle

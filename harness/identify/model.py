@@ -1,0 +1,136 @@
+"""What a sensor records of a free decay, with its derivatives by the unknowns.
+
+    signal = rest + drift (t - middle) + side omega^k d^k y/dtheta^k        k = 0 position, 1 velocity, 2 acceleration
+
+The derivatives by t0 and omega are exact, from the next derivative of y; those by A, zeta, r and b are differences of
+series, which are integrated side by side with the motion itself and looked up at the same place of the same half
+swing, so that no reversal falls between.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .chain import chain
+from .halves import halves, slopes
+from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, ZETA, B, R
+
+SHARE = 0.75  # of the terms of a series are enough for a derivative
+SHORTEST = 2.5  # theta of a half swing: fewer half swings than theta/SHORTEST reach to theta
+LAW = np.array([AMPLITUDE, ZETA, R, B])  # what the half swings depend on
+
+
+@dataclass(frozen=True)
+class Model:
+    """How the motion is seen: `side` +1 where it begins above its rest, `order` k of the derivative recorded, `sine`
+    for a pendulum, `middle` in s where the drift counts from, and the `floor` below which no swing matters."""
+
+    side: float
+    order: int
+    sine: bool
+    middle: float
+    floor: float
+
+    def varied(self, p: np.ndarray, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The laws A, zeta, r, b (1 + V, 4) of p and of its V small changes, their places in p (V,) and sizes (V,)."""
+        places = unknowns[np.isin(unknowns, LAW)]
+        sizes = dict(
+            zip(LAW.tolist(), (1e-6 * p[AMPLITUDE], 1e-7, 1e-7 * p[AMPLITUDE], 1e-6 / p[AMPLITUDE]), strict=True)
+        )
+        changes = np.array([sizes[place] for place in places.tolist()])
+        rows = np.tile(p[LAW], (1 + len(places), 1))
+        for row, (place, change) in enumerate(zip(places, changes, strict=True), 1):
+            rows[row, place == LAW] += change
+        return rows, places, changes
+
+    def __call__(self, p: np.ndarray, unknowns: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The signal (n,) at rising times t (n,) for the values p of UNKNOWNS, and its Jacobian (n, unknowns)."""
+        laws, places, changes = self.varied(p, unknowns)
+        theta = p[OMEGA] * (t - p[T0])
+        most = int(max(theta[-1], 0.0) / SHORTEST) + 4 if len(t) else 0
+        amplitudes, begins = chain(laws, self.sine, most, self.floor)
+        count = len(amplitudes) - 1
+        _, zeta, r, b = np.repeat(laws, count, axis=0).T
+        found = halves(amplitudes[:-1].T.ravel(), zeta, r, b, self.sine)
+        series = found.series.transpose(1, 0, 2).reshape(found.series.shape[1], len(found.begins), len(laws), count)
+        for _ in range(self.order):
+            series = slopes(series)
+
+        half = np.searchsorted(begins[:, 0], theta, "right") - 1
+        held, left = int(np.searchsorted(half, 0)), int(np.searchsorted(half, count))
+        half = half[held:left]
+        local = theta[held:left] - begins[half, 0]
+        stretch = np.searchsorted(found.begins, local, "right") - 1
+        which, h = stretch * count + half, local - found.begins[stretch]
+        way = self.side * np.where(half % 2, -1.0, 1.0) * p[OMEGA] ** self.order
+        still = self.side * (self.order == 0) * np.array([1.0, (-1.0) ** count])  # before and after the motion
+
+        y, rate = with_slope(series[:, :, 0].reshape(len(series), -1), which, h)
+        signal = around(held, way * y, len(t) - left, still * amplitudes[[0, -1], 0])
+        jacobian = np.zeros((len(t), len(unknowns)))
+        column = {place: i for i, place in enumerate(unknowns.tolist())}
+        jacobian[held:left, column[T0]] = -p[OMEGA] * way * rate
+        jacobian[held:left, column[OMEGA]] = (
+            way * rate * (t[held:left] - p[T0]) + self.order / p[OMEGA] * signal[held:left]
+        )
+        short = series[: int(SHARE * len(series))]
+        for i, (place, change) in enumerate(zip(places.tolist(), changes.tolist(), strict=True), 1):
+            differences = ((short[:, :, i] - short[:, :, 0]) / change).reshape(len(short), -1)
+            later = (begins[:-1, i] - begins[:-1, 0]) / change
+            slope = way * (summed(differences, which, h) - rate * later[half])
+            ends = still * (amplitudes[[0, -1], i] - amplitudes[[0, -1], 0]) / change
+            jacobian[:, column[place]] = around(held, slope, len(t) - left, ends)
+        jacobian[:, column[REST]] = 1.0
+        if DRIFT in column:
+            jacobian[:, column[DRIFT]] = t - self.middle
+        return signal + p[REST] + p[DRIFT] * (t - self.middle), jacobian
+
+    def turns(self, p: np.ndarray, unknowns: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Times (count,) in s and positions (count,) of the turning points after the first, and the Jacobian
+        (2, count, unknowns) of both; NaN after the end of the motion."""
+        laws, places, changes = self.varied(p, unknowns)
+        amplitudes, begins = chain(laws, self.sine, count, self.floor)
+        missing = count + 1 - len(amplitudes)
+        pad = ((0, max(missing, 0)), (0, 0))
+        sizes = np.pad(amplitudes, pad, constant_values=np.nan)[1:]
+        theta = np.pad(begins, pad, constant_values=np.nan)[1:]
+        way = self.side * (-1.0) ** np.arange(1, count + 1)
+        times = p[T0] + theta[:, 0] / p[OMEGA]
+        jacobian = np.zeros((2, count, len(unknowns)))
+        for i, place in enumerate(unknowns.tolist()):
+            if place == T0:
+                jacobian[0, :, i] = 1.0
+            elif place == OMEGA:
+                jacobian[0, :, i] = -theta[:, 0] / p[OMEGA] ** 2
+            elif place == REST:
+                jacobian[1, :, i] = 1.0
+            elif place == DRIFT:
+                jacobian[1, :, i] = times - self.middle
+            else:
+                variant = 1 + int(np.flatnonzero(places == place)[0])
+                change = changes[variant - 1]
+                jacobian[0, :, i] = (theta[:, variant] - theta[:, 0]) / (change * p[OMEGA])
+                jacobian[1, :, i] = way * (sizes[:, variant] - sizes[:, 0]) / change
+        return times, p[REST] + p[DRIFT] * (times - self.middle) + way * sizes[:, 0], jacobian
+
+
+def summed(series: np.ndarray, which: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """The series in the columns `which` (n,) at h (n,), by Horner's rule."""
+    total = series[-1][which]
+    for term in series[-2::-1]:
+        total = total * h + term[which]
+    return total
+
+
+def with_slope(series: np.ndarray, which: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same, and the derivatives (n,)."""
+    total, slope = series[-1][which], np.zeros_like(h)
+    for term in series[-2::-1]:
+        slope = slope * h + total
+        total = total * h + term[which]
+    return total, slope
+
+
+def around(before: int, moving: np.ndarray, after: int, ends: np.ndarray) -> np.ndarray:
+    """Values of the motion, with those before and after it, where nothing moves."""
+    return np.concatenate([np.full(before, ends[0]), moving, np.full(after, ends[1])])

@@ -1,0 +1,55 @@
+"""The noise of a record, and what is left when it is smoothed away."""
+
+import numpy as np
+
+
+def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
+    """Standard deviation of the noise of x (n,), and the step of a quantiser that stands out of it, or 0.
+
+    The noise is what is left of a sample by the cubic through its four neighbours, robustly by the median; also the
+    curvature that sampling is too coarse for counts.  A quantiser of step q adds at least q/sqrt(12).
+    """
+    n = len(t) - 4
+    near = np.array([t[i : i + n] for i in (0, 1, 3, 4)])
+    weights = np.ones((4, n))
+    for i in range(4):
+        for j in range(4):
+            if i != j:
+                weights[i] *= (t[2:-2] - near[j]) / (near[i] - near[j])
+    left = x[2:-2] - sum(weight * x[i : i + n] for weight, i in zip(weights, (0, 1, 3, 4), strict=True))
+    noise = float(1.4826 * np.median(np.abs(left) / np.sqrt(1 + (weights**2).sum(axis=0))))
+    rungs = np.diff(np.unique(x))
+    rungs = rungs[rungs > 1e-9 * np.ptp(x)]  # the same value, computed twice
+    step = float(rungs.min()) if len(rungs) else 0.0
+    coarse = step > 1.5 * noise or noise < step / 3
+    return max(noise, step / np.sqrt(12)), step if coarse else 0.0
+
+
+def smooth(x: np.ndarray, width: int, degree: int) -> np.ndarray:
+    """x (n,) through the polynomials of least squares over `width` samples (odd) about each, those at the ends over
+    the first and the last `width` (A. Savitzky, M. J. E. Golay, Analytical Chemistry 36 (1964))."""
+    half = width // 2
+    powers = np.vander(np.linspace(-1, 1, width), degree + 1, increasing=True)
+    project = powers @ np.linalg.pinv(powers)
+    inner = np.convolve(x, project[half][::-1], "valid")
+    return np.concatenate([project[:half] @ x[:width], inner, project[half + 1 :] @ x[-width:]])
+
+
+def reversals(x: np.ndarray, least: float) -> np.ndarray:
+    """Samples at which x (n,) turns back by `least` or more, the first extreme included."""
+    found: list[int] = []
+    low = high = 0
+    rising = None
+    values = x.tolist()
+    for i, value in enumerate(values):
+        if value > values[high]:
+            high = i
+        if value < values[low]:
+            low = i
+        if rising is not False and values[high] - value >= least:
+            found.append(high)
+            rising, low = False, i
+        elif rising is not True and value - values[low] >= least:
+            found.append(low)
+            rising, high = True, i
+    return np.array(found, int)

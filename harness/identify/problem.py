@@ -1,0 +1,168 @@
+"""A record made ready to be fitted: times from its begin, values about their middle in amplitudes, and its start.
+
+For a spring the law has no length of its own, so that positions are counted in amplitudes; the sine of a pendulum
+wants radians.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from .chain import chain
+from .energy import losses
+from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, B, R, Terms, unknowns_of
+from .model import Model
+from .record import Record
+from .squares import least_squares
+from .turning import Turns
+
+LEAST_NOISE = 1e-13  # share of the amplitude: no record is exact beyond
+EXACT = 1e-9  # share of the motion that the series of the model leave open
+NOWHERE = 30.0  # errors of a turning point that the motion never reaches
+WINDOWS = (0.08, 0.2, 0.45, 1.0)  # shares of a record: the phase is known before the next is fitted
+STEPS = 15  # of the fit of a window
+DENSE = 10_000  # samples say nearly as much as more of them: a fit begins with so many
+ROUGH = 1.3  # times the noise: residuals beyond ask for windows
+
+Fitted = tuple[np.ndarray, float]  # the values of UNKNOWNS, and the squares they leave
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Samples `t`, `x` (n,) to be fitted by `model`; `origin` s, `level` and `unit` turn them back into the record's;
+    `noise` of a sample; with or without `drift`."""
+
+    t: np.ndarray
+    x: np.ndarray
+    model: Model
+    origin: float
+    level: float
+    unit: float
+    noise: float
+    drift: bool
+
+    @property
+    def exact(self) -> float:
+        """Residuals below which no fit is better than another."""
+        return EXACT * float(np.std(self.x))
+
+    def unknowns(self, terms: Terms) -> np.ndarray:
+        return unknowns_of(terms, self.drift)
+
+    def only(self, keep: np.ndarray | slice) -> Self:
+        """The same with some of the samples."""
+        return replace(self, t=self.t[keep], x=self.x[keep])
+
+    def off(self, p: np.ndarray, terms: Terms) -> tuple[np.ndarray, np.ndarray]:
+        """Residuals (n,), signal less record, and their Jacobian."""
+        signal, jacobian = self.model(p, self.unknowns(terms), self.t)
+        return signal - self.x, jacobian
+
+    def fit(self, p: np.ndarray, terms: Terms, steps: int = 30) -> Fitted:
+        """The law with these terms, from the values p on."""
+        unknowns, every = self.unknowns(terms), len(self.t) // DENSE
+        if every > 1:
+            thin = self.only(slice(None, None, every))
+            p, _, _, _ = least_squares(lambda q: thin.off(q, terms), p, unknowns, steps)
+        found, cost, _, _ = least_squares(lambda q: self.off(q, terms), p, unknowns, steps)
+        return found, cost
+
+    def grown(self, p: np.ndarray, terms: Terms, swing: float) -> np.ndarray:
+        """The same by growing windows, none shorter than five half swings `swing` in s."""
+        least = int(np.searchsorted(self.t, self.t[0] + 5 * swing))
+        for share in WINDOWS:
+            size = max(int(share * len(self.t)), min(len(self.t), least))
+            p, _ = self.only(slice(size)).fit(p, terms, STEPS)
+        return p
+
+    def rough(self, cost: float) -> bool:
+        """Whether squares are more than noise leaves."""
+        return cost > len(self.t) * (ROUGH * self.noise) ** 2
+
+    def half_swings(self, p: np.ndarray, terms: Terms = TERMS, most: int = 10_000) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes and begins (N + 1,), in s, of the half swings of these values."""
+        amplitudes, begins = chain(p[None, [AMPLITUDE, ZETA, R, B]], self.model.sine, most, self.model.floor)
+        return amplitudes[:, 0], p[T0] + begins[:, 0] / p[OMEGA]
+
+    def turned(self, p: np.ndarray, count: int) -> tuple[Self, np.ndarray]:
+        """The same motion begun `count` half swings later, and its values."""
+        amplitudes, begins = self.half_swings(p, most=count)
+        p = p.copy()
+        p[AMPLITUDE], p[T0] = amplitudes[count], begins[count]
+        return replace(self, model=replace(self.model, side=self.model.side * (-1) ** count)), p
+
+
+def prepare(record: Record, turns: Turns, pendulum: bool, drift: bool) -> tuple[Problem, np.ndarray]:
+    """The problem of a record, and the values of the full law with which its turning points agree best."""
+    origin = float(record.t[0])
+    times, first = turns.t - origin, turns.begin - origin
+    middle = middles(times, turns.x, drift or record.order > 0)
+    side = -float(np.sign(turns.x[0] - middle[0]))
+    a = np.abs(turns.x - middle)
+    unit = 1.0 if pendulum else float(a.max())
+    level = float(middle[-1]) if record.order == 0 else float(np.median(record.x))
+    a, places, error = a / unit, (turns.x - middle) / unit, turns.error / unit
+    noise = max(turns.noise / unit, LEAST_NOISE * float(np.ptp(record.x)) / unit)
+    omega = np.pi / turns.half * (1 + float(np.median(a)) ** 2 / 16 if pendulum else 1.0)
+    error = max(error, 1e-9)
+    model = Model(
+        side, record.order, pendulum, float(record.t[-1] - origin) / 2, max(1e-3 * error, 1e-6 * float(a.max()))
+    )
+
+    start = np.zeros(len(UNKNOWNS))
+    start[T0], start[OMEGA] = first, omega
+    start[ZETA:] = losses(a, TERMS, pendulum) if len(a) > 3 else (0.01, 0.0, 0.0)
+    zeta, r, b = start[ZETA:]
+    start[AMPLITUDE] = a[0] + max(2 * r + np.pi * zeta * a[0] + 4 / 3 * b * a[0] ** 2, 0.0)
+    if pendulum:
+        start[AMPLITUDE] = min(start[AMPLITUDE], 3.1)
+    at_turns = replace(model, order=0)
+    seed = numbered(at_turns, start, times, places, a * omega / (3 * error), error, drift)
+    if record.order:
+        seed[REST] = seed[DRIFT] = 0.0
+    elif drift and len(middle) > 1 and times[-1] > times[0]:
+        slope = (middle[-1] - middle[0]) / (times[-1] - times[0]) / unit
+        seed[DRIFT] += slope
+        seed[REST] += slope * (model.middle - times[-1])
+    problem = Problem(record.t - origin, (record.x - level) / unit, model, origin, level, unit, noise, drift)
+    return problem, seed
+
+
+def middles(times: np.ndarray, places: np.ndarray, moving: bool) -> np.ndarray:
+    """The rest position at each turning point (n,): one for all, or on a line where it may move."""
+    if len(places) < 3:
+        return np.full(len(places), np.mean(places))
+    between = (places[:-2] + 2 * places[1:-1] + places[2:]) / 4
+    if not moving or len(between) < 3:
+        return np.full(len(places), np.median(between))
+    return np.polyval(np.polyfit(times[1:-1], between, 1), times)
+
+
+def numbered(
+    model: Model,
+    start: np.ndarray,
+    times: np.ndarray,
+    places: np.ndarray,
+    weights: np.ndarray,
+    error: float,
+    drift: bool,
+    terms: Terms = TERMS,
+) -> np.ndarray:
+    """The values that agree best with turning points matched by their number, in which no phase can slip."""
+    unknowns = unknowns_of(terms, False)
+    if 2 * len(times) <= len(unknowns):
+        return start
+
+    def off(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        at, x, jacobian = model.turns(p, unknowns, len(times))
+        reached = np.isfinite(at)
+        late = np.where(reached, (np.where(reached, at, 0.0) - times) * weights, NOWHERE)
+        beside = np.where(reached, (np.where(reached, x, 0.0) - places) / error, NOWHERE)
+        slopes = (
+            np.where(reached[None, :, None], jacobian, 0.0)
+            * np.stack([weights, np.full_like(weights, 1 / error)])[..., None]
+        )
+        return np.concatenate([late, beside]), slopes.reshape(-1, len(unknowns))
+
+    return least_squares(off, start, unknowns)[0]

@@ -1,0 +1,171 @@
+"""Which samples are free motion: from a hold or a push before it, to a rest or a hand after it.
+
+The fit begins with the sure turning points, and grows from there as long as the record follows the law.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
+from .noise import scatter
+from .problem import LEAST_NOISE, Problem, prepare
+from .record import Record
+from .turning import Turns
+
+SWINGS = 2.0  # steps of a quantiser that a swing spans at least
+PUSHED = 2.0  # times the noise: what the first half swing may be off
+FAR = 8.0  # times the noise of a stray sample
+STRAY = 0.001  # share of the samples, beside two, that may stray
+PARTS = (0.6, 0.35)  # shares of the turning points that may be free of what disturbs the rest
+LOST = 4.0  # times the noise: where a half swing leaves the law
+LEAST = 6  # turning points before that
+ROUNDS = 6  # of going on from there
+
+
+@dataclass(frozen=True)
+class Window:
+    """The `problem` of the samples used, the values `p` of the full law and the `squares` they leave; what was done is
+    told in `notes`."""
+
+    problem: Problem
+    p: np.ndarray
+    squares: float
+    notes: tuple[str, ...]
+
+
+def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drift: bool) -> Window:
+    """The free motion of a record, from the values that its turning points agree with."""
+    problem, seed = prepare(record, turns, pendulum, drift)
+    for place in (UNKNOWNS.index(term) for term in TERMS if term not in terms):
+        seed[place] = 0.0
+    swing, notes = turns.half, []
+    begin = max(turns.start - problem.origin, seed[T0])
+    later = problem.only(problem.t >= begin)
+    sure = later.only(later.t <= turns.t[-1] - problem.origin + 0.6 * swing)
+    p, squares = fitted(sure, seed, terms, swing)
+
+    used, p, squares = until_stop(later, p, terms, turns, sure, squares)
+    used, p, squares, strayed = without_strays(used, p, squares, terms, swing)
+    pushed = after_push(used, p, squares, terms, swing)
+    if pushed is not None:
+        used, p, squares = pushed
+        used, p, squares = until_stop(used, p, terms, turns, used, squares)
+        notes.append(f"The motion is free from t = {used.t[0] + used.origin:.6g} s on; what is before is left out.")
+
+    if used.rough(squares) and squares > len(used.t) * (2 * used.noise) ** 2:
+        broken = until_disturbed(record, turns, used, squares, terms)
+        if broken is not None:
+            used, p, squares, strayed = without_strays(*broken, terms, swing)
+            at = used.t[-1] + used.origin
+            notes.append(
+                f"The record follows the law until t = {at:.6g} s, and then departs from it; it is used until there."
+            )
+    if len(strayed):
+        notes.append(f"Left out as stray: {len(strayed)} of {len(problem.t)} samples.")
+    noise, _ = scatter(used.t, used.x)  # without what was held or stuck
+    used = replace(used, noise=max(noise, LEAST_NOISE))
+    return Window(used, p, squares, tuple(notes))
+
+
+def fitted(problem: Problem, p: np.ndarray, terms: Terms, swing: float) -> tuple[np.ndarray, float]:
+    """The full law, at once where that succeeds, otherwise by growing windows; the better of both."""
+    found = problem.fit(p, terms)
+    if not problem.rough(found[1]):
+        return found
+    return min(found, problem.fit(problem.grown(p, terms, swing), terms), key=lambda fit: fit[1])
+
+
+def until_stop(
+    problem: Problem, p: np.ndarray, terms: Terms, turns: Turns, fit_to: Problem, squares: float
+) -> tuple[Problem, np.ndarray, float]:
+    """The problem until the motion stops, with its fit; p leaves `squares` of the samples `fit_to`."""
+    used = problem.only(problem.t <= end(problem, p, terms, turns))
+    return (used, p, squares) if len(used.t) == len(fit_to.t) else (used, *fitted(used, p, terms, turns.half))
+
+
+def end(problem: Problem, p: np.ndarray, terms: Terms, turns: Turns) -> float:
+    """In s: half a swing before the motion stops, or where its swings are lost in the steps of a quantiser.
+
+    A tail that is stuck repeats one sample, and its end makes kinks.
+    """
+    amplitudes, begins = problem.half_swings(p)
+    spans = (amplitudes[:-1] + amplitudes[1:]) * p[OMEGA] ** problem.model.order
+    lost = np.flatnonzero(spans < SWINGS * turns.step / problem.unit)
+    last = min(int(lost[0]) if len(lost) else len(begins) - 1, len(begins) - 2)
+    return float(begins[max(last, min(3, len(begins) - 1))])
+
+
+def without_strays(
+    problem: Problem, p: np.ndarray, squares: float, terms: Terms, swing: float
+) -> tuple[Problem, np.ndarray, float, np.ndarray]:
+    """The problem without the samples that are far off where all others are not, and their times; whole where such
+    samples are many."""
+    e, _ = problem.off(p, terms)
+    far = np.abs(e) > FAR * max(typical(e), problem.noise, problem.exact)
+    if not 0 < far.sum() <= 2 + STRAY * len(far):
+        return problem, p, squares, problem.t[:0]
+    rest = problem.only(~far)
+    return rest, *fitted(rest, p, terms, swing), problem.t[far]
+
+
+def typical(e: np.ndarray) -> float:
+    """The standard deviation of residuals (n,) as their median tells it."""
+    return 1.4826 * float(np.median(np.abs(e)))
+
+
+def after_push(
+    problem: Problem, p: np.ndarray, squares: float, terms: Terms, swing: float
+) -> tuple[Problem, np.ndarray, float] | None:
+    """The problem from its first turning point on, where the half swing before that is no free motion."""
+    e, _ = problem.off(p, terms)
+    _, begins = problem.half_swings(p, most=1)
+    first = problem.t < begins[-1]
+    if len(begins) < 2 or not 3 <= first.sum() < len(e) - 12:
+        return None
+    rest = float(np.sqrt(np.mean(e[~first] ** 2)))
+    if not np.sqrt(np.mean(e[first] ** 2)) > PUSHED * max(problem.noise, rest, problem.exact):
+        return None
+    turned, q = problem.turned(p, 1)
+    turned = turned.only(~first)
+    q, less = fitted(turned, q, terms, swing)
+    return (turned, q, less) if less / len(turned.t) < 0.5 * squares / len(e) else None
+
+
+def until_disturbed(
+    record: Record, turns: Turns, used: Problem, squares: float, terms: Terms
+) -> tuple[Problem, np.ndarray, float] | None:
+    """The problem up to where the record leaves the law that it followed until then; None where it follows none."""
+    begin, unfit = used.t[0] + used.origin, float(np.sqrt(squares / len(used.t))) * used.unit
+    for share in PARTS:
+        count = int(share * len(turns.t))
+        if count < LEAST:
+            return None
+        first = replace(turns, t=turns.t[:count], x=turns.x[:count])
+        problem, p = prepare(record, first, used.model.sine, used.drift)
+        problem = problem.only(problem.t >= begin - problem.origin)
+        early, last = problem, float(first.t[-1] - problem.origin)
+        for _ in range(ROUNDS):  # what is fitted reaches farther than what was
+            early = problem.only(problem.t <= last)
+            noise, _ = scatter(early.t, early.x)  # what disturbs the rest may be quieter
+            p, cost = fitted(replace(early, noise=max(noise, early.noise)), p, terms, turns.half)
+            level = max(noise, early.noise, typical(early.off(p, terms)[0]))
+            leaves = leaving(problem, p, terms, last - turns.half / 2, LOST * level)
+            if leaves < last + turns.half / 2 or leaves >= problem.t[-1]:
+                break
+            last = leaves
+        if level * problem.unit < unfit / LOST and leaves < problem.t[-1]:
+            return early, p, cost
+    return None
+
+
+def leaving(problem: Problem, p: np.ndarray, terms: Terms, after: float, far: float) -> float:
+    """When the first half swing begins, later than `after` in s, most of which is `far` off; the end where none is."""
+    e, _ = problem.off(p, terms)
+    _, begins = problem.half_swings(p)
+    edges = np.searchsorted(problem.t, [*begins, problem.t[-1]]).tolist()
+    for begin, (low, high) in zip(begins.tolist(), pairwise(edges), strict=True):
+        if begin >= after and high > low and typical(e[low:high]) > far:
+            return begin
+    return float(problem.t[-1])

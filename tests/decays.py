@@ -1,0 +1,74 @@
+"""Simulated decays whose truth is known: `swung` makes a record, `random_record` one of any kind."""
+
+import numpy as np
+
+from harness.identify.law import LAWS, TERMS, unknowns_of
+from harness.identify.model import Model
+from harness.identify.record import Record
+
+T = np.linspace(0.0, 4.0, 1000)
+OMEGA = 12.566
+
+
+def swung(
+    zeta=0.0,
+    r=0.0,
+    b=0.0,
+    sine=False,
+    omega=OMEGA,
+    turn=0.1,
+    a=0.1,
+    rest=0.02,
+    t=T,
+    noise=0.0,
+    step=0.0,
+    order=0,
+    side=1.0,
+    drift=0.0,
+    seed=6,
+):
+    """The record of a decay from the amplitude `a`, at rest there until `turn`; with white noise, rounded to `step`."""
+    model = Model(side, order, sine, 0.0, 1e-7 * a)
+    x, _ = model(np.array([turn, a, rest, drift, omega, zeta, r, b]), unknowns_of(TERMS, False), t)
+    x = x + noise * np.random.default_rng(seed).standard_normal(len(t))
+    base = "rad" if sine else "m"
+    return Record("swung", t, step * np.round(x / step) if step else x, base + ("", "/s", "/s2")[order], order, base)
+
+
+def random_record(seed, law=None, sine=None, quantised=None, samples=None):
+    """A record and its truth: any law, amplitude, rate, noise; a third of them quantised, half of them pendulums."""
+    rng = np.random.default_rng(seed)
+    sine = bool(rng.integers(2)) if sine is None else sine
+    law = LAWS[rng.integers(len(LAWS))] if law is None else law
+    a = 10 ** (rng.uniform(-0.7, 0.45) if sine else rng.uniform(-3, 0))
+    omega = 10 ** rng.uniform(-0.3, 2)
+    lost = dict(zip(law, rng.dirichlet(np.ones(len(law))) * 10 ** rng.uniform(-2, -0.7), strict=True))  # of a, at first
+    truth = {
+        "zeta": lost.get("zeta", 0.0) / np.pi,
+        "r": lost.get("r", 0.0) * (min(a, 1.0) if sine else a) / 2,
+        "b": lost.get("b", 0.0) * 0.75 / a,
+    }
+    swings = rng.uniform(6, 80)
+    samples = int(10 ** rng.uniform(2.7, 4)) if samples is None else samples
+    t = np.linspace(0, swings * np.pi / omega, max(samples, int(12 * swings)))
+    noise = a * 10 ** rng.uniform(-4, -1.7)
+    quantised = rng.random() < 1 / 3 if quantised is None else quantised
+    step = noise * 10 ** rng.uniform(-0.5, 1) if quantised else 0.0
+    turn = rng.uniform(-1, 0.3) * np.pi / omega
+    rest = rng.normal() * a
+    if sine and a > 2:
+        turn = abs(turn)  # nothing is made up beyond what was seen
+    record = swung(
+        **truth,
+        sine=sine,
+        omega=omega,
+        turn=turn,
+        a=a,
+        rest=rest,
+        t=t,
+        noise=0.3 * noise if quantised else noise,
+        step=step,
+        side=rng.choice([-1.0, 1.0]),
+        seed=seed + 1,
+    )
+    return record, truth | {"omega": omega, "rest": rest}, sine

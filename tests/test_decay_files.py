@@ -1,0 +1,296 @@
+"""Records as instruments, spreadsheets and phones write them: each is read for what it is, or told what it lacks."""
+
+import contextlib
+import io
+
+import numpy as np
+import pytest
+from decays import swung
+
+from harness.errors import HarnessError, SceneError
+from harness.identify.columns import Columns, read
+from harness.identify.figures import Known
+from harness.identify.fit import identify
+from harness.identify.units import known
+
+T = np.arange(600) / 100
+TRUTH = {"omega": 12.566, "zeta": 0.01, "r": 0.002}
+
+
+def motion(order=0, sine=False, rest=0.0, t=T):
+    return swung(0.01, 0.002, sine=sine, turn=0.0, t=t, order=order, rest=rest).x
+
+
+X = motion()
+
+
+def rows(*columns, mark=",", comma=False, form="{:.9g}"):
+    """Lines of numbers, with decimal commas if asked."""
+    lines = [
+        mark.join(cell if isinstance(cell, str) else form.format(cell) for cell in row)
+        for row in zip(*columns, strict=True)
+    ]
+    return "\n".join(line.replace(".", ",") for line in lines) if comma else "\n".join(lines)
+
+
+def phone():
+    """phyphox: three accelerations and their length, quoted headings, six digits after the point."""
+    a = motion(2)
+    noise = 0.02 * np.random.default_rng(1).standard_normal((2, len(T)))
+    head = ",".join(
+        f'"{h}"'
+        for h in (
+            "Time (s)",
+            *(f"Linear Acceleration {axis} (m/s^2)" for axis in "xyz"),
+            "Absolute acceleration (m/s^2)",
+        )
+    )
+    return head + "\n" + rows(T, *noise, a, np.hypot(a, noise[0]), form="{:.9E}")
+
+
+def stamped():
+    start = np.datetime64("2026-11-21T23:59:58.000")
+    stamps = [str(start + np.timedelta64(round(1000 * t), "ms")) + "Z" for t in T]
+    return "timestamp,angle (deg)\n" + rows(stamps, np.degrees(motion(sine=True)))
+
+
+def holes():
+    cells = [f"{1e3 * x:.9g}" for x in X]
+    cells[50], cells[51], cells[200] = "", "NaN", "n/a"
+    return "t [s],x [mm]\n" + rows(T, cells)
+
+
+def gap():
+    keep = (T < 2.0) | (T > 2.7)
+    return "t [s],x [mm]\n" + rows(T[keep], 1e3 * X[keep])
+
+
+def instrument():
+    return (
+        f"Vendor Recorder 3\nSerial;0815\nDate;21.11.2026\n\nTime;Laser\ns;mm\n{rows(T, 1e3 * X, mark=';', comma=True)}"
+    )
+
+
+def logger():
+    """Times rounded to 10 ms where a sample is taken each 12.5 ms; some come twice."""
+    t = 0.0125 * np.arange(480)
+    return "t [s],x [mm]\n" + rows(np.round(t, 2), 1e3 * motion(t=t))
+
+
+def quoted():
+    return "\n".join(f'"{t:.9g}","{1e3 * x:.9g}"'.replace(".", ",") for t, x in zip(T, X, strict=True))
+
+
+def counts():
+    return np.round(np.degrees(motion(sine=True)) / 0.001)
+
+
+def text_of(text, encoding="utf-8"):
+    return text.encode(encoding)
+
+
+FILES = {
+    "commas.csv": lambda: text_of("t [s],x [mm]\n" + rows(T, 1e3 * X)),
+    "semicolons.csv": lambda: text_of("Zeit (s);Weg (mm)\n" + rows(T, 1e3 * X, mark=";", comma=True)),
+    "tabs.tsv": lambda: text_of("time\tx [m]\n" + rows(T, X, mark="\t")),
+    "tabs-commas.txt": lambda: text_of("Time (ms)\tlaser (cm)\n" + rows(1e3 * T, 100 * X, mark="\t", comma=True)),
+    "blanks.dat": lambda: text_of("t x[m]\n" + rows(T, X, mark="   ")),
+    "quoted-decimal-commas.csv": lambda: text_of('"t [s]","x [mm]"\n' + quoted()),
+    "windows-lines.csv": lambda: text_of(("t [s],x [mm]\n" + rows(T, 1e3 * X)).replace("\n", "\r\n")),
+    "utf8-mark.csv": lambda: text_of("t [s],x [µm]\n" + rows(T, 1e6 * X), "utf-8-sig"),
+    "utf16.txt": lambda: text_of("t [s]\tx [mm]\n" + rows(T, 1e3 * X, mark="\t"), "utf-16"),
+    "cp1252.csv": lambda: text_of("Zeit [s];Auslenkung [µm]\n" + rows(T, 1e6 * X, mark=";", comma=True), "cp1252"),
+    "units-row.csv": lambda: text_of("t,x\ns,mm\n" + rows(T, 1e3 * X)),
+    "instrument.csv": lambda: text_of(instrument()),
+    "comments.txt": lambda: text_of("# rig 3\n# second run\nt [s],x [mm]\n" + rows(T, 1e3 * X) + "\n# end\n"),
+    "heading-in-comment.txt": lambda: text_of("# t[s] x[mm]\n" + rows(T, 1e3 * X, mark=" ")),
+    "no-heading.csv": lambda: text_of(rows(T, 1e3 * X)),
+    "index.csv": lambda: text_of(",time,x [mm]\n" + rows([str(i) for i in range(len(T))], T, 1e3 * X)),
+    "time-second.csv": lambda: text_of("x [mm],t [s]\n" + rows(1e3 * X, T)),
+    "stamps.csv": lambda: text_of(stamped()),
+    "logger.csv": lambda: text_of(logger()),
+    "holes.csv": lambda: text_of(holes()),
+    "gap.csv": lambda: text_of(gap()),
+    "cut-off.csv": lambda: text_of("t [s],x [mm]\n" + rows(T, 1e3 * X) + "\n6.0"),
+    "phone.csv": lambda: text_of(phone()),
+    "gyroscope.csv": lambda: text_of('"Time (s)","Gyroscope x (rad/s)"\n' + rows(T, motion(1, sine=True))),
+    "accelerometer-in-g.csv": lambda: text_of("t [s],az [g]\n" + rows(T, 1 + motion(2) / 9.80665)),
+    "encoder.csv": lambda: text_of("t [ms],count [counts]\n" + rows(1e3 * T, counts())),
+    "status.csv": lambda: text_of("t [s],status,x [mm]\n" + rows(T, ["ok"] * len(T), 1e3 * X)),
+    "numpy.npz": lambda: npz(t=T, x=X),
+    "matlab5.mat": lambda: mat5({"t": T[:, None], "x": X[:, None]}),
+    "matlab-structure.mat": lambda: mat5({"run": {"t": T, "x": X, "note": "second"}}),
+    "matlab73.mat": lambda: mat73(t=T[None], x=X[None]),
+    "spreadsheet.xlsx": lambda: xlsx([["Laser"], [], ["t [s]", "x [mm]"], *np.stack([T, 1e3 * X], 1).tolist()]),
+}  # fmt: skip
+ASKED = {
+    "no-heading.csv": {"names": "t [s],x [mm]"},
+    "encoder.csv": {"per_count": "0.001deg"},
+    **{name: {"unit": "m"} for name in ("numpy.npz", "matlab5.mat", "matlab-structure.mat", "matlab73.mat")},
+}
+PENDULUMS = ("stamps.csv", "gyroscope.csv", "encoder.csv")
+QUANTITIES = {"phone.csv": "acceleration", "accelerometer-in-g.csv": "acceleration", "gyroscope.csv": "velocity"}
+SAID = {
+    "logger.csv": "rounded to 0.01 s",
+    "holes.csv": "3 of 600 rows have a missing cell",
+    "cut-off.csv": "1 of 601 rows have a missing cell",
+    "phone.csv": "Linear Acceleration z (m/s^2)",
+}
+
+
+def npz(**arrays):
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+def mat5(arrays):
+    from scipy.io import savemat
+
+    file = io.BytesIO()
+    savemat(file, arrays)
+    return file.getvalue()
+
+
+def mat73(**arrays):
+    """As MATLAB writes it: HDF5 after a block of 512 bytes of its own."""
+    h5py = pytest.importorskip("h5py", reason="extra records")
+    file = io.BytesIO()
+    with h5py.File(file, "w", userblock_size=512) as data:
+        for name, values in arrays.items():
+            data[name] = values
+    return b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + file.getvalue()[512:]
+
+
+def xlsx(rows):
+    openpyxl = pytest.importorskip("openpyxl", reason="only tests write spreadsheets")
+    pytest.importorskip("python_calamine", reason="extra records")
+    book = openpyxl.Workbook()
+    for row in rows:
+        book.active.append(row)
+    file = io.BytesIO()
+    book.save(file)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_as_people_have_it_gives_its_answer(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(FILES[name]())
+    record = read(str(path), Columns(**ASKED.get(name, {})), path.stem)
+    assert record.quantity == QUANTITIES.get(name, "position")
+    found = identify(record, Known(pendulum=name in PENDULUMS))
+    values = {each.name: each for each in found.estimates}
+    for symbol, truth in TRUTH.items():
+        assert values[symbol].value == pytest.approx(truth, rel=2e-3)
+    assert SAID.get(name, "") in " ".join(found.remarks)
+
+
+ROWS = "\n".join(f"{i},{i}" for i in range(20))
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "sentence"),
+    [
+        (f"t,x\n{ROWS}", Columns(), "x has no unit"),
+        (f"t,a\n{ROWS}", Columns(), "as in --unit m/s2 or g"),
+        (f"t [s],x [m]\n{ROWS}", Columns(position="y"), "unknown column 'y'"),
+        (f"t [h/m],x [m]\n{ROWS}", Columns(), "unknown unit of t 'h/m'"),
+        (f"t [s],x [m]\n{ROWS}\n20,abc", Columns(), "'abc' in row 22, column x [m], is not a number"),
+        (f"t [s],x [m]\n{ROWS}\n20,1,2", Columns(), "row 22 has 3 cells where the heading has 2"),
+        (f"t [s],x [m]\n{ROWS}\n5,5", Columns(), "time does not rise after t = 19.0 s"),
+        (f"t [s],x [m]\n{ROWS}\n20,1e200", Columns(), "which nothing measures"),
+        (f"t [s],x [m]\n{ROWS}", Columns(begin=15), "has 5 samples"),
+        (
+            f"t [s],x [m]\n{ROWS.replace(',1', ',').replace(',3', ',')}\n20,\n21,\n22,\n23,",
+            Columns(),
+            "rows have no number",
+        ),
+        (ROWS, Columns(), "--columns 't [s],x [mm]'"),
+        (ROWS, Columns(names="t"), "--columns names 1 columns, and record.csv has 2"),
+        ("", Columns(), "is empty"),
+        ("Dear Sir,\nno table.\n", Columns(), "has no table"),
+        (f"t [s],count [counts]\n{ROWS}", Columns(), "--per-count"),
+        (f"t [s],count [counts]\n{ROWS}", Columns(per_count="half a turn"), "has a number and a unit"),
+        (f"t [s],acceleration [mm]\n{ROWS}", Columns(), "the name of an acceleration and the unit of a position"),
+        (f"t [s],a [m/s^2]\n{ROWS}", Columns(quantity="position"), "is that of an acceleration"),
+        ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, Columns(names="t,x [m]"), "is no time stamp"),
+        ('t [s],"x [m]\n' + ROWS, Columns(), "has no table"),
+    ],
+)
+def test_a_file_that_is_no_record_is_refused_in_one_sentence(tmp_path, text, columns, sentence):
+    path = tmp_path / "record.csv"
+    path.write_text(text)
+    with pytest.raises(SceneError) as refusal:
+        read(str(path), columns, "record")
+    assert sentence in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if not name.endswith((".csv", ".txt", ".tsv", ".dat"))])
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
+def test_a_damaged_file_is_refused_in_one_sentence(tmp_path, name, share):
+    path, data = tmp_path / name, FILES[name]()
+    path.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(HarnessError) as refusal:
+        read(str(path), Columns(unit="m"), path.stem)
+    assert name in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_no_bytes_end_in_a_traceback(tmp_path):
+    """Files as above with bytes changed, cut out and put in: an answer or a sentence, whatever comes."""
+    rng = np.random.default_rng(5)
+    texts = [FILES[name]() for name in ("commas.csv", "instrument.csv", "stamps.csv", "utf16.txt", "phone.csv")]
+    path = tmp_path / "record.csv"
+    for data in texts * 12:
+        bytes_ = bytearray(data[: rng.integers(200, 4000)])
+        at = rng.integers(0, len(bytes_), 8)
+        bytes_[at[0] : at[0]] = bytes(rng.integers(0, 256, rng.integers(1, 200), dtype=np.uint8))
+        for place in at[1:]:
+            bytes_[place] = rng.integers(256)
+        path.write_bytes(bytes_)
+        with contextlib.suppress(HarnessError):
+            read(str(path), Columns(), "record")
+
+
+def test_a_missing_file_is_told_with_the_nearest(tmp_path):
+    (tmp_path / "swing.csv").write_text("t [s],x [m]\n" + ROWS)
+    with pytest.raises(SceneError, match=r"cannot read .*No such file or directory \(nearest: 'swing.csv'\)"):
+        read(str(tmp_path / "swng.csv"), Columns(), "swng")
+
+
+def test_a_heading_is_taken_as_it_stands_in_the_file(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("clock [s],x [mm],Laser 2 [mm]\n" + rows(T, 0 * X, 1e3 * X))
+    record = read(str(path), Columns(time="clock [s]", position="Laser 2 [mm]"), "record")
+    assert record.x == pytest.approx(X, abs=1e-9)
+    assert read(str(path), Columns(position="laser 2"), "record").x == pytest.approx(X, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("written", "order", "base", "size"),
+    [
+        ("m/s^2", 2, "m", 1.0),
+        ("m/s²", 2, "m", 1.0),
+        ("m·s⁻²", 2, "m", 1.0),
+        ("m/s/s", 2, "m", 1.0),
+        ("g", 2, "m", 9.80665),
+        ("deg/s", 1, "rad", np.pi / 180),
+        ("°/s", 1, "rad", np.pi / 180),
+        ("rpm", 1, "rad", np.pi / 30),
+        ("µm", 0, "m", 1e-6),
+        ("Degrees", 0, "rad", np.pi / 180),
+        ("inches", 0, "m", 0.0254),
+    ],
+)
+def test_a_unit_tells_what_was_measured(written, order, base, size):
+    assert known(written) == (order, base, pytest.approx(size, rel=1e-15))
+
+
+def test_a_unit_that_is_not_known_is_kept_and_said(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("t [s],sensor [V]\n" + rows(T, X))
+    record = read(str(path), Columns(), "record")
+    assert (record.unit, record.order) == ("V", 0)
+    assert "taken for a position" in record.notes[0]
