@@ -71,9 +71,9 @@ def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, 
         e, _ = problem.off(full.p, full.terms)
         said.append(
             f"The fit is off by {rms:.3g} {unit} (rms), {100 * spread.rms / motion:.1f} % of the motion, where the "
-            f"samples scatter by {noise:.3g}: something else acts as well, most of it about t = "
-            f"{worst(problem, full.p, e):.4g} s; the intervals are widened, "
-            "but the values are those of a law that does not hold."
+            f"samples scatter by {noise:.3g}: something else acts as well, or the noise is not independent from sample "
+            f"to sample, most of it about t = {worst(problem, full.p, e):.4g} s; the intervals are widened, but where "
+            "the law does not hold its values mean little."
         )
     elif rough and spread.alike:
         said.append(
