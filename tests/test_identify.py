@@ -107,12 +107,16 @@ def test_the_motion_has_no_step_in_its_drag(b, sine):
 # ---- the answers
 
 
-@pytest.mark.parametrize("order", range(3), ids=QUANTITIES)
+@pytest.mark.parametrize(
+    ("law", "order"),
+    [(law, 0) for law in LAWS] + [(law, order) for law in (LAWS[0], ("zeta",), ("r",)) for order in (1, 2)],
+    ids=lambda each: "+".join(each) if isinstance(each, tuple) else QUANTITIES[each],
+)
 @pytest.mark.parametrize("sine", [False, True])
-@pytest.mark.parametrize("law", LAWS, ids="+".join)
 def test_a_clean_signal_gives_its_constants_back_to_nine_digits(law, sine, order):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.4}[term] for term in law}
-    found = identify(swung(**truth, sine=sine, order=order, turn=0.0), Known(pendulum=sine))
+    t = np.linspace(0, 3, 400)
+    found = identify(swung(**truth, sine=sine, order=order, turn=0.0, t=t), Known(pendulum=sine))
     assert set(found.best.terms) == set(law)
     assert values(found.estimates) == pytest.approx(
         dict.fromkeys(TERMS, 0.0) | truth | {"omega": OMEGA, "rest": 0.02}, rel=1e-9, abs=1e-12
@@ -138,7 +142,7 @@ def test_a_late_clock_and_a_far_origin_take_no_digits(origin):
     assert values(found.estimates) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(24))
+@pytest.mark.parametrize("seed", range(12))
 def test_no_answer_is_far_off_without_a_remark(seed):
     """Any law, amplitude, rate and noise; masses and pendulums (tests/intervals.py has many more)."""
     record, truth, sine = random_record(seed, samples=500)
@@ -150,13 +154,14 @@ def test_no_answer_is_far_off_without_a_remark(seed):
 
 @pytest.mark.parametrize(("sine", "quantised"), [(False, False), (False, True), (True, False), (True, True)])
 def test_the_truth_lies_in_the_intervals_as_often_as_they_say(sine, quantised):
-    """Of 100 intervals at 95 %, fewer than 87 would hold the truth once in a thousand times."""
+    """Of 35 intervals at 95 %, fewer than 28 would hold the truth once in a thousand times (tests/intervals.py counts
+    a thousand records of every law)."""
     held = []
-    for seed in range(20):
-        record, truth, _ = random_record(100 + seed, LAWS[seed % 7], sine, quantised, 400)
+    for seed in range(7):
+        record, truth, _ = random_record(100 + seed, LAWS[seed], sine, quantised, 400)
         each = {one.name: one for one in identify(record, Known(pendulum=sine)).estimates}
         held += [each[name].low <= value <= each[name].high for name, value in truth.items()]
-    assert np.mean(held) > 0.87
+    assert np.sum(held) >= 28
 
 
 def test_one_more_term_never_costs_more_than_ln_n():

@@ -41,6 +41,8 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
     for place in (UNKNOWNS.index(term) for term in TERMS if term not in terms):
         seed[place] = 0.0
     swing, notes = turns.half, []
+    if turns.start > record.t[0]:
+        notes.append(f"Before the gap that ends at t = {turns.start:.6g} s are too few swings; they are left out.")
     begin = max(turns.start - problem.origin, seed[T0])
     later = problem.only(problem.t >= begin)
     sure = later.only(later.t <= turns.t[-1] - problem.origin + 0.6 * swing)

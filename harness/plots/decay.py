@@ -8,6 +8,7 @@ from ..identify.fit import Identified
 from ..identify.loss import Loss
 from .style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
 
+MARGINS = {"left": 0.08, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
 MOST = 4000  # points of a line: more are not seen
 COLOURS = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of one term
 
@@ -15,7 +16,8 @@ COLOURS = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of 
 def draw(found: Identified, loss: Loss, path: Path) -> None:
     """Save the figure as PNG."""
     with sheet(path, 1.8 * WIDTH, 3.4 * HEIGHT) as figure:
-        grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2))
+        figure.set_layout_engine("none")  # one that seeks its margins takes as long again as the figure
+        grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
         above = figure.add_subplot(grid[0])
         below = figure.add_subplot(grid[1], sharex=above)
         signal(above, found)
