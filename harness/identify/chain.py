@@ -31,13 +31,13 @@ def chain(laws: np.ndarray, sine: bool, most: int, floor: float) -> tuple[np.nda
     weights = np.cos(np.outer(order, angle)) * 2 / count
     weights[0] /= 2
     coefficients = np.einsum("km,pmj->pkj", weights, table)
-    amplitudes, begins = [first], [np.zeros(len(laws))]
+    amplitudes, durations, scale = [first], [np.zeros(len(laws))], 2 / (first - low)
     for _ in range(most):
         a = amplitudes[-1]
         if not a[0] > low[0] + floor:
             break
-        share = np.clip(2 * (a - low) / (first - low) - 1, -1, 1)
-        looked_up = np.einsum("pk,pkj->pj", np.cos(np.arccos(share)[:, None] * order), coefficients)
+        share = np.minimum(np.maximum((a - low) * scale - 1, -1), 1)
+        looked_up = np.matmul(np.cos(np.arccos(share)[:, None, None] * order), coefficients)[:, 0]
         amplitudes.append(looked_up[:, 0])
-        begins.append(begins[-1] + looked_up[:, 1])
-    return np.array(amplitudes), np.array(begins)
+        durations.append(looked_up[:, 1])
+    return np.array(amplitudes), np.cumsum(durations, axis=0)

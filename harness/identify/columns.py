@@ -81,16 +81,11 @@ def read(source: str, columns: Columns, name: str) -> Record:
 
 
 def numeric(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
-    """Headings and numbers (rows, columns) of a file that has nothing but numbers."""
+    """Headings and numbers (rows, columns) of a file that has nothing but numbers; NaN where one is missing."""
     table = load(str(path))
     if not all(table.heads):
         raise SceneError(f"{table.name} has no heading; its first line must name the columns, as in t [s],x [mm]")
-    columns = [numbers(table, i) for i in range(len(table.heads))]
-    for head, column in zip(table.heads, columns, strict=True):
-        if not np.isfinite(column).all():
-            row = table.line + 1 + int(np.argmin(np.isfinite(column)))
-            raise SceneError(f"{table.name}: row {row}, column {head}, has no number")
-    return table.heads, np.column_stack(columns)
+    return table.heads, np.column_stack([numbers(table, i) for i in range(len(table.heads))])
 
 
 def split(head: str) -> tuple[str, str | None]:
