@@ -30,6 +30,8 @@ def swung(
     """The record of a decay from the amplitude `a`, at rest there until `turn`; with white noise, rounded to `step`."""
     model = Model(side, order, sine, 0.0, 1e-7 * a)
     x, _ = model(np.array([turn, a, rest, drift, omega, zeta, r, b]), unknowns_of(TERMS, False), t)
+    if order:
+        x[t < turn] = rest  # held
     x = x + noise * np.random.default_rng(seed).standard_normal(len(t))
     base = "rad" if sine else "m"
     return Record("swung", t, step * np.round(x / step) if step else x, base + ("", "/s", "/s2")[order], order, base)

@@ -57,10 +57,12 @@ class Model:
             series = slopes(series)
 
         half = np.searchsorted(begins[:, 0], theta, "right") - 1
+        if self.order and count:
+            half = np.maximum(half, 0)  # a rate that jumped at t0 would hold it on its side of a sample
         held, left = int(np.searchsorted(half, 0)), int(np.searchsorted(half, count))
         half = half[held:left]
-        local = theta[held:left] - begins[half, 0]
-        stretch = np.searchsorted(found.begins, local, "right") - 1
+        local = np.maximum(theta[held:left] - begins[half, 0], -1.0)
+        stretch = np.maximum(np.searchsorted(found.begins, local, "right") - 1, 0)
         which, h = stretch * count + half, local - found.begins[stretch]
         way = self.side * np.where(half % 2, -1.0, 1.0) * p[OMEGA] ** self.order
         still = self.side * (self.order == 0) * np.array([1.0, (-1.0) ** count])  # before and after the motion
