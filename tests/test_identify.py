@@ -42,7 +42,6 @@ def said(found):
 # ---- the motion
 
 
-@pytest.mark.parametrize("order", range(3), ids=QUANTITIES)
 @pytest.mark.parametrize(
     ("zeta", "r", "b", "sine", "a"),
     [
@@ -53,7 +52,7 @@ def said(found):
         (0.1, 0.0, 0.0, True, 2.9),
     ],
 )
-def test_the_motion_is_that_of_an_integrator_restarted_at_every_turning_point(zeta, r, b, sine, a, order):
+def test_the_motion_is_that_of_an_integrator_restarted_at_every_turning_point(zeta, r, b, sine, a):
     times = np.linspace(0.0, 30.0, 1000)
     expected, begin, place, s = np.full((3, 1000), np.nan), 0.0, a, -1.0
     while np.isnan(expected[0, -1]):
@@ -75,9 +74,10 @@ def test_the_motion_is_that_of_an_integrator_restarted_at_every_turning_point(ze
         begin, place, s = piece.t[-1], piece.y[0, -1], -s
         if abs(np.sin(place) if sine else place) <= r:
             expected[:, times > begin] = [[place], [0], [0]]
-    model = Model(1.0, order, sine, 0.0, 1e-9 * a)
-    found, _ = model(np.array([0, a, 0, 0, 2.0, zeta, r, b]), unknowns_of(TERMS, False), times / 2)
-    assert found == pytest.approx(expected[order] * 2.0**order, abs=3e-9 * 5**order * a)
+    for order in range(3):
+        model = Model(1.0, order, sine, 0.0, 1e-9 * a)
+        found, _ = model(np.array([0, a, 0, 0, 2.0, zeta, r, b]), unknowns_of(TERMS, False), times / 2)
+        assert found == pytest.approx(expected[order] * 2.0**order, abs=3e-9 * 5**order * a)
 
 
 @pytest.mark.parametrize("sine", [False, True])
@@ -142,7 +142,7 @@ def test_a_late_clock_and_a_far_origin_take_no_digits(origin):
     assert values(found.estimates) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(8))
 def test_no_answer_is_far_off_without_a_remark(seed):
     """Any law, amplitude, rate and noise; masses and pendulums (tests/intervals.py has many more)."""
     record, truth, sine = random_record(seed, samples=500)
