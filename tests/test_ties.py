@@ -157,6 +157,13 @@ def test_a_slip_that_ends_at_the_other_limit_sticks_as_the_load_moves_inward(pai
 
 
 @pytest.mark.parametrize("method", [EXACT, ODE23, ODE45, DOP853, RODAS])
+def test_a_start_beyond_the_limit_slides_however_loose_the_method(pair, method):
+    """What is given has no error; a slide that came there would have."""
+    values = {"x0": 1.001 * 0.9 * 12.5 * 9.81 / 742.5, "solver.method": method, "solver.rtol": 1e-3}
+    assert answers(pair, "stickslip", values, 0.0, 1.0, methodcaller("get", "mode")) == -1
+
+
+@pytest.mark.parametrize("method", [EXACT, ODE23, ODE45, DOP853, RODAS])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_mass_that_only_a_damper_slows_down_never_stops(pair, method, seed):
     draw = random.Random(seed)

@@ -90,7 +90,7 @@ class March(Declaring):
         self.scale(model)
         if step.sticks and self.mode_then * self.v < 0.0:
             self.v = 0.0  # within a slide a speed against its mode is rounding
-        step.stand(model, self.t, self.x, self.v, self.mode_then)
+        step.stand(model, self.t, self.x, self.v, self.mode_then, step.near(model))
         if step.mode1 != self.mode_then:
             step.note_event()
         self.arrive()

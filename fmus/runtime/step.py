@@ -79,15 +79,15 @@ class Step:
         self.size = before.length = 0.0
         before.t_event = t
         self.event = False
-        self.stand(model, t, x, v, STUCK)
+        self.stand(model, t, x, v, STUCK, NEAR)
 
-    def stand(self, model, t, x, v, mode):
+    def stand(self, model, t, x, v, mode, near):
         """The empty step at t, after a mode: both its ends are there, and a step size is at hand unless the body is
         stuck."""
         lost = self.lost
         lost.t1 = lost.x1 = 0.0
         self.t1, self.x1, self.v1 = t, x, v
-        self.settle(model, mode)
+        self.settle(model, mode, near)
         self.arrive(model)
         if self.size == 0.0 and self.methods.chosen != EXACT and not (self.sticks and self.mode1 == STUCK):
             self.size = self.first_size()
@@ -233,15 +233,18 @@ class Step:
 
     def stop(self, model):
         """The speed has come to zero at t1: stick, or slide the other way, or go on if it only touches zero."""
-        self.settle(model, self.mode0)
+        self.settle(model, self.mode0, self.near(model))
         self.begin_anew(model)
         return OK if fabs(self.x1) < HUGE else DIVERGED
 
-    def settle(self, model, mode):
+    def near(self, model):
+        """How far what was computed up to here may be from a tie, as a share."""
+        return NEAR if self.methods.chosen == EXACT and model.linear else NEARLY * self.tolerance
+
+    def settle(self, model, mode, near):
         """The mode that holds from t1 on, after another."""
         self.mode1, self.touches = STUCK, False
         if self.sticks and model.dry:
-            near = NEAR if self.methods.chosen == EXACT and model.linear else NEARLY * self.tolerance
             self.mode1 = model.settle(self.t1, self.x1, self.v1, near)
             if self.v1 == 0.0 and self.mode1 != mode != STUCK and model.touches(self.t1, self.x1, mode, near):
                 self.mode1, self.touches = mode, True
