@@ -8,7 +8,7 @@ from ..identify.fit import Identified
 from ..identify.loss import Loss
 from .style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
 
-MARGINS = {"left": 0.08, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
+MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
 MOST = 4000  # points of a line: more are not seen
 COLOURS = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of one term
 
