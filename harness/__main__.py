@@ -36,7 +36,7 @@ def main() -> None:
     except OSError as error:  # of a file that nobody foresaw, or of standard output: full, or its reader gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter would try, and complain, once more
         where = f"{error.filename}: " if error.filename else ""
-        fail(f"{where}{error.strerror}", quiet=isinstance(error, BrokenPipeError))
+        fail(f"{where}{error.strerror or error}", quiet=isinstance(error, BrokenPipeError))
 
 
 def fail(sentence: str, status: int = 1, quiet: bool = False) -> None:

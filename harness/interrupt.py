@@ -10,15 +10,18 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from signal import SIG_DFL, SIGINT, SIGTERM, default_int_handler
 from threading import current_thread, main_thread
+from time import sleep
 from typing import Any
 
 from .errors import HarnessError
 
 BOTH = (SIGINT, SIGTERM)
 HEARD: list[int] = []  # signals, in the order in which they came
+MEANWHILE = 0.2  # s; Ctrl-C is for child processes too, and that one of them has ended may be known before
 
 
 class Interrupted(HarnessError):
@@ -104,6 +107,8 @@ def interruptible() -> Iterator[None]:
         yield
         check()
     except BaseException as error:  # what a signal made fail may say anything
+        if isinstance(error, (OSError, EOFError, BrokenExecutor)):
+            sleep(MEANWHILE)
         if isinstance(error, KeyboardInterrupt) or (HEARD and not isinstance(error, Interrupted)):
             raise Interrupted from None
         raise

@@ -2,6 +2,8 @@
 
 import csv
 import os
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from math import nan
@@ -10,7 +12,7 @@ import evidence
 import evidence_pendulum
 import numpy as np
 import pytest
-from models import MODELS, declared
+from models import MODELS, ROOT, declared
 
 from harness.errors import HarnessError
 from harness.stability.bounded import bounded
@@ -217,3 +219,13 @@ def test_a_part_of_the_table_ends_as_it_should(place, tmp_path, monkeypatch):
     assert endings(rows).row_count > 20
     assert refusals(rows).row_count > 5
     assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as they should.")
+
+
+def test_a_long_path_of_temporary_files_is_no_hindrance(tmp_path):
+    """The socket of a server that processes are forked from has room for 107 bytes."""
+    folder = tmp_path / ("long" * 25)
+    folder.mkdir()
+    code = "from harness.stability.bounded import bounded\nprint(bounded(60.0, len, 'three'))"
+    asked = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(folder)}
+    done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, timeout=120)
+    assert (done.stdout, done.stderr) == ("5\n", "")

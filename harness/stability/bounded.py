@@ -1,6 +1,7 @@
 """A function in a process of its own, with a time limit: a hang or a crash there is a sentence here."""
 
 import multiprocessing
+import os
 import tempfile
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -14,13 +15,23 @@ from ..errors import HarnessError
 from ..interrupt import check, deaf_children
 from ..unpacked import room
 
-METHODS = multiprocessing.get_all_start_methods()
 ALONE = Lock()  # a start looks after all processes there are, and may take the exit code of one that is waited for
-CONTEXT: Any = multiprocessing.get_context("forkserver" if "forkserver" in METHODS else "spawn")
 # imported once, where processes are forked from
-CONTEXT.set_forkserver_preload(
-    ["__main__", "harness.stability.probe", "harness.stability.truth_linear", "harness.stability.truth_smooth"]
-)
+PRELOAD = ["__main__", "harness.stability.probe", "harness.stability.truth_linear", "harness.stability.truth_smooth"]
+LONGEST = 70  # bytes, of the path of temporary files: below it is a socket, whose path may have 107 (unix(7))
+
+
+def context() -> Any:
+    """How processes are made: forked from a server, where there is one and its socket has room for its path."""
+    short = len(os.fsencode(tempfile.gettempdir())) <= LONGEST
+    if not short or "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    made = multiprocessing.get_context("forkserver")
+    made.set_forkserver_preload(PRELOAD)
+    return made
+
+
+CONTEXT: Any = context()
 
 
 def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
