@@ -84,7 +84,8 @@ def test_an_interrupt_that_something_swallowed_still_ends_it(monkeypatch):
                 signal.raise_signal(signal.SIGINT)
             raise RuntimeError("a step failed, for what it is worth")
 
-    before = [signal.getsignal(number) for number in interrupt.BOTH]
+    usual = signal.default_int_handler, signal.SIG_DFL  # a shell lets what it starts in the background ignore Ctrl-C
+    before = [signal.signal(number, handler) for number, handler in zip(interrupt.BOTH, usual, strict=True)]
     try:
         with pytest.raises(Interrupted, match="interrupted") as told:
             swallowed()
