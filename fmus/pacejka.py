@@ -2,9 +2,10 @@
 
 from math import asin, atan, cos, pi, sin, tan
 
+from .runtime.codes import RODAS
 from .runtime.declare import Choice, Fixed, Input, Output, Parameter
 from .runtime.march import March
-from .runtime.methods import ITEMS, RODAS
+from .runtime.methods import ITEMS
 from .runtime.oscillator import Oscillator
 
 

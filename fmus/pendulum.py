@@ -2,10 +2,11 @@
 
 from math import cos, fabs, radians, sin, sqrt
 
-from .runtime.automaton import HYBRID, HYBRID_LAW, SIGN_LAW, DryFriction, sign
+from .runtime.automaton import HYBRID_LAW, SIGN_LAW, DryFriction, sign
+from .runtime.codes import DOP853, HYBRID
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
 from .runtime.march import March
-from .runtime.methods import DOP853, ITEMS
+from .runtime.methods import ITEMS
 
 POUND, INCH = 0.45359237, 0.0254
 WEIGHT, REACTION = 1, 2

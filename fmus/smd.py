@@ -1,9 +1,10 @@
 """Spring, mass and viscous damper."""
 
+from .runtime.codes import EXACT
 from .runtime.declare import Choice, Fixed, Input, Output, Parameter
 from .runtime.exact import Exact
 from .runtime.march import March
-from .runtime.methods import EXACT, EXACT_ITEM, ITEMS
+from .runtime.methods import EXACT_ITEM, ITEMS
 from .runtime.oscillator import Oscillator
 
 

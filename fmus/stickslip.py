@@ -2,11 +2,12 @@
 
 from math import fabs
 
-from .runtime.automaton import HYBRID, HYBRID_LAW, THRESHOLD_LAW, DryFriction, sign
+from .runtime.automaton import HYBRID_LAW, THRESHOLD_LAW, DryFriction, sign
+from .runtime.codes import EXACT, HYBRID
 from .runtime.declare import Choice, Fixed, Input, Mode, Output, Parameter
 from .runtime.exact import Exact
 from .runtime.march import March
-from .runtime.methods import EXACT, EXACT_ITEM, ITEMS
+from .runtime.methods import EXACT_ITEM, ITEMS
 
 
 class Solver(March):

@@ -8,13 +8,9 @@ based on the synchronous data flow principle, CACSD 1999).
 
 from math import fabs, inf
 
-from .methods import EXACT
+from .codes import BACKWARD, EXACT, FORWARD, HYBRID, SIGN, STUCK, THRESHOLD
 from .oscillator import Oscillator
 from .rounding import NEAR
-from .step import HYBRID, STUCK
-
-BACKWARD, FORWARD = -1, 1
-SIGN, THRESHOLD = 2, 3
 
 HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes, every change of mode is located as an event")
 SIGN_LAW = ("sign", SIGN, "sliding force times sign(v) as it stands: no event, no stick; chatters")

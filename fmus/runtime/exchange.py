@@ -14,9 +14,10 @@ just beyond the event.
 
 from math import fabs, nan
 
+from .codes import STUCK
 from .march import NOMINAL
 from .rounding import ULP
-from .step import NEARLY, STUCK
+from .step import NEARLY
 
 BEYOND, LEAST = 4.0 * ULP, 1e-300  # of the limit; of a speed and a force
 TOLERANCE = 1e-4  # taken for the importer's, which nobody tells, where solver.rtol is 0

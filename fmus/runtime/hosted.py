@@ -10,10 +10,10 @@ from math import fabs, inf, isfinite, nan
 from weakref import WeakSet
 
 from .boundary import announce, guarded, pass_on, printable
+from .codes import DIVERGED, ENDLESS, OK, STALLED
 from .declare import variables
-from .march import ENDLESS, MOST_CALLS, MOST_STEPS
+from .march import MOST_CALLS, MOST_STEPS
 from .state import NOWHERE, RUNNING, SETTABLE, SETTING_UP, Saved, shape
-from .step import DIVERGED, OK, STALLED
 
 SENTENCES = {
     DIVERGED: "the motion leaves the range of numbers after t = {t!r} s; lower what drives it or check the parameters",

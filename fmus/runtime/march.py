@@ -6,11 +6,11 @@ beyond it, because somebody looked ahead, does not show.
 
 from math import fabs, inf, nan
 
+from .codes import DIVERGED, ENDLESS, HYBRID, ODE23, OK, STUCK
 from .declare import Choice, Count, Declaring, Fixed, Local
-from .methods import ITEMS, ODE23
-from .step import DIVERGED, HUGE, HYBRID, OK, STUCK, Step
+from .methods import ITEMS
+from .step import HUGE, Step
 
-ENDLESS = 3
 NOMINAL = 1e-3  # size of a position or a speed, in SI units, where nobody sets one
 # Within one communication step, so that a sentence comes after half a minute at most, on a slow machine too:
 ROUNDS, ROUND = 2000, 1000  # the calls are counted after each round

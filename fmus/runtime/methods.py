@@ -1,12 +1,12 @@
 """The integration methods there are, and the one in force."""
 
 from . import dop853, ode23, ode45, rodas
+from .codes import DOP853, EXACT, ODE23, ODE45, RODAS
 from .dop853 import Dop853
 from .ode23 import Ode23
 from .ode45 import Ode45
 from .rodas import Rodas
 
-EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
 EXACT_ITEM = ("exact", EXACT, "closed form of each linear piece, events included; the hybrid law only")
 ITEMS = (
     ("ode23", ODE23, "Bogacki-Shampine 3(2), with the step control of MATLAB's program; for loose tolerances"),

@@ -10,9 +10,10 @@ from math import fabs, nan
 from . import exchange
 from .beside import PLACES, beside
 from .boundary import guarded
+from .codes import DIVERGED
 from .hosted import ERROR, SENTENCES, Hosted, getter, hosting, setter
 from .state import KEPT, RUNNING, SETTING_UP
-from .step import DIVERGED, HUGE
+from .step import HUGE
 
 UNDECIDED, STEPPING, EXCHANGED = 0, 1, 2
 INTEGRATED = (

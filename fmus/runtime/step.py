@@ -7,13 +7,11 @@ ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci
 
 from math import fabs, inf
 
+from .codes import DIVERGED, EXACT, OK, STALLED, STUCK
 from .interpolant import Interpolant
-from .methods import EXACT, Methods
+from .methods import Methods
 from .rounding import NEAR, ULP
 
-OK, DIVERGED, STALLED = 0, 1, 2
-
-STUCK, HYBRID = 0, 1
 HUGE = 1e100  # beyond it squares, as of an energy, would overflow
 MOST_TRIES = 200  # of one step, which halves each time
 MOST_IDLE = 100  # steps in a row that hardly move the time

@@ -15,9 +15,10 @@ import numpy as np
 
 from fmus.coulomb import Coulomb
 from fmus.runtime.automaton import DryFriction
+from fmus.runtime.codes import HYBRID, ODE45
 from fmus.runtime.declare import Choice
-from fmus.runtime.march import HYBRID, March
-from fmus.runtime.methods import ITEMS, ODE45
+from fmus.runtime.march import March
+from fmus.runtime.methods import ITEMS
 
 from ..errors import HarnessError
 from . import peers

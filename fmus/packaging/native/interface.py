@@ -4,9 +4,9 @@ import inspect
 from string import Formatter
 from typing import Any
 
+from ...runtime.codes import DIVERGED, OK
 from ...runtime.declare import Declared, Declaring
 from ...runtime.hosted import CALCULATED, SENTENCES
-from ...runtime.step import DIVERGED, OK
 from ..description import declared_by
 from .entries import ENTRIES
 from .kinds import BOOL, FLOAT, INT, Kind, literal
