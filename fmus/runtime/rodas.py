@@ -59,32 +59,33 @@ class Rodas:
 
         vs = v + h * A21 * q1
         r = vs + G21 * p1
-        q2 = (model.acceleration(t + C2 * h, x + h * A21 * p1, vs, mode) + G21 * q1 + D2 * drift + s * r) * w
+        a2 = model.acceleration(t + C2 * h, x + h * A21 * p1, vs, mode)
+        q2 = (a2 + G21 * q1 + D2 * drift + s * r) * w
         p2 = GAMMA * (r + h * q2)
 
         xs, vs = x + h * (A31 * p1 + A32 * p2), v + h * (A31 * q1 + A32 * q2)
         r = vs + G31 * p1 + G32 * p2
-        q = G31 * q1 + G32 * q2 + D3 * drift + s * r
-        q3 = (model.acceleration(t + C3 * h, xs, vs, mode) + q) * w
+        a3 = model.acceleration(t + C3 * h, xs, vs, mode)
+        q3 = (a3 + G31 * q1 + G32 * q2 + D3 * drift + s * r) * w
         p3 = GAMMA * (r + h * q3)
 
         xs, vs = x + h * (A41 * p1 + A42 * p2 + A43 * p3), v + h * (A41 * q1 + A42 * q2 + A43 * q3)
         r = vs + G41 * p1 + G42 * p2 + G43 * p3
-        q = G41 * q1 + G42 * q2 + G43 * q3 + D4 * drift + s * r
-        q4 = (model.acceleration(t + C4 * h, xs, vs, mode) + q) * w
+        a4 = model.acceleration(t + C4 * h, xs, vs, mode)
+        q4 = (a4 + G41 * q1 + G42 * q2 + G43 * q3 + D4 * drift + s * r) * w
         p4 = GAMMA * (r + h * q4)
 
         xs = x + h * (A51 * p1 + A52 * p2 + A53 * p3 + A54 * p4)
         vs = v + h * (A51 * q1 + A52 * q2 + A53 * q3 + A54 * q4)
         r = vs + G51 * p1 + G52 * p2 + G53 * p3 + G54 * p4
-        q = G51 * q1 + G52 * q2 + G53 * q3 + G54 * q4 + s * r
-        q5 = (model.acceleration(t + h, xs, vs, mode) + q) * w
+        a5 = model.acceleration(t + h, xs, vs, mode)
+        q5 = (a5 + G51 * q1 + G52 * q2 + G53 * q3 + G54 * q4 + s * r) * w
         p5 = GAMMA * (r + h * q5)
 
         xs, vs = xs + h * p5, vs + h * q5
         r = vs + G61 * p1 + G62 * p2 + G63 * p3 + G64 * p4 + G65 * p5
-        q = G61 * q1 + G62 * q2 + G63 * q3 + G64 * q4 + G65 * q5 + s * r
-        q6 = (model.acceleration(t + h, xs, vs, mode) + q) * w
+        a6 = model.acceleration(t + h, xs, vs, mode)
+        q6 = (a6 + G61 * q1 + G62 * q2 + G63 * q3 + G64 * q4 + G65 * q5 + s * r) * w
         p6 = GAMMA * (r + h * q6)
 
         self.q1, self.q2, self.q3 = q1, q2, q3
