@@ -54,7 +54,7 @@ class Coulomb(DryFriction):
         self.exact.prepare(self.m, self.c, self.k, 0.0)
         return super().prepare()
 
-    def acceleration(self, t, x, v, mode):
+    def rates(self, t, x, v, mode):
         if mode == 0:
             mode = sign(v)
         return (self.F_ext - self.k * x - self.c * v - mode * self.f) / self.m
@@ -65,10 +65,10 @@ class Coulomb(DryFriction):
     def push(self, t, mode):
         return (self.F_ext - mode * self.f) / self.m
 
-    def hold(self, t, x):
+    def hold(self, t, x, v):
         return self.F_ext - self.k * x, 0.0, self.f
 
-    def terms(self, t, x):
+    def terms(self, t, x, v):
         return fabs(self.F_ext) + self.k * fabs(x)
 
     def observe(self, t, x, v, mode):

@@ -80,7 +80,7 @@ class Pacejka(Oscillator):
     def finest(self):
         return self.x_m
 
-    def acceleration(self, t, x, v, mode):
+    def rates(self, t, x, v, mode):
         pull = self.F_ext + self.k * (self.x_base + self.v_driver * (t - self.t_base) - x)
         return pull / self.m - self.mu(v) * self.g
 

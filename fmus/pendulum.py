@@ -87,7 +87,7 @@ class Pendulum(DryFriction):
         rest = 1.0 - self.share * self.share
         return (sqrt(b * b + rest * radial * radial) - mode * self.share * b) / rest
 
-    def acceleration(self, t, x, v, mode):
+    def rates(self, t, x, v, mode):
         if mode == 0:
             mode = sign(v)
         load = self.T_ext - self.moment * sin(x)
@@ -111,10 +111,10 @@ class Pendulum(DryFriction):
         drag = mode * self.arm / self.J
         return 0.0, load_x / self.J - drag * n_x, -drag * n_v
 
-    def hold(self, t, x):
+    def hold(self, t, x, v):
         return self.T_ext - self.moment * sin(x), 0.0, self.arm * self.weight
 
-    def terms(self, t, x):
+    def terms(self, t, x, v):
         return fabs(self.T_ext) + self.moment * fabs(x)
 
     def observe(self, t, x, v, mode):

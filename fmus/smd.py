@@ -47,7 +47,7 @@ class Smd(Oscillator):
         self.exact.prepare(self.m, self.c, self.k, 0.0)
         return 0
 
-    def acceleration(self, t, x, v, mode):
+    def rates(self, t, x, v, mode):
         return (self.F_ext - self.k * x - self.c * v) / self.m
 
     def jacobian(self, t, x, v, mode):

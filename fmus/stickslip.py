@@ -74,7 +74,7 @@ class Stickslip(DryFriction):
         """Force on the sled but for friction."""
         return self.F_ext + self.k * (self.x_base + self.v_driver * (t - self.t_base) - x)
 
-    def acceleration(self, t, x, v, mode):
+    def rates(self, t, x, v, mode):
         pull = self.pull(t, x)
         return (pull - (mode * self.sliding if mode != 0 else self.threshold(pull, v))) / self.m
 
@@ -92,14 +92,14 @@ class Stickslip(DryFriction):
     def push(self, t, mode):
         return (self.pull(t, 0.0) - mode * self.sliding) / self.m
 
-    def hold(self, t, x):
+    def hold(self, t, x, v):
         return self.pull(t, x), self.k * self.v_driver, self.holding
 
-    def terms(self, t, x):
+    def terms(self, t, x, v):
         ways = fabs(x) + fabs(self.x_base) + fabs(self.v_driver) * (fabs(t) + fabs(self.t_base))
         return fabs(self.F_ext) + self.k * ways
 
-    def departure(self, t, x, mode):
+    def departure(self, t, x, v, mode):
         return mode * (self.holding - self.sliding) / self.m
 
     def observe(self, t, x, v, mode):

@@ -71,16 +71,14 @@ def test_the_slope_of_the_block_is_that_of_its_acceleration():
     block, h = anchors.Block(), 1e-6
     for mode, v in ((-1, -0.3), (1, 0.2)):
         at = np.array([3.0, 0.4, v])
-        steps = [block.acceleration(*(at + d), mode) - block.acceleration(*(at - d), mode) for d in h * np.eye(3)]
+        steps = [block.rates(*(at + d), mode) - block.rates(*(at - d), mode) for d in h * np.eye(3)]
         assert block.jacobian(*at, mode) == pytest.approx(np.array(steps) / (2 * h), abs=1e-8)
 
 
 def test_the_two_forms_of_each_anchor_are_one_equation():
     block, belt = anchors.Block(), Belt()
     for mode in (-1, 1):
-        assert belt.rates(mode)(3.0, (0.4, mode * 0.2))[1] == pytest.approx(
-            block.acceleration(3.0, 0.4, mode * 0.2, mode)
-        )
+        assert belt.rates(mode)(3.0, (0.4, mode * 0.2))[1] == pytest.approx(block.rates(3.0, 0.4, mode * 0.2, mode))
         assert Plain().rates(1)(0.0, (0.3, mode * 0.2)) == Classic().rates(mode)(0.0, (0.3, mode * 0.2))
     smooth = Smoothed().rates(1)(3.0, (0.4, 0.2))[1]
-    assert smooth == pytest.approx(block.acceleration(3.0, 0.4, 0.2, 1), abs=1e-5)
+    assert smooth == pytest.approx(block.rates(3.0, 0.4, 0.2, 1), abs=1e-5)

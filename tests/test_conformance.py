@@ -143,7 +143,7 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
     """Position, speed and acceleration, loads, derivatives and outputs, in every mode: the very code that runs."""
     model, t, x, v = physics(name, values)
     for mode in (-1, 0, 1):
-        a = model.acceleration(t, x, v, mode)
+        a = model.rates(t, x, v, mode)
         assert has(a, Quantity.of(1.0, declared(name)[outputs(name)[2]].unit))
         assert has(a, v / t)
         assert has(v, x / t)
@@ -152,11 +152,11 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
         if model.linear:
             assert has(model.push(t, mode), a)
         if model.dry:
-            load, rate, limit = model.hold(t, x)
+            load, rate, limit = model.hold(t, x, v)
             assert has(rate, load / t)
             assert has(limit, load)
-            assert has(model.terms(t, x), load)
-            assert has(model.departure(t, x, 1), a)
+            assert has(model.terms(t, x, v), load)
+            assert has(model.departure(t, x, v, 1), a)
         model.observe(t, x, v, mode)
         for output in outputs(name):
             if declared(name)[output].type == "Real":
@@ -167,7 +167,7 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
 def test_the_methods_keep_the_dimensions(physics, name):
     """One step of each method, its error estimates, and its interpolant; the closed form too."""
     model, t, x, v = physics(name, {})
-    a, h = model.acceleration(t, x, v, 1), Quantity(1e-4, 0, 0, 1)
+    a, h = model.rates(t, x, v, 1), Quantity(1e-4, 0, 0, 1)
     for method in (Ode23(), Ode45(), Dop853(), Rodas()):
         x1, v1, a1, e_x, e_v = method.step(model, 1, t, x, v, a, h)
         assert [has(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [True] * 5
@@ -194,7 +194,7 @@ def test_a_wrong_unit_would_be_noticed(physics, name):
 
         def move(model=model, t=t, x=x, v=v):
             model.prepare()
-            a = model.acceleration(t, x, v, 1), model.acceleration(t, x, v, 0)
+            a = model.rates(t, x, v, 1), model.rates(t, x, v, 0)
             assert all(has(value, v / t) for value in a)
 
         if variable == "eps":

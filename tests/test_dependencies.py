@@ -62,7 +62,7 @@ def situation(name, known, draw):
         for variable in (each for each in values if "." not in each):
             setattr(model, variable, values[variable])
         model.prepare()
-        load, _, limit = model.hold(0.0, values[f"{x}0"])
+        load, _, limit = model.hold(0.0, values[f"{x}0"], 0.0)
         values[entry] += draw.choice(LOADS) * limit - load
     return values
 

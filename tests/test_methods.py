@@ -27,7 +27,7 @@ class Motion:
     def at(self, t):
         return sin(self.w * t), self.w * cos(self.w * t)
 
-    def acceleration(self, t, x, v, mode):
+    def rates(self, t, x, v, mode):
         at, speed = self.at(t)
         return sin(at) - self.w**2 * at + 0.3 * speed**3 - sin(x) - 0.3 * v**3
 
@@ -43,7 +43,7 @@ class Linear:
         self.rate, self.power, self.spring, self.damper = rate, power, spring, damper
         self.calls = []
 
-    def acceleration(self, t, x, v, mode):
+    def rates(self, t, x, v, mode):
         self.calls.append((t, x, v))
         return self.rate * t**self.power + self.spring * x + self.damper * v
 
@@ -62,7 +62,7 @@ class Solver:
 
     def step(self, model, t, x, v, h):
         """New x, v and acceleration, and the rates of the error; the interpolant is ready."""
-        a = model.acceleration(t, x, v, 0)
+        a = model.rates(t, x, v, 0)
         new = self.method.step(model, 0, t, x, v, a, h)
         step = Step()
         step.t0, step.x0, step.v0, step.a0, step.span = t, x, v, a, h
@@ -145,7 +145,7 @@ def test_the_work_is_what_the_numbers_say_and_the_last_slope_is_the_first_of_the
     x, v, a, _, _ = solver.step(model, 0.0, 0.3, 0.2, 0.1)
     assert len(model.calls) == 1 + solver.numbers.STAGES + solver.numbers.EXTRA
     assert model.calls[solver.numbers.STAGES] == (0.1, x, v)
-    assert a == Linear(1.0, 2, -3.0, -0.5).acceleration(0.1, x, v, 0)
+    assert a == Linear(1.0, 2, -3.0, -0.5).rates(0.1, x, v, 0)
 
 
 @every_method
@@ -195,7 +195,7 @@ def test_a_step_its_inside_and_its_estimated_error_are_those_of_scipy(solver, na
     motion = Motion()
     x, v, _, e_x, e_v = solver.step(motion, 0.3, 0.5, 0.7, 0.4)
     peer = getattr(scipy.integrate, PEERS[name])(
-        lambda t, y: (y[1], motion.acceleration(t, y[0], y[1], 0)), 0.3, [0.5, 0.7], 1e3, first_step=0.4, rtol=1e3
+        lambda t, y: (y[1], motion.rates(t, y[0], y[1], 0)), 0.3, [0.5, 0.7], 1e3, first_step=0.4, rtol=1e3
     )
     peer.step()
     assert (x, v) == pytest.approx(tuple(peer.y), abs=1e-14)
@@ -233,7 +233,7 @@ def test_rodas_keeps_its_accuracy_on_a_slow_motion_however_stiff():
     """v' = -damper (v - cos t) - sin t, v(0) = 1: v = cos t (A. Prothero, A. Robinson, Math. Comp. 28 (1974))."""
 
     class Slow(Linear):
-        def acceleration(self, t, x, v, mode):
+        def rates(self, t, x, v, mode):
             return self.damper * (v - cos(t)) - sin(t)
 
         def jacobian(self, t, x, v, mode):
@@ -286,8 +286,7 @@ def test_every_jacobian_is_the_slope_of_its_acceleration(name):
         assert model.prepare() == 0
         for t, x, v, mode in ((0.3, 0.02, 0.004, 1), (1.1, -0.7, -0.4, -1), (2.0, 2.9, 1.3, 0)):
             slopes = [
-                (model.acceleration(t + p, x + q, v + r, mode) - model.acceleration(t - p, x - q, v - r, mode))
-                / (2 * d)
+                (model.rates(t + p, x + q, v + r, mode) - model.rates(t - p, x - q, v - r, mode)) / (2 * d)
                 for p, q, r in ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d))
             ]
             assert model.jacobian(t, x, v, mode) == pytest.approx(slopes, rel=1e-5, abs=1e-5)

@@ -38,7 +38,7 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
         values = {name: another(meaning, sizes, chance) for name, meaning in known.items()}
         put(thing, values)
         if thing.dry and begun(thing, outputs):
-            load, _, limit = thing.hold(0.0, thing.solver.x)
+            load, _, limit = thing.hold(0.0, thing.solver.x, 0.0)
             values[entry] += one(LOADS, chance) * limit - load
             put(thing, values)
         before = begun(thing, outputs)

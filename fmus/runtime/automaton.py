@@ -28,8 +28,9 @@ def sign(v):
 class DryFriction(Oscillator):
     """An oscillator that sticks.
 
-    hold(t, x) tells the load on the body at rest, its rate and the holding limit; terms(t, x) the sum of the sizes of
-    what the load is made of, of which rounding takes its share.  While the body rests, the load is linear in time.
+    hold(t, x, v) tells the load on the body at rest, its rate and the holding limit; terms(t, x, v) the sum of the
+    sizes of what the load is made of, of which rounding takes its share.  While the body rests, the load is linear in
+    time.
     """
 
     dry = True
@@ -52,8 +53,8 @@ class DryFriction(Oscillator):
             return FORWARD
         if v < 0.0:
             return BACKWARD
-        load, rate, limit = self.hold(t, x)
-        slack = NEAR * (self.terms(t, x) + limit)
+        load, rate, limit = self.hold(t, x, v)
+        slack = NEAR * (self.terms(t, x, v) + limit)
         if rate > 0.0 and load >= limit - slack:
             return FORWARD
         if rate < 0.0 and load <= slack - limit:
@@ -64,28 +65,28 @@ class DryFriction(Oscillator):
             return STUCK
         return FORWARD if load > 0.0 else BACKWARD
 
-    def touches(self, t, x, mode, near):
+    def touches(self, t, x, v, mode, near):
         """Whether a slide whose speed comes to zero here only touches it: friction lets go so soon that a speed which
         is off by the share `near` would not have come to zero.
 
         After the wait s the speed grows as v = u (1 - cos(w s)), with the load's rate m w^2 u.
         """
-        load, rate, limit = self.hold(t, x)
+        load, rate, limit = self.hold(t, x, v)
         if rate == 0.0:
             return load == 0.0 and limit == 0.0  # nothing stops it: what is left of the speed is the method's error
         if mode * rate < 0.0:
             return False
         wait = (limit - mode * load) / fabs(rate)
-        _, stiffness, _ = self.jacobian(t, x, 0.0, mode)
+        _, stiffness, _ = self.jacobian(t, x, v, mode)
         return -0.5 * stiffness * wait * wait < near
 
-    def departure(self, t, x, mode):
+    def departure(self, t, x, v, mode):
         """The acceleration at a break-away, where the load is just the limit."""
-        return self.acceleration(t, x, 0.0, mode)
+        return self.rates(t, x, v, mode)
 
-    def release(self, t, x):
+    def release(self, t, x, v):
         """When a body at rest at x breaks away, and in which direction; inf if it never does."""
-        load, rate, limit = self.hold(t, x)
+        load, rate, limit = self.hold(t, x, v)
         if rate == 0.0:
             return inf, STUCK
         direction = FORWARD if rate > 0.0 else BACKWARD

@@ -60,7 +60,7 @@ def rates(model, march):
     """The derivatives of the continuous states."""
     v = a = 0.0
     if not (march.step.sticks and march.mode == STUCK):
-        v, a = march.v, model.acceleration(march.t, march.x, march.v, march.mode)
+        v, a = march.v, model.rates(march.t, march.x, march.v, march.mode)
     return [v, a, model.v_driver] if model.driven else [v, a]
 
 
@@ -70,7 +70,7 @@ def indicators(model, march):
         return [1.0, 1.0]
     if march.mode != STUCK:
         return [march.mode * march.v + LEAST, 1.0]
-    load, _, limit = model.hold(march.t, march.x)
+    load, _, limit = model.hold(march.t, march.x, march.v)
     return [1.0, limit + BEYOND * limit + LEAST - fabs(load)]
 
 
@@ -87,7 +87,7 @@ def update(model, march):
     if stopped:
         march.v = 0.0
     tolerance = march.rtol if march.rtol > 0.0 else TOLERANCE
-    if not model.touches(march.t, march.x, mode, 0.0):
+    if not model.touches(march.t, march.x, march.v, mode, 0.0):
         march.mode = model.settle(march.t, march.x, march.v, NEARLY * tolerance)
     changed = march.mode != mode
     if changed:

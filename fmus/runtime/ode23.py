@@ -15,12 +15,12 @@ class Ode23:
     def step(self, model, mode, t, x, v, a, h):
         """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
         v2 = v + 0.5 * h * a
-        a2 = model.acceleration(t + 0.5 * h, x + 0.5 * h * v, v2, mode)
+        a2 = model.rates(t + 0.5 * h, x + 0.5 * h * v, v2, mode)
         v3 = v + 0.75 * h * a2
-        a3 = model.acceleration(t + 0.75 * h, x + 0.75 * h * v2, v3, mode)
+        a3 = model.rates(t + 0.75 * h, x + 0.75 * h * v2, v3, mode)
         x1 = x + h * (2.0 * v + 3.0 * v2 + 4.0 * v3) / 9.0
         v1 = v + h * (2.0 * a + 3.0 * a2 + 4.0 * a3) / 9.0
-        a1 = model.acceleration(t + h, x1, v1, mode)
+        a1 = model.rates(t + h, x1, v1, mode)
         return (
             x1,
             v1,

@@ -33,19 +33,19 @@ class Ode45:
         """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
         w = h * A21
         v2 = v + w * a
-        a2 = model.acceleration(t + C2 * h, x + w * v, v2, mode)
+        a2 = model.rates(t + C2 * h, x + w * v, v2, mode)
         v3 = v + h * (A31 * a + A32 * a2)
-        a3 = model.acceleration(t + C3 * h, x + h * (A31 * v + A32 * v2), v3, mode)
+        a3 = model.rates(t + C3 * h, x + h * (A31 * v + A32 * v2), v3, mode)
         v4 = v + h * (A41 * a + A42 * a2 + A43 * a3)
-        a4 = model.acceleration(t + C4 * h, x + h * (A41 * v + A42 * v2 + A43 * v3), v4, mode)
+        a4 = model.rates(t + C4 * h, x + h * (A41 * v + A42 * v2 + A43 * v3), v4, mode)
         v5 = v + h * (A51 * a + A52 * a2 + A53 * a3 + A54 * a4)
-        a5 = model.acceleration(t + C5 * h, x + h * (A51 * v + A52 * v2 + A53 * v3 + A54 * v4), v5, mode)
+        a5 = model.rates(t + C5 * h, x + h * (A51 * v + A52 * v2 + A53 * v3 + A54 * v4), v5, mode)
         x6 = x + h * (A61 * v + A62 * v2 + A63 * v3 + A64 * v4 + A65 * v5)
         v6 = v + h * (A61 * a + A62 * a2 + A63 * a3 + A64 * a4 + A65 * a5)
-        a6 = model.acceleration(t + h, x6, v6, mode)
+        a6 = model.rates(t + h, x6, v6, mode)
         x1 = x + h * (B1 * v + B3 * v3 + B4 * v4 + B5 * v5 + B6 * v6)
         v1 = v + h * (B1 * a + B3 * a3 + B4 * a4 + B5 * a5 + B6 * a6)
-        a1 = model.acceleration(t + h, x1, v1, mode)
+        a1 = model.rates(t + h, x1, v1, mode)
         self.v3, self.v4, self.v5, self.v6 = v3, v4, v5, v6
         self.a3, self.a4, self.a5, self.a6 = a3, a4, a5, a6
         return (

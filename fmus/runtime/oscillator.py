@@ -18,8 +18,9 @@ class Oscillator(Declaring):
     A model owns `solver`, a March, and says
         initial(t)                     position and speed at the start, which is at time t
         prepare()                      constants that follow from the values; 0, or the number of the broken rule
-        acceleration(t, x, v, mode)    mode is the direction of sliding, 0 where the law itself looks at v
-        jacobian(t, x, v, mode)        derivatives of the acceleration by t, x and v, for rodas
+        rates(t, x, v, mode)           those that are no states: the acceleration; mode is the direction of sliding, 0
+                                       where the law itself looks at v
+        jacobian(t, x, v, mode)        derivatives of that rate by t, x and v, for rodas
         observe(t, x, v, mode)         sets the outputs
     """
 

@@ -59,39 +59,39 @@ class Rodas:
 
         vs = v + h * A21 * q1
         r = vs + G21 * p1
-        a2 = model.acceleration(t + C2 * h, x + h * A21 * p1, vs, mode)
+        a2 = model.rates(t + C2 * h, x + h * A21 * p1, vs, mode)
         q2 = (a2 + G21 * q1 + D2 * drift + s * r) * w
         p2 = GAMMA * (r + h * q2)
 
         xs, vs = x + h * (A31 * p1 + A32 * p2), v + h * (A31 * q1 + A32 * q2)
         r = vs + G31 * p1 + G32 * p2
-        a3 = model.acceleration(t + C3 * h, xs, vs, mode)
+        a3 = model.rates(t + C3 * h, xs, vs, mode)
         q3 = (a3 + G31 * q1 + G32 * q2 + D3 * drift + s * r) * w
         p3 = GAMMA * (r + h * q3)
 
         xs, vs = x + h * (A41 * p1 + A42 * p2 + A43 * p3), v + h * (A41 * q1 + A42 * q2 + A43 * q3)
         r = vs + G41 * p1 + G42 * p2 + G43 * p3
-        a4 = model.acceleration(t + C4 * h, xs, vs, mode)
+        a4 = model.rates(t + C4 * h, xs, vs, mode)
         q4 = (a4 + G41 * q1 + G42 * q2 + G43 * q3 + D4 * drift + s * r) * w
         p4 = GAMMA * (r + h * q4)
 
         xs = x + h * (A51 * p1 + A52 * p2 + A53 * p3 + A54 * p4)
         vs = v + h * (A51 * q1 + A52 * q2 + A53 * q3 + A54 * q4)
         r = vs + G51 * p1 + G52 * p2 + G53 * p3 + G54 * p4
-        a5 = model.acceleration(t + h, xs, vs, mode)
+        a5 = model.rates(t + h, xs, vs, mode)
         q5 = (a5 + G51 * q1 + G52 * q2 + G53 * q3 + G54 * q4 + s * r) * w
         p5 = GAMMA * (r + h * q5)
 
         xs, vs = xs + h * p5, vs + h * q5
         r = vs + G61 * p1 + G62 * p2 + G63 * p3 + G64 * p4 + G65 * p5
-        a6 = model.acceleration(t + h, xs, vs, mode)
+        a6 = model.rates(t + h, xs, vs, mode)
         q6 = (a6 + G61 * q1 + G62 * q2 + G63 * q3 + G64 * q4 + G65 * q5 + s * r) * w
         p6 = GAMMA * (r + h * q6)
 
         self.q1, self.q2, self.q3 = q1, q2, q3
         self.q4, self.q5 = q4, q5
         xs, vs = xs + h * p6, vs + h * q6
-        return xs, vs, model.acceleration(t + h, xs, vs, mode), p6, q6
+        return xs, vs, model.rates(t + h, xs, vs, mode), p6, q6
 
     def expand(self, model, step):
         """The interpolant of the step just taken; slopes of the speed are of no use where the curve is stiff."""

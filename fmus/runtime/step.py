@@ -141,11 +141,11 @@ class Step:
         self.lost.carry()
         self.waiting, self.touches = True, False
         self.x1, self.v1 = self.x0, 0.0
-        release, direction = model.release(self.t0, self.x0)
+        release, direction = model.release(self.t0, self.x0, 0.0)
         if release <= self.t_end and release < inf:
             self.t1, self.mode1 = release, direction
             self.begin_anew(model)
-            self.a1 = model.departure(release, self.x1, direction)
+            self.a1 = model.departure(release, self.x1, 0.0, direction)
         else:
             self.t1, self.a1 = self.t_end, 0.0
 
@@ -169,7 +169,7 @@ class Step:
         if self.t1 < inf:
             lost.x1 = 0.0
             self.x1, self.v1 = model.exact.at(self.t1 - self.t0 - lost.t0)
-            self.a1 = model.acceleration(self.t1, self.x1, self.v1, self.mode1)
+            self.a1 = model.rates(self.t1, self.x1, self.v1, self.mode1)
             if not fabs(self.x1) + fabs(self.v1) < HUGE:
                 return DIVERGED
         return OK
@@ -244,7 +244,7 @@ class Step:
         self.mode1, self.touches = STUCK, False
         if self.sticks and model.dry:
             self.mode1 = model.settle(self.t1, self.x1, self.v1, near)
-            if self.v1 == 0.0 and self.mode1 != mode != STUCK and model.touches(self.t1, self.x1, mode, near):
+            if self.v1 == 0.0 and self.mode1 != mode != STUCK and model.touches(self.t1, self.x1, self.v1, mode, near):
                 self.mode1, self.touches = mode, True
 
     def arrive(self, model):
@@ -252,7 +252,7 @@ class Step:
         if self.sticks and self.mode1 == STUCK:
             self.a1 = 0.0
         else:
-            self.a1 = model.acceleration(self.t1, self.x1, self.v1, self.mode1)
+            self.a1 = model.rates(self.t1, self.x1, self.v1, self.mode1)
             self.called += 1
             if self.sticks and self.v1 == 0.0 and self.mode1 * self.a1 < 0.0:
                 self.a1 = 0.0  # the last bit at a break-away without a jump: no body starts against its mode

@@ -53,17 +53,17 @@ class Block(DryFriction):
     def initial(self, t):
         return 1.067, -self.belt
 
-    def acceleration(self, t, x, v, mode):
+    def rates(self, t, x, v, mode):
         return -(x + self.belt * t) - mode / (1.0 + 3.0 * mode * v)
 
     def jacobian(self, t, x, v, mode):
         fall = 1.0 + 3.0 * mode * v
         return -self.belt, -1.0, 3.0 / (fall * fall)
 
-    def hold(self, t, x):
+    def hold(self, t, x, v):
         return -(x + self.belt * t), -self.belt, 1.0
 
-    def terms(self, t, x):
+    def terms(self, t, x, v):
         return fabs(x) + fabs(self.belt * t)
 
 
