@@ -12,7 +12,8 @@ from fmus.packaging.edition import FMI2, FMI3
 from fmus.packaging.lean import LAWS, METHODS
 from fmus.packaging.weigh import import_time
 
-FMUS = Path(__file__).parent / "fmus"
+HERE = Path(__file__).parent
+FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  # installed: in the current folder
 
 
 @click.command()

@@ -98,16 +98,19 @@ def _binaries(name: str, platforms: Sequence[str], edition: Edition) -> dict[str
 
 def licenses(edition: Edition = FMI2) -> dict[str, bytes]:
     """The licence of the FMU, and that of the native layer inside it."""
-    texts, layer = {}, edition.layer
-    for path, folder, pattern in (
-        ("license.txt", Path(__file__).resolve().parents[2], "LICENSE"),
-        (f"{layer}.txt", installed(layer).parent, f"{layer}-*.dist-info/**/LICENSE"),
-    ):
-        found = sorted(folder.glob(pattern))
-        if not found:
-            raise BuildError(f"There is no {pattern} in {folder}, and an FMU carries it: restore it.")
-        texts[f"documentation/licenses/{path}"] = found[-1].read_text(encoding="utf-8").encode()
-    return texts
+    layer, ours, kept = edition.layer, Path(__file__).resolve().parents[2], "{}-*.dist-info/**/LICENSE"
+    return {
+        "documentation/licenses/license.txt": _license(ours, kept.format("friction_fmus"), "LICENSE"),  # or of a clone
+        f"documentation/licenses/{layer}.txt": _license(installed(layer).parent, kept.format(layer)),
+    }
+
+
+def _license(folder: Path, *patterns: str) -> bytes:
+    """The text of the first pattern that is there; of several files, the last."""
+    for pattern in patterns:
+        for path in sorted(folder.glob(pattern), reverse=True):
+            return path.read_text(encoding="utf-8").encode()
+    raise BuildError(f"There is no {patterns[-1]} in {folder}, and an FMU carries it: restore it.")
 
 
 def zipped(entries: dict[str, bytes], date: datetime) -> bytes:
