@@ -128,14 +128,15 @@ def test_the_command_shows_both_ways_beside_the_others_and_error_against_toleran
         ("stickslip", CS, ""),
         *(("stickslip", ME, rtol) for rtol in ("0.001", "1e-06", "1e-09")),
     ]
-    assert all(float(row["seconds [s]"]) > 0 for row in rows)
+    for row in rows:  # on a busy machine the tightest may outlast what --quick waits, and says so
+        assert "run time" in row["failure"] if row["failure"] else float(row["seconds [s]"]) > 0
     with (tmp_path / "precision/stickslip-exchange.csv").open(newline="") as file:
         heads, *table = csv.reader(file)
     assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "stickslip [1]"]
     assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
     printed = done.stdout.partition("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol")[2]
     told = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
-    assert told == [[advice.power(float(number)) for number in row] for row in table]
+    assert told == [[advice.power(float(number)) if number else "-" for number in row] for row in table]
 
 
 def test_the_page_has_error_against_tolerance_or_names_the_commands_that_make_it(both, fmus, tmp_path):
