@@ -6,7 +6,7 @@ import sys
 import click
 
 from .errors import HarnessError
-from .interrupt import interruptible
+from .process.interrupt import interruptible
 
 NAME = "python -m harness"
 
@@ -16,7 +16,7 @@ def main() -> None:
     try:
         with interruptible():
             from .commands import commands
-            from .terminal import prepare
+            from .commands.terminal import prepare
 
             prepare()
             try:

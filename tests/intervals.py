@@ -15,10 +15,10 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from decays import random_record
 
+from harness.analyses.decay.figures import Known
+from harness.analyses.decay.fit import identify
+from harness.analyses.decay.law import LAWS
 from harness.errors import HarnessError
-from harness.identify.figures import Known
-from harness.identify.fit import identify
-from harness.identify.law import LAWS
 
 NAMES = ("omega", "zeta", "r", "b", "rest")
 SAMPLES = 600

@@ -5,9 +5,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from harness.precision import anchors, peers
-from harness.precision.inside import Inside, offered
-from harness.precision.problem import Belt, Classic, Plain, Smoothed
+from harness.running.inside import Inside, offered
+from harness.studies.precision import anchors
+from harness.truths import peers
+from harness.truths.problem import Belt, Classic, Plain, Smoothed
 
 BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as published
 

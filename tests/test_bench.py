@@ -8,14 +8,15 @@ from math import inf, nan
 import pytest
 from native_fmus import built as native_built
 
-from harness.bench import in_c, native
-from harness.bench import speed as bench_speed
-from harness.bench.accuracy import default, drift, exact, last, late
-from harness.bench.measure import Beside, Measure, best
-from harness.bench.speed import communication_step, inside_python, many_runs, step
-from harness.bench.study import FILE, FOLDER, bench, measures
-from harness.bench.table import numbers, words
 from harness.errors import HarnessError
+from harness.running.clock import best
+from harness.studies.bench import in_c, native
+from harness.studies.bench import speed as bench_speed
+from harness.studies.bench.accuracy import default, drift, exact, last, late
+from harness.studies.bench.measure import Beside, Measure
+from harness.studies.bench.speed import communication_step, inside_python, many_runs, step
+from harness.studies.bench.study import FILE, FOLDER, bench, measures
+from harness.studies.bench.table import numbers, words
 
 FAST = Measure("a step", 2e-6, "s", 3e-6, (Beside("theirs", 5e-6), Beside("absent is not installed")))
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.compare.difference import compare
-from harness.compare.trajectory import Trajectory
 from harness.errors import HarnessError
+from harness.running.trajectory import Trajectory
+from harness.studies.compare.difference import compare
 
 ROOT = Path(__file__).parent.parent
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "120"}

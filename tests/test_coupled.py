@@ -14,8 +14,8 @@ import pytest
 from fmpy import read_model_description
 from fmpy.ssp.ssd import read_ssd
 
-from harness.coupled.monolith import Bodies, solve
-from harness.coupled.study import ecos
+from harness.studies.coupled.study import ecos
+from harness.truths.monolith import Bodies, solve
 
 here = all(map(find_spec, ("pyssp_standard", "ecospy")))
 pytestmark = pytest.mark.skipif(not here, reason="the extra 'coupled' is not installed")

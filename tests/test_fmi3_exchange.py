@@ -22,7 +22,7 @@ from fmi3_hosts import Failed
 from models import MODELS, SIGN, declared, model_class, outputs
 from test_changes import spans
 
-from harness.reference import CASES, POINTS, late, load, relative
+from harness.truths.reference import CASES, POINTS, late, load, relative
 
 fmus, worker, _workers = fmi3_hosts.FIXTURES
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)

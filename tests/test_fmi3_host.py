@@ -12,7 +12,7 @@ from models import MODELS, declared, model_class, outputs
 from native_host import HEADERS, compiler
 
 from fmus.packaging.native.compiler import STRICT
-from harness.importers.by_c import EMBEDDED
+from harness.running.compiler import EMBEDDED
 
 LIVES, STEPS = 100, 20
 fmus, worker, _workers = fmi3_hosts.FIXTURES

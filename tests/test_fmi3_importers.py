@@ -6,7 +6,7 @@ import fmi3_hosts
 import pytest
 from models import MODELS
 
-from harness.importers.checks import IMPORTERS, absent, play, subject
+from harness.studies.importers.checks import IMPORTERS, absent, play, subject
 
 ECOS = next(importer for importer in IMPORTERS if importer.name == "Ecos")
 

@@ -29,7 +29,7 @@ from test_state import (  # noqa: F401
     test_a_state_holds_the_parameters_also_those_not_yet_in_force,
 )
 
-from harness.reference import POINTS, load, relative
+from harness.truths.reference import POINTS, load, relative
 
 fmus, worker, _workers = fmi3_hosts.FIXTURES
 REACH = dict.fromkeys(MODELS, 1e-13) | {"pendulum": 1e-9, "pacejka": 1e-6}  # by default, relative

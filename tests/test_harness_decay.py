@@ -5,7 +5,7 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from harness.decay import chosen, damping_ratio, friction, turning_points
+from harness.analyses.decay.decrement import chosen, damping_ratio, friction, turning_points
 from harness.errors import HarnessError
 
 

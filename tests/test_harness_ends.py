@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from harness import interrupt
-from harness.child import Hangs, ask
-from harness.interrupt import Interrupted, check, interruptible, later
-from harness.terminal import progress
+from harness.commands.terminal import progress
+from harness.process import interrupt
+from harness.process.child import Hangs, ask
+from harness.process.interrupt import Interrupted, check, interruptible, later
 
 ROOT = Path(__file__).parent.parent
 SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from harness import folder as folders
 from harness.errors import HarnessError
-from harness.folder import replacing
+from harness.results import folder as folders
+from harness.results.folder import replacing
 
 ROOT = Path(__file__).parent.parent
 OURS = ("a.csv", "b.csv")

@@ -12,7 +12,7 @@ import pytest
 
 from harness.commands import commands
 from harness.errors import HarnessError
-from harness.scene import KEYS
+from harness.scenes.scene import KEYS
 
 ROOT = Path(__file__).parent.parent
 SCENE = {"title": '"a title"', "model": '"smd"', "outputs": '["x", "v"]', "stop": "0.1"}
@@ -205,14 +205,14 @@ def test_a_number_of_the_command_line_is_finite_or_refused(here, option, word):
 def test_scenes_with_letters_changed_at_random_run_or_are_refused(here):
     """The shipped ones, changed at a few places each; the same ones every time."""
     dice = random.Random(10)
-    for file in sorted((ROOT / "harness/coupled/scenes").glob("*.toml")):
+    for file in sorted((ROOT / "harness/scenes/coupled").glob("*.toml")):
         for _ in range(60):
             text = list(file.read_text())
             for _ in range(dice.randint(1, 4)):
                 text[dice.randrange(len(text))] = dice.choice('"[]{}=.,#\\\n0-e$\0\u00e9 ')
             (here / "mine.toml").write_text("".join(text), encoding="utf-8")
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr("harness.coupled.study.study", refuse)  # what comes after reading takes long
+                patch.setattr("harness.studies.coupled.study.study", refuse)  # what comes after reading takes long
                 check(*ended("couple", "mine.toml", "--quiet"), "".join(text))
     base = "".join(f"{name} = {told}\n" for name, told in SCENE.items()) + "grid = 0.01\n[values]\nm = 1.5\n"
     for _ in range(150):

@@ -9,9 +9,10 @@ from zipfile import ZipFile
 
 import pytest
 
-from harness import unpacked
 from harness.errors import HarnessError
-from harness.unpacked import plain, room
+from harness.process import room as rooms
+from harness.process.room import plain, room
+from harness.running import unpacked
 
 ROOT = Path(__file__).parent.parent
 ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
@@ -52,7 +53,7 @@ def test_any_letter_may_stand_in_the_path_of_temporary_files_of_fmus_and_of_resu
 
 
 def test_without_a_plain_folder_an_fmu_in_python_is_refused_and_another_one_runs(odd, fmus, monkeypatch):
-    monkeypatch.setattr(unpacked, "SHARED", ())
+    monkeypatch.setattr(rooms, "SHARED", ())
     monkeypatch.setattr(tempfile, "tempdir", str(odd))
     refused = pytest.raises(HarnessError, match=r"smd\.fmu is an FMU in Python, which cannot be run from .*TMPDIR")
     with refused, unpacked.unpacked(fmus / "smd.fmu"):

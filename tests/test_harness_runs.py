@@ -168,7 +168,7 @@ def test_a_failing_case_does_not_lose_the_others(place, tmp_path):
     for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
         (tmp_path / f"{name}.toml").write_text(BASE + extra + published)
     code = (
-        "from pathlib import Path; import harness.scene as scene; from harness.__main__ import main\n"
+        "from pathlib import Path; import harness.scenes.scene as scene; from harness.__main__ import main\n"
         f"scene.SHIPPED = Path({str(tmp_path)!r}); main()"
     )
     done = python(place, "-c", code, "--out", tmp_path / "out")
@@ -213,15 +213,16 @@ def test_list_shows_every_scene(place):
     [
         ("grid = 1", set()),
         ("plots = ['position']", {"matplotlib"}),
-        ("outputs = ['x', 'v', 'a']\nanalyses = ['slip']", {"harness.slip"}),
+        ("outputs = ['x', 'v', 'a']\nanalyses = ['slip']", {"harness.analyses.slip"}),
     ],
 )
 def test_a_scene_imports_only_what_it_names(place, tmp_path, extra, loaded):
     base = BASE.replace('outputs = ["x", "v"]', "") if "outputs" in extra else BASE
     (tmp_path / "mine.toml").write_text(base + extra)
-    optional = {"matplotlib", "harness.slip", "harness.decay", "harness.steps"}
+    optional = {"matplotlib", "harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps"}
     code = (
-        "import sys; from pathlib import Path; from harness.job import perform; from harness.scene import load\n"
+        "import sys; from pathlib import Path; from harness.studies.run.job import perform\n"
+        "from harness.scenes.scene import load\n"
         f"perform(load({str(tmp_path / 'mine.toml')!r}), Path({str(tmp_path)!r}), print)\n"
         f"print(sorted({optional!r} & set(sys.modules)))"
     )

@@ -5,8 +5,8 @@ from dataclasses import fields
 import pytest
 
 from harness.errors import SceneError
-from harness.quantity import Quantity
-from harness.scene import KEYS, Scene, load, shipped
+from harness.results.quantity import Quantity
+from harness.scenes.scene import KEYS, Scene, load, shipped
 
 GOOD = {"title": '"a title"', "model": '"stickslip"', "outputs": '["x", "v", "a"]'}
 

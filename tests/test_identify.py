@@ -16,16 +16,16 @@ from scipy.integrate import solve_ivp
 from scipy.stats import norm
 from scipy.stats import t as student_t
 
-from harness.decay import damping_ratio, friction
+from harness.analyses.decay.decrement import damping_ratio, friction
+from harness.analyses.decay.figures import Known
+from harness.analyses.decay.fit import identify
+from harness.analyses.decay.intervals import bounded, student
+from harness.analyses.decay.law import LAWS, TERMS, unknowns_of
+from harness.analyses.decay.model import Model
+from harness.analyses.decay.record import Record
 from harness.errors import HarnessError
-from harness.identify.figures import Known
-from harness.identify.fit import identify
-from harness.identify.intervals import bounded, student
-from harness.identify.job import numbers
-from harness.identify.law import LAWS, TERMS, unknowns_of
-from harness.identify.model import Model
-from harness.identify.record import Record
-from harness.identify.table import sentences, table
+from harness.studies.decay.job import numbers
+from harness.studies.decay.table import sentences, table
 
 ROOT = Path(__file__).parent.parent
 QUANTITIES = ("position", "velocity", "acceleration")

@@ -9,8 +9,8 @@ import pytest
 from models import MODELS
 
 from harness.errors import HarnessError
-from harness.importers import table
-from harness.importers.checks import CHECKS, IMPORTERS
+from harness.studies.importers import table
+from harness.studies.importers.checks import CHECKS, IMPORTERS
 
 
 @pytest.fixture(scope="module", params=["python", "native"])

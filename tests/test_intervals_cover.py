@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from decays import random_record
 
-from harness.identify.figures import Known
-from harness.identify.fit import identify
+from harness.analyses.decay.figures import Known
+from harness.analyses.decay.fit import identify
 
 RECORDS = 40
 

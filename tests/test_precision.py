@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 
 from harness.errors import HarnessError
-from harness.precision import advice, laws, peers
-from harness.precision.answer import Answer
-from harness.precision.inside import Inside, embedded, offered
-from harness.precision.study import FMPY, FMU, QUICK, WAYS, Extent, Job, Point, Study, jobs, sweep
-from harness.reference import CASES, errors, load
+from harness.running.answer import Answer
+from harness.running.inside import Inside, embedded, offered
+from harness.studies.precision import advice, laws
+from harness.studies.precision.study import FMPY, FMU, QUICK, WAYS, Extent, Job, Point, Study, jobs, sweep
+from harness.truths import peers
+from harness.truths.reference import CASES, errors, load
 
 ROOT = Path(__file__).parent.parent
 CASE = {case.name: case for case in CASES}

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from fmi3_hosts import built
 
-from harness import fmi3
 from harness.errors import HarnessError
-from harness.precision import advice
-from harness.precision.inside import embedded
-from harness.precision.study import CS, ME, Extent, jobs, sweep
-from harness.reference import CASES, load
+from harness.running import fmi3
+from harness.running.inside import embedded
+from harness.studies.precision import advice
+from harness.studies.precision.study import CS, ME, Extent, jobs, sweep
+from harness.truths.reference import CASES, load
 
 ROOT = Path(__file__).parent.parent
 CASE = {case.name: case for case in CASES}

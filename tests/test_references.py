@@ -9,10 +9,10 @@ import pytest
 from evidence import Piece, Trajectory
 from mpmath import mpf
 
-from harness.precision.answer import Answer
-from harness.precision.problem import Belt, Plain, Smoothed
-from harness.reference import CASES, POINTS, errors, late, load
-from harness.references.linear import coulomb, sampled, smd, stickslip, threshold
+from harness.running.answer import Answer
+from harness.truths.linear import coulomb, sampled, smd, stickslip, threshold
+from harness.truths.problem import Belt, Plain, Smoothed
+from harness.truths.reference import CASES, POINTS, errors, late, load
 
 ULP = 2.0**-52
 TRUTHS = {case.truth: case for case in CASES}

@@ -15,10 +15,10 @@ import pytest
 from models import MODELS, ROOT, declared
 
 from harness.errors import HarnessError
-from harness.stability.bounded import bounded
-from harness.stability.cases import Case, scenes, spans, spread
-from harness.stability.probe import Counts, Motion, Refusal, Refusals
-from harness.stability.study import (
+from harness.running.probe import Counts, Motion, Refusal, Refusals
+from harness.studies.stability.bounded import bounded
+from harness.studies.stability.cases import Case, scenes, spans, spread
+from harness.studies.stability.study import (
     FINISHED,
     REFUSED,
     WRONG,
@@ -30,9 +30,9 @@ from harness.stability.study import (
     regions,
     survey,
 )
-from harness.stability.table import endings, refusals, summary
-from harness.stability.truth import Grid, Truth, truth
-from harness.stability.truth_smooth import Curve
+from harness.studies.stability.table import endings, refusals, summary
+from harness.truths.truth import Grid, Truth, truth
+from harness.truths.truth_smooth import Curve
 
 QUICK = (
     "c = {} N.s/m: damping ratio c/20",
@@ -225,7 +225,7 @@ def test_a_long_path_of_temporary_files_is_no_hindrance(tmp_path):
     """The socket of a server that processes are forked from has room for 107 bytes."""
     folder = tmp_path / ("long" * 25)
     folder.mkdir()
-    code = "from harness.stability.bounded import bounded\nprint(bounded(60.0, len, 'three'))"
+    code = "from harness.studies.stability.bounded import bounded\nprint(bounded(60.0, len, 'three'))"
     asked = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(folder)}
     done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, timeout=120)
     assert (done.stdout, done.stderr) == ("5\n", "")

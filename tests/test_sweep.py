@@ -22,9 +22,9 @@ pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
 pandas = pytest.importorskip("pandas", reason="the extra 'sweep' is not installed")
 
 from harness.errors import HarnessError, SceneError  # noqa: E402
-from harness.sweep.rerun import Runs, ready  # noqa: E402
-from harness.sweep.space import Axis, axis, points  # noqa: E402
-from harness.sweep.study import Journal, Sweep  # noqa: E402
+from harness.studies.sweep.rerun import Runs, ready  # noqa: E402
+from harness.studies.sweep.space import Axis, axis, points  # noqa: E402
+from harness.studies.sweep.study import Journal, Sweep  # noqa: E402
 
 ROOT = Path(__file__).parent.parent
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}

@@ -1,1 +1,1 @@
-"""The reference motions, and the script that makes them: python -m harness.references"""
+"""The reference motions, made by python -m harness.truths."""

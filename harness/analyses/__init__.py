@@ -1,0 +1,1 @@
+"""What runs and records say: decay, slip, steps."""

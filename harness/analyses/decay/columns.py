@@ -1,0 +1,237 @@
+"""Which columns of a table are the time and the motion, what was measured, and in which unit.
+
+A heading tells name and unit, as in `x [mm]`, `theta (deg)`, `Linear Acceleration z (m/s^2)` or `x / mm`.  The unit
+tells the quantity, otherwise the name does; both may be overruled.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...errors import SceneError, unknown
+from .clock import seconds, spread_evenly
+from .files import Cells, Table, load
+from .record import QUANTITIES, Record, check
+from .text import MISSING, STAMP
+from .units import COUNTS, TIMES, known, per_count, time_size
+
+HEADING = re.compile(r"^\s*(.*?)\s*(?:[\[(]([^\[\]()]*(?:\([^()]*\))?)[\])])?\s*$")
+SLASHED = re.compile(r"^\s*(.*?)\s+(?:/|in)\s+(\S+)\s*$")
+CLOCK = re.compile(
+    r"^(t|time|times|zeit|temps|tiempo|tid|timestamp|datetime|date|elapsed|seconds)\b|time$|time[ _]s$|^t_", re.I
+)
+BY_NAME = (
+    re.compile(
+        r"^(x|y|z|s|theta|phi|pos|position|displacement|disp|angle|weg|winkel|laser|encoder|height|distance)\b", re.I
+    ),
+    re.compile(r"^(v|vel|velocity|speed|omega|gyro|gyroscope|rate)\b|velocity|gyroscope|speed", re.I),
+    re.compile(r"^(a|acc|accel|accelerometer|alpha|a[xyz])\b|acceleration|accelerometer|accel|^a_|^acc", re.I),
+)
+LENGTH_ONLY = re.compile(r"\b(abs|absolute|magnitude|norm)\b", re.I)  # of a vector: it has no sign
+MOST_MISSING = 0.2  # share of the samples
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What the user says about the columns: their headings (`names` where the file has none), the quantity, and the
+    units that stand above those in the file."""
+
+    time: str | None = None
+    position: str | None = None
+    quantity: str | None = None
+    unit: str | None = None
+    time_unit: str | None = None
+    per_count: str | None = None
+    names: str | None = None
+    begin: float = -np.inf
+    end: float = np.inf
+
+
+def read(source: str, columns: Columns, name: str) -> Record:
+    """The record in a file, from `columns.begin` to `columns.end` in s; SceneError in one sentence if it is not one."""
+    table = load(source, columns.names)
+    if len(table.heads) < 2:
+        raise SceneError(f"{table.name} has one column; time and position are needed")
+    if not any(table.heads):
+        raise SceneError(f"{table.name} has no heading; name its columns, as in --columns 't [s],x [mm]'")
+    parts = [split(head) for head in table.heads]
+    i_t = time_column(table, parts, columns)
+    i_x, notes = signal_column(table, parts, columns, i_t)
+    t = times(table, parts[i_t], i_t, columns)
+    label, unit = parts[i_x][0] or table.heads[i_x], columns.unit or parts[i_x][1]
+    x = numbers(table, i_x)
+    order, base, size, guessed = measured(label, unit, columns, table.name)
+    keep = np.isfinite(t) & np.isfinite(x)
+    missing = int(len(t) - keep.sum())
+    if missing > MOST_MISSING * len(t):
+        raise SceneError(f"{table.name}: {missing} of {len(t)} rows have no number for {table.heads[i_t]} or {label}")
+    if missing:
+        notes.append(f"{missing} of {len(t)} rows have a missing cell and are left out.")
+    t, rounded = spread_evenly(t)
+    notes += [rounded] if rounded else []
+    notes += [guessed] if guessed else []
+    t, x = t[keep], size * x[keep]
+    rate = ("", "/s", "/s2")[order]
+    record = Record(name, t, x, base + rate, order, base, tuple(notes)).between(columns.begin, columns.end)
+    check(record)
+    return record
+
+
+def numeric(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
+    """Headings and numbers (rows, columns) of a file that has nothing but numbers; NaN where one is missing."""
+    table = load(str(path))
+    if not all(table.heads):
+        raise SceneError(f"{table.name} has no heading; its first line must name the columns, as in t [s],x [mm]")
+    return table.heads, np.column_stack([numbers(table, i) for i in range(len(table.heads))])
+
+
+def split(head: str) -> tuple[str, str | None]:
+    """Name and unit of a heading."""
+    found = HEADING.match(head)
+    name, unit = (found[1], found[2]) if found else (head, None)
+    slashed = SLASHED.match(name) if unit is None else None
+    if slashed and (known(slashed[2]) or time_size(slashed[2])):
+        return slashed[1], slashed[2]
+    return name, unit or None
+
+
+def place(asked: str, table: Table, parts: Sequence[tuple[str, str | None]]) -> int:
+    """The column of that heading: as it stands in the file, or by its name without the unit."""
+    for heads in (list(table.heads), [head.strip() for head in table.heads], [part for part, _ in parts]):
+        for fold in (str, str.lower):
+            matches = [i for i, head in enumerate(heads) if fold(head) == fold(asked)]
+            if matches:
+                return matches[0]
+    raise SceneError(f"{table.name}: {unknown('column', asked, filter(None, table.heads))}")
+
+
+def time_column(table: Table, parts: Sequence[tuple[str, str | None]], columns: Columns) -> int:
+    """The one that is asked for, named or measured as a time; otherwise the first that has a heading."""
+    if columns.time is not None:
+        return place(columns.time, table, parts)
+    named = [i for i, (name, _) in enumerate(parts) if CLOCK.search(name)]
+    measured = [i for i, (_, unit) in enumerate(parts) if unit and time_size(unit) and known(unit) is None]
+    both = [i for i in named if i in measured]
+    return (both or named or measured or [i for i, head in enumerate(table.heads) if head])[0]
+
+
+def signal_column(
+    table: Table, parts: Sequence[tuple[str, str | None]], columns: Columns, i_t: int
+) -> tuple[int, list[str]]:
+    """The column of the motion: a position rather than a velocity or an acceleration; of several the liveliest."""
+    if columns.position is not None:
+        return place(columns.position, table, parts), []
+    others = [i for i in range(len(parts)) if i != i_t]
+    others = [i for i in others if table.heads[i] and not CLOCK.search(parts[i][0])] or others
+    kinds = {i: kind(*parts[i]) for i in others}
+    if columns.quantity is not None:
+        wanted: int | None = QUANTITIES.index(columns.quantity)
+        chosen = [i for i in others if kinds[i] == wanted]
+    else:
+        wanted = min((order for order in kinds.values() if order is not None), default=None)
+        chosen = [i for i in others if kinds[i] == wanted]
+    chosen = [i for i in chosen if not LENGTH_ONLY.search(parts[i][0])] or chosen or others
+    if kinds.get(chosen[0]) is None:
+        return chosen[0], []  # nothing is known of any: the first
+    first = [i for i in chosen if parts[i][1] == parts[chosen[0]][1]]
+    if len(first) == 1 or (wanted == 0 and parts[first[0]][0].lower() in ("x", "theta")):
+        return first[0], []
+    spans = [np.nanstd(numbers(table, i, strict=False)) for i in first]
+    best = first[int(np.argmax(spans))]
+    names = ", ".join(table.heads[i] for i in first)
+    return best, [f"Of {names} the one that moves most is taken: {table.heads[best]}; --position takes another."]
+
+
+def kind(name: str, unit: str | None) -> int | None:
+    """The order of the derivative that a heading tells, by its unit or else by its name."""
+    found = known(unit) if unit else None
+    return found.order if found else by_name(name)
+
+
+def by_name(name: str) -> int | None:
+    """The order of the derivative that a name tells."""
+    return next((order for order in (2, 1, 0) if BY_NAME[order].search(name)), None)
+
+
+def measured(name: str, unit: str | None, columns: Columns, file: str) -> tuple[int, str, float, str]:
+    """Order, base unit and size in it of a column, and what had to be guessed."""
+    asked = None if columns.quantity is None else QUANTITIES.index(columns.quantity)
+    named, size = by_name(name), 1.0
+    if columns.per_count is not None:
+        size, unit = per_count(columns.per_count)
+    if unit is None:
+        hint = {None: "--unit mm or deg", 0: "--unit mm or deg", 1: "--unit mm/s or deg/s", 2: "--unit m/s2 or g"}
+        raise SceneError(
+            f"{name} has no unit in the heading of {file}; name it, as in {hint[named if asked is None else asked]}"
+        )
+    if unit.lower() in COUNTS:
+        raise SceneError(f"{name} is in {unit}; say what one of them is, as in --per-count 0.36deg or 0.001mm")
+    found = known(unit)
+    if found is None:
+        order = asked if asked is not None else named if named is not None else 0
+        doubt = asked is None and named is None
+        said = (
+            f"{name} in {unit} is taken for a position, in {unit}; --quantity velocity or acceleration says otherwise."
+        )
+        rate = ("", "/s", "/s2")[order]
+        base = (
+            unit
+            if not order
+            else unit[: -len(rate)]
+            if unit.endswith(rate)
+            else f"{unit}.s{order if order > 1 else ''}"
+        )
+        return order, base, 1.0, said if doubt else ""
+    order = found.order if asked is None else asked
+    if asked is not None and asked != found.order:
+        raise SceneError(
+            f"--quantity {columns.quantity}: {unit}, the unit of {name}, is that of {a(QUANTITIES[found.order])}"
+        )
+    if named is not None and found.order < named and asked is None and columns.unit is None:
+        raise SceneError(
+            f"{name} has the name of {a(QUANTITIES[named])} and the unit of {a(QUANTITIES[found.order])}, {unit}: say "
+            "--quantity, and --unit where the one in the file is wrong"
+        )
+    return order, found.base, size * found.size, ""
+
+
+def a(noun: str) -> str:
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+
+
+def times(table: Table, part: tuple[str, str | None], i: int, columns: Columns) -> np.ndarray:
+    """Times (n,) in s."""
+    cells = table.columns[i]
+    first = next((cell for cell in cells if isinstance(cell, str) and cell), None)
+    if first is not None and ":" in first and STAMP.match(first):
+        return seconds(cells, table.name)  # type: ignore[arg-type]
+    unit = columns.time_unit or part[1] or "s"  # s: every simulation program and nearly every instrument
+    size = time_size(unit)
+    if size is None:
+        raise SceneError(unknown(f"unit of {part[0]}", unit, TIMES))
+    return numbers(table, i) * size
+
+
+def numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
+    """The numbers (n,) of a column, NaN where one is missing; SceneError where a cell is neither, if `strict`."""
+    cells: Cells = table.columns[i]
+    if isinstance(cells, np.ndarray):
+        return cells
+    try:
+        return np.array(cells, dtype="U").astype(float)
+    except ValueError:
+        pass
+    found = np.full(len(cells), np.nan)
+    for at, cell in enumerate(cells):
+        if cell.lower() in MISSING:
+            continue
+        try:
+            found[at] = float(cell.replace(",", ".") if "," in cell and "." not in cell else cell)
+        except ValueError:
+            if strict:
+                row = f"row {table.line + 1 + at}, column {table.heads[i]}"
+                raise SceneError(f"{table.name}: '{cell[:40]}' in {row}, is not a number") from None
+    return found

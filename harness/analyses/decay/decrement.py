@@ -1,0 +1,146 @@
+"""Decay of a free oscillation: what its turning points say about damping and friction.
+
+    viscous       x_n = x_0 exp(-n delta),     zeta = delta/sqrt(4 pi^2 + delta^2)
+    Coulomb       x_n = x_0 - 4 n f/k,         f   = k (x_0 - x_n)/(4 n)
+    pin joint     theta_n = theta_0 - 4 n T_f/(m g a)  for small angles
+
+x_0 and x_n are sizes of turning points n cycles apart; n may be a half number.  Rest is at zero.
+Sources: Thomson, Theory of Vibration, sections 2.6 and 2.7 (logarithmic decrement, Coulomb damping).
+"""
+
+from dataclasses import dataclass
+from math import log, pi, sqrt
+
+import numpy as np
+
+from ...errors import HarnessError
+from ...results.quantity import Quantity
+from ...running.run import Run
+
+
+@dataclass(frozen=True)
+class Decay:
+    """`result` (zeta, f or T_f) over `cycles` cycles; `times` in s and `positions` of the turning points used."""
+
+    result: Quantity
+    cycles: float
+    times: np.ndarray
+    positions: np.ndarray
+    quantities: tuple[Quantity, ...]
+
+
+def analyse(run: Run) -> Decay:
+    """The decay of the recorded position, as the scene's [decay] asks; HarnessError if the run does not show one."""
+    gives, first = run.scene.decay["gives"], run.scene.decay.get("first", 0)
+    times, positions = turning_points(run.time, run.motion("position"), run.motion("velocity"))
+    times, positions, cycles = chosen(times, positions, first, run.scene.decay.get("cycles"))
+    x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
+    if gives == "zeta":
+        result = Quantity("zeta", damping_ratio(x_0, x_n, cycles), "1", f"damping ratio, {cycles:g} cycles")
+    elif gives == "f":
+        k = run.parameter("k", "the decay to f")
+        result = Quantity("f", friction(x_0, x_n, cycles, k), "N", f"friction force, {cycles:g} cycles")
+    else:
+        stiffness = 1.0
+        for name in ("m", "g", "a"):
+            stiffness *= run.parameter(name, "the decay to T_f")
+        result = Quantity("T_f", friction(x_0, x_n, cycles, stiffness), "N.m", f"joint torque, {cycles:g} cycles")
+    unit = run.units[run.scene.motion["position"]]
+    ends = (
+        Quantity("x_0", x_0, unit, f"peak {first:g}"),
+        Quantity("x_n", x_n, unit, f"peak {first + cycles:g}"),
+        Quantity("sample_0", sampled(run, times[0]), unit, f"peak {first:g}, as sampled"),
+        Quantity("sample_n", sampled(run, times[-1]), unit, f"peak {first + cycles:g}, as sampled"),
+    )
+    return Decay(result, cycles, times, positions, (*ends, result))
+
+
+def sampled(run: Run, time: float) -> float:
+    """The larger of the two samples around a turning point: what a plot of the samples shows as the peak."""
+    i = int(np.clip(np.searchsorted(run.time, time), 1, len(run.time) - 1))
+    return float(np.abs(run.motion("position")[i - 1 : i + 1]).max())
+
+
+def turning_points(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times and positions where the velocity passes through zero or comes to rest there.
+
+    Between two samples the position is the cubic of their x and v, and the turning point is where its slope is zero.
+    A start at rest counts when motion follows at once.  Arrays of one length (n,); errors of the order of the sample
+    distance to the fourth.
+    """
+    sign = np.sign(v)
+    times, positions = [], []
+    for i in np.flatnonzero(sign[:-1] * sign[1:] <= 0).tolist():
+        if sign[i] * sign[i + 1] < 0:
+            s = slope_zero(t[i + 1] - t[i], x[i + 1] - x[i], v[i], v[i + 1])
+            times.append(t[i] + s * (t[i + 1] - t[i]))
+            positions.append(cubic(s, t[i + 1] - t[i], x[i], x[i + 1], v[i], v[i + 1]))
+        elif sign[i] == 0 and turns(sign, i):
+            times.append(t[i])
+            positions.append(x[i])
+    if len(t) and sign[-1] == 0 and turns(sign, len(t) - 1):
+        times.append(t[-1])
+        positions.append(x[-1])
+    return np.array(times), np.array(positions)
+
+
+def turns(sign: np.ndarray, i: int) -> bool:
+    """Whether the zero at sample i begins a rest that ends a motion and is not followed by more of the same."""
+    before = sign[i - 1] if i else 0.0
+    if i and before == 0:
+        return False  # the rest began earlier
+    moving = np.flatnonzero(sign[i + 1 :])
+    if not len(moving):
+        return bool(i)
+    return sign[i + 1 + moving[0]] != before and (i > 0 or moving[0] == 0)
+
+
+def slope_zero(h: float, rise: float, v0: float, v1: float) -> float:
+    """Where in [0, 1] the cubic of step h (s) and slopes v0, v1 of opposite sign is level.
+
+    Its slope is v0 + 2 b s + c s^2 with b = 3 rise/h - 2 v0 - v1 and c = 3 (v0 + v1) - 6 rise/h.
+    """
+    b = 3 * rise / h - 2 * v0 - v1
+    c = 3 * (v0 + v1) - 6 * rise / h
+    root = sqrt(max(b * b - c * v0, 0.0))
+    q = -(b + root) if b > 0 else -(b - root)
+    candidates = [v0 / q if q else 0.5, q / c if c else 2.0]
+    return min(candidates, key=lambda s: abs(s - 0.5))  # the one inside: slopes of opposite sign allow just one
+
+
+def cubic(s: float, h: float, x0: float, x1: float, v0: float, v1: float) -> float:
+    """The cubic of positions x0, x1 and slopes v0, v1 a step h apart, at the share s of it."""
+    r = 1 - s
+    return (1 + 2 * s) * r * r * x0 + s * r * r * h * v0 + s * s * (3 - 2 * s) * x1 - s * s * r * h * v1
+
+
+def chosen(
+    times: np.ndarray, positions: np.ndarray, first: int, cycles: float | None
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """The turning points from cycle `first` over `cycles` cycles (None: all that follow), and how many cycles."""
+    begin = 2 * first
+    end = len(times) - 1 if cycles is None else begin + round(2 * cycles)
+    if end >= len(times) or end <= begin:
+        least = max(end, begin + 1) + 1
+        have = f"the decay needs {least} turning points, and the run has {len(times)}"
+        raise HarnessError(f"{have}: take a later stop, a finer grid or fewer cycles")
+    return times[begin : end + 1], positions[begin : end + 1], (end - begin) / 2
+
+
+def damping_ratio(x_0: float, x_n: float, cycles: float) -> float:
+    """zeta from the logarithmic decrement of turning points `cycles` apart."""
+    check_decrease(x_0, x_n)
+    delta = log(x_0 / x_n) / cycles
+    return delta / sqrt(4 * pi * pi + delta * delta)
+
+
+def friction(x_0: float, x_n: float, cycles: float, stiffness: float) -> float:
+    """Friction from the linear envelope: force for a stiffness in N/m, torque for one in N.m/rad."""
+    check_decrease(x_0, x_n)
+    return stiffness * (x_0 - x_n) / (4 * cycles)
+
+
+def check_decrease(x_0: float, x_n: float) -> None:
+    """The oscillation decays, and is not over."""
+    if not x_0 > x_n > 0:
+        raise HarnessError(f"the turning points do not decay: from {x_0:.6g} to {x_n:.6g}, at rest, driven or undamped")

@@ -1,0 +1,166 @@
+"""The table in a file of any kind: text, spreadsheet (.xlsx, .xls, .ods), MATLAB's .mat of either sort, numpy's .npz.
+
+The kind is told by the first bytes, so that standard input can be any of them.
+"""
+
+import io
+import sys
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import HarnessError, SceneError, reason
+from . import text
+
+EXTRA = "python -m pip install 'friction-fmus[records]'"
+Cells = list[Any] | np.ndarray
+
+
+@dataclass(frozen=True)
+class Table:
+    """The columns of a file by their headings, which may be empty; `line` is the number of the line or row before
+    them."""
+
+    name: str
+    heads: tuple[str, ...]
+    columns: tuple[Cells, ...]
+    line: int = 0
+
+
+def load(source: str, names: str | None = None) -> Table:
+    """The table of the file `source`, or of standard input where that is "-"; `names` are the headings, with commas
+    between, where the file has none.  SceneError in one sentence where there is none."""
+    path = Path(source)
+    name = "standard input" if source == "-" else path.name
+    data = sys.stdin.buffer.read() if source == "-" else content(path)
+    if not data.strip():
+        raise SceneError(f"{name} is empty")
+    try:
+        table = parse(data, name)
+    except HarnessError:
+        raise
+    except ImportError as error:
+        raise SceneError(f"{name} needs {error.name} to be read: {EXTRA}") from None
+    except Exception as error:  # those who wrote the readers raise what they meet in a damaged file
+        raise SceneError(f"{name} cannot be read: {reason(error)}") from None
+    if names is None:
+        return table
+    heads = tuple(part.strip() for part in names.split(","))
+    if len(heads) != len(table.columns):
+        raise SceneError(f"--columns names {len(heads)} columns, and {name} has {len(table.columns)}")
+    return Table(name, heads, table.columns, table.line)
+
+
+def content(path: Path) -> bytes:
+    """The bytes of a file."""
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as error:
+        said = getattr(error, "strerror", None) or str(error)
+        near = []
+        if isinstance(error, FileNotFoundError) and path.parent.is_dir():
+            near = get_close_matches(path.name, [each.name for each in path.parent.iterdir()], n=1)
+        hint = f" (nearest: '{near[0]}')" if near else ""
+        raise SceneError(f"cannot read {path}: {said}{hint}") from None
+
+
+def parse(data: bytes, name: str) -> Table:
+    """The table in these bytes."""
+    if data.startswith(b"PK"):
+        return arrays(npz(data), name) if b".npy" in data[:200] else sheet(data, name)
+    if data.startswith(b"\xd0\xcf\x11\xe0"):
+        return sheet(data, name)
+    if data.startswith((b"MATLAB 7.3", b"\x89HDF")):
+        return arrays(hdf5(data), name)
+    if data.startswith(b"MATLAB 5.0"):
+        return arrays(mat(data), name)
+    heads, rows, line = text.parse(data, name)
+    return from_rows(heads, rows, line, name)
+
+
+def from_rows(heads: list[str], rows: list[list[Any]], line: int, name: str) -> Table:
+    """A table from its rows; what a short row lacks is missing."""
+    width = max(len(heads), len(rows[0]))
+    for number, row in enumerate(rows, line + 1):
+        if len(row) > width and any(str(cell).strip() for cell in row[width:]):
+            raise SceneError(f"{name}: row {number} has {len(row)} cells where the heading has {width}")
+    columns = zip(*(row if len(row) == width else [*row, *[""] * width][:width] for row in rows), strict=True)
+    heads = [*heads, *[""] * (width - len(heads))]
+    return Table(name, tuple(heads), tuple(map(list, columns)), line)
+
+
+def sheet(data: bytes, name: str) -> Table:
+    """The first sheet with a table in a workbook."""
+    from python_calamine import CalamineWorkbook
+
+    book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+    for each in book.sheet_names:
+        rows = [[as_cell(cell) for cell in row] for row in book.get_sheet_by_name(each).to_python()]
+        first = text.first_of_numbers(rows)
+        if first is not None:
+            return from_rows(text.headings(rows[:first], len(rows[first])), rows[first:], first, name)
+    raise SceneError(f"{name} has no sheet with a heading and rows of numbers")
+
+
+def as_cell(cell: Any) -> str:
+    """A cell of a workbook as a text file would hold it."""
+    return cell.isoformat(" ") if hasattr(cell, "isoformat") else str(cell).strip()
+
+
+def npz(data: bytes) -> dict[str, Any]:
+    with np.load(io.BytesIO(data), allow_pickle=False) as found:
+        return {name: found[name] for name in found.files}
+
+
+def mat(data: bytes) -> dict[str, Any]:
+    from scipy.io import loadmat
+
+    return {key: value for key, value in loadmat(io.BytesIO(data), simplify_cells=True).items() if key[:2] != "__"}
+
+
+def hdf5(data: bytes) -> dict[str, Any]:
+    """The data sets of an HDF5 file, as MATLAB writes them since version 7.3."""
+    import h5py
+
+    found: dict[str, Any] = {}
+
+    def visit(path: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not path.startswith("#"):
+            found[path.replace("/", ".")] = item[()]
+
+    with h5py.File(io.BytesIO(data), "r") as file:
+        file.visititems(visit)
+    return found
+
+
+def arrays(found: dict[str, Any], name: str) -> Table:
+    """The columns among named arrays: vectors, and matrices by their columns, of the length that most have."""
+    columns: list[tuple[str, np.ndarray]] = []
+    for key, value in flat(found):
+        if value.ndim == 1 or min(value.shape) == 1:
+            columns.append((key, value.ravel()))
+        elif value.ndim == 2:
+            tall = value if value.shape[0] >= value.shape[1] else value.T
+            columns += [(f"{key}{i + 1}", tall[:, i]) for i in range(tall.shape[1])]
+    lengths = [len(values) for _, values in columns if len(values) > 2]
+    length = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
+    kept = [(key, values) for key, values in columns if len(values) == length]
+    if len(kept) < 2:
+        raise SceneError(
+            f"{name} has no two arrays of one length; time and position are needed (it has {', '.join(found)})"
+        )
+    return Table(name, tuple(key for key, _ in kept), tuple(values for _, values in kept))
+
+
+def flat(found: dict[str, Any], above: str = "") -> list[tuple[str, np.ndarray]]:
+    """Arrays of numbers by name, those inside of structures as structure.field."""
+    arrays = []
+    for key, value in found.items():
+        if isinstance(value, dict):
+            arrays += flat(value, f"{above}{key}.")
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and 1 <= value.ndim <= 2 and value.size:
+            arrays.append((above + key, value.astype(float)))
+    return arrays

@@ -1,0 +1,134 @@
+"""What a decay says about damping, dry friction and drag, from its record to values, intervals and remarks.
+
+1. turning points are found and numbered (turning.py);
+2. what each half swing loses gives a start (energy.py), and the turning points, matched by number, a better one;
+3. the law itself (law.py) is fitted to every sample of the free motion (model.py, window.py);
+4. the seven laws compete (choice.py), and the full one tells how sure it all is (intervals.py);
+5. what is in doubt is said, and what is no answer is refused (remarks.py).
+
+Steps 2 and 4 follow J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998), and Journal of Sound and Vibration 295
+(2006); that a half swing depends on its amplitude alone, so that a table of it gives the whole signal, is ours.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import HarnessError
+from .choice import Law, all_laws, plausible
+from .figures import Estimate, Known, estimates
+from .intervals import Spread, spread
+from .law import DRIFT, REST, TERMS, Terms
+from .peaks import by_turning_points, by_two_peaks
+from .problem import Problem
+from .record import Record
+from .remarks import ROUGH, halves_apart, refuse, remarks
+from .turning import Turns, find
+from .window import free_motion
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A record, its turning points and what they say, and the laws tried, best first, fitted to the samples of
+    `problem`.  `published`: what the first and last turning point say; `why` some have nothing to say."""
+
+    record: Record
+    turns: Turns
+    problem: Problem
+    laws: tuple[Law, ...]
+    spread: Spread
+    estimates: tuple[Estimate, ...]
+    by_turns: tuple[Estimate, ...]
+    published: tuple[Estimate, ...]
+    why: dict[str, str]
+    remarks: tuple[str, ...]
+
+    @property
+    def best(self) -> Law:
+        return self.laws[0]
+
+    @property
+    def t(self) -> np.ndarray:
+        """The times (n,) in s of the samples used."""
+        return self.problem.t + self.problem.origin
+
+    @property
+    def x(self) -> np.ndarray:
+        """The samples used (n,), in the record's unit."""
+        return self.problem.x * self.problem.unit + self.problem.level
+
+    def signal(self, law: Law, t: np.ndarray) -> np.ndarray:
+        """What a law says at the times t (n,) in s, in the record's unit."""
+        x, _ = self.problem.model(law.p, self.problem.unknowns(law.terms), t - self.problem.origin)
+        return x * self.problem.unit + self.problem.level
+
+    def rest(self, law: Law, t: np.ndarray) -> np.ndarray:
+        """The rest position (n,) at the times t (n,) in s, in the record's unit."""
+        problem = self.problem
+        moved = law.p[DRIFT] * (t - problem.origin - problem.model.middle)
+        return (law.p[REST] + moved) * problem.unit + problem.level
+
+    @property
+    def rms(self) -> float:
+        """Of the residuals of the best law, in the record's unit."""
+        return float(np.sqrt(self.best.squares / len(self.problem.t))) * self.problem.unit
+
+    @property
+    def sentence(self) -> str:
+        """The choice of the law, and how clear it is."""
+        if not any(each.low > 0 for each in self.estimates if each.name in TERMS) and not self.best.p[5:].any():
+            return "No loss stands out of the noise; the intervals say how large it may be."
+        others = [f"{law.words} {law.bic - self.best.bic:+.1f}" for law in self.laws[1:]]
+        rest = f"; {', '.join(others)})" if others else ")"
+        return f"Best described by {self.best.words} (BIC {self.best.bic:.1f}{rest}."
+
+
+def identify(
+    record: Record,
+    known: Known,
+    drag: bool = True,
+    drift: bool = False,
+    report: Callable[[float], None] = lambda share: None,
+) -> Identified:
+    """Identify a decay; without `drag` its laws are left out, with `drift` the rest position moves at a steady rate.
+    HarnessError where there is no decay, or no fit."""
+    if known.pendulum and record.base != "rad":
+        raise HarnessError(
+            f"a pendulum is measured by its angle or its rate, and {record.name} is in {record.unit} (an accelerometer "
+            "on it feels its weight as well): give --unit rad, deg, rad/s or deg/s, or leave out --pendulum"
+        )
+    terms: Terms = TERMS if drag else ("zeta", "r")
+    turns = find(record, known.pendulum)
+    unknowns = 5 + len(terms) + drift
+    if len(record.t) <= unknowns:
+        raise HarnessError(f"{record.name} has {len(record.t)} samples for {unknowns} values to find; sample finer")
+    report(0.1)
+    window = free_motion(record, turns, terms, known.pendulum, drift)
+    problem = window.problem
+    report(0.5)
+    amplitudes = (
+        np.abs(turns.x - np.median(turns.x)) / problem.unit if len(turns.x) < 4 else sizes_of(turns) / problem.unit
+    )
+    laws = all_laws(problem, (window.p, window.squares), terms, amplitudes, lambda share: report(0.5 + 0.4 * share))
+    full = next(law for law in laws if law.terms == terms)
+    found = spread(problem, full.p, terms)
+    refuse(record, problem, full, found, known.pendulum)
+    values = plausible(laws, full, problem)
+    told = estimates(record, problem, values, full, found, known)
+    said = [*record.notes, *window.notes, *remarks(record, problem, laws, full, found)]
+    if found.alike and found.rms > ROUGH * problem.noise:
+        told, more = halves_apart(record, problem, full, told)
+        said += more
+    omega = told[0]
+    turning, no_turning = by_turning_points(record, problem, turns, laws[0], known, omega)
+    peaks, no_peaks = by_two_peaks(record, problem, turns, laws[0], known, omega)
+    why = {"turning points": no_turning, "two peaks": no_peaks}
+    return Identified(record, turns, problem, laws, found, told, turning, peaks, why, tuple(said))
+
+
+def sizes_of(turns: Turns) -> np.ndarray:
+    """Amplitudes at the turning points (n,), each about the middle of its neighbours."""
+    x = turns.x
+    between = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4
+    return np.abs(x - np.median(between))

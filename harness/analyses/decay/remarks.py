@@ -1,0 +1,164 @@
+"""What a reader of the values should know before believing them; and what is no answer at all."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import HarnessError
+from .choice import Law
+from .figures import Estimate, sizes
+from .intervals import Spread, spread
+from .law import AMPLITUDE, DRIFT, OMEGA, UNKNOWNS, ZETA
+from .problem import Problem
+from .record import Record
+
+ROUGH = 1.5  # times the noise: residuals beyond are no noise of single samples
+UNFIT = 0.1  # share of the motion: residuals beyond are no free decay of one oscillator
+PART = 0.008  # the same: something else acts
+CLEAR = 6.0  # of BIC: odds of 20 to 1
+APART = 3.0  # errors by which the halves of a record disagree
+HINTED = 4.0  # of n ln(squares): what one more term takes away by chance once in twenty times
+DRIFTS = 5.0  # errors of a drift that is told
+GAINS = 5.0  # errors by which the losses are negative
+FEWEST = 100  # samples of a half that is fitted apart
+
+
+def refuse(record: Record, problem: Problem, full: Law, spread: Spread, pendulum: bool) -> None:
+    """HarnessError where the best fit is no answer."""
+    e, _ = problem.off(full.p, full.terms)
+    motion = float(np.sqrt(np.mean((problem.x - problem.x.mean()) ** 2)))
+    share = spread.rms / motion
+    if share > UNFIT and spread.rms > 2 * problem.noise:
+        advice = "cut the record there with --from or --until"
+        if record.base == "rad" and not pendulum:
+            advice = "say --pendulum if it is one, or " + advice
+        raise HarnessError(
+            f"{record.name} is not a free decay of one oscillator: the best fit leaves {100 * share:.0f} % of the "
+            f"motion, most of it about t = {worst(problem, full.p, e):.6g} s; {advice}"
+        )
+    if gains(problem, full) < -GAINS:
+        raise HarnessError(
+            f"{record.name} gains energy: the damping ratio that fits it best is negative, so it is driven, and has no "
+            "decay to measure"
+        )
+
+
+def worst(problem: Problem, p: np.ndarray, e: np.ndarray) -> float:
+    """The time in s of the half swing whose residuals are largest."""
+    width = max(int(np.pi / p[OMEGA] / float(np.median(np.diff(problem.t)))), 1)
+    sums = np.add.reduceat(e**2, np.arange(0, len(e), width))
+    at = min(int(np.argmax(sums)) * width + width // 2, len(e) - 1)
+    return float(problem.t[at] + problem.origin)
+
+
+def gains(problem: Problem, full: Law) -> float:
+    """Of the viscous law alone: how many errors its damping ratio, if it could be negative, is above zero."""
+    if full.p[ZETA:].any():
+        return 0.0
+    found = spread(problem, full.p, ("zeta",))
+    return float(found.free[-1] / found.errors[-1]) if found.errors[-1] > 0 else 0.0
+
+
+def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, spread: Spread) -> tuple[str, ...]:
+    """The sentences."""
+    said = []
+    noise, rms, unit = problem.noise * problem.unit, spread.rms * problem.unit, record.unit
+    motion = float(np.sqrt(np.mean((problem.x - problem.x.mean()) ** 2)))
+    rough, exact = spread.rms > ROUGH * problem.noise, spread.rms < 1e-9 * full.p[AMPLITUDE]
+    if exact:
+        return ()
+    if rough and spread.rms > PART * motion:
+        e, _ = problem.off(full.p, full.terms)
+        said.append(
+            f"The fit is off by {rms:.3g} {unit} (rms), {100 * spread.rms / motion:.1f} % of the motion, where the "
+            f"samples scatter by {noise:.3g}: something else acts as well, or the noise is not independent from sample "
+            f"to sample, most of it about t = {worst(problem, full.p, e):.4g} s; the intervals are widened, but where "
+            "the law does not hold its values mean little."
+        )
+    elif rough and spread.alike:
+        said.append(
+            f"The fit is off by {rms:.3g} {unit} (rms) where the samples scatter by {noise:.3g}: something else acts "
+            "as well, or the noise is not independent from sample to sample; the intervals are widened."
+        )
+    elif rough:
+        said.append(
+            f"The fit is off by {rms:.3g} {unit} (rms) where neighbouring samples scatter by {noise:.3g}: look at the "
+            "time stamps."
+        )
+    elif spread.alike:
+        said.append(
+            f"Neighbouring residuals are alike (correlation {spread.rho:.2f}): the noise is not independent from "
+            "sample to sample; the intervals are widened."
+        )
+    drift = drifting(record, problem, full) if spread.alike and not problem.drift else ""
+    return (*said, *([drift] if drift else []), *undecided(problem, laws))
+
+
+def drifting(record: Record, problem: Problem, full: Law) -> str:
+    """A sentence where the rest position would drift if it could."""
+    free = replace(problem, drift=True)
+    found = spread(free, full.p, full.terms)
+    names = [UNKNOWNS[place] for place in found.unknowns]
+    at = names.index("drift")
+    p, squares = free.fit(full.p, full.terms)
+    if not (abs(found.free[at]) > DRIFTS * found.errors[at] or squares < full.squares / 2):
+        return ""
+    over = float(p[DRIFT] * (problem.t[-1] - problem.t[0]) * problem.unit)
+    return f"The rest position drifts, by {over:.3g} {record.unit} over the record: --drift fits that as well."
+
+
+def undecided(problem: Problem, laws: tuple[Law, ...]) -> tuple[str, ...]:
+    """Laws that this record cannot tell from the best one, and what would."""
+    best = laws[0]
+    n, least = len(problem.t), len(problem.t) * problem.exact**2
+    gains = [n * float(np.log(max(law.squares, least) / max(best.squares, least))) for law in laws]
+    rivals = [
+        law
+        for law, gain in zip(laws[1:], gains[1:], strict=True)
+        if (gain < -HINTED if set(best.terms) < set(law.terms) else gain > 0 and law.bic - best.bic < CLEAR)
+    ]
+    if not rivals:
+        return ()
+    apart = max(abs(next(gain for law, gain in zip(laws, gains, strict=True) if law is rivals[0])), 1.0)
+    factor = float(np.sqrt((CLEAR + np.log(n)) / apart))
+    words = " and ".join(f"{law.words} ({law.bic - best.bic:+.1f})" for law in rivals)
+    return (
+        f"{words[0].upper()}{words[1:]} cannot be told from {best.words} at this noise: a record with {factor:.1f} "
+        f"times less noise, or {np.ceil(factor**2):.0f} times as many samples, or more and larger swings, would tell.",
+    )
+
+
+def halves_apart(
+    record: Record, problem: Problem, full: Law, estimates: tuple[Estimate, ...]
+) -> tuple[tuple[Estimate, ...], tuple[str, ...]]:
+    """Where the fit is rough: the law in the first and in the second half of the record; where they disagree by more
+    than their errors that is told, and the intervals hold both."""
+    _, begins = problem.half_swings(full.p)
+    cut = int(np.searchsorted(begins, problem.t[len(problem.t) // 2]))
+    if cut >= len(begins) - 3:
+        return estimates, ()
+    early = problem.t <= begins[cut]
+    found = []
+    for count, keep in ((0, early), (cut, ~early)):
+        if keep.sum() < FEWEST:
+            return estimates, ()
+        part, p = problem.turned(full.p, count)
+        part = part.only(keep)
+        p, _ = part.fit(p, full.terms, 15)
+        found.append((p, spread(part, p, full.terms)))
+    told, said = list(estimates), []
+    for i, each in enumerate(estimates):
+        if each.name not in ("omega", *full.terms):
+            continue
+        place = UNKNOWNS.index(each.name)
+        size = sizes(problem)[place]
+        at = int(np.flatnonzero(found[0][1].unknowns == place)[0])
+        first, second = (float(p[place]) * size for p, _ in found)
+        both = float(np.hypot(*(s.errors[at] * size for _, s in found)))
+        if abs(first - second) > APART * both:
+            low, high = min(each.low, first, second), max(each.high, first, second)
+            told[i] = replace(each, error=max(each.error, abs(first - second) / 2), low=low, high=high)
+            said.append(
+                f"{each.text}, {each.name}: {first:.4g} in the first half of the record, {second:.4g} in the second."
+            )
+    return tuple(told), tuple(said)

@@ -1,0 +1,89 @@
+"""Units of what a sensor writes: which derivative of which position, and how large in SI."""
+
+import re
+from typing import NamedTuple
+
+from ...errors import SceneError
+
+TIMES = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0}
+LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "ft": 0.3048}
+TURN = 2 * 3.141592653589793
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": TURN / 360, "°": TURN / 360, "rev": TURN, "gon": TURN / 400}
+STANDARD_GRAVITY = 9.80665
+COUNTS = ("count", "counts", "cts", "tick", "ticks", "pulse", "pulses", "increments", "inc", "lsb", "digits")
+SPELLED = {
+    "seconds": "s", "second": "s", "milliseconds": "ms", "millisecond": "ms", "microseconds": "us", "minutes": "min",
+    "hours": "h", "metres": "m", "meters": "m", "metre": "m", "meter": "m", "millimetres": "mm", "millimeters": "mm",
+    "centimetres": "cm", "centimeters": "cm", "inches": "in", "inch": "in", "feet": "ft", "radians": "rad",
+    "radian": "rad", "degrees": "deg", "degree": "deg", "grad": "deg", "turns": "rev", "turn": "rev",
+    "revolutions": "rev",
+}  # fmt: skip
+
+
+class Unit(NamedTuple):
+    """What a unit measures: the `order` of the derivative of a position in `base` (m or rad), and its size in SI."""
+
+    order: int
+    base: str
+    size: float
+
+
+def plain(text: str) -> str:
+    """A unit as the tables below write it: µm is um, m·s⁻², m s^-2 and m/s/s are m/s2."""
+    for old, new in (
+        ("µ", "u"),
+        ("μ", "u"),
+        ("²", "2"),
+        ("⁻", "-"),
+        ("¹", "1"),
+        ("^", ""),
+        ("**", ""),
+        ("·", " "),
+        ("*", " "),
+    ):
+        text = text.replace(old, new)
+    text = re.sub(r"\s+", " ", text.strip())
+    text = re.sub(r"[ .]?s-2$|/s/s$|/\(s2\)$|/sec2$", "/s2", text)
+    text = re.sub(r"[ .]s-1$|/sec$", "/s", text)
+    return re.sub(r"\s", "", text)
+
+
+def known(text: str) -> Unit | None:
+    """The unit of that name, or None where it is none of a motion."""
+    name = plain(text)
+    if name not in UNITS:
+        name = name.lower()
+    stem, slash, over = name.partition("/")
+    return UNITS.get(SPELLED.get(stem, stem) + slash + over)
+
+
+def time_size(text: str) -> float | None:
+    """The size of a unit of time in s, or None where it is none."""
+    name = plain(text).lower()
+    return TIMES.get(SPELLED.get(name, name))
+
+
+def per_count(text: str) -> tuple[float, str]:
+    """The size and the unit of one count, as in 0.36deg or 1e-3 mm."""
+    found = re.fullmatch(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*", text)
+    if not found or known(found[2]) is None:
+        raise SceneError(f"--per-count {text}: what one count is has a number and a unit, as in 0.36deg or 0.001mm")
+    return float(found[1]), found[2]
+
+
+def table() -> dict[str, Unit]:
+    """Every unit, with its rates."""
+    bases = ((LENGTHS, "m"), (ANGLES, "rad"))
+    units = {
+        name + rate: Unit(order, base, size)
+        for sizes, base in bases
+        for name, size in sizes.items()
+        for order, rate in enumerate(("", "/s", "/s2"))
+    }
+    units["rpm"] = Unit(1, "rad", TURN / 60)
+    units["g"] = Unit(2, "m", STANDARD_GRAVITY)
+    units["mg"] = Unit(2, "m", 1e-3 * STANDARD_GRAVITY)
+    return units
+
+
+UNITS = table()

@@ -1,0 +1,98 @@
+"""Stick-slip of a sled behind its driver: when it slips, how often, how fast.
+
+Where the friction law knows modes, a slip lasts from the event that ends a stick to the one that begins the next.
+Otherwise it begins where the sled becomes as fast as the driver, which is where the spring is at its longest:
+    d/dt (x_driver - x) = v_driver - v.
+There too m da/dt = k (v_driver - v) is zero, so that the peak acceleration lies in the slip, apart from any chatter.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import HarnessError
+from ..results.quantity import Quantity
+from ..running.run import Run
+
+
+@dataclass(frozen=True)
+class Slips:
+    """Number of slips; start of the first and period in s; `duration` (s) where modes show it; peaks in m/s, m/s2."""
+
+    count: int
+    first: float
+    period: float
+    duration: float | None
+    peak_speed: float
+    peak_acceleration: float
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        found = [
+            Quantity("slips", self.count, "", "slips"),
+            Quantity("first_slip", self.first, "s", "first slip"),
+            Quantity("period", self.period, "s", "slip period"),
+            Quantity("peak_speed", self.peak_speed, "m/s", "peak speed"),
+            Quantity("peak_acceleration", self.peak_acceleration, "m/s2", "peak acceleration"),
+        ]
+        if self.duration is not None:
+            found.insert(3, Quantity("slip_time", self.duration, "s", "duration of a slip"))
+        return tuple(found)
+
+
+def analyse(run: Run) -> Slips:
+    """The slips of a sled; HarnessError with fewer than two."""
+    driver = run.parameter("v_driver", "the analysis 'slip'")
+    v, a = run.motion("velocity"), run.motion("acceleration")
+    if not driver:
+        raise HarnessError("the analysis 'slip' needs a driver that moves, and v_driver is 0 m/s")
+    if run.events is not None and len(run.events.t) > 1:
+        starts, durations = slips_of_modes(run.events.t, run.events.mode)
+    else:
+        starts, durations = crossings(run.time, v * np.sign(driver) - abs(driver)), np.array([])
+    if len(starts) < 2:
+        raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: take a later stop")
+    fast = v * np.sign(driver) >= abs(driver)
+    return Slips(
+        count=len(starts),
+        first=float(starts[0]),
+        period=float(np.mean(np.diff(starts))),
+        duration=float(np.mean(durations)) if len(durations) else None,
+        peak_speed=crest(run.time, np.abs(v), fast),
+        peak_acceleration=crest(run.time, np.abs(a), widened(fast)),
+    )
+
+
+def slips_of_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and durations in s of the slips that modes (n,) from times t (n,) show; one cut short has no duration."""
+    stuck = np.flatnonzero(mode == 0)
+    starts = t[stuck[stuck < len(t) - 1] + 1]
+    ends = t[stuck[stuck > 0]]
+    ends = ends[ends > starts[0]] if len(starts) else ends
+    return starts, ends - starts[: len(ends)]
+
+
+def crossings(t: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Times (m,) where y (n,) rises through zero, on straight lines between its samples."""
+    i = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
+    return t[i] - y[i] * (t[i + 1] - t[i]) / (y[i + 1] - y[i])
+
+
+def widened(among: np.ndarray) -> np.ndarray:
+    """The samples named, and the neighbours of each."""
+    wide = among.copy()
+    wide[:-1] |= among[1:]
+    wide[1:] |= among[:-1]
+    return wide
+
+
+def crest(t: np.ndarray, y: np.ndarray, among: np.ndarray) -> float:
+    """The largest y (n,) of the samples named, or the top of the parabola through it and its neighbours among them."""
+    i = int(np.argmax(np.where(among, y, -np.inf)))
+    if not (0 < i < len(y) - 1 and among[i - 1] and among[i + 1]):
+        return float(y[i])
+    left, right = t[i] - t[i - 1], t[i + 1] - t[i]
+    down, up = (y[i] - y[i - 1]) / left, (y[i + 1] - y[i]) / right
+    bend = (up - down) / (left + right)
+    slope = (down * right + up * left) / (left + right)
+    return float(y[i] - slope * slope / (4 * bend)) if bend < 0 else float(y[i])

@@ -1,0 +1,59 @@
+"""The command line: one file a command; parse, one call, print."""
+
+from pathlib import Path
+
+import click
+
+from ..errors import HarnessError
+from .bench import bench
+from .compare import compare
+from .couple import couple
+from .decay import decay
+from .importers import importers
+from .list_ import list_
+from .precision import precision
+from .report import report
+from .run import figures, run
+from .stability import stability
+from .sweep import sweep
+from .terminal import JSON, OUT, QUIET, progress, show, tell
+
+
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@OUT
+@QUIET
+@JSON
+@click.pass_context
+def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> None:
+    """Run the built FMUs, measure what they do, and set it beside what was published.
+
+    Without a command: every published case.  Exit status 0: all well, 1: a run failed, 2: wrong usage,
+    130 and 143: ended by Ctrl-C and by SIGTERM, with nothing left half done.
+
+    \b
+    Examples:
+      python -m harness
+      python -m harness run stickslip
+      python -m harness run my-scene.toml --out elsewhere
+      python -m harness list
+    """
+    given = {"out": out, "quiet": quiet, "as_json": as_json}  # before the command, they hold for it too
+    context.default_map = dict.fromkeys(commands.commands, given)
+    if context.invoked_subcommand is None:
+        from ..studies.run import job
+        from ..studies.run.table import comparison
+
+        names = job.published()
+        with progress(quiet or as_json, len(names)) as report:
+            outcomes = list(job.main_job(names, out, report))
+        if as_json:
+            tell([figures(outcome) for outcome in outcomes])
+        else:
+            show(quiet, comparison(outcomes, everything=False), out)
+        failed = [outcome.error for outcome in outcomes if outcome.error]
+        if failed:
+            raise HarnessError("\n".join(failed))
+
+
+for command in (run, precision, stability, bench, importers, list_, decay, sweep, compare, couple, report):
+    commands.add_command(command)

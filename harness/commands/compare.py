@@ -1,0 +1,54 @@
+"""compare: how far two results or FMUs are apart."""
+
+from functools import partial
+from math import isnan
+from pathlib import Path
+
+import click
+
+from ..errors import HarnessError
+from .terminal import JSON, OUT, QUIET, STOP, TOLERANCE, Number, progress, screen, tell
+
+
+@click.command()
+@click.argument("one", metavar="A")
+@click.argument("two", metavar="B")
+@STOP
+@TOLERANCE
+@click.option("--within", type=Number(min=0), help="Exit status 1 if a relative difference is larger.")
+@OUT
+@QUIET
+@JSON
+def compare(
+    one: str,
+    two: str,
+    stop: float | None,
+    tolerance: float,
+    within: float | None,
+    out: Path,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Show how far A and B are apart: FMUs of any origin (FMI 2.0, 3.0), scenes, result folders or CSV files.
+
+    \b
+    Examples:
+      python -m harness compare results/stickslip results/stickslip-threshold
+      python -m harness compare fmus/coulomb.fmu theirs.fmu --stop 2
+      python -m harness compare results/smd measured.csv --within 1e-3
+    """
+    from ..studies.compare import job as anyones
+
+    with progress(quiet or as_json, 1) as report:
+        found, folder = anyones.perform_compare((one, two), stop, tolerance, out, partial(report, "compare"))
+    if as_json:
+        tell(anyones.numbers(found))
+    elif not quiet:
+        console = screen()
+        console.print(anyones.table(found), "")
+        for sentence in (*anyones.sentences(found), f"Results in {folder}"):
+            console.print(sentence, highlight=False)
+    if within is not None and not (found.worst <= within and (found.shift is None or found.shift == found.shift)):
+        if isnan(found.worst):
+            raise HarnessError(f"{one} or {two} holds what is not a finite number, which is in no bound")
+        raise HarnessError(f"{one} and {two} differ by {found.worst:.3g} of the largest value, more than {within:g}")

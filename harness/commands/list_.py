@@ -1,0 +1,19 @@
+"""list: the scenes that there are."""
+
+import click
+
+from .terminal import screen
+
+
+@click.command("list")
+def list_() -> None:
+    """List the scenes that come with the harness."""
+    from rich.table import Table
+
+    from ..scenes.scene import load, shipped
+
+    table = Table("scene", "model", "title", box=None)
+    for file in shipped():
+        scene = load(file)
+        table.add_row(scene.name, scene.model, scene.title)
+    screen().print(table)

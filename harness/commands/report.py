@@ -1,0 +1,37 @@
+"""report: one page of all results."""
+
+from pathlib import Path
+
+import click
+
+from .terminal import JSON, QUIET, tell
+
+
+@click.command()
+@click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("results"),
+    show_default=True,
+    help="Folder of the results; the page is written into it.",
+)
+@QUIET
+@JSON
+def report(out: Path, quiet: bool, as_json: bool) -> None:
+    """Make one page of all results there are: report.html, which needs nothing else.
+
+    It runs nothing; it says which results are missing, and the commands that make them.
+
+    \b
+    Example:
+      python -m harness && python -m harness decay coulomb && python -m harness report
+    """
+    from ..report.page import write
+
+    found = write(out)
+    if as_json:
+        tell({"page": str(found.path), "missing": [name for name, _ in found.missing]})
+    elif not quiet:
+        for name, command in found.missing:
+            click.echo(f"Missing: {name}; make it with `{command}`")
+        click.echo(f"Report in {found.path}")

@@ -1,0 +1,87 @@
+"""sweep: many runs over parameters."""
+
+import os
+from functools import partial
+from pathlib import Path
+
+import click
+
+from ..errors import LONGEST, HarnessError
+from .terminal import JSON, OUT, QUIET, STOP, progress, tell
+
+WORKERS = click.IntRange(1, 1024)
+
+
+@click.command()
+@click.argument("model")
+@click.option(
+    "--vary", multiple=True, required=True, metavar="NAME=LO:HI:N", help="What to vary; :log at the end, or a,b,c."
+)
+@click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="What to set in every run.")
+@click.option(
+    "--random", type=click.IntRange(min=1), help="So many points of a Latin hypercube; then --vary NAME=LO:HI."
+)
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the Latin hypercube.")
+@click.option("--measure", default="final,events", show_default=True, help="What to measure, with commas between.")
+@STOP
+@click.option("--workers", type=WORKERS, default=lambda: os.cpu_count() or 1, help="Processes on this machine.")
+@click.option("--scheduler", metavar="ADDRESS", help="An existing Dask cluster, as in tcp://host:8786.")
+@click.option("--name", help="Name of the result folder.")
+@OUT
+@QUIET
+@JSON
+def sweep(
+    model: str,
+    vary: tuple[str, ...],
+    values: tuple[str, ...],
+    random: int | None,
+    seed: int,
+    measure: str,
+    stop: float | None,
+    workers: int,
+    scheduler: str | None,
+    name: str | None,
+    out: Path,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    """Run MODEL (a name, or the path of an FMU) over many parameters, and measure every run.
+
+    Measures: final, events, steps, evaluations, run_time; along the path also slips, period, unsteady, peak_speed,
+    stuck, rest, zeta, f_over_k.  Interrupted, the same command goes on where it was.
+
+    \b
+    Examples:
+      python -m harness sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.5:60 --measure slips,period
+      python -m harness sweep pacejka --vary x_m=0.001:0.1:40:log --measure unsteady,steps
+      python -m harness sweep coulomb --vary f=0.1:2 --vary k=50:500 --random 1000 --scheduler tcp://host:8786
+    """
+    if name is not None and (name.startswith(".") or Path(name).name != name):
+        raise click.UsageError(f"--name {name[:LONGEST]}: the name of one folder, without dots before it")
+    try:
+        from ..studies.sweep import file as sweep_file
+    except ImportError as error:
+        raise HarnessError(f"a sweep needs {error.name}: python -m pip install 'friction-fmus[sweep]'") from None
+    measures = tuple(dict.fromkeys(word.strip() for word in measure.split(",")))
+    asked = sweep_file.Asked(model, vary, values, random, seed, measures, stop, name)
+    with progress(quiet or as_json, 1) as report:
+        swept = sweep_file.carry_out(asked, out, scheduler, workers, partial(report, model))
+    runs = swept.data["error"].size
+    told = {
+        "runs": runs,
+        "done before": swept.before,
+        "damaged": swept.damaged,
+        "failed": swept.failed,
+        "seconds": swept.seconds,
+        "folder": str(swept.folder),
+    }
+    if as_json:
+        tell(told)
+    elif not quiet:
+        fresh = runs - swept.before
+        click.echo(f"{runs} runs, {swept.before} of them done before, {swept.failed} failed")
+        if swept.damaged:
+            click.echo(f"{swept.damaged} damaged lines of the earlier sweep's journal were left out, and run again")
+        if fresh:
+            click.echo(f"{fresh} runs in {swept.seconds:.3g} s: {fresh / swept.seconds:.4g} runs/s")
+        click.echo(f"Results in {swept.folder}")

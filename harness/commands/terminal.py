@@ -1,0 +1,107 @@
+"""What the commands share at the terminal: options, the progress bar, tables, numbers as JSON.
+
+What takes long to import is imported where it is used: help and small commands start at once.
+"""
+
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from io import TextIOWrapper
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..process.interrupt import check
+from ..process.room import temporary
+
+OUT = click.option(
+    "--out",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=Path("results"),
+    show_default=True,
+    help="Folder that receives one folder for each scene.",
+)
+QUIET = click.option("--quiet", is_flag=True, help="Print errors only.")
+JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
+
+
+class Number(click.FloatRange):
+    """A finite number, in a range or not; click lets NaN through, which is in no range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if not isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
+        return number
+
+
+NUMBER, POSITIVE = Number(), Number(min=0, min_open=True)
+TOLERANCE = click.option(
+    "--tolerance",
+    type=POSITIVE,
+    default=1e-6,
+    show_default=True,
+    help="To which an FMU that does not show its steps is run, relative.",
+)
+STOP = click.option("--stop", type=NUMBER, help="Stop time in s (the FMU's own).")
+
+
+def prepare() -> None:
+    """Let standard output take every letter, a closed stream take everything, and temporary files lie where every
+    library finds them."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - as long as the process
+        elif isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
+    tempfile.tempdir = os.environ["TMPDIR"] = str(temporary())
+
+
+@contextmanager
+def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error, gone at the end; yields what tells it the present scene and its share done."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(file=sys.stderr)  # this very stream: runs redirect sys.stderr
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    if quiet or not console.is_terminal:  # a bar that is told to be silent writes an empty line, until rich 14.2
+        yield lambda name, share: check()
+        return
+    with Progress(*columns, console=console, transient=True, redirect_stderr=False) as bar:
+        task = bar.add_task("", total=total)
+        done: list[str] = []
+
+        def report(name: str, share: float) -> None:
+            check()
+            if name not in done:
+                done.append(name)
+            bar.update(task, description=name, completed=len(done) - 1 + share)
+
+        yield report
+
+
+def tell(result: Any) -> None:
+    """Print a result as JSON."""
+    from ..results.files import as_text
+
+    click.echo(as_text(result))
+
+
+def screen() -> Any:
+    """What prints tables and sentences."""
+    from rich.console import Console
+
+    return Console()
+
+
+def show(quiet: bool, table: Any, where: Path) -> None:
+    """Print a table and where the results are."""
+    if not quiet:
+        screen().print(table)
+        screen().print(f"Results in {where}", highlight=False)

@@ -1,1 +1,0 @@
-"""Figures; the only home of matplotlib in the harness."""

@@ -1,0 +1,61 @@
+"""A program in a process of its own, with a temporary folder of its own: both end with the command that started it."""
+
+import os
+import subprocess
+from collections.abc import Mapping, Sequence
+from math import inf
+from time import monotonic
+
+from ..errors import HarnessError
+from .interrupt import check, later
+from .room import room
+
+OFTEN = 0.1  # s between two looks at whether a signal has come: a thread that waits does not hear it
+
+
+class Hangs(HarnessError):
+    """It has not ended in time."""
+
+
+def ask(
+    command: Sequence[str], text: str = "", environment: Mapping[str, str] = os.environ, patience: float = inf
+) -> subprocess.CompletedProcess[str]:
+    """The ended process, what it answered to the text on its standard input, and what it said; Hangs after `patience`
+    s.  Its temporary files are where every compiler and library can read their path."""
+    late = monotonic() + patience
+    process = None
+    with room("child-") as folder:
+        try:
+            with later():
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                    encoding="utf-8",
+                    errors="replace",
+                    env={**environment, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))},
+                    start_new_session=True,  # a Ctrl-C is for this process alone, which then ends that one
+                )
+            while True:
+                try:
+                    answered, said = process.communicate(text, timeout=OFTEN)
+                    return subprocess.CompletedProcess(command, process.returncode, answered, said)
+                except subprocess.TimeoutExpired:
+                    text = ""  # it is under way
+                check()
+                if monotonic() > late:
+                    raise Hangs(f"no answer after {patience:g} s")
+        except BaseException:
+            if process:
+                end(process)
+            raise
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    """Kill a process and, where there are groups of them, those that it started."""
+    if os.name == "posix":
+        os.killpg(process.pid, 9)
+    else:
+        process.kill()
+    process.communicate()

@@ -1,0 +1,114 @@
+"""Ctrl-C and SIGTERM: both end a command at once, its files and processes gone, with the status that a shell expects.
+
+Both become KeyboardInterrupt, which takes everything down as an error does.  Something may swallow it on the way, as a
+function called from C or somebody else's FMU in Python does: what goes on for long asks `check` now and then.
+"""
+
+import atexit
+import logging
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from signal import SIG_DFL, SIGINT, SIGTERM, default_int_handler
+from threading import current_thread, main_thread
+from time import sleep
+from typing import Any
+
+from ..errors import HarnessError
+
+BOTH = (SIGINT, SIGTERM)
+HEARD: list[int] = []  # signals, in the order in which they came
+MEANWHILE = 0.2  # s; Ctrl-C is for child processes too, and that one of them has ended may be known before
+
+
+class Interrupted(HarnessError):
+    """Ended from outside; what remains to be said of it is one sentence."""
+
+    def __init__(self, sentence: str = "") -> None:
+        number = HEARD[0] if HEARD else SIGINT
+        super().__init__(sentence or ("interrupted" if number == SIGINT else "terminated"))
+        self.status = 128 + number
+
+
+def hear(number: int, frame: Any) -> None:
+    """The handler of both signals."""
+    note(number, frame)
+    raise KeyboardInterrupt
+
+
+def swallowed(unraisable: Any) -> None:
+    """The hook for exceptions that Python cannot raise where they occur, as in a callback; an interrupt is kept."""
+    if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
+
+
+def check() -> None:
+    """KeyboardInterrupt if a signal has come."""
+    if HEARD:
+        raise KeyboardInterrupt
+
+
+def note(number: int, frame: Any) -> None:
+    """The handler of both while something is begun that could not be ended half begun."""
+    HEARD.append(number)
+    logging.disable()  # what Dask would log of connections that end is no news
+
+
+@contextmanager
+def later() -> Iterator[None]:
+    """Within, a signal waits until the end: for what must not be left half done."""
+    listening = current_thread() is main_thread() and [each for each in BOTH if signal.getsignal(each) == hear]
+    before = len(HEARD)
+    for number in listening or ():
+        signal.signal(number, note)
+    try:
+        yield
+    finally:
+        for number in listening or ():
+            signal.signal(number, hear)
+    if listening and len(HEARD) > before:
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def deaf_children() -> Iterator[None]:
+    """Processes and threads that are started within never hear a Ctrl-C; the signal waits until the end."""
+    from multiprocessing import resource_tracker  # later than `finish` is registered, so that it cleans up before
+
+    resource_tracker.ensure_running()  # which multiprocessing would start within, and unblock what is blocked here
+    mask = getattr(signal, "pthread_sigmask", lambda how, signals: None)  # none on Windows
+    with later():
+        mask(signal.SIG_BLOCK, [SIGINT])  # which is inherited
+        try:
+            yield
+        finally:
+            mask(signal.SIG_UNBLOCK, [SIGINT])
+
+
+def finish() -> None:
+    """The last of all that is done at the exit: Python would else tell, for any interrupt in the midst of an import,
+    that SIGINT killed it, and an FMU in Python that passes an interrupt on may do so late."""
+    if HEARD:
+        os._exit(128 + HEARD[0])
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Within, both signals are heard, unless they were to be ignored, and end in Interrupted."""
+    for number, usual in zip(BOTH, (default_int_handler, SIG_DFL), strict=True):
+        if signal.getsignal(number) == usual:
+            signal.signal(number, hear)
+    sys.unraisablehook = swallowed
+    atexit.register(finish)  # the first to be registered is the last to be called
+    try:
+        yield
+        check()
+    except BaseException as error:  # what a signal made fail may say anything
+        if isinstance(error, (OSError, EOFError, BrokenExecutor)):
+            sleep(MEANWHILE)
+        if isinstance(error, KeyboardInterrupt) or (HEARD and not isinstance(error, Interrupted)):
+            raise Interrupted from None
+        raise

@@ -1,0 +1,1 @@
+"""What is left of a run: folders, files, quantities with their units, the look of figures."""

@@ -1,0 +1,40 @@
+"""How results are written: CSV with units in its headings, and JSON."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import fields, is_dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def heading(name: str, unit: str) -> str:
+    """A name with its unit, as in `x [m]`; without one for counts and modes."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def write(path: Path, heads: Sequence[str], columns: Sequence[np.ndarray]) -> None:
+    """A CSV file of equally long columns; every number reads back to the last bit."""
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(",".join(heads) + "\n")
+        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+
+
+def as_text(result: Any) -> str:
+    """A result of dataclasses, dicts, lists, texts and numbers as JSON in ASCII, which every terminal and file takes;
+    what is not finite is null there."""
+    return json.dumps(finite(result), indent=1, allow_nan=False)
+
+
+def finite(result: Any) -> Any:
+    """The result with None for numbers that JSON does not know."""
+    if is_dataclass(result):
+        return {each.name: finite(getattr(result, each.name)) for each in fields(result)}
+    if isinstance(result, dict):
+        return {name: finite(value) for name, value in result.items()}
+    if isinstance(result, list | tuple):
+        return [finite(value) for value in result]
+    return None if isinstance(result, float) and not isfinite(result) else result

@@ -1,0 +1,137 @@
+"""Result folders, replaced whole or not at all.
+
+A result is written into a folder beside the old one, which then takes its place.  On Linux the two are exchanged in one
+step of the file system (renameat2, RENAME_EXCHANGE), on macOS likewise (renamex_np, RENAME_SWAP): whoever looks finds
+the old result or the new one at any moment, also after a kill.  Elsewhere, and on a file system that knows no exchange,
+it takes two steps, and a kill between them leaves the old result under another name, where the next run finds it.
+
+What a killed run left is removed by the next one into the same place.  What another one still writes is not: its folder
+is locked, where there are locks (fcntl).
+"""
+
+import ctypes
+import os
+import re
+import sys
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+
+from ..errors import HarnessError
+from ..process.interrupt import later
+
+if sys.platform != "win32":
+    import fcntl
+
+FRESH, OLD = ".new", ".old"  # endings of the folders beside, after the name of the result and eight letters
+AT_FDCWD, RENAME_EXCHANGE, RENAME_SWAP = -100, 2, 2  # of Linux and macOS
+
+
+@contextmanager
+def replacing(folder: Path, ours: Collection[str]) -> Iterator[Path]:
+    """A new folder beside `folder` to write into; it takes its place if nothing is raised, and is removed otherwise.
+
+    Refused with HarnessError if the old folder is a link, or holds a file not named in `ours`, which would be lost.
+    """
+    try:
+        refuse(folder, ours)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        tidy(folder, ours)
+    except OSError as error:
+        raise HarnessError(f"cannot write below {folder.parent}: {error.strerror}") from None
+    fresh, lock = None, -1
+    try:
+        with later():
+            fresh, lock = begun(folder)
+        yield fresh
+        swap(fresh, folder)
+    except OSError as error:
+        raise HarnessError(f"cannot write {folder}: {error.strerror or error}") from None
+    finally:
+        with later():
+            if fresh:
+                rmtree(fresh, ignore_errors=True)
+            if lock >= 0:
+                os.close(lock)
+
+
+def refuse(folder: Path, ours: Collection[str]) -> None:
+    """HarnessError if something is in the way that is no result."""
+    if folder.is_symlink():
+        raise HarnessError(f"{folder} is a link, which a result does not replace; remove it or choose another --out")
+    if folder.exists():
+        held = [file.name for file in folder.iterdir()] if folder.is_dir() else ["a file of that name"]
+        foreign = sorted(set(held) - set(ours))
+        if foreign:
+            raise HarnessError(f"{folder} holds {foreign[0]}, which is not a result; move it or choose another --out")
+
+
+def begun(folder: Path) -> tuple[Path, int]:
+    """A new folder beside, and what holds its lock, -1 where there are no locks."""
+    while True:
+        fresh = Path(mkdtemp(prefix=f".{folder.name}-", suffix=FRESH, dir=folder.parent))
+        fresh.chmod(0o755)  # mkdtemp gives 0o700
+        lock = locked(fresh, wait=True)
+        if fresh.exists():  # nobody took it for one that was left, before it was locked
+            return fresh, lock
+        if lock >= 0:
+            os.close(lock)
+
+
+def locked(folder: Path, wait: bool = False) -> int:
+    """What holds the lock of a folder, -1 where there are no locks; OSError if another process has it."""
+    if sys.platform == "win32":
+        return -1
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        if wait:
+            return -1  # a file system without locks
+        raise
+    return lock
+
+
+def tidy(folder: Path, ours: Collection[str]) -> None:
+    """Put back what a kill left between the two steps of an exchange, and remove what else killed runs left."""
+    beside = re.compile(rf"\.{re.escape(folder.name)}-[a-z0-9_]{{8}}({FRESH}|{OLD})")
+    for left in sorted(folder.parent.iterdir()):
+        if beside.fullmatch(left.name) and left.is_dir() and {file.name for file in left.iterdir()} <= set(ours):
+            with suppress(OSError):  # somebody writes it
+                lock = locked(left)
+                if left.suffix == OLD and not folder.exists():
+                    left.rename(folder)
+                rmtree(left, ignore_errors=True)
+                if lock >= 0:
+                    os.close(lock)
+
+
+def swap(fresh: Path, folder: Path) -> None:
+    """Put the fresh folder where the old one is, which is left in its place; the old one stays if that fails."""
+    if not folder.exists():
+        fresh.rename(folder)
+    elif not exchanged(fresh, folder):
+        old = fresh.with_suffix(OLD)
+        with later():
+            folder.rename(old)
+            try:
+                fresh.rename(folder)
+            except OSError:
+                old.rename(folder)
+                raise
+            rmtree(old, ignore_errors=True)
+
+
+def exchanged(one: Path, two: Path) -> bool:
+    """Whether two folders have taken each other's place, in one step."""
+    ours, theirs = os.fsencode(one), os.fsencode(two)
+    try:
+        system = ctypes.CDLL(None)
+        if sys.platform == "darwin":
+            return system.renamex_np(ours, theirs, RENAME_SWAP) == 0
+        return system.renameat2(AT_FDCWD, ours, AT_FDCWD, theirs, RENAME_EXCHANGE) == 0
+    except (AttributeError, OSError, TypeError):  # another system, or an older one
+        return False

@@ -1,0 +1,1 @@
+"""Built FMUs, ours or anybody's, run through fmpy; its only home."""

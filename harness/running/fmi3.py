@@ -1,0 +1,142 @@
+"""Runs a built FMI 3.0 FMU through fmpy, both ways; the only file that knows fmpy's FMI 3.0.
+
+Co-simulation: the FMU's own solver.  Model exchange: fmpy's CVode (BDF with Jacobians by differences, the absolute
+tolerance being the relative one times the FMU's nominals).  fmpy lets it take 500 steps from one point to the next,
+and where friction at rest is no more than sliding friction it does not see a turn that only touches v = 0.
+"""
+
+import io
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, redirect_stderr
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+
+from ..errors import HarnessError, reason
+from ..process.interrupt import check
+from .unpacked import unpacked
+
+EXCHANGE, COSIMULATION = "ModelExchange", "CoSimulation"
+COUNT = "solver.evaluations"  # of the FMU's own solver
+QUIET = ("SUNLOGGER_ERROR_FILENAME", "SUNLOGGER_WARNING_FILENAME")  # CVode would write what fmpy raises
+
+
+class Counted(FMU3Model):
+    """An instance for model exchange that counts its right-hand sides."""
+
+    evaluations = 0
+
+    def getContinuousStateDerivatives(self, derivatives: Any, size: int) -> None:
+        self.evaluations += 1
+        super().getContinuousStateDerivatives(derivatives, size)
+
+    def reset(self) -> None:
+        self.evaluations = 0
+        super().reset()
+
+
+@dataclass(frozen=True)
+class Record:
+    """What fmpy recorded: `rows` is a structured array of `time` in s and the outputs by name (SI units), in model
+    exchange with a row before and one after each event; and the right-hand sides evaluated."""
+
+    rows: np.ndarray
+    evaluations: int
+
+    def at(self, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
+        """The outputs of those names, (n, names), at the recorded times nearest to n times in s."""
+        nearest = np.abs(self.rows["time"][:, None] - times).argmin(axis=0)
+        return np.column_stack([self.rows[name][nearest] for name in names])
+
+    def changes(self, name: str) -> list[tuple[float, int]]:
+        """Every change of an integer output, as (time in s, new value)."""
+        times, values = self.rows["time"], self.rows[name]
+        after = np.flatnonzero(np.diff(values)) + 1
+        return list(zip(times[after].tolist(), values[after].tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A live instance of the FMU in a folder, fresh before each run."""
+
+    way: str
+    fmu: Any
+    description: Any
+    folder: str
+
+    def simulate(
+        self,
+        values: dict[str, float],
+        outputs: Sequence[str],
+        stop: float,
+        interval: float,
+        rtol: float | None = None,
+        patience: float | None = None,
+    ) -> Record:
+        """A run from 0 s to the stop, recorded at every interval (s); without rtol that of the FMU's default
+        experiment.  HarnessError if it fails or outlasts `patience` s."""
+        try:
+            rows = fmpy.simulate_fmu(
+                self.folder,
+                fmi_type=self.way,
+                stop_time=stop,
+                output_interval=interval,
+                relative_tolerance=rtol,
+                start_values=values,
+                output=[*outputs, COUNT],
+                timeout=patience,
+                model_description=self.description,
+                fmu_instance=self.fmu,
+                step_finished=heed,
+            )
+        except RuntimeError as error:  # the path of CVode's source stands before its sentence
+            sentence = str(error).rpartition(": ")[2]
+            raise HarnessError(f"fmpy's CVode (500 steps from point to point at most): {sentence}") from None
+        last = rows["time"][-1]
+        if last < stop - 0.5 * interval:
+            raise HarnessError(f"at t = {last:.3g} s" + (f" after {patience:g} s of run time" if patience else ""))
+        evaluations = self.fmu.evaluations if self.way == EXCHANGE else int(rows[COUNT][-1])
+        self.fmu.reset()
+        return Record(rows, evaluations)
+
+
+def heed(time: float, recorder: Any) -> bool:
+    """Go on, unless a signal has come: CVode's callbacks swallow what it raises."""
+    check()
+    return True
+
+
+def beside(fmu: Path) -> Path:
+    """The FMI 3.0 FMU of the same model, beside that of FMI 2.0."""
+    return fmu.parent / "fmi3" / fmu.name
+
+
+@contextmanager
+def instance(file: Path, way: str) -> Iterator[Instance]:
+    """An instance of the FMU, its files and its library gone afterwards; HarnessError with the FMU's own sentence, or
+    fmpy's, if something fails."""
+    if not file.is_file():
+        raise HarnessError(f"not built: {file} (python build_fmus.py --fmi 3)")
+    os.environ |= dict.fromkeys(QUIET, os.devnull)
+    spoken = io.StringIO()
+    try:
+        with redirect_stderr(spoken), unpacked(file) as folder:
+            description = fmpy.read_model_description(file)
+            fmu = (Counted if way == EXCHANGE else FMU3Slave)(
+                guid=description.guid, unzipDirectory=str(folder), modelIdentifier=file.stem, instanceName=file.stem
+            )
+            fmu.instantiate(logMessage=lambda *message: None)  # the FMU says it on standard error as well
+            try:
+                yield Instance(way, fmu, description, str(folder))
+            finally:
+                fmu.freeInstance()
+    except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
+        said = spoken.getvalue().strip().splitlines()
+        if isinstance(error, HarnessError) and not said:
+            raise
+        raise HarnessError(said[-1] if said else f"{file.name}: {reason(error)}") from None

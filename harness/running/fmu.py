@@ -1,0 +1,286 @@
+"""Runs a built FMI 2.0 FMU through fmpy, as a scene says.
+
+The FMU's solver runs free of the communication points.  A step to `solver.t_next` ends where the solver's own step
+ends, so following it shows every step and event through the standard interface alone.
+"""
+
+import io
+from array import array
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, redirect_stderr
+from ctypes import byref, c_double, c_int, c_uint, c_void_p
+from dataclasses import dataclass, field
+from functools import cache
+from time import perf_counter
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+
+from ..errors import HarnessError, SceneError, reason
+from ..scenes.scene import Scene
+from .run import Cost, Events, Run, Steps
+from .settings import check_fmu, labels, settings
+from .unpacked import unpacked
+
+Report = Callable[[float], None]  # told how far the run is, as a share of it
+
+WARNING, ERROR = 1, 3  # fmi2Status; above a warning it is a failure
+MOST_POINTS = 10_000_000  # of a grid
+REPORT_EVERY = 4096  # communication points
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run does: from `start` to `stop` in s, and the variables read at each communication point."""
+
+    scene: Scene
+    variables: dict[str, Any]
+    start: float
+    stop: float
+    reals: list[str]
+    integers: list[str]
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What one pass leaves: time, a row of reals and of integers for each communication point, and the rows where an
+    internal step ends (the start included)."""
+
+    time: array = field(default_factory=lambda: array("d"))
+    reals: array = field(default_factory=lambda: array("d"))
+    integers: array = field(default_factory=lambda: array("i"))
+    ends: array = field(default_factory=lambda: array("q", [0]))
+
+
+def simulate(scene: Scene, report: Report = lambda share: None) -> Run:
+    """Run a scene; HarnessError with the FMU's own sentence if it fails, SceneError for what it does not offer."""
+    functions, messages = callbacks()
+    messages.clear()
+    spoken = io.StringIO()
+    with redirect_stderr(spoken), instance(scene, functions) as (description, fmu):
+        try:
+            return passes(planned(scene, description), fmu, report)
+        except FMICallException as error:
+            lines = [text for status, text in messages if status > WARNING] or spoken.getvalue().strip().splitlines()
+            raise HarnessError(lines[-1] if lines else f"{scene.fmu.name}: {error}") from None
+
+
+@contextmanager
+def loading(scene: Scene) -> Iterator[None]:
+    """Whatever is wrong with the file of a scene's FMU becomes one sentence."""
+    try:
+        yield
+    except HarnessError:
+        raise
+    except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
+        raise HarnessError(f"{scene.fmu.name} cannot be loaded: {reason(error)}") from None
+
+
+def described(scene: Scene) -> Any:
+    """What the FMU says of itself; HarnessError if it cannot be read, SceneError if it does not fit the scene."""
+    with loading(scene):
+        description = fmpy.read_model_description(scene.fmu)
+        if description.fmiVersion != "2.0" or description.coSimulation is None:
+            raise HarnessError(f"{scene.fmu.name} is not an FMI 2.0 co-simulation FMU")
+        check_fmu(scene, {variable.name: variable for variable in description.modelVariables})
+        return description
+
+
+@contextmanager
+def instance(scene: Scene, functions: fmi2.fmi2CallbackFunctions) -> Iterator[tuple[Any, Any]]:
+    """The description and a fresh instance of the FMU; its files and its library are gone afterwards."""
+    with ExitStack() as files:
+        description = described(scene)
+        with loading(scene):
+            folder = files.enter_context(unpacked(scene.fmu))
+            fmu = fmi2.FMU2Slave(
+                guid=description.guid,
+                unzipDirectory=str(folder),
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                instanceName=scene.name,
+            )
+            fmu.instantiate(callbacks=functions, loggingOn=True)
+        try:
+            yield description, fmu
+        finally:
+            fmu.freeInstance()
+
+
+@cache
+def callbacks() -> tuple[fmi2.fmi2CallbackFunctions, list[tuple[int, str]]]:
+    """Callbacks, and the list to which their logger adds (status, text) of every message.
+
+    Made once: fmpy's proxy, which fills in the arguments of a message, calls the last logger it was given, for ever.
+    """
+    messages: list[tuple[int, str]] = []
+
+    def keep(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
+        messages.append((status, text.decode("utf-8", "replace")))
+
+    functions = fmi2.fmi2CallbackFunctions()
+    functions.logger = fmi2.fmi2CallbackLoggerTYPE(keep)
+    functions.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+    functions.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    fmi2.addLoggerProxy(byref(functions))
+    return functions, messages
+
+
+def planned(scene: Scene, description: Any) -> Plan:
+    """The plan of a scene: what it names, and what follows the solver's steps."""
+    variables = {variable.name: variable for variable in description.modelVariables}
+    experiment = description.defaultExperiment
+    start = float(experiment.startTime or 0.0) if scene.start is None else scene.start
+    stop = float(experiment.stopTime) if scene.stop is None else scene.stop
+    if not stop > start:
+        raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
+    if scene.grid is not None and (points := (stop - start) / scene.grid) > MOST_POINTS:
+        sentence = f"grid = {scene.grid!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
+        raise SceneError(f"{sentence}; at most {MOST_POINTS}: take a larger one")
+    wanted = list(scene.outputs)
+    if scene.follow:
+        extra = ("solver.t_next", "solver.rejected", "events.count", "events.t_last", "mode")
+        wanted += [name for name in extra if name in variables and name not in wanted]
+    reals = [name for name in wanted if variables[name].type == "Real"]
+    return Plan(scene, variables, start, stop, reals, [name for name in wanted if name not in reals])
+
+
+def passes(plan: Plan, fmu: Any, report: Report) -> Run:
+    """Run the plan as often as the scene asks, on one instance; keep the last pass, and the fastest time."""
+    repeat = plan.scene.repeat
+    values = settings(plan.scene, plan.variables)
+    seconds = []
+    for turn in range(repeat):
+        if turn:
+            fmu.reset()
+        begin(fmu, values, plan.start, plan.stop)
+        begun = perf_counter()
+        trace = march(plan, fmu, report, turn)
+        seconds.append(perf_counter() - begun)
+    return gather(plan, fmu, trace, min(seconds))
+
+
+def begin(fmu: Any, values: Iterable[tuple[Any, float]], start: float, stop: float | None) -> None:
+    """Set the values of variables, and initialise; times in s."""
+    for variable, value in values:
+        put(fmu, variable, value)
+    fmu.setupExperiment(startTime=start, stopTime=stop)
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+
+
+def put(fmu: Any, variable: Any, value: float) -> None:
+    """Set one variable."""
+    if variable.type == "Real":
+        fmu.setReal([variable.valueReference], [value])
+    else:
+        fmu.setInteger([variable.valueReference], [int(value)])
+
+
+def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
+    """Step from start to stop, and record every communication point; `turn` passes came before.
+
+    The arrays and the C functions are bound once, since at a few microseconds a step looking them up would show.
+    """
+    component = c_void_p(fmu.component)
+    do_step, get_real, get_integer = fmu.dll.fmi2DoStep, fmu.dll.fmi2GetReal, fmu.dll.fmi2GetInteger
+    n_reals, real_references, reals = buffer(plan.variables, plan.reals, c_double)
+    n_integers, integer_references, integers = buffer(plan.variables, plan.integers, c_int)
+    trace = Trace()
+    row_of_reals, row_of_integers = memoryview(reals).cast("B"), memoryview(integers).cast("B")
+
+    def record(t: float) -> None:
+        if get_real(component, real_references, n_reals, reals) > WARNING:
+            raise FMICallException("fmi2GetReal", ERROR)
+        if n_integers and get_integer(component, integer_references, n_integers, integers) > WARNING:
+            raise FMICallException("fmi2GetInteger", ERROR)
+        trace.time.append(t)
+        trace.reals.frombytes(row_of_reals)
+        trace.integers.frombytes(row_of_integers)
+
+    start, stop, grid, follow = plan.start, plan.stop, plan.scene.grid, plan.scene.follow
+    next_at = plan.reals.index("solver.t_next") if follow else 0
+    nearly = 1e-9 * grid if grid else 0.0  # a grid point this close to the end of a step is that end
+    t, point, turns = start, 1, 0
+    record(t)
+    while t < stop:
+        target, ends = stop, False
+        if grid:
+            while start + point * grid <= t + nearly:
+                point += 1
+            if start + point * grid < stop - nearly:
+                target = start + point * grid
+        if follow and reals[next_at] <= target + nearly:
+            target, ends = min(reals[next_at], stop), True
+        if not target > t:
+            raise HarnessError(f"{plan.scene.fmu.name}: solver.t_next = {target!r} s does not lie after t = {t!r} s")
+        status = do_step(component, t, target - t, 1)
+        if status > WARNING:
+            raise FMICallException("fmi2DoStep", status)
+        t = target
+        record(t)
+        if ends:
+            trace.ends.append(len(trace.time) - 1)
+        turns += 1
+        if turns % REPORT_EVERY == 0:
+            report((turn + (t - start) / (stop - start)) / plan.scene.repeat)
+    return trace
+
+
+def buffer(variables: dict[str, Any], names: list[str], kind: Any) -> tuple[int, Any, Any]:
+    """Number, value references and room for the values of the named variables."""
+    n = len(names)
+    return n, (c_uint * n)(*(variables[name].valueReference for name in names)), (kind * n)()
+
+
+def gather(plan: Plan, fmu: Any, trace: Trace, seconds: float) -> Run:
+    """The run that a trace shows."""
+    scene, variables = plan.scene, plan.variables
+    time = np.array(trace.time)
+    read: dict[str, np.ndarray] = {}
+    for names, values in ((plan.reals, trace.reals), (plan.integers, trace.integers)):
+        read |= zip(names, np.array(values).reshape(len(time), len(names)).T, strict=True)
+    columns = {name: read[name] for name in scene.outputs}
+    for name, column in columns.items():
+        lost = np.flatnonzero(~np.isfinite(column))
+        if len(lost) and variables[name].causality == "output":
+            raise HarnessError(f"{scene.fmu.name}: {name} is {column[lost[0]]} at t = {time[lost[0]]} s")
+    steps = events = None
+    if scene.follow:
+        ends = np.array(trace.ends)
+        steps = Steps(time[ends], np.diff(time[ends]), np.diff(read["solver.rejected"][ends]))
+    settled = parameters(plan, fmu)
+    if scene.follow and settled.get("friction") == "hybrid":
+        at = np.flatnonzero(np.diff(read["events.count"])) + 1
+        events = Events(np.append(time[0], read["events.t_last"][at]), np.append(read["mode"][0], read["mode"][at]))
+    taken, refused, evaluated = (whole(plan, fmu, f"solver.{name}") for name in ("steps", "rejected", "evaluations"))
+    return Run(
+        scene=scene,
+        time=time,
+        columns=columns,
+        units={name: variables[name].unit or "" for name in columns},
+        descriptions={name: variables[name].description or name for name in columns},
+        parameters=settled,
+        steps=steps,
+        events=events,
+        cost=Cost(taken, refused, evaluated, seconds),
+    )
+
+
+def parameters(plan: Plan, fmu: Any) -> dict[str, float | str]:
+    """The value of every parameter in the run: reals in their SI unit, enumerations by label."""
+    found: dict[str, float | str] = {}
+    for name, variable in plan.variables.items():
+        if variable.causality == "parameter":
+            if variable.type == "Enumeration":
+                found[name] = labels(variable)[whole(plan, fmu, name)]
+            else:
+                found[name] = fmu.getReal([variable.valueReference])[0]
+    return found
+
+
+def whole(plan: Plan, fmu: Any, name: str) -> int:
+    """The present value of an integer or enumeration."""
+    return fmu.getInteger([plan.variables[name].valueReference])[0]

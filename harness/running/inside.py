@@ -1,0 +1,98 @@
+"""The model of a built FMU, run in this process by the code that the FMU carries, without FMI."""
+
+import sys
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..errors import HarnessError
+from .answer import Answer
+from .unpacked import LAYER, unpacked
+
+OK = 0  # status of the march
+
+
+def embedded(fmu: Path) -> type:
+    """The model class inside an FMU; its package bears a name of its own, so that several live side by side."""
+    with unpacked(fmu) as folder:
+        resources = folder / "resources"
+        package = (resources / LAYER).read_text(encoding="utf-8").removesuffix("_fmu")
+        sys.path.insert(0, str(resources))
+        try:
+            return import_module(package).Model
+        finally:
+            sys.path.remove(str(resources))
+
+
+def offered(model: type) -> dict[str, int]:
+    """The integration methods of a model, by name."""
+    return {name: number for name, number, _ in type(model().solver).method.items}
+
+
+@dataclass
+class Inside:
+    """A model with its values, ready to run from 0 s to the end of the times asked for; SI units."""
+
+    model: Any
+
+    @classmethod
+    def prepared(
+        cls, model: type, values: dict[str, float], method: str | None, rtol: float, atol: float = 0.0
+    ) -> "Inside":
+        """A fresh model, with its own method if None; HarnessError with its sentence if it refuses the values."""
+        new = model()
+        for name, value in values.items():
+            setattr(new, name, value)
+        new.solver.rtol, new.solver.atol = rtol, atol
+        if method:
+            new.solver.method = offered(model)[method]
+        rule = new.prepare()
+        if rule:
+            raise HarnessError(new.rules[rule - 1].format_map(vars(new)))
+        return cls(new)
+
+    def begin(self, stop: float) -> None:
+        x, v = self.model.initial(0.0)
+        self.model.solver.start(self.model, 0.0, x, v, stop, self.model.tolerance)
+
+    def motion(self, times: list[float], patience: float | None = None) -> list[tuple[float, float]]:
+        """Position and speed at the times, from 0 s on; HarnessError if the run fails or outlasts `patience` s."""
+        model, march = self.model, self.model.solver
+        self.begin(times[-1])
+        found = [(march.x, march.v)]
+        late = perf_counter() + patience if patience else None
+        try:
+            for t in times[1:]:
+                if march.advance(model, t) != OK:
+                    raise HarnessError(f"the solver gave up at t = {march.step.t0:.6g} s")
+                found.append((march.x, march.v))
+                if late and perf_counter() > late:
+                    raise HarnessError(f"at t = {t:.3g} s after {patience:g} s of run time")
+        except (ArithmeticError, ValueError):
+            raise HarnessError(f"the motion left the range of numbers after t = {march.step.t0:.6g} s") from None
+        return found
+
+    def answer(self, times: list[float], patience: float | None = None) -> Answer:
+        """The same with counts, and with the changes of mode where friction is dry and hybrid."""
+        motion = np.array(self.motion(times, patience))
+        model = self.model
+        model.solver.report(model.events)
+        evaluations = model.solver.evaluations
+        return Answer(motion, self.events(times[-1]) if model.dry and model.solver.step.sticks else None, evaluations)
+
+    def events(self, stop: float) -> list[tuple[float, int]]:
+        """Changes of mode up to the stop, seen by following the solver's own steps."""
+        model, march = self.model, self.model.solver
+        self.begin(stop)
+        found: list[tuple[float, int]] = []
+        while march.t < stop:
+            march.look_ahead(model)
+            march.advance(model, march.t_next)
+            march.report(model.events)
+            if model.events.count > len(found):
+                found.append((march.t, march.mode))
+        return found

@@ -1,0 +1,53 @@
+"""A run through fmpy in equal communication steps, all outputs recorded, in two loops.
+
+`usual` is fmpy's own, simulate_fmu, which everybody gets; `lean` is the harness's, which calls the library as directly
+as Python can.  A communication step is what the steps of a run add to it: the difference between a run in 1600 steps
+and one in a single step, shared among them.  The solver's own steps do not depend on it; they are in whole runs.
+"""
+
+from pathlib import Path
+
+import fmpy
+
+from ..scenes.scene import Scene
+from .clock import best
+from .fmu import callbacks, described, instance, simulate
+
+POINTS = 1600
+REPEAT = 10
+
+
+def usual(file: Path, steps: int) -> float:
+    """Run time in s of fmpy's loop, the shortest of several runs of one instance."""
+    with instance(_scene(file), callbacks()[0]) as (description, fmu):
+        stop = float(description.defaultExperiment.stopTime)
+
+        def run() -> None:
+            fmu.reset()
+            fmpy.simulate_fmu(
+                fmu.unzipDirectory,
+                model_description=description,
+                fmu_instance=fmu,
+                stop_time=stop,
+                output_interval=stop / steps,
+            )
+
+        return best(run, REPEAT)
+
+
+def lean(file: Path, steps: int) -> float:
+    """Run time in s of the harness's loop, from initialisation on, the shortest of several runs of one instance."""
+    description = described(_scene(file))
+    stop = float(description.defaultExperiment.stopTime)
+    outputs = tuple(v.name for v in description.modelVariables if v.causality == "output")
+    return simulate(_scene(file, outputs, stop, stop / steps)).cost.seconds
+
+
+def _scene(file: Path, outputs: tuple[str, ...] = (), stop: float | None = None, grid: float | None = None) -> Scene:
+    name = file.stem
+    return Scene(name, name, name, file, outputs, stop=stop, grid=grid, follow=False, repeat=REPEAT)
+
+
+def shared(many: float, one: float) -> float:
+    """The time of a communication step, from that of a run in 1600 and of a run in one."""
+    return (many - one) / (POINTS - 1)

@@ -1,0 +1,90 @@
+"""What a run leaves: time, columns, steps, events, cost, and the scene it came from."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import HarnessError
+from ..results.files import heading, write
+from ..results.quantity import Quantity
+from ..scenes.scene import Scene
+
+
+@dataclass(frozen=True)
+class Steps:
+    """The solver's own steps: `t` (n + 1,) their ends in s, start included; `h` (n,) in s; `rejected` (n,) refusals."""
+
+    t: np.ndarray
+    h: np.ndarray
+    rejected: np.ndarray
+
+
+@dataclass(frozen=True)
+class Events:
+    """Changes of mode: `mode` (n,) holds from `t` (n,) in s on; the first entry is the start."""
+
+    t: np.ndarray
+    mode: np.ndarray
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Accepted steps, refused steps, right-hand sides, and the `seconds` of stepping in the fastest repeat."""
+
+    steps: int
+    rejected: int
+    evaluations: int
+    seconds: float
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        return (
+            Quantity("run_time", self.seconds, "s", "run time"),
+            Quantity("evaluations", self.evaluations, "", "right-hand sides"),
+        )
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of one scene: `time` (n,) in s, `columns` name to (n,); `steps` and `events` where the FMU shows them."""
+
+    scene: Scene
+    time: np.ndarray
+    columns: dict[str, np.ndarray]
+    units: dict[str, str]
+    descriptions: dict[str, str]
+    parameters: dict[str, float | str]
+    steps: Steps | None
+    events: Events | None
+    cost: Cost
+
+    @property
+    def setting(self) -> str:
+        """Method, law and tolerance in force, for titles."""
+        words = [str(self.parameters[name]) for name in ("solver.method", "friction") if name in self.parameters]
+        if self.scene.rtol is not None:
+            words.append(f"rtol {self.scene.rtol:g}")
+        return ", ".join(words)
+
+    def motion(self, role: str) -> np.ndarray:
+        """The recorded position, velocity or acceleration (n,)."""
+        return self.columns[self.scene.motion[role]]
+
+    def parameter(self, name: str, purpose: str) -> float:
+        """A parameter's value in the run; HarnessError if the model has none of that name."""
+        value = self.parameters.get(name)
+        if not isinstance(value, float):
+            raise HarnessError(f"{purpose} needs the parameter '{name}', which {self.scene.model} does not have")
+        return value
+
+    def save(self, folder: Path) -> None:
+        """Write trajectory.csv, and steps.csv and events.csv where there are any."""
+        names = list(self.columns)
+        heads = [heading(name, self.units[name]) for name in names]
+        write(folder / "trajectory.csv", ["t [s]", *heads], [self.time, *(self.columns[name] for name in names)])
+        if self.steps:
+            columns = [self.steps.t[1:], self.steps.h, self.steps.rejected]
+            write(folder / "steps.csv", ["t [s]", "h [s]", "rejected"], columns)
+        if self.events:
+            write(folder / "events.csv", ["t [s]", "mode"], [self.events.t, self.events.mode])

@@ -1,0 +1,73 @@
+"""What a scene sets and records, checked against the variables that the FMU declares."""
+
+from typing import Any
+
+from ..errors import SceneError, shown, unknown
+from ..scenes.scene import Scene, is_number
+
+# Keys of a scene that are short for a variable of the FMU.
+SHORT = {
+    "method": "solver.method",
+    "law": "friction",
+    "rtol": "solver.rtol",
+    "atol": "solver.atol",
+    "h_max": "solver.h_max",
+}
+NEEDED = ("solver.t_next", "solver.steps", "solver.rejected", "solver.evaluations")
+
+
+def check_fmu(scene: Scene, variables: dict[str, Any]) -> None:
+    """It is one of these FMUs, and every output to record is one of its outputs or locals."""
+    for name in NEEDED:
+        if name not in variables:
+            raise SceneError(f"{scene.fmu.name} has no variable {name}; the harness runs the FMUs of this project only")
+    readable = [name for name, variable in variables.items() if variable.causality in ("output", "local")]
+    for name in scene.outputs:
+        if name not in readable:
+            raise SceneError(unknown("output", name, readable))
+
+
+def settings(scene: Scene, variables: dict[str, Any]) -> list[tuple[Any, float | int]]:
+    """The variables to set before the run and their values, each within its declared range."""
+    wanted = {name: getattr(scene, key) for key, name in SHORT.items() if getattr(scene, key) is not None}
+    for name in wanted:
+        if name not in variables:
+            key = next(key for key, short in SHORT.items() if short == name)
+            given = shown(wanted[name])
+            raise SceneError(f"{key} = {given}: {scene.model} has nothing to choose there; leave {key} out")
+    settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
+    for name, value in scene.values.items():
+        if name not in settable:
+            raise SceneError(unknown("name in [values]", name, settable))
+        if name in wanted:
+            raise SceneError(f"{name} is set twice, in [values] and above")
+        wanted[name] = value
+    return [(variables[name], accepted(variables[name], value)) for name, value in wanted.items()]
+
+
+def accepted(variable: Any, value: Any) -> float | int:
+    """The number that stands for a value; SceneError if the variable does not allow it."""
+    if variable.type == "Enumeration":
+        items = labels(variable)
+        numbers = {label: number for number, label in items.items()}
+        number = numbers.get(value) if isinstance(value, str) else value
+        if not is_number(number) or number not in items:
+            raise SceneError(unknown(f"value of {variable.name}", value, numbers))
+        return number
+    low, high = bound(variable.min), bound(variable.max)
+    if not is_number(value) or (low is not None and value < low) or (high is not None and value > high):
+        words = [f"{word} {limit!r}" for word, limit in (("at least", low), ("at most", high)) if limit is not None]
+        unit = f" {variable.unit}" if variable.unit not in (None, "1") else ""
+        allowed = " and ".join(words) + unit if words else "any finite number"
+        raise SceneError(f"{variable.name} = {shown(value)} is outside its range; allowed: {allowed}")
+    return float(value)
+
+
+def bound(text: str | None) -> float | None:
+    """A bound from the XML, if there is one."""
+    return None if text is None else float(text)
+
+
+def labels(variable: Any) -> dict[int, str]:
+    """The names of an enumeration's values."""
+    return {int(item.value): item.name for item in variable.declaredType.items}

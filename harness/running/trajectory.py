@@ -1,0 +1,35 @@
+"""What anyone's FMU, or a file, shows of a motion: a trajectory."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..results.files import heading, write
+from .run import Run
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """`columns` name to (n,) over `time` (n,) in s, with their units; the times of `events` and the modes that begin
+    there (m, 2), the start included, where they are known.  `note` says how it came about."""
+
+    name: str
+    time: np.ndarray
+    columns: dict[str, np.ndarray]
+    units: dict[str, str]
+    events: np.ndarray | None = None
+    note: str = ""
+
+    def save(self, path: Path) -> None:
+        """Write it as CSV."""
+        names = list(self.columns)
+        write(
+            path, ["t [s]", *(heading(name, self.units[name]) for name in names)], [self.time, *self.columns.values()]
+        )
+
+
+def of_run(run: Run) -> Trajectory:
+    """The trajectory of a run of one of our FMUs."""
+    events = None if run.events is None else np.column_stack([run.events.t, run.events.mode])
+    return Trajectory(run.scene.fmu.stem, run.time, run.columns, run.units, events, f"solver: {run.setting}")

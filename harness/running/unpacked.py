@@ -1,0 +1,50 @@
+"""An FMU's files in a temporary folder whose path its library can read.
+
+The libraries of pythonfmu and pythonfmu3 take the folder of the resources out of a URI in which they decode %20 and
+nothing else: any other escape, and a missing folder, ends in a crash or a hang (0.7.0 and 0.3.4).  So temporary files
+lie where the URI needs no escape, and an FMU in Python that lacks what its library would look for is refused.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import fmpy
+
+from ..errors import HarnessError, reason
+from ..process.room import plain, room
+
+LAYER = "slavemodule.txt"  # the file that names an FMU's script; the libraries of both packages hold its name
+
+
+@contextmanager
+def unpacked(fmu: Path) -> Iterator[Path]:
+    """The folder of an FMU's files; HarnessError if it cannot be unpacked, or if its library would crash."""
+    with room() as folder:
+        try:
+            fmpy.extract(fmu, folder)
+        except Exception as error:  # fmpy raises bare Exceptions, and those of zip readers
+            raise HarnessError(f"{fmu.name} cannot be unpacked: {reason(error)}") from None
+        if in_python(folder):
+            check(fmu, folder)
+        yield folder
+
+
+def in_python(folder: Path) -> bool:
+    """Whether an unpacked FMU is run by the library of pythonfmu or pythonfmu3."""
+    libraries = folder.glob("binaries/*/*.*")
+    return any(LAYER.encode() in library.read_bytes() for library in libraries if library.is_file())
+
+
+def check(fmu: Path, folder: Path) -> None:
+    """What the library of an FMU in Python relies on without looking."""
+    if not plain(folder):
+        raise HarnessError(
+            f"{fmu.name} is an FMU in Python, which cannot be run from {folder}: its library reads plain letters only; "
+            "name another temporary folder, as in TMPDIR=/tmp"
+        )
+    named = folder / "resources" / LAYER
+    script = named.read_text(encoding="utf-8", errors="replace").split("\n")[0] if named.is_file() else ""
+    if not script or not (named.parent / f"{script}.py").is_file():
+        missing = f"resources/{script}.py" if script else f"resources/{LAYER}"
+        raise HarnessError(f"{fmu.name} lacks {missing}, without which an FMU in Python crashes: build it again")

@@ -1,0 +1,1 @@
+"""What people write: scenes, and what they couple."""

@@ -1,0 +1,127 @@
+"""The benchmark's errors: built FMUs through fmpy against answers by a second route (truth.py)."""
+
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from math import ulp
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from ...errors import HarnessError
+from ...running.inside import Inside, embedded
+from ...running.probe import Card, Motion, Setting, card, run
+from ...scenes.scene import fmu_of
+from ...truths.reference import MODELS
+from ...truths.truth import Grid, truth
+from ...truths.truth_linear import mp
+from .measure import Beside, Measure
+
+EXACT = ("smd", "coulomb", "stickslip")
+POINTS = 1600
+CLOSED = Beside("closed form in 120 digits")
+
+
+def accuracy() -> list[Callable[[], Measure]]:
+    """What to measure, in the order of the design's table."""
+    cards = {model: card(model) for model in MODELS}
+    stuck = (("coulomb", {"x0": 0.003}), ("stickslip", {"v_driver": 0.0}), ("pendulum", {"theta0": 0.005}))
+    return [
+        *(partial(exact, model, cards[model]) for model in EXACT),
+        *(partial(late, model, cards[model]) for model in EXACT[1:]),
+        partial(last, "coulomb", {"f": 1e-7}, 300_000, swings),
+        partial(last, "stickslip", {}, 200_000, slips),
+        *(partial(default, "pendulum", cards["pendulum"], "pin_load", load, 1e-9) for load in ("weight", "reaction")),
+        *(partial(default, "pacejka", cards["pacejka"], "x_m", 10.0**-n, 1e-6) for n in range(2, 7)),
+        *(partial(between_grids, model, cards[model]) for model in MODELS),
+        *(partial(drift, model, cards[model], values) for model, values in stuck),
+    ]
+
+
+def moved(setting: Setting, times: list[float]) -> Motion:
+    """The motion through the times; HarnessError with the FMU's sentence if it is refused."""
+    ending = run(setting, [(t, ahead - t) for t, ahead in pairwise(times)], {})
+    if not isinstance(ending, Motion):
+        raise HarnessError(f"{setting.model}: {ending.sentence}")
+    return ending
+
+
+def error(model: str, its: Card, chosen: dict[str, float | str]) -> float:
+    """The largest error of the default experiment, as a share of the largest value."""
+    values = its.numbers({**its.defaults, **chosen})
+    answer = truth(model, [(0.0, its.stop, values)], Grid(0.0, its.stop, POINTS))
+    motion = moved(Setting(model, values, stop=its.stop), answer.times.tolist())
+    return answer.error(motion.x, motion.v)
+
+
+def exact(model: str, its: Card) -> Measure:
+    return Measure(f"{model}, exact: whole run", error(model, its, {}), "1", 1e-13, (CLOSED,))
+
+
+def default(model: str, its: Card, name: str, value: float | str, reach: float) -> Measure:
+    """A model with its own method and tolerance."""
+    beside = Beside("scipy DOP853 at 1e-13" if model == "pendulum" else "scipy Radau at 1e-11")
+    return Measure(f"{model}, default, {name} {value}", error(model, its, {name: value}), "1", reach, (beside,))
+
+
+def late(model: str, its: Card) -> Measure:
+    """The largest error of the time of an event, relative to it."""
+    answer = truth(model, [(0.0, its.stop, its.defaults)], Grid(0.0, its.stop, 1))
+    found = Inside.prepared(embedded(fmu_of(model)), {}, "exact", 0.0).events(its.stop)
+    if [mode for _, mode in found] != [mode for _, mode in answer.events]:
+        raise HarnessError(f"{model}: the modes after its events are not the true ones")
+    off = max(abs(t / true - 1) for (t, _), (true, _) in zip(found, answer.events, strict=True))
+    return Measure(f"{model}, exact: times of {len(found)} events", off, "1", 1e-14, (CLOSED,))
+
+
+def last(model: str, values: dict[str, float], number: int, law: Callable[[Any, int], Any]) -> Measure:
+    """How far off the time of the last of many events is, in units of its last place."""
+    inside = Inside.prepared(embedded(fmu_of(model)), values, "exact", 0.0)
+    true, next_one = (law(inside.model, n) for n in (number, number + 1))
+    stop = float((true + next_one) / 2)
+    inside.motion([stop * i / 10 for i in range(10)] + [stop])
+    inside.model.solver.report(inside.model.events)
+    events = inside.model.events
+    if events.count != number:
+        raise HarnessError(f"{model}: {events.count} events, not {number}")
+    off = float(abs(events.t_last - true)) / ulp(events.t_last)
+    what = f"{model}, exact: the last of {number} events, units in the last place"
+    return Measure(what, off, "1", 4.0, (CLOSED,))
+
+
+def swings(model: Any, number: int) -> Any:
+    """When a mass on a spring turns for the n-th time: after as many half periods."""
+    return number * mp.pi * mp.sqrt(mp.mpf(model.m) / mp.mpf(model.k))
+
+
+def slips(model: Any, number: int) -> Any:
+    """When the sled breaks away (odd) or sticks (even) for the n-th time.
+
+    It sticks while the stretch of its spring grows from 2 d - h to h, which friction holds, and slips about d.
+    """
+    k, u, w = mp.mpf(model.k), mp.mpf(model.v_driver), mp.sqrt(mp.mpf(model.k) / mp.mpf(model.m))
+    h, d = (mp.mpf(mu) * mp.mpf(model.m) * mp.mpf(model.g) / k for mu in (model.mu_s, model.mu_d))
+    slip, stick = 2 * (mp.pi - mp.atan2(w * (h - d), u)) / w, 2 * (h - d) / u
+    return h / u + (number - 1) // 2 * (slip + stick) + (0 if number % 2 else slip)
+
+
+def between_grids(model: str, its: Card) -> Measure:
+    """The largest difference at shared times between an even grid and a random one, as a share of the largest."""
+    even = [its.stop * i / 200 for i in range(201)]
+    draw = Random(model)
+    both = sorted({*even, *(draw.uniform(0.0, its.stop) for _ in range(777))})
+    setting = Setting(model, its.defaults, stop=its.stop)
+    one, other = moved(setting, even), moved(setting, both)
+    shared = np.searchsorted(both, even)
+    parts = ((one.x, other.x), (one.v, other.v))
+    off = max(float(np.abs(a - b[shared]).max() / np.abs(a).max()) for a, b in parts)
+    return Measure(f"{model}, default: difference between two grids", off, "1", 1e-12, (Beside("each other"),))
+
+
+def drift(model: str, its: Card, chosen: dict[str, float]) -> Measure:
+    """How far a stuck body gets."""
+    setting = Setting(model, {**its.defaults, **chosen}, stop=1e6)
+    x = moved(setting, [1e4 * i for i in range(101)]).x
+    unit = "rad" if model == "pendulum" else "m"
+    return Measure(f"{model}, stuck for 1e6 s: displacement", float(np.abs(x - x[0]).max()), unit, 0.0, ())

@@ -1,0 +1,152 @@
+"""The native FMUs beside those in Python, through fmpy and in a host in C, and beside one that uses CVODE."""
+
+from collections.abc import Callable
+from functools import cache, partial
+from math import nan
+from pathlib import Path
+
+from ...running.loops import POINTS, lean, shared
+from ...scenes.scene import fmu_of
+from ...truths.reference import CASES, MODELS, load, relative
+from .in_c import NotHereError, Runs, built, cvode, runs
+from .measure import Beside, Measure
+
+Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
+
+CASE = {case.name: case for case in CASES}
+
+# Run times in C to reach, in s: of the sled and of the stiffest as asked for, of the others as seen feasible.
+REACH = {
+    "smd": 0.2e-3,
+    "coulomb": 0.15e-3,
+    "stickslip": 0.05e-3,
+    "pacejka-0.01": 1.5e-3,
+    "pacejka-0.001": 1.5e-3,
+    "pendulum": 0.3e-3,
+}
+TOLERANCES = (1e-4, 1e-6, 1e-8)  # of CVODE, relative
+REPEAT, REPEAT_PYTHON = 100, 5
+
+
+def native() -> list[Callable[[], Measure]]:
+    """What to measure: runs and communication steps in C, through fmpy, and runs beside CVODE's."""
+    return [
+        *(partial(run_in_c, case) for case in REACH),
+        *(partial(step_in_c, case) for case in REACH),
+        *(partial(run_through_fmpy, model) for model in MODELS),
+        *(partial(step_through_fmpy, model) for model in MODELS),
+        *(partial(against_cvode, case) for case in REACH),
+    ]
+
+
+def run_in_c(case: str) -> Measure:
+    """One run with 1600 points in the host in C."""
+
+    def figures() -> Figures:
+        try:
+            peer = Beside("FMU in Python", of_fmu(case, "python").seconds)
+        except NotHereError as error:
+            peer = Beside(f"FMU in Python: {error}")
+        return of_fmu(case, "native").seconds, REACH[case], (peer,)
+
+    return row(f"{case}, native: {CASE[case].problem.stop:g} s, {POINTS} points, host in C", "s", figures)
+
+
+def step_in_c(case: str) -> Measure:
+    """One communication step in the host in C, with position and speed read."""
+
+    def seconds(kind: str) -> float:
+        return shared(of_fmu(case, kind).seconds, of_fmu(case, kind, 1).seconds)
+
+    return row(f"{case}, native: communication step, host in C", "s", partial(duel, seconds))
+
+
+def run_through_fmpy(model: str) -> Measure:
+    """One run with 1600 points through fmpy, all outputs recorded."""
+    seconds = partial(through_fmpy, model, steps=POINTS)
+    return row(f"{model}, native: {POINTS} points through fmpy, harness's loop", "s", partial(duel, seconds))
+
+
+def step_through_fmpy(model: str) -> Measure:
+    """One communication step through fmpy, all outputs recorded."""
+
+    def seconds(kind: str) -> float:
+        return shared(through_fmpy(model, kind, steps=POINTS), through_fmpy(model, kind, steps=1))
+
+    return row(f"{model}, native: communication step through fmpy, harness's loop", "s", partial(duel, seconds))
+
+
+def against_cvode(case: str) -> Measure:
+    """Run time and error as shares of CVODE's, the larger of them: below 1 it is both faster and closer.
+
+    The time is compared with CVODE's shortest, the error with its smallest, which is that of another tolerance.
+    """
+    method = "BDF" if CASE[case].problem.stiff else "Adams"
+
+    def figures() -> Figures:
+        mine, theirs = of_fmu(case, "native"), [of_cvode(case, rtol) for rtol in TOLERANCES]
+        error, errors = off(case, mine), [off(case, each) for each in theirs]
+        share = max(mine.seconds / min(each.seconds for each in theirs), error / min(errors))
+        told = [Beside(f"this FMU, error {error:.1e}", mine.seconds)]
+        for rtol, each, its in zip(TOLERANCES, theirs, errors, strict=True):
+            told.append(Beside(f"CVODE FMU, {method} at {rtol:.0e}, error {its:.1e}", each.seconds))
+        return share, 1.0, tuple(told)
+
+    return row(f"{case}, native: larger of run time and error, ratio to the CVODE FMU's", "1", figures)
+
+
+def duel(seconds: Callable[[str], float]) -> Figures:
+    """The time of the native FMU, to be below that of the one in Python."""
+    mine, theirs = seconds("native"), seconds("python")
+    return mine, theirs, (Beside("FMU in Python", theirs),)
+
+
+def row(what: str, unit: str, figures: Callable[[], Figures]) -> Measure:
+    """The measure of what was measured, to reach and beside; or why nothing is."""
+    try:
+        value, reach, others = figures()
+    except NotHereError as error:
+        return Measure(what, nan, unit, nan, (Beside(str(error)),))
+    return Measure(what, value, unit, reach, others)
+
+
+def fmu(model: str, kind: str) -> Path:
+    """The built FMU in Python or the native one."""
+    path, option = fmu_of(model), ""
+    if kind == "native":
+        path, option = path.parent / "native" / path.name, " --native"
+    if not path.is_file():
+        raise NotHereError(f"not built: {path} (python build_fmus.py{option})")
+    return path
+
+
+# Measured once, for all rows that show it.
+
+
+@cache
+def of_fmu(case: str, kind: str, steps: int = POINTS) -> Runs:
+    """A built FMU with its own method and tolerance in the host in C."""
+    its = CASE[case]
+    library = built(fmu(its.model, kind))
+    repeat = REPEAT if kind == "native" else REPEAT_PYTHON
+    return runs(library, its.values, its.outputs, its.problem.stop, steps, repeat)
+
+
+@cache
+def of_cvode(case: str, rtol: float) -> Runs:
+    """The CVODE FMU in the host in C."""
+    its = CASE[case]
+    values = {**its.values, "rtol": rtol, "atol": rtol * its.problem.absolute}
+    return runs(cvode(its.model), values, ("x", "v"), its.problem.stop, POINTS, REPEAT)
+
+
+@cache
+def through_fmpy(model: str, kind: str, steps: int) -> float:
+    """Run time in s of a built FMU in the harness's loop through fmpy."""
+    return lean(fmu(model, kind), steps)
+
+
+def off(case: str, found: Runs) -> float:
+    """The largest error at the points of the reference, relative to the largest of position and speed."""
+    truth = load(CASE[case].truth)
+    return float(relative(found.rows[:: POINTS // (len(truth.times) - 1)], truth.motion).max())

@@ -1,0 +1,127 @@
+"""The benchmark's run times: the best of several after a warm-up, peers in the same run and the same process."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ...running import loops
+from ...running.clock import best, timed
+from ...running.fmu import described
+from ...running.inside import Inside, embedded
+from ...running.loops import POINTS
+from ...running.probe import plain
+from ...scenes.scene import fmu_of
+from ...truths import peers
+from ...truths.problem import Pacejka, Problem, Smd, Stickslip
+from ...truths.reference import MODELS
+from . import empty as bench_empty
+from .measure import Beside, Measure
+
+RTOL, ATOL = 1e-6, 1e-9
+RUNS = 10_000
+STEPS = 500  # of a peer, to take the mean of
+
+
+def speed() -> list[Callable[[], Measure]]:
+    """What to measure, in the order of the design's table."""
+    sled = embedded(fmu_of("stickslip"))
+    pacejka = partial(inside_python, "pacejka", embedded(fmu_of("pacejka")), "rodas", 8e-3, ("Radau", "BDF"))
+    return [
+        partial(inside_python, "stickslip", sled, "exact", 0.5e-3, ("RK23", "Adams"), Stickslip(), {}),
+        *(partial(pacejka, Pacejka(x_m), {"x_m": x_m}) for x_m in (1e-2, 1e-3)),
+        partial(step, embedded(fmu_of("smd"))),
+        *(partial(communication_step, model) for model in MODELS),
+        partial(many_runs, sled),
+    ]
+
+
+def inside_python(
+    model: str,
+    carried: type,
+    method: str,
+    reach: float,
+    rivals: tuple[str, str],
+    problem: Problem,
+    values: dict[str, float],
+) -> Measure:
+    """One run with 1600 points, without fmpy; `rivals` are methods of scipy and of CVODE."""
+    times = np.linspace(0.0, problem.stop, POINTS + 1)
+    mine = Inside.prepared(carried, values, method, RTOL, ATOL)
+    seconds = best(partial(mine.motion, times.tolist()), 20)
+    beside = []
+    for peer, name in zip(("scipy", "cvode"), rivals, strict=True):
+        if peer in peers.missing():
+            beside.append(Beside(f"{peer} {name}: {peers.missing()[peer]} is not installed"))
+        else:
+            ask = partial(peers.solve, peer, name, problem, times, RTOL, ATOL)
+            beside.append(Beside(f"{peer} {name} at {RTOL:g}", best(ask, 3)))
+    setting = ", ".join([model, *(f"{name} {value:g}" for name, value in values.items()), method])
+    return Measure(f"{setting}: {problem.stop:g} s, {POINTS} points, inside Python", seconds, "s", reach, tuple(beside))
+
+
+def step(carried: type) -> Measure:
+    """One step of ode23 on the smooth model, and one of scipy's RK23."""
+    from scipy.integrate import RK23
+
+    problem, rtol = Smd(), 1e-8
+    mine = Inside.prepared(carried, {}, "ode23", rtol, 1e-3 * rtol)
+    seconds = best(partial(mine.motion, [0.0, problem.stop]), 10)
+    solver = mine.model.solver
+    solver.report(mine.model.events)
+    rival: Any = RK23(problem.rates(1), 0.0, problem.start, problem.stop, rtol=rtol, atol=1e-3 * rtol)
+
+    def steps() -> None:
+        for _ in range(STEPS):
+            rival.step()
+
+    peer = Beside("scipy RK23", best(steps, 5) / STEPS)
+    return Measure("smd, ode23: one step", seconds / (solver.steps + solver.rejected), "s", 2e-6, (peer,))
+
+
+def communication_step(model: str) -> Measure:
+    """A communication step through fmpy with all outputs recorded, as a multiple of that of an empty FMU."""
+    mine = fmu_of(model)
+    with TemporaryDirectory(prefix="fmu-") as folder:
+        description = described(plain(model))
+        stop = float(description.defaultExperiment.stopTime)
+        variables = description.modelVariables
+        kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
+        traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
+        nothing = bench_empty.build(f"Empty{model.capitalize()}", traits, stop, Path(folder))
+        ways = [(loop, fmu) for loop in (loops.usual, loops.lean) for fmu in (mine, nothing)]
+        turns = []
+        for _ in range(3):  # in turns: what else runs on the machine hits all
+            turns.append([loops.shared(loop(fmu, POINTS), loop(fmu, 1)) for loop, fmu in ways])
+    usual, empty, lean, lean_empty = map(min, zip(*turns, strict=True))
+    beside = (
+        Beside("this FMU", usual),
+        Beside("empty pythonfmu FMU", empty),
+        Beside("this FMU in the harness's loop", lean),
+        Beside("empty pythonfmu FMU there", lean_empty),
+    )
+    what = f"{model}: communication step through fmpy, ratio to an empty one"
+    return Measure(what, usual / empty, "1", 1.25, beside)
+
+
+def many_runs(carried: type) -> Measure:
+    """10 000 runs of the sled with as many speeds of the driver: final state and number of events."""
+    model = carried()
+    march = model.solver
+
+    def one(v_driver: float) -> tuple[float, float, int]:
+        model.v_driver = v_driver
+        model.prepare()
+        march.start(model, 0.0, *model.initial(0.0), model.stop_time, model.tolerance)
+        march.advance(model, model.stop_time)
+        march.report(model.events)
+        return march.x, march.v, model.events.count
+
+    seconds = timed(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
+    problem = Stickslip()
+    ask = partial(peers.solve, "scipy", "RK23", problem, np.array([0.0, problem.stop]), RTOL, ATOL)
+    rival = Beside(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * best(ask, 5))
+    return Measure(f"stickslip, exact: {RUNS} runs of {problem.stop:g} s, one core", seconds, "s", 10.0, (rival,))

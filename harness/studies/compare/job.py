@@ -1,0 +1,85 @@
+"""Runs and comparisons of anyone's FMUs and results, in folders of results."""
+
+from collections.abc import Callable
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from ...results.files import as_text
+from ...results.folder import replacing
+from . import trajectory
+from .difference import Comparison, compare
+
+Report = Callable[[float], None]
+
+
+def perform_compare(
+    sources: tuple[str, str], stop: float | None, tolerance: float, out: Path, report: Report
+) -> tuple[Comparison, Path]:
+    """Compare two FMUs, scenes, result folders or CSV files, and write the differences to out/compare/<one>-<two>."""
+    from .figure import draw
+
+    one, two = (trajectory.load(source, stop, tolerance, report) for source in sources)
+    found = compare(one, two)
+    folder = out / "compare" / f"{one.name}-{two.name}"
+    with replacing(folder, ("compare.json", "figure.png")) as fresh:
+        (fresh / "compare.json").write_text(as_text(numbers(found)) + "\n", encoding="utf-8")
+        draw(found, fresh / "figure.png")
+    return found, folder
+
+
+def numbers(found: Comparison) -> dict[str, Any]:
+    """Everything found, for JSON."""
+    return {
+        "one": {"name": found.one.name, "note": found.one.note},
+        "two": {"name": found.two.name, "note": found.two.note},
+        "times": len(found.time),
+        "interpolated": found.interpolated,
+        "variables": [
+            {
+                "name": each.name,
+                "unit": each.unit,
+                "largest": each.largest,
+                "at": each.at,
+                "rms": each.rms,
+                "relative": each.relative,
+            }
+            for each in found.differences
+        ],
+        "left_out": list(found.left_out),
+        "events": found.events,
+        "event_shift": found.shift,
+    }
+
+
+def table(found: Comparison) -> Table:
+    """The differences, a row for each variable."""
+    shown = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    shown.add_column("")
+    for head in ("largest difference", "at t [s]", "rms", "relative to largest"):
+        shown.add_column(head, justify="right", no_wrap=True)
+    shown.add_column("", no_wrap=True)
+    for each in found.differences:
+        figures = (f"{each.largest:.3e}", f"{each.at:.6g}", f"{each.rms:.3e}", f"{each.relative:.2e}")
+        shown.add_row(each.name, *figures, each.unit)
+    return shown
+
+
+def sentences(found: Comparison) -> list[str]:
+    """How the two came about, what was compared, and what their events say."""
+    how = "the coarser one's times, the other by cubic spline" if found.interpolated else "common times"
+    said = [f"{each.name}: {each.note}" for each in (found.one, found.two) if each.note]
+    return [
+        *said,
+        f"Compared at {len(found.time)} times ({how}).",
+        *(
+            f"{each.name} is not a finite number at t = {each.at:g} s"
+            for each in found.differences
+            if isnan(each.largest)
+        ),
+        *found.left_out,
+        *([found.events] if found.events else []),
+    ]

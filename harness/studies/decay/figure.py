@@ -1,0 +1,82 @@
+"""The figure of an identified decay: signal and fit, residuals, and what each half swing loses."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ...analyses.decay.fit import Identified
+from ...analyses.decay.loss import Loss
+from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
+
+MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
+MOST = 4000  # points of a line: more are not seen
+COLOURS = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of one term
+
+
+def draw(found: Identified, loss: Loss, path: Path) -> None:
+    """Save the figure as PNG."""
+    with sheet(path, 1.8 * WIDTH, 3.4 * HEIGHT) as figure:
+        figure.set_layout_engine("none")  # one that seeks its margins takes as long again as the figure
+        grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
+        above = figure.add_subplot(grid[0])
+        below = figure.add_subplot(grid[1], sharex=above)
+        signal(above, found)
+        residuals(below, found)
+        shares(figure.add_subplot(grid[2]), found, loss)
+
+
+def signal(axes, found: Identified) -> None:
+    """Record, fit, rest position, turning points, and what was left out."""
+    record, t = found.record, found.t
+    used = np.isin(record.t, t)
+    every = max(1, len(record.t) // (5 * MOST))
+    axes.plot(t[::every], found.x[::every], ".", color=BLUE, markersize=2.5, label="record", rasterized=True)
+    if not used.all():
+        axes.plot(record.t[~used][::every], record.x[~used][::every], ".", color=GREY, markersize=2.5, label="left out")
+    fine = np.linspace(t[0], t[-1], MOST)
+    axes.plot(fine, found.signal(found.best, fine), color=ORANGE, linewidth=0.9, label=f"fit: {found.best.words}")
+    axes.plot(
+        fine[[0, -1]], found.rest(found.best, fine[[0, -1]]), color=GREY, linestyle="--", linewidth=0.8, label="rest"
+    )
+    if not record.order:
+        style = {"color": "black", "fillstyle": "none", "markersize": 5}
+        axes.plot(found.turns.t, found.turns.x, "o", label="turning points", **style)
+    axes.set_title(f"{record.name}: {found.best.words}")
+    axes.set_ylabel(label(("x", "v", "a")[record.order], record.unit))
+    axes.legend(loc="upper right", ncols=3)
+
+
+def residuals(axes, found: Identified) -> None:
+    """Record less fit."""
+    left = found.x - found.signal(found.best, found.t)
+    every = max(1, len(left) // (5 * MOST))
+    axes.plot(found.t[::every], left[::every], ".", color=BLUE, markersize=2.5)
+    axes.axhline(0, color="black", linewidth=0.6)
+    axes.set_title(f"residuals (rms {found.rms:.3g} {found.record.unit})")
+    axes.set_ylabel(label("record - fit", found.record.unit))
+    axes.set_xlabel("t [s]")
+
+
+def shares(axes, found: Identified, loss: Loss) -> None:
+    """The share of its energy that each half swing loses, with the curves of the best law and of those of one term."""
+    best = found.best
+    for law in found.laws:
+        if len(law.terms) == 1 and law is not best:
+            axes.plot(*percent(loss.curves[law.terms]), color=COLOURS[law.terms], linestyle="--", label=law.words)
+    axes.plot(*percent(loss.curves[best.terms]), color=ORANGE, linewidth=2, label=f"fit: {best.words}")
+    if len(loss.amplitude):
+        axes.plot(*percent((loss.amplitude, loss.share)), "o", color="black", fillstyle="none", label="turning points")
+    drawn = np.concatenate([loss.share, loss.curves[best.terms][1]])
+    if len(drawn):
+        low, high = np.percentile(100 * drawn, [5, 95])
+        margin = 0.4 * (high - low) + 0.1 * abs(high) + 1e-9
+        axes.set_ylim(min(low - margin, 0.0), high + margin)
+    axes.set_title("energy lost in a half swing, against its amplitude")
+    axes.set_ylabel("share of the energy [%]")
+    axes.set_xlabel(label("amplitude", found.record.base))
+    axes.legend(loc="best", ncols=2)
+
+
+def percent(curve: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """A curve of shares in percent."""
+    return curve[0], 100 * curve[1]

@@ -1,0 +1,137 @@
+"""A measured record or a scene, from its file to what its decay says, in a folder of results."""
+
+from collections.abc import Callable
+from dataclasses import asdict
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...analyses.decay.columns import Columns, read
+from ...analyses.decay.figures import Known
+from ...analyses.decay.fit import Identified, identify
+from ...analyses.decay.law import AMPLITUDE, T0
+from ...analyses.decay.loss import Loss, losses_seen
+from ...analyses.decay.record import Record, check
+from ...errors import HarnessError, SceneError
+from ...results.files import as_text, heading, write
+from ...results.folder import replacing
+
+FOLDER = "decay"
+FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.png")
+
+
+def perform(
+    source: str,
+    columns: Columns,
+    known: Known,
+    drag: bool,
+    drift: bool,
+    out: Path,
+    report: Callable[[float], None],
+) -> tuple[Identified, Path]:
+    """Identify the decay of a record's file or of a scene; results go to out/decay/<name>."""
+    record, known = load_record(source, columns, known, report)
+    found = identify(record, known, drag, drift, report)
+    folder = out / FOLDER / record.name
+    with replacing(folder, FILES) as fresh:
+        save(found, fresh)
+    return found, folder
+
+
+def load_record(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> tuple[Record, Known]:
+    """The record of a file, or of a run of a scene together with the stiffness that its model has."""
+    path = Path(source)
+    if source == "-":
+        return read(source, columns, "stdin"), known
+    if path.suffix.lower() != ".toml" and (path.is_file() or path.suffix):
+        return read(source, columns, path.stem.encode("utf-8", "replace").decode()), known
+    if path.is_dir():
+        raise SceneError(f"{source} is a folder; name a file in it")
+    return of_scene(source, columns, known, report)
+
+
+def of_scene(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> tuple[Record, Known]:
+    """The positions in a run of a scene."""
+    from ...running.fmu import simulate
+    from ...scenes.scene import check_built, load
+
+    scene = load(source)
+    check_built(scene.fmu)
+    if "position" not in scene.motion:
+        raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
+    run = simulate(scene, report)
+    unit = run.units[scene.motion["position"]]
+    record = Record(scene.name, run.time, run.motion("position"), unit, 0, unit).between(columns.begin, columns.end)
+    check(record)
+    if known.k is None and known.m is None:
+        names = ("m", "g", "a") if unit == "rad" else ("k",)
+        try:
+            k = prod(run.parameter(name, "the decay of a scene") for name in names)
+        except HarnessError:
+            return record, known  # a model without them has no force to tell
+        known = Known(k=k, pendulum=unit == "rad")
+    return record, known
+
+
+def save(found: Identified, folder: Path) -> None:
+    """Write numbers, turning points, the fitted motion and the figure."""
+    from .figure import draw
+
+    unit = found.record.unit
+    loss = losses_seen(found)
+    (folder / "decay.json").write_text(as_text(numbers(found, loss)) + "\n", encoding="utf-8")
+    write(folder / "turning-points.csv", ["t [s]", heading("x", found.record.base)], [found.turns.t, found.turns.x])
+    fitted = found.signal(found.best, found.t)
+    name = ("x", "v", "a")[found.record.order]
+    heads = ["t [s]", heading(name, unit), heading("fit", unit), heading("residual", unit)]
+    write(folder / "fit.csv", heads, [found.t, found.x, fitted, found.x - fitted])
+    draw(found, loss, folder / "figure.png")
+
+
+def numbers(found: Identified, loss: Loss | None = None) -> dict[str, Any]:
+    """Everything found, for JSON."""
+    problem, record, best = found.problem, found.record, found.best
+    loss = loss or losses_seen(found)
+    return {
+        "record": record.name,
+        "quantity": record.quantity,
+        "unit": record.unit,
+        "sentence": found.sentence,
+        "remarks": list(found.remarks),
+        "noise": found.turns.noise,
+        "residual": found.rms,
+        "turning points": len(found.turns.t),
+        "used": {
+            "from": float(found.t[0]),
+            "until": float(found.t[-1]),
+            "samples": len(found.t),
+            "of": len(record.t),
+            "time_unit": "s",
+        },
+        "release": {
+            "time": float(best.p[T0]) + problem.origin,
+            "amplitude": float(best.p[AMPLITUDE]) * problem.unit,
+            "unit": record.base,
+        },
+        "fit": [asdict(each) for each in found.estimates],
+        "turning_points": [asdict(each) for each in found.by_turns],
+        "published": [asdict(each) for each in found.published],
+        "why_empty": {name: why for name, why in found.why.items() if why},
+        "laws": [
+            {
+                "terms": list(law.terms),
+                "bic": law.bic,
+                "residual": float(np.sqrt(law.squares / len(found.t))) * problem.unit,
+            }
+            for law in found.laws
+        ],
+        "loss": {
+            "unit": record.base,
+            "amplitude": loss.amplitude.tolist(),
+            "share_of_energy": loss.share.tolist(),
+            "laws": {"+".join(law.terms): loss.curves[law.terms][1].tolist() for law in found.laws},
+            "laws_amplitude": {"+".join(law.terms): loss.curves[law.terms][0].tolist() for law in found.laws},
+        },
+    }

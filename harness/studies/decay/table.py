@@ -1,0 +1,58 @@
+"""What was found, for the terminal: three ways side by side, and the sentences that belong to them."""
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from ...analyses.decay.figures import Estimate
+from ...analyses.decay.fit import Identified
+
+UNEVEN = 0.1  # of an interval: beyond, its ends are told rather than its half
+
+
+def table(found: Identified) -> Table:
+    """Value and half of its 95 % interval, by the whole signal, by its turning points, and by two of them."""
+    shown = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), title=found.record.name, title_justify="left")
+    shown.add_column("")
+    for head in ("whole signal", "turning points", "two peaks"):
+        shown.add_column(head, justify="right", no_wrap=True)
+    shown.add_column("", no_wrap=True)
+    turns = {each.name: each for each in found.by_turns}
+    peaks = {each.name: each for each in found.published}
+    for each in found.estimates:
+        cells = [told(by[each.name]) if each.name in by else "" for by in (turns, peaks)]
+        unit = "" if each.unit == "1" else each.unit
+        shown.add_row(f"{each.text}, {each.name}", told(each), *cells, unit)
+    return shown
+
+
+def told(each: Estimate) -> str:
+    """Value, with the digits that its interval leaves, and half of it; its ends where they are not alike; the value
+    alone where there is none."""
+    below, above = each.value - each.low, each.high - each.value
+    if not np.isfinite(above):
+        return f"{each.value:.5g}"
+    if each.value == 0:
+        return f"< {each.high:.2g}"
+    margin = max(below, above)
+    digits = int(np.clip(np.ceil(np.log10(abs(each.value) / margin)) + 1, 1, 8)) if margin > 0 else 8
+    if abs(above - below) <= UNEVEN * (above + below):
+        return f"{each.value:.{digits}g} ± {margin:.1e}"
+    digits = max(digits, 2)
+    return f"{each.value:.{digits}g} ({each.low:.{digits}g} to {each.high:.{digits}g})"
+
+
+def sentences(found: Identified) -> list[str]:
+    """What is to be read below the table."""
+    said = [found.sentence]
+    said += [f"No {name}: {why}." for name, why in found.why.items() if why]
+    if found.published and len(found.best.terms) > 1:
+        said.append("Two peaks take all of the loss for one kind; beside a mixed law each of them is too large.")
+    used, record = found.t, found.record
+    left = len(record.t) - len(used)
+    if left:
+        said.append(
+            f"Fitted to {record.quantity} from t = {used[0]:.6g} to {used[-1]:.6g} s; {left} of {len(record.t)} "
+            "samples are left out (before the release, after the last sure swing, or stray)."
+        )
+    return [*said, *found.remarks]

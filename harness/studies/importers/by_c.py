@@ -1,0 +1,91 @@
+"""A request carried out by a C program (host.c), for which Python is a library at most."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+from ...process.room import room
+from ...running.compiler import COMPILER, EMBEDDED, HEADERS
+from ...running.unpacked import in_python, unpacked
+from .request import Answer, Request, serve
+
+
+def play(request: Request) -> Answer:
+    count = len(request.instances)
+    if request.lives:
+        rows, _ = told(host(request.fmu, life(request) * request.lives + ["0 unload"]), 1)
+        return Answer(compiler(), rows, [], 0)
+    calls = [f"{i} new {name}" for i, name in enumerate(request.instances)]
+    calls += run(request, request.values, request.change)
+    if request.again:
+        calls += [f"{i} reset" for i in range(count)] + run(request, {}, {})
+    calls += [f"{i} free" for i in range(count)] + ["0 unload"]
+    rows, statuses = told(host(request.fmu, calls), count)
+    size = request.steps + 1
+    return Answer(compiler(), rows[:size], rows[size:], sum(statuses[: request.steps]))
+
+
+def run(request: Request, values: dict[str, float], change: dict[str, float]) -> list[str]:
+    """The calls of one run."""
+    references, every = request.references, range(len(request.instances))
+    read = "getr " + " ".join(str(references[name]) for name in request.read)
+    calls = [f"0 setr {references[name]} {value!r}" for name, value in values.items()]
+    calls += [f"{i} begin" for i in every] + [f"{i} {read}" for i in every]
+    for step in range(request.steps):
+        if request.connect:
+            source, sink = (references[name] for name in request.connect)
+            calls.append(f"0 pass {source} 1 {sink}")
+        if step == request.steps // 2:
+            calls += [f"0 setr {references[name]} {value!r}" for name, value in change.items()]
+        calls += [f"{i} step {request.step * step!r} {request.step!r}" for i in every]
+        calls += [f"{i} {read}" for i in every]
+    return calls
+
+
+def life(request: Request) -> list[str]:
+    """The calls of one life: run, save on the way, restore and run on, reset and run."""
+    times = [request.step * i for i in range(request.steps)]
+    steps = [f"0 step {t!r} {request.step!r}" for t in times]
+    early, late = steps[: len(steps) // 2], steps[len(steps) // 2 :]
+    read = ["0 getr " + " ".join(str(request.references[name]) for name in request.read)]
+    once = [*early, "0 save", *late, *read, "0 restore", *late, *read]
+    return ["0 new a", "0 begin", *once, "0 reset", "0 begin", *steps, *read, "0 free"]
+
+
+def told(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
+    """The rows of values of so many instances, and for each step whether all accepted it."""
+    words = [line.split() for line in lines]
+    values = [[float(word) for word in rest] for kind, *rest in words if kind == "values"]
+    statuses = [rest == ["0"] for kind, *rest in words if kind == "status"]
+    rows = [[value for part in values[i : i + count] for value in part] for i in range(0, len(values), count)]
+    return rows, [all(statuses[i : i + count]) for i in range(0, len(statuses), count)]
+
+
+def host(fmu: str, calls: list[str]) -> list[str]:
+    """What the C program prints when it plays the calls on the FMU; its log goes to standard error."""
+    with room("host-") as folder, unpacked(Path(fmu)) as files:
+        program = folder / "host"
+        source = Path(__file__).with_name("host.c")
+        options = ["-std=c99", "-Wall", "-Werror", "-I", str(HEADERS)]
+        subprocess.run([COMPILER or "cc", *options, str(source), "-o", str(program), "-ldl"], check=True)
+        root = ElementTree.parse(files / "modelDescription.xml").getroot()
+        (library,) = (files / "binaries" / "linux64").glob("*.so")
+        environment = dict(os.environ)
+        if in_python(files):
+            environment["LD_PRELOAD"] = str(EMBEDDED)
+        command = [str(program), str(library), root.attrib["guid"], (files / "resources").as_uri()]
+        text = "".join(f"{call}\n" for call in calls)
+        done = subprocess.run(command, input=text, stdout=subprocess.PIPE, text=True, env=environment, check=True)
+        return done.stdout.splitlines()
+
+
+def compiler() -> str:
+    """The version that the compiler tells of itself."""
+    told = subprocess.run([COMPILER or "cc", "--version"], capture_output=True, text=True, check=True)
+    return (re.findall(r"\d+(?:\.\d+)+", told.stdout.splitlines()[0]) or ["of unknown version"])[-1]
+
+
+if __name__ == "__main__":
+    serve(play)

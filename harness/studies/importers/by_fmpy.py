@@ -1,0 +1,99 @@
+"""A request carried out by fmpy, call by call."""
+
+import ctypes
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import fmpy
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+from fmpy.logging import addLoggerProxy
+
+from ...running.unpacked import unpacked
+from .request import Answer, Request, serve
+
+
+def play(request: Request) -> Answer:
+    with unpacked(Path(request.fmu)) as folder:
+        return played(request, str(folder))
+
+
+def played(request: Request, folder: str) -> Answer:
+    """The answer, from the FMU's files in a folder."""
+    description = fmpy.read_model_description(request.fmu)
+    callbacks = logging()
+    instances = []
+    for name in request.instances:
+        identifier = description.coSimulation.modelIdentifier
+        instances.append(
+            fmi2.FMU2Slave(guid=description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=name)
+        )
+        instances[-1].instantiate(callbacks=callbacks, loggingOn=True)
+    rows, accepted = run(request, instances, request.values, request.change)
+    again: list[list[float]] = []
+    if request.again:
+        for instance in instances:
+            instance.reset()
+        again, _ = run(request, instances, {}, {})
+    for instance in instances:
+        instance.freeInstance()
+    return Answer(fmpy.__version__, rows, again, accepted)
+
+
+def run(
+    request: Request, instances: list[Any], values: dict[str, float], change: dict[str, float]
+) -> tuple[list[list[float]], int]:
+    """The rows of one run, and how many steps were accepted."""
+    references = request.references
+    wanted = [references[name] for name in request.read]
+
+    def write(instance: Any, new: dict[str, float]) -> None:
+        instance.setReal([references[name] for name in new], list(new.values()))
+
+    def row() -> list[float]:
+        return [value for instance in instances for value in instance.getReal(wanted)]
+
+    def transfer() -> None:
+        if request.connect:
+            source, sink = request.connect
+            write(instances[1], {sink: instances[0].getReal([references[source]])[0]})
+
+    write(instances[0], values)
+    for instance in instances:
+        instance.setupExperiment(startTime=0.0)
+        instance.enterInitializationMode()
+        with suppress(FMICallException):  # as with the steps below
+            instance.exitInitializationMode()
+    rows, accepted = [row()], 0
+    for i in range(request.steps):
+        transfer()
+        if i == request.steps // 2:
+            write(instances[0], change)
+        try:
+            for instance in instances:
+                instance.doStep(request.step * i, request.step)
+            accepted += 1
+        except FMICallException:
+            pass  # the tool tells it; what counts is what the FMU answers from now on
+        rows.append(row())
+    return rows, accepted
+
+
+def logging() -> fmi2.fmi2CallbackFunctions:
+    """Callbacks that print the log."""
+
+    def hear(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
+        print(f"log: {text.decode()}", file=sys.stderr, flush=True)
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(hear)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
+
+
+if __name__ == "__main__":
+    serve(play)

@@ -1,0 +1,237 @@
+"""What every importer is asked of every FMU, and when the answer is right.
+
+Numbers agree when they differ by less than AGREE of the largest value of their variable: an importer counts time in
+its own way, and a change in mid-run that comes an instant later makes other internal steps, within the tolerance.
+"""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from math import isfinite, isnan, nan
+from pathlib import Path
+
+from ...errors import HarnessError
+from ...process.child import Hangs, ask
+from ...running.any_fmu import description
+from .request import Answer, Request
+
+AGREE = 1e-6
+PATIENCE = 300  # s, for one request
+LIVES = 100
+POINTS = 200  # communication steps of a run
+DIVERGED = "the motion leaves the range of numbers"
+BESIDE = 1.1  # a tunable is changed by this factor
+
+
+@dataclass(frozen=True)
+class Importer:
+    """A tool: its player, the packages it needs; whether it shows the log, heeds the status of a step, and ends its own
+    process, with the FMU's sentence, when initialisation answers an error."""
+
+    name: str
+    player: str
+    packages: tuple[str, ...]
+    logs: bool
+    heeds: bool
+    ends: bool = False
+
+
+IMPORTERS = (
+    Importer("fmpy", "by_fmpy", ("fmpy",), True, True),
+    Importer("C, cc", "by_c", (), True, True),
+    Importer("Ecos", "by_ecos", ("ecospy", "tbb"), False, False),
+    Importer("libcosim", "by_libcosim", ("libcosimpy",), True, True, ends=True),
+)
+
+
+@dataclass(frozen=True)
+class Played:
+    """An answer, and what the process said on standard error meanwhile."""
+
+    answer: Answer
+    said: str
+
+
+class Wrong(Exception):
+    """A check that failed, in a few words."""
+
+
+def absent(importer: Importer) -> str:
+    """Why an importer cannot be asked here, or nothing."""
+    for package in importer.packages:
+        try:
+            version(package)
+        except PackageNotFoundError:
+            return f"{package} is not installed: pip install -e '.[importers]'"
+    if importer.player == "by_c":
+        from ...running.compiler import COMPILER, EMBEDDED
+
+        if COMPILER is None:
+            return "there is no C compiler here"
+        if not EMBEDDED.is_file():
+            return "this Python has no shared library that a C program could load"
+    return ""
+
+
+def play(importer: Importer, request: Request) -> Played:
+    """The answer of an importer, from a process of its own; Wrong if that crashes or hangs."""
+    return asked(importer.player, json.dumps(asdict(request)))
+
+
+@cache
+def asked(player: str, request: str) -> Played:
+    """The same, asked once."""
+    command = [sys.executable, "-m", f"{__package__}.{player}"]
+    try:
+        done = ask(command, request, os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}, PATIENCE)
+    except Hangs:
+        raise Wrong(f"hangs for {PATIENCE} s") from None
+    if done.returncode:
+        last = done.stderr.strip().splitlines()[-1:] or ["nothing said"]
+        raise Wrong(f"exit status {done.returncode}: {last[0]}")
+    return Played(Answer(**json.loads(done.stdout)), done.stderr)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """An FMU and what the checks need to know of it."""
+
+    fmu: Path
+    basis: Request  # the default experiment, its first two outputs and acceleration read
+    entry: str  # the input
+    source: str  # an output of the same unit
+    change: dict[str, float]  # a tunable and its new value in mid-run
+
+
+def subject(fmu: Path) -> Subject:
+    """Read the description of an FMU of this project."""
+    if not fmu.is_file():
+        raise HarnessError(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another folder")
+    found = description(fmu)
+    if found.fmiVersion != "2.0":
+        raise HarnessError(f"{fmu} is of FMI {found.fmiVersion}; the importers are asked with FMUs of FMI 2.0")
+    reals = {v.name: v for v in found.modelVariables if v.type == "Real"}
+    outputs = [name for name, v in reals.items() if v.causality == "output"]
+    entry = next(name for name, v in reals.items() if v.causality == "input")
+    source = next(name for name in outputs if reals[name].unit == reals[entry].unit)
+    change = {name: BESIDE * float(v.start) for name, v in reals.items() if name in ("k", "r")}
+    basis = Request(
+        fmu=str(fmu.resolve()),
+        references={name: v.valueReference for name, v in reals.items()},
+        step=float(found.defaultExperiment.stopTime) / POINTS,
+        steps=POINTS,
+        read=outputs[:2],
+    )
+    return Subject(fmu, basis, entry, source, change)
+
+
+# ---- the checks: each returns what the table shows, or raises Wrong
+
+
+def default_run(importer: Importer, subject: Subject) -> str:
+    return agreement(importer, subject.basis)
+
+
+def tunable_changed(importer: Importer, subject: Subject) -> str:
+    return agreement(importer, replace(subject.basis, change=subject.change))
+
+
+def two_connected(importer: Importer, subject: Subject) -> str:
+    connection = [subject.source, subject.entry]
+    return agreement(importer, replace(subject.basis, instances=["a", "b"], connect=connection))
+
+
+def bad_parameter(importer: Importer, subject: Subject) -> str:
+    return failure(importer, replace(subject.basis, values={"m": -1.0}), "m = -1.0")
+
+
+def bad_input(importer: Importer, subject: Subject) -> str:
+    return failure(importer, replace(subject.basis, change={subject.entry: nan}), f"{subject.entry} = nan")
+
+
+def diverging(importer: Importer, subject: Subject) -> str:
+    return failure(importer, replace(subject.basis, change={"m": 1e-300, subject.entry: 1e308}), DIVERGED)
+
+
+def percent_signs(importer: Importer, subject: Subject) -> str:
+    request = replace(subject.basis, instances=["100%s%n"], values={"m": -1.0})
+    return failure(importer, request, "m = -1.0")
+
+
+def lives(importer: Importer, subject: Subject) -> str:
+    """Runs, saves, runs on, restores, runs on, resets, runs and frees, in one process; then unloads the library."""
+    if importer.player != "by_c":
+        return "-"
+    request = replace(subject.basis, steps=10, lives=LIVES)
+    rows = play(importer, request).answer.rows
+    if len(rows) != 3 * LIVES or any(row != rows[0] for row in rows):
+        raise Wrong("the lives differ")
+    difference([[], rows[0]], [[], play(IMPORTERS[0], replace(request, lives=0)).answer.rows[-1]])
+    return "alike"
+
+
+CHECKS: dict[str, Callable[[Importer, Subject], str]] = {
+    "default run": default_run,
+    "tunable changed": tunable_changed,
+    "two connected": two_connected,
+    "100 lives": lives,
+    "bad parameter": bad_parameter,
+    "bad input": bad_input,
+    "diverging run": diverging,
+    "% in a name": percent_signs,
+}
+
+
+def agreement(importer: Importer, request: Request) -> str:
+    """The largest difference from fmpy, as a share of the largest value of the variable."""
+    mine = play(importer, request)
+    if mine.said:
+        raise Wrong(f"it says: {mine.said.splitlines()[0]}")
+    if not all(isfinite(value) for row in mine.answer.rows for value in row):
+        raise Wrong("it answers what is not a number")
+    expected = play(IMPORTERS[0], request).answer.rows
+    worst = difference(mine.answer.rows, expected)
+    return f"{worst:.0e}" if importer is not IMPORTERS[0] else "runs"
+
+
+def difference(rows: list[list[float]], expected: list[list[float]]) -> float:
+    """The same as a number, from the first step on: libcosim shows nothing before it; Wrong if too large."""
+    if len(rows) != len(expected):
+        raise Wrong(f"{len(rows)} points instead of {len(expected)}")
+    worst = 0.0
+    for mine, right in zip(zip(*rows[1:], strict=True), zip(*expected[1:], strict=True), strict=True):
+        size = max(abs(value) for value in right) or 1.0
+        worst = max(worst, *(abs(a - b) / size if a == a else 1.0 for a, b in zip(mine, right, strict=True)))
+    if not worst <= AGREE:
+        raise Wrong(f"differs from fmpy by {worst:.0e}")
+    return worst
+
+
+def failure(importer: Importer, request: Request, sentence: str) -> str:
+    """A run that fails: said once on standard error and in the log, no number afterwards, all well after a reset."""
+    asked = replace(request, steps=10, again=True)
+    try:
+        played = play(importer, asked)
+    except Wrong as wrong:
+        if importer.ends and request.values and sentence in str(wrong):
+            return "told, ends"
+        raise
+    kind = request.instances[0]
+    lines = [line for line in played.said.splitlines() if sentence in line]
+    own = [line for line in lines if f"({kind}): " in line or f"{Path(request.fmu).name}): " in line]
+    if len(own) != 1:
+        raise Wrong(f"{len(own)} lines on standard error instead of one")
+    if importer.logs and len(lines) != 2:
+        raise Wrong("the log says nothing")
+    rows, accepted = played.answer.rows, played.answer.accepted
+    if importer.heeds and accepted == asked.steps:
+        raise Wrong("every step is accepted")
+    if not (all(isnan(value) for value in rows[-1]) or (importer.heeds and rows[-1] == rows[accepted])):
+        raise Wrong(f"answers {rows[-1][0]!r} after it failed")
+    fresh = play(IMPORTERS[0], replace(asked, values={}, change={}, instances=["a"], again=False)).answer.rows
+    difference(played.answer.again, fresh)
+    return "told"

@@ -1,0 +1,79 @@
+"""The importer table: importers by checks by FMUs."""
+
+import csv
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from rich.markup import escape
+from rich.table import Table
+
+from ...results.folder import replacing
+from ...truths.reference import MODELS
+from .checks import CHECKS, IMPORTERS, Importer, Subject, Wrong, absent, play, subject
+
+WORKERS = 2
+FOLDER, FILES = "importers", ("importers.csv",)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One check of one importer: what each FMU gave, and what went wrong; `reason` where it was not asked."""
+
+    importer: str
+    check: str
+    cells: tuple[str, ...] = ()
+    failed: tuple[str, ...] = ()
+    reason: str = ""
+
+
+def rows(folder: Path, report: Callable[[str, float], None]) -> list[Row]:
+    """Ask every importer everything about the FMUs in a folder; `report` is told the importer and the share done."""
+    subjects = [subject(folder / f"{name}.fmu") for name in MODELS]
+    found: list[Row] = []
+    with ThreadPoolExecutor(WORKERS) as workers:
+        for importer in IMPORTERS:
+            if reason := absent(importer):
+                found.append(Row(importer.name, "", reason=reason))
+                continue
+            name = f"{importer.name} {play(importer, subjects[0].basis).answer.version}"
+            for done, check in enumerate(CHECKS):
+                report(name, done / len(CHECKS))
+                cells = tuple(workers.map(partial(ask, importer, check), subjects))
+                failed = tuple(f"{m}: {cell}" for m, cell in zip(MODELS, cells, strict=True) if "FAILED" in cell)
+                found.append(Row(name, check, cells, failed))
+    return found
+
+
+def ask(importer: Importer, check: str, subject: Subject) -> str:
+    """What a check gives."""
+    try:
+        return CHECKS[check](importer, subject)
+    except Wrong as wrong:
+        return f"FAILED: {wrong}"
+
+
+def table(found: list[Row]) -> Table:
+    """The rows for reading; below them what the words mean, and which tools were not asked."""
+    notes = [f"{row.importer} was not asked: {row.reason}" for row in found if row.reason]
+    words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers, or the tool ends"
+    caption = escape("\n".join([words, *notes]))
+    shown = Table("importer", "check", *MODELS, box=None, caption=caption, caption_justify="left")
+    last = ""
+    for row in found:
+        if row.check:
+            shown.add_row(row.importer if row.importer != last else "", row.check, *map(escape, row.cells))
+            last = row.importer
+    return shown
+
+
+def save(found: list[Row], out: Path) -> None:
+    """Write the rows to out/importers/importers.csv."""
+    with replacing(out / FOLDER, FILES) as folder, (folder / FILES[0]).open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["importer", "check", *MODELS])
+        for row in found:
+            check = row.check or f"not asked: {row.reason}"
+            writer.writerow([row.importer, check, *(row.cells or ("",) * len(MODELS))])

@@ -1,0 +1,75 @@
+"""What to use, from the points of a work-precision study: the fastest that is right to a given share of the motion."""
+
+from collections.abc import Iterable
+from itertools import groupby
+from math import isnan
+
+from ...truths.reference import Case
+from .laws import Law
+from .study import FMPY, FMU, WAYS, Point, Study
+
+TARGET = 1e-6
+TARGETS = (1e-3, TARGET, 1e-9)
+NOBODY = "no method of the FMU gets there"
+
+
+def needed(curve: Iterable[Point], target: float, beside_dry: bool = False) -> Point | None:
+    """The fastest point whose largest error is not above the target; None if there is none."""
+    right = [p for p in curve if (p.beside_dry if beside_dry and p.beside_dry is not None else p.largest) <= target]
+    return min(right, key=lambda point: point.seconds, default=None)
+
+
+def ranking(study: Study, case: Case, target: float) -> list[Point]:
+    """The fastest point of every solver that meets the target, fastest first; FMUs without the ways through fmpy."""
+    curves = [study.curve(case, *solver) for solver in study.solvers(case) if solver[0] not in (FMPY, *WAYS)]
+    found = [point for curve in curves if (point := needed(curve, target))]
+    return sorted(found, key=lambda point: point.seconds)
+
+
+def advise(study: Study, laws: Iterable[Law]) -> str:
+    """One sentence on what to use for a model."""
+    best = [(case, ranking(study, case, TARGET)) for case in study.cases if not case.chatters]
+    parts = []
+    for method, cases in groupby(best, key=lambda pair: next((p.method for p in pair[1] if p.tool == FMU), "")):
+        parts.append(f"use {method}: " + series([price(*each) for each in cases]) if method else NOBODY)
+    parts += [shortcut(study, case) for case in study.cases if case.chatters]
+    off = {law.case: law.largest for law in laws}
+    smooth = [f"{off[case.name]:.2g}" for case in study.cases if case.name in off and not case.chatters]
+    if smooth:
+        parts.append(f"however well integrated, these laws are {series(smooth)} of the motion away from dry friction")
+    return f"{study.model}: " + "; ".join(parts) + "."
+
+
+def price(case: Case, ranks: list[Point]) -> str:
+    """What the best method of the FMU costs, and how much longer the next best and the best peer take."""
+    own = [point for point in ranks if point.tool == FMU]
+    peers = [point for point in ranks if point.tool != FMU]
+    first = own[0]
+    where = "" if isnan(first.rtol) else f" at rtol {power(first.rtol)}"
+    text = f"{power(first.largest)} of the motion takes {1e3 * first.seconds:.2g} ms{where} ({case.law}"
+    others = [(point.method, point) for point in own[1:2]]
+    others += [(f"{point.tool} {point.method}", point) for point in peers[:1]]
+    ratios = [f"{name} {point.seconds / first.seconds:.2g} times" for name, point in others]
+    return text + (f"; for {power(TARGET)} {series(ratios)} as long)" if ratios else ")")
+
+
+def shortcut(study: Study, case: Case) -> str:
+    """What a law that chatters costs, compared with the first law of the model."""
+    solvers = [solver for solver in study.solvers(case) if solver[0] == FMU]
+    points = [point for solver in solvers for point in study.curve(case, *solver)]
+    best = ranking(study, study.cases[0], TARGET)
+    found = needed(points, TARGET, beside_dry=True)
+    if found and best:
+        return f"the law '{case.law}' needs {found.seconds / best[0].seconds:.2g} times as long for {power(TARGET)}"
+    nearest = min((point.beside_dry for point in points if point.beside_dry is not None), default=float("nan"))
+    return f"the law '{case.law}' never comes nearer to true stick and slip than {nearest:.1g}"
+
+
+def power(value: float) -> str:
+    """A power of ten, as people write it."""
+    return f"{value:.0e}".replace("e-0", "e-")
+
+
+def series(words: list[str]) -> str:
+    """Words in a row."""
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))

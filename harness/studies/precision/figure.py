@@ -1,0 +1,73 @@
+"""Work-precision figures: run time and right-hand sides over the error, for every solver of a model."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ...results.style import FAMILIES, GREY, WIDTH, sheet
+from ...truths.reference import Case
+from .laws import Law
+from .study import CS, FMPY, FMU, ME, Study
+
+TOOLS: dict[str, dict[str, Any]] = {
+    FMU: {"linestyle": "-", "marker": "o", "markersize": 4},
+    FMPY: {"linestyle": ":", "marker": ".", "markersize": 4},
+    CS: {"linestyle": "", "marker": "P", "markersize": 8, "fillstyle": "none"},
+    ME: {"linestyle": "-.", "marker": "D", "markersize": 4},
+    "scipy": {"linestyle": "--", "marker": "s", "markersize": 4, "fillstyle": "none"},
+    "cvode": {"linestyle": "--", "marker": "^", "markersize": 5, "fillstyle": "none"},
+}
+COSTS = {"seconds": "run time [s]", "evaluations": "right-hand sides and Jacobians"}
+CHATTERING: dict[str, Any] = {"linestyle": "-", "marker": "x", "markersize": 4, "linewidth": 0.7}
+FILL = {FMU: "full"}  # of the star that stands for a closed form
+LEGEND = (
+    "FMU: its own code in this process; fmpy: the FMU through fmpy\n"
+    "FMI 3.0 through fmpy: co-simulation (CS) with the FMU's defaults, model exchange (ME) by fmpy's CVode"
+)
+FLOOR = 2.0**-53  # errors below what a double can tell are drawn there
+
+
+def draw(study: Study, laws: Sequence[Law], path: Path) -> None:
+    """Save the figure of a study as PNG: run time and right-hand sides over the error, a row for each law.
+
+    Laws that chatter are drawn in the row of true stick and slip, by their error beside that.
+    """
+    cases = [case for case in study.cases if not case.chatters]
+    shortcuts = [case for case in study.cases if case.chatters]
+    with sheet(path, 2 * WIDTH + 1.5, 0.8 + 3.6 * len(cases)) as figure:
+        figure.suptitle(f"{study.model}: what accuracy costs\n{LEGEND}", fontsize=11)
+        panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
+        for case, row in zip(cases, panels, strict=True):
+            drawn = [case, *(shortcuts if case is cases[0] else [])]
+            for axes, (cost, name) in zip(row, COSTS.items(), strict=True):
+                for each in drawn:
+                    curves(axes, study, each, cost)
+                for law in laws:
+                    if law.largest and law.case in [each.name for each in drawn]:
+                        axes.axvline(law.largest, color=GREY, linestyle="-.", label="error of the law itself")
+                axes.set_title(case.law)
+                axes.set_ylabel(name)
+                axes.tick_params(labelbottom=True)
+        for axes in panels[-1]:
+            axes.set_xlabel("largest error, relative to the largest of the motion")
+        lines = {line.get_label(): line for axes in panels.flat for line in axes.lines}
+        figure.legend(lines.values(), lines.keys(), loc="outside right upper")
+
+
+def curves(axes: Axes, study: Study, case: Case, cost: str) -> None:
+    """Every solver of a case, log-log; a failed run is a gap."""
+    for tool, method in study.solvers(case):
+        same = tool in (FMPY, CS) and (cost != "seconds" or case.chatters)  # the same right-hand sides
+        if same or not study.curve(case, tool, method):
+            continue
+        mine = [p for p in study.points if (p.case, p.tool, p.method) == (case.name, tool, method)]
+        errors = [max(p.beside_dry if case.chatters and p.beside_dry is not None else p.largest, FLOOR) for p in mine]
+        style = CHATTERING if case.chatters else TOOLS[tool]
+        text = f"{method}, law '{case.law}'" if case.chatters else f"{tool}: {method}"
+        star = {"markersize": 9, "marker": "*", "fillstyle": FILL.get(tool, "none")}
+        shape = {**style, **(star if method == "exact" and tool != CS else {})}
+        costs = [np.nan if p.failure else getattr(p, cost) for p in mine]
+        axes.loglog(errors, costs, color=FAMILIES[method], label=text, **shape)

@@ -1,0 +1,68 @@
+"""Model error: what a shortcut law costs even when it is integrated without error, beside true stick and slip.
+
+Published remarks become numbers here: with the magic formula the sled creeps while it should stick, and its
+acceleration is no longer symmetric.  The law sign has no error of its own: integrated ever more finely it tends to
+dry friction itself (A. F. Filippov, Differential Equations with Discontinuous Righthand Sides, 1988).
+"""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ...running.answer import Answer
+from ...running.inside import Inside
+from ...truths.reference import Case, Reference, errors, load
+
+FINE = 16001  # points among which peaks and slips are looked for
+TOLERANCE = 1e-8
+
+
+@dataclass(frozen=True)
+class Law:
+    """One law beside dry friction: the errors of its true solution, as in reference.Errors; where dry friction holds
+    the sled, the median speed `creep` in m/s; the slip `period` in s; and `asymmetry`, the largest forward over the
+    largest backward acceleration, which is 1 for dry friction.  None for what does not occur or is not in question."""
+
+    model: str
+    case: str
+    law: str
+    final: float
+    rms: float
+    largest: float
+    creep: float | None
+    period: float | None
+    asymmetry: float | None
+
+
+def analyse(case: Case, model: type) -> Law:
+    """The law of a case beside dry friction; `model` is the class inside the FMU."""
+    assert case.dry is not None
+    truth, dry = load(case.truth), load(case.dry)
+    off = errors(Answer(truth.motion, None, 0), dry)
+    law = partial(Law, case.model, case.name, case.law, off.final, off.rms, off.largest)
+    held = stuck(dry)
+    if not held.any():
+        return law(None, None, None)
+    creep = float(np.median(np.abs(truth.motion[held, 1])))
+    if case.problem.dry:
+        return law(creep, float(np.mean(np.diff([t for t, mode in truth.modes if mode]))), None)
+    times = np.linspace(0.0, case.problem.stop, FINE)
+    run = Inside.prepared(model, case.values, None, TOLERANCE)
+    motion = run.motion(times.tolist())
+    rates = case.problem.rates(1)
+    a = [rates(t, y)[1] for t, y in zip(times.tolist(), motion, strict=True)]
+    return law(creep, period(times, np.array(motion)[:, 1] - run.model.v_driver), max(a) / -min(a))
+
+
+def stuck(truth: Reference) -> np.ndarray:
+    """Which of the common points (n,) find the body stuck."""
+    starts, modes = zip(*truth.modes, strict=True)
+    return np.array(modes)[np.searchsorted(starts, truth.times, side="right") - 1] == 0
+
+
+def period(times: np.ndarray, y: np.ndarray) -> float:
+    """The mean distance of the times where y (n,) rises through zero."""
+    i = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
+    starts = times[i] - y[i] * (times[i + 1] - times[i]) / (y[i + 1] - y[i])
+    return float(np.mean(np.diff(starts)))

@@ -1,0 +1,255 @@
+"""Work-precision: what accuracy costs, in run time and in right-hand sides, for every method, law and peer.
+
+As in the SciML benchmarks: the relative and the absolute tolerance are swept together, the time is the best of
+several runs after a warm-up, and a run that failed is a gap.  Every solver answers at the same common points.
+Errors are relative to the largest of the motion (see reference.py).  Integration error is that against the true
+solution of the run's own law; `beside_dry` is the whole error, that of the law included.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from math import isnan, nan
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from ...errors import HarnessError
+from ...running import fmi3
+from ...running.answer import Answer
+from ...running.clock import timed
+from ...running.fmu import simulate
+from ...running.inside import Inside, embedded, offered
+from ...scenes.scene import Scene, fmu_of
+from ...truths import peers
+from ...truths.reference import CASES, Case, errors, load
+
+MOST = 20  # timed runs of one point
+
+FMU, FMPY = "FMU", "fmpy"  # the FMU's own code in this process; the FMU through fmpy
+CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # the FMI 3.0 FMU through fmpy, in co-simulation and in model exchange
+WAYS = {CS: fmi3.COSIMULATION, ME: fmi3.EXCHANGE}
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How far a sweep goes: `patience` in s is for one run, and where one takes longer tighter ones are not tried;
+    `budget` in s is for the timed runs of one point."""
+
+    tolerances: tuple[float, ...]
+    patience: float
+    budget: float
+
+
+FULL = Extent(tuple(float(f"1e-{n}") for n in range(2, 13)), 0.5, 0.04)
+QUICK = Extent((1e-3, 1e-6, 1e-9), 0.1, 0.005)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One solver at one tolerance (rtol NaN for a closed form; either NaN for the FMU's own choice): run time in s,
+    right-hand sides and Jacobians, errors as in reference.Errors, the largest error beside dry friction; or the
+    failure, and no numbers."""
+
+    case: str
+    tool: str
+    method: str
+    rtol: float
+    atol: float
+    seconds: float = nan
+    evaluations: int | None = None
+    final: float = nan
+    rms: float = nan
+    largest: float = nan
+    events: float | None = None
+    beside_dry: float | None = None
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class Job:
+    """How one solver is asked: `run(rtol, extent)` gives its answer and the run time in s, None if there is nothing
+    to ask.  `absolute` is atol as a share of rtol, NaN for the FMU's own choice; to fail is an error where `must` is
+    set, else a gap.  Where it is not `swept` it is asked once, with rtol 0."""
+
+    tool: str
+    method: str
+    absolute: float
+    run: Callable[[float, Extent], tuple[Answer, float] | None]
+    must: bool = False
+    swept: bool = True
+
+
+@dataclass(frozen=True)
+class Study:
+    """All points of one model, its cases in order."""
+
+    model: str
+    cases: tuple[Case, ...]
+    points: tuple[Point, ...]
+
+    def curve(self, case: Case, tool: str, method: str) -> list[Point]:
+        """The points of one solver that did not fail, in the order of the sweep."""
+        mine = (case.name, tool, method)
+        return [p for p in self.points if (p.case, p.tool, p.method) == mine and not p.failure]
+
+    def solvers(self, case: Case) -> list[tuple[str, str]]:
+        """Tool and method of every curve of a case, in order."""
+        return list(dict.fromkeys((point.tool, point.method) for point in self.points if point.case == case.name))
+
+    def exchanged(self) -> dict[float, dict[str, float]]:
+        """By relative tolerance, the largest error of every case in model exchange, NaN where that failed; nothing
+        where the FMI 3.0 FMU is not built."""
+        found: dict[float, dict[str, float]] = {}
+        for point in self.points:
+            if point.tool == ME and not isnan(point.rtol):
+                found.setdefault(point.rtol, {})[point.case] = point.largest
+        return found
+
+
+def study(model: str, extent: Extent, report: Callable[[float], None]) -> Study:
+    """Sweep every case of a model; told how far it is as a share."""
+    cases = tuple(case for case in CASES if case.model == model)
+    file = fmu_of(model)
+    carried = embedded(file)
+    work = [(case, job) for case in cases for job in jobs(case, carried, file)]
+    points: list[Point] = []
+    for done, (case, job) in enumerate(work):
+        points += sweep(case, job, extent)
+        report((done + 1) / len(work))
+    return Study(model, cases, tuple(points))
+
+
+def jobs(case: Case, carried: type, file: Path) -> Iterator[Job]:
+    """Every solver that is asked about a case."""
+    times = load(case.truth).times
+    for method in offered(carried):
+        if not (method == "exact" and case.chatters):
+            taken: dict[float, float] = {}  # run time in s by rtol, from the first of the two for the second
+            swept = method != "exact"
+            own = partial(inside, case, carried, method, times.tolist(), taken)
+            yield Job(FMU, method, nan, own, swept=swept)
+            yield Job(FMPY, method, nan, partial(through_fmpy, case, file, method, times, taken), True, swept)
+    if not case.chatters:
+        three = fmi3.beside(file)
+        usual = {number: name for name, number in offered(carried).items()}[carried().solver.method]
+        for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", three.is_file())):
+            yield Job(tool, method, nan, partial(by_importer, case, three, WAYS[tool], times), swept=swept)
+        absent = peers.missing()
+        for peer, methods in (("scipy", peers.SCIPY), ("cvode", ("BDF",) if case.problem.stiff else ("Adams",))):
+            for method in methods:
+                if peer not in absent:
+                    yield Job(peer, method, case.problem.absolute, partial(by_peer, case, peer, method, times))
+
+
+def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
+    """One solver over all tolerances, from loose to tight."""
+    truth, dry = load(case.truth), load(case.dry) if case.dry else None
+    given_up = ""
+    for rtol in extent.tolerances if job.swept else (nan,):
+        point = partial(Point, case.name, job.tool, job.method, rtol, job.absolute * rtol)
+        if given_up:
+            yield point(failure=f"not tried: {given_up}")
+            continue
+        begun = perf_counter()
+        try:
+            found = job.run(0.0 if isnan(rtol) else rtol, extent)
+        except HarnessError as error:
+            if job.must:
+                raise
+            if perf_counter() - begun > 0.5 * extent.patience:
+                given_up = f"at rtol {rtol:g} it was only {error}"
+            yield point(failure=str(error))
+            continue
+        if not found:
+            continue
+        answer, seconds = found
+        off = errors(answer, truth)
+        yield point(
+            seconds=seconds,
+            evaluations=answer.evaluations,
+            final=off.final,
+            rms=off.rms,
+            largest=off.largest,
+            events=off.events,
+            beside_dry=errors(answer, dry).largest if dry else None,
+        )
+
+
+def inside(
+    case: Case,
+    carried: type,
+    method: str,
+    times: list[float],
+    taken: dict[float, float],
+    rtol: float,
+    extent: Extent,
+) -> tuple[Answer, float]:
+    """The FMU's own code, in this process."""
+    run = Inside.prepared(carried, case.values, method, rtol)
+    answer = run.answer(times, extent.patience)
+    taken[rtol] = best(partial(run.motion, times), extent.budget)
+    return answer, taken[rtol]
+
+
+def through_fmpy(
+    case: Case,
+    file: Path,
+    method: str,
+    times: np.ndarray,
+    taken: dict[float, float],
+    rtol: float,
+    extent: Extent,
+) -> tuple[Answer, float] | None:
+    """The FMU through fmpy, position and speed recorded; only where it did not fail without fmpy, then it must not."""
+    if rtol not in taken:
+        return None
+    scene = Scene(
+        name="precision",
+        title=case.name,
+        model=case.model,
+        fmu=file,
+        outputs=case.outputs,
+        method=method,
+        rtol=rtol or None,
+        grid=float(times[1]),
+        follow=False,
+        repeat=repeats(taken[rtol], extent.budget),
+        values=case.values,
+    )
+    run = simulate(scene)
+    columns = np.column_stack([run.columns[name] for name in case.outputs])
+    return Answer(columns, None, run.cost.evaluations), run.cost.seconds
+
+
+def by_importer(
+    case: Case, file: Path, way: str, times: np.ndarray, rtol: float, extent: Extent
+) -> tuple[Answer, float]:
+    """The FMI 3.0 FMU through fmpy, position and speed recorded, and in model exchange every change of mode; the run
+    time is that of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
+    marks = ("mode",) if way == fmi3.EXCHANGE and case.problem.dry else ()
+    with fmi3.instance(file, way) as fmu:
+        run = partial(fmu.simulate, case.values, case.outputs + marks, float(times[-1]), float(times[1]), rtol or None)
+        found = run(extent.patience)
+        seconds = best(run, extent.budget)
+    events = found.changes(*marks) if marks else None
+    return Answer(found.at(times, case.outputs), events, found.evaluations), seconds
+
+
+def by_peer(case: Case, peer: str, method: str, times: np.ndarray, rtol: float, extent: Extent) -> tuple[Answer, float]:
+    """Somebody else's solver."""
+    ask = partial(peers.solve, peer, method, case.problem, times, rtol, case.problem.absolute * rtol)
+    return ask(peers.within(extent.patience)), best(ask, extent.budget)
+
+
+def best(call: Callable[[], object], budget: float) -> float:
+    """The time of the fastest of several calls, in s."""
+    found = [timed(call)]
+    found += [timed(call) for _ in range(repeats(found[0], budget) - 1)]
+    return min(found)
+
+
+def repeats(once: float, budget: float) -> int:
+    """How often to run what takes `once` s within the budget in s."""
+    return 1 if once > 4 * budget else max(2, min(MOST, int(budget / once)))

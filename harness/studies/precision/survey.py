@@ -1,0 +1,121 @@
+"""The work-precision job: studies of the models asked for, the laws beside dry friction, the anchors, the results."""
+
+import csv
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import astuple, dataclass, fields
+from functools import partial
+from math import isnan
+from pathlib import Path
+from shutil import copytree, ignore_patterns
+
+from ...errors import SceneError, unknown
+from ...results.files import heading
+from ...results.folder import replacing
+from ...running.inside import embedded
+from ...scenes.scene import fmu_of
+from ...truths.peers import missing
+from ...truths.reference import CASES, MODELS
+from . import anchors, laws
+from .advice import advise
+from .study import Extent, Point, Study, study
+
+FOLDER = "precision"
+UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and rad/s
+    **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry"), "1"),
+    **dict.fromkeys(("seconds", "events", "period"), "s"),
+    **dict.fromkeys(("atol", "error"), "SI"),
+    "creep": "m/s",
+}
+EXCHANGED = "model exchange by fmpy's CVode: largest error at rtol [1]"
+ENDS = (".csv", ".png", ".txt", "-exchange.csv", "-laws.csv")
+FILES = ("anchors.csv", *(f"{model}{end}" for model in MODELS for end in ENDS))
+
+
+@dataclass(frozen=True)
+class Survey:
+    """All that was found; what to use, in a sentence for each study; and what is missing, a sentence each."""
+
+    studies: tuple[Study, ...]
+    laws: tuple[laws.Law, ...]
+    anchors: tuple[anchors.Row, ...]
+    advice: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def survey(models: Sequence[str], extent: Extent, out: Path, report: Callable[[str, float], None]) -> Survey:
+    """Study the models and write results to out/precision; what is there on other models stays."""
+    for model in models:
+        if model not in MODELS:
+            raise SceneError(unknown("model", model, MODELS))
+    with replacing(out / FOLDER, FILES) as folder:
+        if (out / FOLDER).exists():
+            stale = ignore_patterns(*(f"{model}[.-]*" for model in models))
+            copytree(out / FOLDER, folder, ignore=stale, dirs_exist_ok=True)
+        found = gather(models, extent, report)
+        write(found, folder)
+    return found
+
+
+def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float], None]) -> Survey:
+    """Run everything."""
+    studies = []
+    for model in models:
+        studies.append(study(model, extent, partial(report, model)))
+    carried = {model: embedded(fmu_of(model)) for model in models}
+    told = [laws.analyse(case, carried[case.model]) for case in CASES if case.dry and case.model in models]
+    report("anchors", 0.0)
+    rows = tuple(anchors.analyse())
+    return Survey(
+        tuple(studies),
+        tuple(told),
+        rows,
+        tuple(advise(each, [law for law in told if law.model == each.model]) for each in studies),
+        (
+            *map(gaps, studies),
+            *reasons(studies),
+            *(f"{peer} is left out: pip install {package}" for peer, package in missing().items()),
+        ),
+    )
+
+
+def gaps(found: Study) -> str:
+    """How many runs failed."""
+    failed = sum(bool(point.failure) for point in found.points)
+    return f"{found.model}: {failed} of {len(found.points)} runs are gaps; {found.model}.csv has the reasons"
+
+
+def reasons(found: Iterable[Study]) -> Iterable[str]:
+    """Why what is asked once has no answer."""
+    return dict.fromkeys(p.failure for study in found for p in study.points if p.failure and isnan(p.rtol))
+
+
+def write(found: Survey, folder: Path) -> None:
+    """Tables and figures of what was found."""
+    from .figure import draw
+
+    for each, sentence in zip(found.studies, found.advice, strict=True):
+        (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
+        save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
+        exchanged = each.exchanged()
+        if exchanged:
+            cases = next(iter(exchanged.values()))
+            rows = [[rtol, *errors.values()] for rtol, errors in exchanged.items()]
+            save(folder / f"{each.model}-exchange.csv", [EXCHANGED, *(f"{case} [1]" for case in cases)], rows)
+        mine = [law for law in found.laws if law.model == each.model]
+        draw(each, mine, folder / f"{each.model}.png")
+        if mine:
+            save(folder / f"{each.model}-laws.csv", heads(laws.Law), map(astuple, mine))
+    save(folder / "anchors.csv", heads(anchors.Row), map(astuple, found.anchors))
+
+
+def heads(kind: type) -> list[str]:
+    """The names of a record's fields, with the units that they are declared with."""
+    return [heading(field.name, UNITS.get(field.name, "")) for field in fields(kind)]
+
+
+def save(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """A CSV file; None and NaN are left empty."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(heads)
+        writer.writerows([["" if value != value else value for value in row] for row in rows])

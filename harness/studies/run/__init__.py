@@ -1,0 +1,1 @@
+"""One scene, or one FMU, run; and the main job, every published scene."""

@@ -1,0 +1,24 @@
+"""An FMU of any origin, run by its path; its outputs in a folder of results."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ...results.folder import replacing
+from ...running.any_fmu import own, run
+from ...running.fmu import simulate
+from ...running.trajectory import Trajectory, of_run
+from .job import FILES
+
+Report = Callable[[float], None]
+
+
+def perform_run(
+    path: Path, stop: float | None, tolerance: float, values: dict[str, Any], out: Path, report: Report
+) -> tuple[Trajectory, Path]:
+    """Run an FMU, and write its outputs to out/<name of the file>."""
+    folder, scene = out / path.stem, own(path, stop, values)
+    with replacing(folder, FILES) as fresh:
+        found = of_run(simulate(scene, report)) if scene else run(path, stop, tolerance, values, report)
+        found.save(fresh / "trajectory.csv")
+    return found, folder

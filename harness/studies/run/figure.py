@@ -1,0 +1,97 @@
+"""Figures of a run, one panel for each plot that its scene names; as a scene asks for them."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ...results.style import BLUE, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
+from ...running.run import Run
+
+OVER_TIME = ("position", "velocity", "acceleration")  # left, one below the other; the others stand on the right
+EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
+
+Results = dict[str, Any]  # by the name of the analysis
+
+
+def draw(run: Run, results: Results, path: Path) -> None:
+    """Save the figure of all plots that the scene names as a PNG file."""
+    columns = [
+        [name for name in run.scene.plots if (name in OVER_TIME) == left]
+        for left in (True, False)
+        if any((name in OVER_TIME) == left for name in run.scene.plots)
+    ]
+    height = HEIGHT * max(2, *map(len, columns), 2)
+    with sheet(path, WIDTH * len(columns), height) as figure:
+        figure.suptitle(f"{run.scene.title}\n{run.setting}", fontsize=11)
+        parts = figure.subfigures(1, len(columns), squeeze=False)[0]
+        for part, names in zip(parts, columns, strict=True):
+            over_time = names[0] in OVER_TIME
+            for axes, name in zip(part.subplots(len(names), sharex=over_time, squeeze=False)[:, 0], names, strict=True):
+                PANELS[name](axes, run, results)
+
+
+def history(axes: Axes, run: Run, role: str) -> None:
+    """One output over time."""
+    name = run.scene.motion[role]
+    axes.plot(run.time, drawable(run.columns[name]), color=BLUE, label=name)
+    axes.set_title(run.descriptions[name])
+    axes.set_ylabel(label(name, run.units[name]))
+    axes.set_xlabel("t [s]")
+    axes.set_xlim(*EDGES @ run.time[[0, -1]])
+    axes.label_outer()
+
+
+def position(axes: Axes, run: Run, results: Results) -> None:
+    """Position over time, with the driver's if it is recorded, and the turning points if they were measured."""
+    history(axes, run, "position")
+    if "x_driver" in run.columns:
+        axes.plot(run.time, run.columns["x_driver"], color=ORANGE, linestyle="--", label="x_driver")
+    if "decay" in results:
+        decay = results["decay"]
+        axes.plot(decay.times, decay.positions, "o", color=ORANGE, fillstyle="none", label="turning points used")
+    if len(axes.lines) > 1:
+        axes.legend()
+
+
+def velocity(axes: Axes, run: Run, results: Results) -> None:
+    history(axes, run, "velocity")
+
+
+def acceleration(axes: Axes, run: Run, results: Results) -> None:
+    history(axes, run, "acceleration")
+
+
+def phase(axes: Axes, run: Run, results: Results) -> None:
+    """Velocity over position."""
+    x, v = run.scene.motion["position"], run.scene.motion["velocity"]
+    axes.plot(drawable(run.columns[x]), drawable(run.columns[v]), color=BLUE)
+    axes.set_title("phase plane")
+    axes.set_xlabel(label(x, run.units[x]))
+    axes.set_ylabel(label(v, run.units[v]))
+
+
+def steps(axes: Axes, run: Run, results: Results) -> None:
+    """Size of the solver's own steps over the time where they begin, with the mean if it was measured."""
+    assert run.steps is not None  # the scene was checked for it
+    axes.semilogy(run.steps.t[:-1], run.steps.h, color=BLUE, linewidth=0.6, marker=".", markersize=3)
+    axes.set_title("step size of the solver")
+    if "steps" in results:
+        mean = results["steps"].mean
+        axes.axhline(mean, color=ORANGE, linestyle="--")
+        axes.set_title(f"step size of the solver (dashed: mean {1e3 * mean:.4g} ms)")
+    axes.set_xlim(*EDGES @ run.time[[0, -1]])
+    axes.set_xlabel("t [s]")
+    axes.set_ylabel("h [s]")
+
+
+Panel = Callable[[Axes, Run, Results], None]
+PANELS: dict[str, Panel] = {
+    "position": position,
+    "velocity": velocity,
+    "acceleration": acceleration,
+    "phase": phase,
+    "steps": steps,
+}

@@ -1,0 +1,118 @@
+"""One scene from file to results, and the main job: every published one.
+
+What a scene does not name is not imported: analyses and plots load here, when they are asked for.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ...errors import HarnessError, SceneError, unknown
+from ...process.interrupt import check
+from ...results.folder import replacing
+from ...results.quantity import Quantity
+from ...running.fmu import simulate
+from ...running.run import Run
+from ...scenes.scene import Scene, check_built, load, shipped
+
+FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.png")  # all that a result folder may hold
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a scene: its measured quantities, or the sentence that says why there are none."""
+
+    name: str
+    scene: Scene | None
+    run: Run | None
+    quantities: tuple[Quantity, ...]
+    error: str | None
+
+
+def decay(run: Run) -> Any:
+    from ...analyses.decay.decrement import analyse
+
+    return analyse(run)
+
+
+def slip(run: Run) -> Any:
+    from ...analyses.slip import analyse
+
+    return analyse(run)
+
+
+def steps(run: Run) -> Any:
+    from ...analyses.steps import analyse
+
+    return analyse(run)
+
+
+ANALYSE = {"decay": decay, "slip": slip, "steps": steps}
+
+
+def perform(scene: Scene, out: Path, report: Callable[[float], None]) -> Outcome:
+    """Run, analyse and write results to out/<scene>; HarnessError leaves older results as they are."""
+    try:
+        with replacing(out / scene.name, FILES) as folder:
+            return fill(scene, folder, report)
+    except HarnessError as error:
+        raise type(error)(f"scene {scene.name}: {error}") from None
+
+
+def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome:
+    """Run and analyse a scene, and write its results into an empty folder."""
+    check_built(scene.fmu)
+    run = simulate(scene, report)
+    results: dict[str, Any] = {}
+    for name in scene.analyses:
+        results[name] = ANALYSE[name](run)
+    quantities = tuple(quantity for result in results.values() for quantity in result.quantities)
+    quantities += run.cost.quantities
+    check_published(scene, quantities)
+    run.save(folder)
+    if scene.published:
+        from .table import save
+
+        save(quantities, scene.published, folder / "figures.csv")
+    if scene.plots:
+        from .figure import draw
+
+        draw(run, results, folder / "figure.png")
+    return Outcome(scene.name, scene, run, quantities, None)
+
+
+def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
+    """Every published figure has a measured one beside it, in a unit that fits."""
+    measured = {quantity.name: quantity for quantity in quantities}
+    for name, value in scene.published.items():
+        if name == "source":
+            continue
+        if name not in measured:
+            raise SceneError(unknown("name in [published]", name, measured))
+        if isinstance(value, list):
+            try:
+                measured[name].in_unit(value[1])
+            except KeyError:
+                unit = measured[name].unit
+                raise SceneError(f"published {name} in '{value[1]}' does not fit the measured '{unit}'") from None
+
+
+def published() -> list[str]:
+    """The names of the shipped scenes that have figures to stand beside; HarnessError if an FMU is not built."""
+    scenes = [scene for scene in map(load, shipped()) if scene.published]
+    for scene in scenes:
+        check_built(scene.fmu)
+    return [scene.name for scene in scenes]
+
+
+def main_job(names: Iterable[str], out: Path, report: Callable[[str, float], None]) -> Iterator[Outcome]:
+    """The outcome of each scene; one that fails does not lose the others."""
+    for name in names:
+        check()
+        try:
+            yield perform(load(name), out, partial(report, name))
+        except HarnessError as error:
+            check()  # an FMU in Python may have swallowed the interrupt that made it fail
+            yield Outcome(name, None, None, (), str(error))

@@ -1,0 +1,73 @@
+"""The table that sets measured figures beside published ones."""
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from rich.text import Text
+
+from ...results.quantity import Quantity
+from .job import Outcome
+
+ELSEWHERE = "elsewhere: the published run time is that of another machine"
+ALWAYS = ("steps", "mean_step", "run_time")  # shown in the main job even where nothing was published
+
+
+def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
+    """One table for all outcomes; `everything`: also what has no published figure."""
+    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0, caption_justify="left")
+    table.add_column("", no_wrap=True)
+    table.add_column("measured", justify="right", no_wrap=True)
+    table.add_column("published", justify="right", min_width=15)
+    table.add_column("", no_wrap=True)
+    table.add_column("difference", justify="right", no_wrap=True)
+    for outcome in outcomes:
+        table.add_section()
+        if outcome.scene is None or outcome.run is None:
+            table.add_row(Text(outcome.name, style="bold red"), Text("failed", style="red"))
+            continue
+        figures = outcome.scene.published
+        title = Text.assemble((outcome.name, "bold"), f"\n  {outcome.run.setting}")
+        table.add_row(title, "", Text("\n" + figures.get("source", ""), style="italic"))
+        for quantity in outcome.quantities:
+            if everything or quantity.name in figures or quantity.name in ALWAYS:
+                table.add_row(*map(Text, row(quantity, figures.get(quantity.name))))
+                if quantity.name == "run_time" and quantity.name in figures:
+                    table.caption = ELSEWHERE
+    return table
+
+
+def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
+    """Text, measured, published, unit and difference; in the unit of the published figure where it has one."""
+    value, unit, digits = quantity.value, quantity.unit, 5
+    published = difference = ""
+    if isinstance(figure, list):
+        figure, unit = figure
+        value = quantity.in_unit(unit)
+    if isinstance(figure, int | float):
+        published = repr(figure)
+        digits = max(digits, len(published.replace(".", "").lstrip("0")))
+        if quantity.name == "run_time":
+            difference = "elsewhere"
+        elif figure:
+            difference = f"{100 * (value / figure - 1):+.2g} %"
+    else:
+        published = str(figure or "")
+        if unit == "s" and abs(value) < 1:
+            value, unit = 1e3 * value, "ms"
+    measured = str(value) if isinstance(value, int) else f"{value:.{digits}g}"
+    return f"  {quantity.text}", measured, published, "" if unit == "1" else unit, difference
+
+
+def save(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) -> None:
+    """Write what the table shows of a scene as CSV, with the source of the published figures in its heading."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["", "measured", f"published ({published['source']})", "unit", "difference"])
+        for quantity in quantities:
+            if quantity.name in published or quantity.name in ALWAYS:
+                text, measured, figure, unit, difference = row(quantity, published.get(quantity.name))
+                writer.writerow([text.strip(), measured, figure, unit, difference])

@@ -1,0 +1,123 @@
+"""The stiff and extreme scenes of stability.toml, one case for each method that meets them."""
+
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ...running.probe import Card, Setting
+from ...truths.truth import Grid, Span
+
+FILE = Path(__file__).with_name("stability.toml")
+RTOL = 1e-6
+POINTS = 200
+OWN = ("start", "stop", "rtol", "calls")  # what `each` may vary besides a value
+
+
+@dataclass(frozen=True)
+class Case:
+    """One scene with one method: `finish` is the largest error allowed, `refuse` the words to be refused with."""
+
+    title: str
+    model: str
+    method: str
+    setting: Setting
+    grid: Grid
+    spans: list[Span]
+    calls: list[tuple[float, float]] | None = None
+    changes: dict[float, dict[str, float]] = field(default_factory=dict)
+    finish: float | None = None
+    refuse: str | None = None
+    poison: bool = False
+    events: str = "all"  # which methods must find every event: all, exact or none
+    region: float | None = None  # where the scene stands on the axis of the region figure
+    place: int = 0  # in the table
+
+    @property
+    def label(self) -> str:
+        return f"{self.model}: {self.title}, {self.method}"
+
+    @property
+    def rtol(self) -> float:
+        return self.setting.values["solver.rtol"]
+
+    @property
+    def free(self) -> bool:
+        """Whether nothing puts energy in."""
+        values = self.setting.values
+        return not self.changes and not any(values.get(name) for name in ("F_ext", "T_ext", "v_driver"))
+
+
+def scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
+    """Every scene with one model and one value, and the largest errors allowed where a scene says nothing."""
+    table = tomllib.loads(file.read_text(encoding="utf-8"))
+    return [one for scene in table["scene"] for one in spread(scene)], table["finish"]
+
+
+def spread(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """A scene for each of its models and for each value that it varies."""
+    for model in scene.get("models", [scene.get("model")]):
+        if "each" not in scene:
+            yield {**scene, "model": model, "pattern": scene["title"]}
+            continue
+        ((name, values),) = scene["each"].items()
+        for value in values:
+            new = {name: value} if name in OWN else {"values": {**scene.get("values", {}), name: value}}
+            shown = value if name != "calls" else ", then ".join(f"{h!r} s from {t!r} s" for t, h in value)
+            told = {"title": scene["title"].format(shown), "pattern": scene["title"], "varied": value}
+            yield {**scene, **new, "model": model, **told}
+
+
+def cases(scene: dict[str, Any], card: Card, finish: dict[str, float]) -> list[Case]:
+    """The cases of one scene: the methods that it names, of those that its FMU offers."""
+    methods = scene.get("methods", card.methods)
+    methods = [card.default if method == "default" else method for method in methods]
+    return [
+        case(scene, card, method, largest_error(scene, method, finish)) for method in methods if method in card.methods
+    ]
+
+
+def largest_error(scene: dict[str, Any], method: str, finish: dict[str, float]) -> float:
+    """What a scene allows a method: its own figure, else that of its tolerance."""
+    own = scene.get("finish", {})
+    if not isinstance(own, dict):
+        return own
+    if method == "exact":
+        return own.get("exact", finish["exact"])
+    return own.get("other", max(finish["tolerances"] * scene.get("rtol", RTOL), finish["least"]))
+
+
+def case(scene: dict[str, Any], card: Card, method: str, finish: float) -> Case:
+    """A scene with a method."""
+    chosen = {"solver.rtol": scene.get("rtol", RTOL), **scene.get("values", {}), "solver.method": method}
+    values = card.numbers({**card.defaults, **chosen})
+    start, stop = scene.get("start", 0.0), scene.get("stop", card.stop)
+    changes = {row["t"]: card.numbers({k: v for k, v in row.items() if k != "t"}) for row in scene.get("changes", ())}
+    points = round((stop - start) / scene["step"]) if "step" in scene else scene.get("points", POINTS)
+    ends = not ("refuse" in scene or "poison" in scene)
+    return Case(
+        title=scene["title"],
+        model=scene["model"],
+        method=method,
+        setting=Setting(scene["model"], values, start, stop),
+        grid=Grid(start, stop, points, tuple(changes), scene.get("at_events", False)),
+        spans=spans(start, stop, values, changes),
+        calls=[(t, h) for t, h in scene["calls"]] if "calls" in scene else None,
+        changes=changes,
+        finish=finish if ends else None,
+        refuse=scene.get("refuse"),
+        poison=scene.get("poison", False),
+        events=scene.get("events", "all"),
+        region=scene["varied"] if scene.get("region") else None,
+    )
+
+
+def spans(start: float, stop: float, values: dict[str, float], changes: dict[float, dict[str, float]]) -> list[Span]:
+    """From one change to the next, and the values that hold there; those of the solver are none of the truth's."""
+    physical = {name: value for name, value in values.items() if not name.startswith("solver.")}
+    found, begin = [], start
+    for t in sorted(changes):
+        found.append((begin, t, physical))
+        physical, begin = {**physical, **changes[t]}, t
+    return [*found, (begin, stop, physical)]

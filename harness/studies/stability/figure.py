@@ -1,0 +1,21 @@
+"""The figure of stability: internal steps over the stiffness, for every method."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from ...results.style import FAMILIES, HEIGHT, WIDTH, sheet
+from .study import Region
+
+
+def draw(regions: Iterable[Region], path: Path) -> None:
+    """Save the steps of each method as PNG; a line of slope -1 is bounded by stability."""
+    with sheet(path, 1.3 * WIDTH, 2 * HEIGHT) as figure:
+        axes = figure.subplots()
+        for each in regions:
+            text = f"{each.method}: {each.slope:+.2f}"
+            axes.loglog(each.stiff, each.steps, color=FAMILIES[each.method], marker="o", markersize=4, label=text)
+        axes.set_title("pacejka, 16 s at rtol 1e-6: steps over the speed at the peak of the friction curve")
+        axes.set_xlabel("x_m [m/s]")
+        axes.set_ylabel("internal steps")
+        axes.invert_xaxis()  # stiffer to the right
+        axes.legend(title="slope at the stiff end")

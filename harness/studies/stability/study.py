@@ -1,0 +1,208 @@
+"""Stiff and extreme scenes: each ends within its error, or is refused with its sentence; never a hang.
+
+The scenes and what is expected of them stand in stability.toml, the answers come by a second route (truth.py), and
+every run has a process of its own with a time limit (bounded.py).
+"""
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import HarnessError
+from ...results.folder import replacing
+from ...running.probe import Card, Motion, Refusal, Refusals, card, poison, run
+from ...truths.truth import Truth, check, truth, worst
+from .bounded import bounded
+from .cases import Case, cases, scenes
+
+WORKERS = 2
+LIMIT = 120.0  # s, for one run and for one answer to compare with
+FOLDER, FILES = "stability", ("stability.csv", "region.png")
+FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
+
+
+@dataclass(frozen=True)
+class Row:
+    """How a case ended: `ended` is finished, refused or wrong; `text` is the FMU's sentence, or what is wrong.
+
+    `error` and `rise` (of energy that nobody put in) are shares of the largest values; NaN where there is none.
+    """
+
+    case: Case
+    ended: str
+    text: str
+    error: float = math.nan
+    rise: float = math.nan
+    motion: Motion | None = None
+
+    @property
+    def expected(self) -> str:
+        case = self.case
+        if case.poison:
+            return "refused, each by name"
+        return f"refused: {case.refuse}" if case.refuse else f"finished within {case.finish:g}"
+
+    @property
+    def well(self) -> bool:
+        """Whether it ended as it should."""
+        return self.ended == (REFUSED if self.case.poison or self.case.refuse else FINISHED)
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where a method's steps are bounded by stability: `steps` (n,) against `stiff` (n,), and the slope, log by log.
+
+    The slope is that of the two stiffest scenes: -1 is an explicit method at its limit, 0 one that has none.
+    """
+
+    method: str
+    stiff: np.ndarray
+    steps: np.ndarray
+    slope: float
+
+
+def survey(out: Path, report: Callable[[str, float], None], chosen: list[list[Case]]) -> tuple[list[Row], list[Region]]:
+    """Run the chosen groups of cases and write results to out/stability."""
+    from .figure import draw
+
+    with replacing(out / FOLDER, FILES) as folder:
+        rows = table(report, chosen)
+        found = regions(rows)
+        save(rows, folder / "stability.csv")
+        draw(found, folder / "region.png")
+    return rows, found
+
+
+def table(report: Callable[[str, float], None], chosen: list[list[Case]]) -> list[Row]:
+    """The rows of the chosen cases; `report` hears of each as it comes."""
+
+    def rows(group: list[Case]) -> list[Row]:
+        found = []
+        for row in judged(group):
+            found.append(row)
+            report(row.case.label, 1.0)
+        return found
+
+    with ThreadPoolExecutor(WORKERS) as pool:
+        found = [row for found in pool.map(rows, chosen) for row in found]
+    return sorted(found, key=lambda row: row.case.place)
+
+
+def all_cases(wanted: Callable[[dict[str, Any]], bool] = lambda scene: True) -> list[list[Case]]:
+    """The cases of all wanted scenes; those that share one true answer stand together."""
+    check()
+    found, finish = scenes()
+    found = [scene for scene in found if wanted(scene)]
+    cards: dict[str, Card] = {}
+    groups: dict[str, list[Case]] = {}
+    for place, scene in enumerate(found):
+        if scene["model"] not in cards:
+            cards[scene["model"]] = bounded(LIMIT, card, scene["model"])
+        for case in cases(scene, cards[scene["model"]], finish):
+            shared = repr((case.model, case.spans, case.grid))
+            groups.setdefault(shared, []).append(replace(case, place=place))
+    return list(groups.values())
+
+
+def judged(group: Iterable[Case]) -> Iterator[Row]:
+    """The rows of cases that share one true answer."""
+    answer: Truth | None = None
+    for case in group:
+        try:
+            if case.poison:
+                yield all_refused(case, bounded(LIMIT, poison, case.setting))
+                continue
+            if case.refuse is None and answer is None:
+                answer = bounded(LIMIT, truth, case.model, case.spans, case.grid)
+            times = answer.times.tolist() if answer else case.grid.times(())
+            calls = case.calls or [(t, ahead - t) for t, ahead in pairwise(times)]
+            ending = bounded(LIMIT, run, case.setting, calls, case.changes)
+            if isinstance(ending, Refusal):
+                yield refused(case, ending)
+            elif answer is None or case.refuse is not None:
+                yield Row(case, WRONG, "it was taken", motion=ending)
+            else:
+                yield finished(case, ending, answer)
+        except HarnessError as error:
+            yield Row(case, WRONG, str(error))
+
+
+def all_refused(case: Case, ending: Refusals) -> Row:
+    if ending.wrong:
+        return Row(case, WRONG, f"{len(ending.wrong)} of {ending.tried}: {'; '.join(ending.wrong)}")
+    return Row(case, REFUSED, f"{ending.tried} of {ending.tried}, each by name")
+
+
+def refused(case: Case, ending: Refusal) -> Row:
+    """A refusal says the words that the scene expects, and leaves no number to be taken for a result."""
+    if not ending.sentence:
+        return Row(case, WRONG, "it was refused without a sentence")
+    if not ending.silent:
+        return Row(case, WRONG, f"refused, but numbers can still be read: {ending.sentence}")
+    if case.refuse is None or case.refuse not in ending.sentence:
+        return Row(case, WRONG, f"refused: {ending.sentence}")
+    return Row(case, REFUSED, ending.sentence)
+
+
+def finished(case: Case, motion: Motion, answer: Truth) -> Row:
+    """A motion has the right events, is as near to the answer as the scene expects, and makes no energy."""
+    assert case.finish is not None
+    error = answer.error(motion.x, motion.v)
+    rise = math.nan
+    if case.free:
+        energy = motion.energy
+        rise = float((energy - np.minimum.accumulate(energy)).max() / (energy.max() or 1.0))
+    wrong = []
+    if case.events == "all" or case.events == case.method:
+        if motion.counts.events != len(answer.events):
+            wrong.append(f"{motion.counts.events} events, not {len(answer.events)}")
+        elif answer.events:
+            late = abs(motion.t_last - answer.events[-1][0])
+            error = worst(error, late / (case.grid.stop - case.grid.start))
+    if not error <= case.finish:
+        wrong.append(f"error {error:.2g}, more than {case.finish:g}")
+    if case.free and not rise <= case.finish:
+        wrong.append(f"energy rises by {rise:.2g}")
+    return Row(case, WRONG if wrong else FINISHED, "; ".join(wrong), error, rise, motion)
+
+
+def regions(rows: Iterable[Row]) -> list[Region]:
+    """Steps against stiffness, for each method of the scenes that vary it."""
+    found: dict[str, list[tuple[float, int]]] = {}
+    for row in rows:
+        if row.case.region is not None and row.motion is not None:
+            found.setdefault(row.case.method, []).append((row.case.region, row.motion.counts.steps))
+    regions = []
+    for method, points in found.items():
+        stiff, steps = np.array(sorted(points, reverse=True), float).T
+        slope = np.diff(np.log(steps[-2:])) / np.diff(np.log(stiff[-2:])) if len(steps) > 1 else [math.nan]
+        regions.append(Region(method, stiff, steps, float(slope[0])))
+    return regions
+
+
+def save(rows: list[Row], path: Path) -> None:
+    """Write stability.csv: one line for each row."""
+    columns: dict[str, list[Any]] = {
+        "model": [row.case.model for row in rows],
+        "scene": [row.case.title for row in rows],
+        "method": [row.case.method for row in rows],
+        "expected": [row.expected for row in rows],
+        "ended": [row.ended for row in rows],
+        "error [1]": [row.error for row in rows],
+        "energy rise [1]": [row.rise for row in rows],
+    }
+    for name in ("events", "steps", "rejected", "evaluations"):
+        columns[name] = [getattr(row.motion.counts, name) if row.motion else "" for row in rows]
+    columns["run time [s]"] = [row.motion.seconds if row.motion else math.nan for row in rows]
+    columns["sentence"] = [row.text for row in rows]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*columns.values(), strict=True))

@@ -1,0 +1,63 @@
+"""Makes the reference motions, in some minutes: python -m harness.truths
+
+piecewise linear laws   closed form in 40 digits; the tests hold a second one against it
+pendulum                Taylor series in 25 digits, and DOP853 restarted at every change of mode
+magic formula           DOP853, which is explicit, and Radau, which is implicit
+"""
+
+import numpy as np
+
+from ..results.files import heading, write
+from ..running.answer import Answer
+from .linear import Events, Motion, coulomb, sampled, smd, stickslip, threshold
+from .peers import solve
+from .problem import Pendulum
+from .reference import CASES, FOLDER, POINTS, Case, late, relative
+from .taylor import swings
+
+CLOSED = {"smd": smd, "coulomb": coulomb, "stickslip": stickslip, "threshold": threshold}
+ROUNDING = 2.0**-53  # of a number stored as a double
+
+
+def main() -> None:
+    """Write every reference, and how well its routes agree."""
+    rows = []
+    for case in {case.truth: case for case in CASES}.values():
+        times = np.linspace(0.0, case.problem.stop, POINTS)
+        answer, routes, doubt = make(case, times)
+        print(f"{case.truth}: {routes}, difference {doubt:.1e}", flush=True)
+        rows.append(f"{case.truth},{routes},{doubt:.1e}\n")
+        unit, events = case.problem.unit, answer.events or []
+        if case.problem.dry:
+            events.insert(0, (0.0, case.problem.settle(0.0, *case.problem.start)))
+        heads = ["t [s]", heading("x", unit), heading("v", f"{unit}/s")]
+        write(FOLDER / f"{case.truth}.csv", heads, [times, *answer.motion.T])
+        columns = [np.array([t for t, _ in events]), np.array([mode for _, mode in events])]
+        write(FOLDER / f"{case.truth}-events.csv", ["t [s]", "mode"], columns)
+    (FOLDER / "agreement.csv").write_text("reference,routes,difference [1]\n" + "".join(sorted(rows)), encoding="utf-8")
+
+
+def make(case: Case, times: np.ndarray) -> tuple[Answer, str, float]:
+    """The motion, the routes that led to it, and their largest difference relative to the largest of each column."""
+    if case.truth in CLOSED:
+        return rounded(*sampled(CLOSED[case.truth], times.tolist())), "closed form in 40 digits", ROUNDING
+    explicit = solve("scipy", "DOP853", case.problem, times, 3e-14, 1e-16)  # as far down as it goes
+    if isinstance(case.problem, Pendulum):
+        answer = rounded(*swings(case.problem, times.tolist()))
+        apart = max(difference(answer, explicit), late(answer.events or [], explicit.events or []) / times[-1])
+        return answer, "Taylor series in 25 digits and DOP853", apart
+    implicit = solve("scipy", "Radau", case.problem, times, 1e-11, 1e-14)
+    return explicit, "DOP853 and Radau", difference(explicit, implicit)
+
+
+def rounded(motion: Motion, events: Events) -> Answer:
+    """The doubles next to what many digits say."""
+    return Answer(np.array([[float(x), float(v)] for x, v in motion]), [(float(t), mode) for t, mode in events], 0)
+
+
+def difference(one: Answer, other: Answer) -> float:
+    return float(relative(other.motion, one.motion).max())
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,197 @@
+"""Other people's solvers on the same problems, each in its best use: restarted at every change of mode.
+
+scipy's solve_ivp, and CVODE of SUNDIALS through scikit-sundae; both get the Jacobian where they want it.
+"""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
+from itertools import count
+from time import perf_counter
+
+import numpy as np
+
+from ..errors import HarnessError
+from ..running.answer import Answer
+from .problem import Problem, Rates, State
+
+SCIPY = ("RK23", "RK45", "DOP853", "Radau", "LSODA")
+IMPLICIT = ("Radau", "LSODA", "BDF")  # those that ask for a Jacobian
+PACKAGES = {"scipy": ("scipy", "scipy"), "cvode": ("sksundae", "scikit-sundae")}  # module, and name to install
+
+
+Watch = Callable[[Rates], Rates]
+
+
+def unwatched(rates: Rates) -> Rates:
+    """As they are: counting costs time."""
+    return rates
+
+
+def at_most(limit: int) -> Watch:
+    """Right-hand sides that end the run after so many of them, all together."""
+    calls = count(1)
+
+    def watched(rates: Rates) -> Rates:
+        def counting(t: float, y: State) -> tuple[float, float]:
+            if next(calls) > limit:
+                raise HarnessError(f"at t = {t:.3g} s after {limit} right-hand sides")
+            return rates(t, y)
+
+        return counting
+
+    return watched
+
+
+def within(seconds: float) -> Watch:
+    """Right-hand sides that end the run after so many seconds from now."""
+    end = perf_counter() + seconds
+
+    def watched(rates: Rates) -> Rates:
+        def timing(t: float, y: State) -> tuple[float, float]:
+            if perf_counter() > end:
+                raise HarnessError(f"at t = {t:.3g} s after {seconds:g} s of run time")
+            return rates(t, y)
+
+        return timing
+
+    return watched
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """One mode: samples (n, 2) at the points passed, the end in s, the state there, and whether v came to zero."""
+
+    samples: np.ndarray
+    end: float
+    state: tuple[float, float]
+    turned: bool
+    evaluations: int
+
+
+def missing() -> dict[str, str]:
+    """The peers that are not installed, each with the package that brings it."""
+    return {peer: package for peer, (module, package) in PACKAGES.items() if find_spec(module) is None}
+
+
+def solve(
+    peer: str, method: str, problem: Problem, times: np.ndarray, rtol: float, atol: float, watched: Watch = unwatched
+) -> Answer:
+    """The motion at `times` (n,), which begin at 0 and end at the stop; HarnessError says why there is none."""
+    stretch: Callable[..., Stretch] = {"scipy": by_scipy, "cvode": by_cvode}[peer]
+    ask = partial(stretch, method, problem, watched=watched, rtol=rtol, atol=atol)
+    t, state = 0.0, problem.start
+    mode = problem.settle(t, *state)
+    motion = np.empty((len(times), 2))
+    motion[0] = state
+    events: list[tuple[float, int]] = []
+    evaluations, done = 0, 1  # samples made
+    while t < problem.stop:
+        if mode:
+            part = ask(mode, t, state, times[done:])
+            motion[done : done + len(part.samples)] = part.samples
+            done += len(part.samples)
+            evaluations += part.evaluations
+            t, state = part.end, part.state
+            if part.turned:
+                mode = problem.settle(t, state[0], 0.0)
+                events.append((t, mode))
+        else:
+            release, mode = problem.release(t, state[0])
+            t = min(release, problem.stop)
+            passed = int(np.searchsorted(times, t, side="right"))
+            motion[done:passed] = state
+            done = max(done, passed)
+            if release <= problem.stop:
+                events.append((t, mode))
+    return Answer(motion, events if problem.dry else None, evaluations)
+
+
+def by_scipy(
+    method: str,
+    problem: Problem,
+    mode: int,
+    t: float,
+    state: tuple[float, float],
+    times: np.ndarray,
+    *,
+    watched: Watch,
+    rtol: float,
+    atol: float,
+) -> Stretch:
+    """One mode through solve_ivp."""
+    from scipy.integrate import solve_ivp
+
+    def standstill(t: float, y: np.ndarray) -> float:
+        return y[1]
+
+    standstill.terminal, standstill.direction = True, -mode  # type: ignore[attr-defined]
+    options = {"jac": problem.jacobian(mode)} if method in IMPLICIT else {}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a failure is told by its status
+        run = solve_ivp(
+            watched(problem.rates(mode)),
+            (t, problem.stop),
+            state,
+            method,
+            t_eval=times,
+            events=standstill if problem.dry else None,
+            rtol=rtol,
+            atol=atol,
+            **options,
+        )
+    if run.status < 0:
+        raise HarnessError(run.message.splitlines()[0])
+    evaluations = int(run.nfev + run.njev)
+    samples = np.reshape(run.y, (2, -1)).T  # a list where there are none
+    if run.status == 1:
+        end = float(run.t_events[0][-1])
+        return Stretch(samples, end, (float(run.y_events[0][-1][0]), 0.0), True, evaluations)
+    return Stretch(samples, problem.stop, tuple(run.y[:, -1].tolist()), False, evaluations)
+
+
+def by_cvode(
+    method: str,
+    problem: Problem,
+    mode: int,
+    t: float,
+    state: tuple[float, float],
+    times: np.ndarray,
+    *,
+    watched: Watch,
+    rtol: float,
+    atol: float,
+) -> Stretch:
+    """One mode through CVODE."""
+    from sksundae.cvode import CVODE as Solver
+
+    rates = watched(problem.rates(mode))
+    jacobian = problem.jacobian(mode) if method in IMPLICIT else None
+
+    def fill(t: float, y: np.ndarray, slope: np.ndarray) -> None:
+        slope[0], slope[1] = rates(t, y)
+
+    def fill_matrix(t: float, y: np.ndarray, slope: np.ndarray, matrix: np.ndarray) -> None:
+        assert jacobian is not None
+        matrix[:] = jacobian(t, y)
+
+    def standstill(t: float, y: np.ndarray, guard: np.ndarray) -> None:
+        guard[0] = y[1]
+
+    standstill.terminal, standstill.direction = [True], [-mode]  # type: ignore[attr-defined]
+    options = {"eventsfn": standstill, "num_events": 1} if problem.dry else {}
+    if jacobian is not None:
+        options["jacfn"] = fill_matrix
+    solver = Solver(fill, method=method, rtol=rtol, atol=atol, max_num_steps=1_000_000, **options)
+    run = solver.solve(np.append(t, times), np.array(state))
+    if not run.success:
+        raise HarnessError(str(run.message).splitlines()[0])
+    evaluations = int(run.nfev + run.njev)
+    if run.t_events is not None and len(run.t_events):
+        end = float(run.t_events[-1])
+        passed = int(np.searchsorted(times, end, side="right"))
+        return Stretch(run.y[1 : passed + 1], end, (float(run.y_events[-1][0]), 0.0), True, evaluations)
+    samples = run.y[1:] if len(times) > 1 else run.y[-1:]  # between two points it shows its own steps
+    return Stretch(samples, problem.stop, tuple(run.y[-1].tolist()), False, evaluations)

@@ -1,0 +1,100 @@
+"""The answer by a second route, for any values: what the stability table compares with.
+
+    linear models     closed forms in 120 digits: truth_linear.py
+    pacejka           scipy's Radau at 1e-11, restarted where a value changes: truth_smooth.py
+    pendulum          scipy's DOP853 at 1e-13, restarted at every change of mode or value: truth_smooth.py
+
+Nothing is shared with the FMUs.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from importlib.util import find_spec
+from itertools import pairwise
+
+import numpy as np
+
+from ..errors import HarnessError
+from .pieces import Piece, Span
+
+
+@dataclass(frozen=True)
+class Truth:
+    """`x`, `v` (n,) at `times` (n,) in s; `events` are (time, new mode), the start left out."""
+
+    times: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    events: tuple[tuple[float, int], ...]
+
+    def error(self, x: np.ndarray, v: np.ndarray) -> float:
+        """The largest error of positions and speeds (n,); NaN if there is one.
+
+        Position counts in its largest value; speed in its largest, or in what covers the largest distance in the run.
+        """
+        far = largest(self.x)
+        fast = max(largest(self.v), far / (self.times[-1] - self.times[0]))
+        return worst(largest(x - self.x) / (far or 1.0), largest(v - self.v) / (fast or 1.0))
+
+
+def largest(values: np.ndarray) -> float:
+    """The largest size among values (n,); NaN if there is one."""
+    return float(np.abs(values).max())
+
+
+def worst(*errors: float) -> float:
+    """The largest of some errors; NaN if there is one, which Python's own max may lose."""
+    return float(np.max(errors))
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Communication points from `start` to `stop` (s): evenly `points` steps, and where values change or modes do."""
+
+    start: float
+    stop: float
+    points: int
+    changes: tuple[float, ...] = ()
+    at_events: bool = False
+
+    def times(self, events: Iterable[float]) -> list[float]:
+        run = self.stop - self.start
+        even = [self.start + run * i / self.points for i in range(self.points)]
+        return sorted({*even, self.stop, *self.changes, *(events if self.at_events else ())})
+
+
+def truth(model: str, spans: list[Span], grid: Grid) -> Truth:
+    """The motion over the spans, at the points of the grid."""
+    pieces = list(PIECES[model](model, spans))
+    events = [(float(new.start), new.mode) for old, new in pairwise(pieces) if new.mode != old.mode]
+    times, rows, i = grid.times(t for t, _ in events), [], 0
+    for t in times:
+        while i + 1 < len(pieces) and pieces[i + 1].start <= t:
+            i += 1
+        x, v = pieces[i].at(t)
+        rows.append((float(x), float(v)))
+    x, v = np.array(rows).T
+    return Truth(np.array(times), x, v, tuple(events))
+
+
+def linear(model: str, spans: list[Span]) -> Iterator[Piece]:
+    from .truth_linear import pieces
+
+    return pieces(model, spans)
+
+
+def smooth(model: str, spans: list[Span]) -> Iterator[Piece]:
+    from . import truth_smooth
+
+    return getattr(truth_smooth, model)(spans)
+
+
+PIECES = {"smd": linear, "coulomb": linear, "stickslip": linear, "pacejka": smooth, "pendulum": smooth}
+
+
+def check() -> None:
+    """HarnessError if what the answers are made with is not installed."""
+    missing = [name for name in ("mpmath", "scipy") if find_spec(name) is None]
+    if missing:
+        names = " and ".join(missing)
+        raise HarnessError(f"the answers to compare with need {names}: try `pip install {' '.join(missing)}`")
