@@ -1,35 +1,41 @@
 """Fixtures: the FMUs built once, and a process that runs them."""
 
-import subprocess
-import sys
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import builds
+import native_fmus
 import pytest
+from builds import ROOT, build  # noqa: F401 - for tests
 from driver import Worker
 
-ROOT = Path(__file__).parent.parent
+
+def pytest_configure(config):
+    """Open the room of what is built, or enter the one that the first process of this run has opened."""
+    if hasattr(config, "workerinput"):
+        builds.room = Path(config.workerinput["room"])
+    else:
+        folder = TemporaryDirectory()
+        config.add_cleanup(folder.cleanup)
+        builds.room = Path(folder.name)
 
 
-def build(root, out, *names, timeout=120):
-    """Build FMUs from the sources under `root` in a process of their own."""
-    command = [sys.executable, "build_fmus.py", *names, "--out", str(out)]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=timeout)
-    assert done.returncode == 0, done.stderr
-    return out
+@pytest.hookimpl(optionalhook=True)  # of pytest-xdist
+def pytest_configure_node(node):
+    """Tell another process of this run where the room is."""
+    node.workerinput["room"] = str(builds.room)
 
 
 @pytest.fixture(scope="session")
-def fmus(tmp_path_factory):
+def fmus():
     """The folder of the built FMUs."""
-    return build(ROOT, tmp_path_factory.mktemp("fmus"))
+    return builds.once("fmi2")
 
 
 @pytest.fixture(params=["python", "native"])
 def kind(request, fmus):
     """The folder of the FMUs of a kind."""
-    from native_fmus import built  # which needs this file
-
-    return fmus if request.param == "python" else built()
+    return fmus if request.param == "python" else native_fmus.built()
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,11 @@ A test module takes them over by assignment: `fmus, worker, _workers = fmi3_host
 """
 
 from functools import cache
-from pathlib import Path
 
+import builds
 import driver
 import pytest
-from conftest import ROOT, build, processes
-from native_fmus import room
+from conftest import processes
 
 
 class Worker(driver.Worker):
@@ -40,7 +39,7 @@ class Failed(Exception):
 @cache
 def built():
     """The folder of the FMI 3.0 FMUs."""
-    return build(ROOT, Path(room().name) / "fmus", "--fmi", "3")
+    return builds.once("fmi3", "--fmi", "3")
 
 
 @pytest.fixture(scope="module")

@@ -2,10 +2,9 @@
 
 import tempfile
 from functools import cache
-from pathlib import Path
 
+import builds
 import pytest
-from conftest import ROOT, build
 
 
 @cache
@@ -18,4 +17,4 @@ def room():
 def built(platform="linux64"):
     """The folder of the native FMUs for a platform."""
     pytest.importorskip("ziglang", reason="native FMUs are compiled by the package ziglang: pip install -e '.[native]'")
-    return build(ROOT, Path(room().name) / platform, "--native", "--platform", platform, timeout=600)
+    return builds.once(platform, "--native", "--platform", platform, timeout=600)
