@@ -7,7 +7,7 @@ import builds
 import native_fmus
 import pytest
 from builds import ROOT, build  # noqa: F401 - for tests
-from driver import Worker
+from driver import Worker, processes
 
 
 def pytest_configure(config):
@@ -44,34 +44,6 @@ def place(fmus, tmp_path_factory):
     folder = tmp_path_factory.mktemp("place")
     (folder / "fmus").symlink_to(fmus)
     return folder
-
-
-def processes(kind, scope):
-    """The fixtures `_workers`, `worker` and `fresh` for processes of a kind, under these names."""
-
-    @pytest.fixture(scope=scope)
-    def _workers():
-        workers = [kind()]
-        yield workers
-        for worker in workers:
-            worker.close()
-
-    @pytest.fixture
-    def worker(_workers):
-        """The process that runs FMUs; a new one when the last test killed it."""
-        if not _workers[-1].alive:
-            _workers.append(kind())
-        _workers[-1].complaints()
-        return _workers[-1]
-
-    @pytest.fixture
-    def fresh():
-        """A process of the test's own, which must end well: late damage to memory shows at the exit."""
-        worker = kind()
-        yield worker
-        assert worker.close() == 0
-
-    return _workers, worker, fresh
 
 
 _workers, worker, fresh = processes(Worker, "session")

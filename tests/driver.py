@@ -9,6 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+import pytest
+
 PATIENCE = 120.0  # s, for one request
 
 
@@ -134,3 +136,31 @@ class Instance:
     def free(self):
         self.freed = True
         self.worker.call(self.number, "free")
+
+
+def processes(kind, scope):
+    """The fixtures `_workers`, `worker` and `fresh` for processes of a kind, under these names."""
+
+    @pytest.fixture(scope=scope)
+    def _workers():
+        workers = [kind()]
+        yield workers
+        for worker in workers:
+            worker.close()
+
+    @pytest.fixture
+    def worker(_workers):
+        """The process that runs FMUs; a new one when the last test killed it."""
+        if not _workers[-1].alive:
+            _workers.append(kind())
+        _workers[-1].complaints()
+        return _workers[-1]
+
+    @pytest.fixture
+    def fresh():
+        """A process of the test's own, which must end well: late damage to memory shows at the exit."""
+        worker = kind()
+        yield worker
+        assert worker.close() == 0
+
+    return _workers, worker, fresh

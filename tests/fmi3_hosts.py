@@ -8,7 +8,6 @@ from functools import cache
 import builds
 import driver
 import pytest
-from conftest import processes
 
 
 class Worker(driver.Worker):
@@ -47,5 +46,5 @@ def fmus():
     return built()
 
 
-_workers, worker, fresh = processes(Worker, "module")
+_workers, worker, fresh = driver.processes(Worker, "module")
 FIXTURES = fmus, worker, _workers
