@@ -13,6 +13,7 @@ import pytest
 from harness.errors import HarnessError
 from harness.running.trajectory import Trajectory
 from harness.studies.compare.difference import compare
+from harness.studies.compare.trajectory import read
 
 ROOT = Path(__file__).parent.parent
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "120"}
@@ -188,16 +189,75 @@ def test_what_cannot_be_compared_is_one_sentence(harness, arguments, status, sen
     assert done.stderr.count("\n") == 1
 
 
-def path(name, times, **columns):
-    return Trajectory(name, times, columns, {"x": "m", "y": "m", "mode": ""})
+UNITS = {"x": "m", "v": "m/s", "y": "m", "mode": ""}
 
 
-def test_times_that_are_not_common_are_met_by_a_spline():
+def path(name, times, events=None, **columns):
+    return Trajectory(name, times, columns, {name: UNITS[name] for name in columns}, events)
+
+
+def test_between_samples_a_variable_follows_its_rate_or_stays_between_its_neighbours():
     one, two = np.linspace(0, 6, 1001), np.linspace(0.0005, 5.9, 400)
-    found = compare(path("one", one, x=np.sin(one)), path("two", two, x=np.sin(two)))
+    found = compare(*(path("x and v", t, x=np.sin(t), v=np.cos(t)) for t in (one, two)))
     assert found.interpolated
     assert len(found.time) == 400
-    assert found.worst < 1e-9
+    x, v = found.differences
+    assert x.relative < 1e-10  # the fourth power of the spacing over 384 times 16
+    assert v.relative < 1e-5
+    stairs = np.floor(one) + 0.25
+    found = compare(path("stairs", one, x=stairs), path("line", two, x=np.zeros(400)))
+    assert found.differences[0].largest == 5.25  # no spline swings beyond the stairs
+
+
+@pytest.mark.parametrize("late", [0.0, 1e-9, 1e-3])
+def test_a_jump_is_compared_as_a_jump(late):
+    """A body is let go at 1 s, which its speed and its position follow; its acceleration jumps."""
+
+    def motion(name, grid, at):
+        t = np.unique(np.append(grid, at))
+        since = np.where(t >= at, t - at, 0.0)
+        columns = {"a": np.where(t >= at, 2.0, 0.0), "v": 2 * since, "x": since**2}
+        units = {"a": "m/s2", "v": "m/s", "x": "m"}
+        return Trajectory(name, t, columns, units, np.array([[0, 0], [at, 1]]))
+
+    found = compare(motion("one", np.linspace(0, 2, 101), 1.0), motion("two", np.linspace(0, 1.99, 57), 1.0 + late))
+    largest = {each.name: each.largest for each in found.differences}
+    assert largest["a"] == 0.0
+    assert largest["v"] <= 2.1 * late + 1e-15
+    assert largest["x"] <= 2.1 * late + 1e-15
+    assert found.shift == pytest.approx(late, rel=1e-6, abs=1e-15)
+
+
+def test_a_time_that_stands_twice_has_both_sides_of_a_jump(tmp_path):
+    (tmp_path / "twice.csv").write_text("t [s],x [m]\n0,1\n1,1\n1,5\n2,5\n")
+    for value, apart in ((1, 4.0), (3, 2.0), (5, 4.0), (6, 5.0)):
+        (tmp_path / "other.csv").write_text(f"t [s],x [m]\n0,{value}\n1,{value}\n2,{value}\n")
+        one, two = (read(tmp_path / name) for name in ("twice.csv", "other.csv"))
+        (x,) = compare(one, two).differences
+        assert x.largest == apart
+        assert abs(x.left[1] - x.right[1]) == (0 if 1 <= value <= 5 else 1)
+
+
+def test_what_only_one_side_has_and_what_has_no_unit_is_said():
+    t = np.arange(20.0)
+    one = Trajectory("one", t, {"x": t, "a": t, "F": t}, {"x": "m", "a": "m/s²", "F": "N"})
+    two = Trajectory("two", t, {"x": t, "a": t, "E": t}, {"x": "", "a": "m/s^2", "E": "J"})
+    found = compare(one, two)
+    assert [each.name for each in found.differences] == ["x", "a"]
+    assert found.left_out == (
+        "x has no unit in two; it is taken to be in m",
+        "only in one: F",
+        "only in two: E",
+    )
+
+
+def test_the_first_example_of_the_help_shows_no_more_than_the_curves_have(harness):
+    for scene in ("stickslip", "stickslip-threshold"):
+        assert harness("run", scene, "--quiet").returncode == 0
+    done = harness("compare", "results/stickslip", "results/stickslip-threshold", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    (a,) = (each for each in json.loads(done.stdout)["variables"] if each["name"] == "a")
+    assert a["largest"] < 9.0
 
 
 def test_modes_are_not_interpolated():

@@ -4,6 +4,7 @@ It does not tell where its solver's steps end, so its communication steps are ha
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from .unpacked import unpacked
 
 COARSEST = 64  # communication steps of the first run
 FINEST = 2**18
-POINTS = 500  # communication steps of a run of ours from which nothing else is asked
+POINTS = 512  # communication steps of a run of ours from which nothing else is asked: those of others meet them
 NUMBERS = ("Real", "Float64", "Float32", "Integer", "Enumeration", "Boolean", "Int32", "Int64")
 
 
@@ -32,15 +33,26 @@ def description(path: Path) -> Any:
         raise HarnessError(f"{path.name} cannot be read: {reason(error)}") from None
 
 
-def own(path: Path, stop: float | None, values: dict[str, Any] | None = None) -> Scene | None:
+def own(
+    path: Path, stop: float | None, values: dict[str, Any] | None = None, grid: float | None = None
+) -> Scene | None:
     """The scene that runs one of our FMUs, every output recorded; None for an FMU that does not show its steps."""
     found = description(path)
     names = [variable.name for variable in found.modelVariables]
     if found.fmiVersion != "2.0" or any(name not in names for name in NEEDED):
         return None
     outputs = tuple(variable.name for variable in found.modelVariables if variable.causality == "output")
-    grid = ((stop or float(found.defaultExperiment.stopTime)) - float(found.defaultExperiment.startTime or 0)) / POINTS
-    return Scene(path.stem, path.stem, path.stem, path, outputs, stop=stop, grid=grid, values=values or {})
+    return gridded(Scene(path.stem, path.stem, path.stem, path, outputs, stop=stop, grid=grid, values=values or {}))
+
+
+def gridded(scene: Scene) -> Scene:
+    """The scene with a grid, its own or one that runs of anyone's FMUs meet."""
+    if scene.grid is not None:
+        return scene
+    experiment = description(scene.fmu).defaultExperiment
+    start = float(experiment.startTime or 0) if scene.start is None else scene.start
+    stop = float(experiment.stopTime) if scene.stop is None else scene.stop
+    return replace(scene, grid=(stop - start) / POINTS)
 
 
 def run(

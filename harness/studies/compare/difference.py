@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
+from ...analyses.decay.units import plain
 from ...errors import HarnessError
 from ...running.trajectory import Trajectory
+from .between import Sides, sides
 from .trajectory import common
 
-FEWEST = 10  # common times that make interpolation needless
+ENOUGH = 0.5  # share of the coarser one's times that are common, which makes interpolation needless
 SAME = 1e-9  # share of the stretch: times this close are one
 
 
@@ -56,19 +57,37 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
         has = [f"{each.name} ({', '.join(each.columns)})" for each in (one, two)]
         raise HarnessError(f"{' and '.join(has)} have no variable in common")
     begin, end = common(one, two)
-    time, first, second, interpolated = aligned(one, two, begin, end)
+    time, interpolated = times(one, two, begin, end)
+    said, shift, jumps = events(one, two, begin, end)
     differences, left_out = [], []
     for name in shared:
-        units = one.units[name], two.units[name]
-        if all(units) and units[0] != units[1]:
-            left_out.append(f"{name} is in {units[0]} in {one.name} and in {units[1]} in {two.name}")
-            continue
-        left, right = first(one.columns[name]), second(two.columns[name])
-        differences.append(difference(name, max(units), time, left, right))
+        unit, differs = units(one, two, name)
+        left_out += [differs] if differs else []
+        if unit is not None:
+            left, right = nearest(*(sides(each, name, time, at) for each, at in zip((one, two), jumps, strict=True)))
+            differences.append(difference(name, unit, time, left, right))
     if not differences:
         raise HarnessError(f"nothing to compare: {'; '.join(left_out)}")
-    said, shift = events(one, two, begin, end)
+    for each, other in ((one, two), (two, one)):
+        alone = [name for name in each.columns if name not in other.columns]
+        left_out += [f"only in {each.name}: {', '.join(alone)}"] if alone else []
     return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), said, shift)
+
+
+def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, str]:
+    """The unit in which a variable is compared, None where that cannot be, and what is to be said of it."""
+    left, right = (each.units[name] for each in (one, two))
+    if plain(left) == plain(right):
+        return left, ""
+    if left and right:
+        return None, f"{name} is in {left} in {one.name} and in {right} in {two.name}, and is left out"
+    return left or right, f"{name} has no unit in {(two if left else one).name}; it is taken to be in {left or right}"
+
+
+def nearest(left: Sides, right: Sides) -> tuple[np.ndarray, np.ndarray]:
+    """Of all values (n,) that either side may have, the two that are nearest to each other."""
+    one = np.clip(np.maximum(left.low, right.low), left.low, left.high)
+    return one, np.clip(one, right.low, right.high)
 
 
 def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: np.ndarray) -> Difference:
@@ -84,48 +103,35 @@ def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: 
     return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, left, right)
 
 
-def aligned(one: Trajectory, two: Trajectory, begin: float, end: float):  # type: ignore[no-untyped-def]
-    """The times of comparison (n,), what takes a column of each there, and whether that interpolates.
-
-    Common times if there are enough of them; else the coarser one's, the other one by its cubic spline.
-    """
+def times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[np.ndarray, bool]:
+    """The times of comparison (n,), and whether one is interpolated: those that are common if there are enough of them,
+    else those of the coarser one."""
     near = SAME * (end - begin)
-    at = np.clip(np.searchsorted(two.time, one.time - near), 0, len(two.time) - 1)
-    same = np.flatnonzero(np.abs(two.time[at] - one.time) <= near)
-    if len(same) >= min(FEWEST, len(one.time), len(two.time)):
-        return one.time[same], lambda y: y[same], lambda y: y[at[same]], False
-    grids = [each.time[(each.time >= begin) & (each.time <= end)] for each in (one, two)]
-    time = min(grids, key=len)
-    return (
-        time,
-        lambda y: y[np.isin(one.time, time)] if time is grids[0] else between(one.time, y, time),
-        lambda y: y[np.isin(two.time, time)] if time is grids[1] else between(two.time, y, time),
-        True,
-    )
+    grids = [np.unique(each.time[(each.time >= begin) & (each.time <= end)]) for each in (one, two)]
+    coarser, finer = sorted(grids, key=len)
+    at = np.clip(np.searchsorted(finer, coarser - near), 0, len(finer) - 1)
+    same = coarser[np.abs(finer[at] - coarser) <= near]
+    if len(same) >= ENOUGH * len(coarser):
+        return same, False
+    return coarser, True
 
 
-def between(t: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """The values y (n,) over t (n,) at other times; whole numbers, as modes, hold until the next."""
-    if not np.isfinite(y).all():
-        return np.full(len(at), np.nan)  # no spline knows what lies between
-    if (y == np.rint(y)).all():
-        return y[np.searchsorted(t, at, "right") - 1]
-    return CubicSpline(t, y)(at)
-
-
-def events(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[str, float | None]:
-    """A sentence about the changes of mode, and the largest difference of their times in s."""
+def events(
+    one: Trajectory, two: Trajectory, begin: float, end: float
+) -> tuple[str, float | None, tuple[np.ndarray, np.ndarray]]:
+    """A sentence about the changes of mode, the largest difference of their times in s, and the stretches of time in
+    which each of the two jumps (k, 2): where events are of one kind, from the earlier to the later of a pair."""
+    known = [np.zeros((1, 2)) if each.events is None else each.events for each in (one, two)]
+    first, second = (rows[1:][(rows[1:, 0] >= begin) & (rows[1:, 0] <= end)] for rows in known)
+    jumps = np.column_stack([first[:, 0], first[:, 0]]), np.column_stack([second[:, 0], second[:, 0]])
     if one.events is None or two.events is None:
-        return "", None
-    first, second = (each.events[1:] for each in (one, two) if each.events is not None)
-    first, second = (rows[(rows[:, 0] >= begin) & (rows[:, 0] <= end)] for rows in (first, second))
+        return "", None, jumps
     if len(first) != len(second):
-        return f"{len(first)} changes of mode in {one.name}, {len(second)} in {two.name}", np.nan
+        return f"{len(first)} changes of mode in {one.name}, {len(second)} in {two.name}", np.nan, jumps
     if not (first[:, 1] == second[:, 1]).all():
         i = int(np.argmax(first[:, 1] != second[:, 1]))
-        return (
-            f"change of mode {i + 1} is to {first[i, 1]:g} in {one.name} and to {second[i, 1]:g} in {two.name}",
-            np.nan,
-        )
+        text = f"change of mode {i + 1} is to {first[i, 1]:g} in {one.name} and to {second[i, 1]:g} in {two.name}"
+        return text, np.nan, jumps
     shift = float(np.abs(first[:, 0] - second[:, 0]).max()) if len(first) else 0.0
-    return f"{len(first)} changes of mode in both, at most {shift:.3g} s apart", shift
+    pairs = np.sort(np.column_stack([first[:, 0], second[:, 0]]), axis=1)
+    return f"{len(first)} changes of mode in both, at most {shift:.3g} s apart", shift, (pairs, pairs)

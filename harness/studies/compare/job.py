@@ -22,7 +22,7 @@ def perform_compare(
     """Compare two FMUs, scenes, result folders or CSV files, and write the differences to out/compare/<one>-<two>."""
     from .figure import draw
 
-    one, two = (trajectory.load(source, stop, tolerance, report) for source in sources)
+    one, two = trajectory.both(sources, stop, tolerance, report)
     found = compare(one, two)
     folder = out / "compare" / f"{one.name}-{two.name}"
     with replacing(folder, ("compare.json", "figure.png")) as fresh:
@@ -70,7 +70,7 @@ def table(found: Comparison) -> Table:
 
 def sentences(found: Comparison) -> list[str]:
     """How the two came about, what was compared, and what their events say."""
-    how = "the coarser one's times, the other by cubic spline" if found.interpolated else "common times"
+    how = "those of the coarser one; the other lies between its samples" if found.interpolated else "common to both"
     said = [f"{each.name}: {each.note}" for each in (found.one, found.two) if each.note]
     return [
         *said,

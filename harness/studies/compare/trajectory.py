@@ -1,6 +1,7 @@
 """A trajectory, wherever it comes from: a result folder, a CSV file, or a run of any FMU."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from ...analyses.decay.columns import numeric, split
 from ...analyses.decay.units import TIMES
 from ...errors import HarnessError, SceneError, shown
-from ...running.any_fmu import own, run
+from ...running.any_fmu import gridded, own, run
 from ...running.fmu import simulate
 from ...running.trajectory import Trajectory, of_run
 from ...scenes.scene import check_built
@@ -32,28 +33,55 @@ def read(path: Path) -> Trajectory:
     time = table[:, 0] * TIMES[units[0] or "s"]
     if not ((np.abs(time) < LATEST).all() and (np.diff(time) >= 0).all()):
         raise SceneError(f"{file.name}: the time in its first column must rise, within {LATEST:g} s")
-    last = np.append(np.diff(time) > 0, True)  # where a time stands twice, what holds after the event
-    columns = {name: table[last, i] for i, name in enumerate(names) if i}
+    columns = {name: table[:, i] for i, name in enumerate(names) if i}
     events = path / "events.csv" if path.is_dir() else None
     known = numeric(events)[1] if events and events.is_file() else None
     if known is not None and (known.shape[1] != 2 or not np.isfinite(known).all()):
         raise SceneError(f"{events} holds no times and modes")
-    return Trajectory(path.stem, time[last], columns, dict(zip(names, (u or "" for u in units), strict=True)), known)
+    return Trajectory(path.stem, time, columns, dict(zip(names, (u or "" for u in units), strict=True)), known)
 
 
-def load(source: str, stop: float | None, tolerance: float, report: Callable[[float], None]) -> Trajectory:
-    """The trajectory of a folder, a CSV file, an FMU's path or a shipped scene's name."""
+def both(
+    sources: tuple[str, str], stop: float | None, tolerance: float, report: Callable[[float], None]
+) -> tuple[Trajectory, Trajectory]:
+    """The trajectories of two folders, CSV files, FMUs' paths or shipped scenes' names.  Where one is recorded and the
+    other can be run, it is run to the same times."""
+    found = [recorded(source) for source in sources]
+    grid = next((spacing(each.time) for each in found if each), None)
+    one, two = (each or ran(source, stop, tolerance, grid, report) for each, source in zip(found, sources, strict=True))
+    return one, two
+
+
+def recorded(source: str) -> Trajectory | None:
+    """The trajectory of a folder or a CSV file; None for what has to be run."""
     path = Path(source)
-    if path.suffix == ".fmu":
-        scene = own(path, stop)
-        return of_run(simulate(scene, report)) if scene else run(path, stop, tolerance, {}, report)
-    if path.exists() and path.suffix != ".toml":
+    if path.exists() and path.suffix not in (".fmu", ".toml"):
         return read(path)
     if path.suffix in (".csv", ".txt"):
         raise SceneError(f"there is no {path}")
+    return None
+
+
+def ran(
+    source: str, stop: float | None, tolerance: float, grid: float | None, report: Callable[[float], None]
+) -> Trajectory:
+    """The trajectory of an FMU's path or a shipped scene's name, run anew; the grid in s is for one of ours."""
+    path = Path(source)
+    if path.suffix == ".fmu":
+        scene = own(path, stop, grid=grid)
+        return of_run(simulate(scene, report)) if scene else run(path, stop, tolerance, {}, report)
     scene = load_scene(source)
     check_built(scene.fmu)
-    return of_run(simulate(scene, report))
+    return of_run(simulate(replace(scene, grid=grid) if grid else gridded(scene), report))
+
+
+def spacing(time: np.ndarray) -> float | None:
+    """The communication step in s of which the times (n,) are multiples, but for some that lie between, as of events;
+    None if there is none."""
+    h = float(np.median(np.diff(time)))
+    places = (time - time[0]) / h if h > 0 else np.full(len(time), np.nan)
+    even = np.abs(places - np.rint(places)) < 1e-6 * np.maximum(places, 1)
+    return h if even.mean() > 0.5 else None
 
 
 def common(one: Trajectory, two: Trajectory) -> tuple[float, float]:
