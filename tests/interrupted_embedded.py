@@ -29,7 +29,7 @@ def interrupted(slave, name, arguments):
     try:
         list(map(methodcaller("__call__"), calls))
     except BaseException as error:
-        return [type(error).__name__, error.args, slave.failure]
+        return [type(error).__name__, error.args, sys.stderr.getvalue().splitlines()[-1]]
 
 
 FMI2 = {"get_real": [[0]], "set_real": [[0], [1.0]], "get_integer": [[0]], "setup_experiment": [0.0]}

@@ -5,7 +5,9 @@ from math import radians
 import pytest
 from models import MODELS, Choice, Input, Output, Parameter, declared, model_class
 
+from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.declare import Count, Declaring, Fixed, Local
+from fmus.runtime.sentences import of_value
 
 POUND, INCH = 0.45359237, 0.0254
 SLED = {"m": 12.5, "k": 742.5, "mu_s": 0.9, "mu_d": 0.6, "g": 9.81, "v_driver": 0.034}
@@ -122,7 +124,8 @@ def test_a_declaration_says_what_it_allows():
         kind = Choice(2, "kind", (("one", 1, "first"), ("two", 2, "second")))
 
     assert vars(Sample()) == {"free": 1.0, "mass": 1.0, "share": 0.5, "kind": 2}
-    assert Sample.mass.refusal("mass", -2.0) == "mass = -2.0 kg is refused: mass must be above 0.0 kg"
+    told = of_value(OUT_OF_RANGE, "mass", Sample.mass, -2.0)
+    assert told == "mass = -2.0 kg is refused: mass must be above 0.0 kg"
     assert Sample.share.allowed == "at least 0.0 and below 1.0"
     assert Sample.kind.allowed == "one of 1 (one), 2 (two)"
     assert Sample.free.allowed == "a finite number"

@@ -91,11 +91,10 @@ def test_own_bytes_are_taken_and_the_same_again(kind, name):
     heir = made(instance_name="heir")
     for spoil in ([], ["set"], ["set", "step"]):  # healthy, with a value that cannot be used, failed
         if spoil == ["set"]:
-            one.refused["m"] = "m = nan kg is refused: a sentence with a · and brackets [{"
-            one.changed = True
+            one.refuse("m", "m = nan kg is refused: a sentence with a · and brackets [{")
         if "step" in spoil:
             one.do_step(0.3, 0.1)
-            assert one.failure
+            assert one.run.failed
         heir._set_fmu_state(made._fmu_state_from_bytes(own(made, one)))
         assert own(made, heir) == own(made, one)
 
@@ -174,16 +173,8 @@ SENTENCES = {
     "with half a letter": {"m": "\ud800"},
     "with an end in C": {"m": "a\0b"},
 }
-SETTINGS = {
-    "phase": 7,
-    "start_time": 1,
-    "given_tolerance": 1.0,
-    "changed": 0,
-    "failure": "\udfff",
-    "origin": "elsewhere",
-    "refused": [["m", "a"]],
-    "kind": 3,
-}
+SETTINGS = {"origin": "elsewhere", "refused": [["m", "a"]], "run": {}}
+RUN = {"phase": 7, "interface": 3, "start_time": 1, "tolerance": 1.0, "refused": 1, "changed": 0, "observed": True}
 SPELLINGS = {
     "a space more": lambda text: text + b" ",
     "no spaces": lambda text: text.replace(b" ", b""),
@@ -195,7 +186,7 @@ SPELLINGS = {
     "nested without end": lambda text: b"[" * 200_000,
     "nested objects": lambda text: b'{"a":' * 200_000,
     "nested in a member": lambda text: text.replace(b'"refused": {}', b'"refused": ' + b"[" * 300 + b"]" * 300),
-    "very long": lambda text: text.replace(b'"failure": ""', b'"failure": "' + b"a" * 2_000_000 + b'"'),
+    "very long": lambda text: text.replace(b'"origin": "', b'"origin": "' + b"a" * 2_000_000),
     "a list": lambda text: b"[]",
     "a number": lambda text: b"NaN",
     "nothing": lambda text: b"",
@@ -210,6 +201,10 @@ FORGERIES = {
     **{
         f"setting {what}": lambda content, n=what, v=v: forged(content, lambda state: state.update({n: v}))
         for what, v in SETTINGS.items()
+    },
+    **{
+        f"run with {what}": lambda content, n=what, v=v: forged(content, lambda state: state["run"].update({n: v}))
+        for what, v in RUN.items()
     },
     **{what: lambda content, spell=spell: sealed(spell(content[8:])) for what, spell in SPELLINGS.items()},
     "mass of -5": lambda content: forged(content, lambda state: state["model"].update(m=-5.0)),

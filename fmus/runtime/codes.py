@@ -1,6 +1,16 @@
-"""The codes of the numerics: a number for each law, method, mode and status, said here and nowhere else."""
+"""A number for everything that is told apart by one, said here and nowhere else."""
 
 EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5  # methods, as solver.method
 HYBRID, SIGN, THRESHOLD = 1, 2, 3  # friction laws, as friction
 BACKWARD, STUCK, FORWARD = -1, 0, 1  # modes
-OK, DIVERGED, STALLED, ENDLESS = 0, 1, 2, 3  # statuses of a step
+
+INSTANTIATED, INITIALISING, RUNNING, TERMINATED = 0, 1, 2, 3  # phases of an instance
+UNDECIDED, CO_SIMULATION, MODEL_EXCHANGE = 0, 1, 2  # what an importer has it for
+
+# Statuses: of the motion; of a run that failed before; of what an importer asks for
+OK, DIVERGED, STALLED, ENDLESS = 0, 1, 2, 3
+FAILED = 4
+BAD_STEP, BAD_START, BAD_STOP, BAD_VALUE, INTEGRATED = 5, 6, 7, 8, 9
+CALCULATED, FIXED, OUT_OF_RANGE = 10, 11, 12  # why a value is bad
+NO_VARIABLE, FOREIGN_STATE, INTERRUPTED = 13, 14, 15
+RULES = 100  # and the number of the rule of the model that the values break

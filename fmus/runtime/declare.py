@@ -6,6 +6,8 @@ plain numbers of the same names.  The XML, the pages and the error messages read
 
 from math import inf, isfinite
 
+from .rules import within
+
 
 class Declared:
     """What a variable is: unit, description and range; an enumeration has `items` (label, value, sentence)."""
@@ -26,25 +28,24 @@ class Declared:
         self.name = name
 
     @property
+    def suffix(self):
+        """The unit, as it stands behind a number."""
+        return "" if self.unit in ("", "1") else f" {self.unit}"
+
+    @property
     def allowed(self):
         """The range in words."""
         if self.items:
             return "one of " + ", ".join(f"{value} ({label})" for label, value, _ in self.items)
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
         bounds = (("at least", self.low), ("above", self.above), ("at most", self.high), ("below", self.below))
-        words = [f"{word} {bound!r}{unit}" for word, bound in bounds if isfinite(bound)]
+        words = [f"{word} {bound!r}{self.suffix}" for word, bound in bounds if isfinite(bound)]
         return " and ".join(words) or "a finite number"
-
-    def refusal(self, name, value):
-        """The sentence about a value that is not allowed."""
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
-        return f"{name} = {value!r}{unit} is refused: {self.text} must be {self.allowed}"
 
     def accepts(self, value):
         """Whether `value` lies in the range; NaN and infinities never do."""
         if self.items:
             return value in [number for _, number, _ in self.items]
-        return isfinite(value) and self.low <= value <= self.high and self.above < value < self.below
+        return within(value, self.low, self.high, self.above, self.below)
 
 
 class Parameter(Declared):

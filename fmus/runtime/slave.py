@@ -4,8 +4,10 @@ from math import inf, nan
 
 from pythonfmu.fmi2slave import Fmi2Slave, Fmi2Status
 
+from . import rules
 from .boundary import guarded
-from .hosted import Hosted, getter, hosting, setter
+from .hosted import Hosted, hosting
+from .values import getter, setter
 
 
 def slave_for(model):
@@ -19,11 +21,8 @@ class Slave(Hosted, Fmi2Slave):
     @guarded
     def setup_experiment(self, start_time, stop_time=None, tolerance=None):
         try:
-            self.start_time = start_time
-            self.stop_time = inf if stop_time is None else stop_time
-            if tolerance is not None and 0.0 < tolerance < 1.0:
-                self.given_tolerance = tolerance
-            self.changed, self.observed = True, False
+            stop_time, tolerance = inf if stop_time is None else stop_time, tolerance or 0.0
+            rules.setup(self.run, start_time, stop_time, tolerance)
         except BaseException as error:  # as in hosted.py
             self.rescue(error)
 

@@ -7,19 +7,14 @@ comes (model exchange), and the run begins where the first step does.
 
 from math import fabs, nan
 
-from . import exchange
+from . import exchange, rules
 from .beside import PLACES, beside
 from .boundary import guarded
-from .codes import DIVERGED
-from .hosted import ERROR, SENTENCES, Hosted, getter, hosting, setter
-from .state import KEPT, RUNNING, SETTING_UP
+from .codes import CO_SIMULATION, DIVERGED, MODEL_EXCHANGE, OK, RUNNING, UNDECIDED
+from .failure import ERROR
+from .hosted import Hosted, hosting
 from .step import HUGE
-
-UNDECIDED, STEPPING, EXCHANGED = 0, 1, 2
-INTEGRATED = (
-    "a communication step from t = {t!r} s is refused: the importer integrates this instance (model exchange); "
-    "instantiate the FMU once more for co-simulation"
-)
+from .values import getter, setter
 
 
 def slave_for(model):
@@ -60,7 +55,7 @@ class Blank:
     value = 0
 
 
-DONE, FAILED = Stepped(0), Stepped(ERROR)
+STEPPED, NOT_STEPPED = Stepped(0), Stepped(ERROR)
 
 
 class Instance:
@@ -102,11 +97,11 @@ def asker(function, number):
 class Slave(Hosted, Instance):
     """One instance of a model, for co-simulation or for model exchange."""
 
-    kept = (*KEPT, "kind")
+    exchanges = True
 
     def begin(self, **kwargs):
         super().begin(**kwargs)
-        self.kind = UNDECIDED
+        self.run.interface = UNDECIDED
         self.nominals = exchange.nominals(self.model)
 
     get_float64, set_float64 = getter("Real", nan), setter("Real")
@@ -122,41 +117,23 @@ class Slave(Hosted, Instance):
     def place(self, name):
         return PLACES.get(name, name)
 
-    def recount(self, ahead):
-        super().recount(ahead)
+    def report(self, ahead):
+        super().report(ahead)
         self.model.exchange.show(self.model, self.model.solver)
-
-    def is_sound(self):
-        return self.kind in (UNDECIDED, STEPPING, EXCHANGED) and super().is_sound()
-
-    def broken_rule(self):
-        """The rule for our own solver binds as soon as that is what solves."""
-        rule = super().broken_rule()
-        return rule if self.kind == STEPPING or rule != self.model.own_solver else 0
 
     # ---- co-simulation
 
     @guarded
     def do_step(self, current_time, step_size):
         try:
-            if self.kind != STEPPING:
-                self.begin_stepping(current_time)
-            return DONE if Hosted.do_step(self, current_time, step_size) else FAILED
+            run, model = self.run, self.model
+            status = OK if run.interface == CO_SIMULATION else rules.begin_steps(run, model, current_time)
+            if status == OK:
+                status = rules.step(run, model, current_time, step_size)
+            return STEPPED if status == OK or self.give_up(status, current_time, step_size) else NOT_STEPPED
         except BaseException as error:  # as in hosted.py
             self.rescue(error)
-            return FAILED
-
-    def begin_stepping(self, current_time):
-        """The start time is that of the first step."""
-        if self.kind == EXCHANGED:
-            self.fail(INTEGRATED.format(t=current_time))
-            return
-        self.kind = STEPPING
-        if self.phase == RUNNING and not self.failure:
-            if current_time != self.model.solver.t:
-                self.start_time, self.phase = current_time, SETTING_UP
-            elif sentence := self.objection():
-                self.fail(sentence)
+            return NOT_STEPPED
 
     # ---- model exchange
 
@@ -198,39 +175,35 @@ class Slave(Hosted, Instance):
                 if fabs(march.x) + fabs(march.v) < HUGE:
                     before, self.nominals = self.nominals, exchange.nominals(model)
                     return Updated(states=exchange.update(model, march), nominals=self.nominals != before)
-                self.fail(SENTENCES[DIVERGED].format(t=march.t))
+                self.give_up(DIVERGED)
         except BaseException as error:  # as above
             self.rescue(error)
         return Updated(terminate=True)
 
     def begin_exchange(self):
-        self.observed = False
-        if self.kind != EXCHANGED:
-            self.kind = EXCHANGED
+        run = self.run
+        run.observed = False
+        if run.interface != MODEL_EXCHANGE:
+            run.interface = MODEL_EXCHANGE
             exchange.begin(self.model.solver)
 
     def ready(self):
         """Whether the values can be used; a run that has begun fails if they cannot."""
-        if self.phase == SETTING_UP:
-            if not self.observed:
+        run = self.run
+        if run.phase < RUNNING:
+            if not run.observed:
                 self.observe()
-            return self.observed
+            return run.observed
         try:
-            return self.prepared()
+            status = rules.ready(run, self.model)
+            return status == OK or self.give_up(status)
         except BaseException as error:  # as above
             return self.rescue(error)
-
-    def apply(self):
-        """In model exchange nothing starts anew: the mode follows at the next event."""
-        if self.kind == EXCHANGED and self.phase == RUNNING:
-            self.changed = self.observed = False
-        else:
-            super().apply()
 
     def observe(self):
         try:
             super().observe()
         except (ArithmeticError, ValueError):
-            if self.kind != EXCHANGED:
+            if self.run.interface != MODEL_EXCHANGE:
                 raise
             self.silence()

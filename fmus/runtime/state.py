@@ -3,21 +3,19 @@
 import json
 from binascii import crc32
 
+from . import rules
 from .boundary import announce, guarded, pay, printable
+from .codes import FOREIGN_STATE
+from .sentences import CALLS
 
-SETTING_UP, RUNNING = 0, 1
 SETTABLE = ("parameter", "input")
-KEPT = ("phase", "start_time", "stop_time", "given_tolerance", "changed", "failure")
 NOWHERE = ""  # among the values that cannot be used: one for a variable that is not there
 
 LONGEST = 1 << 20  # bytes; a state has some thousand
 DEEPEST = 400  # brackets: what they nest must not overflow the parser
 WIDEST = 1 << 63  # integers are those of C
 
-REFUSED = (
-    "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
-    "save a state anew and pass it on unchanged"
-)
+REFUSED = CALLS[FOREIGN_STATE]
 
 
 def sealed(state):
@@ -77,6 +75,9 @@ def take_over(thing, names, kept):
             setattr(thing, name, list(value) if isinstance(value, list) else value)
 
 
+RUN = shape(rules.Run(0.0))
+
+
 class Foreign(ValueError):
     """What is not a saved state of this FMU; the layer tells the host what it reads here."""
 
@@ -88,13 +89,14 @@ class Saved:
     """The part of an instance that saves and restores its state."""
 
     shape = living = bare = None  # of the subclass that hosting() makes
-    kept: tuple[str, ...] = KEPT  # what a state holds beside the model
+    exchanges = False  # made for model exchange as well
 
     @guarded
     def _get_fmu_state(self):
         try:
-            kept = {name: getattr(self, name) for name in self.kept}
-            return kept | {"origin": __name__, "refused": dict(self.refused), "model": numbers(self.model, self.shape)}
+            run = dict(numbers(self.run, RUN), observed=False)  # for outputs are calculated anew
+            kept = {"run": run, "origin": __name__, "refused": dict(self.refused)}
+            return kept | {"model": numbers(self.model, self.shape)}
         except BaseException as error:  # as in hosted.py
             self.rescue(error)
             return {}
@@ -142,14 +144,13 @@ class Saved:
             return False
 
     def is_sound(self):
-        """Whether phase, settings and sentences are such as can come about."""
+        """Whether run, settings and sentences are such as can come about."""
         names = {NOWHERE, *(name for name, _ in self.variables)}
-        texts = [self.failure, *self.refused.values()]
         return (
-            self.phase in (SETTING_UP, RUNNING)
-            and 0.0 < self.given_tolerance < 1.0
+            rules.is_sound(self.run, self.model, self.exchanges)
+            and self.run.refused == len(self.refused)
             and names.issuperset(self.refused)
-            and all(type(text) is str and text == printable(text) for text in texts)
+            and all(type(text) is str and text == printable(text) for text in self.refused.values())
             and all(
                 declared.accepts(getattr(thing, name))
                 for (_, declared), (thing, name) in zip(self.variables, self.owners)
@@ -173,10 +174,8 @@ class Saved:
 
     def be(self, state):
         """Take over a state that has been found good."""
-        for name in self.kept:
-            setattr(self, name, state[name])
+        take_over(self.run, RUN, state["run"])
         self.refused = dict(state["refused"])
         take_over(self.model, self.shape, state["model"])
-        self.observed = False
-        if self.failure:
+        if self.run.failed:
             self.silence()

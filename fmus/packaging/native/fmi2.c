@@ -1,9 +1,9 @@
 /* FMI 2.0 co-simulation of the model in model.h.
  *
- * Every call does what it does in the Python FMU of the same model (fmus/runtime/hosted.py there), with the same
- * sentences: a value that cannot be used is remembered and told by the next step; a run that cannot begin or go on
- * answers fmi2Error, and every calculated Real reads NaN from then on.  On top, calls out of order, wrong references
- * and missing addresses are refused: such a call changes nothing.
+ * Every call does what it does in the Python FMU of the same model, by the same rules (rules_... in model.h) and with
+ * the same sentences: a value that cannot be used is remembered and told by the next step; a run that cannot begin or
+ * go on answers fmi2Error, and every calculated Real reads NaN from then on.  On top, calls out of order, wrong
+ * references and missing addresses are refused: such a call changes nothing.
  *
  * All that an instance changes is in one struct, and nothing is shared: instances may run side by side in threads.
  */
@@ -16,7 +16,6 @@
 
 typedef struct {
     State state;
-    bool observed; /* the outputs are those of the present point */
     bool logging;
     fmi2CallbackFunctions functions;
     char name[];
@@ -47,7 +46,7 @@ static fmi2Status refuse_order(const Instance *instance, int phases, const char 
     if (!instance) return fmi2Error;
     add(&why, " is refused: the FMU is ");
     for (int i = 0; i < 4; i++) {
-        if (instance->state.phase == 1 << i) add(&why, names[i]);
+        if (instance->state.run.phase == i) add(&why, names[i]);
     }
     for (int i = 0; i < 4; i++) {
         if (!(phases & 1 << i)) continue;
@@ -61,19 +60,19 @@ static fmi2Status refuse_order(const Instance *instance, int phases, const char 
 static fmi2Status refuse_reference(const Instance *instance, fmi2ValueReference reference, const char *type)
 {
     Text text = {0};
-    add(&text, "value reference ");
-    add_integer(&text, reference);
-    add(&text, " is refused: it is not that of a variable of type ");
-    add(&text, type);
-    add(&text, "; the model description of this very FMU has those that are");
+    tell_call(&text, NO_VARIABLE, reference, type);
     say(instance, &text);
     return fmi2Error;
 }
 
+/* Phases as bits. */
+enum { NEW = 1 << INSTANTIATED, SETTING_UP = NEW | 1 << INITIALISING, ALIVE = SETTING_UP | 1 << RUNNING };
+enum { ANY = ALIVE | 1 << TERMINATED };
+
 /* The instance, if the call is allowed in its phase. */
 #define ENTER(phases)         \
     Instance *it = component; \
-    if (!it || !(it->state.phase & (phases))) return refuse_order(it, (phases), __func__)
+    if (!it || !(1 << it->state.run.phase & (phases))) return refuse_order(it, (phases), __func__)
 
 /* An address that the call cannot do without. */
 #define NEED(address) \
@@ -81,34 +80,12 @@ static fmi2Status refuse_reference(const Instance *instance, fmi2ValueReference 
 
 /* ---- values */
 
-static void add_value(Text *text, const Variable *variable, double value)
-{
-    if (variable->is_real) add_real(text, value);
-    else add_integer(text, (int64_t)value);
-}
-
-static void tell_refusal(const Variable *variable, const Refusal *refusal, Text *text)
-{
-    add(text, variable->name);
-    add(text, " = ");
-    add_value(text, variable, refusal->value);
-    if (refusal->reason == OUT_OF_RANGE) {
-        add(text, variable->refusal);
-        return;
-    }
-    add(text, " is refused: ");
-    add(text, variable->text);
-    add(text, refusal->reason == CALCULATED ? " is calculated, not set"
-                                            : " is fixed, it must be set before initialisation ends; reset the FMU "
-                                              "to change it");
-}
-
 /* The refused value that came first. */
 static const Refusal *refused(const State *state)
 {
     const Refusal *first = NULL, *end = state->refused + VARIABLES;
     for (const Refusal *refusal = state->refused; refusal < end; refusal++) {
-        if (refusal->reason != NONE && (!first || refusal->turn < first->turn)) first = refusal;
+        if (refusal->reason != OK && (!first || refusal->turn < first->turn)) first = refusal;
     }
     return first;
 }
@@ -124,99 +101,33 @@ static void silence(Model *model)
 
 static void fail(Instance *it, const Text *text)
 {
-    it->state.failed = true;
-    it->observed = false;
+    it->state.run.failed = true;
+    it->state.run.observed = false;
     silence(&it->state.model);
     say(it, text);
 }
 
-static void fail_by_status(Instance *it, int64_t status, double start)
+/* Fail for the reason that the rules give, in a communication step of h from t. */
+static void give_up(Instance *it, int64_t status, double t, double h)
 {
+    const State *state = &it->state;
     Text text = {0};
-    tell_failure(status, it->state.model.solver.step.t0, start, &text);
+    if (status == FAILED) return; /* which has been told */
+    if (status == BAD_VALUE) {
+        const Refusal *first = refused(state);
+        tell_value(&text, first->reason, &variables[first - state->refused], first->value);
+    } else {
+        tell_status(&text, status, &state->run, &state->model, t, h);
+    }
     fail(it, &text);
 }
 
-/* Where Python would raise. */
-static void fail_by_fault(Instance *it) { fail_by_status(it, DIVERGED, it->state.model.solver.t); }
-
-/* ---- the run */
-
-typedef enum { GOOD, BAD, FAULTY } Verdict;
-
-/* Whether the values can be used as they stand; if they are bad, why. */
-static Verdict judge(State *state, Text *why)
+/* What the rules have answered; a fault is where Python would raise. */
+static fmi2Status answer(Instance *it, int64_t status, bool fault, double t, double h)
 {
-    bool fault = false;
-    int64_t rule;
-    if (state->refusals) {
-        const Refusal *first = refused(state);
-        tell_refusal(&variables[first - state->refused], first, why);
-        return BAD;
-    }
-    if (!isfinite(state->start_time)) {
-        add(why, "start time = ");
-        add_real(why, state->start_time);
-        add(why, " s is refused: it must be a finite number");
-        return BAD;
-    }
-    if (!(state->stop_time > state->start_time)) {
-        add(why, "stop time = ");
-        add_real(why, state->stop_time);
-        add(why, " s is refused: it must be above the start time, ");
-        add_real(why, state->start_time);
-        add(why, " s");
-        return BAD;
-    }
-    rule = prepare(&state->model, &fault);
-    if (fault) return FAULTY;
-    if (rule) tell_rule(&state->model, rule, why);
-    return rule ? BAD : GOOD;
-}
-
-/* Let the motion begin, or go on from the present point, with values that have been found good. */
-static bool apply(Instance *it)
-{
-    State *state = &it->state;
-    bool fault = false;
-    if (!(state->phase & SETTING_UP)) restart(&state->model, &fault);
-    else start(&state->model, state->start_time, state->stop_time, state->tolerance, &fault);
-    if (fault) {
-        fail_by_fault(it);
-        return false;
-    }
-    state->changed = it->observed = false;
-    return true;
-}
-
-/* Take over what was set, or fail. */
-static bool settle(Instance *it)
-{
-    Text why = {0};
-    switch (judge(&it->state, &why)) {
-    case GOOD: return apply(it);
-    case BAD: fail(it, &why); return false;
-    default: fail_by_fault(it); return false;
-    }
-}
-
-/* Bring the outputs to the present point; NaN while the values cannot be used.  False after a fault. */
-static bool bring_up(Instance *it)
-{
-    State *state = &it->state;
-    bool fault = false;
-    if (state->changed || state->phase & SETTING_UP || state->refusals) {
-        Text why = {0};
-        switch (judge(state, &why)) {
-        case GOOD: break;
-        case BAD: silence(&state->model); return true;
-        default: fail_by_fault(it); return false;
-        }
-        if (!apply(it)) return false;
-    }
-    it->observed = observe(&state->model, &fault) && !fault;
-    if (!it->observed) fail_by_fault(it);
-    return it->observed;
+    if (fault) status = DIVERGED;
+    if (status != OK) give_up(it, status, t, h);
+    return status == OK ? fmi2OK : fmi2Error;
 }
 
 /* ---- reading and writing */
@@ -241,6 +152,7 @@ static fmi2Status check(const Instance *it, bool is_real, const fmi2ValueReferen
 static fmi2Status ready(Instance *it, bool is_real, const fmi2ValueReference vr[], size_t nvr, const void *value,
                         const char *function)
 {
+    State *state = &it->state;
     bool reported = false, ahead = false, fault = false;
     if (!vr || !value) return check(it, is_real, vr, nvr, value, function);
     for (size_t i = 0; i < nvr; i++) {
@@ -248,23 +160,17 @@ static fmi2Status ready(Instance *it, bool is_real, const fmi2ValueReference vr[
         reported |= variables[vr[i]].is_reported;
         ahead |= vr[i] == T_NEXT;
     }
-    if (!it->observed && !it->state.failed && !bring_up(it)) return fmi2Discard;
-    if (reported && it->observed) report(&it->state.model, &fault);
-    if (ahead && it->observed && !fault) look_ahead(&it->state.model, &fault);
-    if (fault) fail_by_fault(it);
-    return fault ? fmi2Discard : fmi2OK;
+    if (!state->run.observed && !state->run.failed) {
+        int64_t status = rules_observe(&state->run, &state->model, &fault);
+        if (!fault && status != OK && status != DIVERGED) silence(&state->model);
+        else if (answer(it, status, fault, NAN, NAN)) return fmi2Discard;
+    }
+    if (reported && state->run.observed) rules_report(&state->model, ahead, &fault);
+    return answer(it, OK, fault, NAN, NAN) ? fmi2Discard : fmi2OK;
 }
 
 /* As much of a count as an fmi2Integer can hold. */
 static fmi2Integer integer_of(double value) { return value < 2147483647.0 ? (fmi2Integer)value : 2147483647; }
-
-static Reason objection(const State *state, const Variable *variable, double value)
-{
-    return variable->is_calculated                         ? CALCULATED
-           : state->phase == RUNNING && variable->is_fixed ? FIXED
-           : accepts(variable, value)                      ? NONE
-                                                           : OUT_OF_RANGE;
-}
 
 /* Take over a value, or remember that it cannot be used.  False after a fault. */
 static bool write_one(Instance *it, fmi2ValueReference reference, double value)
@@ -272,23 +178,19 @@ static bool write_one(Instance *it, fmi2ValueReference reference, double value)
     State *state = &it->state;
     const Variable *variable = &variables[reference];
     Refusal *refusal = &state->refused[reference];
-    bool fault = false;
-    if (value == value_of(&state->model, variable) && refusal->reason == NONE) return true;
-    it->observed = false;
-    state->refusals -= refusal->reason != NONE;
-    refusal->reason = objection(state, variable, value);
-    if (refusal->reason != NONE) {
-        state->refusals++;
+    bool allowed = accepts(variable, value), fault = false;
+    if (value == value_of(&state->model, variable) && refusal->reason == OK) return true;
+    state->run.observed = false;
+    state->run.refused -= refusal->reason != OK;
+    refusal->reason = rules_reason(&state->run, variable->is_calculated, variable->is_fixed, allowed, &fault);
+    if (refusal->reason != OK) {
+        state->run.refused++;
         refusal->value = value;
         refusal->turn = ++state->turns;
         return true;
     }
-    if (!state->changed && state->phase == RUNNING) rebase(&state->model, &fault);
-    if (fault) {
-        fail_by_fault(it);
-        return false;
-    }
-    state->changed = true;
+    rules_change(&state->run, &state->model, &fault);
+    if (answer(it, OK, fault, NAN, NAN)) return false;
     if (variable->is_real) *(double *)place(&state->model, variable) = value;
     else *(int64_t *)place(&state->model, variable) = (int64_t)value;
     return true;
@@ -318,7 +220,7 @@ fmi2Status fmi2GetInteger(fmi2Component component, const fmi2ValueReference vr[]
 
 fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
 {
-    ENTER(SETTING_UP | RUNNING);
+    ENTER(ALIVE);
     if (check(it, true, vr, nvr, value, __func__)) return fmi2Error;
     for (size_t i = 0; i < nvr && write_one(it, vr[i], value[i]); i++) continue;
     return fmi2OK;
@@ -326,7 +228,7 @@ fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], s
 
 fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
 {
-    ENTER(SETTING_UP | RUNNING);
+    ENTER(ALIVE);
     if (check(it, false, vr, nvr, value, __func__)) return fmi2Error;
     for (size_t i = 0; i < nvr && write_one(it, vr[i], value[i]); i++) continue;
     return fmi2OK;
@@ -356,14 +258,14 @@ fmi2Status fmi2GetString(fmi2Component component, const fmi2ValueReference vr[],
 
 fmi2Status fmi2SetBoolean(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Boolean value[])
 {
-    ENTER(SETTING_UP | RUNNING);
+    ENTER(ALIVE);
     (void)value;
     return refuse_all(it, vr, nvr, "Boolean");
 }
 
 fmi2Status fmi2SetString(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
 {
-    ENTER(SETTING_UP | RUNNING);
+    ENTER(ALIVE);
     (void)value;
     return refuse_all(it, vr, nvr, "String");
 }
@@ -373,16 +275,6 @@ fmi2Status fmi2SetString(fmi2Component component, const fmi2ValueReference vr[],
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return fmi2Version; }
-
-static void begin(Instance *it)
-{
-    memset(&it->state, 0, sizeof it->state);
-    it->state.phase = INSTANTIATED;
-    it->state.stop_time = INFINITY;
-    it->state.tolerance = TOLERANCE;
-    it->state.model = initial;
-    it->observed = false;
-}
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
                               fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
@@ -402,7 +294,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     copy_name(it->name, name);
     it->functions = *functions;
     it->logging = loggingOn;
-    begin(it);
+    memcpy(&it->state, &initial, sizeof initial);
     if (fmuType != fmi2CoSimulation) {
         add(&why, "fmi2Instantiate is refused: this FMU is for co-simulation only");
     } else if (!fmuGUID || strcmp(fmuGUID, MODEL_GUID)) {
@@ -433,96 +325,54 @@ fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, s
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-    ENTER(INSTANTIATED);
-    it->state.start_time = startTime;
-    it->state.stop_time = stopTimeDefined ? stopTime : INFINITY;
-    if (toleranceDefined && 0.0 < tolerance && tolerance < 1.0) it->state.tolerance = tolerance;
-    it->state.changed = true;
-    it->observed = false;
+    ENTER(NEW);
+    bool fault = false;
+    rules_setup(&it->state.run, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0,
+                &fault);
     return fmi2OK;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component component)
 {
-    ENTER(INSTANTIATED);
-    it->state.phase = INITIALISING;
+    ENTER(NEW);
+    it->state.run.phase = INITIALISING;
     return fmi2OK;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component component)
 {
-    ENTER(INITIALISING);
-    bool good = settle(it) && !it->state.failed;
-    it->state.phase = RUNNING;
-    return good ? fmi2OK : fmi2Error;
+    ENTER(1 << INITIALISING);
+    bool fault = false;
+    int64_t status = rules_begin(&it->state.run, &it->state.model, &fault);
+    return answer(it, status, fault, NAN, NAN);
 }
 
 fmi2Status fmi2Terminate(fmi2Component component)
 {
-    ENTER(RUNNING);
-    it->state.phase = TERMINATED;
+    ENTER(1 << RUNNING);
+    it->state.run.phase = TERMINATED;
     return fmi2OK;
 }
 
 fmi2Status fmi2Reset(fmi2Component component)
 {
     ENTER(ANY);
-    begin(it);
+    memcpy(&it->state, &initial, sizeof initial);
     return fmi2OK;
 }
 
 /* ---- steps */
 
-static void fail_by_step(Instance *it, double t, double h)
-{
-    Text text = {0};
-    add(&text, "a communication step of ");
-    add_real(&text, h);
-    add(&text, " s from t = ");
-    add_real(&text, t);
-    add(&text, " s is refused: it must be above zero, begin at the present point, t = ");
-    add_real(&text, it->state.model.solver.t);
-    add(&text, " s, and end by the stop time, t = ");
-    add_real(&text, it->state.model.solver.step.t_end);
-    add(&text, " s");
-    fail(it, &text);
-}
-
-/* One communication step, which must begin at the present point and end by the stop time.  An importer's times are sums
- * at the size of the start, so that near zero they may be off by more than the last place of the time itself. */
-static bool advance_by(Instance *it, double t, double h)
-{
-    Model *model = &it->state.model;
-    double now = model->solver.t, stop = model->solver.step.t_end, end = t + h;
-    double size = greater(greater(fabs(it->state.start_time), fabs(now)), fabs(end));
-    bool fault = false, begins_here = fabs(t - now) <= 1e-6 * h + 4e-15 * size;
-    int64_t status;
-    if (fabs(end - model->solver.step.t1) <= 1e-15 * size && fabs(end) < INFINITY) {
-        end = model->solver.step.t1; /* the end of an internal step, but for the rounding of the sum */
-    } else if (stop < end && end < INFINITY && end <= stop + 1e-6 * h + 1e-11 * size) {
-        end = stop;
-    }
-    if (!(h > 0.0 && begins_here && now <= end && end <= stop && end < INFINITY)) {
-        fail_by_step(it, t, h);
-        return false;
-    }
-    if (!(end > now)) return true;
-    it->observed = false;
-    status = advance(model, end, &fault);
-    if (fault) fail_by_fault(it);
-    else if (status != OK) fail_by_status(it, status, now);
-    return !fault && status == OK;
-}
-
 fmi2Status fmi2DoStep(fmi2Component component, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
-    ENTER(RUNNING);
+    ENTER(1 << RUNNING);
     State *state = &it->state;
+    double t = currentCommunicationPoint, h = communicationStepSize;
+    bool fault = false;
+    int64_t status = rules_step(&state->run, &state->model, t, h, &fault);
     (void)noSetFMUStatePriorToCurrentPoint;
-    if (state->failed) return fmi2Error;
-    if ((state->changed || state->refusals) && !settle(it)) return fmi2Error;
-    return advance_by(it, currentCommunicationPoint, communicationStepSize) ? fmi2OK : fmi2Error;
+    return answer(it, status, fault, t, h);
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind s, fmi2Real *value)
@@ -530,7 +380,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind s, fm
     ENTER(ANY);
     NEED(value);
     if (s != fmi2LastSuccessfulTime) return fmi2Discard;
-    *value = it->state.phase & SETTING_UP ? NAN : it->state.model.solver.t;
+    *value = it->state.run.phase < RUNNING ? NAN : it->state.model.solver.t;
     return fmi2OK;
 }
 
@@ -548,8 +398,10 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s,
 
 static fmi2Status refuse_state(const Instance *it)
 {
-    return refuse(it, "a saved state", " is refused: it is not, to the last bit, one that this very FMU wrote; save a "
-                                       "state anew and pass it on unchanged");
+    Text text = {0};
+    tell_call(&text, FOREIGN_STATE, 0, "");
+    say(it, &text);
+    return fmi2Error;
 }
 
 /* Keep a state in memory, in place of an older one if there is one. */
@@ -574,7 +426,6 @@ fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate)
     const State *state = unsealed(FMUstate);
     if (!state) return refuse_state(it);
     memcpy(&it->state, state, sizeof *state);
-    it->observed = false;
     return fmi2OK;
 }
 

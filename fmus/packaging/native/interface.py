@@ -1,22 +1,25 @@
-"""The C header of one model: its numerics, its declared variables, its sentences."""
+"""The C header of one model: its numerics, the rules, its declared variables, the sentences."""
 
 import inspect
+from collections.abc import Mapping
 from string import Formatter
 from typing import Any
 
-from ...runtime.codes import DIVERGED, OK
+from ...runtime import codes, rules
+from ...runtime.codes import INTEGRATED, INTERRUPTED, RULES
 from ...runtime.declare import Declared, Declaring
-from ...runtime.hosted import CALCULATED, SENTENCES
+from ...runtime.failure import CALCULATED
+from ...runtime.sentences import CALLS, RUN, VALUES
 from ..description import declared_by
-from .entries import ENTRIES
-from .kinds import BOOL, FLOAT, INT, Kind, literal
+from .entries import entries
+from .kinds import BOOL, FLOAT, INT, literal
 from .program import Program
 
 HEADER = """\
 /* {sentence}
  *
- * Frozen from {file}.py and the runtime of friction-fmus: structs for the model and what it owns, its numerics, its
- * declared variables and what is said about them.
+ * Frozen from {file}.py and the runtime of friction-fmus: structs for the model and what it owns, its numerics, the
+ * rules of its run, its declared variables and all that is said.
  */
 #ifndef MODEL_H
 #define MODEL_H
@@ -27,13 +30,12 @@ HEADER = """\
 #include "variable.h"
 
 #define MODEL_NAME "{name}"
-#define TOLERANCE {tolerance}
-enum {{ OK = {ok}, DIVERGED = {diverged} }};
+
+enum {{
+{codes}}};
 
 {numerics}
 typedef struct {name} Model;
-
-static const Model initial = {image};
 
 {items}
 enum {{ VARIABLES = {count}, T_NEXT = {ahead} }};
@@ -41,62 +43,94 @@ enum {{ VARIABLES = {count}, T_NEXT = {ahead} }};
 static const Variable variables[VARIABLES] = {{
 {table}}};
 
+/* What of an instance makes its run. */
+typedef struct {{
+    struct Run run;
+    Model model;
+    int64_t turns; /* how many values were refused so far */
+    Refusal refused[VARIABLES];
+}} State;
+
+static const State initial = {{
+    .run = {run},
+    .model = {image},
+}};
+
 enum {{ MEMBERS = {count_of_members} }};
 
 static const Member members[MEMBERS] = {{
 {members}}};
 
-/* Why the motion ended at t, in a communication step from start on. */
-static void tell_failure(int64_t status, double t, double start, Text *text)
+/* Why the run cannot go on, in a communication step of h from t. */
+static void tell_status(Text *text, int64_t status, const struct Run *run, const Model *model, double t, double h)
 {{
-{failures}}}
+    switch (status) {{
+{statuses}    }}
+}}
 
-/* The rule that the values break. */
-static void tell_rule(const Model *self, int64_t rule, Text *text)
+/* Why a variable cannot be set to a value. */
+static void tell_value(Text *text, int64_t reason, const Variable *variable, double value)
 {{
-{rules}}}
+    switch (reason) {{
+{values}    }}
+}}
+
+/* Why a call is refused: there is no such variable of the type, or a state is foreign. */
+static void tell_call(Text *text, int64_t reason, int64_t reference, const char *type)
+{{
+    switch (reason) {{
+{calls}    }}
+}}
 
 #endif
 """
-
-
-class _Gap:
-    """Stands for the value in a sentence."""
-
-    def __repr__(self) -> str:
-        return "\0"
+PLACES = {  # field of a sentence -> what adds it to the text
+    **{name: f"add_real(text, {name})" for name in ("t", "h")},
+    **{name: f"add_real(text, run->{name}_time)" for name in ("start", "stop")},
+    **{"now": "add_real(text, model->solver.t)", "t0": "add_real(text, model->solver.step.t0)"},
+    **{"t_end": "add_real(text, model->solver.step.t_end)", "value": "add_value(text, variable, value)"},
+    **{name: f"add(text, variable->{name})" for name in ("name", "unit", "text", "allowed")},
+    **{"reference": "add_integer(text, reference)", "kind": "add(text, type)"},
+}
+ELSEWHERE = (INTEGRATED, INTERRUPTED)  # statuses of other kinds
 
 
 def header(model: type[Declaring]) -> str:
     """The text of model.h."""
     thing: Any = model()
-    program = Program(thing)
-    for entry, kinds in ENTRIES.items():
-        program.entry(entry.__name__, entry, *kinds)
+    run = rules.Run(thing.tolerance)
+    program = Program(thing, run)
+    for function, kinds in entries(program.layout.model).items():
+        program.exported(function, kinds)
+    layout = program.layout
     declared = declared_by(model)
     names = [name for name, _ in declared]
-    fields: dict[str, tuple[Kind, str]] = {
-        name: (kind, f"self->{name}") for name, kind in program.layout.fields[model].items()
+    numbers = [("run", rules.Run), ("model", model)]
+    members = [(path, kind) for prefix, cls in numbers for path, kind in layout.scalars(cls, f"{prefix}.")]
+    members = [(path, kind) for path, kind in members if kind in (INT, BOOL)]
+    statuses = {status: sentence for status, sentence in RUN.items() if status not in ELSEWHERE}
+    broken = dict(enumerate(thing.rules, RULES + 1))
+    own = {
+        name: f"{'add_real' if kind is FLOAT else 'add_integer'}(text, model->{name})"
+        for name, kind in layout.fields[model].items()
     }
-    members = [(path, kind) for path, kind in program.layout.scalars(model) if kind in (INT, BOOL)]
-    rules = dict(enumerate(thing.rules, 1))
     return HEADER.format(
         sentence=(inspect.getdoc(model) or "").splitlines()[0],
         name=model.__name__,
         file=model.__module__.rsplit(".", 1)[-1],
-        tolerance=literal(thing.tolerance),
-        ok=OK,
-        diverged=DIVERGED,
+        codes="".join(f"    {name} = {code},\n" for name, code in vars(codes).items() if name.isupper()),
         numerics=program.text(),
-        image=program.layout.image(thing),
+        run=layout.image(run, "        "),
+        image=layout.image(thing, "        "),
         items="".join(_items(name, meaning) for name, meaning in declared if meaning.items),
         count=len(names),
         ahead=names.index("solver.t_next"),
         count_of_members=len(members),
-        members="".join(f"    {{offsetof(Model, {path}), {literal(kind is BOOL)}}},\n" for path, kind in members),
-        table="".join(_row(name, meaning) for name, meaning in declared),
-        failures=_told("status", SENTENCES, {name: (FLOAT, name) for name in ("t", "start")}),
-        rules=_told("rule", rules, fields),
+        members="".join(f"    {{offsetof(State, {path}), {literal(kind is BOOL)}}},\n" for path, kind in members),
+        table="".join(_line(name, meaning) for name, meaning in declared),
+        statuses=_cases(statuses, PLACES) + _cases(broken, own),
+        values=_cases(VALUES, PLACES),
+        calls=_cases(CALLS, PLACES),
     )
 
 
@@ -115,32 +149,31 @@ def _of(name: str) -> str:
     return f"items_of_{name.replace('.', '_')}"
 
 
-def _row(name: str, meaning: Declared) -> str:
+def _line(name: str, meaning: Declared) -> str:
     """One variable in the table."""
-    _, refusal = meaning.refusal(name, _Gap()).split("\0")
+    words = (name, meaning.text, meaning.suffix, meaning.allowed)
     flags = (meaning.type == "Real", meaning.causality in CALCULATED, meaning.variability == "fixed", "." in name)
     bounds = (meaning.low, meaning.high, meaning.above, meaning.below)
     items = f"{_of(name)}, {_of(name)} + {len(meaning.items)}" if meaning.items else "NULL, NULL"
     parts = [
-        f"{_text(name)}, {_text(meaning.text)}, offsetof(Model, {name})",
+        *map(_text, words),
+        f"offsetof(Model, {name})",
         *map(literal, flags),
         *(literal(float(bound)) for bound in bounds),
         items,
-        _text(refusal),
     ]
     return f"    {{{', '.join(parts)}}},\n"
 
 
-def _told(number: str, sentences: dict[int, str], fields: dict[str, tuple[Kind, str]]) -> str:
-    """A switch over sentences with numbers in them; every parameter is used, whatever the sentences are."""
-    lines = [f"    switch ({number}) {{\n"]
+def _cases(sentences: Mapping[int, str], places: Mapping[str, str]) -> str:
+    """The cases of a switch over sentences with fields in them."""
+    lines = []
     for case, sentence in sentences.items():
         lines.append(f"    case {case}:\n")
         for words, field, _, _ in Formatter().parse(sentence):
             if words:
                 lines.append(f"        add(text, {_text(words)});\n")
             if field:
-                kind, place = fields[field]
-                lines.append(f"        {'add_real' if kind is FLOAT else 'add_integer'}(text, {place});\n")
+                lines.append(f"        {places[field]};\n")
         lines.append("        break;\n")
-    return "".join([*lines, "    }\n"])
+    return "".join(lines)

@@ -11,10 +11,10 @@ NOTHING = "nothing"  # the member of a struct that has no other, for C has no em
 class Layout:
     """The fields of every class, owned classes first."""
 
-    def __init__(self, model: object) -> None:
+    def __init__(self, model: object, *others: object) -> None:
         self.fields: dict[type, dict[str, Kind]] = {}
         self._seen: set[int] = set()
-        self.model = self._add(model, type(model).__name__)
+        self.model, *_ = [self._add(thing, type(thing).__name__) for thing in (model, *others)]
 
     def _add(self, thing: object, path: str) -> Object:
         if id(thing) in self._seen:

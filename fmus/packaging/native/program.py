@@ -20,20 +20,25 @@ class Compiled:
 
 
 class Program:
-    """The numerics of one live model object."""
+    """The numerics of one live model object, and of what stands beside it."""
 
-    def __init__(self, model: object) -> None:
-        self.layout = Layout(model)
+    def __init__(self, model: object, *others: object) -> None:
+        self.layout = Layout(model, *others)
         self._done: dict[tuple, Compiled | None] = {}  # None: begun
         self._texts: list[str] = []
         self._groups: dict[str, Group] = {}
         self._names: set[str] = set()
 
     def entry(self, name: str, function: FunctionType, *kinds: Scalar) -> Compiled:
-        """A function of the model and of numbers, for the FMI layer to call by `name`."""
-        body = Body(self, function, [self.layout.model, *kinds])
-        body.faults = True  # so that all entries look alike
-        return self._keep(body, name)
+        """A function of the model and of numbers, to be called from outside by `name`."""
+        return self.exported(function, [self.layout.model, *kinds], name)
+
+    def exported(self, function: FunctionType, kinds: list[Kind], name: str = "") -> Compiled:
+        """A function to be called from outside: each of them has a fault flag, whatever the model."""
+        body = Body(self, function, kinds)
+        body.faults = True
+        done = self._done[(function, *kinds)] = self._keep(body, name or self._name(function))
+        return done
 
     def specialised(self, function: FunctionType, kinds: list[Kind]) -> Compiled | None:
         """The C function for a function of the numerics and the kinds of its arguments; None while it is begun."""

@@ -1,4 +1,4 @@
-/* What of an instance makes its run; and a saved state, which is that under a seal.
+/* A saved state: what of an instance makes its run, under a seal.
  *
  * Bytes come back from files and networks, and so do pointers from importers.  A saved state is believed if it carries
  * the GUID of this very FMU, if its checksum holds, and if nothing in it could lead the code astray: no truth value but
@@ -12,30 +12,6 @@
 #include <string.h>
 
 #include "model.h"
-
-/* The phases of an instance, as bits. */
-enum { INSTANTIATED = 1, INITIALISING = 2, RUNNING = 4, TERMINATED = 8 };
-enum { SETTING_UP = INSTANTIATED | INITIALISING, ANY = SETTING_UP | RUNNING | TERMINATED };
-
-typedef enum { NONE, CALCULATED, FIXED, OUT_OF_RANGE } Reason;
-
-/* A value that was set and cannot be used; the earliest is told first. */
-typedef struct {
-    Reason reason;
-    double value;
-    int64_t turn;
-} Refusal;
-
-typedef struct {
-    int phase;
-    double start_time, stop_time, tolerance;
-    bool changed; /* values were set since the motion was last settled */
-    bool failed;
-    int refusals; /* how many values are refused */
-    int64_t turns;
-    Refusal refused[VARIABLES];
-    Model model;
-} State;
 
 typedef struct {
     uint64_t sum; /* of all bytes that follow */
@@ -63,8 +39,8 @@ static bool accepts(const Variable *variable, double value)
         }
         return false;
     }
-    return isfinite(value) && variable->low <= value && value <= variable->high && variable->above < value &&
-           value < variable->below;
+    bool fault = false;
+    return rules_within(value, variable->low, variable->high, variable->above, variable->below, &fault);
 }
 
 /* ---- the seal */
@@ -93,6 +69,7 @@ static void seal(Sealed *sealed, const State *state)
     memset(sealed, 0, sizeof *sealed);
     memcpy(sealed->guid, MODEL_GUID, sizeof MODEL_GUID);
     memcpy(&sealed->state, state, sizeof *state);
+    sealed->state.run.observed = false; /* for outputs are calculated anew */
     sealed->sum = sum_under(sealed);
 }
 
@@ -104,10 +81,10 @@ static bool is_ours(const Sealed *sealed) { return sealed && !strncmp(sealed->gu
 /* Whether a byte can be read as a bool. */
 static bool is_bool(const void *byte) { return *(const unsigned char *)byte <= 1; }
 
-static bool are_members_sound(const Model *model)
+static bool are_members_sound(const State *state)
 {
     for (const Member *member = members; member < members + MEMBERS; member++) {
-        const void *value = (const char *)model + member->offset;
+        const void *value = (const char *)state + member->offset;
         if (member->is_bool ? !is_bool(value) : *(const int64_t *)value < -1 || *(const int64_t *)value > LARGEST) {
             return false;
         }
@@ -127,26 +104,24 @@ static bool are_values_sound(const Model *model)
 
 static bool are_refusals_sound(const State *state)
 {
-    int refusals = 0;
+    int64_t refusals = 0;
     if (state->turns < 0 || state->turns > LARGEST) return false;
     for (int i = 0; i < VARIABLES; i++) {
         const Refusal *refusal = &state->refused[i];
-        if (refusal->reason == NONE) continue;
-        if ((unsigned)refusal->reason > OUT_OF_RANGE || refusal->turn < 1 || refusal->turn > state->turns) return false;
+        if (refusal->reason == OK) continue;
+        if (refusal->reason < CALCULATED || refusal->reason > OUT_OF_RANGE) return false;
+        if (refusal->turn < 1 || refusal->turn > state->turns) return false;
         if (!variables[i].is_real && !(fabs(refusal->value) <= 2147483648.0)) return false; /* an fmi2Integer */
         refusals++;
     }
-    return refusals == state->refusals;
+    return refusals == state->run.refused;
 }
 
 static bool is_sound(State *state)
 {
     bool fault = false;
-    if (!is_bool(&state->changed) || !is_bool(&state->failed) || !are_members_sound(&state->model)) return false;
-    if (state->phase < INSTANTIATED || state->phase > TERMINATED || state->phase & (state->phase - 1)) return false;
-    if (!(0.0 < state->tolerance && state->tolerance < 1.0)) return false;
-    if (!are_values_sound(&state->model) || !are_refusals_sound(state)) return false;
-    return state->phase & SETTING_UP || state->failed || holds_together(&state->model, &fault);
+    return are_members_sound(state) && are_values_sound(&state->model) && are_refusals_sound(state) &&
+           rules_is_sound(&state->run, &state->model, false, &fault) && !fault;
 }
 
 /* The state under the seal; NULL if it is broken in any way. */

@@ -6,21 +6,36 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "text.h"
+
 typedef struct {
     const char *name, *text;
+    const char *unit, *allowed; /* the unit behind a number, and the range, in words */
     size_t offset; /* in the model */
     bool is_real;  /* a double; otherwise an int64_t */
     bool is_calculated, is_fixed;
     bool is_reported; /* tells of the solver, and is brought up to date when it is read */
     double low, high, above, below;     /* low <= value <= high, above < value < below */
     const int64_t *items, *end_of_items; /* of an enumeration */
-    const char *refusal;                /* what is said behind a value out of range */
 } Variable;
 
-/* A member of the model, or of what it owns, that is an int or a bool of the numerics. */
+/* A value that was set and cannot be used; the earliest is told first. */
+typedef struct {
+    int64_t reason; /* OK where there is none */
+    double value;
+    int64_t turn;
+} Refusal;
+
+/* An int or a bool of the numerics, as a member of the state. */
 typedef struct {
     size_t offset;
     bool is_bool; /* otherwise an int64_t */
 } Member;
+
+static inline void add_value(Text *text, const Variable *variable, double value)
+{
+    if (variable->is_real) add_real(text, value);
+    else add_integer(text, (int64_t)value);
+}
 
 #endif

@@ -1,0 +1,66 @@
+"""All that an FMU says, by its code; the native kind gets these very words.
+
+Fields: t, h are the communication step that is asked for; now, t_end the present point and where the run ends; t0 is
+the beginning of the internal step in force; start, stop are the experiment.  Numbers stand as repr writes them.
+"""
+
+from .codes import (
+    BAD_START,
+    BAD_STEP,
+    BAD_STOP,
+    CALCULATED,
+    DIVERGED,
+    ENDLESS,
+    FIXED,
+    FOREIGN_STATE,
+    INTEGRATED,
+    INTERRUPTED,
+    NO_VARIABLE,
+    OUT_OF_RANGE,
+    RULES,
+    STALLED,
+)
+from .march import MOST_CALLS, MOST_STEPS
+
+RUN = {
+    DIVERGED: "the motion leaves the range of numbers after t = {t0!r} s; lower what drives it or check the parameters",
+    STALLED: "the solver makes no headway after t = {t0!r} s, its step is as small as the time axis can hold; "
+    "raise solver.rtol or choose another solver.method",
+    ENDLESS: f"more than {MOST_STEPS} internal steps or {MOST_CALLS} right-hand sides within one communication step, "
+    "from t = {now!r} s on; choose another solver.method, raise solver.rtol or take shorter communication steps",
+    BAD_STEP: "a communication step of {h!r} s from t = {t!r} s is refused: it must be above zero, begin at the "
+    "present point, t = {now!r} s, and end by the stop time, t = {t_end!r} s",
+    BAD_START: "start time = {start!r} s is refused: it must be a finite number",
+    BAD_STOP: "stop time = {stop!r} s is refused: it must be above the start time, {start!r} s",
+    INTEGRATED: "a communication step from t = {t!r} s is refused: the importer integrates this instance (model "
+    "exchange); instantiate the FMU once more for co-simulation",
+    INTERRUPTED: "the run was interrupted after t = {now!r} s; reset the FMU to run again",
+}
+VALUES = {
+    CALCULATED: "{name} = {value} is refused: {text} is calculated, not set",
+    FIXED: "{name} = {value} is refused: {text} is fixed, it must be set before initialisation ends; reset the FMU to "
+    "change it",
+    OUT_OF_RANGE: "{name} = {value}{unit} is refused: {text} must be {allowed}",
+}
+CALLS = {
+    NO_VARIABLE: "value reference {reference} is refused: it is not that of a variable of type {kind}; the model "
+    "description of this very FMU has those that are",
+    FOREIGN_STATE: "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; save a state "
+    "anew and pass it on unchanged",
+}
+
+
+def of_run(status, run, model, t, h):
+    """The sentence about a run, or about the rule of the model that its values break."""
+    if status not in RUN:
+        return model.rules[status - RULES - 1].format_map(vars(model))
+    march = model.solver
+    present = {"now": march.t, "t0": march.step.t0, "t_end": march.step.t_end}
+    return RUN[status].format(t=t, h=h, start=run.start_time, stop=run.stop_time, **present)
+
+
+def of_value(reason, name, declared, value):
+    """The sentence about a value that cannot be used, of a declared variable."""
+    return VALUES[reason].format(
+        name=name, value=repr(value), unit=declared.suffix, text=declared.text, allowed=declared.allowed
+    )
