@@ -43,7 +43,7 @@ def analyse(run: Run) -> StepSizes:
     h = run.steps.h
     refused = int(run.steps.rejected.sum())
     collapse = None
-    if "velocity" in run.scene.motion:
+    if "velocity" in run.wanted.motion:
         collapse = collapse_at_reversals(run.steps.t, h, run.time, run.motion("velocity"))
     return StepSizes(
         count=len(h) + 1,

@@ -15,5 +15,5 @@ def list_() -> None:
     table = Table("scene", "model", "title", box=None)
     for file in shipped():
         scene = load(file)
-        table.add_row(scene.name, scene.model, scene.title)
+        table.add_row(scene.name, scene.file.stem, scene.title)
     screen().print(table)

@@ -12,8 +12,8 @@ import fmpy
 import numpy as np
 
 from ..errors import HarnessError, SceneError, reason, unknown
-from ..scenes.scene import Scene
 from .settings import NEEDED
+from .specification import Specification
 from .trajectory import Trajectory
 from .unpacked import unpacked
 
@@ -35,24 +35,24 @@ def description(path: Path) -> Any:
 
 def own(
     path: Path, stop: float | None, values: dict[str, Any] | None = None, grid: float | None = None
-) -> Scene | None:
-    """The scene that runs one of our FMUs, every output recorded; None for an FMU that does not show its steps."""
+) -> Specification | None:
+    """What runs one of our FMUs, every output recorded; None for an FMU that does not show its steps."""
     found = description(path)
     names = [variable.name for variable in found.modelVariables]
     if found.fmiVersion != "2.0" or any(name not in names for name in NEEDED):
         return None
     outputs = tuple(variable.name for variable in found.modelVariables if variable.causality == "output")
-    return gridded(Scene(path.stem, path.stem, path.stem, path, outputs, stop=stop, grid=grid, values=values or {}))
+    return gridded(Specification(path, outputs, values or {}, stop=stop, grid=grid))
 
 
-def gridded(scene: Scene) -> Scene:
-    """The scene with a grid, its own or one that runs of anyone's FMUs meet."""
-    if scene.grid is not None:
-        return scene
-    experiment = description(scene.fmu).defaultExperiment
-    start = float(experiment.startTime or 0) if scene.start is None else scene.start
-    stop = float(experiment.stopTime) if scene.stop is None else scene.stop
-    return replace(scene, grid=(stop - start) / POINTS)
+def gridded(wanted: Specification) -> Specification:
+    """The same with a grid, its own or one that runs of anyone's FMUs meet."""
+    if wanted.grid is not None:
+        return wanted
+    experiment = description(wanted.fmu).defaultExperiment
+    start = float(experiment.startTime or 0) if wanted.start is None else wanted.start
+    stop = float(experiment.stopTime) if wanted.stop is None else wanted.stop
+    return replace(wanted, grid=(stop - start) / POINTS)
 
 
 def run(

@@ -1,4 +1,4 @@
-"""Runs a built FMI 2.0 FMU through fmpy, as a scene says.
+"""Runs a built FMI 2.0 FMU through fmpy, as it is wanted.
 
 The FMU's solver runs free of the communication points.  A step to `solver.t_next` ends where the solver's own step
 ends, so following it shows every step and event through the standard interface alone.
@@ -20,9 +20,9 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from ..errors import HarnessError, SceneError, reason
-from ..scenes.scene import Scene
 from .run import Cost, Events, Run, Steps
 from .settings import check_fmu, labels, settings
+from .specification import Specification
 from .unpacked import unpacked
 
 Report = Callable[[float], None]  # told how far the run is, as a share of it
@@ -36,7 +36,7 @@ REPORT_EVERY = 4096  # communication points
 class Plan:
     """What a run does: from `start` to `stop` in s, and the variables read at each communication point."""
 
-    scene: Scene
+    wanted: Specification
     variables: dict[str, Any]
     start: float
     stop: float
@@ -55,52 +55,52 @@ class Trace:
     ends: array = field(default_factory=lambda: array("q", [0]))
 
 
-def simulate(scene: Scene, report: Report = lambda share: None) -> Run:
-    """Run a scene; HarnessError with the FMU's own sentence if it fails, SceneError for what it does not offer."""
+def simulate(wanted: Specification, report: Report = lambda share: None) -> Run:
+    """The run that is wanted; HarnessError with the FMU's sentence if it fails, SceneError if it has not got that."""
     functions, messages = callbacks()
     messages.clear()
     spoken = io.StringIO()
-    with redirect_stderr(spoken), instance(scene, functions) as (description, fmu):
+    with redirect_stderr(spoken), instance(wanted, functions) as (description, fmu):
         try:
-            return passes(planned(scene, description), fmu, report)
+            return passes(planned(wanted, description), fmu, report)
         except FMICallException as error:
             lines = [text for status, text in messages if status > WARNING] or spoken.getvalue().strip().splitlines()
-            raise HarnessError(lines[-1] if lines else f"{scene.fmu.name}: {error}") from None
+            raise HarnessError(lines[-1] if lines else f"{wanted.fmu.name}: {error}") from None
 
 
 @contextmanager
-def loading(scene: Scene) -> Iterator[None]:
-    """Whatever is wrong with the file of a scene's FMU becomes one sentence."""
+def loading(wanted: Specification) -> Iterator[None]:
+    """Whatever is wrong with the file of an FMU becomes one sentence."""
     try:
         yield
     except HarnessError:
         raise
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
-        raise HarnessError(f"{scene.fmu.name} cannot be loaded: {reason(error)}") from None
+        raise HarnessError(f"{wanted.fmu.name} cannot be loaded: {reason(error)}") from None
 
 
-def described(scene: Scene) -> Any:
-    """What the FMU says of itself; HarnessError if it cannot be read, SceneError if it does not fit the scene."""
-    with loading(scene):
-        description = fmpy.read_model_description(scene.fmu)
+def described(wanted: Specification) -> Any:
+    """What the FMU says of itself; HarnessError if it cannot be read, SceneError if it does not fit what is wanted."""
+    with loading(wanted):
+        description = fmpy.read_model_description(wanted.fmu)
         if description.fmiVersion != "2.0" or description.coSimulation is None:
-            raise HarnessError(f"{scene.fmu.name} is not an FMI 2.0 co-simulation FMU")
-        check_fmu(scene, {variable.name: variable for variable in description.modelVariables})
+            raise HarnessError(f"{wanted.fmu.name} is not an FMI 2.0 co-simulation FMU")
+        check_fmu(wanted, {variable.name: variable for variable in description.modelVariables})
         return description
 
 
 @contextmanager
-def instance(scene: Scene, functions: fmi2.fmi2CallbackFunctions) -> Iterator[tuple[Any, Any]]:
+def instance(wanted: Specification, functions: fmi2.fmi2CallbackFunctions) -> Iterator[tuple[Any, Any]]:
     """The description and a fresh instance of the FMU; its files and its library are gone afterwards."""
     with ExitStack() as files:
-        description = described(scene)
-        with loading(scene):
-            folder = files.enter_context(unpacked(scene.fmu))
+        description = described(wanted)
+        with loading(wanted):
+            folder = files.enter_context(unpacked(wanted.fmu))
             fmu = fmi2.FMU2Slave(
                 guid=description.guid,
                 unzipDirectory=str(folder),
                 modelIdentifier=description.coSimulation.modelIdentifier,
-                instanceName=scene.name,
+                instanceName=wanted.model,
             )
             fmu.instantiate(callbacks=functions, loggingOn=True)
         try:
@@ -128,29 +128,29 @@ def callbacks() -> tuple[fmi2.fmi2CallbackFunctions, list[tuple[int, str]]]:
     return functions, messages
 
 
-def planned(scene: Scene, description: Any) -> Plan:
-    """The plan of a scene: what it names, and what follows the solver's steps."""
+def planned(wanted: Specification, description: Any) -> Plan:
+    """The plan of a run: what it names, and what follows the solver's steps."""
     variables = {variable.name: variable for variable in description.modelVariables}
     experiment = description.defaultExperiment
-    start = float(experiment.startTime or 0.0) if scene.start is None else scene.start
-    stop = float(experiment.stopTime) if scene.stop is None else scene.stop
+    start = float(experiment.startTime or 0.0) if wanted.start is None else wanted.start
+    stop = float(experiment.stopTime) if wanted.stop is None else wanted.stop
     if not stop > start:
         raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
-    if scene.grid is not None and (points := (stop - start) / scene.grid) > MOST_POINTS:
-        sentence = f"grid = {scene.grid!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
+    if wanted.grid is not None and (points := (stop - start) / wanted.grid) > MOST_POINTS:
+        sentence = f"grid = {wanted.grid!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
         raise SceneError(f"{sentence}; at most {MOST_POINTS}: take a larger one")
-    wanted = list(scene.outputs)
-    if scene.follow:
+    names = list(wanted.outputs)
+    if wanted.follow:
         extra = ("solver.t_next", "solver.rejected", "events.count", "events.t_last", "mode")
-        wanted += [name for name in extra if name in variables and name not in wanted]
-    reals = [name for name in wanted if variables[name].type == "Real"]
-    return Plan(scene, variables, start, stop, reals, [name for name in wanted if name not in reals])
+        names += [name for name in extra if name in variables and name not in names]
+    reals = [name for name in names if variables[name].type == "Real"]
+    return Plan(wanted, variables, start, stop, reals, [name for name in names if name not in reals])
 
 
 def passes(plan: Plan, fmu: Any, report: Report) -> Run:
-    """Run the plan as often as the scene asks, on one instance; keep the last pass, and the fastest time."""
-    repeat = plan.scene.repeat
-    values = settings(plan.scene, plan.variables)
+    """Run the plan as often as is asked, on one instance; keep the last pass, and the fastest time."""
+    repeat = plan.wanted.repeat
+    values = settings(plan.wanted, plan.variables)
     seconds = []
     for turn in range(repeat):
         if turn:
@@ -200,7 +200,7 @@ def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
         trace.reals.frombytes(row_of_reals)
         trace.integers.frombytes(row_of_integers)
 
-    start, stop, grid, follow = plan.start, plan.stop, plan.scene.grid, plan.scene.follow
+    start, stop, grid, follow = plan.start, plan.stop, plan.wanted.grid, plan.wanted.follow
     next_at = plan.reals.index("solver.t_next") if follow else 0
     nearly = 1e-9 * grid if grid else 0.0  # a grid point this close to the end of a step is that end
     t, point, turns = start, 1, 0
@@ -215,7 +215,7 @@ def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
         if follow and reals[next_at] <= target + nearly:
             target, ends = min(reals[next_at], stop), True
         if not target > t:
-            raise HarnessError(f"{plan.scene.fmu.name}: solver.t_next = {target!r} s does not lie after t = {t!r} s")
+            raise HarnessError(f"{plan.wanted.fmu.name}: solver.t_next = {target!r} s does not lie after t = {t!r} s")
         status = do_step(component, t, target - t, 1)
         if status > WARNING:
             raise FMICallException("fmi2DoStep", status)
@@ -225,7 +225,7 @@ def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
             trace.ends.append(len(trace.time) - 1)
         turns += 1
         if turns % REPORT_EVERY == 0:
-            report((turn + (t - start) / (stop - start)) / plan.scene.repeat)
+            report((turn + (t - start) / (stop - start)) / plan.wanted.repeat)
     return trace
 
 
@@ -237,27 +237,27 @@ def buffer(variables: dict[str, Any], names: list[str], kind: Any) -> tuple[int,
 
 def gather(plan: Plan, fmu: Any, trace: Trace, seconds: float) -> Run:
     """The run that a trace shows."""
-    scene, variables = plan.scene, plan.variables
+    wanted, variables = plan.wanted, plan.variables
     time = np.array(trace.time)
     read: dict[str, np.ndarray] = {}
     for names, values in ((plan.reals, trace.reals), (plan.integers, trace.integers)):
         read |= zip(names, np.array(values).reshape(len(time), len(names)).T, strict=True)
-    columns = {name: read[name] for name in scene.outputs}
+    columns = {name: read[name] for name in wanted.outputs}
     for name, column in columns.items():
         lost = np.flatnonzero(~np.isfinite(column))
         if len(lost) and variables[name].causality == "output":
-            raise HarnessError(f"{scene.fmu.name}: {name} is {column[lost[0]]} at t = {time[lost[0]]} s")
+            raise HarnessError(f"{wanted.fmu.name}: {name} is {column[lost[0]]} at t = {time[lost[0]]} s")
     steps = events = None
-    if scene.follow:
+    if wanted.follow:
         ends = np.array(trace.ends)
         steps = Steps(time[ends], np.diff(time[ends]), np.diff(read["solver.rejected"][ends]))
     settled = parameters(plan, fmu)
-    if scene.follow and settled.get("friction") == "hybrid":
+    if wanted.follow and settled.get("friction") == "hybrid":
         at = np.flatnonzero(np.diff(read["events.count"])) + 1
         events = Events(np.append(time[0], read["events.t_last"][at]), np.append(read["mode"][0], read["mode"][at]))
     taken, refused, evaluated = (whole(plan, fmu, f"solver.{name}") for name in ("steps", "rejected", "evaluations"))
     return Run(
-        scene=scene,
+        wanted=wanted,
         time=time,
         columns=columns,
         units={name: variables[name].unit or "" for name in columns},

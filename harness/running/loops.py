@@ -9,9 +9,9 @@ from pathlib import Path
 
 import fmpy
 
-from ..scenes.scene import Scene
 from .clock import best
 from .fmu import callbacks, described, instance, simulate
+from .specification import Specification
 
 POINTS = 1600
 REPEAT = 10
@@ -19,7 +19,7 @@ REPEAT = 10
 
 def usual(file: Path, steps: int) -> float:
     """Run time in s of fmpy's loop, the shortest of several runs of one instance."""
-    with instance(_scene(file), callbacks()[0]) as (description, fmu):
+    with instance(Specification(file), callbacks()[0]) as (description, fmu):
         stop = float(description.defaultExperiment.stopTime)
 
         def run() -> None:
@@ -37,15 +37,12 @@ def usual(file: Path, steps: int) -> float:
 
 def lean(file: Path, steps: int) -> float:
     """Run time in s of the harness's loop, from initialisation on, the shortest of several runs of one instance."""
-    description = described(_scene(file))
+    description = described(Specification(file))
     stop = float(description.defaultExperiment.stopTime)
     outputs = tuple(v.name for v in description.modelVariables if v.causality == "output")
-    return simulate(_scene(file, outputs, stop, stop / steps)).cost.seconds
-
-
-def _scene(file: Path, outputs: tuple[str, ...] = (), stop: float | None = None, grid: float | None = None) -> Scene:
-    name = file.stem
-    return Scene(name, name, name, file, outputs, stop=stop, grid=grid, follow=False, repeat=REPEAT)
+    return simulate(
+        Specification(file, outputs, stop=stop, grid=stop / steps, follow=False, repeat=REPEAT)
+    ).cost.seconds
 
 
 def shared(many: float, one: float) -> float:

@@ -9,15 +9,15 @@ from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf, isnan, nan
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from ..scenes.scene import Scene, build
+from ..scenes.fmus import fmu_of
 from .fmu import WARNING, FMICallException, begin, callbacks, described, instance, put
 from .settings import labels
+from .specification import Specification
 
 Calls = list[tuple[float, float]]  # communication steps: from, size in s
 Changes = dict[float, dict[str, float]]  # values by the time from which they hold, in s
@@ -89,10 +89,10 @@ class Refusals:
     wrong: tuple[str, ...]
 
 
-def plain(model: str) -> Scene:
-    """The scene that names a model's FMU, position, velocity and energy."""
-    motion = ["theta", "omega"] if model == "pendulum" else ["x", "v"]
-    return build(Path(model), {"title": model, "model": model, "outputs": [*motion, "energy"]})
+def plain(model: str) -> Specification:
+    """A model's FMU, its position, velocity and energy."""
+    motion = ("theta", "omega") if model == "pendulum" else ("x", "v")
+    return Specification(fmu_of(model), (*motion, "energy"))
 
 
 def card(model: str) -> Card:
@@ -116,8 +116,10 @@ def card(model: str) -> Card:
 class Slave:
     """An instance of an FMU that can be run anew and anew."""
 
-    def __init__(self, scene: Scene, description: Any, fmu: Any, messages: list[tuple[int, str]], spoken: io.StringIO):
-        self.fmu, self.messages, self.spoken, self.outputs = fmu, messages, spoken, scene.outputs
+    def __init__(
+        self, outputs: tuple[str, ...], description: Any, fmu: Any, messages: list[tuple[int, str]], spoken: io.StringIO
+    ):
+        self.fmu, self.messages, self.spoken, self.outputs = fmu, messages, spoken, outputs
         self.variables = {variable.name: variable for variable in description.modelVariables}
 
     def begin(self, setting: Setting) -> None:
@@ -154,9 +156,9 @@ class Slave:
 def slave(model: str) -> Iterator[Slave]:
     """A fresh instance of a model's FMU, whose words are kept from the terminal."""
     functions, messages = callbacks()
-    scene, spoken = plain(model), io.StringIO()
-    with redirect_stderr(spoken), instance(scene, functions) as (description, fmu):
-        yield Slave(scene, description, fmu, messages, spoken)
+    wanted, spoken = plain(model), io.StringIO()
+    with redirect_stderr(spoken), instance(wanted, functions) as (description, fmu):
+        yield Slave(wanted.outputs, description, fmu, messages, spoken)
 
 
 def run(setting: Setting, calls: Calls, changes: Changes) -> Motion | Refusal:

@@ -1,4 +1,4 @@
-"""What a run leaves: time, columns, steps, events, cost, and the scene it came from."""
+"""What a run leaves: time, columns, steps, events, cost, and what was wanted."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import HarnessError
 from ..results.files import heading, write
 from ..results.quantity import Quantity
-from ..scenes.scene import Scene
+from .specification import Specification
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class Cost:
 
 @dataclass(frozen=True)
 class Run:
-    """One run of one scene: `time` (n,) in s, `columns` name to (n,); `steps` and `events` where the FMU shows them."""
+    """One run: `time` (n,) in s, `columns` name to (n,); `steps` and `events` where the FMU shows them."""
 
-    scene: Scene
+    wanted: Specification
     time: np.ndarray
     columns: dict[str, np.ndarray]
     units: dict[str, str]
@@ -63,19 +63,19 @@ class Run:
     def setting(self) -> str:
         """Method, law and tolerance in force, for titles."""
         words = [str(self.parameters[name]) for name in ("solver.method", "friction") if name in self.parameters]
-        if self.scene.rtol is not None:
-            words.append(f"rtol {self.scene.rtol:g}")
+        if "solver.rtol" in self.wanted.values:
+            words.append(f"rtol {self.wanted.values['solver.rtol']:g}")
         return ", ".join(words)
 
     def motion(self, role: str) -> np.ndarray:
         """The recorded position, velocity or acceleration (n,)."""
-        return self.columns[self.scene.motion[role]]
+        return self.columns[self.wanted.motion[role]]
 
     def parameter(self, name: str, purpose: str) -> float:
         """A parameter's value in the run; HarnessError if the model has none of that name."""
         value = self.parameters.get(name)
         if not isinstance(value, float):
-            raise HarnessError(f"{purpose} needs the parameter '{name}', which {self.scene.model} does not have")
+            raise HarnessError(f"{purpose} needs the parameter '{name}', which {self.wanted.model} does not have")
         return value
 
     def save(self, folder: Path) -> None:

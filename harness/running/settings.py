@@ -1,48 +1,36 @@
-"""What a scene sets and records, checked against the variables that the FMU declares."""
+"""What a run sets and records, checked against the variables that the FMU declares."""
 
 from typing import Any
 
 from ..errors import SceneError, shown, unknown
-from ..scenes.scene import Scene, is_number
+from ..scenes.schema import is_number
+from .specification import SHORT, Specification
 
-# Keys of a scene that are short for a variable of the FMU.
-SHORT = {
-    "method": "solver.method",
-    "law": "friction",
-    "rtol": "solver.rtol",
-    "atol": "solver.atol",
-    "h_max": "solver.h_max",
-}
 NEEDED = ("solver.t_next", "solver.steps", "solver.rejected", "solver.evaluations")
 
 
-def check_fmu(scene: Scene, variables: dict[str, Any]) -> None:
+def check_fmu(run: Specification, variables: dict[str, Any]) -> None:
     """It is one of these FMUs, and every output to record is one of its outputs or locals."""
     for name in NEEDED:
         if name not in variables:
-            raise SceneError(f"{scene.fmu.name} has no variable {name}; the harness runs the FMUs of this project only")
+            raise SceneError(f"{run.fmu.name} has no variable {name}; the harness runs the FMUs of this project only")
     readable = [name for name, variable in variables.items() if variable.causality in ("output", "local")]
-    for name in scene.outputs:
+    for name in run.outputs:
         if name not in readable:
             raise SceneError(unknown("output", name, readable))
 
 
-def settings(scene: Scene, variables: dict[str, Any]) -> list[tuple[Any, float | int]]:
+def settings(run: Specification, variables: dict[str, Any]) -> list[tuple[Any, float | int]]:
     """The variables to set before the run and their values, each within its declared range."""
-    wanted = {name: getattr(scene, key) for key, name in SHORT.items() if getattr(scene, key) is not None}
-    for name in wanted:
-        if name not in variables:
-            key = next(key for key, short in SHORT.items() if short == name)
-            given = shown(wanted[name])
-            raise SceneError(f"{key} = {given}: {scene.model} has nothing to choose there; leave {key} out")
     settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
-    for name, value in scene.values.items():
+    keys = {name: key for key, name in SHORT.items()}
+    for name, value in run.values.items():
+        if name in keys and name not in variables:
+            key = keys[name]
+            raise SceneError(f"{key} = {shown(value)}: {run.model} has nothing to choose there; leave {key} out")
         if name not in settable:
             raise SceneError(unknown("name in [values]", name, settable))
-        if name in wanted:
-            raise SceneError(f"{name} is set twice, in [values] and above")
-        wanted[name] = value
-    return [(variables[name], accepted(variables[name], value)) for name, value in wanted.items()]
+    return [(variables[name], accepted(variables[name], value)) for name, value in run.values.items()]
 
 
 def accepted(variable: Any, value: Any) -> float | int:

@@ -32,4 +32,4 @@ class Trajectory:
 def of_run(run: Run) -> Trajectory:
     """The trajectory of a run of one of our FMUs."""
     events = None if run.events is None else np.column_stack([run.events.t, run.events.mode])
-    return Trajectory(run.scene.name, run.time, run.columns, run.units, events, f"solver: {run.setting}")
+    return Trajectory(run.wanted.model, run.time, run.columns, run.units, events, f"solver: {run.setting}")

@@ -29,11 +29,11 @@ class Decay:
     quantities: tuple[Quantity, ...]
 
 
-def analyse(run: Run) -> Decay:
-    """The decay of the recorded position, as the scene's [decay] asks; HarnessError if the run does not show one."""
-    gives, first = run.scene.decay["gives"], run.scene.decay.get("first", 0)
+def analyse(run: Run, gives: str, first: int = 0, cycles: float | None = None) -> Decay:
+    """What the decay of the recorded position `gives` (zeta, f or T_f) from the peak `first` over so many cycles, None
+    for all; HarnessError if the run does not show one."""
     times, positions = turning_points(run.time, run.motion("position"), run.motion("velocity"))
-    times, positions, cycles = chosen(times, positions, first, run.scene.decay.get("cycles"))
+    times, positions, cycles = chosen(times, positions, first, cycles)
     x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
     if gives == "zeta":
         result = Quantity("zeta", damping_ratio(x_0, x_n, cycles), "1", f"damping ratio, {cycles:g} cycles")
@@ -45,7 +45,7 @@ def analyse(run: Run) -> Decay:
         for name in ("m", "g", "a"):
             stiffness *= run.parameter(name, "the decay to T_f")
         result = Quantity("T_f", friction(x_0, x_n, cycles, stiffness), "N.m", f"joint torque, {cycles:g} cycles")
-    unit = run.units[run.scene.motion["position"]]
+    unit = run.units[run.wanted.motion["position"]]
     ends = (
         Quantity("x_0", x_0, unit, f"peak {first:g}"),
         Quantity("x_n", x_n, unit, f"peak {first + cycles:g}"),

@@ -18,18 +18,64 @@ The force k (x_other - x) of a spring is one connection each way with the factor
 """
 
 import re
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 from ...errors import SceneError, shown, unknown
-from ..scene import fmu_of, is_number, is_positive, is_text, is_title, read
+from ..fmus import fmu_of
+from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Kind, is_names, read, structured
 
 FOLDER = Path(__file__).parent
 MODELS = ("smd", "coulomb", "stickslip")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 MOST_STEPS = 1_000_000
 SOURCES = ("x", "v", "F_spring")  # outputs that a connection may come from
+
+
+PAIR = Kind(lambda value: is_names(value) and len(value) == 2, "a list of two different names")
+STEPS = Kind(
+    lambda value: isinstance(value, list) and bool(value) and all(map(POSITIVE.accepts, value)),
+    "a list of finite numbers above 0",
+)
+
+
+@dataclass(frozen=True)
+class PartKeys:
+    """A table in [parts]."""
+
+    model: Annotated[str, TEXT]
+    values: dict[str, Annotated[float, NUMBER]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class SpringKeys:
+    """A table in [[springs]]."""
+
+    between: Annotated[tuple[str, str], PAIR]
+    k: Annotated[float, POSITIVE]
+
+
+@dataclass(frozen=True)
+class ConnectionKeys:
+    """A table in [[connections]]."""
+
+    from_: Annotated[str, TEXT]
+    to: Annotated[str, TEXT]
+    factor: Annotated[float, NUMBER]
+
+
+@dataclass(frozen=True)
+class Keys:
+    """The keys of the file."""
+
+    title: Annotated[str, TITLE]
+    stop: Annotated[float, POSITIVE]
+    steps: Annotated[tuple[float, ...], STEPS]
+    parts: dict[str, PartKeys]
+    springs: tuple[SpringKeys, ...] = ()
+    connections: tuple[ConnectionKeys, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -82,95 +128,54 @@ def load(source: str, stiffness: dict[str, float]) -> Coupled:
         path = names[source]
     table = read(path)
     try:
-        return build(path, table, stiffness)
+        return build(path, structured(table, Keys), stiffness)
     except SceneError as error:
         raise SceneError(f"scene {path.stem}: {error}") from None
 
 
-def build(path: Path, table: dict[str, Any], stiffness: dict[str, float]) -> Coupled:
-    """The scene in a table."""
-    check(
-        table, {"title": is_title, "stop": is_positive, "steps": is_steps, "parts": is_table}, "springs", "connections"
-    )
-    for key in ("springs", "connections"):
-        if not is_tables(table.get(key, [])):
-            raise SceneError(f"{key} = {shown(table[key])} cannot be used; write each of them as [[{key}]]")
-    parts: dict[str, dict[str, Any]] = {}
-    for name, part in table["parts"].items():
+def build(path: Path, keys: Keys, stiffness: dict[str, float]) -> Coupled:
+    """The scene that the keys of its file say."""
+    if not keys.parts:
+        raise SceneError("parts is empty; name each part in a table of its own, as in [parts.left]")
+    for name, part in keys.parts.items():
         if not NAME.fullmatch(name):
             raise SceneError(f"part {shown(name)}: a name has letters, digits and _, and begins with a letter")
-        check(part, {"model": is_text}, "values")
-        if part["model"] not in MODELS:
-            raise SceneError(f"part {name}: {unknown('model', part['model'], MODELS)}")
-        values = part.get("values", {})
-        if not isinstance(values, dict):
-            raise SceneError(f"part {name}: values = {shown(values)} is not a table, as in {{m = 2.0}}")
-        for key, value in values.items():
-            if not is_number(value):
-                raise SceneError(f"part {name}: {key} = {shown(value)} is not a finite number")
-        parts[name] = {"model": part["model"], "values": {key: float(value) for key, value in values.items()}}
+        if part.model not in MODELS:
+            raise SceneError(f"part {name}: {unknown('model', part.model, MODELS)}")
+    values = {name: {key: float(value) for key, value in part.values.items()} for name, part in keys.parts.items()}
     connections = []
-    for spring in table.get("springs", []):
-        check(spring, {"between": is_pair, "k": is_positive})
-        one, two = (known(name, parts) for name in spring["between"])
-        connections += [Connection(one, "x", two, float(spring["k"])), Connection(two, "x", one, float(spring["k"]))]
+    for spring in keys.springs:
+        one, two = (known(name, keys.parts) for name in spring.between)
+        connections += [Connection(one, "x", two, float(spring.k)), Connection(two, "x", one, float(spring.k))]
         for name in (one, two):
-            if parts[name]["model"] == "stickslip":
+            model = keys.parts[name].model
+            if model == "stickslip":
                 raise SceneError(
                     f"part {name}: more stiffness of a stickslip sled would pull at its driver; take coulomb"
                 )
-            values = parts[name]["values"]
-            values["k"] = values.get("k", stiffness[parts[name]["model"]]) + float(spring["k"])
-    for each in table.get("connections", []):
-        check(each, {"from": is_text, "to": is_text, "factor": is_number})
-        source, _, output = each["from"].partition(".")
+            values[name]["k"] = values[name].get("k", stiffness[model]) + float(spring.k)
+    for each in keys.connections:
+        source, _, output = each.from_.partition(".")
         if output not in SOURCES:
-            raise SceneError(f"from = {shown(each['from'])}: {unknown('output', output, SOURCES)}")
-        connections.append(Connection(known(source, parts), output, known(each["to"], parts), float(each["factor"])))
+            raise SceneError(f"from = {shown(each.from_)}: {unknown('output', output, SOURCES)}")
+        connections.append(
+            Connection(known(source, keys.parts), output, known(each.to, keys.parts), float(each.factor))
+        )
     driven = [each.sink for each in connections]
-    twice = [name for name in parts if driven.count(name) > 1]
+    twice = [name for name in keys.parts if driven.count(name) > 1]
     if twice:
         raise SceneError(f"part {twice[0]} is driven twice; an input takes one connection")
-    steps = tuple(sorted((float(h) for h in table["steps"]), reverse=True))
+    steps = tuple(sorted(map(float, keys.steps), reverse=True))
     for step in steps:
-        if not 1 <= float(table["stop"]) / step <= MOST_STEPS:
-            count = f"{float(table['stop']) / step:.6g}"
+        if not 1 <= keys.stop / step <= MOST_STEPS:
             raise SceneError(
-                f"steps: {step!r} s makes {count} steps up to the stop; from 1 to {MOST_STEPS} are allowed"
+                f"steps: {step!r} s makes {keys.stop / step:.6g} steps to the stop; from 1 to {MOST_STEPS} are allowed"
             )
-    whole = tuple(Part(name, part["model"], fmu_of(part["model"]), part["values"]) for name, part in parts.items())
-    return Coupled(path.stem, table["title"], float(table["stop"]), steps, whole, tuple(connections))
+    parts = tuple(Part(name, part.model, fmu_of(part.model), values[name]) for name, part in keys.parts.items())
+    return Coupled(path.stem, keys.title, float(keys.stop), steps, parts, tuple(connections))
 
 
-def check(table: dict[str, Any], needed: dict[str, Any], *more: str) -> None:
-    """The keys needed are there and of their kind, and there are no others."""
-    for key in table:
-        if key not in needed and key not in more:
-            raise SceneError(unknown("key", key, (*needed, *more)))
-    for key, accepts in needed.items():
-        if key not in table:
-            raise SceneError(f"the key '{key}' is missing")
-        if not accepts(table[key]):
-            raise SceneError(f"{key} = {shown(table[key])} cannot be used; see the examples in harness/scenes/coupled")
-
-
-def is_table(value: object) -> bool:
-    return isinstance(value, dict) and len(value) > 0 and all(isinstance(part, dict) for part in value.values())
-
-
-def is_tables(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(each, dict) for each in value)
-
-
-def is_steps(value: object) -> bool:
-    return isinstance(value, list) and len(value) > 0 and all(map(is_positive, value))
-
-
-def is_pair(value: object) -> bool:
-    return isinstance(value, list) and len(value) == 2 and all(map(is_text, value)) and value[0] != value[1]
-
-
-def known(name: str, parts: dict[str, Any]) -> str:
+def known(name: str, parts: Collection[str]) -> str:
     """The name of a part that there is."""
     if name not in parts:
         raise SceneError(unknown("part", name, parts))

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import HarnessError
 from ...running.inside import Inside, embedded
 from ...running.probe import Card, Motion, Setting, card, run
-from ...scenes.scene import fmu_of
+from ...scenes.fmus import fmu_of
 from ...truths.reference import MODELS
 from ...truths.truth import Grid, truth
 from ...truths.truth_linear import mp

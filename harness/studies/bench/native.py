@@ -6,7 +6,7 @@ from math import nan
 from pathlib import Path
 
 from ...running.loops import POINTS, lean, shared
-from ...scenes.scene import fmu_of
+from ...scenes.fmus import fmu_of
 from ...truths.reference import CASES, MODELS, load, relative
 from .in_c import NotHereError, Runs, built, cvode, runs
 from .measure import Beside, Measure

@@ -14,7 +14,7 @@ from ...running.fmu import described
 from ...running.inside import Inside, embedded
 from ...running.loops import POINTS
 from ...running.probe import plain
-from ...scenes.scene import fmu_of
+from ...scenes.fmus import fmu_of
 from ...truths import peers
 from ...truths.problem import Pacejka, Problem, Smd, Stickslip
 from ...truths.reference import MODELS

@@ -11,8 +11,9 @@ from ...analyses.decay.units import TIMES
 from ...errors import HarnessError, SceneError, shown
 from ...running.any_fmu import gridded, own, run
 from ...running.fmu import simulate
+from ...running.specification import of_scene
 from ...running.trajectory import Trajectory, of_run
-from ...scenes.scene import check_built
+from ...scenes.fmus import check_built
 from ...scenes.scene import load as load_scene
 
 LATEST = 1e100  # s, either way
@@ -68,11 +69,13 @@ def ran(
     """The trajectory of an FMU's path or a shipped scene's name, run anew; the grid in s is for one of ours."""
     path = Path(source)
     if path.suffix == ".fmu":
-        scene = own(path, stop, grid=grid)
-        return of_run(simulate(scene, report)) if scene else run(path, stop, tolerance, {}, report)
+        wanted = own(path, stop, grid=grid)
+        return of_run(simulate(wanted, report)) if wanted else run(path, stop, tolerance, {}, report)
     scene = load_scene(source)
-    check_built(scene.fmu)
-    return of_run(simulate(replace(scene, grid=grid) if grid else gridded(scene), report))
+    check_built(scene.file)
+    wanted = of_scene(scene)
+    found = of_run(simulate(replace(wanted, grid=grid) if grid else gridded(wanted), report))
+    return replace(found, name=scene.name)
 
 
 def spacing(time: np.ndarray) -> float | None:

@@ -16,7 +16,7 @@ from ...results.files import write as write_csv
 from ...results.folder import replacing
 from ...running.any_fmu import description
 from ...scenes.coupled.scene import MODELS, Coupled, load
-from ...scenes.scene import fmu_of
+from ...scenes.fmus import fmu_of
 from ...truths.monolith import bodies, solve
 
 FOLDER = "coupled"

@@ -55,13 +55,15 @@ def load_record(source: str, columns: Columns, known: Known, report: Callable[[f
 def of_scene(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> tuple[Record, Known]:
     """The positions in a run of a scene."""
     from ...running.fmu import simulate
-    from ...scenes.scene import check_built, load
+    from ...running.specification import of_scene
+    from ...scenes.fmus import check_built
+    from ...scenes.scene import load
 
     scene = load(source)
-    check_built(scene.fmu)
+    check_built(scene.file)
     if "position" not in scene.motion:
         raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
-    run = simulate(scene, report)
+    run = simulate(of_scene(scene), report)
     unit = run.units[scene.motion["position"]]
     record = Record(scene.name, run.time, run.motion("position"), unit, 0, unit).between(columns.begin, columns.end)
     check(record)

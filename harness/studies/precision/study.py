@@ -21,7 +21,8 @@ from ...running.answer import Answer
 from ...running.clock import timed
 from ...running.fmu import simulate
 from ...running.inside import Inside, embedded, offered
-from ...scenes.scene import Scene, fmu_of
+from ...running.specification import Specification
+from ...scenes.fmus import fmu_of
 from ...truths import peers
 from ...truths.reference import CASES, Case, errors, load
 
@@ -205,20 +206,16 @@ def through_fmpy(
     """The FMU through fmpy, position and speed recorded; only where it did not fail without fmpy, then it must not."""
     if rtol not in taken:
         return None
-    scene = Scene(
-        name="precision",
-        title=case.name,
-        model=case.model,
-        fmu=file,
-        outputs=case.outputs,
-        method=method,
-        rtol=rtol or None,
+    tolerance = {"solver.rtol": rtol} if rtol else {}
+    wanted = Specification(
+        file,
+        case.outputs,
+        {**case.values, **tolerance, "solver.method": method},
         grid=float(times[1]),
         follow=False,
         repeat=repeats(taken[rtol], extent.budget),
-        values=case.values,
     )
-    run = simulate(scene)
+    run = simulate(wanted)
     columns = np.column_stack([run.columns[name] for name in case.outputs])
     return Answer(columns, None, run.cost.evaluations), run.cost.seconds
 

@@ -12,7 +12,7 @@ from ...errors import SceneError, unknown
 from ...results.files import heading
 from ...results.folder import replacing
 from ...running.inside import embedded
-from ...scenes.scene import fmu_of
+from ...scenes.fmus import fmu_of
 from ...truths.peers import missing
 from ...truths.reference import CASES, MODELS
 from . import anchors, laws

@@ -17,8 +17,8 @@ def perform_run(
     path: Path, stop: float | None, tolerance: float, values: dict[str, Any], out: Path, report: Report
 ) -> tuple[Trajectory, Path]:
     """Run an FMU, and write its outputs to out/<name of the file>."""
-    folder, scene = out / path.stem, own(path, stop, values)
+    folder, wanted = out / path.stem, own(path, stop, values)
     with replacing(folder, FILES) as fresh:
-        found = of_run(simulate(scene, report)) if scene else run(path, stop, tolerance, values, report)
+        found = of_run(simulate(wanted, report)) if wanted else run(path, stop, tolerance, values, report)
         found.save(fresh / "trajectory.csv")
     return found, folder

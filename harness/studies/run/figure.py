@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 
 from ...results.style import BLUE, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
 from ...running.run import Run
+from ...scenes.scene import Scene
 
 OVER_TIME = ("position", "velocity", "acceleration")  # left, one below the other; the others stand on the right
 EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
@@ -16,16 +17,16 @@ EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start a
 Results = dict[str, Any]  # by the name of the analysis
 
 
-def draw(run: Run, results: Results, path: Path) -> None:
+def draw(scene: Scene, run: Run, results: Results, path: Path) -> None:
     """Save the figure of all plots that the scene names as a PNG file."""
     columns = [
-        [name for name in run.scene.plots if (name in OVER_TIME) == left]
+        [name for name in scene.plots if (name in OVER_TIME) == left]
         for left in (True, False)
-        if any((name in OVER_TIME) == left for name in run.scene.plots)
+        if any((name in OVER_TIME) == left for name in scene.plots)
     ]
     height = HEIGHT * max(2, *map(len, columns), 2)
     with sheet(path, WIDTH * len(columns), height) as figure:
-        figure.suptitle(f"{run.scene.title}\n{run.setting}", fontsize=11)
+        figure.suptitle(f"{scene.title}\n{run.setting}", fontsize=11)
         parts = figure.subfigures(1, len(columns), squeeze=False)[0]
         for part, names in zip(parts, columns, strict=True):
             over_time = names[0] in OVER_TIME
@@ -35,7 +36,7 @@ def draw(run: Run, results: Results, path: Path) -> None:
 
 def history(axes: Axes, run: Run, role: str) -> None:
     """One output over time."""
-    name = run.scene.motion[role]
+    name = run.wanted.motion[role]
     axes.plot(run.time, drawable(run.columns[name]), color=BLUE, label=name)
     axes.set_title(run.descriptions[name])
     axes.set_ylabel(label(name, run.units[name]))
@@ -66,7 +67,7 @@ def acceleration(axes: Axes, run: Run, results: Results) -> None:
 
 def phase(axes: Axes, run: Run, results: Results) -> None:
     """Velocity over position."""
-    x, v = run.scene.motion["position"], run.scene.motion["velocity"]
+    x, v = run.wanted.motion["position"], run.wanted.motion["velocity"]
     axes.plot(drawable(run.columns[x]), drawable(run.columns[v]), color=BLUE)
     axes.set_title("phase plane")
     axes.set_xlabel(label(x, run.units[x]))

@@ -15,7 +15,9 @@ from ...results.folder import replacing
 from ...results.quantity import Quantity
 from ...running.fmu import simulate
 from ...running.run import Run
-from ...scenes.scene import Scene, check_built, load, shipped
+from ...running.specification import of_scene
+from ...scenes.fmus import check_built
+from ...scenes.scene import Scene, load, shipped
 
 FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.png")  # all that a result folder may hold
 
@@ -31,19 +33,19 @@ class Outcome:
     error: str | None
 
 
-def decay(run: Run) -> Any:
+def decay(run: Run, scene: Scene) -> Any:
     from ...analyses.decay.decrement import analyse
 
-    return analyse(run)
+    return analyse(run, scene.decay.gives or "", scene.decay.first, scene.decay.cycles)
 
 
-def slip(run: Run) -> Any:
+def slip(run: Run, scene: Scene) -> Any:
     from ...analyses.slip import analyse
 
     return analyse(run)
 
 
-def steps(run: Run) -> Any:
+def steps(run: Run, scene: Scene) -> Any:
     from ...analyses.steps import analyse
 
     return analyse(run)
@@ -63,11 +65,11 @@ def perform(scene: Scene, out: Path, report: Callable[[float], None]) -> Outcome
 
 def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome:
     """Run and analyse a scene, and write its results into an empty folder."""
-    check_built(scene.fmu)
-    run = simulate(scene, report)
+    check_built(scene.file)
+    run = simulate(of_scene(scene), report)
     results: dict[str, Any] = {}
     for name in scene.analyses:
-        results[name] = ANALYSE[name](run)
+        results[name] = ANALYSE[name](run, scene)
     quantities = tuple(quantity for result in results.values() for quantity in result.quantities)
     quantities += run.cost.quantities
     check_published(scene, quantities)
@@ -79,7 +81,7 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     if scene.plots:
         from .figure import draw
 
-        draw(run, results, folder / "figure.png")
+        draw(scene, run, results, folder / "figure.png")
     return Outcome(scene.name, scene, run, quantities, None)
 
 
@@ -91,7 +93,7 @@ def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
             continue
         if name not in measured:
             raise SceneError(unknown("name in [published]", name, measured))
-        if isinstance(value, list):
+        if isinstance(value, tuple):
             try:
                 measured[name].in_unit(value[1])
             except KeyError:
@@ -103,7 +105,7 @@ def published() -> list[str]:
     """The names of the shipped scenes that have figures to stand beside; HarnessError if an FMU is not built."""
     scenes = [scene for scene in map(load, shipped()) if scene.published]
     for scene in scenes:
-        check_built(scene.fmu)
+        check_built(scene.file)
     return [scene.name for scene in scenes]
 
 

@@ -44,7 +44,7 @@ def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
     """Text, measured, published, unit and difference; in the unit of the published figure where it has one."""
     value, unit, digits = quantity.value, quantity.unit, 5
     published = difference = ""
-    if isinstance(figure, list):
+    if isinstance(figure, tuple):
         figure, unit = figure
         value = quantity.in_unit(unit)
     if isinstance(figure, int | float):

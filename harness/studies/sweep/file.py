@@ -13,7 +13,7 @@ from ...errors import SceneError, unknown
 from ...results.files import heading
 from ...results.folder import replacing
 from ...scenes.assigned import assigned
-from ...scenes.scene import check_built, fmu_of
+from ...scenes.fmus import check_built, fmu_of
 from .measures import columns
 from .rerun import Runs, ready
 from .space import Axis, axis, points

@@ -12,7 +12,7 @@ from ...analyses.decay.decrement import damping_ratio, friction, turning_points
 from ...analyses.slip import crest, crossings, slips_of_modes
 from ...errors import HarnessError, SceneError, unknown
 from ...running.run import Run
-from ...scenes.scene import ROLES
+from ...scenes.roles import roles
 
 PIECES = 400  # communication steps along a path; the ends of the solver's own steps come on top
 
@@ -106,11 +106,6 @@ ON_PATH = {
     "f_over_k": Path("solver.steps", "", "friction over stiffness by linear envelope", f_over_k),
 }
 LIKE = {"peak_speed": "velocity", "rest": "position", "f_over_k": "position"}  # measured in the unit of
-
-
-def roles(variables: dict) -> dict[str, str]:
-    """The output that plays each role."""
-    return {role: name for role, names in ROLES.items() for name in names if name in variables}
 
 
 def columns(measures: tuple[str, ...], variables: dict) -> tuple[Column, ...]:

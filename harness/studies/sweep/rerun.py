@@ -24,8 +24,9 @@ from ...running.fmu import (
     planned,
 )
 from ...running.settings import settings
-from ...scenes.scene import Scene
-from .measures import AT_END, ON_PATH, PIECES, roles
+from ...running.specification import Specification
+from ...scenes.roles import roles
+from .measures import AT_END, ON_PATH, PIECES
 
 
 @dataclass(frozen=True)
@@ -45,24 +46,24 @@ Row = tuple[list[float], str]  # the measured columns, or the sentence that says
 class Rerun:
     """The instance, and the room for what is set and read, made once: a run by closed form takes a tenth of a ms."""
 
-    def __init__(self, runs: Runs, description: Any, fmu: Any, scene: Scene) -> None:
+    def __init__(self, runs: Runs, description: Any, fmu: Any, wanted: Specification) -> None:
         self.runs, self.fmu, self.description = runs, fmu, description
         variables = {variable.name: variable for variable in description.modelVariables}
         motion = roles(variables)
-        self.plan = planned(replace(scene, outputs=(motion["position"], motion["velocity"])), description)
+        self.plan = planned(replace(wanted, outputs=(motion["position"], motion["velocity"])), description)
         if runs.stop is not None:
             self.plan = replace(self.plan, stop=runs.stop)
-        self.fixed = settings(scene, variables)
+        self.fixed = settings(wanted, variables)
         self.varied = [variables[name] for name in runs.varied]
         self.along = [name for name in runs.measures if name in ON_PATH]
         if self.along:
             grid = (self.plan.stop - self.plan.start) / PIECES
             self.plan = replace(
-                planned(replace(self.plan.scene, grid=grid, follow=True), description), stop=self.plan.stop
+                planned(replace(self.plan.wanted, grid=grid, follow=True), description), stop=self.plan.stop
             )
         self.ends = [AT_END[name][1] for name in runs.measures if name in AT_END]
         self.n_whole, self.whole_at, self.whole = buffer(variables, self.ends, c_int)
-        self.n_real, self.real_at, self.real = buffer(variables, list(self.plan.scene.outputs), c_double)
+        self.n_real, self.real_at, self.real = buffer(variables, list(self.plan.wanted.outputs), c_double)
         self.component = c_void_p(fmu.component)
         self.messages = callbacks()[1]
 
@@ -129,6 +130,6 @@ class Rerun:
 @contextmanager
 def ready(runs: Runs, file: Path) -> Iterator[Rerun]:
     """The FMU in a file, loaded and ready to run; what it writes to standard error is kept back."""
-    scene = Scene(runs.model, runs.model, runs.model, file, (), values=runs.values, follow=False, grid=1.0)
-    with redirect_stderr(io.StringIO()), instance(scene, callbacks()[0]) as (description, fmu):
-        yield Rerun(runs, description, fmu, scene)
+    wanted = Specification(file, values=runs.values, grid=1.0, follow=False)
+    with redirect_stderr(io.StringIO()), instance(wanted, callbacks()[0]) as (description, fmu):
+        yield Rerun(runs, description, fmu, wanted)

@@ -1,0 +1,64 @@
+"""What to run: an FMU, what to set in it, and what to record."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..errors import SceneError
+from ..scenes.roles import roles
+from ..scenes.scene import Scene
+
+# Keys of a scene that are short for a variable of the FMU.
+SHORT = {
+    "method": "solver.method",
+    "law": "friction",
+    "rtol": "solver.rtol",
+    "atol": "solver.atol",
+    "h_max": "solver.h_max",
+}
+
+
+@dataclass(frozen=True)
+class Specification:
+    """One run of an FMU of ours, from `start` to `stop` in s (None: its own).
+
+    `values` are set by the names of variables, enumerations by label or number.  The communication points are those of
+    the `grid` (a step in s, if there is one), and where it is to `follow` them the ends of the solver's own steps.  It
+    is timed as often as it is to `repeat`.
+    """
+
+    fmu: Path
+    outputs: tuple[str, ...] = ()
+    values: Mapping[str, float | str] = field(default_factory=dict)
+    start: float | None = None
+    stop: float | None = None
+    grid: float | None = None
+    follow: bool = True
+    repeat: int = 1
+
+    @property
+    def model(self) -> str:
+        return self.fmu.stem
+
+    @property
+    def motion(self) -> dict[str, str]:
+        """The output that plays each role, of those recorded."""
+        return roles(self.outputs)
+
+
+def of_scene(scene: Scene) -> Specification:
+    """The run that a scene asks for."""
+    short = {name: getattr(scene, key) for key, name in SHORT.items() if getattr(scene, key) is not None}
+    for name in short:
+        if name in scene.values:
+            raise SceneError(f"{name} is set twice, in [values] and above")
+    return Specification(
+        fmu=scene.file,
+        outputs=scene.outputs,
+        values=short | scene.values,
+        start=scene.start,
+        stop=scene.stop,
+        grid=scene.grid,
+        follow=scene.follow,
+        repeat=scene.repeat,
+    )

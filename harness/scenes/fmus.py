@@ -1,0 +1,24 @@
+"""Where built FMUs are."""
+
+from pathlib import Path
+
+from ..errors import HarnessError, SceneError, unknown
+
+
+def fmu_of(name: str) -> Path:
+    """Where the FMU of a model is, or will be once it is built."""
+    folders = (Path("fmus"), Path(__file__).parents[2] / "fmus")
+    files = [file for folder in folders for file in folder.glob("*.fmu")]
+    sources = [file for folder in folders for file in folder.glob("[!_]*.py")]
+    names = {file.stem for file in files + sources}
+    if not names:
+        raise SceneError("there are no models here: run from the folder of the project, or name fmu = 'a/file.fmu'")
+    if name not in names:
+        raise SceneError(unknown("model", name, names))
+    return next((file for file in files if file.stem == name), Path("fmus") / f"{name}.fmu")
+
+
+def check_built(fmu: Path) -> None:
+    """The FMU is there."""
+    if not fmu.is_file():
+        raise HarnessError(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another file")

@@ -1,0 +1,177 @@
+"""The one check of what people write: a table of TOML becomes a dataclass, or one sentence says where it is wrong.
+
+The dataclass is the schema: keys, tables in tables, and beside each type, as in `Annotated[float, POSITIVE]`, what a
+value must be and the words for that.  cattrs walks the table.  (It finds the place of what is wrong, tables by name
+included; msgspec leaves such names out, and pydantic is forty times its size.)
+"""
+
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeVar, get_origin
+
+from cattrs import Converter
+from cattrs.cols import homogenous_tuple_structure_factory
+from cattrs.errors import (
+    BaseValidationError,
+    ClassValidationError,
+    ForbiddenExtraKeysError,
+    IterableValidationError,
+    IterableValidationNote,
+)
+from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn, override
+
+from ..errors import SceneError, shown, unknown
+
+LONGEST_TITLE = 200  # letters
+LARGEST = 1_000_000  # bytes of a file that somebody wrote
+Schema = TypeVar("Schema")
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a value must be, and the words for it."""
+
+    accepts: Callable[[Any], bool]
+    words: str
+
+
+class Refused(ValueError):
+    """A value that is not of its kind."""
+
+
+def is_text(value: object) -> bool:
+    return isinstance(value, str) and bool(value)
+
+
+def is_title(value: object) -> bool:
+    text = str(value)
+    return is_text(value) and len(text) <= LONGEST_TITLE and text.splitlines() == [text] and "\0" not in text
+
+
+def is_number(value: object) -> bool:
+    try:
+        return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+    except OverflowError:  # an integer beyond all floats
+        return False
+
+
+def is_whole(value: object, least: float, most: float) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
+
+
+def is_names(value: object) -> bool:
+    return isinstance(value, list) and all(map(is_text, value)) and len(set(value)) == len(value)
+
+
+TITLE = Kind(is_title, f"a text of one line and at most {LONGEST_TITLE} letters")
+TEXT = Kind(is_text, "a text")
+NUMBER = Kind(is_number, "a finite number")
+POSITIVE = Kind(lambda value: is_number(value) and value > 0, "a finite number above 0")
+NAMES = Kind(is_names, "a list of different names")
+FLAG = Kind(lambda value: isinstance(value, bool), "true or false")
+TABLE = Kind(lambda value: isinstance(value, dict), "a table")
+LIST = Kind(lambda value: isinstance(value, list), "a list")
+
+Hook = Callable[[Any, Any], Any]
+CONVERTER = Converter(forbid_extra_keys=True)
+
+
+def kind_of(annotation: Any) -> Kind | None:
+    """The kind that stands beside a type."""
+    return next((each for each in getattr(annotation, "__metadata__", ()) if isinstance(each, Kind)), None)
+
+
+def of_kind(kind: Kind, then: Hook) -> Hook:
+    """What refuses a value that is not of its kind, and goes on with one that is."""
+
+    def hook(value: Any, annotation: Any) -> Any:
+        if not kind.accepts(value):
+            raise Refused(f"{shown(value)} is not {kind.words}")
+        return then(value, annotation)
+
+    return hook
+
+
+def plain(annotation: Any) -> Hook:
+    """A value stays as it is; a list, which could be changed, becomes a tuple."""
+    kind = kind_of(annotation)
+    assert kind is not None
+    return of_kind(kind, lambda value, _: tuple(value) if isinstance(value, list) else value)
+
+
+def table(annotation: Any) -> Hook:
+    """A table whose keys are the fields of a dataclass; `from_` stands for the key `from`."""
+    renamed: Any = {name: override(rename=name.rstrip("_")) for name in keys(annotation) if name.endswith("_")}
+    return of_kind(TABLE, make_dict_structure_fn(annotation, CONVERTER, **renamed))
+
+
+def keys(schema: Any) -> list[str]:
+    return [each.name for each in fields(schema)]
+
+
+CONVERTER.register_structure_hook_factory(is_dataclass, table)
+CONVERTER.register_structure_hook_factory(
+    lambda annotation: get_origin(annotation) is dict,
+    lambda annotation: of_kind(TABLE, make_mapping_structure_fn(annotation, CONVERTER)),
+)
+CONVERTER.register_structure_hook_factory(
+    lambda annotation: get_origin(annotation) is tuple,
+    lambda annotation: of_kind(LIST, homogenous_tuple_structure_factory(annotation, CONVERTER)),
+)
+CONVERTER.register_structure_hook_factory(lambda annotation: kind_of(annotation) is not None, plain)
+
+
+def structured(written: dict[str, Any], schema: type[Schema]) -> Schema:
+    """A table as its schema says; SceneError in one sentence if it does not fit."""
+    try:
+        return CONVERTER.structure(written, schema)
+    except BaseValidationError as error:
+        raise SceneError(min(faults(error))[1]) from None
+
+
+def faults(error: Exception, where: str = "") -> Iterator[tuple[int, str]]:
+    """What is wrong at a place and below it, a sentence each; a key that nobody knows explains most: rank 0."""
+    if isinstance(error, ClassValidationError | IterableValidationError):
+        placed, others = error.group_exceptions()
+        for each, note in placed:
+            yield from faults(each, below(where, note.index if isinstance(note, IterableValidationNote) else note.name))
+        for each in others:
+            yield from faults(each, where)
+    elif isinstance(error, ForbiddenExtraKeysError):
+        allowed = [name.rstrip("_") for name in keys(error.cl)]
+        yield 0, unknown(f"key in [{where}]" if where else "key", min(error.extra_fields), allowed)
+    elif isinstance(error, KeyError):
+        yield 2, f"the key '{where}' is missing"
+    else:
+        yield 1, f"{where} = {error}"
+
+
+def below(where: str, key: str | int) -> str:
+    """The place of a key, or of an item counted from 0."""
+    if isinstance(key, int):
+        return f"{where}[{key}]"
+    name = key.rstrip("_") if key.isidentifier() else shown(key)
+    return f"{where}.{name}" if where else name
+
+
+def read(path: Path) -> dict[str, Any]:
+    """The table in a TOML file; SceneError in one sentence if there is none."""
+    try:
+        if path.exists() and not path.is_file():
+            raise SceneError(f"cannot read the scene {path}: not a file")
+        if path.stat().st_size > LARGEST:
+            raise SceneError(f"scene {path.stem}: more than {LARGEST} bytes are no scene")
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise SceneError(f"cannot read the scene {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise SceneError(f"scene {path.stem}: not a text file in UTF-8") from None
+    except RecursionError:
+        raise SceneError(f"scene {path.stem}: not valid TOML: brackets too deep in each other") from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(f"scene {path.stem}: not valid TOML: {error}") from None
+    except ValueError:
+        raise SceneError(f"scene {path.stem}: an integer of thousands of digits") from None
