@@ -107,7 +107,7 @@ def test_steps_add_up_to_the_run(main_job):
 def test_a_scene_leaves_only_what_it_names(scene):
     done, results = scene(BASE + "grid = 0.25\nstop = 2")
     assert (done.returncode, done.stderr) == (0, "")
-    assert [path.name for path in results.iterdir()] == ["trajectory.csv"]
+    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "provenance.json"}
     head, columns = table(results / "trajectory.csv")
     assert head == ["t [s]", "x [m]", "v [m/s]"]
     assert list(columns[0]) == [0.25 * i for i in range(9)]

@@ -416,7 +416,8 @@ def test_a_scene_leaves_numbers_turning_points_fit_and_figure(fmus, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     assert "Best described by dry friction" in done.stdout
     folder = tmp_path / "results/decay/coulomb"
-    assert {file.name for file in folder.iterdir()} == {"decay.json", "turning-points.csv", "fit.csv", "figure.png"}
+    files = {"decay.json", "turning-points.csv", "fit.csv", "figure.png", "provenance.json"}
+    assert {file.name for file in folder.iterdir()} == files
     found = {each["name"]: each for each in json.loads((folder / "decay.json").read_text())["fit"]}
     assert found["f"]["value"] == pytest.approx(0.5, rel=1e-9)
     with (folder / "fit.csv").open() as file:

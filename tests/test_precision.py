@@ -160,7 +160,7 @@ def test_the_command_writes_every_point_and_says_what_to_use(place, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     assert "smd: use exact: " in done.stdout
     folder = tmp_path / "precision"
-    assert {path.name for path in folder.iterdir()} == {"smd.csv", "smd.png", "smd.txt", "anchors.csv"}
+    assert {path.name for path in folder.iterdir()} == {"smd.csv", "smd.json", "smd.png", "smd.txt", "anchors.csv"}
     with (folder / "smd.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     tools = {FMU, FMPY, *WAYS, "scipy", "cvode"} - peers.missing().keys()

@@ -28,7 +28,7 @@ def importers(fmus: Path, out: Path, quiet: bool, as_json: bool) -> None:
 
     with progress(quiet or as_json, len(IMPORTERS)) as report:
         rows = work.rows(fmus, report)
-    work.save(rows, out)
+    work.save(rows, fmus, out)
     if as_json:
         tell(rows)
     elif not quiet:

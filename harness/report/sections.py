@@ -5,11 +5,12 @@ import json
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from ..errors import reason
+from ..results import provenance
 
 MODELS = {
     "smd": "Spring, mass and viscous damper. Every swing loses the same share: the envelope is an exponential.",
@@ -50,14 +51,15 @@ class Grid:
 
 @dataclass(frozen=True)
 class Part:
-    """A piece of a section: heading, sentences, table and pictures, as far as there are any; `lost` if its results
-    could not be read, which a sentence says."""
+    """A piece of a section: heading, sentences, table and pictures, as far as there are any, and sentences on
+    their origin; `lost` if its results could not be read, which a sentence says."""
 
     title: str
     sentences: tuple[str, ...] = ()
     grid: Grid | None = None
     pictures: tuple[Picture, ...] = ()
     lost: bool = False
+    origin: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -82,11 +84,18 @@ def sections(results: Path) -> list[Section]:
 def read(place: Path, make: Callable[[Path], Part]) -> Part:
     """What is made of a file or folder of results; a sentence in its place if that holds something else."""
     try:
-        return make(place)
+        part = make(place)
+        return replace(part, origin=origin(place)) if part.grid or part.pictures else part
     except Exception as error:  # it may hold anything: half of a file, another version's, somebody else's
         return Part(
             place.name, (f"{place} cannot be shown ({type(error).__name__}: {reason(error)[:100]}).",), lost=True
         )
+
+
+def origin(place: Path) -> tuple[str, ...]:
+    """Where the results at a place came from: told in their folder, or in a file of their own beside them."""
+    own = place.with_suffix(".json")
+    return provenance.sentences(own if own.is_file() else (place if place.is_dir() else place.parent) / provenance.FILE)
 
 
 def oscillators(results: Path) -> Section:

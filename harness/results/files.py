@@ -1,7 +1,8 @@
 """How results are written: CSV with units in its headings, and JSON."""
 
+import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from math import isfinite
 from pathlib import Path
@@ -17,10 +18,15 @@ def heading(name: str, unit: str) -> str:
 
 def write(path: Path, heads: Sequence[str], columns: Sequence[np.ndarray]) -> None:
     """A CSV file of equally long columns; every number reads back to the last bit."""
-    rows = zip(*(column.tolist() for column in columns), strict=True)
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(",".join(heads) + "\n")
-        file.writelines(",".join(map(repr, row)) + "\n" for row in rows)
+    write_rows(path, heads, zip(*(column.tolist() for column in columns), strict=True))
+
+
+def write_rows(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """The same of rows; None is left empty."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(heads)
+        writer.writerows(rows)
 
 
 def as_text(result: Any) -> str:
@@ -37,4 +43,6 @@ def finite(result: Any) -> Any:
         return {name: finite(value) for name, value in result.items()}
     if isinstance(result, list | tuple):
         return [finite(value) for value in result]
+    if isinstance(result, Path):
+        return str(result)
     return None if isinstance(result, float) and not isfinite(result) else result

@@ -21,6 +21,7 @@ from tempfile import mkdtemp
 
 from ..errors import HarnessError
 from ..process.interrupt import later
+from .provenance import FILE
 
 if sys.platform != "win32":
     import fcntl
@@ -36,6 +37,7 @@ def replacing(folder: Path, ours: Collection[str]) -> Iterator[Path]:
     Refused with HarnessError if the old folder is a link, or holds a file not named in `ours`, which would be lost.
     """
     try:
+        ours = {*ours, FILE}
         refuse(folder, ours)
         folder.parent.mkdir(parents=True, exist_ok=True)
         tidy(folder, ours)

@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 
 from ..errors import HarnessError, SceneError, reason, unknown
-from .settings import NEEDED
+from .settings import NEEDED, unit
 from .specification import Specification
 from .trajectory import Trajectory
 from .unpacked import unpacked
@@ -77,6 +77,8 @@ def run(
     end = float(experiment.stopTime) if stop is None else stop
     if not end > start:
         raise SceneError(f"stop = {end!r} s is not after start = {start!r} s")
+    tuned = [variable for variable in variables.values() if variable.causality == "parameter"]
+    parameters = {each.name: (values.get(each.name, each.start), unit(each)) for each in tuned}
     with unpacked(path) as folder:
         steps, before, difference = COARSEST, None, np.inf
         while steps <= FINEST:
@@ -88,7 +90,7 @@ def run(
                     columns = {name: now[name].astype(float) for name in outputs}
                     h = (end - start) / steps
                     note = f"communication step {h:.4g} s; half of it changes no output by more than {difference:.2g}"
-                    return Trajectory(path.stem, now["time"], columns, units, None, note)
+                    return Trajectory(path.stem, now["time"], columns, units, None, note, path, parameters)
             before, steps = now, 2 * steps
             report(np.log2(steps / COARSEST) / np.log2(FINEST / COARSEST))
     raise HarnessError(
@@ -140,9 +142,3 @@ def apart(coarse: np.ndarray, fine: np.ndarray, outputs: list[str], every: int) 
         size = float(np.abs(two).max())
         worst = max(worst, float(np.abs(one - two).max()) / size if size else 0.0)
     return worst
-
-
-def unit(variable: Any) -> str:
-    """The unit that a variable or its type names."""
-    found = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
-    return "" if found in (None, "1") else found

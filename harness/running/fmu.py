@@ -21,7 +21,7 @@ from fmpy.fmi1 import FMICallException
 
 from ..errors import HarnessError, SceneError, reason
 from .run import Cost, Events, Run, Steps
-from .settings import check_fmu, labels, settings
+from .settings import check_fmu, labels, settings, unit
 from .specification import Specification
 from .unpacked import unpacked
 
@@ -260,7 +260,7 @@ def gather(plan: Plan, fmu: Any, trace: Trace, seconds: float) -> Run:
         wanted=wanted,
         time=time,
         columns=columns,
-        units={name: variables[name].unit or "" for name in columns},
+        units={name: unit(variables[name]) for name in [*columns, *settled]},
         descriptions={name: variables[name].description or name for name in columns},
         parameters=settled,
         steps=steps,

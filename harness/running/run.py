@@ -47,7 +47,8 @@ class Cost:
 
 @dataclass(frozen=True)
 class Run:
-    """One run: `time` (n,) in s, `columns` name to (n,); `steps` and `events` where the FMU shows them."""
+    """One run: `time` (n,) in s, `columns` name to (n,); `units` of these and of the parameters; `steps` and `events`
+    where the FMU shows them."""
 
     wanted: Specification
     time: np.ndarray
@@ -66,6 +67,11 @@ class Run:
         if "solver.rtol" in self.wanted.values:
             words.append(f"rtol {self.wanted.values['solver.rtol']:g}")
         return ", ".join(words)
+
+    @property
+    def in_force(self) -> dict[str, tuple[object, str]]:
+        """The value of every parameter, and its unit."""
+        return {name: (value, self.units[name]) for name, value in self.parameters.items()}
 
     def motion(self, role: str) -> np.ndarray:
         """The recorded position, velocity or acceleration (n,)."""

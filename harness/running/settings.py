@@ -59,3 +59,9 @@ def bound(text: str | None) -> float | None:
 def labels(variable: Any) -> dict[int, str]:
     """The names of an enumeration's values."""
     return {int(item.value): item.name for item in variable.declaredType.items}
+
+
+def unit(variable: Any) -> str:
+    """The unit that a variable or its type names; without one for counts, modes and ratios."""
+    found = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+    return "" if found in (None, "1") else found

@@ -1,6 +1,7 @@
 """What anyone's FMU, or a file, shows of a motion: a trajectory."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from .run import Run
 @dataclass(frozen=True)
 class Trajectory:
     """`columns` name to (n,) over `time` (n,) in s, with their units; the times of `events` and the modes that begin
-    there (m, 2), the start included, where they are known.  `note` says how it came about."""
+    there (m, 2), the start included, where they are known.  `note`, `file` and `parameters` say where it
+    came from."""
 
     name: str
     time: np.ndarray
@@ -20,6 +22,8 @@ class Trajectory:
     units: dict[str, str]
     events: np.ndarray | None = None
     note: str = ""
+    file: Path | None = None
+    parameters: Mapping[str, tuple[object, str]] = field(default_factory=dict)
 
     def save(self, path: Path) -> None:
         """Write it as CSV."""
@@ -32,4 +36,6 @@ class Trajectory:
 def of_run(run: Run) -> Trajectory:
     """The trajectory of a run of one of our FMUs."""
     events = None if run.events is None else np.column_stack([run.events.t, run.events.mode])
-    return Trajectory(run.wanted.model, run.time, run.columns, run.units, events, f"solver: {run.setting}")
+    note = f"solver: {run.setting}"
+    units = {name: run.units[name] for name in run.columns}
+    return Trajectory(run.wanted.model, run.time, run.columns, units, events, note, run.wanted.fmu, run.in_force)

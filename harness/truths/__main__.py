@@ -7,7 +7,7 @@ magic formula           DOP853, which is explicit, and Radau, which is implicit
 
 import numpy as np
 
-from ..results.files import heading, write
+from ..results.files import heading, write, write_rows
 from ..running.answer import Answer
 from .linear import Events, Motion, coulomb, sampled, smd, stickslip, threshold
 from .peers import solve
@@ -26,7 +26,7 @@ def main() -> None:
         times = np.linspace(0.0, case.problem.stop, POINTS)
         answer, routes, doubt = make(case, times)
         print(f"{case.truth}: {routes}, difference {doubt:.1e}", flush=True)
-        rows.append(f"{case.truth},{routes},{doubt:.1e}\n")
+        rows.append((case.truth, routes, f"{doubt:.1e}"))
         unit, events = case.problem.unit, answer.events or []
         if case.problem.dry:
             events.insert(0, (0.0, case.problem.settle(0.0, *case.problem.start)))
@@ -34,7 +34,7 @@ def main() -> None:
         write(FOLDER / f"{case.truth}.csv", heads, [times, *answer.motion.T])
         columns = [np.array([t for t, _ in events]), np.array([mode for _, mode in events])]
         write(FOLDER / f"{case.truth}-events.csv", ["t [s]", "mode"], columns)
-    (FOLDER / "agreement.csv").write_text("reference,routes,difference [1]\n" + "".join(sorted(rows)), encoding="utf-8")
+    write_rows(FOLDER / "agreement.csv", ["reference", "routes", "difference [1]"], sorted(rows))
 
 
 def make(case: Case, times: np.ndarray) -> tuple[Answer, str, float]:

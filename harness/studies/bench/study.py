@@ -1,10 +1,13 @@
 """The numbers to reach, each beside what it is compared with in the same run."""
 
-import csv
 from collections.abc import Callable
 from pathlib import Path
 
+from ...results.files import write_rows
 from ...results.folder import replacing
+from ...results.provenance import record
+from ...scenes.fmus import fmu_of
+from ...truths.reference import MODELS
 from ...truths.truth import check
 from .measure import Measure
 
@@ -29,15 +32,12 @@ def bench(chosen: list[Callable[[], Measure]], out: Path, report: Callable[[str,
             found.append(measure())
             report(found[-1].what, 1.0)
         save(found, folder / FILE)
+        record(folder, map(fmu_of, MODELS))
     return found
 
 
 def save(found: list[Measure], path: Path) -> None:
     """One line for each measure and for each number beside it."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["what", "measured", "unit", "to reach", "reached", "beside", "its value"])
-        for measure in found:
-            mine = [measure.what, repr(measure.value), measure.unit, repr(measure.reach), measure.reached]
-            for beside in measure.beside:
-                writer.writerow([*mine, beside.name, "" if beside.value is None else repr(beside.value)])
+    heads = ["what", "measured", "unit", "to reach", "reached", "beside", "its value"]
+    mine = ((each, (each.what, each.value, each.unit, each.reach, each.reached)) for each in found)
+    write_rows(path, heads, ((*cells, beside.name, beside.value) for each, cells in mine for beside in each.beside))

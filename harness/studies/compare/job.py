@@ -10,6 +10,7 @@ from rich.table import Table
 
 from ...results.files import as_text
 from ...results.folder import replacing
+from ...results.provenance import record
 from . import trajectory
 from .difference import Comparison, compare
 
@@ -28,6 +29,9 @@ def perform_compare(
     with replacing(folder, ("compare.json", "figure.png")) as fresh:
         (fresh / "compare.json").write_text(as_text(numbers(found)) + "\n", encoding="utf-8")
         draw(found, fresh / "figure.png")
+        sides = {each.name: each for each in (one, two)}
+        values = {f"{side}: {name}": told for side, each in sides.items() for name, told in each.parameters.items()}
+        record(fresh, [each.file for each in (one, two) if each.file], values)
     return found, folder
 
 

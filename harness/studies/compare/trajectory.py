@@ -39,7 +39,8 @@ def read(path: Path) -> Trajectory:
     known = numeric(events)[1] if events and events.is_file() else None
     if known is not None and (known.shape[1] != 2 or not np.isfinite(known).all()):
         raise SceneError(f"{events} holds no times and modes")
-    return Trajectory(path.stem, time, columns, dict(zip(names, (u or "" for u in units), strict=True)), known)
+    told = dict(zip(names, (unit or "" for unit in units), strict=True))
+    return Trajectory(path.stem, time, columns, told, known, file=file)
 
 
 def both(

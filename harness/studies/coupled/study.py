@@ -14,6 +14,7 @@ from ...process.child import ask
 from ...process.room import room
 from ...results.files import write as write_csv
 from ...results.folder import replacing
+from ...results.provenance import record
 from ...running.any_fmu import description
 from ...scenes.coupled.scene import MODELS, Coupled, load
 from ...scenes.fmus import fmu_of
@@ -70,6 +71,7 @@ def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[St
         columns = [np.array(found.steps), np.array(found.errors)]
         write_csv(fresh / "error.csv", ["communication step [s]", "largest error [m]"], columns)
         draw(found, fresh / "figure.png")
+        record(fresh, {part.fmu for part in scene.parts}, scene=scene)
     return found, folder
 
 

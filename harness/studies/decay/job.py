@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,15 @@ from ...analyses.decay.law import AMPLITUDE, T0
 from ...analyses.decay.loss import Loss, losses_seen
 from ...analyses.decay.record import Record, check
 from ...errors import HarnessError, SceneError
+from ...results import provenance
 from ...results.files import as_text, heading, write
 from ...results.folder import replacing
 
 FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.png")
+
+
+Loaded = tuple[Record, Known, Callable[[Path], None]]  # and what writes into a folder where they come from
 
 
 def perform(
@@ -32,27 +37,29 @@ def perform(
     report: Callable[[float], None],
 ) -> tuple[Identified, Path]:
     """Identify the decay of a record's file or of a scene; results go to out/decay/<name>."""
-    record, known = load_record(source, columns, known, report)
+    record, known, told = load_record(source, columns, known, report)
     found = identify(record, known, drag, drift, report)
     folder = out / FOLDER / record.name
     with replacing(folder, FILES) as fresh:
         save(found, fresh)
+        told(fresh)
     return found, folder
 
 
-def load_record(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> tuple[Record, Known]:
+def load_record(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> Loaded:
     """The record of a file, or of a run of a scene together with the stiffness that its model has."""
     path = Path(source)
     if source == "-":
-        return read(source, columns, "stdin"), known
+        return read(source, columns, "stdin"), known, partial(provenance.record, files=())
     if path.suffix.lower() != ".toml" and (path.is_file() or path.suffix):
-        return read(source, columns, path.stem.encode("utf-8", "replace").decode()), known
+        name = path.stem.encode("utf-8", "replace").decode()
+        return read(source, columns, name), known, partial(provenance.record, files=(path,))
     if path.is_dir():
         raise SceneError(f"{source} is a folder; name a file in it")
-    return of_scene(source, columns, known, report)
+    return recorded(source, columns, known, report)
 
 
-def of_scene(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> tuple[Record, Known]:
+def recorded(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> Loaded:
     """The positions in a run of a scene."""
     from ...running.fmu import simulate
     from ...running.specification import of_scene
@@ -67,14 +74,15 @@ def of_scene(source: str, columns: Columns, known: Known, report: Callable[[floa
     unit = run.units[scene.motion["position"]]
     record = Record(scene.name, run.time, run.motion("position"), unit, 0, unit).between(columns.begin, columns.end)
     check(record)
+    told = partial(provenance.record, files=(scene.file,), parameters=run.in_force, scene=scene)
     if known.k is None and known.m is None:
         names = ("m", "g", "a") if unit == "rad" else ("k",)
         try:
             k = prod(run.parameter(name, "the decay of a scene") for name in names)
         except HarnessError:
-            return record, known  # a model without them has no force to tell
+            return record, known, told  # a model without them has no force to tell
         known = Known(k=k, pendulum=unit == "rad")
-    return record, known
+    return record, known, told
 
 
 def save(found: Identified, folder: Path) -> None:

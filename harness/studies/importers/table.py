@@ -1,6 +1,5 @@
 """The importer table: importers by checks by FMUs."""
 
-import csv
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -10,7 +9,9 @@ from pathlib import Path
 from rich.markup import escape
 from rich.table import Table
 
+from ...results.files import write_rows
 from ...results.folder import replacing
+from ...results.provenance import record
 from ...truths.reference import MODELS
 from .checks import CHECKS, IMPORTERS, Importer, Subject, Wrong, absent, play, subject
 
@@ -69,11 +70,10 @@ def table(found: list[Row]) -> Table:
     return shown
 
 
-def save(found: list[Row], out: Path) -> None:
-    """Write the rows to out/importers/importers.csv."""
-    with replacing(out / FOLDER, FILES) as folder, (folder / FILES[0]).open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["importer", "check", *MODELS])
-        for row in found:
-            check = row.check or f"not asked: {row.reason}"
-            writer.writerow([row.importer, check, *(row.cells or ("",) * len(MODELS))])
+def save(found: list[Row], fmus: Path, out: Path) -> None:
+    """Write the rows on the FMUs in a folder to out/importers/importers.csv."""
+    nothing = ("",) * len(MODELS)
+    rows = ((row.importer, row.check or f"not asked: {row.reason}", *(row.cells or nothing)) for row in found)
+    with replacing(out / FOLDER, FILES) as folder:
+        write_rows(folder / FILES[0], ["importer", "check", *MODELS], rows)
+        record(folder, [fmus / f"{model}.fmu" for model in MODELS])

@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from ...analyses.slip import crossings
 from ...running.answer import Answer
 from ...running.inside import Inside
 from ...truths.reference import Case, Reference, errors, load
@@ -52,17 +53,11 @@ def analyse(case: Case, model: type) -> Law:
     motion = run.motion(times.tolist())
     rates = case.problem.rates(1)
     a = [rates(t, y)[1] for t, y in zip(times.tolist(), motion, strict=True)]
-    return law(creep, period(times, np.array(motion)[:, 1] - run.model.v_driver), max(a) / -min(a))
+    slips = crossings(times, np.array(motion)[:, 1] - run.model.v_driver)
+    return law(creep, float(np.mean(np.diff(slips))), max(a) / -min(a))
 
 
 def stuck(truth: Reference) -> np.ndarray:
     """Which of the common points (n,) find the body stuck."""
     starts, modes = zip(*truth.modes, strict=True)
     return np.array(modes)[np.searchsorted(starts, truth.times, side="right") - 1] == 0
-
-
-def period(times: np.ndarray, y: np.ndarray) -> float:
-    """The mean distance of the times where y (n,) rises through zero."""
-    i = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
-    starts = times[i] - y[i] * (times[i + 1] - times[i]) / (y[i + 1] - y[i])
-    return float(np.mean(np.diff(starts)))

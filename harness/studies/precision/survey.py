@@ -1,6 +1,5 @@
 """The work-precision job: studies of the models asked for, the laws beside dry friction, the anchors, the results."""
 
-import csv
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import partial
@@ -9,8 +8,9 @@ from pathlib import Path
 from shutil import copytree, ignore_patterns
 
 from ...errors import SceneError, unknown
-from ...results.files import heading
+from ...results.files import heading, write_rows
 from ...results.folder import replacing
+from ...results.provenance import record
 from ...running.inside import embedded
 from ...scenes.fmus import fmu_of
 from ...truths.peers import missing
@@ -27,7 +27,7 @@ UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and r
     "creep": "m/s",
 }
 EXCHANGED = "model exchange by fmpy's CVode: largest error at rtol [1]"
-ENDS = (".csv", ".png", ".txt", "-exchange.csv", "-laws.csv")
+ENDS = (".csv", ".json", ".png", ".txt", "-exchange.csv", "-laws.csv")
 FILES = ("anchors.csv", *(f"{model}{end}" for model in MODELS for end in ENDS))
 
 
@@ -94,6 +94,7 @@ def write(found: Survey, folder: Path) -> None:
     from .figure import draw
 
     for each, sentence in zip(found.studies, found.advice, strict=True):
+        record(folder, [fmu_of(each.model)], name=f"{each.model}.json")
         (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
         save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
         exchanged = each.exchanged()
@@ -115,7 +116,4 @@ def heads(kind: type) -> list[str]:
 
 def save(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """A CSV file; None and NaN are left empty."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(heads)
-        writer.writerows([["" if value != value else value for value in row] for row in rows])
+    write_rows(path, heads, ([None if value != value else value for value in row] for row in rows))

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ...results.folder import replacing
+from ...results.provenance import record
 from ...running.any_fmu import own, run
 from ...running.fmu import simulate
 from ...running.trajectory import Trajectory, of_run
@@ -21,4 +22,5 @@ def perform_run(
     with replacing(folder, FILES) as fresh:
         found = of_run(simulate(wanted, report)) if wanted else run(path, stop, tolerance, values, report)
         found.save(fresh / "trajectory.csv")
+        record(fresh, [path], found.parameters, {"stop": stop, "tolerance": tolerance, "values": values})
     return found, folder

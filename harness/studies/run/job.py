@@ -4,7 +4,7 @@ What a scene does not name is not imported: analyses and plots load here, when t
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 from ...errors import HarnessError, SceneError, unknown
 from ...process.interrupt import check
 from ...results.folder import replacing
+from ...results.provenance import record
 from ...results.quantity import Quantity
 from ...running.fmu import simulate
 from ...running.run import Run
@@ -74,6 +75,8 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     quantities += run.cost.quantities
     check_published(scene, quantities)
     run.save(folder)
+    as_run = replace(scene, start=float(run.time[0]), stop=float(run.time[-1]))
+    record(folder, [scene.file], run.in_force, as_run)
     if scene.published:
         from .table import save
 

@@ -1,6 +1,5 @@
 """The table that sets measured figures beside published ones."""
 
-import csv
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from ...results.files import write_rows
 from ...results.quantity import Quantity
 from .job import Outcome
 
@@ -64,10 +64,6 @@ def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
 
 def save(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) -> None:
     """Write what the table shows of a scene as CSV, with the source of the published figures in its heading."""
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["", "measured", f"published ({published['source']})", "unit", "difference"])
-        for quantity in quantities:
-            if quantity.name in published or quantity.name in ALWAYS:
-                text, measured, figure, unit, difference = row(quantity, published.get(quantity.name))
-                writer.writerow([text.strip(), measured, figure, unit, difference])
+    heads = ["", "measured", f"published ({published['source']})", "unit", "difference"]
+    told = (row(each, published.get(each.name)) for each in quantities if each.name in published or each.name in ALWAYS)
+    write_rows(path, heads, ((text.strip(), *cells) for text, *cells in told))

@@ -4,7 +4,6 @@ The scenes and what is expected of them stand in stability.toml, the answers com
 every run has a process of its own with a time limit (bounded.py).
 """
 
-import csv
 import math
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -16,8 +15,11 @@ from typing import Any
 import numpy as np
 
 from ...errors import HarnessError
+from ...results.files import write_rows
 from ...results.folder import replacing
+from ...results.provenance import record
 from ...running.probe import Card, Motion, Refusal, Refusals, card, poison, run
+from ...scenes.fmus import fmu_of
 from ...truths.truth import Truth, check, truth, worst
 from .bounded import bounded
 from .cases import Case, cases, scenes
@@ -77,6 +79,7 @@ def survey(out: Path, report: Callable[[str, float], None], chosen: list[list[Ca
         found = regions(rows)
         save(rows, folder / "stability.csv")
         draw(found, folder / "region.png")
+        record(folder, [fmu_of(model) for model in dict.fromkeys(row.case.model for row in rows)])
     return rows, found
 
 
@@ -202,7 +205,4 @@ def save(rows: list[Row], path: Path) -> None:
         columns[name] = [getattr(row.motion.counts, name) if row.motion else "" for row in rows]
     columns["run time [s]"] = [row.motion.seconds if row.motion else math.nan for row in rows]
     columns["sentence"] = [row.text for row in rows]
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(zip(*columns.values(), strict=True))
+    write_rows(path, list(columns), zip(*columns.values(), strict=True))

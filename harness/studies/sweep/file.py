@@ -12,6 +12,8 @@ import xarray
 from ...errors import SceneError, unknown
 from ...results.files import heading
 from ...results.folder import replacing
+from ...results.provenance import record
+from ...running.settings import unit
 from ...scenes.assigned import assigned
 from ...scenes.fmus import check_built, fmu_of
 from .measures import columns
@@ -66,6 +68,7 @@ def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, repo
         rows, before, damaged, seconds = perform(sweep, out / FOLDER, scheduler, workers, report)
         data = dataset(sweep, rows, described)
         save(data, fresh)
+        record(fresh, [file], described["constants"], asked)
     forget(sweep, out / FOLDER)
     return Swept(data, folder, before, damaged, sum(1 for _, error in rows if error), seconds)
 
@@ -94,12 +97,12 @@ def describe(runs: Runs, axes: tuple[Axis, ...], file: Path) -> dict[str, Any]:
             if variables[each.name].type != "Real" and any(value % 1 for value in each.values):
                 raise SceneError(f"{each.name} is a choice: vary it over whole numbers, as in {each.name}=1,2")
         measured = columns(runs.measures, variables)
-        constants = rerun.constants()
+        constants, names = rerun.constants(), runs.varied
         stop = rerun.plan.stop
     return {
-        "varied": {name: (variables[name].unit or "", variables[name].description) for name in runs.varied},
+        "varied": {name: (unit(variables[name]), variables[name].description) for name in runs.varied},
         "columns": measured,
-        "constants": {name: value for name, value in constants.items() if name not in runs.varied},
+        "constants": {name: (value, unit(variables[name])) for name, value in constants.items() if name not in names},
         "stop": stop,
     }
 
@@ -120,16 +123,16 @@ def dataset(sweep: Sweep, rows: list[Any], about: dict[str, Any]) -> xarray.Data
     found = xarray.Dataset(data, coordinates)
     for column in about["columns"]:
         found[column.name].attrs = {"units": column.unit or "1", "long_name": column.text}
-    for name, (unit, text) in about["varied"].items():
+    for name, (size, text) in about["varied"].items():
         spread = "log" if next(each for each in sweep.axes if each.name == name).log else "linear"
-        found[name].attrs = {"units": unit or "1", "long_name": text or name, "scale": spread}
+        found[name].attrs = {"units": size or "1", "long_name": text or name, "scale": spread}
     found["error"].attrs = {"long_name": "why a run failed; empty if it did not"}
     found.attrs = {
         "title": f"{sweep.runs.model} over {', '.join(names)}",
         "model": sweep.runs.model,
         "fmu_sha256": sweep.digest,
         "stop_time": about["stop"],
-        "parameters": json.dumps(about["constants"], sort_keys=True),
+        "parameters": json.dumps({name: value for name, (value, _) in about["constants"].items()}, sort_keys=True),
         "sample": "grid" if sweep.random is None else f"Latin hypercube, seed {sweep.seed}",
     }
     return found
