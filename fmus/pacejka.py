@@ -87,15 +87,15 @@ class Pacejka(Oscillator):
     def jacobian(self, t, x, v, mode):
         z = self.B * v
         y = z - self.E * (z - atan(z))
-        slope = self.D * self.C * cos(self.C * atan(y)) / (1.0 + y * y)
-        slope *= self.B * (1.0 - self.E + self.E / (1.0 + z * z))
+        slope = self.B - self.E * (self.B - self.B / (1.0 + z * z))
+        slope = self.D * (cos(self.C * atan(y)) * (self.C * (slope / (1.0 + y * y))))
         return self.k * self.v_driver / self.m, -self.k / self.m, -slope * self.g
 
     def observe(self, t, x, v, mode):
         driver = self.x_base + self.v_driver * (t - self.t_base)
-        stretch, drag = driver - x, self.mu(v) * self.weight
+        stretch, mu = driver - x, self.mu(v)
         spring = self.k * stretch
         self.x, self.v, self.x_driver = x, v, driver
-        self.F_spring, self.F_friction = spring, drag
-        self.a = (self.F_ext + spring - drag) / self.m
+        self.F_spring, self.F_friction = spring, mu * self.weight
+        self.a = (self.F_ext + spring) / self.m - mu * self.g
         self.energy = 0.5 * (self.m * v * v + spring * stretch)

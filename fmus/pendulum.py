@@ -105,11 +105,11 @@ class Pendulum(DryFriction):
         b_x = self.weight * cos(x) + self.m * self.a * load_x / self.J
         rest = 1.0 - self.share * self.share
         root = sqrt(b * b + rest * radial * radial)
-        n_r = radial / root if root > 0.0 else 0.0
-        n_b = ((b / root if root > 0.0 else 0.0) - mode * self.share) / rest
-        n_x, n_v = n_b * b_x - n_r * self.weight * sin(x), n_r * 2.0 * self.m * self.a * v
-        drag = mode * self.arm / self.J
-        return 0.0, load_x / self.J - drag * n_x, -drag * n_v
+        r_x, r_v = -self.weight * sin(x), self.m * self.a * v + self.m * self.a * v
+        root_x = 0.5 * (2.0 * b * b_x + (rest * r_x * radial + rest * radial * r_x)) / root if root > 0.0 else 0.0
+        root_v = 0.5 * (rest * r_v * radial + rest * radial * r_v) / root if root > 0.0 else 0.0
+        n_x, n_v = (root_x - mode * self.share * b_x) / rest, root_v / rest
+        return 0.0, (load_x - mode * (self.arm * n_x)) / self.J, -mode * (self.arm * n_v) / self.J
 
     def hold(self, t, x, v):
         return self.T_ext - self.moment * sin(x), 0.0, self.arm * self.weight
