@@ -21,6 +21,7 @@ from mpmath import atan2, atanh, exp, factorial, findroot, mp, mpf, pi, re, sign
 
 mp.dps = 80
 GRAZE = mpf(10) ** -40  # a speed this near to zero only touches it; a load this near to the limit is the limit
+ROUNDING = mpf(10) ** -75  # of a speed; below it a root is found no better, however often it is looked for
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ class Piece:
             if catches and abs(self.at(high)[1]) <= GRAZE:
                 return high
             if mode * self.at(high)[1] < -GRAZE:
-                return findroot(lambda s: self.at(s)[1], (low, high), solver="anderson", tol=GRAZE**3, maxsteps=200)
+                return findroot(lambda s: self.at(s)[1], (low, high), solver="anderson", tol=ROUNDING, maxsteps=200)
             low = high
         return None
 
