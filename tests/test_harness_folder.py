@@ -96,7 +96,7 @@ def test_an_exchange_that_fails_half_way_leaves_the_old_result(older, monkeypatc
 KILLED = """
 import json, os, sys
 from pathlib import Path
-from harness import folder as folders
+from harness.results import folder as folders
 if sys.argv[2] == "two":
     folders.exchanged = lambda one, two: False
 place, ours = Path(sys.argv[1]), ("a.csv", "b.csv")
