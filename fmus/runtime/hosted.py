@@ -68,7 +68,13 @@ class Hosted(Values, Saved, Failing):
     @guarded
     def do_step(self, current_time, step_size):
         try:
-            status = rules.step(self.run, self.model, current_time, step_size)
-            return status == OK or self.give_up(status, current_time, step_size)
+            run, model = self.run, self.model
+            seen = run.observed
+            status = rules.step(run, model, current_time, step_size)
+            if status != OK:
+                return self.give_up(status, current_time, step_size)
+            if seen:  # who has read the last point will read this one too, and this way is shorter
+                rules.show(run, model)
+            return True
         except BaseException as error:  # as above
             return self.rescue(error)

@@ -156,8 +156,7 @@ def ready(run, model):
 
 def step(run, model, t, h):
     """A communication step of h from t.  Status."""
-    seen = run.observed and run.phase >= RUNNING  # nothing was set since the last point was read
-    if not seen:
+    if not (run.observed and run.phase >= RUNNING):  # something was set since the last point was read
         status = ready(run, model)
         if status != OK:
             return status
@@ -165,13 +164,10 @@ def step(run, model, t, h):
     end = end_of_step(run, march, t, h)
     if not end >= march.t:
         return BAD_STEP
-    if end > march.t:
-        status = march.advance(model, end)
-        if status != OK:
-            return status
-        if seen:  # who has read the last point will read this one too
-            show(run, model)
-    return OK
+    if end == march.t:
+        return OK
+    run.observed = False
+    return march.advance(model, end)
 
 
 def end_of_step(run, march, t, h):

@@ -128,9 +128,10 @@ class Slave(Hosted, Instance):
         try:
             run, model = self.run, self.model
             status = OK if run.interface == CO_SIMULATION else rules.begin_steps(run, model, current_time)
-            if status == OK:
-                status = rules.step(run, model, current_time, step_size)
-            return STEPPED if status == OK or self.give_up(status, current_time, step_size) else NOT_STEPPED
+            if status != OK:
+                self.give_up(status, current_time)
+                return NOT_STEPPED
+            return STEPPED if Hosted.do_step(self, current_time, step_size) else NOT_STEPPED
         except BaseException as error:  # as in hosted.py
             self.rescue(error)
             return NOT_STEPPED

@@ -108,11 +108,11 @@ static void fail(Instance *it, const Text *text)
 }
 
 /* Fail for the reason that the rules give, in a communication step of h from t. */
-static void give_up(Instance *it, int64_t status, double t, double h)
+static fmi2Status give_up(Instance *it, int64_t status, double t, double h)
 {
     const State *state = &it->state;
     Text text = {0};
-    if (status == FAILED) return; /* which has been told */
+    if (status == FAILED) return fmi2Error; /* which has been told */
     if (status == BAD_VALUE) {
         const Refusal *first = refused(state);
         tell_value(&text, first->reason, &variables[first - state->refused], first->value);
@@ -120,14 +120,7 @@ static void give_up(Instance *it, int64_t status, double t, double h)
         tell_status(&text, status, &state->run, &state->model, t, h);
     }
     fail(it, &text);
-}
-
-/* What the rules have answered; a fault is where Python would raise. */
-static fmi2Status answer(Instance *it, int64_t status, bool fault, double t, double h)
-{
-    if (fault) status = DIVERGED;
-    if (status != OK) give_up(it, status, t, h);
-    return status == OK ? fmi2OK : fmi2Error;
+    return fmi2Error;
 }
 
 /* ---- reading and writing */
@@ -148,7 +141,7 @@ static fmi2Status check(const Instance *it, bool is_real, const fmi2ValueReferen
     return fmi2OK;
 }
 
-/* Make the values ready to be read; fmi2Discard after a fault. */
+/* Make the values ready to be read; fmi2Discard after a fault, which is where Python would raise. */
 static fmi2Status ready(Instance *it, bool is_real, const fmi2ValueReference vr[], size_t nvr, const void *value,
                         const char *function)
 {
@@ -162,11 +155,13 @@ static fmi2Status ready(Instance *it, bool is_real, const fmi2ValueReference vr[
     }
     if (!state->run.observed && !state->run.failed) {
         int64_t status = rules_observe(&state->run, &state->model, &fault);
-        if (!fault && status != OK && status != DIVERGED) silence(&state->model);
-        else if (answer(it, status, fault, NAN, NAN)) return fmi2Discard;
+        if (status == DIVERGED) fault = true;
+        else if (status != OK) silence(&state->model);
     }
-    if (reported && state->run.observed) rules_report(&state->model, ahead, &fault);
-    return answer(it, OK, fault, NAN, NAN) ? fmi2Discard : fmi2OK;
+    if (reported && state->run.observed && !fault) rules_report(&state->model, ahead, &fault);
+    if (!fault) return fmi2OK;
+    give_up(it, DIVERGED, NAN, NAN);
+    return fmi2Discard;
 }
 
 /* As much of a count as an fmi2Integer can hold. */
@@ -190,7 +185,10 @@ static bool write_one(Instance *it, fmi2ValueReference reference, double value)
         return true;
     }
     rules_change(&state->run, &state->model, &fault);
-    if (answer(it, OK, fault, NAN, NAN)) return false;
+    if (fault) {
+        give_up(it, DIVERGED, NAN, NAN);
+        return false;
+    }
     if (variable->is_real) *(double *)place(&state->model, variable) = value;
     else *(int64_t *)place(&state->model, variable) = (int64_t)value;
     return true;
@@ -344,7 +342,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component component)
     ENTER(1 << INITIALISING);
     bool fault = false;
     int64_t status = rules_begin(&it->state.run, &it->state.model, &fault);
-    return answer(it, status, fault, NAN, NAN);
+    return status == OK && !fault ? fmi2OK : give_up(it, fault ? DIVERGED : status, NAN, NAN);
 }
 
 fmi2Status fmi2Terminate(fmi2Component component)
@@ -372,7 +370,7 @@ fmi2Status fmi2DoStep(fmi2Component component, fmi2Real currentCommunicationPoin
     bool fault = false;
     int64_t status = rules_step(&state->run, &state->model, t, h, &fault);
     (void)noSetFMUStatePriorToCurrentPoint;
-    return answer(it, status, fault, t, h);
+    return status == OK && !fault ? fmi2OK : give_up(it, fault ? DIVERGED : status, t, h);
 }
 
 fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind s, fmi2Real *value)

@@ -45,15 +45,15 @@ static const Variable variables[VARIABLES] = {{
 
 /* What of an instance makes its run. */
 typedef struct {{
-    struct Run run;
     Model model;
+    struct Run run;
     int64_t turns; /* how many values were refused so far */
     Refusal refused[VARIABLES];
 }} State;
 
 static const State initial = {{
-    .run = {run},
     .model = {image},
+    .run = {run},
 }};
 
 enum {{ MEMBERS = {count_of_members} }};
