@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from ..errors import reason
 from ..results import provenance
@@ -319,7 +320,7 @@ def digits(number: float | None, count: int) -> str:
     return "not finite" if number is None else f"{number:.{count}g}"
 
 
-def interval(each: dict | None) -> str:
+def interval(each: dict[str, Any] | None) -> str:
     """Value and half of its 95 % interval, where there is one."""
     if each is None:
         return ""
@@ -330,5 +331,5 @@ def interval(each: dict | None) -> str:
     return f"{each['value']:.7g} ± {each['high'] - each['value']:.1g}"
 
 
-def unit(each: dict) -> str:
+def unit(each: dict[str, Any]) -> str:
     return "" if each["unit"] == "1" else each["unit"]

@@ -17,7 +17,7 @@ from typing import Any
 import fmpy
 import numpy as np
 from fmpy import fmi2
-from fmpy.fmi1 import FMICallException
+from fmpy.fmi1 import FMICallException as FMICallException  # which those that run step by step catch
 
 from ..errors import HarnessError, SceneError, reason
 from .run import Cost, Events, Run, Steps
@@ -49,10 +49,10 @@ class Trace:
     """What one pass leaves: time, a row of reals and of integers for each communication point, and the rows where an
     internal step ends (the start included)."""
 
-    time: array = field(default_factory=lambda: array("d"))
-    reals: array = field(default_factory=lambda: array("d"))
-    integers: array = field(default_factory=lambda: array("i"))
-    ends: array = field(default_factory=lambda: array("q", [0]))
+    time: "array[float]" = field(default_factory=lambda: array("d"))
+    reals: "array[float]" = field(default_factory=lambda: array("d"))
+    integers: "array[int]" = field(default_factory=lambda: array("i"))
+    ends: "array[int]" = field(default_factory=lambda: array("q", [0]))
 
 
 def simulate(wanted: Specification, report: Report = lambda share: None) -> Run:

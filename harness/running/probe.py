@@ -13,9 +13,10 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from fmpy.fmi1 import FMICallException
 
 from ..scenes.fmus import fmu_of
-from .fmu import WARNING, FMICallException, begin, callbacks, described, instance, put
+from .fmu import WARNING, begin, callbacks, described, instance, put
 from .settings import labels
 from .specification import Specification
 

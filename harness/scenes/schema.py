@@ -112,16 +112,22 @@ def keys(schema: Any) -> list[str]:
     return [each.name for each in fields(schema)]
 
 
-CONVERTER.register_structure_hook_factory(is_dataclass, table)
-CONVERTER.register_structure_hook_factory(
-    lambda annotation: get_origin(annotation) is dict,
-    lambda annotation: of_kind(TABLE, make_mapping_structure_fn(annotation, CONVERTER)),
-)
-CONVERTER.register_structure_hook_factory(
-    lambda annotation: get_origin(annotation) is tuple,
-    lambda annotation: of_kind(LIST, homogenous_tuple_structure_factory(annotation, CONVERTER)),
-)
-CONVERTER.register_structure_hook_factory(lambda annotation: kind_of(annotation) is not None, plain)
+def tables(annotation: Any) -> Hook:
+    """A table whose keys are free, and whose values are alike."""
+    return of_kind(TABLE, make_mapping_structure_fn(annotation, CONVERTER))
+
+
+def items(annotation: Any) -> Hook:
+    """A list whose items are alike."""
+    return of_kind(LIST, homogenous_tuple_structure_factory(annotation, CONVERTER))
+
+
+def made_of(container: Any) -> Callable[[Any], bool]:
+    return lambda annotation: get_origin(annotation) is container
+
+
+for concerns, hooks in ((is_dataclass, table), (made_of(dict), tables), (made_of(tuple), items), (kind_of, plain)):
+    CONVERTER.register_structure_hook_factory(concerns, hooks)  # type: ignore[arg-type]
 
 
 def structured(written: dict[str, Any], schema: type[Schema]) -> Schema:

@@ -1,5 +1,7 @@
 """The pendulum by Taylor series in 25 digits, from one turning point to the next."""
 
+from collections.abc import Callable
+
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
 from .linear import Events, Motion
@@ -24,7 +26,7 @@ def swings(problem: Pendulum, times: list[float]) -> tuple[Motion, Events]:
             b, s = weight * sin(x) * (1 - moment * a / inertia), mode * arm * moment / inertia
             return (sqrt((1 - s * s) * radial**2 + b * b) - s * b) / (1 - s * s)
 
-        def swing(mode: int, t: mpf, x: mpf):
+        def swing(mode: int, t: mpf, x: mpf) -> Callable[[mpf], list[mpf]]:
             def rates(_: mpf, y: list[mpf]) -> list[mpf]:
                 return [y[1], -(weight * a * sin(y[0]) + mode * arm * normal(y[0], y[1], mode)) / inertia]
 

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from .pieces import Motion, Piece, Span, Values
 
+State = tuple[float, float]
 REACTION = 2  # the number of pin_load = reaction
 BEYOND_PI = 1.2246467991473532e-16  # of pi, after what a float holds
 
@@ -22,11 +23,11 @@ def pacejka(spans: list[Span]) -> Iterator[Piece]:
     for begin, end, p in spans:
         curve = Curve(p)
 
-        def rates(s, y, p=p, curve=curve, drive=drive):
+        def rates(s: float, y: np.ndarray, p: Values = p, curve: Curve = curve, drive: float = drive) -> State:
             pull = p["F_ext"] + p["k"] * (drive + p["v_driver"] * s - y[0])
             return y[1], pull / p["m"] - curve.mu(y[1]) * p["g"]
 
-        def slopes(s, y, p=p, curve=curve):
+        def slopes(s: float, y: np.ndarray, p: Values = p, curve: Curve = curve) -> list[list[float]]:
             return [[0.0, 1.0], [-p["k"] / p["m"], -curve.slope(y[1]) * p["g"]]]
 
         # in the time from the beginning of the span, which has finer digits than that of the clock

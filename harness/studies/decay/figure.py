@@ -1,8 +1,10 @@
 """The figure of an identified decay: signal and fit, residuals, and what each half swing loses."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ...analyses.decay.fit import Identified
 from ...analyses.decay.loss import Loss
@@ -25,7 +27,7 @@ def draw(found: Identified, loss: Loss, path: Path) -> None:
         shares(figure.add_subplot(grid[2]), found, loss)
 
 
-def signal(axes, found: Identified) -> None:
+def signal(axes: Axes, found: Identified) -> None:
     """Record, fit, rest position, turning points, and what was left out."""
     record, t = found.record, found.t
     used = np.isin(record.t, t)
@@ -39,14 +41,14 @@ def signal(axes, found: Identified) -> None:
         fine[[0, -1]], found.rest(found.best, fine[[0, -1]]), color=GREY, linestyle="--", linewidth=0.8, label="rest"
     )
     if not record.order:
-        style = {"color": "black", "fillstyle": "none", "markersize": 5}
+        style: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
         axes.plot(found.turns.t, found.turns.x, "o", label="turning points", **style)
     axes.set_title(f"{record.name}: {found.best.words}")
     axes.set_ylabel(label(("x", "v", "a")[record.order], record.unit))
     axes.legend(loc="upper right", ncols=3)
 
 
-def residuals(axes, found: Identified) -> None:
+def residuals(axes: Axes, found: Identified) -> None:
     """Record less fit."""
     left = found.x - found.signal(found.best, found.t)
     every = max(1, len(left) // (5 * MOST))
@@ -57,7 +59,7 @@ def residuals(axes, found: Identified) -> None:
     axes.set_xlabel("t [s]")
 
 
-def shares(axes, found: Identified, loss: Loss) -> None:
+def shares(axes: Axes, found: Identified, loss: Loss) -> None:
     """The share of its energy that each half swing loses, with the curves of the best law and of those of one term."""
     best = found.best
     for law in found.laws:

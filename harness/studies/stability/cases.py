@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ...running.probe import Card, Setting
-from ...truths.truth import Grid, Span
+from ...truths.pieces import Span
+from ...truths.truth import Grid
 
 FILE = Path(__file__).with_name("stability.toml")
 RTOL = 1e-6

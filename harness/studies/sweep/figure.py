@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray
@@ -96,7 +97,7 @@ def scatter(axes: Axes, data: xarray.Dataset, measure: str, name: str) -> None:
     axes.set_ylabel(words(data, measure))
 
 
-def parameters(data: xarray.Dataset) -> dict:
+def parameters(data: xarray.Dataset) -> dict[str, Any]:
     """The parameters that were not varied."""
     return json.loads(data.attrs["parameters"])
 

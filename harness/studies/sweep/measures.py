@@ -5,6 +5,7 @@ A measure that a run does not have (the period of a single slip, the rest of wha
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -108,7 +109,7 @@ ON_PATH = {
 LIKE = {"peak_speed": "velocity", "rest": "position", "f_over_k": "position"}  # measured in the unit of
 
 
-def columns(measures: tuple[str, ...], variables: dict) -> tuple[Column, ...]:
+def columns(measures: tuple[str, ...], variables: dict[str, Any]) -> tuple[Column, ...]:
     """The columns of these measures, for an FMU with these variables; SceneError for what it does not offer."""
     offered = ["final", "run_time", *(name for name, (_, variable) in AT_END.items() if variable in variables)]
     offered += [name for name, path in ON_PATH.items() if path.variable in variables]
