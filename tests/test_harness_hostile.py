@@ -12,7 +12,7 @@ import pytest
 
 from harness.commands import commands
 from harness.errors import HarnessError
-from harness.scenes.scene import Keys
+from harness.scenes.scene import SceneKeys
 from harness.scenes.schema import keys
 
 ROOT = Path(__file__).parent.parent
@@ -117,7 +117,7 @@ def check(status, said, shown):
         assert said.strip(), shown
 
 
-@pytest.mark.parametrize("key", [*keys(Keys), "nosuch"])
+@pytest.mark.parametrize("key", [*keys(SceneKeys), "nosuch"])
 def test_whatever_a_scene_says_it_runs_or_is_refused(here, key):
     for value in VALUES:
         text = "".join(f"{name} = {told}\n" for name, told in (SCENE | {key: value}).items())

@@ -17,12 +17,12 @@ from models import MODELS, ROOT, declared
 from harness.errors import HarnessError
 from harness.running.probe import Counts, Motion, Refusal, Refusals
 from harness.studies.stability.bounded import bounded
-from harness.studies.stability.cases import Case, scenes, spans, spread
+from harness.studies.stability.cases import Trial, scenes, spans, spread
 from harness.studies.stability.study import (
     FINISHED,
     REFUSED,
     WRONG,
-    Row,
+    Ending,
     all_cases,
     all_refused,
     finished,
@@ -130,7 +130,7 @@ def test_what_is_raised_comes_through():
 # ---- the judgement
 
 
-CASE = Case("rest", "coulomb", "exact", setting=None, grid=Grid(0.0, 1.0, 2), spans=[], finish=1e-3)
+CASE = Trial("rest", "coulomb", "exact", setting=None, grid=Grid(0.0, 1.0, 2), spans=[], finish=1e-3)
 REST = Truth(np.array([0.0, 0.5, 1.0]), np.ones(3), np.zeros(3), ((0.5, 0),))
 GOOD = Motion(np.ones(3), np.zeros(3), np.zeros(3), 0.5, Counts(1, 2, 0, 3), 0.1)
 
@@ -174,7 +174,7 @@ def test_a_refusal_says_the_words_and_leaves_no_numbers(case):
 
 def test_the_slope_is_that_of_the_stiff_end(case):
     rows = [
-        Row(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=Counts(0, n, 0, 0)))
+        Ending(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=Counts(0, n, 0, 0)))
         for x, n in ((1e-4, 1000), (1e-3, 100), (1e-2, 50))
     ]
     (found,) = regions(rows)

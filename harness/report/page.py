@@ -20,14 +20,14 @@ ADVICE = (
 
 
 @dataclass(frozen=True)
-class Report:
+class Page:
     """Where the page was written, and what it could not show: name and command of each."""
 
     path: Path
     missing: tuple[tuple[str, str], ...]
 
 
-def write(results: Path) -> Report:
+def write(results: Path) -> Page:
     """Write the page of all results below a folder into it; HarnessError if there are none."""
     found = sections(results)
     if not any(part.grid or part.pictures or part.lost for section in found for part in section.parts):
@@ -41,7 +41,7 @@ def write(results: Path) -> Report:
         fresh.replace(path)
     except OSError as error:
         raise HarnessError(f"cannot write {path}: {error.strerror}") from None
-    return Report(path, tuple(gap for section in found for gap in section.missing))
+    return Page(path, tuple(gap for section in found for gap in section.missing))
 
 
 def page(found: list[Section]) -> str:

@@ -43,7 +43,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Grid:
+class TableCells:
     """A table: its headings and its rows of texts."""
 
     heads: tuple[str, ...]
@@ -51,13 +51,13 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Part:
+class Item:
     """A piece of a section: heading, sentences, table and pictures, as far as there are any, and sentences on
     their origin; `lost` if its results could not be read, which a sentence says."""
 
     title: str
     sentences: tuple[str, ...] = ()
-    grid: Grid | None = None
+    grid: TableCells | None = None
     pictures: tuple[Picture, ...] = ()
     lost: bool = False
     origin: tuple[str, ...] = ()
@@ -70,7 +70,7 @@ class Section:
     name: str
     title: str
     intro: str
-    parts: tuple[Part, ...]
+    parts: tuple[Item, ...]
     missing: tuple[tuple[str, str], ...]
 
 
@@ -82,13 +82,13 @@ def sections(results: Path) -> list[Section]:
     ]
 
 
-def read(place: Path, make: Callable[[Path], Part]) -> Part:
+def read(place: Path, make: Callable[[Path], Item]) -> Item:
     """What is made of a file or folder of results; a sentence in its place if that holds something else."""
     try:
         part = make(place)
         return replace(part, origin=origin(place)) if part.grid or part.pictures else part
     except Exception as error:  # it may hold anything: half of a file, another version's, somebody else's
-        return Part(
+        return Item(
             place.name, (f"{place} cannot be shown ({type(error).__name__}: {reason(error)[:100]}).",), lost=True
         )
 
@@ -105,16 +105,16 @@ def oscillators(results: Path) -> Section:
         present = [case for case in CASES[model] if (results / case / "figures.csv").is_file()]
         missing += [(case, f"python -m harness run {case}") for case in CASES[model] if case not in present]
         if not present:
-            parts.append(Part(model, (text,)))
+            parts.append(Item(model, (text,)))
         for i, case in enumerate(present):
             parts.append(read(results / case, partial(oscillator, "" if i else text)))
     intro = "What each of the five does, with figures measured here beside those that were published."
     return Section("oscillators", "The five oscillators", intro, tuple(parts), tuple(missing))
 
 
-def oscillator(text: str, folder: Path) -> Part:
+def oscillator(text: str, folder: Path) -> Item:
     picture = drawn(folder / "figure.png", f"{folder.name}: position, velocity and phase plane of the run")
-    return Part(folder.name, (text,) if text else (), table(folder / "figures.csv"), picture)
+    return Item(folder.name, (text,) if text else (), table(folder / "figures.csv"), picture)
 
 
 def decays(results: Path) -> Section:
@@ -124,7 +124,7 @@ def decays(results: Path) -> Section:
     return Section("decay", "Decay", intro, tuple(parts), missing)
 
 
-def decay(folder: Path) -> Part:
+def decay(folder: Path) -> Item:
     found = json.loads((folder / "decay.json").read_text(encoding="utf-8"))
     turns = {each["name"]: each for each in found["turning_points"]}
     peaks = {each["name"]: each for each in found["published"]}
@@ -138,12 +138,12 @@ def decay(folder: Path) -> Part:
         )
         for each in found["fit"]
     )
-    grid = Grid(("", "whole signal", "turning points", "first and last peak", "unit"), rows)
+    grid = TableCells(("", "whole signal", "turning points", "first and last peak", "unit"), rows)
     alternative = (
         f"Decay of {found['record']}: signal, turning points, envelope and fit, and residuals. {found['sentence']}"
     )
     sentences = (found["sentence"], *found["remarks"])
-    return Part(found["record"], sentences, grid, drawn(folder / "figure.png", alternative))
+    return Item(found["record"], sentences, grid, drawn(folder / "figure.png", alternative))
 
 
 def steps(results: Path) -> Section:
@@ -151,7 +151,7 @@ def steps(results: Path) -> Section:
     made = [read(results / case, sizes) for case in cases]
     rows = [row for part in made if part.grid for row in part.grid.rows]
     heads = ("case", "steps", "smallest [ms]", "mean [ms]", "largest [ms]", "refused")
-    parts = [Part("The solver's own steps", (), Grid(heads, tuple(rows)))] if rows else []
+    parts = [Item("The solver's own steps", (), TableCells(heads, tuple(rows)))] if rows else []
     parts += [part for part in made if not part.grid]
     intro = (
         "Seen through solver.t_next, whatever the communication step. Where friction is a jump that the solver is not "
@@ -160,13 +160,13 @@ def steps(results: Path) -> Section:
     return Section("steps", "Steps", intro, tuple(parts), () if rows else (("steps", "python -m harness"),))
 
 
-def sizes(folder: Path) -> Part:
+def sizes(folder: Path) -> Item:
     """The row of one case."""
     rows = table(folder / "steps.csv", cut=False).rows
     h = [float(cells[1]) for cells in rows]
     figures = (f"{1e3 * size:.4g}" for size in (min(h), sum(h) / len(h), max(h)))
     row = (folder.name, str(len(h)), *figures, f"{sum(float(cells[2]) for cells in rows):g}")
-    return Part(folder.name, grid=Grid((), (row,)))
+    return Item(folder.name, grid=TableCells((), (row,)))
 
 
 def precision(results: Path) -> Section:
@@ -184,14 +184,14 @@ def precision(results: Path) -> Section:
     return Section("precision", "Error against run time", intro, tuple(parts), tuple(missing))
 
 
-def tradeoff(place: Path) -> Part:
+def tradeoff(place: Path) -> Item:
     """One model's, whose files begin with its name."""
     picture = drawn(
         place.with_suffix(".png"), f"{place.name}: run time and right-hand sides over the largest error, by method"
     )
     text, exchanged = place.with_suffix(".txt"), place.with_name(f"{place.name}-exchange.csv")
     said = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
-    return Part(place.name, said, table(exchanged) if exchanged.is_file() else None, picture)
+    return Item(place.name, said, table(exchanged) if exchanged.is_file() else None, picture)
 
 
 def stability(results: Path) -> Section:
@@ -202,7 +202,7 @@ def stability(results: Path) -> Section:
     return Section("stability", "Stability", intro, tuple(parts), missing)
 
 
-def endings(file: Path) -> Part:
+def endings(file: Path) -> Item:
     found = table(file, cut=False)
     at = {name: i for i, name in enumerate(found.heads)}
     counts = Counter((row[at["model"]], row[at["method"]], row[at["ended"]]) for row in found.rows)
@@ -215,7 +215,7 @@ def endings(file: Path) -> Part:
         file.with_name("region.png"), "Steps of each method over the speed at the peak of the friction curve"
     )
     text = f"{len(found.rows)} stiff and extreme cases; how each ended:"
-    return Part("Endings", (text,), Grid(("model", "method", *kinds), rows), picture)
+    return Item("Endings", (text,), TableCells(("model", "method", *kinds), rows), picture)
 
 
 def importers(results: Path) -> Section:
@@ -231,12 +231,12 @@ def sweeps(results: Path) -> Section:
     return Section("sweeps", "Sweeps", intro, tuple(parts), () if parts else (("a sweep", command),))
 
 
-def swept(folder: Path) -> Part:
+def swept(folder: Path) -> Item:
     found = table(folder / "sweep.csv", cut=False)
     failed = sum(bool(row[found.heads.index("error")]) for row in found.rows)
     measured = [head for head in found.heads if head != "error"]
     text = f"{len(found.rows)} runs, {failed} failed. Columns: {', '.join(measured)}."
-    return Part(folder.name, (text,), None, drawn(folder / "figure.png", f"Sweep {folder.name}. {text}"))
+    return Item(folder.name, (text,), None, drawn(folder / "figure.png", f"Sweep {folder.name}. {text}"))
 
 
 def comparisons(results: Path) -> Section:
@@ -246,16 +246,16 @@ def comparisons(results: Path) -> Section:
     return Section("compare", "Comparisons", intro, tuple(parts), () if parts else (("a comparison", command),))
 
 
-def comparison(folder: Path) -> Part:
+def comparison(folder: Path) -> Item:
     found = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
     rows = tuple(
         (each["name"], digits(each["largest"], 3), digits(each["rms"], 3), digits(each["relative"], 2), each["unit"])
         for each in found["variables"]
     )
-    grid = Grid(("variable", "largest", "rms", "relative", "unit"), rows)
+    grid = TableCells(("variable", "largest", "rms", "relative", "unit"), rows)
     title = f"{found['one']['name']} and {found['two']['name']}"
     said = tuple(filter(None, (found["one"]["note"], found["two"]["note"], found["events"])))
-    return Part(title, said, grid, drawn(folder / "figure.png", f"{title}, and their difference"))
+    return Item(title, said, grid, drawn(folder / "figure.png", f"{title}, and their difference"))
 
 
 def coupled(results: Path) -> Section:
@@ -265,9 +265,9 @@ def coupled(results: Path) -> Section:
     return Section("coupled", "Coupled", intro, tuple(parts), missing)
 
 
-def pair(folder: Path) -> Part:
+def pair(folder: Path) -> Item:
     alternative = f"Coupled scene {folder.name}: positions beside the monolithic reference, and error over the step"
-    return Part(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.png", alternative))
+    return Item(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.png", alternative))
 
 
 def bench(results: Path) -> Section:
@@ -278,9 +278,9 @@ def bench(results: Path) -> Section:
     )
 
 
-def whole(file: Path, title: str) -> list[Part]:
+def whole(file: Path, title: str) -> list[Item]:
     """The part that shows all of a table, if there is one."""
-    return [read(file, lambda place: Part(title, (), table(place)))] if file.is_file() else []
+    return [read(file, lambda place: Item(title, (), table(place)))] if file.is_file() else []
 
 
 def folders(parent: Path, file: str) -> list[Path]:
@@ -298,13 +298,13 @@ def drawn(file: Path, text: str) -> tuple[Picture, ...]:
     return (Picture(f"data:image/png;base64,{b64encode(data).decode()}", text),)
 
 
-def table(file: Path, cut: bool = True) -> Grid:
+def table(file: Path, cut: bool = True) -> TableCells:
     """The table in a CSV file; `cut`: long numbers to four digits."""
     with file.open(encoding="utf-8", newline="") as text:
         heads, *rows = csv.reader(text)
     if any(len(row) != len(heads) for row in rows):
         raise ValueError(f"a row of {file.name} has more or fewer cells than its heading")
-    return Grid(tuple(heads), tuple(tuple(shortened(cell) if cut else cell for cell in row) for row in rows))
+    return TableCells(tuple(heads), tuple(tuple(shortened(cell) if cut else cell for cell in row) for row in rows))
 
 
 def shortened(cell: str) -> str:

@@ -41,7 +41,7 @@ class Counted(FMU3Model):
 
 
 @dataclass(frozen=True)
-class Record:
+class Recording:
     """What fmpy recorded: `rows` is a structured array of `time` in s and the outputs by name (SI units), in model
     exchange with a row before and one after each event; and the right-hand sides evaluated."""
 
@@ -77,7 +77,7 @@ class Instance:
         interval: float,
         rtol: float | None = None,
         patience: float | None = None,
-    ) -> Record:
+    ) -> Recording:
         """A run from 0 s to the stop, recorded at every interval (s); without rtol that of the FMU's default
         experiment.  HarnessError if it fails or outlasts `patience` s."""
         try:
@@ -102,7 +102,7 @@ class Instance:
             raise HarnessError(f"at t = {last:.3g} s" + (f" after {patience:g} s of run time" if patience else ""))
         evaluations = self.fmu.evaluations if self.way == EXCHANGE else int(rows[COUNT][-1])
         self.fmu.reset()
-        return Record(rows, evaluations)
+        return Recording(rows, evaluations)
 
 
 def heed(time: float, recorder: Any) -> bool:
@@ -111,7 +111,7 @@ def heed(time: float, recorder: Any) -> bool:
     return True
 
 
-def beside(fmu: Path) -> Path:
+def sibling(fmu: Path) -> Path:
     """The FMI 3.0 FMU of the same model, beside that of FMI 2.0."""
     return fmu.parent / "fmi3" / fmu.name
 

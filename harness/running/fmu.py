@@ -157,7 +157,7 @@ def passes(plan: Plan, fmu: Any, report: Report) -> Run:
             fmu.reset()
         begin(fmu, values, plan.start, plan.stop)
         begun = perf_counter()
-        trace = march(plan, fmu, report, turn)
+        trace = traced(plan, fmu, report, turn)
         seconds.append(perf_counter() - begun)
     return gather(plan, fmu, trace, min(seconds))
 
@@ -179,7 +179,7 @@ def put(fmu: Any, variable: Any, value: float) -> None:
         fmu.setInteger([variable.valueReference], [int(value)])
 
 
-def march(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
+def traced(plan: Plan, fmu: Any, report: Report, turn: int) -> Trace:
     """Step from start to stop, and record every communication point; `turn` passes came before.
 
     The arrays and the C functions are bound once, since at a few microseconds a step looking them up would show.

@@ -1,7 +1,7 @@
 """A run through fmpy in equal communication steps, all outputs recorded, in two loops.
 
-`usual` is fmpy's own, simulate_fmu, which everybody gets; `lean` is the harness's, which calls the library as directly
-as Python can.  A communication step is what the steps of a run add to it: the difference between a run in 1600 steps
+`usual` is fmpy's own, simulate_fmu, which everybody gets; `direct` is the harness's, which calls the library with
+nothing between.  A communication step is what the steps of a run add to it: the difference between a run in 1600 steps
 and one in a single step, shared among them.  The solver's own steps do not depend on it; they are in whole runs.
 """
 
@@ -35,7 +35,7 @@ def usual(file: Path, steps: int) -> float:
         return best(run, REPEAT)
 
 
-def lean(file: Path, steps: int) -> float:
+def direct(file: Path, steps: int) -> float:
     """Run time in s of the harness's loop, from initialisation on, the shortest of several runs of one instance."""
     description = described(Specification(file))
     stop = float(description.defaultExperiment.stopTime)

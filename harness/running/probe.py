@@ -114,7 +114,7 @@ def card(model: str) -> Card:
     )
 
 
-class Slave:
+class Probe:
     """An instance of an FMU that can be run anew and anew."""
 
     def __init__(
@@ -154,17 +154,17 @@ class Slave:
 
 
 @contextmanager
-def slave(model: str) -> Iterator[Slave]:
+def probe(model: str) -> Iterator[Probe]:
     """A fresh instance of a model's FMU, whose words are kept from the terminal."""
     functions, messages = callbacks()
     wanted, spoken = plain(model), io.StringIO()
     with redirect_stderr(spoken), instance(wanted, functions) as (description, fmu):
-        yield Slave(wanted.outputs, description, fmu, messages, spoken)
+        yield Probe(wanted.outputs, description, fmu, messages, spoken)
 
 
 def run(setting: Setting, calls: Calls, changes: Changes) -> Motion | Refusal:
     """Make the calls, with values changed at the times that `changes` holds; a row is read after each."""
-    with slave(setting.model) as it:
+    with probe(setting.model) as it:
         begun = perf_counter()
         try:
             it.begin(setting)
@@ -188,7 +188,7 @@ def poison(setting: Setting) -> Refusals:
     Each must be refused with a sentence that names it, and leave an FMU that runs again after a reset.
     """
     wrong, tried = [], 0
-    with slave(setting.model) as it:
+    with probe(setting.model) as it:
         for name, value, late in product(it.reals("parameter", "input"), (nan, inf, -inf), (False, True)):
             tried += 1
             it.forget()

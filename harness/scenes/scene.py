@@ -83,7 +83,7 @@ class Envelope:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Keys:
+class SceneKeys:
     """The keys of the file; None means what the FMU itself says."""
 
     title: Annotated[str, TITLE]
@@ -108,7 +108,7 @@ class Keys:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Scene(Keys):
+class Scene(SceneKeys):
     """One scene, under the name of its file, with the file of its FMU."""
 
     name: str
@@ -143,7 +143,7 @@ def load(scene: str | Path) -> Scene:
 
 def build(path: Path, table: dict[str, Any]) -> Scene:
     """A scene from the table that its file holds."""
-    keys = structured(table, Keys)
+    keys = structured(table, SceneKeys)
     for key, names, allowed in (("analyses", keys.analyses, ANALYSES), ("plots", keys.plots, PLOTS)):
         for name in names:
             if name not in allowed:
@@ -178,7 +178,7 @@ def check_needs(scene: Scene) -> None:
         raise SceneError("[published] needs a source, as in source = 'MATLAB ode23'")
 
 
-def find(path: Path, keys: Keys) -> Path:
+def find(path: Path, keys: SceneKeys) -> Path:
     """Where the FMU is, or will be once it is built."""
     if keys.model is not None and keys.fmu is None:
         return fmu_of(keys.model)

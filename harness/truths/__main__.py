@@ -9,7 +9,7 @@ import numpy as np
 
 from ..results.files import heading, write, write_rows
 from ..running.answer import Answer
-from .linear import Events, Motion, coulomb, sampled, smd, stickslip, threshold
+from .linear import ModeChanges, Samples, coulomb, sampled, smd, stickslip, threshold
 from .peers import solve
 from .problem import Pendulum
 from .reference import CASES, FOLDER, POINTS, Case, late, relative
@@ -29,7 +29,7 @@ def main() -> None:
         rows.append((case.truth, routes, f"{doubt:.1e}"))
         unit, events = case.problem.unit, answer.events or []
         if case.problem.dry:
-            events.insert(0, (0.0, case.problem.settle(0.0, *case.problem.start)))
+            events.insert(0, (0.0, case.problem.mode_from(0.0, *case.problem.start)))
         heads = ["t [s]", heading("x", unit), heading("v", f"{unit}/s")]
         write(FOLDER / f"{case.truth}.csv", heads, [times, *answer.motion.T])
         columns = [np.array([t for t, _ in events]), np.array([mode for _, mode in events])]
@@ -50,7 +50,7 @@ def make(case: Case, times: np.ndarray) -> tuple[Answer, str, float]:
     return explicit, "DOP853 and Radau", difference(explicit, implicit)
 
 
-def rounded(motion: Motion, events: Events) -> Answer:
+def rounded(motion: Samples, events: ModeChanges) -> Answer:
     """The doubles next to what many digits say."""
     return Answer(np.array([[float(x), float(v)] for x, v in motion]), [(float(t), mode) for t, mode in events], 0)
 

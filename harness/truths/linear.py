@@ -13,8 +13,8 @@ from mpmath import acos, atan2, cos, exp, inf, mpf, pi, sin, sqrt, workdps
 DIGITS = 40
 ZERO = mpf(0)
 
-Motion = list[tuple[mpf, mpf]]
-Events = list[tuple[mpf, int]]
+Samples = list[tuple[mpf, mpf]]
+ModeChanges = list[tuple[mpf, int]]
 
 
 @dataclass(frozen=True)
@@ -60,17 +60,17 @@ class Glide:
         return self.x + self.v * s, self.v
 
 
-Piece = tuple[mpf, int, Swing | Glide]  # its beginning, the mode, the motion
+Leg = tuple[mpf, int, Swing | Glide]  # its beginning, the mode, the motion
 
 
-def smd() -> Iterator[Piece]:
+def smd() -> Iterator[Leg]:
     """Spring, mass and damper: one piece."""
     m, k, c = mpf(1.0), mpf(157.9), mpf(2.0)
     z = c / (2 * m)
     yield mpf(0), 1, Swing(mpf(0.1), mpf(0), mpf(0), mpf(0), sqrt(k / m - z * z), z)
 
 
-def coulomb() -> Iterator[Piece]:
+def coulomb() -> Iterator[Leg]:
     """Spring and mass with Coulomb friction: swings about +- f/k."""
     m, k, f = mpf(1.0), mpf(157.9), mpf(0.5)
     t, x = mpf(0), mpf(0.1)
@@ -83,7 +83,7 @@ def coulomb() -> Iterator[Piece]:
     yield t, 0, Glide(x, mpf(0))
 
 
-def stickslip(eps: mpf | None = None) -> Iterator[Piece]:
+def stickslip(eps: mpf | None = None) -> Iterator[Leg]:
     """The sled, pulled at u; with `eps` (m/s) that of the threshold law, in the limit of exact integration.
 
     There the sled is held below the speed eps only as far as friction can: it starts with the friction mu_s until
@@ -108,14 +108,14 @@ def stickslip(eps: mpf | None = None) -> Iterator[Piece]:
         t, x, v = t + s, slip.at(s)[0], level
 
 
-def threshold() -> Iterator[Piece]:
+def threshold() -> Iterator[Leg]:
     return stickslip(mpf(1e-7))
 
 
-def sampled(law: Callable[[], Iterator[Piece]], times: list[float]) -> tuple[Motion, Events]:
+def sampled(law: Callable[[], Iterator[Leg]], times: list[float]) -> tuple[Samples, ModeChanges]:
     """The motion of a law at the times, and the changes of mode up to the last of them."""
-    motion: Motion = []
-    events: Events = []
+    motion: Samples = []
+    events: ModeChanges = []
     with workdps(DIGITS):
         pieces = law()
         current = next(pieces)

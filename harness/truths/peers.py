@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import HarnessError
 from ..running.answer import Answer
-from .problem import Problem, Rates, State
+from .problem import Equations, Rates, State
 
 SCIPY = ("RK23", "RK45", "DOP853", "Radau", "LSODA")
 IMPLICIT = ("Radau", "LSODA", "BDF")  # those that ask for a Jacobian
@@ -77,13 +77,13 @@ def missing() -> dict[str, str]:
 
 
 def solve(
-    peer: str, method: str, problem: Problem, times: np.ndarray, rtol: float, atol: float, watched: Watch = unwatched
+    peer: str, method: str, problem: Equations, times: np.ndarray, rtol: float, atol: float, watched: Watch = unwatched
 ) -> Answer:
     """The motion at `times` (n,), which begin at 0 and end at the stop; HarnessError says why there is none."""
     stretch: Callable[..., Stretch] = {"scipy": by_scipy, "cvode": by_cvode}[peer]
     ask = partial(stretch, method, problem, watched=watched, rtol=rtol, atol=atol)
     t, state = 0.0, problem.start
-    mode = problem.settle(t, *state)
+    mode = problem.mode_from(t, *state)
     motion = np.empty((len(times), 2))
     motion[0] = state
     events: list[tuple[float, int]] = []
@@ -96,7 +96,7 @@ def solve(
             evaluations += part.evaluations
             t, state = part.end, part.state
             if part.turned:
-                mode = problem.settle(t, state[0], 0.0)
+                mode = problem.mode_from(t, state[0], 0.0)
                 events.append((t, mode))
         else:
             release, mode = problem.release(t, state[0])
@@ -111,7 +111,7 @@ def solve(
 
 def by_scipy(
     method: str,
-    problem: Problem,
+    problem: Equations,
     mode: int,
     t: float,
     state: tuple[float, float],
@@ -154,7 +154,7 @@ def by_scipy(
 
 def by_cvode(
     method: str,
-    problem: Problem,
+    problem: Equations,
     mode: int,
     t: float,
     state: tuple[float, float],

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 Values = dict[str, float]
-Motion = Callable[[Any], tuple[Any, Any]]  # position and speed at a time
+Course = Callable[[Any], tuple[Any, Any]]  # position and speed at a time
 Span = tuple[float, float, Values]  # from, to in s, and the values that hold
 
 
@@ -15,4 +15,4 @@ class Piece:
 
     start: Any
     mode: int
-    at: Motion
+    at: Course

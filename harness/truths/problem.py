@@ -18,7 +18,7 @@ Jacobian = Callable[[float, State], list[list[float]]]
 POUND, INCH = 0.45359237, 0.0254
 
 
-class Problem:
+class Equations:
     """One run from `start` (position in `unit`, and speed) at t = 0 to `stop` (s); `absolute` is the tolerance below
     which errors do not matter, as a share of the relative one."""
 
@@ -40,7 +40,7 @@ class Problem:
         """Load on the body at rest, its rate, and what friction can hold."""
         raise NotImplementedError
 
-    def settle(self, t: float, x: float, v: float) -> int:
+    def mode_from(self, t: float, x: float, v: float) -> int:
         """The mode that holds from here on."""
         if not self.dry:
             return 1
@@ -54,7 +54,7 @@ class Problem:
         return (t + (limit - direction * load) / abs(rate), direction) if rate else (inf, 0)
 
 
-class Smd(Problem):
+class Smd(Equations):
     """Spring, mass and viscous damper."""
 
     start, stop = (0.1, 0.0), 4.0
@@ -67,7 +67,7 @@ class Smd(Problem):
         return lambda t, y: matrix
 
 
-class Coulomb(Problem):
+class Coulomb(Equations):
     """Spring and mass with Coulomb friction."""
 
     start, stop, dry = (0.1, 0.0), 4.0, True
@@ -108,7 +108,7 @@ class Plain(Classic):
         return None
 
 
-class Stickslip(Problem):
+class Stickslip(Equations):
     """Drag sled pulled through a spring."""
 
     start, stop, dry = (0.0, 0.0), 16.0, True
@@ -132,7 +132,7 @@ class Pacejka(Stickslip):
     dry, stiff = False, True
 
     def __init__(self, x_m: float = 0.01) -> None:
-        self.absolute = min(x_m, Problem.absolute)  # the curve is as fine as that
+        self.absolute = min(x_m, Equations.absolute)  # the curve is as fine as that
         self.D = self.mu_s
         self.C = 1 + (1 - 2 * asin(self.mu_d / self.D) / pi)
         self.B = self.mu_s / (x_m / 2) / (self.C * self.D)
@@ -162,7 +162,7 @@ class Pacejka(Stickslip):
         return jacobian
 
 
-class Pendulum(Problem):
+class Pendulum(Equations):
     """Compound pendulum with friction in its pin, loaded by the weight."""
 
     start, stop, unit, dry = (radians(10.02), 0.0), 5.0, "rad", True
@@ -206,7 +206,7 @@ class Reaction(Pendulum):
         return None
 
 
-class Belt(Problem):
+class Belt(Equations):
     """Block on a belt (R. I. Leine, Bifurcations in Discontinuous Mechanical Systems of Filippov-Type, 2000).
 
     m = k = F_s = 1 in SI units; seen from the belt, y = x - 0.2 t, the block sticks where its speed is zero:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..running.answer import Answer
-from .problem import Coulomb, Pacejka, Pendulum, Problem, Reaction, Smd, Stickslip
+from .problem import Coulomb, Equations, Pacejka, Pendulum, Reaction, Smd, Stickslip
 
 FOLDER = Path(__file__).parents[1] / "references"
 POINTS = 401  # common points of every run, start and stop included
@@ -27,7 +27,7 @@ class Case:
     model: str
     law: str
     truth: str
-    problem: Problem
+    problem: Equations
     values: dict[str, float] = field(default_factory=dict)
     dry: str | None = None
 

@@ -4,14 +4,14 @@ from collections.abc import Callable
 
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
-from .linear import Events, Motion
+from .linear import ModeChanges, Samples
 from .problem import Pendulum, Reaction
 
 DIGITS = 25
 WITHIN = (0.25, 0.45)  # s: half a period and then some, which holds one turning point
 
 
-def swings(problem: Pendulum, times: list[float]) -> tuple[Motion, Events]:
+def swings(problem: Pendulum, times: list[float]) -> tuple[Samples, ModeChanges]:
     """The motion at the times, and the changes of mode."""
     with workdps(DIGITS):
         weight, arm = mpf(problem.m) * mpf(problem.g), mpf(problem.mu) * mpf(problem.r)
@@ -32,8 +32,8 @@ def swings(problem: Pendulum, times: list[float]) -> tuple[Motion, Events]:
 
             return odefun(rates, t, [x, mpf(0)])
 
-        motion: Motion = []
-        events: Events = []
+        motion: Samples = []
+        events: ModeChanges = []
         t, x = mpf(0), mpf(problem.start[0])
         while weight * a * abs(sin(x)) > arm * weight:
             mode = -int(sign(x))

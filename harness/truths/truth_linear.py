@@ -12,7 +12,7 @@ from typing import Any
 
 from mpmath import MPContext
 
-from .pieces import Motion, Piece, Span, Values
+from .pieces import Course, Piece, Span, Values
 
 mp = MPContext()  # a context of its own: the precision of others stays theirs
 mp.dps = 120
@@ -81,16 +81,16 @@ def pieces(model: str, spans: list[Span]) -> Iterator[Piece]:
                 mode = s.direction(load)
 
 
-def later(at: Motion, origin: Any) -> Motion:
+def later(at: Course, origin: Any) -> Course:
     """A motion with its time counted from elsewhere."""
     return lambda t: at(mpf(t) - origin)
 
 
-def resting(x: Any) -> Motion:
+def resting(x: Any) -> Course:
     return lambda s: (x, mpf(0))
 
 
-def sliding(s: System, x: Any, v: Any, net: Any) -> Motion:
+def sliding(s: System, x: Any, v: Any, net: Any) -> Course:
     """Position and speed from x, v on; `net` is the force at the beginning without that of the damper."""
     k = s.k or NEARLY
     r1, r2 = roots(s, k)

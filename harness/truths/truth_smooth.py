@@ -10,9 +10,8 @@ from math import asin, atan, copysign, cos, hypot, pi, sin, sqrt, tan
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from .pieces import Motion, Piece, Span, Values
+from .pieces import Course, Piece, Span, Values
 
-State = tuple[float, float]
 REACTION = 2  # the number of pin_load = reaction
 BEYOND_PI = 1.2246467991473532e-16  # of pi, after what a float holds
 
@@ -23,7 +22,9 @@ def pacejka(spans: list[Span]) -> Iterator[Piece]:
     for begin, end, p in spans:
         curve = Curve(p)
 
-        def rates(s: float, y: np.ndarray, p: Values = p, curve: Curve = curve, drive: float = drive) -> State:
+        def rates(
+            s: float, y: np.ndarray, p: Values = p, curve: Curve = curve, drive: float = drive
+        ) -> tuple[float, float]:
             pull = p["F_ext"] + p["k"] * (drive + p["v_driver"] * s - y[0])
             return y[1], pull / p["m"] - curve.mu(y[1]) * p["g"]
 
@@ -36,7 +37,7 @@ def pacejka(spans: list[Span]) -> Iterator[Piece]:
         y, drive = run.y[:, -1], drive + p["v_driver"] * (end - begin)
 
 
-def later(at: Motion, origin: float) -> Motion:
+def later(at: Course, origin: float) -> Course:
     """A motion with its time counted from elsewhere."""
     return lambda t: at(t - origin)
 
@@ -81,12 +82,12 @@ def pendulum(spans: list[Span]) -> Iterator[Piece]:
             t += ahead
 
 
-def turned(at: Motion, angle: float) -> Motion:
+def turned(at: Course, angle: float) -> Course:
     """A motion with its angle counted from elsewhere."""
     return lambda t: (angle + at(t)[0], at(t)[1])
 
 
-def resting(angle: float) -> Motion:
+def resting(angle: float) -> Course:
     return lambda t: (angle, 0.0)
 
 
@@ -118,7 +119,7 @@ class Pin:
         return alpha
 
 
-def swing(pin: Pin, mode: int, longest: float, angle: float, omega: float) -> tuple[float, float, float, Motion]:
+def swing(pin: Pin, mode: int, longest: float, angle: float, omega: float) -> tuple[float, float, float, Course]:
     """To the next standstill, or as long as may be: how long, angle, angular speed and the motion until then."""
 
     def rates(_: float, y: np.ndarray) -> tuple[float, float]:

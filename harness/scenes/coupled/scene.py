@@ -67,7 +67,7 @@ class ConnectionKeys:
 
 
 @dataclass(frozen=True)
-class Keys:
+class CoupledKeys:
     """The keys of the file."""
 
     title: Annotated[str, TITLE]
@@ -128,12 +128,12 @@ def load(source: str, stiffness: dict[str, float]) -> Coupled:
         path = names[source]
     table = read(path)
     try:
-        return build(path, structured(table, Keys), stiffness)
+        return build(path, structured(table, CoupledKeys), stiffness)
     except SceneError as error:
         raise SceneError(f"scene {path.stem}: {error}") from None
 
 
-def build(path: Path, keys: Keys, stiffness: dict[str, float]) -> Coupled:
+def build(path: Path, keys: CoupledKeys, stiffness: dict[str, float]) -> Coupled:
     """The scene that the keys of its file say."""
     if not keys.parts:
         raise SceneError("parts is empty; name each part in a table of its own, as in [parts.left]")

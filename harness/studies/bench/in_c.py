@@ -38,7 +38,7 @@ class Library:
 
 
 @dataclass(frozen=True)
-class Runs:
+class Timing:
     """Run time in s of the fastest, and what was read at every point of the last (points, read)."""
 
     seconds: float
@@ -47,7 +47,7 @@ class Runs:
 
 def runs(
     library: Library, values: dict[str, float], read: tuple[str, ...], stop: float, steps: int, repeat: int
-) -> Runs:
+) -> Timing:
     """Runs from 0 to the stop in equal steps, one after the other on one instance."""
     words = [f"{library.references[name]}={value!r}" for name, value in values.items()]
     words += [str(library.references[name]) for name in read]
@@ -57,7 +57,7 @@ def runs(
     if done.returncode:
         raise HarnessError((done.stderr.splitlines() or [f"{library.file.name} ends the host in C"])[0])
     seconds, *rows = done.stdout.splitlines()
-    return Runs(float(seconds), np.array([row.split() for row in rows], dtype=float))
+    return Timing(float(seconds), np.array([row.split() for row in rows], dtype=float))
 
 
 def built(fmu: Path) -> Library:

@@ -5,10 +5,10 @@ from functools import cache, partial
 from math import nan
 from pathlib import Path
 
-from ...running.loops import POINTS, lean, shared
+from ...running.loops import POINTS, direct, shared
 from ...scenes.fmus import fmu_of
 from ...truths.reference import CASES, MODELS, load, relative
-from .in_c import NotHereError, Runs, built, cvode, runs
+from .in_c import NotHereError, Timing, built, cvode, runs
 from .measure import Beside, Measure
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
@@ -124,7 +124,7 @@ def fmu(model: str, kind: str) -> Path:
 
 
 @cache
-def of_fmu(case: str, kind: str, steps: int = POINTS) -> Runs:
+def of_fmu(case: str, kind: str, steps: int = POINTS) -> Timing:
     """A built FMU with its own method and tolerance in the host in C."""
     its = CASE[case]
     library = built(fmu(its.model, kind))
@@ -133,7 +133,7 @@ def of_fmu(case: str, kind: str, steps: int = POINTS) -> Runs:
 
 
 @cache
-def of_cvode(case: str, rtol: float) -> Runs:
+def of_cvode(case: str, rtol: float) -> Timing:
     """The CVODE FMU in the host in C."""
     its = CASE[case]
     values = {**its.values, "rtol": rtol, "atol": rtol * its.problem.absolute}
@@ -143,10 +143,10 @@ def of_cvode(case: str, rtol: float) -> Runs:
 @cache
 def through_fmpy(model: str, kind: str, steps: int) -> float:
     """Run time in s of a built FMU in the harness's loop through fmpy."""
-    return lean(fmu(model, kind), steps)
+    return direct(fmu(model, kind), steps)
 
 
-def off(case: str, found: Runs) -> float:
+def off(case: str, found: Timing) -> float:
     """The largest error at the points of the reference, relative to the largest of position and speed."""
     truth = load(CASE[case].truth)
     return float(relative(found.rows[:: POINTS // (len(truth.times) - 1)], truth.motion).max())

@@ -16,7 +16,7 @@ from ...running.loops import POINTS
 from ...running.probe import plain
 from ...scenes.fmus import fmu_of
 from ...truths import peers
-from ...truths.problem import Pacejka, Problem, Smd, Stickslip
+from ...truths.problem import Equations, Pacejka, Smd, Stickslip
 from ...truths.reference import MODELS
 from . import empty as bench_empty
 from .measure import Beside, Measure
@@ -45,7 +45,7 @@ def inside_python(
     method: str,
     reach: float,
     rivals: tuple[str, str],
-    problem: Problem,
+    problem: Equations,
     values: dict[str, float],
 ) -> Measure:
     """One run with 1600 points, without fmpy; `rivals` are methods of scipy and of CVODE."""
@@ -92,7 +92,7 @@ def communication_step(model: str) -> Measure:
         kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
         traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
         nothing = bench_empty.build(f"Empty{model.capitalize()}", traits, stop, Path(folder))
-        ways = [(loop, fmu) for loop in (loops.usual, loops.lean) for fmu in (mine, nothing)]
+        ways = [(loop, fmu) for loop in (loops.usual, loops.direct) for fmu in (mine, nothing)]
         turns = []
         for _ in range(3):  # in turns: what else runs on the machine hits all
             turns.append([loops.shared(loop(fmu, POINTS), loop(fmu, 1)) for loop, fmu in ways])

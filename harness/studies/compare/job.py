@@ -1,6 +1,5 @@
 """Runs and comparisons of anyone's FMUs and results, in folders of results."""
 
-from collections.abc import Callable
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -11,10 +10,9 @@ from rich.table import Table
 from ...results.files import as_text
 from ...results.folder import replacing
 from ...results.provenance import record
+from ...running.fmu import Report
 from . import trajectory
 from .difference import Comparison, compare
-
-Report = Callable[[float], None]
 
 
 def perform_compare(

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, sheet
-from .study import Study
+from .study import Convergence
 
 
-def draw(found: Study, path: Path) -> None:
+def draw(found: Convergence, path: Path) -> None:
     """Save the figure as PNG."""
     with sheet(path, 2 * WIDTH, 1.6 * HEIGHT) as figure:
         figure.suptitle(found.scene.title, fontsize=11)

@@ -26,7 +26,7 @@ EXTRA = "python -m pip install 'friction-fmus[coupled]'"
 
 
 @dataclass(frozen=True)
-class Study:
+class Convergence:
     """Positions `x` (m, n) at `time` (m,) with the finest communication step, the reference `truth` (m, n), and for
     each of the `steps` in s the largest `error` of a position, in m."""
 
@@ -45,7 +45,7 @@ class Study:
         return float(np.log(self.errors[-2] / self.errors[-1]) / np.log(self.steps[-2] / self.steps[-1]))
 
 
-def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[Study, Path]:
+def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[Convergence, Path]:
     """Write the archive of a coupled scene, run it at each communication step, compare, write out/coupled/<name>."""
     try:
         from . import archive
@@ -77,7 +77,7 @@ def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[St
 
 def study(
     scene: Coupled, archive: Path, defaults: dict[str, dict[str, float]], report: Callable[[float], None]
-) -> Study:
+) -> Convergence:
     """Run the archive at each communication step, beside the reference."""
     system, start = bodies(scene, defaults)
     errors = []
@@ -88,7 +88,7 @@ def study(
         truth = solve(system, start, time)
         errors.append(float(np.abs(x - truth).max()))
         report((i + 1) / len(scene.steps))
-    return Study(scene, time, x, truth, scene.steps, tuple(errors))
+    return Convergence(scene, time, x, truth, scene.steps, tuple(errors))
 
 
 def starts(fmu: Path) -> dict[str, float]:

@@ -9,14 +9,14 @@ from xml.etree import ElementTree
 from ...process.room import room
 from ...running.compiler import COMPILER, EMBEDDED, HEADERS
 from ...running.unpacked import in_python, unpacked
-from .request import Answer, Request, serve
+from .request import Reply, Request, serve
 
 
-def play(request: Request) -> Answer:
+def play(request: Request) -> Reply:
     count = len(request.instances)
     if request.lives:
         rows, _ = told(host(request.fmu, life(request) * request.lives + ["0 unload"]), 1)
-        return Answer(compiler(), rows, [], 0)
+        return Reply(compiler(), rows, [], 0)
     calls = [f"{i} new {name}" for i, name in enumerate(request.instances)]
     calls += run(request, request.values, request.change)
     if request.again:
@@ -24,7 +24,7 @@ def play(request: Request) -> Answer:
     calls += [f"{i} free" for i in range(count)] + ["0 unload"]
     rows, statuses = told(host(request.fmu, calls), count)
     size = request.steps + 1
-    return Answer(compiler(), rows[:size], rows[size:], sum(statuses[: request.steps]))
+    return Reply(compiler(), rows[:size], rows[size:], sum(statuses[: request.steps]))
 
 
 def run(request: Request, values: dict[str, float], change: dict[str, float]) -> list[str]:

@@ -5,7 +5,7 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from .request import Answer, Request, serve
+from .request import Reply, Request, serve
 
 if sys.platform == "linux":
     ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
@@ -13,7 +13,7 @@ if sys.platform == "linux":
 from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure
 
 
-def play(request: Request) -> Answer:
+def play(request: Request) -> Reply:
     EcosLib.set_log_level("warn")
     first = request.instances[0]
     with EcosSimulationStructure() as structure:
@@ -30,7 +30,7 @@ def play(request: Request) -> Answer:
                 simulation.reset()
                 again = run(simulation, request, None, {})
             # Ecos does not look at the status of a step, so it accepts all.
-            return Answer(version("ecospy"), rows, again, request.steps)
+            return Reply(version("ecospy"), rows, again, request.steps)
 
 
 def run(

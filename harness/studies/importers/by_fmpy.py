@@ -12,15 +12,15 @@ from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 
 from ...running.unpacked import unpacked
-from .request import Answer, Request, serve
+from .request import Reply, Request, serve
 
 
-def play(request: Request) -> Answer:
+def play(request: Request) -> Reply:
     with unpacked(Path(request.fmu)) as folder:
         return played(request, str(folder))
 
 
-def played(request: Request, folder: str) -> Answer:
+def played(request: Request, folder: str) -> Reply:
     """The answer, from the FMU's files in a folder."""
     description = fmpy.read_model_description(request.fmu)
     callbacks = logging()
@@ -39,7 +39,7 @@ def played(request: Request, folder: str) -> Answer:
         again, _ = run(request, instances, {}, {})
     for instance in instances:
         instance.freeInstance()
-    return Answer(fmpy.__version__, rows, again, accepted)
+    return Reply(fmpy.__version__, rows, again, accepted)
 
 
 def run(

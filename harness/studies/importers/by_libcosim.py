@@ -8,16 +8,16 @@ from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from .request import Answer, Request, serve
+from .request import Reply, Request, serve
 
 NANO = 1e9  # libcosim counts time in whole ns
 
 
-def play(request: Request) -> Answer:
+def play(request: Request) -> Reply:
     log_output_level(CosimLogLevel.ERROR)
     rows, accepted = run(request, request.values, request.change)
     again = run(request, {}, {})[0] if request.again else []
-    return Answer(version("libcosimpy"), rows, again, accepted)
+    return Reply(version("libcosimpy"), rows, again, accepted)
 
 
 def run(request: Request, values: dict[str, float], change: dict[str, float]) -> tuple[list[list[float]], int]:

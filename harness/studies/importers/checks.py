@@ -17,14 +17,14 @@ from pathlib import Path
 from ...errors import HarnessError
 from ...process.child import Hangs, ask
 from ...running.any_fmu import description
-from .request import Answer, Request
+from .request import Reply, Request
 
 AGREE = 1e-6
 PATIENCE = 300  # s, for one request
 LIVES = 100
 POINTS = 200  # communication steps of a run
 DIVERGED = "the motion leaves the range of numbers"
-BESIDE = 1.1  # a tunable is changed by this factor
+FACTOR = 1.1  # a tunable is changed by this factor
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ IMPORTERS = (
 class Played:
     """An answer, and what the process said on standard error meanwhile."""
 
-    answer: Answer
+    answer: Reply
     said: str
 
 
@@ -93,7 +93,7 @@ def asked(player: str, request: str) -> Played:
     if done.returncode:
         last = done.stderr.strip().splitlines()[-1:] or ["nothing said"]
         raise Wrong(f"exit status {done.returncode}: {last[0]}")
-    return Played(Answer(**json.loads(done.stdout)), done.stderr)
+    return Played(Reply(**json.loads(done.stdout)), done.stderr)
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def subject(fmu: Path) -> Subject:
     outputs = [name for name, v in reals.items() if v.causality == "output"]
     entry = next(name for name, v in reals.items() if v.causality == "input")
     source = next(name for name in outputs if reals[name].unit == reals[entry].unit)
-    change = {name: BESIDE * float(v.start) for name, v in reals.items() if name in ("k", "r")}
+    change = {name: FACTOR * float(v.start) for name, v in reals.items() if name in ("k", "r")}
     basis = Request(
         fmu=str(fmu.resolve()),
         references={name: v.valueReference for name, v in reals.items()},

@@ -29,7 +29,7 @@ class Request:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Reply:
     """Rows of values, one a point in time, instance after instance; those of the run after a reset; how many steps the
     tool accepted.  Version of the tool."""
 
@@ -39,7 +39,7 @@ class Answer:
     accepted: int
 
 
-def serve(play: Callable[[Request], Answer]) -> None:
+def serve(play: Callable[[Request], Reply]) -> None:
     """Answer the one request on standard input; what a tool prints goes to standard error."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)

@@ -20,7 +20,7 @@ FOLDER, FILES = "importers", ("importers.csv",)
 
 
 @dataclass(frozen=True)
-class Row:
+class Checked:
     """One check of one importer: what each FMU gave, and what went wrong; `reason` where it was not asked."""
 
     importer: str
@@ -30,21 +30,21 @@ class Row:
     reason: str = ""
 
 
-def rows(folder: Path, report: Callable[[str, float], None]) -> list[Row]:
+def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
     """Ask every importer everything about the FMUs in a folder; `report` is told the importer and the share done."""
     subjects = [subject(folder / f"{name}.fmu") for name in MODELS]
-    found: list[Row] = []
+    found: list[Checked] = []
     with ThreadPoolExecutor(WORKERS) as workers:
         for importer in IMPORTERS:
             if reason := absent(importer):
-                found.append(Row(importer.name, "", reason=reason))
+                found.append(Checked(importer.name, "", reason=reason))
                 continue
             name = f"{importer.name} {play(importer, subjects[0].basis).answer.version}"
             for done, check in enumerate(CHECKS):
                 report(name, done / len(CHECKS))
                 cells = tuple(workers.map(partial(ask, importer, check), subjects))
                 failed = tuple(f"{m}: {cell}" for m, cell in zip(MODELS, cells, strict=True) if "FAILED" in cell)
-                found.append(Row(name, check, cells, failed))
+                found.append(Checked(name, check, cells, failed))
     return found
 
 
@@ -56,7 +56,7 @@ def ask(importer: Importer, check: str, subject: Subject) -> str:
         return f"FAILED: {wrong}"
 
 
-def table(found: list[Row]) -> Table:
+def table(found: list[Checked]) -> Table:
     """The rows for reading; below them what the words mean, and which tools were not asked."""
     notes = [f"{row.importer} was not asked: {row.reason}" for row in found if row.reason]
     words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers, or the tool ends"
@@ -70,7 +70,7 @@ def table(found: list[Row]) -> Table:
     return shown
 
 
-def save(found: list[Row], fmus: Path, out: Path) -> None:
+def save(found: list[Checked], fmus: Path, out: Path) -> None:
     """Write the rows on the FMUs in a folder to out/importers/importers.csv."""
     nothing = ("",) * len(MODELS)
     rows = ((row.importer, row.check or f"not asked: {row.reason}", *(row.cells or nothing)) for row in found)

@@ -5,7 +5,7 @@ from itertools import groupby
 from math import isnan
 
 from ...truths.reference import Case
-from .laws import Law
+from .laws import Shortcut
 from .study import FMPY, FMU, WAYS, Point, Study
 
 TARGET = 1e-6
@@ -26,7 +26,7 @@ def ranking(study: Study, case: Case, target: float) -> list[Point]:
     return sorted(found, key=lambda point: point.seconds)
 
 
-def advise(study: Study, laws: Iterable[Law]) -> str:
+def advise(study: Study, laws: Iterable[Shortcut]) -> str:
     """One sentence on what to use for a model."""
     best = [(case, ranking(study, case, TARGET)) for case in study.cases if not case.chatters]
     parts = []

@@ -24,7 +24,7 @@ from ...errors import HarnessError
 from ...running.answer import Answer
 from ...running.inside import Inside, offered
 from ...truths import peers
-from ...truths.problem import Belt, Classic, Plain, Problem, Smoothed
+from ...truths.problem import Belt, Classic, Equations, Plain, Smoothed
 
 LIMIT = 20_000  # right-hand sides after which a run counts as without end
 RUNTIME, EVENTS = "this runtime", "events"
@@ -68,7 +68,7 @@ class Block(DryFriction):
 
 
 @dataclass(frozen=True)
-class Row:
+class AnchorRun:
     """One solver: `error` is the larger of those of position (m) and speed (m/s) at the end; or the failure."""
 
     problem: str
@@ -87,7 +87,7 @@ CLASSIC = (sqrt(125.0) - 10.0, 0.0)  # x = -10 + 10 cos t + 5 sin t up to its fi
 TIGHT = {"RK23": 1e-6, "ode23": 1e-6, "DOP853": 1e-10, "dop853": 1e-10}  # and 1e-8 for the others
 
 
-def analyse() -> Iterator[Row]:
+def analyse() -> Iterator[AnchorRun]:
     """Both anchors with every method of the runtime, then with the peers."""
     name = "block on a belt"
     yield from runtime(name, Block, {}, Belt.stop, BLOCK)
@@ -99,27 +99,29 @@ def analyse() -> Iterator[Row]:
     yield from others(name, Plain(), CLASSIC, "plain sign(v)", {"scipy": ("RK23", "RK45", "LSODA", "Radau")})
 
 
-def runtime(name: str, model: type, values: dict[str, float], stop: float, end: tuple[float, float]) -> Iterator[Row]:
+def runtime(
+    name: str, model: type, values: dict[str, float], stop: float, end: tuple[float, float]
+) -> Iterator[AnchorRun]:
     """Every method that the runtime offers for a model, up to the stop in s."""
     for method in offered(model):
         rtol = TIGHT.get(method, 1e-8)
         run = Inside.prepared(model, values, method, rtol, 1e-3 * rtol)
-        yield row(partial(Row, name, RUNTIME, method, rtol), partial(run.answer, [0.0, stop]), end)
+        yield row(partial(AnchorRun, name, RUNTIME, method, rtol), partial(run.answer, [0.0, stop]), end)
 
 
 def others(
-    name: str, problem: Problem, end: tuple[float, float], way: str, methods: dict[str, tuple[str, ...]]
-) -> Iterator[Row]:
+    name: str, problem: Equations, end: tuple[float, float], way: str, methods: dict[str, tuple[str, ...]]
+) -> Iterator[AnchorRun]:
     """The peers that are installed."""
     times = np.array([0.0, problem.stop])
     for peer in (peer for peer in methods if peer not in peers.missing()):
         for method in methods[peer]:
             rtol = TIGHT.get(method, 1e-8)
             ask = partial(peers.solve, peer, method, problem, times, rtol, 1e-3 * rtol, peers.at_most(LIMIT))
-            yield row(partial(Row, name, f"{peer}, {way}", method, rtol), ask, end)
+            yield row(partial(AnchorRun, name, f"{peer}, {way}", method, rtol), ask, end)
 
 
-def row(begin: Callable[..., Row], ask: Callable[[], Answer], end: tuple[float, float]) -> Row:
+def row(begin: Callable[..., AnchorRun], ask: Callable[[], Answer], end: tuple[float, float]) -> AnchorRun:
     """One line of the table."""
     try:
         answer = ask()

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from ...results.style import FAMILIES, GREY, WIDTH, sheet
 from ...truths.reference import Case
-from .laws import Law
+from .laws import Shortcut
 from .study import CS, FMPY, FMU, ME, Study
 
 TOOLS: dict[str, dict[str, Any]] = {
@@ -30,7 +30,7 @@ LEGEND = (
 FLOOR = 2.0**-53  # errors below what a double can tell are drawn there
 
 
-def draw(study: Study, laws: Sequence[Law], path: Path) -> None:
+def draw(study: Study, laws: Sequence[Shortcut], path: Path) -> None:
     """Save the figure of a study as PNG: run time and right-hand sides over the error, a row for each law.
 
     Laws that chatter are drawn in the row of true stick and slip, by their error beside that.

@@ -20,7 +20,7 @@ TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True)
-class Law:
+class Shortcut:
     """One law beside dry friction: the errors of its true solution, as in reference.Errors; where dry friction holds
     the sled, the median speed `creep` in m/s; the slip `period` in s; and `asymmetry`, the largest forward over the
     largest backward acceleration, which is 1 for dry friction.  None for what does not occur or is not in question."""
@@ -36,12 +36,12 @@ class Law:
     asymmetry: float | None
 
 
-def analyse(case: Case, model: type) -> Law:
+def analyse(case: Case, model: type) -> Shortcut:
     """The law of a case beside dry friction; `model` is the class inside the FMU."""
     assert case.dry is not None
     truth, dry = load(case.truth), load(case.dry)
     off = errors(Answer(truth.motion, None, 0), dry)
-    law = partial(Law, case.model, case.name, case.law, off.final, off.rms, off.largest)
+    law = partial(Shortcut, case.model, case.name, case.law, off.final, off.rms, off.largest)
     held = stuck(dry)
     if not held.any():
         return law(None, None, None)

@@ -133,7 +133,7 @@ def jobs(case: Case, carried: type, file: Path) -> Iterator[Job]:
             yield Job(FMU, method, nan, own, swept=swept)
             yield Job(FMPY, method, nan, partial(through_fmpy, case, file, method, times, taken), True, swept)
     if not case.chatters:
-        three = fmi3.beside(file)
+        three = fmi3.sibling(file)
         usual = {number: name for name, number in offered(carried).items()}[carried().solver.method]
         for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", three.is_file())):
             yield Job(tool, method, nan, partial(by_importer, case, three, WAYS[tool], times), swept=swept)

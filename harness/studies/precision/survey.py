@@ -36,8 +36,8 @@ class Survey:
     """All that was found; what to use, in a sentence for each study; and what is missing, a sentence each."""
 
     studies: tuple[Study, ...]
-    laws: tuple[laws.Law, ...]
-    anchors: tuple[anchors.Row, ...]
+    laws: tuple[laws.Shortcut, ...]
+    anchors: tuple[anchors.AnchorRun, ...]
     advice: tuple[str, ...]
     missing: tuple[str, ...]
 
@@ -105,8 +105,8 @@ def write(found: Survey, folder: Path) -> None:
         mine = [law for law in found.laws if law.model == each.model]
         draw(each, mine, folder / f"{each.model}.png")
         if mine:
-            save(folder / f"{each.model}-laws.csv", heads(laws.Law), map(astuple, mine))
-    save(folder / "anchors.csv", heads(anchors.Row), map(astuple, found.anchors))
+            save(folder / f"{each.model}-laws.csv", heads(laws.Shortcut), map(astuple, mine))
+    save(folder / "anchors.csv", heads(anchors.AnchorRun), map(astuple, found.anchors))
 
 
 def heads(kind: type) -> list[str]:

@@ -7,8 +7,8 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from .advice import TARGETS, needed, power
-from .anchors import Row
-from .laws import Law
+from .anchors import AnchorRun
+from .laws import Shortcut
 from .study import Study
 
 
@@ -44,7 +44,7 @@ def exchange(studies: Iterable[Study]) -> Table:
     return table
 
 
-def laws(found: Iterable[Law]) -> Table:
+def laws(found: Iterable[Shortcut]) -> Table:
     """The error of each law, integrated without error."""
     table = grid("model error: each law beside true stick and slip", "law")
     for name in ("final", "rms", "largest", "creep [m/s]", "period [s]", "a+/a-"):
@@ -56,7 +56,7 @@ def laws(found: Iterable[Law]) -> Table:
     return table
 
 
-def anchors(rows: Iterable[Row]) -> Table:
+def anchors(rows: Iterable[AnchorRun]) -> Table:
     """The problems of other people."""
     table = grid("external anchors: calls of the right-hand side, and error at the end", "solver")
     table.add_column("method")

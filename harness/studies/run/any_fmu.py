@@ -1,17 +1,14 @@
 """An FMU of any origin, run by its path; its outputs in a folder of results."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from ...results.folder import replacing
 from ...results.provenance import record
 from ...running.any_fmu import own, run
-from ...running.fmu import simulate
+from ...running.fmu import Report, simulate
 from ...running.trajectory import Trajectory, of_run
 from .job import FILES
-
-Report = Callable[[float], None]
 
 
 def perform_run(

@@ -17,7 +17,7 @@ OWN = ("start", "stop", "rtol", "calls")  # what `each` may vary besides a value
 
 
 @dataclass(frozen=True)
-class Case:
+class Trial:
     """One scene with one method: `finish` is the largest error allowed, `refuse` the words to be refused with."""
 
     title: str
@@ -70,7 +70,7 @@ def spread(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
             yield {**scene, **new, "model": model, **told}
 
 
-def cases(scene: dict[str, Any], card: Card, finish: dict[str, float]) -> list[Case]:
+def cases(scene: dict[str, Any], card: Card, finish: dict[str, float]) -> list[Trial]:
     """The cases of one scene: the methods that it names, of those that its FMU offers."""
     methods = scene.get("methods", card.methods)
     methods = [card.default if method == "default" else method for method in methods]
@@ -89,7 +89,7 @@ def largest_error(scene: dict[str, Any], method: str, finish: dict[str, float]) 
     return own.get("other", max(finish["tolerances"] * scene.get("rtol", RTOL), finish["least"]))
 
 
-def case(scene: dict[str, Any], card: Card, method: str, finish: float) -> Case:
+def case(scene: dict[str, Any], card: Card, method: str, finish: float) -> Trial:
     """A scene with a method."""
     chosen = {"solver.rtol": scene.get("rtol", RTOL), **scene.get("values", {}), "solver.method": method}
     values = card.numbers({**card.defaults, **chosen})
@@ -97,7 +97,7 @@ def case(scene: dict[str, Any], card: Card, method: str, finish: float) -> Case:
     changes = {row["t"]: card.numbers({k: v for k, v in row.items() if k != "t"}) for row in scene.get("changes", ())}
     points = round((stop - start) / scene["step"]) if "step" in scene else scene.get("points", POINTS)
     ends = not ("refuse" in scene or "poison" in scene)
-    return Case(
+    return Trial(
         title=scene["title"],
         model=scene["model"],
         method=method,

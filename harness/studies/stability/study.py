@@ -22,7 +22,7 @@ from ...running.probe import Card, Motion, Refusal, Refusals, card, poison, run
 from ...scenes.fmus import fmu_of
 from ...truths.truth import Truth, check, truth, worst
 from .bounded import bounded
-from .cases import Case, cases, scenes
+from .cases import Trial, cases, scenes
 
 WORKERS = 2
 LIMIT = 120.0  # s, for one run and for one answer to compare with
@@ -31,13 +31,13 @@ FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
 
 
 @dataclass(frozen=True)
-class Row:
+class Ending:
     """How a case ended: `ended` is finished, refused or wrong; `text` is the FMU's sentence, or what is wrong.
 
     `error` and `rise` (of energy that nobody put in) are shares of the largest values; NaN where there is none.
     """
 
-    case: Case
+    case: Trial
     ended: str
     text: str
     error: float = math.nan
@@ -70,7 +70,9 @@ class Region:
     slope: float
 
 
-def survey(out: Path, report: Callable[[str, float], None], chosen: list[list[Case]]) -> tuple[list[Row], list[Region]]:
+def survey(
+    out: Path, report: Callable[[str, float], None], chosen: list[list[Trial]]
+) -> tuple[list[Ending], list[Region]]:
     """Run the chosen groups of cases and write results to out/stability."""
     from .figure import draw
 
@@ -83,10 +85,10 @@ def survey(out: Path, report: Callable[[str, float], None], chosen: list[list[Ca
     return rows, found
 
 
-def table(report: Callable[[str, float], None], chosen: list[list[Case]]) -> list[Row]:
+def table(report: Callable[[str, float], None], chosen: list[list[Trial]]) -> list[Ending]:
     """The rows of the chosen cases; `report` hears of each as it comes."""
 
-    def rows(group: list[Case]) -> list[Row]:
+    def rows(group: list[Trial]) -> list[Ending]:
         found = []
         for row in judged(group):
             found.append(row)
@@ -98,13 +100,13 @@ def table(report: Callable[[str, float], None], chosen: list[list[Case]]) -> lis
     return sorted(found, key=lambda row: row.case.place)
 
 
-def all_cases(wanted: Callable[[dict[str, Any]], bool] = lambda scene: True) -> list[list[Case]]:
+def all_cases(wanted: Callable[[dict[str, Any]], bool] = lambda scene: True) -> list[list[Trial]]:
     """The cases of all wanted scenes; those that share one true answer stand together."""
     check()
     found, finish = scenes()
     found = [scene for scene in found if wanted(scene)]
     cards: dict[str, Card] = {}
-    groups: dict[str, list[Case]] = {}
+    groups: dict[str, list[Trial]] = {}
     for place, scene in enumerate(found):
         if scene["model"] not in cards:
             cards[scene["model"]] = bounded(LIMIT, card, scene["model"])
@@ -114,7 +116,7 @@ def all_cases(wanted: Callable[[dict[str, Any]], bool] = lambda scene: True) -> 
     return list(groups.values())
 
 
-def judged(group: Iterable[Case]) -> Iterator[Row]:
+def judged(group: Iterable[Trial]) -> Iterator[Ending]:
     """The rows of cases that share one true answer."""
     answer: Truth | None = None
     for case in group:
@@ -130,31 +132,31 @@ def judged(group: Iterable[Case]) -> Iterator[Row]:
             if isinstance(ending, Refusal):
                 yield refused(case, ending)
             elif answer is None or case.refuse is not None:
-                yield Row(case, WRONG, "it was taken", motion=ending)
+                yield Ending(case, WRONG, "it was taken", motion=ending)
             else:
                 yield finished(case, ending, answer)
         except HarnessError as error:
-            yield Row(case, WRONG, str(error))
+            yield Ending(case, WRONG, str(error))
 
 
-def all_refused(case: Case, ending: Refusals) -> Row:
+def all_refused(case: Trial, ending: Refusals) -> Ending:
     if ending.wrong:
-        return Row(case, WRONG, f"{len(ending.wrong)} of {ending.tried}: {'; '.join(ending.wrong)}")
-    return Row(case, REFUSED, f"{ending.tried} of {ending.tried}, each by name")
+        return Ending(case, WRONG, f"{len(ending.wrong)} of {ending.tried}: {'; '.join(ending.wrong)}")
+    return Ending(case, REFUSED, f"{ending.tried} of {ending.tried}, each by name")
 
 
-def refused(case: Case, ending: Refusal) -> Row:
+def refused(case: Trial, ending: Refusal) -> Ending:
     """A refusal says the words that the scene expects, and leaves no number to be taken for a result."""
     if not ending.sentence:
-        return Row(case, WRONG, "it was refused without a sentence")
+        return Ending(case, WRONG, "it was refused without a sentence")
     if not ending.silent:
-        return Row(case, WRONG, f"refused, but numbers can still be read: {ending.sentence}")
+        return Ending(case, WRONG, f"refused, but numbers can still be read: {ending.sentence}")
     if case.refuse is None or case.refuse not in ending.sentence:
-        return Row(case, WRONG, f"refused: {ending.sentence}")
-    return Row(case, REFUSED, ending.sentence)
+        return Ending(case, WRONG, f"refused: {ending.sentence}")
+    return Ending(case, REFUSED, ending.sentence)
 
 
-def finished(case: Case, motion: Motion, answer: Truth) -> Row:
+def finished(case: Trial, motion: Motion, answer: Truth) -> Ending:
     """A motion has the right events, is as near to the answer as the scene expects, and makes no energy."""
     assert case.finish is not None
     error = answer.error(motion.x, motion.v)
@@ -173,10 +175,10 @@ def finished(case: Case, motion: Motion, answer: Truth) -> Row:
         wrong.append(f"error {error:.2g}, more than {case.finish:g}")
     if case.free and not rise <= case.finish:
         wrong.append(f"energy rises by {rise:.2g}")
-    return Row(case, WRONG if wrong else FINISHED, "; ".join(wrong), error, rise, motion)
+    return Ending(case, WRONG if wrong else FINISHED, "; ".join(wrong), error, rise, motion)
 
 
-def regions(rows: Iterable[Row]) -> list[Region]:
+def regions(rows: Iterable[Ending]) -> list[Region]:
     """Steps against stiffness, for each method of the scenes that vary it."""
     found: dict[str, list[tuple[float, int]]] = {}
     for row in rows:
@@ -190,7 +192,7 @@ def regions(rows: Iterable[Row]) -> list[Region]:
     return regions
 
 
-def save(rows: list[Row], path: Path) -> None:
+def save(rows: list[Ending], path: Path) -> None:
     """Write stability.csv: one line for each row."""
     columns: dict[str, list[Any]] = {
         "model": [row.case.model for row in rows],

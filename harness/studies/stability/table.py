@@ -7,12 +7,12 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from .study import FINISHED, Region, Row
+from .study import FINISHED, Ending, Region
 
 METHODS = ("exact", "ode23", "ode45", "dop853", "rodas")
 
 
-def endings(rows: Iterable[Row]) -> Table:
+def endings(rows: Iterable[Ending]) -> Table:
     """Largest error and, below it, internal steps of every run that should end."""
     table = scenes("largest error, as a share of the largest value, and below it internal steps")
     for method in METHODS:
@@ -34,19 +34,19 @@ def scenes(title: str) -> Table:
     return table
 
 
-def cell(row: Row) -> Text:
+def cell(row: Ending) -> Text:
     """The end of one run."""
     if not row.well or row.ended != FINISHED or row.motion is None:
         return Text("wrong", style="bold red")
     return Text(f"{f'{row.error:.0e}' if row.error else '0'}\n{row.motion.counts.steps}")
 
 
-def refusals(rows: Iterable[Row]) -> Table:
+def refusals(rows: Iterable[Ending]) -> Table:
     """The sentence of every run that should be refused; where the models say the same, that of one."""
     table = scenes("refused, each with its sentence")
     table.add_column("models")
     table.add_column("sentence", ratio=3)
-    found: dict[str, list[Row]] = {}
+    found: dict[str, list[Ending]] = {}
     for row in rows:
         if row.case.finish is None:
             found.setdefault(row.case.title, []).append(row)
@@ -57,7 +57,7 @@ def refusals(rows: Iterable[Row]) -> Table:
     return table
 
 
-def summary(rows: list[Row], found: Iterable[Region]) -> str:
+def summary(rows: list[Ending], found: Iterable[Region]) -> str:
     """How many ended as they should, what energy did, and where stability bounds the steps."""
     well = sum(row.well for row in rows)
     lines = [f"{well} of {len(rows)} ended as they should."]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-Values = dict[str, Any]  # parameters by name: numbers, or arrays of one shape
+Space = dict[str, Any]  # parameters by name: numbers, or arrays of one shape
 
 
 @dataclass(frozen=True)
@@ -15,10 +15,10 @@ class Boundary:
 
     text: str
     parameters: tuple[str, ...]
-    quantity: Callable[[Values, float], Any]
+    quantity: Callable[[Space, float], Any]
 
 
-def first_pull(p: Values, stop: float) -> Any:
+def first_pull(p: Space, stop: float) -> Any:
     """The force of a spring pulled at constant speed until the stop, over the holding limit."""
     return p["k"] * np.abs(p["v_driver"]) * stop / (p["mu_s"] * p["m"] * p["g"])
 
@@ -51,7 +51,7 @@ BOUNDARIES = {
 }
 
 
-def damping_ratio(p: Values) -> Any:
+def damping_ratio(p: Space) -> Any:
     return p["c"] / (2 * np.sqrt(p["k"] * p["m"]))
 
 

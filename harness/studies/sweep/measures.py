@@ -28,7 +28,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Path:
+class AlongPath:
     """A measure along the path; it needs the `variable` in the FMU."""
 
     variable: str
@@ -97,14 +97,14 @@ AT_END = {  # and the variable that tells it
     "evaluations": (Column("evaluations", "", "right-hand sides"), "solver.evaluations"),
 }
 ON_PATH = {
-    "slips": Path("v_driver", "", "slips", lambda run: float(len(starts(run)))),
-    "period": Path("v_driver", "s", "slip period", period),
-    "unsteady": Path("v_driver", "1", "swing of the speed in the later half, over that of the driver", unsteady),
-    "peak_speed": Path("solver.steps", "", "peak speed", peak_speed),
-    "stuck": Path("mode", "s", "time stuck", stuck),
-    "rest": Path("mode", "", "rest position", rest),
-    "zeta": Path("solver.steps", "1", "damping ratio by logarithmic decrement", zeta),
-    "f_over_k": Path("solver.steps", "", "friction over stiffness by linear envelope", f_over_k),
+    "slips": AlongPath("v_driver", "", "slips", lambda run: float(len(starts(run)))),
+    "period": AlongPath("v_driver", "s", "slip period", period),
+    "unsteady": AlongPath("v_driver", "1", "swing of the speed in the later half, over that of the driver", unsteady),
+    "peak_speed": AlongPath("solver.steps", "", "peak speed", peak_speed),
+    "stuck": AlongPath("mode", "s", "time stuck", stuck),
+    "rest": AlongPath("mode", "", "rest position", rest),
+    "zeta": AlongPath("solver.steps", "1", "damping ratio by logarithmic decrement", zeta),
+    "f_over_k": AlongPath("solver.steps", "", "friction over stiffness by linear envelope", f_over_k),
 }
 LIKE = {"peak_speed": "velocity", "rest": "position", "f_over_k": "position"}  # measured in the unit of
 

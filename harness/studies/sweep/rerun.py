@@ -19,9 +19,9 @@ from ...running.fmu import (
     callbacks,
     gather,
     instance,
-    march,
     parameters,
     planned,
+    traced,
 )
 from ...running.settings import settings
 from ...running.specification import Specification
@@ -40,7 +40,7 @@ class Runs:
     measures: tuple[str, ...]
 
 
-Row = tuple[list[float], str]  # the measured columns, or the sentence that says why there are none
+Measured = tuple[list[float], str]  # the measured columns, or the sentence that says why there are none
 
 
 class Rerun:
@@ -67,7 +67,7 @@ class Rerun:
         self.component = c_void_p(fmu.component)
         self.messages = callbacks()[1]
 
-    def run(self, point: list[float]) -> Row:
+    def run(self, point: list[float]) -> Measured:
         """The measures at a point of the varied values, or the FMU's sentence why it has none."""
         self.messages.clear()
         try:
@@ -104,7 +104,7 @@ class Rerun:
 
     def follow(self, begun: float) -> dict[str, float]:
         """Step along the path, and measure there."""
-        trace = march(self.plan, self.fmu, lambda share: None, 0)
+        trace = traced(self.plan, self.fmu, lambda share: None, 0)
         run = gather(self.plan, self.fmu, trace, perf_counter() - begun)
         return {name: ON_PATH[name].measure(run) for name in self.along}
 

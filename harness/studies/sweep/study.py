@@ -20,7 +20,7 @@ import numpy as np
 from ...errors import HarnessError, reason
 from ...process.interrupt import HEARD, Interrupted, deaf_children
 from ...process.room import room
-from .rerun import Rerun, Row, Runs, ready
+from .rerun import Measured, Rerun, Runs, ready
 from .space import Axis
 
 LONGEST_BLOCK = 200  # runs
@@ -60,7 +60,7 @@ class Sweep:
 
 def perform(
     sweep: Sweep, folder: Path, scheduler: str | None, workers: int, report: Callable[[float], None]
-) -> tuple[list[Row], int, int, float]:
+) -> tuple[list[Measured], int, int, float]:
     """The rows of all points, in their order; how many of them an earlier, interrupted sweep had finished; how many
     lines of its journal were damaged; and the seconds that the others took, once the workers were there.
 
@@ -87,7 +87,7 @@ def perform(
     return [kept.rows[i] for i in range(len(sweep.points))], before, kept.damaged, seconds
 
 
-def finished(dask: Any, sweep: Sweep, left: list[int]) -> Iterator[list[tuple[int, Row]]]:
+def finished(dask: Any, sweep: Sweep, left: list[int]) -> Iterator[list[tuple[int, Measured]]]:
     """The blocks of runs as workers finish them."""
     from distributed import as_completed
 
@@ -110,7 +110,7 @@ def finished(dask: Any, sweep: Sweep, left: list[int]) -> Iterator[list[tuple[in
         dask.run(unload)
 
 
-def work(block: list[tuple[int, list[float]]], runs: Runs, fmu: bytes) -> list[tuple[int, Row]]:
+def work(block: list[tuple[int, list[float]]], runs: Runs, fmu: bytes) -> list[tuple[int, Measured]]:
     """Run a block in a worker, with the instance that it keeps."""
     with BUSY:
         key = (json.dumps(asdict(runs), sort_keys=True), sha256(fmu).digest())
@@ -175,7 +175,7 @@ class Journal:
         with self.told():
             lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
         found = [kept(line, points, columns) for line in lines]
-        self.rows: dict[int, Row] = dict(filter(None, found))
+        self.rows: dict[int, Measured] = dict(filter(None, found))
         self.damaged = found[:-1].count(None) + (bool(found) and not found[-1] and lines[-1].endswith(b"\n"))
 
     @contextmanager
@@ -203,17 +203,17 @@ class Journal:
                 self.file.close()
             fresh.unlink(missing_ok=True)
 
-    def add(self, block: list[tuple[int, Row]]) -> None:
+    def add(self, block: list[tuple[int, Measured]]) -> None:
         self.rows.update(block)
         self.write(block)
 
-    def write(self, rows: Iterable[tuple[int, Row]]) -> None:
+    def write(self, rows: Iterable[tuple[int, Measured]]) -> None:
         with self.told():
             self.file.writelines(json.dumps([i, *row]) + "\n" for i, row in rows)
             self.file.flush()
 
 
-def kept(line: bytes, points: int, columns: int) -> tuple[int, Row] | None:
+def kept(line: bytes, points: int, columns: int) -> tuple[int, Measured] | None:
     """The number of a run and its row, None if a line holds none."""
     try:
         i, values, error = json.loads(line)
