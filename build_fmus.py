@@ -1,4 +1,4 @@
-"""Build the FMUs: python build_fmus.py [NAME ...] [--fmi 3] [--native] [--method M] [--law L] ..."""
+"""Build FMUs: python build_fmus.py [NAME | FILE.py ...] [--fmi 3] [--native] [--method M] [--law L] ..."""
 
 from hashlib import sha256
 from pathlib import Path
@@ -7,7 +7,7 @@ import click
 
 from fmus.packaging import BuildError
 from fmus.packaging.archive import build
-from fmus.packaging.catalogue import names
+from fmus.packaging.catalogue import find, names
 from fmus.packaging.edition import FMI2, FMI3
 from fmus.packaging.lean import LAWS, METHODS
 from fmus.packaging.weigh import import_time
@@ -17,13 +17,13 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  #
 
 
 @click.command()
-@click.argument("models", metavar="[NAME]...", nargs=-1)
+@click.argument("models", metavar="[NAME | FILE.py]...", nargs=-1)
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="Version; 3 has model exchange as well.")
 @click.option("--native", "compiled", is_flag=True, help="Compiled to machine code: no Python in the FMU.")
 @click.option("--method", "methods", multiple=True, type=click.Choice(list(METHODS)), help="Offer this; repeatable.")
 @click.option("--law", "laws", multiple=True, type=click.Choice(list(LAWS)), help="Offer this law; repeatable.")
 @click.option("--platform", "platforms", multiple=True, help="For this only, as linux64; repeatable.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder; fmus, fmus/fmi3 or fmus/native, without.")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder; fmus, or beside FILE.py, without.")
 def main(
     models: tuple[str, ...],
     fmi: str,
@@ -33,38 +33,39 @@ def main(
     platforms: tuple[str, ...],
     out: Path | None,
 ) -> None:
-    """Build the FMU of every model NAME (without one: of all models).
+    """Build the FMU of every model NAME, and of the model in every FILE.py (without any: of all models).
 
     Prints the size, the time that Python takes to import it, and the sha256 digest.
     """
-    known = names()
-    for name in models:
-        if name not in known:
-            raise Mistake(f"There is no model {name!r}; known are {', '.join(known)}.")
     if compiled and fmi == "3":
         raise Mistake("There are no native FMUs of FMI 3.0: leave out --native, or --fmi 3.")
-    edition, folder = (FMI3, FMUS / "fmi3") if fmi == "3" else (FMI2, FMUS)
-    for name in models or known:
+    edition, kind = (FMI3, "fmi3") if fmi == "3" else (FMI2, "native" if compiled else "")
+    try:
+        wanted = {model: find(model) for model in models or names()}
+    except BuildError as error:
+        raise Mistake(str(error)) from error
+    for model, source in wanted.items():
+        folder = out or (FMUS if model in names() else source.path.parent) / kind
         try:
             if compiled:
-                path = native(name, out or FMUS / "native", methods, laws, platforms)
+                path = native(source.path, folder, methods, laws, platforms)
                 weight = ""
             else:
-                path = build(name, out or folder, methods, laws, platforms, edition)
+                path = build(source.path, folder, methods, laws, platforms, edition)
                 weight = f"  {1000 * import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
         content = path.read_bytes()
-        click.echo(f"{name}.fmu  {len(content) / 1000:4.0f} kB{weight}  {sha256(content).hexdigest()[:16]}")
+        click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB{weight}  {sha256(content).hexdigest()[:16]}")
 
 
 def native(
-    name: str, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...]
+    model: Path, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...]
 ) -> Path:
     """The native FMU; what builds it needs more than the others do."""
     from fmus.packaging.native import build
 
-    return build(name, folder, methods, laws, platforms)
+    return build(model, folder, methods, laws, platforms)
 
 
 class Mistake(click.ClickException):

@@ -1,19 +1,9 @@
 """Drag sled with a smooth friction curve."""
 
-from math import asin, atan, cos, pi, sin, tan
-
-from .runtime.codes import RODAS
-from .runtime.declare import Choice, Fixed, Input, Output, Parameter
-from .runtime.march import March
-from .runtime.methods import ITEMS
-from .runtime.oscillator import Oscillator
+from fmus import Fixed, Input, Model, Output, Parameter, Rule, State, asin, atan, pi, sin, tan
 
 
-class Solver(March):
-    method = Choice(RODAS, "integration method", ITEMS)
-
-
-class Pacejka(Oscillator):
+class Pacejka(Model):
     """Drag sled with the smooth friction curve of Pacejka's magic formula; it creeps where the sled sticks.
 
         m a = F_ext + k (x_driver - x) - F_friction,   d(x_driver)/dt = v_driver
@@ -35,67 +25,35 @@ class Pacejka(Oscillator):
     x0 = Fixed(0.0, "m", "position at the start")
     v0 = Fixed(0.0, "m/s", "speed at the start")
     F_ext = Input(0.0, "N", "outer force on the sled")
-    x = Output("m", "position of the sled")
-    v = Output("m/s", "speed of the sled")
-    a = Output("m/s2", "acceleration of the sled", direct=True)
-    x_driver = Output("m", "position of the driver, zero at the start")
-    F_spring = Output("N", "force of the spring on the sled")
-    F_friction = Output("N", "force of friction, against the motion")
-    energy = Output("J", "kinetic and potential energy", low=0.0)
 
-    driven = True
+    x = State("m", "position of the sled", start=x0)
+    v = State("m/s", "speed of the sled", start=v0, rate_of=x, finest=x_m)
+    x_driver = State("m", "position of the driver, zero at the start", rate=v_driver)
+
+    D = mu_s
+    C = 2.0 - 2.0 * asin(mu_d / D) / pi
+    B = 2.0 * mu_s / (x_m * C * D)
+    peak = B * x_m
+    E = (peak - tan(0.5 * pi / C)) / (peak - atan(peak))
+    z = B * v
+    y = z - E * (z - atan(z))
+    mu = D * sin(C * atan(y))
+
+    weight = m * g
+    stretch = x_driver - x
+    F_spring = Output("N", "force of the spring on the sled", k * stretch)
+    F_friction = Output("N", "force of friction, against the motion", mu * weight)
+    a = Output("m/s2", "acceleration of the sled", (F_ext + F_spring) / m - mu * g, rate_of=v)
+    energy = Output("J", "kinetic and potential energy", 0.5 * (m * v * v + F_spring * stretch), low=0.0)
+
     stop_time = 16.0
     step_size = 0.016
+    method = "rodas"
     tolerance = 2e-7  # a position error shifts the next break-away: the speed loses a digit more
     rules = (
-        "mu_d is {mu_d!r}, not below mu_s = {mu_s!r}: at mu_d = mu_s the factor C is 1 and no finite E puts the peak "
-        "of the curve at x_m; lower mu_d or raise mu_s",
+        Rule(
+            mu_d >= mu_s,
+            "mu_d is {mu_d!r}, not below mu_s = {mu_s!r}: at mu_d = mu_s the factor C is 1 and no finite E puts the "
+            "peak of the curve at x_m; lower mu_d or raise mu_s",
+        ),
     )
-
-    def __init__(self):
-        super().__init__()
-        self.solver = Solver()
-        self.t_base = self.x_base = 0.0
-        self.B = self.C = self.D = self.E = self.weight = 0.0
-
-    def initial(self, t):
-        self.t_base, self.x_base = t, 0.0
-        return self.x0, self.v0
-
-    def prepare(self):
-        if self.mu_d >= self.mu_s:
-            return 1
-        self.weight = self.m * self.g
-        self.D = self.mu_s
-        self.C = 2.0 - 2.0 * asin(self.mu_d / self.D) / pi
-        self.B = 2.0 * self.mu_s / (self.x_m * self.C * self.D)
-        peak = self.B * self.x_m
-        self.E = (peak - tan(0.5 * pi / self.C)) / (peak - atan(peak))
-        return 0
-
-    def mu(self, v):
-        z = self.B * v
-        return self.D * sin(self.C * atan(z - self.E * (z - atan(z))))
-
-    def finest(self):
-        return self.x_m
-
-    def rates(self, t, x, v, mode):
-        pull = self.F_ext + self.k * (self.x_base + self.v_driver * (t - self.t_base) - x)
-        return pull / self.m - self.mu(v) * self.g
-
-    def jacobian(self, t, x, v, mode):
-        z = self.B * v
-        y = z - self.E * (z - atan(z))
-        slope = self.B - self.E * (self.B - self.B / (1.0 + z * z))
-        slope = self.D * (cos(self.C * atan(y)) * (self.C * (slope / (1.0 + y * y))))
-        return self.k * self.v_driver / self.m, -self.k / self.m, -slope * self.g
-
-    def observe(self, t, x, v, mode):
-        driver = self.x_base + self.v_driver * (t - self.t_base)
-        stretch, mu = driver - x, self.mu(v)
-        spring = self.k * stretch
-        self.x, self.v, self.x_driver = x, v, driver
-        self.F_spring, self.F_friction = spring, mu * self.weight
-        self.a = (self.F_ext + spring) / self.m - mu * self.g
-        self.energy = 0.5 * (self.m * v * v + spring * stretch)

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from models import model_class
 
 from harness.running.inside import Inside, offered
 from harness.studies.precision import anchors
@@ -55,7 +56,7 @@ def test_smoothing_is_four_digits_worse_at_more_cost_than_locating_events():
     assert smooth.evaluations > located.evaluations
 
 
-@pytest.mark.parametrize("method", offered(anchors.Coulomb))
+@pytest.mark.parametrize("method", offered(model_class("coulomb")))
 def test_every_method_of_the_runtime_stops_the_classic_once_and_for_good(method):
     row = next(row for row in rows("chattering classic", anchors.RUNTIME) if row.method == method)
     assert row.error < 10 * row.rtol

@@ -23,7 +23,7 @@ from stat import S_IFREG
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from . import BuildError
-from .catalogue import load
+from .catalogue import find
 from .companions import companions
 from .description import declared_by
 from .edition import FMI2, Edition
@@ -40,32 +40,34 @@ EARLIEST, LATEST = datetime(1980, 1, 1, tzinfo=UTC), datetime(2107, 12, 31, tzin
 
 
 def build(
-    name: str,
+    model: str | Path,
     folder: Path,
     methods: Sequence[str] = (),
     laws: Sequence[str] = (),
     platforms: Sequence[str] = (),
     edition: Edition = FMI2,
 ) -> Path:
-    """Write `<name>.fmu` into `folder`; an older one is replaced whole or not at all.
+    """Write the FMU of a model, given by its name or by the path of its file, into `folder`.
 
-    Methods, friction laws and platforms may be chosen (lean.py); without a choice it has all there are.
+    An older one is replaced whole or not at all.  Methods, friction laws and platforms may be chosen (lean.py); without
+    a choice it has all there are.
     """
-    model, date = load(name), build_date()
-    offered = offer(model, name, methods, laws)
+    source, date = find(model), build_date()
+    name, cls = source.name, source.model
+    offered = offer(cls, name, methods, laws)
     edit = partial(reduced, offered=offered) if offered else unchanged
-    sources = travelling(name, edit=edit, edition=edition)
+    sources = travelling(source, edit=edit, edition=edition)
     code = digest(sources, edition.entry)
     package = f"{name}_{code[:12]}"
     if offered:
-        model = imported(sources, name, package)
-    entries = companions(model, name, declared_by(model), edition)
+        cls = imported(sources, name, source.title, package)
+    entries = companions(cls, source.path, declared_by(cls), edition)
     entries |= {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
     entries |= {
         "documentation/externalDependencies.txt": NEEDED.encode(),
-        "modelDescription.xml": edition.describe(model, name, code, date),
+        "modelDescription.xml": edition.describe(cls, name, code, date),
         "resources/slavemodule.txt": f"{package}_fmu".encode(),
-        f"resources/{package}_fmu.py": edition.entry.format(package=package, model=model.__name__).encode(),
+        f"resources/{package}_fmu.py": edition.entry.format(package=package, model=cls.__name__).encode(),
     }
     entries |= _binaries(name, platforms, edition) | licenses(edition)
     return write(folder / f"{name}.fmu", zipped(entries, date))

@@ -1,24 +1,33 @@
-"""The models there are: every public file of `fmus/`, and in it the class of the same name."""
+"""Where models are: those of `fmus/`, one a file, by their names; any other by the path of its file."""
 
-from importlib import import_module
 from pathlib import Path
 
 from ..runtime.declare import Declaring
 from . import BuildError
+from .equations.authored import Authored, authored
 
 FMUS = Path(__file__).resolve().parent.parent
 
 
 def names() -> list[str]:
-    """The name of every model, in alphabetical order."""
+    """The name of every model of the project, in alphabetical order."""
     return sorted(path.stem for path in FMUS.glob("*.py") if not path.stem.startswith("_"))
 
 
-def load(name: str) -> type[Declaring]:
-    """The class of the model `name`."""
-    if name not in names():
-        raise BuildError(f"There is no model {name!r}; known are {', '.join(names())}.")
-    model = getattr(import_module(f"fmus.{name}"), name.capitalize(), None)
-    if not (isinstance(model, type) and issubclass(model, Declaring)):
-        raise BuildError(f"fmus/{name}.py declares no class {name.capitalize()}; a model derives from Declaring.")
-    return model
+def find(source: str | Path) -> Authored:
+    """The model of a name, or in the file of a path, which has the ending .py."""
+    path = Path(source)
+    if path.suffix == ".py":
+        if not path.is_file():
+            raise BuildError(f"There is no file {path}.")
+        return authored(path)
+    if str(source) not in names():
+        raise BuildError(
+            f"There is no model {str(source)!r}; known are {', '.join(names())}, and any .py file by its path."
+        )
+    return authored(FMUS / f"{source}.py")
+
+
+def load(source: str | Path) -> type[Declaring]:
+    """The class of a model, written out in plain scalars."""
+    return find(source).model

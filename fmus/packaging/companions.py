@@ -7,14 +7,14 @@ from .edition import FMI2, Edition
 from .page import page
 from .reference import files, reference
 
-ICONS = Path(__file__).with_name("icons")
-
 
 def companions(
-    model: type[Declaring], name: str, declared: list[tuple[str, Declared]], edition: Edition = FMI2
+    model: type[Declaring], path: Path, declared: list[tuple[str, Declared]], edition: Edition = FMI2
 ) -> dict[str, bytes]:
-    """Their content, by their paths in the FMU; a model without icon or certified result has none."""
-    found, icon = reference(name, declared), ICONS / f"{name}.png"
+    """Their content, by their paths in the FMU; a model has an icon and a certified result if they lie beside its file
+    at `path`, under the same name."""
+    name, icon = path.stem, path.with_suffix(".png")
+    found = reference(name, declared)
     entries = {"documentation/index.html": page(model, name, declared, found, edition)}
     if found is not None:
         entries |= files(name, found, declared)

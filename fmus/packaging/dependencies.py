@@ -28,7 +28,7 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
     known = {name: meaning for name, meaning in declared if meaning.causality in SETTABLE}
     if not outputs:
         return {}
-    entry = next(name for name, meaning in known.items() if meaning.causality == "input")
+    entry = next((name for name, meaning in known.items() if meaning.causality == "input"), "")
     sizes: dict[str, list[float]] = {}  # values of a unit meet at the size of one of them
     for meaning in known.values():
         sizes.setdefault(meaning.unit, []).append(abs(meaning.start) or 1.0)
@@ -37,7 +37,7 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
     for _ in range(SITUATIONS):
         values = {name: another(meaning, sizes, chance) for name, meaning in known.items()}
         put(thing, values)
-        if thing.dry and begun(thing, outputs):
+        if thing.dry and entry and begun(thing, outputs):
             load, _, limit = thing.hold(0.0, thing.solver.x, 0.0)
             values[entry] += one(LOADS, chance) * limit - load
             put(thing, values)

@@ -15,7 +15,7 @@ from ..runtime.state import SETTABLE
 from . import BuildError, __version__
 from .dependencies import at_start
 from .document import document
-from .units import UNITS, unit_of
+from .units import in_order, unit_of
 
 CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -93,7 +93,7 @@ def define_units(root: Element, declared: Variables) -> None:
     """UnitDefinitions: every unit that a variable has, in the order of the table."""
     used = {meaning.unit: unit_of(name, meaning.unit) for name, meaning in declared if meaning.type == "Real"}
     definitions = SubElement(root, "UnitDefinitions")
-    for symbol in filter(used.get, UNITS):
+    for symbol in in_order(used):
         unit = used[symbol]
         powers = {base: str(getattr(unit, base)) for base in ("kg", "m", "s", "rad") if getattr(unit, base)}
         element = SubElement(definitions, "Unit", name=symbol)
@@ -116,10 +116,10 @@ def _define_types(root: Element, declared: Variables) -> None:
 
 def quantities(declared: Variables) -> list[dict[str, str]]:
     """What is measured and in which unit, for every unit that a variable has."""
-    used = {meaning.unit for _, meaning in declared if meaning.type == "Real"}
+    used = {meaning.unit: unit_of(name, meaning.unit) for name, meaning in declared if meaning.type == "Real"}
     found = []
-    for symbol in filter(used.__contains__, UNITS):
-        unit = UNITS[symbol]
+    for symbol in in_order(used):
+        unit = used[symbol]
         attributes = {"quantity": unit.quantity, "unit": symbol, "displayUnit": unit.display}
         found.append({key: value for key, value in attributes.items() if value})
     return found

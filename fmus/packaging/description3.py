@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any, cast
 from xml.etree.ElementTree import Element, SubElement
 
-from ..runtime.beside import TO_BREAK_AWAY, TO_DRIVER, TO_REST, beside
+from ..runtime.beside import DERIVATIVE, TO_BREAK_AWAY, TO_REST, beside
 from ..runtime.declare import Declaring, Output
 from ..runtime.exchange import nominals
 from .dependencies import at_start
@@ -72,11 +72,12 @@ def _define_types(root: Element, declared: Variables) -> None:
 
 
 def _rates(declared: Variables) -> dict[int, int]:
-    """The references of the derivatives, each with that of its state: position, speed, and position of a driver."""
-    position, speed, acceleration, *_ = _of(declared, "output")
+    """The references of the derivatives, each with that of its state: states as declared, then drivers."""
     names = {name: reference for reference, (name, _) in enumerate(declared)}
-    driver = {reference: names[name[4:-1]] for name, reference in names.items() if name.startswith("der(")}
-    return {speed: position, acceleration: speed} | driver
+    rates = {names[meaning.rate_of]: names[name] for name, meaning in declared if meaning.rate_of}
+    of_state = {state: rate for state, rate in rates.items() if declared[state][1].role == "state"}
+    drivers = {names[name]: names[DERIVATIVE.format(name)] for name, meaning in declared if meaning.rate}
+    return {rate: state for state, rate in (of_state | drivers).items()}
 
 
 def _of(declared: Variables, causality: str) -> list[int]:
@@ -89,8 +90,8 @@ def _tell_states(elements: list[Element], model: type[Declaring], rates: dict[in
     for (rate, state), size in zip(rates.items(), nominals(thing), strict=True):
         elements[rate].set("derivative", str(state))
         elements[state].set("nominal", repr(size))
-    _, speed, *_ = rates.values()
     if thing.dry:
+        _, speed, *_ = rates.values()
         elements[speed].set("reinit", "true")
 
 
@@ -112,7 +113,8 @@ def _structure(root: Element, model: Any, declared: Variables, rates: dict[int, 
     for reference in to_driver:
         _unknown(structure, "ContinuousStateDerivative", reference, [])
     references = {name: reference for reference, (name, _) in enumerate(declared)}
-    followed = at_start(model, declared) | {TO_DRIVER: ["v_driver"]}
+    drivers = {DERIVATIVE.format(name): [meaning.rate] for name, meaning in declared if meaning.rate}
+    followed = at_start(model, declared) | drivers
     for reference in sorted({*outputs, *rates}):
         name, _ = declared[reference]
         _unknown(structure, "InitialUnknown", reference, [references[known] for known in followed[name]])

@@ -65,8 +65,8 @@ def reduced(path: str, text: str, offered: Offer) -> str:
     return text if ast.dump(tree) == before else ast.unparse(tree) + "\n"
 
 
-def imported(sources: dict[str, str], name: str, package: str) -> type[Declaring]:
-    """The model class as it travels."""
+def imported(sources: dict[str, str], name: str, title: str, package: str) -> type[Declaring]:
+    """The class `title` of a model, as it travels."""
     with TemporaryDirectory() as folder:
         for path, text in sources.items():
             file = Path(folder, package, path)
@@ -75,7 +75,7 @@ def imported(sources: dict[str, str], name: str, package: str) -> type[Declaring
         sys.path.insert(0, folder)
         invalidate_caches()
         try:
-            return vars(import_module(f"{package}.{name}"))[name.capitalize()]
+            return vars(import_module(f"{package}.{name}"))[title]
         finally:
             sys.path.remove(folder)
 

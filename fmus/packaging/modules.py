@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 from . import BuildError
 from .catalogue import FMUS
 from .edition import FMI2, Edition
+from .equations.authored import Authored
 
 ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # what stands in the originals of these does not travel
 Edit = Callable[[str, str], str]  # of the text of the file at a path
@@ -33,15 +34,17 @@ def installed(layer: str) -> Path:
     return Path(spec.origin).parent
 
 
-def travelling(name: str, root: Path = FMUS, edit: Edit = unchanged, edition: Edition = FMI2) -> dict[str, str]:
-    """Path inside the package and source text, after `edit`, of every file that the model `name` in `root` needs."""
-    files = {ROOT: edition.init.format(name=name, model=name.capitalize())}
-    waiting = [f"{name}.py", GUARD, edition.slave]
+def travelling(source: Authored, root: Path = FMUS, edit: Edit = unchanged, edition: Edition = FMI2) -> dict[str, str]:
+    """Path inside the package and text, after `edit`, of the written-out model and of every file in `root` it needs."""
+    files = {ROOT: edition.init.format(name=source.name, model=source.title)}
+    model = f"{source.name}.py"
+    waiting = [model, GUARD, edition.slave]
     for path in waiting:  # which grows on the way
         if path == VENDORED:
             files[path] = ""
         elif path not in files:
-            files[path], needed = _embed(path, root, edit)
+            text = source.text if path == model else _on_disk(path, root).read_text(encoding="utf-8")
+            files[path], needed = _embed(path, edit(path, text), root)
             waiting += needed
     return files
 
@@ -59,10 +62,10 @@ def _on_disk(path: str, root: Path) -> Path:
     return installed("pythonfmu").parent / path if path.startswith("pythonfmu/") else root / path
 
 
-def _embed(path: str, root: Path, edit: Edit) -> tuple[str, list[str]]:
+def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
     """The text of a file as it travels, and the paths of the files that it needs in turn."""
     # Text mode turns any line end into "\n", so that checkouts on all systems build the same bytes.
-    lines = edit(path, _on_disk(path, root).read_text(encoding="utf-8")).splitlines(keepends=True)
+    lines = text.splitlines(keepends=True)
     inside = PurePosixPath(path).parts
     needed = ["/".join((*inside[:depth], "__init__.py")) for depth in range(1, len(inside))]
     for node in _imports(path, "".join(lines)):

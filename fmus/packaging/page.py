@@ -11,8 +11,8 @@ from . import __version__
 from .chart import chart
 from .description import Variables
 from .edition import FMI2, Edition
-from .reference import INSIDE, Reference
-from .units import UNITS
+from .reference import INSIDE, Reference, integrated
+from .units import unit_of
 
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "pi": "pi"}
 STYLE = Path(__file__).with_name("page.css")
@@ -82,14 +82,13 @@ def readable(unit: str) -> str:
 
 
 def _figure(found: Reference, declared: Variables) -> list[str]:
-    """Position and speed over time."""
+    """The states over time."""
     times, *columns = ([float(word) for word in column] for column in zip(*found.rows, strict=True))
-    outputs = [(variable, meaning) for variable, meaning in declared if meaning.causality == "output"]
     parts = ["<h2>Default run</h2>", "<figure>"]
-    for values, (variable, meaning) in zip(columns, outputs, strict=False):
+    for values, (variable, meaning) in zip(columns, integrated(declared), strict=True):
         shown, factor = meaning.unit, 1.0
         if meaning.display:
-            shown, factor = meaning.display, UNITS[meaning.unit].factor
+            shown, factor = meaning.display, unit_of(variable, meaning.unit).factor
         parts.append(chart(times, [factor * value for value in values], f"{variable} in {readable(shown)}"))
     return [*parts, f"<figcaption>{escape(found.told)}</figcaption></figure>"]
 
@@ -115,7 +114,9 @@ def _table(chosen: Variables) -> str:
         settable = meaning.causality in SETTABLE
         value = f"{meaning.start:.10g}" if settable else ""
         if settable and meaning.display:
-            value = f"{meaning.start * UNITS[meaning.unit].factor:.10g} {readable(meaning.display)} = {value}"
+            value = (
+                f"{meaning.start * unit_of(variable, meaning.unit).factor:.10g} {readable(meaning.display)} = {value}"
+            )
         notes = [readable(meaning.allowed)] if settable and meaning.allowed != FREE else []
         if meaning.variability == "fixed":
             notes.append("fixed")

@@ -1,7 +1,7 @@
 """The certified result of the default experiment, as the layered standard FMI-LS-REF 1.0.0-alpha.1 places it.
 
     extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml
-    extra/org.fmi-standard.fmi-ls-ref/<name>_out.csv          time and the first two outputs, by their names
+    extra/org.fmi-standard.fmi-ls-ref/<name>_out.csv          time and the states, by their names
 
 The numbers are those of harness/references, which stand there with the script that made them.
 """
@@ -56,10 +56,14 @@ def _read(file: str) -> list[list[str]]:
         return list(csv.reader(text))
 
 
+def integrated(declared: list[tuple[str, Declared]]) -> list[tuple[str, Declared]]:
+    """The states that a solver integrates, in order."""
+    return [(variable, meaning) for variable, meaning in declared if meaning.role == "state" and not meaning.rate]
+
+
 def files(name: str, found: Reference, declared: list[tuple[str, Declared]]) -> dict[str, bytes]:
     """The result and its manifest, by their paths in the FMU."""
-    outputs = [variable for variable, meaning in declared if meaning.causality == "output"]
-    lines = [["time", *outputs[:2]], *found.rows]
+    lines = [["time", *(variable for variable, _ in integrated(declared))], *found.rows]
     result = "".join(",".join(line) + "\n" for line in lines)
     root = Element("fmiReferences", {"xmlns:fmi-ls": NAMESPACE})
     for key, text in STANDARD.items():

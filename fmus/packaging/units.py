@@ -1,8 +1,10 @@
-"""The units that models may declare, by their SI base units (FMI 2.0.4, section 2.2.2).
+"""The units that models may declare: products and quotients of SI units, as N.m.s/rad (FMI 2.0.4, section 2.2.2).
 
 1 <unit> = kg^kg · m^m · s^s · rad^rad;   value in display unit = factor · value in unit.
 """
 
+import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from math import pi
 
@@ -24,7 +26,7 @@ class Unit:
     factor: float = 1.0
 
 
-UNITS = {
+UNITS = {  # those whose quantity has a name
     "1": Unit("Ratio"),
     "s": Unit("Time", s=1),
     "kg": Unit("Mass", kg=1),
@@ -43,11 +45,41 @@ UNITS = {
 }
 
 
+SYMBOLS = {  # exponents of kg, m, s and rad
+    **{"1": (0, 0, 0, 0), "kg": (1, 0, 0, 0), "m": (0, 1, 0, 0), "s": (0, 0, 1, 0), "rad": (0, 0, 0, 1)},
+    **{"N": (1, 1, -2, 0), "J": (1, 2, -2, 0), "W": (1, 2, -3, 0), "Pa": (1, -1, -2, 0), "Hz": (0, 0, -1, 0)},
+}
+FACTOR = re.compile(r"([./])(1|[A-Za-z]+)(-?\d+)?")
+
+
+def derived(symbol: str) -> Unit | None:
+    """A unit that is a product or quotient, each with an exponent if need be; None for what is not.
+
+    >>> derived("N.m.s/rad")
+    Unit(quantity='N.m.s/rad', kg=1, m=2, s=-1, rad=-1, display='', factor=1.0)
+    """
+    factors = FACTOR.findall(f".{symbol}")
+    if "".join(map("".join, factors)) != f".{symbol}" or any(part not in SYMBOLS for _, part, _ in factors):
+        return None
+    times = [int(power or "1") * (1 if sign == "." else -1) for sign, _, power in factors]
+    each = [[n * power for power in SYMBOLS[part]] for n, (_, part, _) in zip(times, factors, strict=True)]
+    kg, m, s, rad = map(sum, zip(*each, strict=True))
+    return Unit(symbol, kg, m, s, rad)
+
+
+def in_order(symbols: Collection[str]) -> list[str]:
+    """Each unit once: those with a name in the order of the table, then the others."""
+    return [*filter(symbols.__contains__, UNITS), *dict.fromkeys(symbol for symbol in symbols if symbol not in UNITS)]
+
+
 def unit_of(name: str, symbol: str, display: str = "") -> Unit:
     """The unit of the variable `name`, with the display unit that it asks for."""
-    if symbol not in UNITS:
-        raise BuildError(f"{name} has the unit {symbol!r}; known units are {', '.join(UNITS)}: add it to units.py.")
-    unit = UNITS[symbol]
+    unit = UNITS.get(symbol) or derived(symbol)
+    if unit is None:
+        raise BuildError(
+            f"{name} has the unit {symbol!r}; known units are {', '.join(UNITS)}, and products of {', '.join(SYMBOLS)} "
+            "and their powers, as in N.m.s/rad."
+        )
     if display not in ("", symbol, unit.display):
         allowed = " or ".join(repr(word) for word in (symbol, unit.display) if word)
         raise BuildError(f"{name} has the display unit {display!r}; allowed for {symbol} is {allowed}.")

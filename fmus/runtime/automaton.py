@@ -25,6 +25,13 @@ def sign(v):
     return 1 if v > 0.0 else -1 if v < 0.0 else 0
 
 
+def threshold(v, eps, load, slide, hold):
+    """Friction by the threshold law."""
+    if fabs(v) >= eps:
+        return sign(v) * slide
+    return hold if load > hold else -hold if load < -hold else load
+
+
 class DryFriction(Oscillator):
     """An oscillator that sticks.
 

@@ -2,13 +2,14 @@
 
 from .declare import Declared, Local
 
-TIME, TO_REST, TO_BREAK_AWAY, TO_DRIVER = "time", "events.to_rest", "events.to_break_away", "der(x_driver)"
-PLACES = {  # in a model that owns an Exchange
-    TIME: "solver.t",
-    TO_REST: "exchange.to_rest",
-    TO_BREAK_AWAY: "exchange.to_break_away",
-    TO_DRIVER: "exchange.driver",
-}
+TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
+DERIVATIVE = "der({})"  # of a state that a driver is
+PLACES = {TIME: "solver.t", TO_REST: "exchange.to_rest", TO_BREAK_AWAY: "exchange.to_break_away"}
+
+
+def place(name):
+    """Where a variable is in a model that owns an Exchange."""
+    return "exchange.driver" if name.startswith(DERIVATIVE[:4]) else PLACES.get(name, name)
 
 
 class Time(Declared):
@@ -25,13 +26,16 @@ class Smooth(Local):
 
 def beside(model, declared):
     """Name and declaration of those that a model has, whose declared variables are given likewise."""
-    _, speed, *_ = (meaning for _, meaning in declared if meaning.causality == "output")
-    push = next(meaning for _, meaning in declared if meaning.causality == "input")
+    units = {name: meaning.unit for name, meaning in declared}
     found = [(TIME, Time("s", "the independent variable"))]
     if model.dry:
+        (speed,) = [meaning.unit for _, meaning in declared if meaning.role == "state" and meaning.rate_of]
+        (force,) = [meaning.unit for _, meaning in declared if meaning.role == "contact"]
         rest = "event indicator: speed in the direction of the slide; 1 while stuck"
         away = "event indicator: holding limit less load on the body at rest; 1 while sliding"
-        found += [(TO_REST, Smooth(speed.unit, rest)), (TO_BREAK_AWAY, Smooth(push.unit, away))]
-    if model.driven:
-        found.append((TO_DRIVER, Smooth(speed.unit, "rate of the position of the driver")))
+        found += [(TO_REST, Smooth(speed, rest)), (TO_BREAK_AWAY, Smooth(force, away))]
+    for name, meaning in declared:
+        if meaning.rate:
+            words = "rate of the " + meaning.text.split(",")[0]
+            found.append((DERIVATIVE.format(name), Smooth(units[meaning.rate], words)))
     return found

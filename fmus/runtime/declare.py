@@ -18,6 +18,9 @@ class Declared:
     initial = ""
     start = 0.0
     items = ()
+    role = ""  # what it is to the motion: a "state", the force of a "contact"
+    rate_of = ""  # the name of the state whose rate it is
+    rate = ""  # the name of the parameter that is its rate for all time, as of a driver
 
     def __init__(self, unit, text, low=-inf, high=inf, above=-inf, below=inf, display=""):
         self.name = ""
@@ -85,9 +88,28 @@ class Output(Declared):
 
     causality, variability, initial = "output", "continuous", "calculated"
 
-    def __init__(self, unit, text, direct=False, **more):
+    def __init__(self, unit, text, direct=False, rate_of="", **more):
         super().__init__(unit, text, **more)
-        self.direct = direct
+        self.direct, self.rate_of = direct, rate_of
+
+
+class State(Output):
+    """A continuous state."""
+
+    role = "state"
+
+    def __init__(self, unit, text, rate="", **more):
+        super().__init__(unit, text, **more)
+        self.rate = rate
+
+
+class Contact(Output):
+    """The force of dry friction in a contact."""
+
+    role = "contact"
+
+    def __init__(self, unit, text, **more):
+        super().__init__(unit, text, direct=True, **more)
 
 
 class Mode(Output):

@@ -61,7 +61,7 @@ def rates(model, march):
     v = a = 0.0
     if not (march.step.sticks and march.mode == STUCK):
         v, a = march.v, model.rates(march.t, march.x, march.v, march.mode)
-    return [v, a, model.v_driver] if model.driven else [v, a]
+    return [v, a, model.drive()] if model.driven else [v, a]
 
 
 def indicators(model, march):
@@ -107,7 +107,7 @@ class Exchange:
         if model.dry:
             self.to_rest, self.to_break_away = indicators(model, march)
         if model.driven:
-            self.driver = model.v_driver
+            self.driver = model.drive()
 
 
 class Exchanging:

@@ -8,7 +8,7 @@ comes (model exchange), and the run begins where the first step does.
 from math import fabs, nan
 
 from . import exchange, rules
-from .beside import PLACES, beside
+from .beside import beside, place
 from .boundary import guarded
 from .codes import CO_SIMULATION, DIVERGED, MODEL_EXCHANGE, OK, RUNNING, UNDECIDED
 from .failure import ERROR
@@ -115,7 +115,7 @@ class Slave(Hosted, Instance):
     get_string, set_string = getter("String", ""), setter("String")
 
     def place(self, name):
-        return PLACES.get(name, name)
+        return place(name)
 
     def report(self, ahead):
         super().report(ahead)

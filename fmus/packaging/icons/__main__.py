@@ -1,7 +1,6 @@
 """Draws the icons: python -m fmus.packaging.icons"""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -9,6 +8,8 @@ import numpy as np
 mpl.use("Agg")
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch
+
+from ..catalogue import FMUS
 
 PIXELS = 256
 INK, BODY, FRICTION, MOTION = "#1b1f24", "#9cc4f5", "#d1242f", "#1f6feb"
@@ -116,11 +117,11 @@ DRAWINGS: tuple[Callable, ...] = (smd, coulomb, stickslip, pacejka, pendulum)
 
 
 def main() -> None:
-    """Write `<model>.png` beside this file."""
+    """Write `<model>.png` beside the file of each model."""
     for drawing in DRAWINGS:
         figure, axes = canvas()
         drawing(axes)
-        figure.savefig(Path(__file__).with_name(f"{drawing.__name__}.png"), metadata={"Software": None})
+        figure.savefig(FMUS / f"{drawing.__name__}.png", metadata={"Software": None})
 
 
 if __name__ == "__main__":

@@ -18,10 +18,11 @@ from xml.etree.ElementTree import SubElement, fromstring
 from ...runtime.declare import Declaring
 from .. import BuildError
 from ..archive import build_date, licenses, write, zipped
-from ..catalogue import load
+from ..catalogue import find
 from ..companions import companions
 from ..description import declared_by, describe
 from ..document import document
+from ..equations.authored import Authored
 from ..lean import Offer, imported, offer, reduced
 from ..modules import digest, travelling
 from .compiler import PLATFORMS, USUAL, compiled
@@ -31,23 +32,27 @@ LICENSE = "documentation/licenses/license.txt"
 
 
 def build(
-    name: str, folder: Path, methods: Sequence[str] = (), laws: Sequence[str] = (), platforms: Sequence[str] = ()
+    model: str | Path,
+    folder: Path,
+    methods: Sequence[str] = (),
+    laws: Sequence[str] = (),
+    platforms: Sequence[str] = (),
 ) -> Path:
-    """Write `<name>.fmu` for the platforms (none: the usual ones) into `folder`; an older one is replaced whole or not
-    at all.
+    """Write the FMU of a model, by name or path, for the platforms (none: the usual ones) into `folder`.
 
-    Methods and friction laws may be chosen, as for the Python FMU.
+    An older one is replaced whole or not at all.  Methods and friction laws may be chosen, as for the Python FMU.
     """
     platforms = platforms or USUAL
     for platform in platforms:
         if platform not in PLATFORMS:
             raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
     date = build_date()
-    model = load(name)
-    if offered := offer(model, name, methods, laws):
-        model = lean(name, offered)
-    files, description = frozen(model, name, date)
-    entries = companions(model, name, declared_by(model))
+    source = find(model)
+    name, cls = source.name, source.model
+    if offered := offer(cls, name, methods, laws):
+        cls = lean(source, offered)
+    files, description = frozen(cls, name, date)
+    entries = companions(cls, source.path, declared_by(cls))
     entries |= {"modelDescription.xml": description, LICENSE: licenses()[LICENSE]}
     entries |= {f"sources/{file}": text.encode() for file, text in files.items()}
     entries["sources/buildDescription.xml"] = build_description(name)
@@ -58,10 +63,10 @@ def build(
     return write(folder / f"{name}.fmu", zipped(entries, date))
 
 
-def lean(name: str, offered: Offer) -> type[Declaring]:
+def lean(source: Authored, offered: Offer) -> type[Declaring]:
     """The model without what is not offered; `inspect` still finds its source, whose files are gone."""
-    texts = travelling(name, edit=partial(reduced, offered=offered))
-    model = imported(texts, name, f"frozen_{name}_{digest(texts)[:12]}")
+    texts = travelling(source, edit=partial(reduced, offered=offered))
+    model = imported(texts, source.name, source.title, f"frozen_{source.name}_{digest(texts)[:12]}")
     root = Path(inspect.getfile(model)).parent
     for path, text in texts.items():
         linecache.cache[str(root / path)] = (len(text), None, text.splitlines(keepends=True), str(root / path))

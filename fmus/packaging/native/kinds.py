@@ -65,13 +65,6 @@ class Method:
 Kind: TypeAlias = Scalar | Row | Group | Object | Known | Method
 
 
-WORDS_OF_C = """
-    auto break case char const continue default do double else enum extern float for goto if inline int long register
-    restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
-    bool true false fault
-"""
-
-
 def kind_of(value: object) -> Scalar | None:
     """The kind of a Python number; None for anything else."""
     return {float: FLOAT, int: INT, bool: BOOL}.get(type(value))

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from .kinds import FLOAT, WORDS_OF_C, Kind, Object, Row, Scalar, declare, kind_of, literal
+from ..words import OF_C
+from .kinds import FLOAT, Kind, Object, Row, Scalar, declare, kind_of, literal
 from .refusal import Refused
 
 NOTHING = "nothing"  # the member of a struct that has no other, for C has no empty ones
@@ -29,7 +30,7 @@ class Layout:
         return Object(cls)
 
     def _kind(self, value: object, path: str) -> Kind:
-        if (name := path.rsplit(".", 1)[-1]) in WORDS_OF_C.split():
+        if (name := path.rsplit(".", 1)[-1]) in OF_C:
             raise Refused(f"{path}: {name} is a word of C; take another name.")
         if kind := kind_of(value):
             return kind

@@ -13,8 +13,9 @@ from textwrap import dedent
 from types import FunctionType
 from typing import TYPE_CHECKING
 
+from ..words import OF_C
 from .expressions import SIGN, Expressions, Value, group
-from .kinds import BOOL, FLOAT, INT, WORDS_OF_C, Group, Kind, Known, Object, Scalar, declare, spell
+from .kinds import BOOL, FLOAT, INT, Group, Kind, Known, Object, Scalar, declare, spell
 from .refusal import place
 
 if TYPE_CHECKING:
@@ -212,7 +213,7 @@ class Body(Expressions):
 
     def name(self, node: ast.AST, name: str, kind: Kind) -> None:
         """Take a name into use; it keeps its kind for life."""
-        if name in WORDS_OF_C.split():
+        if name in OF_C:
             raise self.refused(node, f"uses {name}, a word of C", "take another name")
         self.same(node, self.locals.setdefault(name, kind), kind)
 

@@ -13,7 +13,7 @@ from math import fabs, sqrt
 
 import numpy as np
 
-from fmus.coulomb import Coulomb
+from fmus.packaging.catalogue import load
 from fmus.runtime.automaton import DryFriction
 from fmus.runtime.codes import HYBRID, ODE45
 from fmus.runtime.declare import Choice
@@ -94,7 +94,7 @@ def analyse() -> Iterator[AnchorRun]:
     yield from others(name, Belt(), BLOCK, EVENTS, {"scipy": ("RK23", "RK45", "DOP853", "LSODA"), "cvode": ("Adams",)})
     yield from others(name, Smoothed(), BLOCK, "arctan(1e6 v)", {"scipy": ("RK45", "LSODA")})
     name, values = "chattering classic", {"m": 1.0, "k": 1.0, "f": 10.0, "x0": 0.0, "v0": 5.0}
-    yield from runtime(name, Coulomb, values, Classic.stop, CLASSIC)
+    yield from runtime(name, load("coulomb"), values, Classic.stop, CLASSIC)
     yield from others(name, Classic(), CLASSIC, EVENTS, {"scipy": ("RK23", "RK45", "LSODA")})
     yield from others(name, Plain(), CLASSIC, "plain sign(v)", {"scipy": ("RK23", "RK45", "LSODA", "Radau")})
 

@@ -1,0 +1,15 @@
+"""From a file of declared equations to a model in plain scalars.
+
+    expressions.py   what can be calculated with
+    declared.py      the variables of a model, and what says how they hang together
+    authored.py      the file of an author: where it is, what it holds, what is wrong with it and in which line
+    algebra.py       values put in, derivatives, operations undone, bounds
+    anatomy.py       roles by name: states and their rates, drives, contacts with their loads; what can be run
+    dimensions.py    units of expressions against those declared
+    influence.py     what follows from what
+    scribe.py        expressions as text, line by line
+    methods.py       the methods of the written-out class
+    written.py       its text, and the class itself
+
+Nothing is regrouped: what an author wrote as (F_ext + F_spring - F_friction) / m is calculated in that order.
+"""

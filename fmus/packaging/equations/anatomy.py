@@ -1,0 +1,253 @@
+"""What a model is: its variables by their roles, all by name and never by order; what follows; what can be run.
+
+The contacts are looked at as a whole: A F = b for the forces that make the rates of all slips zero.
+"""
+
+from functools import cached_property
+from keyword import iskeyword
+
+from ...runtime.automaton import DryFriction
+from ...runtime.methods import EXACT_ITEM, ITEMS
+from ..words import OF_C
+from .algebra import degree, depends, derivative, leaves, made, negative, occurrences, put, same, undone
+from .declared import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
+from .expressions import COMPARISONS, Expression, Mistake, Operand, Term
+
+METHODS = [label for label, _, _ in (EXACT_ITEM, *ITEMS)]
+OURS = {"friction", "solver", "events", "exact", "exchange", "self", "t", "x_base", "t_base"}  # in a written-out model
+OURS |= {"initial", "rates", "jacobian", "push", "hold", "terms", "observe"}
+RESERVED = OURS | {name for name in dir(DryFriction) if not name.startswith("__")} - set(vars(Model))
+TIME = Expression()
+TIME.name = "t"
+
+
+class Anatomy:
+    """Everything about a model that numerics, description, page and C ask for."""
+
+    def __init__(self, model: type[Model]) -> None:
+        self.model, self.name = model, model.__name__
+        own = [(name, e) for name, e in vars(model).items() if isinstance(e, Expression) and e.name == name]
+        for name, e in own:  # a second name for the same, as D for mu_s, is none
+            self._judge_name(name, e)
+        self.declared: list[Variable] = [e for _, e in own if isinstance(e, Variable)]
+        self.parameters = self._all(Parameter, Fixed)
+        self.choices, self.inputs = self._all(Choice), self._all(Input)
+        self.states = [s for s in self._all(State) if s.steady is None]
+        self.drives = [s for s in self._all(State) if s.steady is not None]
+        self.contacts, self.modes = self._all(Contact), self._all(Mode)
+        self.outputs = self._all(Output)
+        self.rules: tuple[Rule, ...] = (model.rules,) if isinstance(model.rules, Rule) else model.rules
+        self._find_rates()
+        self.moving = (TIME, *self.states, *self.drives, *self.contacts, *self.modes)
+        self.flow = {s: self.rate[s] for s in self.states} | {d: d.steady for d in self.drives} | {TIME: 1.0}
+        self._judge_parts()
+        self._find_forces()
+
+    def _all(self, *kinds: type) -> list:
+        return [e for e in self.declared if type(e) in kinds]
+
+    def _judge_name(self, name: str, e: Expression) -> None:
+        if name in RESERVED or name in OF_C or iskeyword(name) or name.startswith("_"):
+            raise Mistake(f"the name {name} is taken: it has a meaning in the solver or in C; choose another", e.place)
+        if not name.isascii():
+            raise Mistake(f"the name {name} has letters that C does not take: choose another", e.place)
+
+    # ---- roles
+
+    def _find_rates(self) -> None:
+        """Of every state the variable that is its rate; a state can be that of another."""
+        self.rate: dict[State, State | Output] = {}
+        for e in self.declared:
+            if isinstance(e, (State, Output)) and e.whose is not None:
+                if e.whose in self.rate:
+                    both = f"{e.name} and {self.rate[e.whose].name}"
+                    raise Mistake(f"{both} both say that they are the rate of {e.whose.name}", e.place)
+                if e.whose not in self.states:
+                    raise Mistake(f"{e.name} says that it is the rate of {e.whose.name}, which is no state", e.place)
+                self.rate[e.whose] = e
+        for s in self.states:
+            if s not in self.rate:
+                raise Mistake(
+                    f"nothing is the rate of {s.name}: say rate_of={s.name} where its derivative is declared", s.place
+                )
+        if not self.states:
+            raise Mistake(f"{self.name} has no state: declare one with State()", self.model.place)
+        self.positions = [s for s in self.states if self.rate[s] in self.states]
+        self.law = {s: e for s, e in self.rate.items() if isinstance(e, Output)}  # rates that must be calculated
+        self.own = [s for s in self.states if s in self.law]
+
+    def _judge_parts(self) -> None:
+        """That every part is declared in this class, every mode belongs to one contact, starts are of parameters."""
+        known, place = set(self.declared), self.model.place
+        for e in self.declared:
+            for part in self.parts(e):
+                for leaf in leaves(part):
+                    if leaf not in known:
+                        word = leaf.name or "a variable without a name"
+                        raise Mistake(f"{e.name} uses {word}, which is not declared in {self.name}", e.place)
+        for mode in self.modes:
+            owners = [c for c in self.contacts if c.mode is mode]
+            if len(owners) != 1:
+                raise Mistake(f"{mode.name} is the mode of {len(owners)} contacts, and must be that of one", mode.place)
+        for s in (*self.states, *self.drives):
+            for word, e in ("start", s.begins), ("rate", s.steady), ("finest", s.finest):
+                if depends(e, self.moving):
+                    raise Mistake(f"{word} of {s.name} moves: it must follow from parameters", s.place)
+        for d in self.drives:
+            if not isinstance(d.steady, Parameter):
+                raise Mistake(f"rate of {d.name} must be a parameter: then it is known in closed form", d.place)
+            if d.begins != 0.0:
+                raise Mistake(f"{d.name} starts at zero: leave out its start", d.place)
+        for rule in self.rules:
+            if not (isinstance(rule.broken, Term) and rule.broken.op in COMPARISONS):
+                raise Mistake(f"a Rule begins with a comparison of parameters, not with {rule.broken!r}", place)
+            if depends(rule.broken, (*self.moving, *self.inputs)):
+                raise Mistake("a Rule is about parameters, and this one moves", rule.broken.place)
+            try:
+                rule.sentence.format_map({e.name: 1.0 for e in (*self.parameters, *self.choices)})
+            except (LookupError, ValueError) as error:
+                raise Mistake(
+                    f"the sentence of a Rule names {error}, which is no parameter", rule.broken.place
+                ) from None
+        if self.model.method not in ("", *METHODS):
+            raise Mistake(f"method = {self.model.method!r} is not known; there are {', '.join(METHODS)}", place)
+        if not (self.model.__doc__ or "").strip():
+            raise Mistake(
+                f"{self.name} has no docstring: its first line describes the FMU, the rest is its page", place
+            )
+
+    @staticmethod
+    def parts(e: Variable) -> list[Operand]:
+        """The expressions that a variable is declared with."""
+        if isinstance(e, Output):
+            return [e.means]
+        if isinstance(e, State):
+            return [one for one in (e.begins, e.steady, e.finest) if one is not None]
+        if isinstance(e, Contact):
+            return [one for one in (e.mode, e.slip, e.slide, e.hold, e.eps) if one is not None]
+        return []
+
+    # ---- contacts
+
+    def _find_forces(self) -> None:
+        """For each contact the rate of its slip, what it holds, and the load: the force that keeps that rate zero."""
+        forces = (*self.contacts, *self.modes)
+        self.slip_rate: dict[Contact, Operand] = {c: derivative(c.slip, self.flow) for c in self.contacts}
+        self.A: dict[tuple[Contact, Contact], Operand] = {}
+        for c in self.contacts:
+            if depends(c.slip, forces) or depends(c.slide, self.contacts):
+                raise Mistake(f"slip and slide of {c.name} must not depend on the force of a contact", c.place)
+            for d in self.contacts:
+                acts = derivative(self.slip_rate[c], {d: 1.0})
+                if depends(acts, forces):
+                    raise Mistake(f"{d.name} must enter the rate of the slip of {c.name} linearly", d.place)
+                self.A[c, d] = negative(acts)
+            if same(self.A[c, c], 0.0):
+                raise Mistake(f"{c.name} does not act on its own slip: nothing could hold it", c.place)
+        self.lonely = [c for c in self.contacts if all(same(self.A[c, d], 0.0) for d in self.contacts if d is not c)]
+        self.hold: dict[Contact, Operand] = {}
+        self.load: dict[Contact, Operand] = {}
+        for c in self.contacts:
+            at_rest = {c.slip: 0.0} if isinstance(c.slip, Expression) else {}
+            self.hold[c] = put(c.slide, at_rest) if c.hold is None else c.hold
+            if depends(self.hold[c], forces):
+                raise Mistake(f"what {c.name} holds depends on its direction: give hold=", c.place)
+            if c in self.lonely:
+                e = self.slip_rate[c]
+                load = undone(e, c) if occurrences(e, c) == 1 else made("/", put(e, {c: 0.0}), self.A[c, c])
+                self.load[c] = put(load, at_rest) if isinstance(c.slip, State) else load
+
+    def held(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
+        """The derivative of an expression while every contact holds."""
+        return derivative(e, by | {c: derivative(self.load[c], by) for c in self.lonely})
+
+    def sliding(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
+        """The derivative of an expression while every contact slides."""
+        return derivative(e, by | {c: made("*", c.mode, derivative(c.slide, by)) for c in self.contacts})
+
+    # ---- what the runtime asks
+
+    @property
+    def by_time(self) -> dict[Expression, Operand]:
+        """What goes on by itself, while the states stay."""
+        return {TIME: 1.0} | {d: d.steady for d in self.drives}
+
+    @cached_property
+    def closed_form(self) -> tuple[Operand, Operand, Operand, Operand] | None:
+        """Mass, damping, stiffness and the speed of the resting point where one body moves under a linear law."""
+        if len(self.states) != 2 or len(self.own) != 1 or any(depends(c.slide, self.moving) for c in self.contacts):
+            return None
+        (x,), (v,) = self.positions, self.own
+        rate = self.law[v].means
+        mass, force = (rate.args[1], rate.args[0]) if isinstance(rate, Term) and rate.op == "/" else (1.0, rate)
+        damping, stiffness = (negative(derivative(force, {s: 1.0})) for s in (v, x))
+        drift, speed = derivative(force, self.by_time), 0.0
+        if any(depends(e, self.moving) for e in (mass, damping, stiffness, drift)):
+            return None
+        if not same(drift, 0.0):
+            if len(self.drives) != 1 or not same(damping, 0.0):
+                return None
+            (drive,) = self.drives
+            if not same(derivative(force, {drive: 1.0}), stiffness) or depends(rate, (TIME,)):
+                return None
+            speed = drive.steady
+        return mass, damping, stiffness, speed
+
+    def judge_runtime(self) -> None:
+        """Refuse what the solver cannot run."""
+        if len(self.positions) != 1 or len(self.own) != 1 or len(self.states) != 2:
+            raise Mistake(
+                f"{self.name} has the states {', '.join(s.name for s in self.states)}: the solver runs one position "
+                "and its speed so far",
+                self.states[-1].place,
+            )
+        if len(self.contacts) > 1:
+            raise Mistake("the solver runs one contact so far", self.contacts[1].place)
+        if len(self.drives) > 1:
+            raise Mistake("the solver runs one driver so far", self.drives[1].place)
+        for c in self.contacts:
+            if c.slip is not self.own[0]:
+                raise Mistake(
+                    f"the slip of {c.name} must be the speed {self.own[0].name}: the solver knows no other so far",
+                    c.place,
+                )
+            still = self.by_time
+            if depends(derivative(self.load[c], still), (TIME, *self.drives)):
+                raise Mistake(
+                    f"the load on {c.name} at rest must be linear in time: the solver knows no other", c.place
+                )
+
+    @property
+    def methods(self) -> list[str]:
+        """The labels of those that are offered."""
+        return METHODS if self.closed_form else METHODS[1:]
+
+    @property
+    def method(self) -> str:
+        """The default one."""
+        if self.model.method == METHODS[0] and not self.closed_form:
+            raise Mistake(f"method = {METHODS[0]!r} needs a linear law, and {self.name} has none", self.model.place)
+        return self.model.method or (METHODS[0] if self.closed_form else "ode45")
+
+    def direct(self, e: Variable) -> bool:
+        """Whether an output follows an input at once."""
+        if isinstance(e, (Contact, Mode)):
+            (c,) = (c for c in self.contacts if e in (c, c.mode))
+            return depends(self.load.get(c, self.slip_rate[c]), self.inputs) or depends(c.slide, self.inputs)
+        return depends(e, self.inputs) or any(depends(e, (c,)) and self.direct(c) for c in self.contacts)
+
+    @property
+    def told(self) -> list[Variable]:
+        """The outputs as the description has them: states, rates, drives, then as declared, modes last."""
+        rates = [self.rate[s] for s in self.own]
+        others = [e for e in self.declared if isinstance(e, (Output, Contact)) and e not in rates]
+        return [*self.states, *rates, *self.drives, *others, *self.modes]
+
+    @property
+    def first_to_overflow(self) -> list[Variable]:
+        """Outputs that are numbers only where all are: the energy if it has squares of all states and no other more."""
+        grows = [degree(e, self.moving) for e in (*self.outputs, *(c.slide for c in self.contacts))]
+        energies = [e for e in self.outputs if e.unit == "J" and all(depends(e, (s,)) for s in self.states)]
+        if energies and max(grows) <= 2.0:
+            return energies[:1]
+        return [*self.states, *self.outputs, *self.contacts]

@@ -1,0 +1,158 @@
+"""The variables that an author declares, and what says how they hang together."""
+
+from collections.abc import MutableMapping
+from typing import Any
+
+from ...runtime import declare
+from .expressions import Expression, Mistake, Operand, Term, written_at
+
+HYBRID, SIGN, THRESHOLD = "hybrid", "sign", "threshold"
+
+
+class Variable(Expression, declare.Declared):
+    """What has a name, a unit, words and a range."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """It has its name since it was first assigned: D = mu_s does not change that."""
+
+
+class Parameter(Variable, declare.Parameter):
+    """Set by the user, tunable at every communication point.
+
+    Parameter(start, unit, text): the start value in `unit`, which is SI, and what it is in a few words.  A range is
+    given by `low`, `high` (at least, at most), `above`, `below`; a unit that people rather read by `display`.
+    """
+
+
+class Fixed(Variable, declare.Fixed):
+    """As Parameter, but set before initialisation ends: where a state starts, for example."""
+
+
+class Input(Variable, declare.Input):
+    """As Parameter, but set by the importer while it runs."""
+
+
+class Choice(Variable, declare.Choice):
+    """An enumeration, label=sentence for each item: numbered from 1, and the first is the default."""
+
+    def __init__(self, text: str, **items: str) -> None:
+        super().__init__(1, text, tuple((label, n, sentence) for n, (label, sentence) in enumerate(items.items(), 1)))
+        self.numbers = {label: n for n, label in enumerate(items, 1)}
+
+    def choose(self, **cases: Operand) -> Operand:
+        """The expression of the item in force, by its label."""
+        if set(cases) != set(self.numbers):
+            raise Mistake(f"choose() has a case for each of {', '.join(self.numbers)}, and for nothing else")
+        *rest, (_, value) = cases.items()
+        for label, case in reversed(rest):
+            value = Term("choose", Term("==", self, self.numbers[label]), case, value)
+        return value
+
+
+class State(Variable, declare.Output):
+    """A continuous state.
+
+    `start`: a number or an expression of parameters.  `rate_of`: the state that this one is the rate of, as a speed is
+    of a position.  `rate`: a parameter which is the rate of this one for all time, as of a driver; it is then known in
+    closed form.  `finest`: the size that a tolerance must resolve, where the law has one of its own.
+    """
+
+    def __init__(
+        self,
+        unit: str,
+        text: str,
+        start: Operand = 0.0,
+        rate_of: "State | None" = None,
+        rate: Operand = None,
+        finest: Operand = None,
+        **more: Any,
+    ) -> None:
+        super().__init__(unit, text, **more)
+        self.begins, self.whose, self.steady, self.finest = start, rate_of, rate, finest
+
+
+class Output(Variable, declare.Output):
+    """What is calculated: unit, words, expression.  `rate_of`: the state whose rate it is."""
+
+    def __init__(self, unit: str, text: str, means: Operand, rate_of: State | None = None, **more: Any) -> None:
+        super().__init__(unit, text, **more)
+        self.means, self.whose = means, rate_of
+
+
+class Mode(Variable, declare.Mode):
+    """The direction of sliding: -1, 0 while stuck, or 1."""
+
+    def __init__(self, text: str = "-1 sliding backward, 0 stuck, 1 sliding forward") -> None:
+        super().__init__(text)
+
+
+class Contact(Variable, declare.Output):
+    """The force of dry friction in a contact, an unknown of the equations; positive where it opposes a positive slip.
+
+    mode: its declared Mode.  slip: the relative speed.  slide: the force while it slides, at least 0.  hold: the most
+    that it holds; left out, the sliding force at zero slip.  laws: HYBRID, and beside it SIGN or THRESHOLD, which needs
+    eps, the slip below which it holds.
+    """
+
+    def __init__(
+        self,
+        unit: str,
+        text: str,
+        mode: Mode,
+        slip: Operand,
+        slide: Operand,
+        hold: Operand = None,
+        laws: tuple[str, ...] = (HYBRID,),
+        eps: Operand = None,
+        **more: Any,
+    ) -> None:
+        super().__init__(unit, text, **more)
+        self.mode, self.slip, self.slide, self.hold, self.laws, self.eps = mode, slip, slide, hold, laws, eps
+        if laws not in ((HYBRID,), (HYBRID, SIGN), (HYBRID, THRESHOLD)):
+            raise Mistake(f"laws = {laws!r} is refused: HYBRID comes first, and beside it SIGN or THRESHOLD")
+        if (eps is not None) != (THRESHOLD in laws):
+            raise Mistake("eps is given with the law THRESHOLD, and with no other")
+
+
+class Rule:
+    """A comparison of parameters that must not hold, and the sentence about it, with values as {name!r}."""
+
+    def __init__(self, broken: Operand, sentence: str) -> None:
+        self.broken, self.sentence = broken, sentence
+
+
+class _Body(dict[str, Any]):
+    """The body of the class of a model, in which no name has two equations."""
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        if isinstance(self.get(name), Expression):
+            raise Mistake(f"{name} has two equations: give the second another name")
+        if isinstance(value, Expression):
+            value.name = value.name or name
+        super().__setitem__(name, value)
+
+
+class _Authored(type):
+    place: tuple[str, int]
+
+    @classmethod
+    def __prepare__(cls, name: str, bases: tuple[type, ...], /, **_: Any) -> MutableMapping[str, object]:
+        return _Body()
+
+    def __new__(cls, name: str, bases: tuple[type, ...], body: dict[str, Any]) -> "_Authored":
+        made = super().__new__(cls, name, bases, dict(body))
+        made.place = written_at()
+        return made
+
+
+class Model(metaclass=_Authored):
+    """What a model derives from: its docstring is its page, its body its variables and equations.
+
+    `rules`: one Rule or several.  The default run: `stop_time` and `step_size` in s, relative `tolerance`, `method`.
+    """
+
+    rules: Rule | tuple[Rule, ...] = ()
+    stop_time = 4.0
+    step_size = 0.004
+    tolerance = 1e-6
+    method = ""

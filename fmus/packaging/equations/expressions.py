@@ -1,0 +1,159 @@
+"""Expressions: what a number is calculated from.  Nothing is evaluated here."""
+
+import math
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Never
+
+HERE = str(Path(__file__).parent)
+Operand = Any  # an expression or a number
+
+# The derivative of each function, by its argument and its value.
+FUNCTIONS: dict[str, Callable[[Operand, Operand], Operand]] = {
+    "sin": lambda u, value: Term("cos", u),
+    "cos": lambda u, value: -Term("sin", u),
+    "tan": lambda u, value: 1.0 + value * value,
+    "asin": lambda u, value: 1.0 / Term("sqrt", 1.0 - u * u),
+    "acos": lambda u, value: -1.0 / Term("sqrt", 1.0 - u * u),
+    "atan": lambda u, value: 1.0 / (1.0 + u * u),
+    "sinh": lambda u, value: Term("cosh", u),
+    "cosh": lambda u, value: Term("sinh", u),
+    "tanh": lambda u, value: 1.0 - value * value,
+    "exp": lambda u, value: value,
+    "log": lambda u, value: 1.0 / u,
+    "sqrt": lambda u, value: choose(value > 0.0, 0.5 / value, 0.0),
+    "fabs": lambda u, value: Term("copysign", 1.0, u),
+}
+COMPARISONS = ("<", "<=", ">", ">=", "==")
+
+
+class Mistake(ValueError):
+    """Something that an author wrote and that cannot be: what is wrong, and in which line of which file."""
+
+    def __init__(self, sentence: str, place: "tuple[str, int] | None" = None) -> None:
+        super().__init__(sentence)
+        self.place = place or written_at()
+
+
+def written_at() -> tuple[str, int]:
+    """File and line, in the file of the author, of what is made just now."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(HERE):
+        frame = frame.f_back
+    return frame.f_code.co_filename, frame.f_lineno
+
+
+class Expression:
+    """What a number is calculated from: a declared variable, or a term of such."""
+
+    name = ""
+    place: tuple[str, int]
+
+    def __new__(cls, *_: object, **__: object) -> "Expression":
+        made = super().__new__(cls)
+        made.place = written_at()
+        return made
+
+    def __add__(self, other: Operand) -> "Term":
+        return Term("+", self, other)
+
+    def __radd__(self, other: Operand) -> "Term":
+        return Term("+", other, self)
+
+    def __sub__(self, other: Operand) -> "Term":
+        return Term("-", self, other)
+
+    def __rsub__(self, other: Operand) -> "Term":
+        return Term("-", other, self)
+
+    def __mul__(self, other: Operand) -> "Term":
+        return Term("*", self, other)
+
+    def __rmul__(self, other: Operand) -> "Term":
+        return Term("*", other, self)
+
+    def __truediv__(self, other: Operand) -> "Term":
+        return Term("/", self, other)
+
+    def __rtruediv__(self, other: Operand) -> "Term":
+        return Term("/", other, self)
+
+    def __neg__(self) -> "Term":
+        return Term("neg", self)
+
+    def __pos__(self) -> "Expression":
+        return self
+
+    def __abs__(self) -> "Term":
+        return Term("fabs", self)
+
+    def __lt__(self, other: Operand) -> "Term":
+        return Term("<", self, other)
+
+    def __le__(self, other: Operand) -> "Term":
+        return Term("<=", self, other)
+
+    def __gt__(self, other: Operand) -> "Term":
+        return Term(">", self, other)
+
+    def __ge__(self, other: Operand) -> "Term":
+        return Term(">=", self, other)
+
+    def __pow__(self, other: Operand) -> Never:
+        raise Mistake("** rounds in ways of its own: write a product, x * x, or exp and log")
+
+    __rpow__ = __pow__
+
+    def __bool__(self) -> Never:
+        raise Mistake(f"{self.name or 'an expression'} has no value yet: write choose(condition, this, that) for an if")
+
+    def __float__(self) -> Never:
+        raise Mistake(
+            f"{self.name or 'an expression'} has no value yet: functions of expressions are imported from fmus, "
+            f"which has {', '.join(FUNCTIONS)}"
+        )
+
+    def __iter__(self) -> Never:
+        raise Mistake(f"{self.name or 'an expression'} is one number: there is nothing to loop over")
+
+    def __index__(self) -> Never:
+        raise Mistake(
+            f"{self.name or 'an expression'} has no value yet, and no table can be read by it: write its law as a "
+            "formula, or as pieces with choose(condition, this, that)"
+        )
+
+    __array_ufunc__ = None  # numpy leaves it alone
+
+
+class Term(Expression):
+    """An operation or a function, and what it is done to."""
+
+    def __init__(self, op: str, *args: Operand) -> None:
+        for one in args:
+            if isinstance(one, bool) or not isinstance(one, (Expression, int, float)):
+                raise Mistake(f"{one!r} is neither a number nor an expression: nothing can be calculated with it")
+            if not isinstance(one, Expression) and not math.isfinite(one):
+                raise Mistake(f"{one!r} is not a finite number: nothing can be calculated with it")
+        self.op, self.args = op, args
+
+
+def _function(name: str) -> Callable[[Operand], Operand]:
+    def made(u: Operand) -> Operand:
+        return Term(name, u) if isinstance(u, Expression) else getattr(math, name)(u)
+
+    made.__name__ = made.__qualname__ = name
+    made.__doc__ = f"The function {name} of an expression, or of a number."
+    return made
+
+
+sin, cos, tan, asin, acos, atan = map(_function, ("sin", "cos", "tan", "asin", "acos", "atan"))
+sinh, cosh, tanh, exp, log = map(_function, ("sinh", "cosh", "tanh", "exp", "log"))
+sqrt, fabs = map(_function, ("sqrt", "fabs"))
+
+
+def choose(condition: Operand, this: Operand, that: Operand) -> Term:
+    """The expression `this` where the condition, a comparison of expressions, holds, and `that` elsewhere."""
+    if not (isinstance(condition, Term) and condition.op in COMPARISONS):
+        raise Mistake("choose() begins with a comparison of expressions by <, <=, > or >=")
+    return Term("choose", condition, this, that)

@@ -1,0 +1,137 @@
+"""The class of a model in plain scalars, as text: what travels inside an FMU, and what is frozen to C."""
+
+import ast
+from inspect import cleandoc
+from math import isfinite
+from textwrap import indent, wrap
+
+from ...runtime.oscillator import Oscillator
+from .anatomy import Anatomy
+from .declared import Contact, Mode, Output, State, Variable
+from .expressions import FUNCTIONS
+from .methods import Methods
+from .scribe import INDENT
+
+HEAD = '''"""{first}
+
+Written out from the equations in {file}: change those, not this.
+"""
+
+{imports}
+
+
+class Solver(March):
+    method = Choice({method}, "integration method", {items})
+
+
+class {name}({base}):
+    """{about}"""
+
+{declarations}
+
+{facts}
+
+{methods}
+'''
+IMPORTS = {  # module -> what may be needed of it
+    "automaton": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
+    "codes": ("DOP853", "EXACT", "HYBRID", "ODE23", "ODE45", "RODAS"),
+    "declare": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
+    "exact": ("Exact",),
+    "march": ("March",),
+    "methods": ("EXACT_ITEM", "ITEMS"),
+    "oscillator": ("Oscillator",),
+}
+MATH = ("copysign", "inf", "pi", *FUNCTIONS)
+WIDTH = 105
+RUN = ("stop_time", "step_size", "tolerance")
+
+
+def written(an: Anatomy, file: str) -> str:
+    """The text of the module."""
+    an.judge_runtime()
+    first, _, rest = cleandoc(an.model.__doc__ or "").partition("\n")
+    about = indent(f"{first}\n{rest}" + ("\n" if rest else ""), INDENT).strip(" ")
+    text = HEAD.format(
+        first=first,
+        file=file,
+        imports="{imports}",
+        method=an.method.upper(),
+        items="(EXACT_ITEM, *ITEMS)" if an.closed_form else "ITEMS",
+        name=an.name,
+        base="DryFriction" if an.contacts else "Oscillator",
+        about=about.rstrip(" ") + (INDENT if rest else ""),
+        declarations=indent("\n".join(declarations(an)), INDENT),
+        facts=indent("\n".join(facts(an)), INDENT),
+        methods=Methods(an).text(),
+    )
+    return text.replace("{imports}", imports(text), 1)
+
+
+def imports(text: str) -> str:
+    """What the text needs."""
+    used = {node.id for node in ast.walk(ast.parse(text.replace("{imports}", ""))) if isinstance(node, ast.Name)}
+    lines = [f"from math import {', '.join(names)}\n"] if (names := sorted(used & set(MATH))) else []
+    for module, offered in IMPORTS.items():
+        if names := [name for name in offered if name in used]:
+            lines.append(f"from .runtime.{module} import {', '.join(names)}")
+    return "\n".join(lines)
+
+
+def declarations(an: Anatomy) -> list[str]:
+    """The variables in the order of the description: parameters, choices, inputs, outputs."""
+    lines = [f"{e.name} = {type(e).__name__}({float(e.start)!r}, {described(e)})" for e in an.parameters]
+    if laws := {law: None for c in an.contacts for law in c.laws}:
+        items = ", ".join(f"{law.upper()}_LAW" for law in laws)
+        lines.append(f'friction = Choice(HYBRID, "friction law", ({items}{"," if len(laws) == 1 else ""}))')
+    for e in an.choices:
+        items = ", ".join(f"({quoted(label)}, {value}, {quoted(sentence)})" for label, value, sentence in e.items)
+        lines.append(f"{e.name} = Choice({e.start}, {quoted(e.text)}, ({items},))")
+    lines += [f"{e.name} = Input({float(e.start)!r}, {described(e)})" for e in an.inputs]
+    return lines + [f"{e.name} = {output(an, e)}" for e in an.told]
+
+
+def output(an: Anatomy, e: Variable) -> str:
+    """The declaration of what is calculated."""
+    if isinstance(e, Mode):
+        return f"Mode({quoted(e.text)})"
+    more = f", rate_of={quoted(e.whose.name)}" if isinstance(e, (State, Output)) and e.whose is not None else ""
+    if isinstance(e, State):
+        more += f", rate={quoted(e.steady.name)}" if e.steady is not None else ""
+        return f"State({described(e)}{more})"
+    if isinstance(e, Contact):
+        return f"Contact({described(e)})"
+    return f"Output({described(e)}{more}{', direct=True' if an.direct(e) else ''})"
+
+
+def described(e: Variable) -> str:
+    """Unit, words and range."""
+    bounds = [(key, getattr(e, key)) for key in ("low", "high", "above", "below")]
+    more = [f"{key}={float(bound)!r}" for key, bound in bounds if isfinite(bound)]
+    more += [f"display={quoted(e.display)}"] if e.display else []
+    return ", ".join([quoted(e.unit), quoted(e.text), *more])
+
+
+def facts(an: Anatomy) -> list[str]:
+    """What the runtime asks of the class."""
+    lines = [f"{word} = True" for word, holds in (("linear", an.closed_form), ("driven", an.drives)) if holds]
+    for word in RUN:
+        if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
+            lines.append(f"{word} = {value!r}")
+    if an.rules:
+        inherited = [f"{INDENT}*DryFriction.rules,"] if an.contacts else []
+        sentences = [f"{INDENT}{lines_of(rule.sentence)}," for rule in an.rules]
+        lines += ["rules = (", *inherited, *sentences, ")"]
+    return lines
+
+
+def lines_of(text: str) -> str:
+    """A string literal over several lines, if it is long."""
+    lines = wrap(text, WIDTH, drop_whitespace=False)
+    return quoted(text) if len(lines) == 1 else f"\n{INDENT}".join(map(quoted, lines))
+
+
+def quoted(text: str) -> str:
+    """A string literal."""
+    literal = repr(text)
+    return literal if literal[0] == '"' else '"' + literal[1:-1].replace("\\'", "'").replace('"', '\\"') + '"'

@@ -1,0 +1,180 @@
+"""Declared equations: what follows from them, by routes that share nothing with how they are written out."""
+
+import ast
+import math
+import random
+
+import mpmath
+import pytest
+from models import AUTHORED, MODELS, ROOT
+
+import fmus
+from fmus.packaging.catalogue import find
+from fmus.packaging.equations.algebra import ARITHMETIC
+from fmus.packaging.equations.declared import Choice, Contact, Model, Output, Rule, Variable
+from fmus.packaging.equations.expressions import FUNCTIONS, Term
+
+SOURCES = [*MODELS, *AUTHORED]
+EVERY_SOURCE = pytest.mark.parametrize("source", SOURCES, ids=lambda source: getattr(source, "stem", source))
+COMPARED = {"<": lambda a, b: a < b, "<=": lambda a, b: a <= b, ">": lambda a, b: a > b, ">=": lambda a, b: a >= b}
+DIGITS = 50
+
+
+class Evaluated:
+    """The declared equations of a model, evaluated as they stand, term by term, in floats or in many digits."""
+
+    def __init__(self, anatomy, values, functions):
+        self.anatomy, self.values, self.functions = anatomy, values, functions
+
+    def of(self, e):
+        if isinstance(e, Output):
+            return self.of(e.means)
+        if not isinstance(e, Term):
+            return self.values[e.name] if isinstance(e, Variable) else self.number(e)
+        if e.op == "choose":
+            test, this, that = e.args
+            return self.of(this if self.holds(test) else that)
+        args = [self.of(one) for one in e.args]
+        if e.op in ARITHMETIC:
+            return ARITHMETIC[e.op](*args)
+        return -args[0] if e.op == "neg" else getattr(self.functions, e.op)(*args)
+
+    def holds(self, test):
+        a, b = test.args
+        return self.values[a.name] == b if test.op == "==" else COMPARED[test.op](self.of(a), self.of(b))
+
+    def number(self, x):
+        return mpmath.mpf(x) if self.functions is mpmath.mp else float(x)
+
+
+def situations(anatomy, model, count):
+    """Values for all parameters, choices and inputs, set in the model too, and a time, states and a mode."""
+    draw = random.Random(anatomy.name)
+    for _ in range(count):
+        values = {}
+        for e in (*anatomy.parameters, *anatomy.inputs):
+            size = (e.start or 0.3) * draw.uniform(0.7, 1.3)
+            values[e.name] = float(size if e.accepts(size) else e.start)
+        for e in anatomy.choices:
+            values[e.name] = draw.choice(e.items)[1]
+        for name, value in values.items():
+            setattr(model, name, value)
+        if model.prepare():
+            continue
+        t = draw.uniform(0.0, 10.0)
+        if anatomy.drives:
+            model.t_base, model.x_base = draw.uniform(0.0, 1.0), draw.uniform(-0.01, 0.01)
+        at = {e.name: draw.uniform(-0.5, 0.5) for e in anatomy.states}
+        yield values, t, at, draw.choice((-1, 1))
+
+
+def driven(anatomy, model, t):
+    """Where a driver is."""
+    return {d.name: model.x_base + getattr(model, d.steady.name) * (t - model.t_base) for d in anatomy.drives}
+
+
+def same_bits(a, b):
+    return a == b and str(a) == str(b)
+
+
+@EVERY_SOURCE
+def test_what_is_written_out_has_the_bits_of_the_equations_as_they_stand(source):
+    """Rates and outputs while sliding and while stuck; the load as rates that it makes zero."""
+    anatomy, model = find(source).anatomy, find(source).model()
+    modes = [m.name for m in anatomy.modes]
+    tried = 0
+    for values, t, at, mode in situations(anatomy, model, 300):
+        values |= at | driven(anatomy, model, t) | dict.fromkeys(modes, mode)
+        equations = Evaluated(anatomy, values, math)
+        for c in anatomy.contacts:
+            values[c.name] = mode * equations.of(c.slide)
+        model.observe(t, *at.values(), mode)
+        for e in (*anatomy.outputs, *anatomy.contacts):
+            assert same_bits(getattr(model, e.name) + 0.0, equations.of(e) + 0.0), e.name
+        rate = model.rates(t, *at.values(), mode)
+        assert same_bits(rate + 0.0, equations.of(anatomy.law[anatomy.own[0]]) + 0.0)
+        for c in anatomy.contacts:
+            at[c.slip.name] = values[c.slip.name] = 0.0
+            values[c.name], _, limit = model.hold(t, *at.values())
+            size = sum(abs(equations.of(e)) for e in anatomy.outputs) + abs(values[c.name])
+            assert abs(equations.of(anatomy.law[c.slip])) < 1e-13 * size
+            assert limit >= 0.0
+            model.observe(t, *at.values(), 0)
+            assert getattr(model, anatomy.law[c.slip].name) == 0.0
+        tried += 1
+    assert tried > 100
+
+
+@EVERY_SOURCE
+def test_jacobians_are_those_of_differences_in_fifty_digits(source):
+    """By time and by each state, sliding either way: of the equations as they stand."""
+    anatomy, model = find(source).anatomy, find(source).model()
+    law, found = anatomy.law[anatomy.own[0]], []
+    with mpmath.workdps(DIGITS):
+        h = mpmath.mpf(10) ** -20
+        for values, t, at, mode in situations(anatomy, model, 40):
+            known = {name: mpmath.mpf(value) for name, value in (values | at | driven(anatomy, model, t)).items()}
+            known |= {e.name: values[e.name] for e in anatomy.choices} | {m.name: mode for m in anatomy.modes}
+            by_time = {d.name: known[d.steady.name] for d in anatomy.drives}
+            for way, slope in zip((by_time, *({x: 1} for x in at)), model.jacobian(t, *at.values(), mode), strict=True):
+                ahead, behind = (rate(anatomy, law, known, way, step) for step in (h, -h))
+                found.append((slope, (ahead - behind) / (2 * h)))
+        size = max(abs(true) for _, true in found)
+        assert all(abs(slope - true) <= 1e-12 * abs(true) + 1e-15 * size for slope, true in found)
+
+
+def rate(anatomy, law, known, way, step):
+    """The law at a point that is moved along a way, while what is in contact slides."""
+    values = known | {name: known[name] + step * speed for name, speed in way.items()}
+    equations = Evaluated(anatomy, values, mpmath.mp)
+    for c in anatomy.contacts:
+        values[c.name] = values[c.mode.name] * equations.of(c.slide)
+    return equations.of(law)
+
+
+@EVERY_SOURCE
+def test_a_model_is_written_from_the_face_alone(source):
+    """So that a file from anywhere is like ours."""
+    tree = ast.parse(find(source).source)
+    for node in ast.walk(tree):
+        assert not isinstance(node, ast.Import)
+        if isinstance(node, ast.ImportFrom):
+            assert (node.module, node.level) in (("fmus", 0), ("math", 0))
+            assert node.module == "math" or {alias.name for alias in node.names} <= set(fmus.__all__)
+
+
+def test_the_face_is_complete():
+    """Every variable that can be declared, every function that has a derivative, and nothing that is not said."""
+    kinds = {cls.__name__ for cls in Variable.__subclasses__()} | {Model.__name__, Rule.__name__}
+    assert set(fmus.__all__) == kinds | {*FUNCTIONS, "choose", "pi", "HYBRID", "SIGN", "THRESHOLD"}
+    assert len(fmus.__all__) == len(set(fmus.__all__))
+    assert all(hasattr(fmus, name) for name in fmus.__all__)
+    assert fmus.pi == math.pi
+    for name in FUNCTIONS:
+        assert math.isfinite(getattr(fmus, name)(0.5))
+
+
+@EVERY_SOURCE
+def test_the_text_that_travels_is_the_same_each_time(source):
+    """Builds are compared by their bytes; reading a file anew changes nothing."""
+    first = find(source)
+    again = type(first)(first.path, first.source)
+    assert again.text == first.text
+    assert f"Written out from the equations in {first.path.name}" in first.text
+
+
+def test_a_file_is_read_anew_when_it_has_changed(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text((ROOT / "fmus" / "smd.py").read_text())
+    first = find(path)
+    assert find(path) is first
+    path.write_text(path.read_text().replace("157.9", "158.0"))
+    assert find(path).model().k == 158.0
+
+
+def test_choices_and_contacts_are_walked():
+    """The models of these tests have what they are to try."""
+    kinds = {type(e) for source in SOURCES for e in find(source).anatomy.declared}
+    assert {Choice, Contact} <= kinds
+    functions = {name for source in SOURCES for name in FUNCTIONS if f"{name}(" in find(source).text}
+    assert functions == {*FUNCTIONS}
