@@ -10,13 +10,12 @@ from evidence import Piece, Trajectory
 from mpmath import mpf
 
 from harness.running.answer import Answer
-from harness.truths.linear import coulomb, sampled, smd, stickslip, threshold
+from harness.truths.__main__ import CLOSED, closed
 from harness.truths.problem import Belt, Plain, Smoothed
 from harness.truths.reference import CASES, POINTS, errors, late, load
 
 ULP = 2.0**-52
 TRUTHS = {case.truth: case for case in CASES}
-CLOSED = {"smd": smd, "coulomb": coulomb, "stickslip": stickslip, "threshold": threshold}
 DOP853, RODAS = 4, 5
 
 
@@ -121,9 +120,9 @@ def test_every_reference_covers_its_run_and_states_its_doubt(name):
 @pytest.mark.parametrize("name", CLOSED)
 def test_the_script_makes_the_numbers_beside_it(name):
     truth = load(name)
-    motion, events = sampled(CLOSED[name], truth.times.tolist())
-    assert [[float(x), float(v)] for x, v in motion] == truth.motion.tolist()
-    assert [(float(t), mode) for t, mode in events] == truth.events
+    answer = closed(name, truth.times)
+    assert answer.motion.tolist() == truth.motion.tolist()
+    assert answer.events == truth.events
 
 
 @pytest.mark.parametrize(

@@ -31,8 +31,8 @@ from harness.studies.stability.study import (
     survey,
 )
 from harness.studies.stability.table import endings, refusals, summary
+from harness.truths.smooth import Curve
 from harness.truths.truth import Grid, Truth, truth
-from harness.truths.truth_smooth import Curve
 
 QUICK = (
     "c = {} N.s/m: damping ratio c/20",

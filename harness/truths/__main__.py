@@ -5,18 +5,31 @@ pendulum                Taylor series in 25 digits, and DOP853 restarted at ever
 magic formula           DOP853, which is explicit, and Radau, which is implicit
 """
 
+from collections.abc import Callable, Iterator
+
 import numpy as np
 
 from ..results.files import heading, write, write_rows
 from ..running.answer import Answer
-from .linear import ModeChanges, Samples, coulomb, sampled, smd, stickslip, threshold
+from .linear import pieces, threshold
 from .peers import solve
+from .pieces import Piece
 from .problem import Pendulum
 from .reference import CASES, FOLDER, POINTS, Case, late, relative
 from .taylor import swings
+from .truth import changes, sampled
 
-CLOSED = {"smd": smd, "coulomb": coulomb, "stickslip": stickslip, "threshold": threshold}
+REST = {"v0": 0.0, "F_ext": 0.0}
+SLED = {"m": 12.5, "k": 742.5, "g": 9.81, "mu_s": 0.9, "mu_d": 0.6, "v_driver": 0.034, "x0": 0.0} | REST
+MASS = {"m": 1.0, "k": 157.9, "x0": 0.1} | REST
+CLOSED: dict[str, Callable[[float], Iterator[Piece]]] = {  # up to a stop in s
+    "smd": lambda stop: pieces("smd", [(0.0, stop, MASS | {"c": 2.0})]),
+    "coulomb": lambda stop: pieces("coulomb", [(0.0, stop, MASS | {"f": 0.5})]),
+    "stickslip": lambda stop: pieces("stickslip", [(0.0, stop, SLED)]),
+    "threshold": lambda stop: threshold(SLED, 1e-7, stop),
+}
 ROUNDING = 2.0**-53  # of a number stored as a double
+NOTHING = 1e-40  # what 120 digits leave of a zero is less
 
 
 def main() -> None:
@@ -40,19 +53,23 @@ def main() -> None:
 def make(case: Case, times: np.ndarray) -> tuple[Answer, str, float]:
     """The motion, the routes that led to it, and their largest difference relative to the largest of each column."""
     if case.truth in CLOSED:
-        return rounded(*sampled(CLOSED[case.truth], times.tolist())), "closed form in 40 digits", ROUNDING
+        return closed(case.truth, times), "closed form in 40 digits", ROUNDING
     explicit = solve("scipy", "DOP853", case.problem, times, 3e-14, 1e-16)  # as far down as it goes
     if isinstance(case.problem, Pendulum):
-        answer = rounded(*swings(case.problem, times.tolist()))
+        answer = swings(case.problem, times.tolist())
         apart = max(difference(answer, explicit), late(answer.events or [], explicit.events or []) / times[-1])
         return answer, "Taylor series in 25 digits and DOP853", apart
     implicit = solve("scipy", "Radau", case.problem, times, 1e-11, 1e-14)
     return explicit, "DOP853 and Radau", difference(explicit, implicit)
 
 
-def rounded(motion: Samples, events: ModeChanges) -> Answer:
-    """The doubles next to what many digits say."""
-    return Answer(np.array([[float(x), float(v)] for x, v in motion]), [(float(t), mode) for t, mode in events], 0)
+def closed(name: str, times: np.ndarray) -> Answer:
+    """The doubles next to the closed form; what changes after the last of the times is left out."""
+    found = list(CLOSED[name](float(times[-1])))
+    motion = sampled(found, times.tolist())
+    motion[np.abs(motion) < NOTHING] = 0.0
+    events = [(t, mode) for t, mode in changes(found) if t <= times[-1]]
+    return Answer(motion, events, 0)
 
 
 def difference(one: Answer, other: Answer) -> float:

@@ -1,129 +1,169 @@
-"""Piecewise linear motion in closed form, in 40 digits.
+"""Closed forms of the piecewise linear models, in 120 digits.
 
-In a piece the body swings about a resting point that moves at the constant speed u:
+    m x'' + c x' + k x = P + k u s          P holds from one event to the next, u is the speed of the driver
+    x = q + u s + A e^(r1 s) + B e^(r2 s)   r1, r2 the roots of m r^2 + c r + k,  q = (P - c u)/k
 
-    x = p + u s + exp(-z s) (A cos(w s) + B sin(w s))         s from the beginning of the piece
+A double root and a missing spring are approached to 1e-40, which costs at most 80 of the digits.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
 
-from mpmath import acos, atan2, cos, exp, inf, mpf, pi, sin, sqrt, workdps
+from mpmath import MPContext
 
-DIGITS = 40
-ZERO = mpf(0)
+from .pieces import Course, Piece, Span, Values
 
-Samples = list[tuple[mpf, mpf]]
-ModeChanges = list[tuple[mpf, int]]
-
-
-@dataclass(frozen=True)
-class Swing:
-    """Oscillation from x, v about p + u s: angular frequency w in 1/s, decay z in 1/s."""
-
-    x: mpf
-    v: mpf
-    p: mpf
-    u: mpf
-    w: mpf
-    z: mpf = ZERO
-
-    def at(self, s: mpf) -> tuple[mpf, mpf]:
-        a = self.x - self.p
-        b = (self.v - self.u + self.z * a) / self.w
-        e, c, d = exp(-self.z * s), cos(self.w * s), sin(self.w * s)
-        swing = e * (a * c + b * d)
-        return self.p + self.u * s + swing, self.u - self.z * swing + self.w * e * (b * c - a * d)
-
-    def falls_to(self, level: mpf, mode: int) -> mpf:
-        """When, without decay, mode v next falls to the level; inf if it never does.
-
-        v = u + R cos(w s - phi) falls where the argument of the cosine lies in (0, pi).
-        """
-        along, across = mode * (self.v - self.u), mode * self.w * (self.p - self.x)
-        reach, phi = sqrt(along**2 + across**2), atan2(across, along)
-        share = (level - mode * self.u) / reach
-        if abs(share) > 1:
-            return inf
-        turn = phi + acos(share)
-        return (turn if turn > 0 else turn + 2 * pi) / self.w
+mp = MPContext()  # a context of its own: the precision of others stays theirs
+mp.dps = 120
+mpf = mp.mpf
+NEARLY = mpf(10) ** -40
+GRAZE = mpf(10) ** -30  # of the speed: what only touches zero is no standstill
 
 
 @dataclass(frozen=True)
-class Glide:
-    """Constant speed v, zero for a stuck body."""
+class System:
+    """The forces of one span: `slide` and `hold` are those of friction, `u` is the speed of the driver."""
 
-    x: mpf
-    v: mpf
+    m: Any
+    k: Any
+    c: Any
+    slide: Any
+    hold: Any
+    u: Any
+    push: Any
+    dry: bool
 
-    def at(self, s: mpf) -> tuple[mpf, mpf]:
-        return self.x + self.v * s, self.v
+    def load(self, x: Any, drive: Any) -> Any:
+        """What a body at rest feels without friction."""
+        return self.push + self.k * (drive - x)
 
-
-Leg = tuple[mpf, int, Swing | Glide]  # its beginning, the mode, the motion
-
-
-def smd() -> Iterator[Leg]:
-    """Spring, mass and damper: one piece."""
-    m, k, c = mpf(1.0), mpf(157.9), mpf(2.0)
-    z = c / (2 * m)
-    yield mpf(0), 1, Swing(mpf(0.1), mpf(0), mpf(0), mpf(0), sqrt(k / m - z * z), z)
-
-
-def coulomb() -> Iterator[Leg]:
-    """Spring and mass with Coulomb friction: swings about +- f/k."""
-    m, k, f = mpf(1.0), mpf(157.9), mpf(0.5)
-    t, x = mpf(0), mpf(0.1)
-    while abs(k * x) > f:
-        mode = -1 if x > 0 else 1
-        piece = Swing(x, mpf(0), -mode * f / k, mpf(0), sqrt(k / m))
-        yield t, mode, piece
-        s = piece.falls_to(mpf(0), mode)
-        t, x = t + s, piece.at(s)[0]
-    yield t, 0, Glide(x, mpf(0))
+    def direction(self, load: Any) -> int:
+        """Where a body at rest goes: nowhere while friction can hold the load."""
+        return 0 if abs(load) <= self.hold else 1 if load > 0 else -1
 
 
-def stickslip(eps: mpf | None = None) -> Iterator[Leg]:
-    """The sled, pulled at u; with `eps` (m/s) that of the threshold law, in the limit of exact integration.
+def system(model: str, values: Values) -> System:
+    """The system that a model's values make."""
+    value = {name: mpf(number) for name, number in values.items()}
+    slide = hold = mpf(0)
+    if model == "coulomb":
+        slide = hold = value["f"]
+    elif model == "stickslip":
+        weight = value["m"] * value["g"]
+        slide, hold = value["mu_d"] * weight, value["mu_s"] * weight
+    c, u = value.get("c", mpf(0)), value.get("v_driver", mpf(0))
+    return System(value["m"], value["k"], c, slide, hold, u, value["F_ext"], model != "smd")
 
-    There the sled is held below the speed eps only as far as friction can: it starts with the friction mu_s until
-    it is as fast as eps, slides, and, once it has slowed down to eps, glides on at that speed until the pull exceeds
-    what friction holds.
+
+def pieces(model: str, spans: list[Span]) -> Iterator[Piece]:
+    """The pieces of the motion, each from an event or a change of values on."""
+    x, v, drive = mpf(spans[0][2]["x0"]), mpf(spans[0][2]["v0"]), mpf(0)
+    for begin, end, values in spans:
+        s = system(model, values)
+        t, load = mpf(begin), s.load(x, drive)
+        mode = 1 if not s.dry else (1 if v > 0 else -1) if v != 0 else s.direction(load)
+        while True:
+            stuck = s.dry and mode == 0
+            at = gliding(x, mpf(0)) if stuck else sliding(s, x, v, load - mode * s.slide)
+            yield Piece(t, mode, later(at, t))
+            wait = release(s, load) if stuck else standstill(s, mode, v, load - mode * s.slide) if s.dry else None
+            ahead = mpf(end) - t if wait is None or t + wait >= end else wait
+            x, v = at(ahead)
+            t, drive = t + ahead, drive + s.u * ahead
+            if ahead != wait:
+                break
+            v, load = mpf(0), s.load(x, drive)
+            if stuck:  # the load is the limit by definition: no rounding decides the direction
+                mode = 1 if s.u > 0 else -1
+                load = mode * s.hold
+            else:
+                mode = s.direction(load)
+
+
+def threshold(values: Values, eps: float, stop: float) -> Iterator[Piece]:
+    """The sled, from rest, under the threshold law with `eps` (m/s) in the limit of exact integration.
+
+    It is held below the speed eps only as far as friction can: it starts with the friction that holds until it is as
+    fast as eps, slides, and, once it has slowed down to eps, glides on at that speed until the pull exceeds what
+    friction holds.
     """
-    m, k, g, mu_s, mu_d, u = (mpf(value) for value in (12.5, 742.5, 9.81, 0.9, 0.6, 0.034))
-    w, sliding, holding = sqrt(k / m), mu_d * m * g / k, mu_s * m * g / k  # as stretch of the spring
-    level = eps or mpf(0)
+    s, level = system("stickslip", values), mpf(eps)
     t, x, v = mpf(0), mpf(0), mpf(0)
-    while True:
-        yield t, 0, Glide(x, v)
-        t, x = (s := (holding - (u * t - x)) / (u - v)) + t, x + v * s
+    while t < stop:
+        yield Piece(t, 0, later(gliding(x, v), t))
+        wait = (s.hold - s.load(x, s.u * t)) / (s.k * (s.u - v))
+        t, x = t + wait, x + v * wait
         if v < level:
-            heavy = Swing(x, v, u * t - holding, u, w)
-            yield t, 0, heavy
-            s = acos((u - level) / (u - v)) / w  # v = u - (u - v0) cos(w s)
-            t, x = t + s, heavy.at(s)[0]
-        slip = Swing(x, level, u * t - sliding, u, w)
-        yield t, 1, slip
-        s = slip.falls_to(level, 1)
-        t, x, v = t + s, slip.at(s)[0], level
+            heavy = sliding(s, x, v, s.load(x, s.u * t) - s.hold)
+            yield Piece(t, 0, later(heavy, t))
+            wait = mp.acos((s.u - level) / (s.u - v)) / mp.sqrt(s.k / s.m)  # v = u - (u - v0) cos(w s)
+            t, x = t + wait, heavy(wait)[0]
+        net = s.load(x, s.u * t) - s.slide
+        slip = sliding(s, x, level, net)
+        yield Piece(t, 1, later(slip, t))
+        wait = standstill(replace(s, u=s.u - level), 1, mpf(0), net)  # seen by who moves at the level
+        t, x, v = t + wait, slip(wait)[0], level
 
 
-def threshold() -> Iterator[Leg]:
-    return stickslip(mpf(1e-7))
+def later(at: Course, origin: Any) -> Course:
+    """A motion with its time counted from elsewhere."""
+    return lambda t: at(mpf(t) - origin)
 
 
-def sampled(law: Callable[[], Iterator[Leg]], times: list[float]) -> tuple[Samples, ModeChanges]:
-    """The motion of a law at the times, and the changes of mode up to the last of them."""
-    motion: Samples = []
-    events: ModeChanges = []
-    with workdps(DIGITS):
-        pieces = law()
-        current = next(pieces)
-        coming = next(pieces, None)
-        for t in times:
-            while coming is not None and coming[0] <= t:
-                if coming[1] != current[1]:
-                    events.append(coming[:2])
-                current, coming = coming, next(pieces, None)
-            motion.append(current[2].at(mpf(t) - current[0]))
-    return motion, events
+def gliding(x: Any, v: Any) -> Course:
+    return lambda s: (x + v * s, v)
+
+
+def sliding(s: System, x: Any, v: Any, net: Any) -> Course:
+    """Position and speed from x, v on; `net` is the force at the beginning without that of the damper."""
+    k = s.k or NEARLY
+    r1, r2 = roots(s, k)
+    rest = (net - s.c * s.u) / k  # of q - x
+    a = (v - s.u + r2 * rest) / (r1 - r2)
+    b = -rest - a
+
+    def at(time: Any) -> tuple[Any, Any]:
+        first, second = a * mp.exp(r1 * time), b * mp.exp(r2 * time)
+        return x + rest + s.u * time + mp.re(first + second), s.u + mp.re(r1 * first + r2 * second)
+
+    return at
+
+
+def roots(s: System, k: Any) -> tuple[Any, Any]:
+    """The roots of m r^2 + c r + k, never equal."""
+    spread = mp.sqrt((s.c * s.c - 4 * s.m * k) or NEARLY)
+    return (-s.c + spread) / (2 * s.m), (-s.c - spread) / (2 * s.m)
+
+
+def release(s: System, load: Any) -> Any:
+    """Time until the load on a body at rest is what friction can hold, or None."""
+    rate = s.k * s.u
+    return None if rate == 0 else (s.hold - mp.sign(rate) * load) / abs(rate)
+
+
+def standstill(s: System, mode: int, v: Any, net: Any) -> Any:
+    """Time until the speed leaves the sign of the mode, or None."""
+    k = s.k or NEARLY
+    if s.c == 0:  # v = u + size cos(w s - phase)
+        w = mp.sqrt(k / s.m)
+        p, q = v - s.u, net / s.m / w
+        size, phase = mp.hypot(p, q), mp.atan2(q, p)
+        if size - abs(s.u) <= GRAZE * size:
+            return None
+        return turn(phase + mode * mp.acos(-s.u / size), 2 * mp.pi) / w
+    if s.u != 0:
+        raise ValueError("a damper and a moving driver have no closed standstill")
+    r1, r2 = roots(s, k)
+    a = (net - s.c * v) / s.m
+    ratio = (a - r1 * v) / (a - r2 * v) if a != r2 * v else mpf(0)  # v = 0 where e^((r1 - r2) s) is this
+    if mp.im(r1) != 0:
+        return turn(mp.arg(ratio), 2 * mp.pi) / (2 * mp.im(r1))
+    late = mp.log(ratio) / (r1 - r2) if ratio > 0 else mpf(0)
+    return late if late > NEARLY else None
+
+
+def turn(angle: Any, whole: Any) -> Any:
+    """The angle in (0, whole]; one that is zero but for rounding is a whole turn."""
+    part = angle % whole
+    return whole if part < NEARLY else part

@@ -2,16 +2,17 @@
 
 from collections.abc import Callable
 
+import numpy as np
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
-from .linear import ModeChanges, Samples
+from ..running.answer import Answer
 from .problem import Pendulum, Reaction
 
 DIGITS = 25
 WITHIN = (0.25, 0.45)  # s: half a period and then some, which holds one turning point
 
 
-def swings(problem: Pendulum, times: list[float]) -> tuple[Samples, ModeChanges]:
+def swings(problem: Pendulum, times: list[float]) -> Answer:
     """The motion at the times, and the changes of mode."""
     with workdps(DIGITS):
         weight, arm = mpf(problem.m) * mpf(problem.g), mpf(problem.mu) * mpf(problem.r)
@@ -32,8 +33,8 @@ def swings(problem: Pendulum, times: list[float]) -> tuple[Samples, ModeChanges]
 
             return odefun(rates, t, [x, mpf(0)])
 
-        motion: Samples = []
-        events: ModeChanges = []
+        motion: list[tuple[mpf, mpf]] = []
+        events: list[tuple[mpf, int]] = []
         t, x = mpf(0), mpf(problem.start[0])
         while weight * a * abs(sin(x)) > arm * weight:
             mode = -int(sign(x))
@@ -46,4 +47,4 @@ def swings(problem: Pendulum, times: list[float]) -> tuple[Samples, ModeChanges]
         events.append((t, 0))
         motion += [(x, mpf(0)) for s in times if s >= t]
         assert len(motion) == len(times)
-        return motion, events
+        return Answer(np.array(motion, float), [(float(t), mode) for t, mode in events], 0)

@@ -1,8 +1,8 @@
 """The answer by a second route, for any values: what the stability table compares with.
 
-    linear models     closed forms in 120 digits: truth_linear.py
-    pacejka           scipy's Radau at 1e-11, restarted where a value changes: truth_smooth.py
-    pendulum          scipy's DOP853 at 1e-13, restarted at every change of mode or value: truth_smooth.py
+    linear models     closed forms in 120 digits: linear.py
+    pacejka           scipy's Radau at 1e-11, restarted where a value changes: smooth.py
+    pendulum          scipy's DOP853 at 1e-13, restarted at every change of mode or value: smooth.py
 
 Nothing is shared with the FMUs.
 """
@@ -66,30 +66,44 @@ class Grid:
 def truth(model: str, spans: list[Span], grid: Grid) -> Truth:
     """The motion over the spans, at the points of the grid."""
     pieces = list(PIECES[model](model, spans))
-    events = [(float(new.start), new.mode) for old, new in pairwise(pieces) if new.mode != old.mode]
-    times, rows, i = grid.times(t for t, _ in events), [], 0
+    events = changes(pieces)
+    times = grid.times(t for t, _ in events)
+    x, v = sampled(pieces, times).T
+    return Truth(np.array(times), x, v, tuple(events))
+
+
+def changes(pieces: list[Piece]) -> list[tuple[float, int]]:
+    """The changes of mode: times in s, and the modes that hold from there on."""
+    return [(float(new.start), new.mode) for old, new in pairwise(pieces) if new.mode != old.mode]
+
+
+def sampled(pieces: list[Piece], times: list[float]) -> np.ndarray:
+    """Positions and speeds (n, 2) at n rising times in s."""
+    rows, i = [], 0
     for t in times:
         while i + 1 < len(pieces) and pieces[i + 1].start <= t:
             i += 1
         x, v = pieces[i].at(t)
         rows.append((float(x), float(v)))
-    x, v = np.array(rows).T
-    return Truth(np.array(times), x, v, tuple(events))
+    return np.array(rows)
 
 
-def linear(model: str, spans: list[Span]) -> Iterator[Piece]:
-    from .truth_linear import pieces
+def in_closed_form(model: str, spans: list[Span]) -> Iterator[Piece]:
+    from .linear import pieces
 
     return pieces(model, spans)
 
 
-def smooth(model: str, spans: list[Span]) -> Iterator[Piece]:
-    from . import truth_smooth
+def by_scipy(model: str, spans: list[Span]) -> Iterator[Piece]:
+    from . import smooth
 
-    return getattr(truth_smooth, model)(spans)
+    return {"pacejka": smooth.pacejka, "pendulum": smooth.pendulum}[model](spans)
 
 
-PIECES = {"smd": linear, "coulomb": linear, "stickslip": linear, "pacejka": smooth, "pendulum": smooth}
+PIECES = {
+    **dict.fromkeys(("smd", "coulomb", "stickslip"), in_closed_form),
+    **dict.fromkeys(("pacejka", "pendulum"), by_scipy),
+}
 
 
 def check() -> None:

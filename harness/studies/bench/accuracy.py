@@ -13,9 +13,9 @@ from ...errors import HarnessError
 from ...running.inside import Inside, embedded
 from ...running.probe import Card, Motion, Setting, card, run
 from ...scenes.fmus import fmu_of
+from ...truths.linear import mp
 from ...truths.reference import MODELS
 from ...truths.truth import Grid, truth
-from ...truths.truth_linear import mp
 from .measure import Beside, Measure
 
 EXACT = ("smd", "coulomb", "stickslip")

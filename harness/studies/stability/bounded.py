@@ -17,7 +17,7 @@ from ...process.room import room
 
 ALONE = Lock()  # a start looks after all processes there are, and may take the exit code of one that is waited for
 # imported once, where processes are forked from
-PRELOAD = ["__main__", "harness.running.probe", "harness.truths.truth_linear", "harness.truths.truth_smooth"]
+PRELOAD = ["__main__", "harness.running.probe", "harness.truths.linear", "harness.truths.smooth"]
 LONGEST = 70  # bytes, of the path of temporary files: below it is a socket, whose path may have 107 (unix(7))
 
 
