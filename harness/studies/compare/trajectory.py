@@ -82,7 +82,7 @@ def ran(
 def spacing(time: np.ndarray) -> float | None:
     """The communication step in s of which the times (n,) are multiples, but for some that lie between, as of events;
     None if there is none."""
-    h = float(np.median(np.diff(time)))
+    h = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     places = (time - time[0]) / h if h > 0 else np.full(len(time), np.nan)
     even = np.abs(places - np.rint(places)) < 1e-6 * np.maximum(places, 1)
     return h if even.mean() > 0.5 else None
