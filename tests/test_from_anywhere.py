@@ -1,5 +1,6 @@
 """A model in a file anywhere, as a user writes it: built by its path, in every kind, and right."""
 
+import os
 import subprocess
 import sys
 from functools import cache
@@ -155,11 +156,52 @@ def test_methods_laws_and_folders_are_chosen_for_a_file_as_for_a_name(tmp_path):
     assert refused.stderr == "Error: rotor_brake has no method 'exact'; it has ode23, ode45, dop853, rodas.\n"
 
 
-def test_what_lies_beside_the_file_under_its_name_goes_into_the_fmu(tmp_path):
+@pytest.fixture
+def oil(tmp_path):
+    """A folder with the file of a model in it, under the name of one of ours."""
     path = next(path for path in AUTHORED if path.stem == "viscous_pendulum")
-    (tmp_path / path.name).write_text(path.read_text())
+    (tmp_path / "pendulum.py").write_text(path.read_text())
+    return tmp_path
+
+
+TABLE = "# series and DOP853, relative difference 1e-13\nt [s],phi [rad],omega [rad/s]\n0.0,0.3,0.0\n4.0,0.1,-0.2\n"
+
+
+def test_what_lies_beside_the_file_under_its_name_goes_into_the_fmu_and_nothing_of_ours(oil):
+    """Icon and certified result; neither is needed, whatever the name."""
+    assert command("pendulum.py", cwd=oil).returncode == 0
+    with ZipFile(oil / "pendulum.fmu") as archive:
+        assert not [name for name in archive.namelist() if name.endswith(".png") or "fmi-ls-ref" in name]
     icon = (ROOT / "fmus" / "smd.png").read_bytes()
-    (tmp_path / f"{path.stem}.png").write_bytes(icon)
-    assert command(path.name, cwd=tmp_path).returncode == 0
-    with ZipFile(tmp_path / f"{path.stem}.fmu") as archive:
+    (oil / "pendulum.png").write_bytes(icon)
+    (oil / "pendulum.csv").write_text(TABLE)
+    assert command("pendulum.py", cwd=oil).returncode == 0
+    with ZipFile(oil / "pendulum.fmu") as archive:
         assert archive.read("model.png") == icon
+        result = archive.read("extra/org.fmi-standard.fmi-ls-ref/pendulum_out.csv").decode()
+        page = archive.read("documentation/index.html").decode()
+    assert result.splitlines() == ["time,phi,omega", "0.0,0.3,0.0", "4.0,0.1,-0.2"]
+    assert "Certified result of the default experiment: series and DOP853, relative difference 1e-13." in page
+
+
+@pytest.mark.parametrize(
+    "table", ["", "t,x\n0,1\n", TABLE.replace("# ", ""), TABLE.replace(",0.3,", ",nan,"), TABLE.replace(",-0.2", "")]
+)
+def test_a_result_that_is_none_is_refused(oil, table):
+    (oil / "pendulum.csv").write_text(table)
+    run = command("pendulum.py", cwd=oil)
+    assert run.returncode == 1
+    assert run.stderr.startswith("Error: pendulum.csv is no certified result: its first line tells after a # how")
+    assert run.stderr.count("\n") == 1
+
+
+def test_a_run_of_it_by_the_harness_shows_its_events_by_whatever_name_its_mode_has(built, tmp_path):
+    fmu = built(next(path for path in AUTHORED if path.stem == "rotor_brake"), "")
+    (tmp_path / "brake.toml").write_text(f'title = "Brake"\nfmu = "{fmu}"\noutputs = ["phi", "omega", "alpha"]\n')
+    call = [sys.executable, "-m", "harness", "run", "brake.toml", "--out", "results"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    run = subprocess.run(call, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr
+    header, *rows = (tmp_path / "results" / "brake" / "events.csv").read_text().splitlines()
+    assert header == "t [s],mode"
+    assert [int(row.split(",")[1]) for row in rows[:4]] == [0, 1, 0, 1]

@@ -286,7 +286,8 @@ def test_one_process_can_make_many_instances(fmu, name, tmp_path):
 def test_an_unknown_name_is_refused_with_the_known_ones_before_anything_is_built(arguments, tmp_path):
     run = command(*arguments, "--out", tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
-    assert run.stderr == f"Error: There is no model 'bogus'; known are {', '.join(names())}.\n"
+    known = ", ".join(names())
+    assert run.stderr == f"Error: There is no model 'bogus'; known are {known}, and any .py file by its path.\n"
     assert list(tmp_path.iterdir()) == []
 
 

@@ -14,7 +14,7 @@ def companions(
     """Their content, by their paths in the FMU; a model has an icon and a certified result if they lie beside its file
     at `path`, under the same name."""
     name, icon = path.stem, path.with_suffix(".png")
-    found = reference(name, declared)
+    found = reference(path, declared)
     entries = {"documentation/index.html": page(model, name, declared, found, edition)}
     if found is not None:
         entries |= files(name, found, declared)

@@ -3,19 +3,24 @@
     extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml
     extra/org.fmi-standard.fmi-ls-ref/<name>_out.csv          time and the states, by their names
 
-The numbers are those of harness/references, which stand there with the script that made them.
+The numbers lie beside the file of the model, under its name: `belt.csv`, whose first line tells after a # how they were
+got and how well that agrees, the second what each column is.  Those of our own models stand in harness/references, with
+the script that made them.
 """
 
 import csv
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from ..runtime.declare import Declared
+from . import BuildError
+from .catalogue import FMUS
 from .document import document
 
-FOLDER = Path(__file__).resolve().parents[2] / "harness" / "references"
+OURS = FMUS.parent / "harness" / "references"
 INSIDE = "extra/org.fmi-standard.fmi-ls-ref"
 VARIANTS = {"pacejka": "pacejka-0.01"}  # the file of the default values, where a model has several
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
@@ -28,31 +33,60 @@ STANDARD = {
 
 @dataclass(frozen=True)
 class Reference:
-    """Rows of time (s), position and speed, as they stand in the file; how they were got, and how well that agrees."""
+    """Rows of time (s) and the states, as they stand in the file; how they were got, and how well that agrees."""
 
     rows: list[list[str]]
-    routes: str
-    difference: str
+    how: str
 
     @property
     def told(self) -> str:
         """Where the numbers come from, in one sentence."""
-        return f"Certified result of the default experiment: {self.routes}, relative difference {self.difference}."
+        return f"Certified result of the default experiment: {self.how}."
 
 
-def reference(name: str, declared: list[tuple[str, Declared]]) -> Reference | None:
-    """The reference of a model, if it has one that holds for what is declared: with true sticking, where it sticks."""
-    file = VARIANTS.get(name, name)
+def reference(path: Path, declared: list[tuple[str, Declared]]) -> Reference | None:
+    """The reference of the model in a file, if it has one that holds for what is declared: with true sticking, where it
+    sticks."""
     laws: Any = next((meaning.items for variable, meaning in declared if variable == "friction"), ())
-    if not (FOLDER / f"{file}.csv").is_file() or (laws and "hybrid" not in [label for label, _, _ in laws]):
+    if laws and "hybrid" not in [label for label, _, _ in laws]:
         return None
-    _, *rows = _read(file)
-    routes, difference = next(rest for reference, *rest in _read("agreement") if reference == file)
-    return Reference(rows, routes, difference)
+    if path.parent.resolve() == FMUS:
+        return _ours(VARIANTS.get(path.stem, path.stem))
+    beside = path.with_suffix(".csv")
+    return _checked(beside, len(integrated(declared))) if beside.is_file() else None
 
 
-def _read(file: str) -> list[list[str]]:
-    with (FOLDER / f"{file}.csv").open(encoding="utf-8", newline="") as text:
+def _ours(name: str) -> Reference | None:
+    """Of one of our own models."""
+    if not (OURS / f"{name}.csv").is_file():
+        return None
+    _, *rows = _read(OURS / f"{name}.csv")
+    routes, difference = next(rest for known, *rest in _read(OURS / "agreement.csv") if known == name)
+    return Reference(rows, f"{routes}, relative difference {difference}")
+
+
+def _checked(file: Path, states: int) -> Reference:
+    """Of any other; BuildError where the file is not such a table."""
+    text = file.read_text(encoding="utf-8", errors="replace")
+    how, _, table = text.partition("\n")
+    rows = list(csv.reader(table.splitlines()))[1:]
+    if how[:1] != "#" or not how[1:].strip() or len(rows) < 2 or not all(_is_row(row, states) for row in rows):
+        raise BuildError(
+            f"{file} is no certified result: its first line tells after a # how the numbers were got, the second what "
+            f"each column is, and the others hold the time in s, from 0 on, and {states} states, all finite numbers."
+        )
+    return Reference(rows, how[1:].strip().rstrip("."))
+
+
+def _is_row(row: list[str], states: int) -> bool:
+    try:
+        return len(row) == 1 + states and all(isfinite(float(word)) for word in row)
+    except ValueError:
+        return False
+
+
+def _read(file: Path) -> list[list[str]]:
+    with file.open(encoding="utf-8", newline="") as text:
         return list(csv.reader(text))
 
 

@@ -141,10 +141,15 @@ def planned(wanted: Specification, description: Any) -> Plan:
         raise SceneError(f"{sentence}; at most {MOST_POINTS}: take a larger one")
     names = list(wanted.outputs)
     if wanted.follow:
-        extra = ("solver.t_next", "solver.rejected", "events.count", "events.t_last", "mode")
+        extra = ("solver.t_next", "solver.rejected", "events.count", "events.t_last", mode_of(variables))
         names += [name for name in extra if name in variables and name not in names]
     reals = [name for name in names if variables[name].type == "Real"]
     return Plan(wanted, variables, start, stop, reals, [name for name in names if name not in reals])
+
+
+def mode_of(variables: dict[str, Any]) -> str:
+    """The output that is the mode of friction, the only one that is an integer; empty where there is none."""
+    return next((name for name, one in variables.items() if (one.causality, one.type) == ("output", "Integer")), "")
 
 
 def passes(plan: Plan, fmu: Any, report: Report) -> Run:
@@ -254,7 +259,8 @@ def gather(plan: Plan, fmu: Any, trace: Trace, seconds: float) -> Run:
     settled = parameters(plan, fmu)
     if wanted.follow and settled.get("friction") == "hybrid":
         at = np.flatnonzero(np.diff(read["events.count"])) + 1
-        events = Events(np.append(time[0], read["events.t_last"][at]), np.append(read["mode"][0], read["mode"][at]))
+        mode = read[mode_of(variables)]
+        events = Events(np.append(time[0], read["events.t_last"][at]), np.append(mode[0], mode[at]))
     taken, refused, evaluated = (whole(plan, fmu, f"solver.{name}") for name in ("steps", "rejected", "evaluations"))
     return Run(
         wanted=wanted,
