@@ -13,11 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .law import at_rest
-
-ORDER = {False: 16, True: 22}  # the series of the pendulum has poles at complex times, that of the spring has none
+ORDER = {False: 20, True: 22}  # the series of the pendulum has poles at complex times, that of the spring has none
 SMALL = {False: 1e-13, True: 1e-11}  # share of the series that its last terms may be
-LONGEST = 1.05  # of a series, in theta
+LONGEST = 1.7  # of a series, in theta
 MOST = 100  # series in a half swing
 
 
@@ -76,25 +74,28 @@ def value(series: np.ndarray, h: np.ndarray | float) -> np.ndarray:
 
 
 def halves(a: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: bool) -> Halves:
-    """The half swings from rest at y = a; all arrays (L,).  NaN where one does not come back to rest."""
-    y, w, n = a.copy(), np.zeros_like(a), len(a)
-    end, duration, running = np.full(n, np.nan), np.full(n, np.nan), np.ones(n, bool)
-    still, at, begins, series = at_rest(r, sine), 0.0, [], []
-    for _ in range(MOST if n else 0):
+    """The half swings from rest at y = a; all arrays (L,).  NaN where one does not come back to rest.
+
+    Those that have ended go on by the law of the way down, so that at any theta all of them are smooth in a.
+    """
+    y, w = a, np.zeros_like(a)
+    end, duration = np.full(len(a), np.nan), np.full(len(a), np.nan)
+    at, begins, series = 0.0, [], []
+    for _ in range(MOST):
         c = taylor(y, w, zeta, r, b, sine)
-        h = reach(c[:, running], SMALL[sine])
+        h = reach(c, SMALL[sine])
         begins.append(at)
         series.append(c)
-        y, w = value(c, h), value(slopes(c), h)
-        ends = np.flatnonzero(running & (w >= 0))
+        speed = slopes(c)
+        y, w = value(c, h), value(speed, h)
+        ends = np.flatnonzero(np.isnan(end) & (w >= 0))
         if len(ends):
-            root = standstill(slopes(c[:, ends]), h)
-            duration[ends], end[ends], running[ends] = at + root, value(c[:, ends], root), False
-        if not running.any():
+            root = standstill(speed[:, ends], h)
+            duration[ends], end[ends] = at + root, value(c[:, ends], root)
+        if not np.isnan(end).any() or not np.isfinite(y).all():
             break
-        y[~running], w[~running] = still[~running], 0.0  # those that have ended wait where nothing moves
         at += h
-    return Halves(end, duration, np.array(begins), np.array(series).reshape(len(series), ORDER[sine] + 1, n))
+    return Halves(end, duration, np.array(begins), np.array(series))
 
 
 def reach(c: np.ndarray, small: float) -> float:
@@ -111,6 +112,6 @@ def standstill(speed: np.ndarray, h: float) -> np.ndarray:
         slope = value(bend, root)
         step = value(speed, root) / np.where(slope > 1e-300, slope, 1e-300)
         root = np.clip(root - step, 0, h)
-        if np.abs(step).max() < 1e-14:
-            break
+        if np.abs(step).max() < 1e-8:
+            break  # the next one would be as small as the square of it
     return root

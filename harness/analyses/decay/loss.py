@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .fit import Identified
-from .law import OMEGA, T0, Terms
+from .law import Terms
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,9 @@ def losses_seen(found: Identified) -> Loss:
         way = np.sign(off[0]) * (-1.0) ** np.arange(len(off))
         seen = np.array(shares(way * off, problem.model.sine))
     curves = {}
-    until = found.t[-1] - problem.origin
     for law in found.laws:
-        amplitudes, begins = problem.half_swings(law.p, most=int(law.p[OMEGA] * (until - law.p[T0]) / 2.5) + 2)
-        curves[law.terms] = shares(amplitudes[begins <= until] * problem.unit, problem.model.sine)
+        amplitudes, begins = problem.half_swings(law.p)
+        curves[law.terms] = shares(amplitudes[begins <= problem.t[-1]] * problem.unit, problem.model.sine)
     return Loss(seen[0], seen[1], curves)
 
 

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .chain import chain
-from .halves import halves, slopes
+from .halves import slopes
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, ZETA, B, R
 
 SHARE = 0.75  # of the terms of a series are enough for a derivative
-SHORTEST = 2.5  # theta of a half swing: fewer half swings than theta/SHORTEST reach to theta
 LAW = np.array([AMPLITUDE, ZETA, R, B])  # what the half swings depend on
 
 
@@ -47,12 +46,9 @@ class Model:
         """The signal (n,) at rising times t (n,) for the values p of UNKNOWNS, and its Jacobian (n, unknowns)."""
         laws, places, changes = self.varied(p, unknowns)
         theta = p[OMEGA] * (t - p[T0])
-        most = int(max(theta[-1], 0.0) / SHORTEST) + 4 if len(t) else 0
-        amplitudes, begins = chain(laws, self.sine, most, self.floor)
+        found = chain(laws, self.sine, self.floor, until=float(theta[-1]) if len(t) else 0.0)
+        amplitudes, begins, series = found.amplitudes, found.begins, found.series
         count = len(amplitudes) - 1
-        _, zeta, r, b = np.repeat(laws, count, axis=0).T
-        found = halves(amplitudes[:-1].T.ravel(), zeta, r, b, self.sine)
-        series = found.series.transpose(1, 0, 2).reshape(found.series.shape[1], len(found.begins), len(laws), count)
         for _ in range(self.order):
             series = slopes(series)
 
@@ -62,8 +58,8 @@ class Model:
         held, left = int(np.searchsorted(half, 0)), int(np.searchsorted(half, count))
         half = half[held:left]
         local = np.maximum(theta[held:left] - begins[half, 0], -1.0)
-        stretch = np.maximum(np.searchsorted(found.begins, local, "right") - 1, 0)
-        which, h = stretch * count + half, local - found.begins[stretch]
+        stretch = np.maximum(np.searchsorted(found.swings.begins, local, "right") - 1, 0)
+        which, h = stretch * count + half, local - found.swings.begins[stretch]
         way = self.side * np.where(half % 2, -1.0, 1.0) * p[OMEGA] ** self.order
         still = self.side * (self.order == 0) * np.array([1.0, (-1.0) ** count])  # before and after the motion
 
@@ -91,7 +87,8 @@ class Model:
         """Times (count,) in s and positions (count,) of the turning points after the first, and the Jacobian
         (2, count, unknowns) of both; NaN after the end of the motion."""
         laws, places, changes = self.varied(p, unknowns)
-        amplitudes, begins = chain(laws, self.sine, count, self.floor)
+        found = chain(laws, self.sine, self.floor, count)
+        amplitudes, begins = found.amplitudes, found.begins
         missing = count + 1 - len(amplitudes)
         pad = ((0, max(missing, 0)), (0, 0))
         sizes = np.pad(amplitudes, pad, constant_values=np.nan)[1:]

@@ -22,7 +22,8 @@ from .record import Record
 from .squares import least_squares, scales
 from .turning import Turns
 
-CLOSE = 1e-5  # share of the last amplitude that is met
+CLOSE = 1e-9  # share of a loss that a step changes
+STEPS = 20
 
 
 def by_turning_points(
@@ -46,7 +47,7 @@ def by_turning_points(
 
     def off(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         laws, at, changes = model.varied(p, unknowns)
-        rows, _ = chain(laws, model.sine, len(places) - 1, model.floor)
+        rows = chain(laws, model.sine, model.floor, len(places) - 1).amplitudes
         rows = np.pad(rows, ((0, len(places) - len(rows)), (0, 0)), mode="edge")
         way = model.side * (-1.0) ** np.arange(len(places))
         jacobian = np.ones((len(places), len(unknowns)))
@@ -122,10 +123,13 @@ def alone(place: int, first: float, last: float, count: int, sine: bool) -> floa
     p[[AMPLITUDE, OMEGA, place]] = first, 1.0, small
     model, unknowns = Model(1.0, 0, sine, 0.0, 0.0), np.array([place])
 
-    def off(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    for _ in range(STEPS):
         laws, _, changes = model.varied(p, unknowns)
-        ends = chain(laws, sine, count, 0.0)[0][-1]
-        return (ends[:1] - last) / last, (ends[1:] - ends[:1])[None] / (changes * last)
-
-    p, squares, _, _ = least_squares(off, p, unknowns)
-    return float(p[place]) if squares < CLOSE**2 else np.nan
+        ends = chain(laws, sine, 0.0, count).amplitudes[-1]
+        step = changes[0] * (last - ends[0]) / (ends[1] - ends[0])
+        if not np.isfinite(step):
+            break
+        p[place] = np.clip(p[place] + step, p[place] / 4, 4 * p[place])
+        if abs(step) < CLOSE * p[place]:
+            return float(p[place])
+    return np.nan

@@ -9,11 +9,12 @@ from typing import Self
 
 import numpy as np
 
-from .chain import chain
+from ...errors import HarnessError
+from .chain import MOST, chain
 from .energy import losses
-from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, B, R, Terms, unknowns_of
-from .model import Model
-from .record import Record
+from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, Terms, unknowns_of
+from .model import LAW, Model
+from .record import FEWEST, Record
 from .squares import least_squares
 from .turning import Turns
 
@@ -30,9 +31,10 @@ Fitted = tuple[np.ndarray, float]  # the values of UNKNOWNS, and the squares the
 
 @dataclass(frozen=True)
 class Problem:
-    """Samples `t`, `x` (n,) to be fitted by `model`; `origin` s, `level` and `unit` turn them back into the record's;
-    `noise` of a sample; with or without `drift`."""
+    """Samples `t`, `x` (n,) of the record `name` to be fitted by `model`; `origin` s, `level` and `unit` turn them back
+    into the record's; `noise` of a sample; with or without `drift`."""
 
+    name: str
     t: np.ndarray
     x: np.ndarray
     model: Model
@@ -51,8 +53,14 @@ class Problem:
         return unknowns_of(terms, self.drift)
 
     def only(self, keep: np.ndarray | slice) -> Self:
-        """The same with some of the samples."""
-        return replace(self, t=self.t[keep], x=self.x[keep])
+        """The same with some of the samples; HarnessError where these are too few to be fitted."""
+        some = replace(self, t=self.t[keep], x=self.x[keep])
+        if len(some.t) < FEWEST:
+            raise HarnessError(
+                f"{self.name}: only {len(some.t)} samples in a row follow the free decay of one oscillator, and "
+                f"{FEWEST} are needed: is it one? Sample finer, or cut out what is with --from and --until"
+            )
+        return some
 
     def off(self, p: np.ndarray, terms: Terms) -> tuple[np.ndarray, np.ndarray]:
         """Residuals (n,), signal less record, and their Jacobian."""
@@ -80,10 +88,11 @@ class Problem:
         """Whether squares are more than noise leaves."""
         return cost > len(self.t) * (ROUGH * self.noise) ** 2
 
-    def half_swings(self, p: np.ndarray, terms: Terms = TERMS, most: int = 10_000) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes and begins (N + 1,), in s, of the half swings of these values."""
-        amplitudes, begins = chain(p[None, [AMPLITUDE, ZETA, R, B]], self.model.sine, most, self.model.floor)
-        return amplitudes[:, 0], p[T0] + begins[:, 0] / p[OMEGA]
+    def half_swings(self, p: np.ndarray, most: int = MOST) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes and begins (N + 1,), in s, of the half swings of these values up to the end of the samples."""
+        until = p[OMEGA] * (self.t[-1] - p[T0])
+        found = chain(p[None, LAW], self.model.sine, self.model.floor, most, until)
+        return found.amplitudes[:, 0], p[T0] + found.begins[:, 0] / p[OMEGA]
 
     def turned(self, p: np.ndarray, count: int) -> tuple[Self, np.ndarray]:
         """The same motion begun `count` half swings later, and its values."""
@@ -125,7 +134,9 @@ def prepare(record: Record, turns: Turns, pendulum: bool, drift: bool) -> tuple[
         slope = (middle[-1] - middle[0]) / (times[-1] - times[0]) / unit
         seed[DRIFT] += slope
         seed[REST] += slope * (model.middle - times[-1])
-    problem = Problem(record.t - origin, (record.x - level) / unit, model, origin, level, unit, noise, drift)
+    problem = Problem(
+        record.name, record.t - origin, (record.x - level) / unit, model, origin, level, unit, noise, drift
+    )
     return problem, seed
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
 from .noise import scatter
 from .problem import LEAST_NOISE, Problem, prepare
-from .record import Record
+from .record import FEWEST, Record
 from .turning import Turns
 
 SWINGS = 2.0  # steps of a quantiser that a swing spans at least
@@ -95,7 +95,8 @@ def end(problem: Problem, p: np.ndarray, terms: Terms, turns: Turns) -> float:
     amplitudes, begins = problem.half_swings(p)
     spans = (amplitudes[:-1] + amplitudes[1:]) * p[OMEGA] ** problem.model.order
     lost = np.flatnonzero(spans < SWINGS * turns.step / problem.unit)
-    last = min(int(lost[0]) if len(lost) else len(begins) - 1, len(begins) - 2)
+    stop = len(begins) - (1 if begins[-1] > problem.t[-1] else 2)
+    last = min(int(lost[0]), stop) if len(lost) else stop
     return float(begins[max(last, min(3, len(begins) - 1))])
 
 
@@ -104,12 +105,18 @@ def without_strays(
 ) -> tuple[Problem, np.ndarray, float, np.ndarray]:
     """The problem without the samples that are far off where all others are not, and their times; whole where such
     samples are many."""
-    e, _ = problem.off(p, terms)
-    far = np.abs(e) > FAR * max(typical(e), problem.noise, problem.exact)
-    if not 0 < far.sum() <= 2 + STRAY * len(far):
-        return problem, p, squares, problem.t[:0]
-    rest = problem.only(~far)
-    return rest, *fitted(rest, p, terms, swing), problem.t[far]
+    most, q = 2 + int(STRAY * len(problem.t)), p
+    for _ in range(2):  # one that strays bends the fit away from the others
+        e, _ = problem.off(q, terms)
+        far = np.abs(e) > FAR * max(typical(e), problem.noise, problem.exact)
+        if not far.any():
+            break
+        farthest = far & (np.abs(e) >= np.sort(np.abs(e))[-most])
+        rest = problem.only(~farthest)
+        q, less = fitted(rest, q, terms, swing)
+        if far.sum() <= most:
+            return rest, q, less, problem.t[far]
+    return problem, p, squares, problem.t[:0]
 
 
 def typical(e: np.ndarray) -> float:
@@ -148,6 +155,8 @@ def until_disturbed(
         problem, p = prepare(record, first, used.model.sine, used.drift)
         problem = problem.only(problem.t >= begin - problem.origin)
         early, last = problem, float(first.t[-1] - problem.origin)
+        if np.searchsorted(problem.t, last, "right") < FEWEST:
+            return None
         for _ in range(ROUNDS):  # what is fitted reaches farther than what was
             early = problem.only(problem.t <= last)
             noise, _ = scatter(early.t, early.x)  # what disturbs the rest may be quieter
