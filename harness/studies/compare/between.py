@@ -14,6 +14,7 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from ...running.trajectory import Trajectory
 
 PER_SECOND = {"m": "m/s", "m/s": "m/s2", "rad": "rad/s", "rad/s": "rad/s2"}
+LARGE, REDUCED = 1e150, 2.0**-600  # differences of larger values have no number: they are reckoned in a smaller unit
 ALIKE = 0.02  # share of its way by which a variable may miss the integral of its rate
 
 
@@ -33,7 +34,8 @@ def sides(path: Trajectory, name: str, at: np.ndarray, jumps: np.ndarray) -> Sid
         held = y[np.searchsorted(t, at, "right") - 1]
         held = np.where(np.isin(at, t), held, np.nan)  # nobody knows what lies between
         return Sides(held, held)
-    smooth = follow(t, y, rate(path, name), at)
+    scale = REDUCED if np.abs(y).max() > LARGE else 1.0
+    smooth = follow(t, scale * y, rate(path, name, scale), at) / scale
     low, high = smooth.copy(), smooth.copy()
 
     def widen(begin: float, end: float, first: int, last: int) -> None:
@@ -61,13 +63,15 @@ def follow(t: np.ndarray, y: np.ndarray, slope: np.ndarray | None, at: np.ndarra
     return CubicHermiteSpline(t, y, slope[holds])(at)
 
 
-def rate(path: Trajectory, name: str) -> np.ndarray | None:
-    """The recorded rate (n,) of a variable: of a unit per second, with an integral that is the variable's own way."""
-    wanted, y = PER_SECOND.get(path.units[name]), path.columns[name]
+def rate(path: Trajectory, name: str, scale: float) -> np.ndarray | None:
+    """The recorded rate (n,) of a variable: of a unit per second, with an integral that is the variable's own way; all
+    values times the scale."""
+    wanted, y = PER_SECOND.get(path.units[name]), scale * path.columns[name]
     h, way = np.diff(path.time), np.diff(y)
     found = {}
     for other, slope in path.columns.items():
         if path.units[other] == wanted and np.isfinite(slope).all():
+            slope = scale * slope
             missed = np.abs(way - h * (slope[1:] + slope[:-1]) / 2)[h > 0].sum()
             if missed <= ALIKE * np.abs(way).sum():
                 found[missed] = slope
