@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, sheet
-from .study import Convergence
+from .convergence import Convergence
 
 
 def draw(found: Convergence, path: Path) -> None:

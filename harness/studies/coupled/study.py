@@ -3,7 +3,6 @@
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from shutil import copy
 
@@ -19,30 +18,11 @@ from ...running.any_fmu import description
 from ...scenes.coupled.scene import MODELS, Coupled, load
 from ...scenes.fmus import fmu_of
 from ...truths.monolith import bodies, solve
+from .convergence import Convergence
 
 FOLDER = "coupled"
 PATIENCE = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
-
-
-@dataclass(frozen=True)
-class Convergence:
-    """Positions `x` (m, n) at `time` (m,) with the finest communication step, the reference `truth` (m, n), and for
-    each of the `steps` in s the largest `error` of a position, in m."""
-
-    scene: Coupled
-    time: np.ndarray
-    x: np.ndarray
-    truth: np.ndarray
-    steps: tuple[float, ...]
-    errors: tuple[float, ...]
-
-    @property
-    def order(self) -> float:
-        """The power of the step with which the error falls, from the two finest steps; NaN with one."""
-        if len(self.steps) < 2 or not all(self.errors[-2:]):
-            return float("nan")
-        return float(np.log(self.errors[-2] / self.errors[-1]) / np.log(self.steps[-2] / self.steps[-1]))
 
 
 def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[Convergence, Path]:

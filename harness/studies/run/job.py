@@ -4,7 +4,7 @@ What a scene does not name is not imported: analyses and plots load here, when t
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,19 +19,9 @@ from ...running.run import Run
 from ...running.specification import of_scene
 from ...scenes.fmus import check_built
 from ...scenes.scene import Scene, load, shipped
+from .outcome import Outcome
 
 FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.png")  # all that a result folder may hold
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a scene: its measured quantities, or the sentence that says why there are none."""
-
-    name: str
-    scene: Scene | None
-    run: Run | None
-    quantities: tuple[Quantity, ...]
-    error: str | None
 
 
 def decay(run: Run, scene: Scene) -> Any:

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from ...results.files import write_rows
 from ...results.quantity import Quantity
-from .job import Outcome
+from .outcome import Outcome
 
 ELSEWHERE = "elsewhere: the published run time is that of another machine"
 ALWAYS = ("steps", "mean_step", "run_time")  # shown in the main job even where nothing was published

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from ...results.style import FAMILIES, HEIGHT, WIDTH, sheet
-from .study import Region
+from .endings import Region
 
 
 def draw(regions: Iterable[Region], path: Path) -> None:

@@ -7,7 +7,7 @@ every run has a process of its own with a time limit (bounded.py).
 import math
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -23,51 +23,11 @@ from ...scenes.fmus import fmu_of
 from ...truths.truth import Truth, check, truth, worst
 from .bounded import bounded
 from .cases import Trial, cases, scenes
+from .endings import FINISHED, REFUSED, WRONG, Ending, Region
 
 WORKERS = 2
 LIMIT = 120.0  # s, for one run and for one answer to compare with
 FOLDER, FILES = "stability", ("stability.csv", "region.png")
-FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
-
-
-@dataclass(frozen=True)
-class Ending:
-    """How a case ended: `ended` is finished, refused or wrong; `text` is the FMU's sentence, or what is wrong.
-
-    `error` and `rise` (of energy that nobody put in) are shares of the largest values; NaN where there is none.
-    """
-
-    case: Trial
-    ended: str
-    text: str
-    error: float = math.nan
-    rise: float = math.nan
-    motion: Motion | None = None
-
-    @property
-    def expected(self) -> str:
-        case = self.case
-        if case.poison:
-            return "refused, each by name"
-        return f"refused: {case.refuse}" if case.refuse else f"finished within {case.finish:g}"
-
-    @property
-    def well(self) -> bool:
-        """Whether it ended as it should."""
-        return self.ended == (REFUSED if self.case.poison or self.case.refuse else FINISHED)
-
-
-@dataclass(frozen=True)
-class Region:
-    """Where a method's steps are bounded by stability: `steps` (n,) against `stiff` (n,), and the slope, log by log.
-
-    The slope is that of the two stiffest scenes: -1 is an explicit method at its limit, 0 one that has none.
-    """
-
-    method: str
-    stiff: np.ndarray
-    steps: np.ndarray
-    slope: float
 
 
 def survey(

@@ -7,7 +7,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from .study import FINISHED, Ending, Region
+from .endings import FINISHED, Ending, Region
 
 METHODS = ("exact", "ode23", "ode45", "dop853", "rodas")
 
