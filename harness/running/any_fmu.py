@@ -1,9 +1,9 @@
 """Runs anyone's FMU, FMI 2.0 or 3.0, co-simulation or model exchange, through fmpy.
 
-It does not tell where its solver's steps end, so its communication steps are halved until two results agree.
+One of ours runs at its solver's own steps.  Another does not tell where these end, so its communication steps are
+halved until two results agree.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,11 @@ import fmpy
 import numpy as np
 
 from ..errors import HarnessError, SceneError, reason, unknown
+from .description import description
+from .fmu import Report, simulate
 from .settings import NEEDED, unit
 from .specification import Specification
-from .trajectory import Trajectory
+from .trajectory import Trajectory, of_run
 from .unpacked import unpacked
 
 COARSEST = 64  # communication steps of the first run
@@ -23,26 +25,14 @@ POINTS = 512  # communication steps of a run of ours from which nothing else is 
 NUMBERS = ("Real", "Float64", "Float32", "Integer", "Enumeration", "Boolean", "Int32", "Int64")
 
 
-def description(path: Path) -> Any:
-    """What an FMU says of itself; HarnessError if it cannot be read."""
-    if not path.is_file():
-        raise SceneError(f"there is no {path}")
-    try:
-        return fmpy.read_model_description(path)
-    except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
-        raise HarnessError(f"{path.name} cannot be read: {reason(error)}") from None
-
-
-def own(
-    path: Path, stop: float | None, values: dict[str, Any] | None = None, grid: float | None = None
-) -> Specification | None:
+def own(path: Path, stop: float | None, values: dict[str, Any], grid: float | None) -> Specification | None:
     """What runs one of our FMUs, every output recorded; None for an FMU that does not show its steps."""
     found = description(path)
     names = [variable.name for variable in found.modelVariables]
     if found.fmiVersion != "2.0" or any(name not in names for name in NEEDED):
         return None
     outputs = tuple(variable.name for variable in found.modelVariables if variable.causality == "output")
-    return gridded(Specification(path, outputs, values or {}, stop=stop, grid=grid))
+    return gridded(Specification(path, outputs, values, stop=stop, grid=grid))
 
 
 def gridded(wanted: Specification) -> Specification:
@@ -56,8 +46,19 @@ def gridded(wanted: Specification) -> Specification:
 
 
 def run(
-    path: Path, stop: float | None, tolerance: float, values: dict[str, Any], report: Callable[[float], None]
+    path: Path,
+    stop: float | None,
+    tolerance: float,
+    values: dict[str, Any],
+    report: Report,
+    grid: float | None = None,
 ) -> Trajectory:
+    """The outputs of an FMU, ours or anyone's; `tolerance` is for anyone's, the `grid` in s for ours."""
+    wanted = own(path, stop, values, grid)
+    return of_run(simulate(wanted, report)) if wanted else halved(path, stop, tolerance, values, report)
+
+
+def halved(path: Path, stop: float | None, tolerance: float, values: dict[str, Any], report: Report) -> Trajectory:
     """Run with ever shorter communication steps, until the outputs of two runs differ by less than `tolerance` of
     their largest value at the times of the coarsest.  HarnessError if the FMU fails or they never do."""
     found = description(path)

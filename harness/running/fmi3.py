@@ -19,6 +19,7 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from ..errors import HarnessError, reason
 from ..process.interrupt import check
+from .description import description
 from .unpacked import unpacked
 
 EXCHANGE, COSIMULATION = "ModelExchange", "CoSimulation"
@@ -126,13 +127,13 @@ def instance(file: Path, way: str) -> Iterator[Instance]:
     spoken = io.StringIO()
     try:
         with redirect_stderr(spoken), unpacked(file) as folder:
-            description = fmpy.read_model_description(file)
+            found = description(file)
             fmu = (Counted if way == EXCHANGE else FMU3Slave)(
-                guid=description.guid, unzipDirectory=str(folder), modelIdentifier=file.stem, instanceName=file.stem
+                guid=found.guid, unzipDirectory=str(folder), modelIdentifier=file.stem, instanceName=file.stem
             )
             fmu.instantiate(logMessage=lambda *message: None)  # the FMU says it on standard error as well
             try:
-                yield Instance(way, fmu, description, str(folder))
+                yield Instance(way, fmu, found, str(folder))
             finally:
                 fmu.freeInstance()
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers

@@ -14,12 +14,12 @@ from functools import cache
 from time import perf_counter
 from typing import Any
 
-import fmpy
 import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException as FMICallException  # which those that run step by step catch
 
 from ..errors import HarnessError, SceneError, reason
+from .description import description
 from .run import Cost, Events, Run, Steps
 from .settings import check_fmu, labels, settings, unit
 from .specification import Specification
@@ -60,51 +60,41 @@ def simulate(wanted: Specification, report: Report = lambda share: None) -> Run:
     functions, messages = callbacks()
     messages.clear()
     spoken = io.StringIO()
-    with redirect_stderr(spoken), instance(wanted, functions) as (description, fmu):
+    with redirect_stderr(spoken), instance(wanted, functions) as (found, fmu):
         try:
-            return passes(planned(wanted, description), fmu, report)
+            return passes(planned(wanted, found), fmu, report)
         except FMICallException as error:
             lines = [text for status, text in messages if status > WARNING] or spoken.getvalue().strip().splitlines()
             raise HarnessError(lines[-1] if lines else f"{wanted.fmu.name}: {error}") from None
 
 
-@contextmanager
-def loading(wanted: Specification) -> Iterator[None]:
-    """Whatever is wrong with the file of an FMU becomes one sentence."""
-    try:
-        yield
-    except HarnessError:
-        raise
-    except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
-        raise HarnessError(f"{wanted.fmu.name} cannot be loaded: {reason(error)}") from None
-
-
 def described(wanted: Specification) -> Any:
     """What the FMU says of itself; HarnessError if it cannot be read, SceneError if it does not fit what is wanted."""
-    with loading(wanted):
-        description = fmpy.read_model_description(wanted.fmu)
-        if description.fmiVersion != "2.0" or description.coSimulation is None:
-            raise HarnessError(f"{wanted.fmu.name} is not an FMI 2.0 co-simulation FMU")
-        check_fmu(wanted, {variable.name: variable for variable in description.modelVariables})
-        return description
+    found = description(wanted.fmu)
+    if found.fmiVersion != "2.0" or found.coSimulation is None:
+        raise HarnessError(f"{wanted.fmu.name} is not an FMI 2.0 co-simulation FMU")
+    check_fmu(wanted, {variable.name: variable for variable in found.modelVariables})
+    return found
 
 
 @contextmanager
 def instance(wanted: Specification, functions: fmi2.fmi2CallbackFunctions) -> Iterator[tuple[Any, Any]]:
     """The description and a fresh instance of the FMU; its files and its library are gone afterwards."""
     with ExitStack() as files:
-        description = described(wanted)
-        with loading(wanted):
-            folder = files.enter_context(unpacked(wanted.fmu))
+        found = described(wanted)
+        folder = files.enter_context(unpacked(wanted.fmu))
+        try:
             fmu = fmi2.FMU2Slave(
-                guid=description.guid,
+                guid=found.guid,
                 unzipDirectory=str(folder),
-                modelIdentifier=description.coSimulation.modelIdentifier,
+                modelIdentifier=found.coSimulation.modelIdentifier,
                 instanceName=wanted.model,
             )
             fmu.instantiate(callbacks=functions, loggingOn=True)
+        except Exception as error:  # fmpy raises bare Exceptions
+            raise HarnessError(f"{wanted.fmu.name} cannot be loaded: {reason(error)}") from None
         try:
-            yield description, fmu
+            yield found, fmu
         finally:
             fmu.freeInstance()
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...analyses.decay.columns import numeric, split
 from ...analyses.decay.units import TIMES
 from ...errors import HarnessError, SceneError, shown
-from ...running.any_fmu import gridded, own, run
+from ...running.any_fmu import gridded, run
 from ...running.fmu import simulate
 from ...running.specification import of_scene
 from ...running.trajectory import Trajectory, of_run
@@ -70,8 +70,7 @@ def ran(
     """The trajectory of an FMU's path or a shipped scene's name, run anew; the grid in s is for one of ours."""
     path = Path(source)
     if path.suffix == ".fmu":
-        wanted = own(path, stop, grid=grid)
-        return of_run(simulate(wanted, report)) if wanted else run(path, stop, tolerance, {}, report)
+        return run(path, stop, tolerance, {}, report, grid)
     scene = load_scene(source)
     check_built(scene.file)
     wanted = of_scene(scene)

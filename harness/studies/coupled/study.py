@@ -14,7 +14,7 @@ from ...process.room import room
 from ...results.files import write as write_csv
 from ...results.folder import replacing
 from ...results.provenance import record
-from ...running.any_fmu import description
+from ...running.description import description
 from ...scenes.coupled.scene import MODELS, Coupled, load
 from ...scenes.fmus import fmu_of
 from ...truths.monolith import bodies, solve

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from ...errors import HarnessError
 from ...process.child import Hangs, ask
-from ...running.any_fmu import description
+from ...running.description import description
 from .request import Reply, Request
 
 AGREE = 1e-6
