@@ -67,6 +67,12 @@ def test_every_parameter_in_force_is_told_with_its_unit(here, model):
     assert found["m"] == {"value": 1.5, "unit": "kg"}
 
 
+def test_a_comparison_tells_the_parameters_of_both_sides(here):
+    assert harness(here, "compare", "fmus/smd.fmu", "smd").returncode == 0
+    found = told(here / "results/compare/smd-smd")["parameters"]
+    assert found["one: c"] == found["two: c"] == {"value": 2.0, "unit": "N.s/m"}
+
+
 def test_the_scene_is_kept_as_it_was_run(here):
     (here / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\n[values]\nc = 3.0\n')
     assert harness(here, "run", "mine.toml").returncode == 0

@@ -16,13 +16,11 @@ from .report import report
 from .run import figures, run
 from .stability import stability
 from .sweep import sweep
-from .terminal import JSON, OUT, QUIET, progress, show, tell
+from .terminal import answer, progress, results
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
-@OUT
-@QUIET
-@JSON
+@results
 @click.pass_context
 def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> None:
     """Run the built FMUs, measure what they do, and set it beside what was published.
@@ -46,10 +44,8 @@ def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> N
         names = job.published()
         with progress(quiet or as_json, len(names)) as report:
             outcomes = list(job.main_job(names, out, report))
-        if as_json:
-            tell([figures(outcome) for outcome in outcomes])
-        else:
-            show(quiet, comparison(outcomes, everything=False), out)
+        table = comparison(outcomes, everything=False)
+        answer(quiet, as_json, [figures(outcome) for outcome in outcomes], table, f"Results in {out}")
         failed = [outcome.error for outcome in outcomes if outcome.error]
         if failed:
             raise HarnessError("\n".join(failed))

@@ -4,13 +4,11 @@ from pathlib import Path
 
 import click
 
-from .terminal import JSON, OUT, QUIET, progress, show, tell
+from .terminal import answer, progress, results
 
 
 @click.command()
-@OUT
-@QUIET
-@JSON
+@results
 def bench(out: Path, quiet: bool, as_json: bool) -> None:
     """Measure the numbers to reach, each beside what it is compared with in the same run.
 
@@ -24,7 +22,4 @@ def bench(out: Path, quiet: bool, as_json: bool) -> None:
     chosen = work.measures()
     with progress(quiet or as_json, len(chosen)) as report:
         found = work.bench(chosen, out, report)
-    if as_json:
-        tell(found)
-    else:
-        show(quiet, numbers(found), out / work.FOLDER)
+    answer(quiet, as_json, found, numbers(found), f"Results in {out / work.FOLDER}")

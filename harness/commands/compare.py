@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..errors import HarnessError
-from .terminal import JSON, OUT, QUIET, STOP, TOLERANCE, Number, progress, screen, tell
+from .terminal import STOP, TOLERANCE, Number, answer, progress, results
 
 
 @click.command()
@@ -16,9 +16,7 @@ from .terminal import JSON, OUT, QUIET, STOP, TOLERANCE, Number, progress, scree
 @STOP
 @TOLERANCE
 @click.option("--within", type=Number(min=0), help="Exit status 1 if a relative difference is larger.")
-@OUT
-@QUIET
-@JSON
+@results
 def compare(
     one: str,
     two: str,
@@ -41,13 +39,8 @@ def compare(
 
     with progress(quiet or as_json, 1) as report:
         found, folder = anyones.perform_compare((one, two), stop, tolerance, out, partial(report, "compare"))
-    if as_json:
-        tell(anyones.numbers(found))
-    elif not quiet:
-        console = screen()
-        console.print(anyones.table(found), "")
-        for sentence in (*anyones.sentences(found), f"Results in {folder}"):
-            console.print(sentence, highlight=False)
+    shown = (anyones.table(found), "", *anyones.sentences(found), f"Results in {folder}")
+    answer(quiet, as_json, anyones.numbers(found), *shown)
     if within is not None and not (found.worst <= within and (found.shift is None or found.shift == found.shift)):
         if isnan(found.worst):
             raise HarnessError(f"{one} or {two} holds what is not a finite number, which is in no bound")

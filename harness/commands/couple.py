@@ -5,14 +5,12 @@ from pathlib import Path
 
 import click
 
-from .terminal import JSON, OUT, QUIET, progress, tell
+from .terminal import progress, results, tell
 
 
 @click.command()
 @click.argument("scene")
-@OUT
-@QUIET
-@JSON
+@results
 def couple(scene: str, out: Path, quiet: bool, as_json: bool) -> None:
     """Couple the FMUs of a SCENE: written as an SSP archive, run by Ecos, beside a monolithic reference.
 

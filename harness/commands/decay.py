@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from .terminal import JSON, OUT, POSITIVE, QUIET, progress, screen, tell
+from .terminal import POSITIVE, answer, progress, results
 
 
 @click.command()
@@ -29,9 +29,7 @@ from .terminal import JSON, OUT, POSITIVE, QUIET, progress, screen, tell
 @click.option("--pendulum", is_flag=True, help="The restoring torque is k sin(theta), k = m g a.")
 @click.option("--drag/--no-drag", default=True, show_default=True, help="Try the laws with quadratic drag.")
 @click.option("--drift", is_flag=True, help="Let the rest position (or the offset of a sensor) drift steadily.")
-@OUT
-@QUIET
-@JSON
+@results
 def decay(
     source: str,
     time: str | None,
@@ -86,10 +84,4 @@ def decay(
     with progress(quiet or as_json, 1) as report:
         progressed = partial(report, "standard input" if source == "-" else source)
         found, folder = decays.perform(source, columns, Known(k, m, pendulum), drag, drift, out, progressed)
-    if as_json:
-        tell(decays.numbers(found))
-    elif not quiet:
-        console = screen()
-        console.print(table(found), "")
-        for sentence in (*sentences(found), f"Results in {folder}"):
-            console.print(sentence, highlight=False)
+    answer(quiet, as_json, decays.numbers(found), table(found), "", *sentences(found), f"Results in {folder}")

@@ -5,14 +5,12 @@ from pathlib import Path
 import click
 
 from ..errors import HarnessError
-from .terminal import JSON, OUT, QUIET, progress, screen, tell
+from .terminal import answer, progress, results
 
 
 @click.command()
 @click.option("--fmus", type=click.Path(file_okay=False, path_type=Path), default=Path("fmus"), show_default=True)
-@OUT
-@QUIET
-@JSON
+@results
 def importers(fmus: Path, out: Path, quiet: bool, as_json: bool) -> None:
     """Run the FMUs of a folder in tools that others wrote, and set their answers beside fmpy's.
 
@@ -29,10 +27,7 @@ def importers(fmus: Path, out: Path, quiet: bool, as_json: bool) -> None:
     with progress(quiet or as_json, len(IMPORTERS)) as report:
         rows = work.rows(fmus, report)
     work.save(rows, fmus, out)
-    if as_json:
-        tell(rows)
-    elif not quiet:
-        screen().print(work.table(rows))
+    answer(quiet, as_json, rows, work.table(rows))
     failed = [f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed]
     if failed:
         raise HarnessError("\n".join(failed))

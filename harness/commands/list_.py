@@ -2,12 +2,11 @@
 
 import click
 
-from .terminal import screen
-
 
 @click.command("list")
 def list_() -> None:
     """List the scenes that come with the harness."""
+    from rich.console import Console
     from rich.table import Table
 
     from ..scenes.scene import load, shipped
@@ -16,4 +15,4 @@ def list_() -> None:
     for file in shipped():
         scene = load(file)
         table.add_row(scene.name, scene.file.stem, scene.title)
-    screen().print(table)
+    Console().print(table)

@@ -4,14 +4,12 @@ from pathlib import Path
 
 import click
 
-from .terminal import JSON, OUT, QUIET, progress, screen, tell
+from .terminal import answer, progress, results
 
 
 @click.command()
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
-@OUT
-@QUIET
-@JSON
+@results
 @click.option("--quick", is_flag=True, help="Three tolerances only, and little patience.")
 def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, quick: bool) -> None:
     """Show what accuracy costs: error against run time and right-hand sides, for each MODEL (without one: all).
@@ -28,14 +26,9 @@ def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, qu
 
     with progress(quiet or as_json, len(models or MODELS) + 1) as report:
         found = survey(models or MODELS, QUICK if quick else FULL, out, report)
-    if as_json:
-        points = {study.model: study.points for study in found.studies}
-        rest = {"laws": found.laws, "anchors": found.anchors, "advice": found.advice, "missing": found.missing}
-        tell({"points": points} | rest)
-    elif not quiet:
-        errors = (tables.exchange(found.studies), tables.laws(found.laws), tables.anchors(found.anchors))
-        for table in (*map(tables.work, found.studies), *errors):
-            screen().print(table, "")
-        for sentence in (*found.advice, *found.missing):
-            screen().print(sentence, highlight=False)
-        screen().print(f"Results in {out / FOLDER}", highlight=False)
+    told = {"points": {study.model: study.points for study in found.studies}} | {
+        name: getattr(found, name) for name in ("laws", "anchors", "advice", "missing")
+    }
+    errors = (tables.exchange(found.studies), tables.laws(found.laws), tables.anchors(found.anchors))
+    shown = [each for table in (*map(tables.work, found.studies), *errors) for each in (table, "")]
+    answer(quiet, as_json, told, *shown, *found.advice, *found.missing, f"Results in {out / FOLDER}")

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from .terminal import JSON, OUT, QUIET, STOP, TOLERANCE, progress, show, tell
+from .terminal import STOP, TOLERANCE, answer, progress, results, tell
 
 
 @click.command()
@@ -15,9 +15,7 @@ from .terminal import JSON, OUT, QUIET, STOP, TOLERANCE, progress, show, tell
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="With --fmu: a value to set.")
 @STOP
 @TOLERANCE
-@OUT
-@QUIET
-@JSON
+@results
 def run(
     scene: str | None,
     fmu: Path | None,
@@ -51,10 +49,8 @@ def run(
     chosen = load(scene)
     with progress(quiet or as_json, 1) as report:
         outcome = job.perform(chosen, out, partial(report, chosen.name))
-    if as_json:
-        tell(figures(outcome))
-    else:
-        show(quiet, comparison([outcome], everything=True), out / chosen.name)
+    table = comparison([outcome], everything=True)
+    answer(quiet, as_json, figures(outcome), table, f"Results in {out / chosen.name}")
 
 
 def run_any(

@@ -5,13 +5,11 @@ from pathlib import Path
 import click
 
 from ..errors import HarnessError
-from .terminal import JSON, OUT, QUIET, progress, screen, tell
+from .terminal import answer, progress, results
 
 
 @click.command()
-@OUT
-@QUIET
-@JSON
+@results
 def stability(out: Path, quiet: bool, as_json: bool) -> None:
     """Run stiff and extreme scenes with every method: each ends right, or is refused with a sentence.
 
@@ -27,11 +25,9 @@ def stability(out: Path, quiet: bool, as_json: bool) -> None:
     chosen = all_cases()
     with progress(quiet or as_json, sum(map(len, chosen))) as report:
         rows, regions = survey(out, report, chosen)
-    if as_json:
-        tell([{"scene": row.case.label, "well": row.well, "ended": row.ended} for row in rows])
-    elif not quiet:
-        screen().print(tables.endings(rows), "", tables.refusals(rows), "")
-        screen().print(tables.summary(rows, regions), f"Results in {out / FOLDER}", sep="\n", highlight=False)
+    told = [{"scene": row.case.label, "well": row.well, "ended": row.ended} for row in rows]
+    shown = (tables.endings(rows), "", tables.refusals(rows), "", tables.summary(rows, regions))
+    answer(quiet, as_json, told, *shown, f"Results in {out / FOLDER}")
     wrong = [f"{row.case.label}: {row.text}" for row in rows if not row.well]
     if wrong:
         raise HarnessError("\n".join(wrong))

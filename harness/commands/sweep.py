@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..errors import LONGEST, HarnessError
-from .terminal import JSON, OUT, QUIET, STOP, progress, tell
+from .terminal import STOP, progress, results, tell
 
 WORKERS = click.IntRange(1, 1024)
 
@@ -27,9 +27,7 @@ WORKERS = click.IntRange(1, 1024)
 @click.option("--workers", type=WORKERS, default=lambda: os.cpu_count() or 1, help="Processes on this machine.")
 @click.option("--scheduler", metavar="ADDRESS", help="An existing Dask cluster, as in tcp://host:8786.")
 @click.option("--name", help="Name of the result folder.")
-@OUT
-@QUIET
-@JSON
+@results
 def sweep(
     model: str,
     vary: tuple[str, ...],

@@ -29,6 +29,11 @@ QUIET = click.option("--quiet", is_flag=True, help="Print errors only.")
 JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 
 
+def results(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of all commands that have results."""
+    return OUT(QUIET(JSON(command)))
+
+
 class Number(click.FloatRange):
     """A finite number, in a range or not; click lets NaN through, which is in no range."""
 
@@ -93,15 +98,12 @@ def tell(result: Any) -> None:
     click.echo(as_text(result))
 
 
-def screen() -> Any:
-    """What prints tables and sentences."""
+def answer(quiet: bool, as_json: bool, result: Any, *shown: Any) -> None:
+    """Print a result as JSON, or, unless all is to be quiet, the tables and sentences that people are shown."""
     from rich.console import Console
 
-    return Console()
-
-
-def show(quiet: bool, table: Any, where: Path) -> None:
-    """Print a table and where the results are."""
-    if not quiet:
-        screen().print(table)
-        screen().print(f"Results in {where}", highlight=False)
+    if as_json:
+        tell(result)
+    elif not quiet:
+        for each in shown:
+            Console().print(each, highlight=False)

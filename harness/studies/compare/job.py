@@ -27,8 +27,8 @@ def perform_compare(
     with replacing(folder, ("compare.json", "figure.png")) as fresh:
         (fresh / "compare.json").write_text(as_text(numbers(found)) + "\n", encoding="utf-8")
         draw(found, fresh / "figure.png")
-        sides = {each.name: each for each in (one, two)}
-        values = {f"{side}: {name}": told for side, each in sides.items() for name, told in each.parameters.items()}
+        sides = (("one", one), ("two", two))
+        values = {f"{side}: {name}": told for side, each in sides for name, told in each.parameters.items()}
         record(fresh, [each.file for each in (one, two) if each.file], values)
     return found, folder
 
