@@ -156,8 +156,8 @@ static void flips(void)
     for (int i = 0; i < LIVES; i++) {
         Instance *it = life(i), *other = life(3);
         fmi2FMUstate state = NULL;
-        State before = it->state;
         bytes_of(it, bytes);
+        State before = it->state;
         memcpy(longer, bytes, BYTES);
         for (size_t size = 0; size < BYTES + 64; size += 1 + draw(60)) {
             if (size != BYTES) refuses(it, longer, size), tried++;
@@ -200,10 +200,10 @@ static void refuses_forged(Instance *it, const State *forged, bool good)
 }
 
 /* One more refused value. */
-static void refuse_in(State *state, fmi2ValueReference reference, Reason reason, double value)
+static void refuse_in(State *state, fmi2ValueReference reference, int64_t reason, double value)
 {
     state->refused[reference] = (Refusal){reason, value, ++state->turns};
-    state->refusals++;
+    state->run.refused++;
 }
 
 #define FORGED(change)                     \
@@ -219,23 +219,23 @@ static void forged(void)
     for (int i = 0; i < LIVES; i++) {
         Instance *it = life(i);
         State good = it->state;
+        good.run.observed = false; /* as it is saved */
         refuses_forged(it, &good, true);
-        FORGED(state.phase = 0);
-        FORGED(state.phase = 3);
-        FORGED(state.phase = 16);
-        FORGED(state.phase = -4);
-        FORGED(state.refusals++);
-        FORGED(state.refusals = -1);
+        FORGED(state.run.phase = 4);
+        FORGED(state.run.phase = -1);
+        FORGED(state.run.interface = UNDECIDED);
+        FORGED(state.run.interface = MODEL_EXCHANGE);
+        FORGED(state.run.refused++);
+        FORGED(state.run.refused = -1);
+        FORGED(state.run.observed = true);
+        FORGED(state.run.tolerance = NAN);
         FORGED(state.turns = -1);
-        FORGED(state.tolerance = NAN);
-        FORGED(memset(&state.changed, 2, 1));
-        FORGED(memset(&state.failed, 255, 1));
-        FORGED(refuse_in(&state, 1, (Reason)99, 1.0));
+        FORGED(refuse_in(&state, 1, 99, 1.0));
         FORGED(refuse_in(&state, 1, FIXED, 1.0); state.turns--);
         FORGED(refuse_in(&state, reference_of("solver.method"), OUT_OF_RANGE, 1e300));
         for (const Member *member = members; member < members + MEMBERS; member++) {
-            FORGED(memset((char *)&state.model + member->offset, 0x7f, member->is_bool ? 1 : 8));
-            FORGED(memset((char *)&state.model + member->offset, 0x80, member->is_bool ? 1 : 8));
+            FORGED(memset((char *)&state + member->offset, 0x7f, member->is_bool ? 1 : 8));
+            FORGED(memset((char *)&state + member->offset, 0x80, member->is_bool ? 1 : 8));
         }
         for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
             if (!variable->is_real) FORGED(*(int64_t *)place(&state.model, variable) = -7);

@@ -415,6 +415,7 @@ fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *FMUstate)
 {
     ENTER(ANY);
     NEED(FMUstate);
+    it->state.run.observed = false; /* here and there, outputs are calculated anew */
     return keep(it, &it->state, FMUstate, __func__);
 }
 

@@ -69,7 +69,6 @@ static void seal(Sealed *sealed, const State *state)
     memset(sealed, 0, sizeof *sealed);
     memcpy(sealed->guid, MODEL_GUID, sizeof MODEL_GUID);
     memcpy(&sealed->state, state, sizeof *state);
-    sealed->state.run.observed = false; /* for outputs are calculated anew */
     sealed->sum = sum_under(sealed);
 }
 
@@ -120,7 +119,7 @@ static bool are_refusals_sound(const State *state)
 static bool is_sound(State *state)
 {
     bool fault = false;
-    return are_members_sound(state) && are_values_sound(&state->model) && are_refusals_sound(state) &&
+    return are_members_sound(state) && !state->run.observed && are_values_sound(&state->model) && are_refusals_sound(state) &&
            rules_is_sound(&state->run, &state->model, false, &fault) && !fault;
 }
 
