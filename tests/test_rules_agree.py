@@ -1,0 +1,188 @@
+"""What one kind refuses the others refuse, with the same sentence, whatever is asked for in an order that FMI allows.
+
+The same calls, as hypothesis finds them, in the Python FMU for FMI 2.0 and in another kind beside it.  After each call
+all that can be seen is compared with ==: whether it was refused, what was said in the log and on standard error, and
+the value of every variable.
+"""
+
+import json
+from math import inf, nan
+
+import driver
+import fmi3_hosts
+import native_fmus
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+from models import EXACT, HYBRID, MODELS, declared
+
+KINDS = {"native": (driver.Worker, native_fmus.built), "FMI 3.0": (fmi3_hosts.Worker, fmi3_hosts.built)}
+OFTEN = settings(
+    max_examples=80,
+    stateful_step_count=30,
+    derandomize=True,  # the same calls every time
+    database=None,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
+
+REALS = st.sampled_from([0.0, -0.0, 0.5, 1.0, 2.0, -1.0, 1e-3, 100.0, 5e-324, 1e300, nan, inf, -inf])
+INTEGERS = st.sampled_from([0, 1, 2, 3, 4, 5, 99, -1, 2**31 - 1, -(2**31)])
+TIMES = st.sampled_from([0.0, 0.0, -3.0, 1e4, 1e-9, nan, inf, -inf])
+RUNS = st.sampled_from([None, None, 0.4, 1.0, 0.0, -1.0, nan, inf])
+SIZES = st.sampled_from([0.1, 0.1, 0.05, 0.3, 1e-3, 1e-9, 1e-17, 0.0, -0.0, -0.1, nan, inf])
+OFF = st.sampled_from([0.0] * 6 + [1e-17, -1e-17, 4e-16, -4e-16, 1e-8, 1e-6, -1e-3, nan, inf])  # of a point in time
+NEW, INITIALISING, RUNNING = range(3)
+BOTH = range(2)  # places of the kinds
+
+
+class Calls(RuleBasedStateMachine):
+    """Two instances of each of two kinds, led alike."""
+
+    folders = workers = free = None  # of the kinds; `free`: start, stop and tolerance reach the other one too
+
+    @initialize(name=st.sampled_from(MODELS))
+    def instantiate(self, name):
+        self.declared = declared(name)
+        paths = [folder / f"{name}.fmu" for folder in self.folders]
+        self.pairs = [
+            [worker.instantiate(path, "twin") for worker, path in zip(self.workers, paths, strict=True)]
+            for _ in range(2)
+        ]
+        self.saved, self.phase, self.t, self.begun = [], NEW, 0.0, False
+        self.seen = sorted(v for v in self.declared if v != "solver.t_next")  # which looks ahead
+
+    def both(self, function, *arguments, of=None):
+        """The same call of both, or of what each of them has in `of`; what they answer, which must be the same."""
+        answers = []
+        for place, instance in enumerate(self.pairs[0]):
+            own = [of[place]] if of else []
+            try:
+                answers.append(getattr(instance, function)(*own, *arguments))
+            except driver.Refused:
+                answers.append(driver.Refused)
+        said = [self.heard(place) for place in BOTH]
+        assert said[0] == said[1], (function, arguments)
+        refused = [answer is driver.Refused for answer in answers]
+        if function not in ("exit", "ask"):  # which a Python FMU for FMI 2.0 cannot refuse
+            assert refused[0] == refused[1], (function, arguments, said)
+        values = [json.dumps(pair.get(*self.seen)) for pair in self.pairs[0]]  # where NaN is NaN
+        said = [self.heard(place) for place in BOTH]
+        assert (values[0], said[0]) == (values[1], said[1]), (function, arguments)
+        return answers
+
+    def heard(self, place):
+        """What one kind said: in the log, where the newest instance hears all, and on standard error."""
+        log = [text.replace("%%", "%") for pair in self.pairs for _, _, text in pair[place].messages()]
+        return log, self.workers[place].complaints()
+
+    # ---- from instantiation to the end
+
+    @precondition(lambda self: self.phase == NEW)
+    @rule(start=TIMES, run=RUNS, tolerance=st.sampled_from([None, 1e-4, 0.0, 1.0, -1.0, nan]))
+    def setup(self, start, run, tolerance):
+        if self.free:
+            self.t = start
+            self.both("setup", start, None if run is None else start + run, tolerance)
+        else:
+            self.both("setup", 0.0, None, None)
+
+    @precondition(lambda self: self.phase == NEW)
+    @rule()
+    def enter(self):
+        self.both("enter")
+        self.phase = INITIALISING
+
+    @precondition(lambda self: self.phase == INITIALISING)
+    @rule()
+    def exit(self):
+        self.both("exit")
+        self.phase = RUNNING
+
+    @precondition(lambda self: self.phase == RUNNING)
+    @rule(again=st.booleans())
+    def reset(self, again):
+        self.both("reset")
+        self.phase, self.t, self.begun = NEW, 0.0, False
+        if again:
+            self.both("setup", 0.0, None, None)
+            self.both("enter")
+            self.both("exit")
+            self.phase = RUNNING
+
+    # ---- the run
+
+    @precondition(lambda self: self.phase == RUNNING)
+    @rule(h=SIZES, begin=OFF, end=OFF)
+    def step(self, h, begin, end):
+        if not self.free and not self.begun:
+            begin = 0.0  # where it begins is where the run does
+        self.begun = True
+        at, size = self.t + begin, h + end if h else h
+        python, _ = self.both("step", at, size)
+        if python is not driver.Refused:
+            self.t = at + size
+
+    @precondition(lambda self: self.phase == RUNNING)
+    @rule(off=OFF)
+    def leap(self, off):
+        """To where the internal step ends, or beside it."""
+        (ahead, _) = self.both("get", "solver.t_next")
+        self.step(ahead - self.t, 0.0, off)
+
+    # ---- values
+
+    @rule(data=st.data(), n=st.integers(1, 3))
+    def write(self, data, n):
+        for name in data.draw(st.lists(st.sampled_from(sorted(self.declared)), min_size=n, max_size=n)):
+            is_real = self.declared[name].type == "Real"
+            self.set(name, data.draw(REALS if is_real else INTEGERS))
+
+    def set(self, name, value):
+        if name in ("friction", "solver.method") and value not in (EXACT, HYBRID, 99):
+            value = self.declared[name].start  # others may take steps without number
+        self.both("set", {name: value})
+
+    @precondition(lambda self: self.phase == RUNNING)
+    @rule(kind=st.sampled_from(["Boolean", "String"]), reference=st.sampled_from([0, 3, 2**31, 2**32 - 1]))
+    def read_what_is_not_there(self, kind, reference):
+        self.both("ask", kind, reference)
+
+    # ---- state
+
+    @precondition(lambda self: len(self.saved) < 3)
+    @rule(as_bytes=st.booleans())
+    def save(self, as_bytes):
+        states = self.both("save")
+        if as_bytes:
+            states = self.both("deserialize", of=self.both("serialize", of=states))
+        self.saved.append((states, self.phase, self.t, self.begun))
+
+    @precondition(lambda self: self.saved)
+    @rule(data=st.data())
+    def restore(self, data):
+        states, self.phase, self.t, self.begun = data.draw(st.sampled_from(self.saved))
+        self.both("restore", of=states)
+
+    @rule()
+    def move(self):
+        """Life goes on in the other instances."""
+        states = self.both("serialize", of=self.both("save"))
+        self.pairs.reverse()
+        self.both("restore", of=self.both("deserialize", of=states))
+        self.saved = []
+
+    def teardown(self):
+        for pair in getattr(self, "pairs", []):
+            for instance in pair:
+                instance.free()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_both_kinds_refuse_the_same_with_the_same_sentence(fmus, kind):
+    process, built = KINDS[kind]
+    workers = [driver.Worker(), process()]
+    chosen = {"workers": workers, "folders": [fmus, built()], "free": kind == "native"}
+    run_state_machine_as_test(type("Machine", (Calls,), chosen), settings=OFTEN)
+    assert [worker.close() for worker in workers] == [0, 0]
