@@ -184,6 +184,61 @@ def test_what_lies_beside_the_file_under_its_name_goes_into_the_fmu_and_nothing_
     assert "Certified result of the default experiment: series and DOP853, relative difference 1e-13." in page
 
 
+def harness(*arguments, cwd):
+    """A command of the harness, in a folder of the user's."""
+    call = [sys.executable, "-m", "harness", *map(str, arguments)]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(call, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300)
+
+
+def test_a_result_is_certified_by_two_methods_that_agree_and_goes_into_the_next_build(oil):
+    assert harness("references", "pendulum.py", cwd=oil).stderr == (
+        "Error: there is no pendulum.fmu: build it with `python build_fmus.py pendulum.py`\n"
+    )
+    assert command("pendulum.py", cwd=oil).returncode == 0
+    made = harness("references", "pendulum.py", cwd=oil)
+    assert (made.returncode, made.stderr) == (0, "")
+    how, heads, *rows = (oil / "pendulum.csv").read_text().splitlines()
+    assert how.startswith("# dop853 and rodas, relative difference ")
+    assert float(how.rsplit(" ", 1)[1]) < 1e-10
+    assert heads == "t [s],phi [rad],omega [rad/s]"
+    t, phi, omega = np.array([row.split(",") for row in rows], float).T
+    true = solve_ivp(viscous_pendulum, (0.0, t[-1]), (0.3, 0.0), "DOP853", t_eval=t, rtol=1e-12, atol=1e-13).y
+    assert np.abs(true - [phi, omega]).max() < 1e-9
+    assert command("pendulum.py", "--method", "rodas", cwd=oil).returncode == 0
+    with ZipFile(oil / "pendulum.fmu") as archive:
+        assert "extra/org.fmi-standard.fmi-ls-ref/pendulum_out.csv" in archive.namelist()
+    assert (
+        "pendulum.fmu does not offer dop853: build it with all" in harness("references", "pendulum.py", cwd=oil).stderr
+    )
+
+
+DUFFING = '''
+from fmus import Model, Output, Parameter, State, cos
+
+class Duffing(Model):
+    """Forced mass between two wells."""
+
+    w = Parameter(1.2, "rad/s", "frequency of the force")
+    u = Parameter(1.0, "1/s", "unit of rates")
+    x = State("1", "position", start=0.1)
+    v = State("1/s", "speed", rate_of=x)
+    phase = State("rad", "phase of the force", rate=w)
+    a = Output("1/s2", "acceleration", u * (u * (x - x * x * x + 0.5 * cos(phase)) - 0.3 * v), rate_of=v)
+    stop_time, method = 400.0, "dop853"
+'''
+
+
+def test_a_run_that_two_methods_see_in_two_ways_is_not_certified(oil):
+    """An oscillator that forgets where it started."""
+    (oil / "duffing.py").write_text(DUFFING)
+    assert command("duffing.py", cwd=oil).returncode == 0
+    run = harness("references", "duffing.py", cwd=oil)
+    assert run.returncode == 1
+    assert run.stderr.startswith("Error: duffing.py: dop853 and rodas differ by ")
+    assert not (oil / "duffing.csv").exists()
+
+
 @pytest.mark.parametrize(
     "table", ["", "t,x\n0,1\n", TABLE.replace("# ", ""), TABLE.replace(",0.3,", ",nan,"), TABLE.replace(",-0.2", "")]
 )
@@ -198,9 +253,7 @@ def test_a_result_that_is_none_is_refused(oil, table):
 def test_a_run_of_it_by_the_harness_shows_its_events_by_whatever_name_its_mode_has(built, tmp_path):
     fmu = built(next(path for path in AUTHORED if path.stem == "rotor_brake"), "")
     (tmp_path / "brake.toml").write_text(f'title = "Brake"\nfmu = "{fmu}"\noutputs = ["phi", "omega", "alpha"]\n')
-    call = [sys.executable, "-m", "harness", "run", "brake.toml", "--out", "results"]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    run = subprocess.run(call, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300)
+    run = harness("run", "brake.toml", "--out", "results", cwd=tmp_path)
     assert run.returncode == 0, run.stderr
     header, *rows = (tmp_path / "results" / "brake" / "events.csv").read_text().splitlines()
     assert header == "t [s],mode"

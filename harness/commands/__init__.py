@@ -12,6 +12,7 @@ from .decay import decay
 from .importers import importers
 from .list_ import list_
 from .precision import precision
+from .references import references
 from .report import report
 from .run import figures, run
 from .stability import stability
@@ -51,5 +52,7 @@ def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> N
             raise HarnessError("\n".join(failed))
 
 
-for command in (run, precision, stability, bench, importers, list_, decay, sweep, compare, couple, report):
+for command in (
+    *(run, precision, stability, bench, importers, list_, decay, sweep, compare, couple, references, report),
+):
     commands.add_command(command)

@@ -1,0 +1,33 @@
+"""references: certified results for models of one's own."""
+
+from pathlib import Path
+
+import click
+
+from .terminal import JSON, QUIET, screen, tell
+
+FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.command()
+@click.argument("files", metavar="FILE.py...", nargs=-1, required=True, type=FILE)
+@QUIET
+@JSON
+def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
+    """Write the certified result of the model in each FILE.py, whose FMU is built, beside it: FILE.csv.
+
+    The default run is made by two methods that share no formula; where they agree, the FMU carries the result from its
+    next build on, and its page shows it.
+
+    \b
+    Example:
+      python -m harness references belt.py
+    """
+    from ..truths.certified import certify
+
+    made = [certify(file) for file in files]
+    if as_json:
+        tell(made)
+    elif not quiet:
+        for one in made:
+            screen().print(f"{one.path}, relative difference {one.difference:.1e}", highlight=False)
