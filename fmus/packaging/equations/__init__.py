@@ -6,10 +6,11 @@
     algebra.py       values put in, derivatives, operations undone, bounds
     anatomy.py       roles by name: states and their rates, drives, contacts with their loads; what can be run
     dimensions.py    units of expressions against those declared
-    influence.py     what follows from what
+    names.py         those that a written-out model takes for itself
     scribe.py        expressions as text, line by line
-    methods.py       the methods of the written-out class
-    written.py       its text, and the class itself
+    frame.py         what its methods share
+    values.py, motion.py, friction.py, outputs.py    its methods
+    written.py       its text
 
 Nothing is regrouped: what an author wrote as (F_ext + F_spring - F_friction) / m is calculated in that order.
 """

@@ -41,6 +41,16 @@ def leaves(e: Operand, found: dict[int, Expression] | None = None) -> list[Expre
     return [one for one in found.values() if not isinstance(one, (Term, Output))]
 
 
+def parts(e: Operand, found: set[int] | None = None) -> set[int]:
+    """The identities of all that an expression is made of."""
+    found = set() if found is None else found
+    if id(e) not in found:
+        found.add(id(e))
+        for one in inside(e):
+            parts(one, found)
+    return found
+
+
 def occurrences(e: Operand, leaf: Expression) -> int:
     return 1 if e is leaf else sum(occurrences(one, leaf) for one in inside(e))
 
@@ -146,7 +156,7 @@ def derivative(e: Operand, by: Mapping[Expression, Operand], memo: Memo | None =
     else:
         assert isinstance(e, Term)
         new = _of_term(e, slope)
-    if e.name and isinstance(new, Term) and not new.name:
+    if e.name and isinstance(new, Term) and not new.name and id(new) not in parts(e):
         new.name = f"d{e.name}_d{next(iter(by)).name}"
     memo[id(e)] = new
     return new

@@ -6,17 +6,14 @@ The contacts are looked at as a whole: A F = b for the forces that make the rate
 from functools import cached_property
 from keyword import iskeyword
 
-from ...runtime.automaton import DryFriction
 from ...runtime.methods import EXACT_ITEM, ITEMS
 from ..words import OF_C
 from .algebra import degree, depends, derivative, leaves, made, negative, occurrences, put, same, undone
 from .declared import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 from .expressions import COMPARISONS, Expression, Mistake, Operand, Term
+from .names import RESERVED
 
 METHODS = [label for label, _, _ in (EXACT_ITEM, *ITEMS)]
-OURS = {"friction", "solver", "events", "exact", "exchange", "self", "t", "x_base", "t_base"}  # in a written-out model
-OURS |= {"initial", "rates", "jacobian", "push", "hold", "terms", "observe"}
-RESERVED = OURS | {name for name in dir(DryFriction) if not name.startswith("__")} - set(vars(Model))
 TIME = Expression()
 TIME.name = "t"
 

@@ -4,7 +4,7 @@ from collections.abc import MutableMapping
 from typing import Any
 
 from ...runtime import declare
-from .expressions import Expression, Mistake, Operand, Term, written_at
+from .expressions import Expression, Mistake, Operand, Term, operand, written_at
 
 HYBRID, SIGN, THRESHOLD = "hybrid", "sign", "threshold"
 
@@ -68,7 +68,7 @@ class State(Variable, declare.Output):
         **more: Any,
     ) -> None:
         super().__init__(unit, text, **more)
-        self.begins, self.whose, self.steady, self.finest = start, rate_of, rate, finest
+        self.begins, self.whose, self.steady, self.finest = operand(start), rate_of, rate, finest
 
 
 class Output(Variable, declare.Output):
@@ -76,7 +76,7 @@ class Output(Variable, declare.Output):
 
     def __init__(self, unit: str, text: str, means: Operand, rate_of: State | None = None, **more: Any) -> None:
         super().__init__(unit, text, **more)
-        self.means, self.whose = means, rate_of
+        self.means, self.whose = operand(means), rate_of
 
 
 class Mode(Variable, declare.Mode):
@@ -107,7 +107,8 @@ class Contact(Variable, declare.Output):
         **more: Any,
     ) -> None:
         super().__init__(unit, text, **more)
-        self.mode, self.slip, self.slide, self.hold, self.laws, self.eps = mode, slip, slide, hold, laws, eps
+        self.mode, self.slip, self.slide, self.laws, self.eps = mode, slip, operand(slide), laws, eps
+        self.hold = None if hold is None else operand(hold)
         if laws not in ((HYBRID,), (HYBRID, SIGN), (HYBRID, THRESHOLD)):
             raise Mistake(f"laws = {laws!r} is refused: HYBRID comes first, and beside it SIGN or THRESHOLD")
         if (eps is not None) != (THRESHOLD in laws):

@@ -39,7 +39,8 @@ def judge_units(an: Anatomy) -> None:
 
 
 def agree(owner: Expression, e: Operand, expected: Powers | None, begin: str, known: dict) -> None:
-    found = None if e is None else of(e, known)
+    """Refuse an expression of another unit than expected; a plain number is of that unit."""
+    found = of(e, known) if isinstance(e, Expression) else None
     if None not in (found, expected) and found != expected:
         raise Mistake(f"{begin} {shown(e)} is in {told(found)}", owner.place)
 

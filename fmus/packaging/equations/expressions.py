@@ -126,16 +126,22 @@ class Expression:
     __array_ufunc__ = None  # numpy leaves it alone
 
 
+def operand(e: Operand) -> Operand:
+    """An expression as it is, a number as a float; anything else is refused."""
+    if isinstance(e, Expression):
+        return e
+    if isinstance(e, bool) or not isinstance(e, (int, float)):
+        raise Mistake(f"{e!r} is neither a number nor an expression: nothing can be calculated with it")
+    if not math.isfinite(e):
+        raise Mistake(f"{e!r} is not a finite number: nothing can be calculated with it")
+    return float(e)
+
+
 class Term(Expression):
     """An operation or a function, and what it is done to."""
 
     def __init__(self, op: str, *args: Operand) -> None:
-        for one in args:
-            if isinstance(one, bool) or not isinstance(one, (Expression, int, float)):
-                raise Mistake(f"{one!r} is neither a number nor an expression: nothing can be calculated with it")
-            if not isinstance(one, Expression) and not math.isfinite(one):
-                raise Mistake(f"{one!r} is not a finite number: nothing can be calculated with it")
-        self.op, self.args = op, args
+        self.op, self.args = op, tuple(map(operand, args))
 
 
 def _function(name: str) -> Callable[[Operand], Operand]:

@@ -23,10 +23,12 @@ class Scribe:
     `given`: what variables are called here.  `kept`: constants, which are attributes of the model.
     """
 
-    def __init__(self, given: Mapping[Expression, str], kept: Collection[Expression], taken: Collection[str]) -> None:
+    def __init__(
+        self, given: Mapping[Expression, str], kept: Collection[Expression], taken: Collection[str], depth: int
+    ) -> None:
         self.given, self.kept, self.taken = dict(given), kept, set(taken)
         self.lines: list[str] = []
-        self.depth = 2
+        self.depth = depth
         self.known: dict[int, str] = {}  # number of an expression -> its local name
         self.names: dict[int, str] = {}
         self._uses: Counter[int] = Counter()
@@ -144,23 +146,18 @@ class Scribe:
         return ast.Name(name)
 
     def _built(self, e: Term) -> ast.expr:
-        args = [real(self._node(one)) for one in e.args]
+        args = [self._node(one) for one in e.args]
         if e.op in BINARY:
             return signed(e.op, *args)
         if e.op == "neg":
             return minus(args[0])
         if e.op in COMPARED:
             if e.op == "==":
-                args[1] = ast.Constant(e.args[1])
+                args[1] = ast.Constant(int(e.args[1]))
             return ast.Compare(args[0], [COMPARED[e.op]], [args[1]])
         if e.op == "choose":
             return ast.IfExp(*args)
         return ast.Call(ast.Name(e.op), args, [])
-
-
-def real(node: ast.expr) -> ast.expr:
-    """A number as a float: C would divide whole ones otherwise."""
-    return ast.Constant(float(node.value)) if isinstance(node, ast.Constant) and type(node.value) is int else node
 
 
 def signed(op: str, a: ast.expr, b: ast.expr) -> ast.expr:

@@ -8,9 +8,13 @@ from textwrap import indent, wrap
 from ...runtime.oscillator import Oscillator
 from .anatomy import Anatomy
 from .declared import Contact, Mode, Output, State, Variable
-from .expressions import FUNCTIONS
-from .methods import Methods
+from .frame import Frame
+from .friction import friction
+from .motion import motion
+from .names import IMPORTS, MATH
+from .outputs import observe
 from .scribe import INDENT
+from .values import values
 
 HEAD = '''"""{first}
 
@@ -33,16 +37,6 @@ class {name}({base}):
 
 {methods}
 '''
-IMPORTS = {  # module -> what may be needed of it
-    "automaton": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
-    "codes": ("DOP853", "EXACT", "HYBRID", "ODE23", "ODE45", "RODAS"),
-    "declare": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
-    "exact": ("Exact",),
-    "march": ("March",),
-    "methods": ("EXACT_ITEM", "ITEMS"),
-    "oscillator": ("Oscillator",),
-}
-MATH = ("copysign", "inf", "pi", *FUNCTIONS)
 WIDTH = 105
 RUN = ("stop_time", "step_size", "tolerance")
 
@@ -50,6 +44,7 @@ RUN = ("stop_time", "step_size", "tolerance")
 def written(an: Anatomy, file: str) -> str:
     """The text of the module."""
     an.judge_runtime()
+    f = Frame(an)
     first, _, rest = cleandoc(an.model.__doc__ or "").partition("\n")
     about = indent(f"{first}\n{rest}" + ("\n" if rest else ""), INDENT).strip(" ")
     text = HEAD.format(
@@ -63,7 +58,7 @@ def written(an: Anatomy, file: str) -> str:
         about=about.rstrip(" ") + (INDENT if rest else ""),
         declarations=indent("\n".join(declarations(an)), INDENT),
         facts=indent("\n".join(facts(an)), INDENT),
-        methods=Methods(an).text(),
+        methods="\n\n".join([*values(f), *motion(f), *friction(f), observe(f)]),
     )
     return text.replace("{imports}", imports(text), 1)
 

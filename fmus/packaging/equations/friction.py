@@ -1,0 +1,75 @@
+"""The methods of a written-out model about its contact at rest, and the force under the law in force."""
+
+from .algebra import depends, derivative, inside, put, size
+from .declared import SIGN, THRESHOLD, Contact
+from .expressions import Expression, Operand, Term
+from .frame import Frame, method
+from .scribe import Scribe
+
+
+def friction(f: Frame) -> list[str]:
+    """All of them; none where nothing sticks."""
+    c = f.contact
+    return [] if c is None else [hold(f, c), terms(f, c), *departure(f, c)]
+
+
+def hold(f: Frame, c: Contact) -> str:
+    """The load on the body at rest, its rate, and the most that is held."""
+    load = f.an.load[c]
+    wanted = [load, derivative(load, f.an.by_time), f.an.hold[c]]
+    return method("hold", ["t", *f.states], f.returning(f.scribe(), wanted))
+
+
+def terms(f: Frame, c: Contact) -> str:
+    """The sum of the sizes of what the load is made of."""
+    s, sizes = f.scribe(), size(f.an.load[c])
+    if f.drive is not None and depends(sizes, (f.drive,)):
+        way = f"fabs(self.{f.drive.steady.name}) * (fabs(t) + fabs(self.t_base))"
+        s.say(f"{f.drive.name} = fabs(self.x_base) + {way}")
+        sizes = put(sizes, dict.fromkeys(magnitudes(sizes, f.drive), f.drive))
+        s.given[f.drive] = f.drive.name
+    s.count(sizes)
+    s.say(f"return {s.text(sizes)}")
+    return method("terms", ["t", *f.states], s.lines)
+
+
+def departure(f: Frame, c: Contact) -> list[str]:
+    """The rate at a break-away, where the load is just the limit and friction falls to what it is while it slides."""
+    if c.hold is None or any(depends(e, f.an.moving) for e in (c.slide, c.hold)):
+        return []
+    less = Term("neg", Term("*", c.mode, Term("-", c.hold, c.slide)))
+    jump = derivative(f.rate.means, {c: less})
+    return [method("departure", f.point, f.returning(f.scribe(), [jump]))]
+
+
+def under_the_law(f: Frame, s: Scribe, c: Contact) -> None:
+    """The lines that calculate the force; the mode is told as the law has it."""
+    load = f.an.load[c]
+    held = s.hold(load) if isinstance(load, Term) else s.text(load)
+    if THRESHOLD in c.laws:
+        with s.block(f"if {f.mode} != 0:"):
+            s.say(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
+        with s.block("elif self.friction == HYBRID:"):
+            s.say(f"{c.name} = {held}")
+        with s.block("else:"):
+            s.say(f"{c.name} = {by_threshold(f, s, c)}")
+            s.say(f"{f.mode} = sign({f.v.name}) if fabs({f.v.name}) >= {s.text(c.eps)} else 0")
+    else:
+        with s.block(f"if {f.mode} == 0{' and self.friction == HYBRID' if SIGN in c.laws else ''}:"):
+            s.say(f"{c.name} = {held}")
+        with s.block("else:"):
+            f.follow_sign(s, [c.mode])
+            s.say(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
+    s.given[c] = c.name
+
+
+def by_threshold(f: Frame, s: Scribe, c: Contact) -> str:
+    """The force by the threshold law."""
+    return f"threshold({f.v.name}, {', '.join(map(s.text, (c.eps, f.an.load[c], c.slide, f.an.hold[c])))})"
+
+
+def magnitudes(e: Operand, drive: Expression) -> list[Term]:
+    """Where the size of the position of a driver is asked for."""
+    if isinstance(e, Term) and e.op == "fabs" and e.args[0] is drive:
+        return [e]
+    return [found for one in inside(e) for found in magnitudes(one, drive)]

@@ -1,0 +1,23 @@
+"""The names that a written-out model takes for itself; an author's are others."""
+
+from ...runtime.automaton import DryFriction
+from .expressions import FUNCTIONS
+
+MATH = ("copysign", "inf", "pi", *FUNCTIONS)
+IMPORTS = {  # module -> what may be needed of it
+    "automaton": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
+    "codes": ("DOP853", "EXACT", "HYBRID", "ODE23", "ODE45", "RODAS"),
+    "declare": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
+    "exact": ("Exact",),
+    "march": ("March",),
+    "methods": ("EXACT_ITEM", "ITEMS"),
+    "oscillator": ("Oscillator",),
+}
+ATTRIBUTES = ("friction", "solver", "events", "exact", "exchange", "x_base", "t_base")
+METHODS = ("initial", "rates", "jacobian", "push", "hold", "terms", "observe")  # beside those that are inherited
+FACTS = ("stop_time", "step_size", "tolerance", "rules")  # which an author sets as such
+RESERVED = {
+    *("self", "t", *MATH, *ATTRIBUTES, *METHODS),
+    *(name for names in IMPORTS.values() for name in names),
+    *(name for name in dir(DryFriction) if not name.startswith("__")),
+} - {*FACTS}

@@ -1,0 +1,22 @@
+"""The method of a written-out model that sets its outputs, and says whether they are numbers."""
+
+from .expressions import Term
+from .frame import Frame, method
+from .friction import under_the_law
+
+
+def observe(f: Frame) -> str:
+    an, s, c = f.an, f.scribe(), f.contact
+    f.place_drive(s, an.drives)
+    s.count(*an.outputs, *an.outputs)
+    if c is not None:
+        s.count(an.load[c], an.load[c], c.slide)
+        under_the_law(f, s, c)
+    for e in an.outputs:
+        if isinstance(e.means, Term):
+            s.hold(e)
+    for e in (*an.states, *an.drives, *an.outputs, *an.contacts, *an.modes):
+        s.say(f"self.{e.name} = {s.text(e)}")
+    sizes = (s.text(e) if e.low >= 0.0 else f"fabs({s.text(e)})" for e in an.first_to_overflow)
+    s.say(f"return {' + '.join(sizes)} < inf")
+    return method("observe", f.point, s.lines)

@@ -1,0 +1,65 @@
+"""The methods of a written-out model about its values: at its birth, at the start, when they have changed."""
+
+from .algebra import parts
+from .expressions import Term
+from .frame import Frame, method
+from .scribe import INDENT
+
+
+def values(f: Frame) -> list[str]:
+    """All of them."""
+    return [init(f), initial(f), prepare(f), *finest(f), *drive(f)]
+
+
+def init(f: Frame) -> str:
+    """Every attribute is born here."""
+    lines = ["super().__init__()", "self.solver = Solver()"]
+    if f.an.closed_form:
+        lines.append("self.exact = Exact()")
+    if f.drive is not None:
+        lines.append("self.t_base = self.x_base = 0.0")
+    if f.constants:
+        lines.append(" = ".join(f"self.{e.name}" for e in f.constants) + " = 0.0")
+    return method("__init__", (), [2 * INDENT + line for line in lines])
+
+
+def initial(f: Frame) -> str:
+    """Position and speed at the start."""
+    s = f.scribe()
+    if f.drive is not None:
+        s.say("self.t_base, self.x_base = t, 0.0")
+    return method("initial", ["t"], f.returning(s, [f.x.begins, f.v.begins]))
+
+
+def prepare(f: Frame) -> str:
+    """Constants and rules; a rule is judged as soon as it can be: what it refuses could not be divided by."""
+    s, dry = f.scribe(), f.contact is not None
+    done: list[Term] = []
+    s.kept = done
+    s.count(*f.constants, *(rule.broken for rule in f.an.rules))
+
+    def calculate(needed: set[int] | None = None) -> None:
+        for e in f.constants:
+            if (needed is None or id(e) in needed) and not any(e is one for one in done):
+                s.let(f"self.{e.name}", e)
+                done.append(e)
+
+    for number, rule in enumerate(f.an.rules, 2 if dry else 1):  # friction has a rule of its own
+        calculate(parts(rule.broken))
+        with s.block(f"if {s.text(rule.broken)}:"):
+            s.say(f"return {number}")
+    calculate()
+    if f.an.closed_form:
+        s.say(f"self.exact.prepare({', '.join(map(s.text, f.an.closed_form))})")
+    s.say("return super().prepare()" if dry else "return 0")
+    return method("prepare", (), s.lines)
+
+
+def finest(f: Frame) -> list[str]:
+    """The speed that a tolerance must resolve."""
+    return [] if f.v.finest is None else [method("finest", (), f.returning(f.scribe(), [f.v.finest]))]
+
+
+def drive(f: Frame) -> list[str]:
+    """The speed of the driver."""
+    return [] if f.drive is None else [method("drive", (), f.returning(f.scribe(), [f.drive.steady]))]
