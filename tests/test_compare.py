@@ -1,12 +1,11 @@
 """Runs and comparisons of FMUs that are not ours, built with plain pythonfmu, and of ours."""
 
 import json
-import os
 import subprocess
 import sys
 from math import cos, sqrt
-from pathlib import Path
 
+import commands
 import numpy as np
 import pytest
 
@@ -15,8 +14,6 @@ from harness.running.trajectory import Trajectory
 from harness.studies.compare.difference import compare
 from harness.studies.compare.trajectory import read
 
-ROOT = Path(__file__).parent.parent
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "120"}
 FOREIGN = '''
 from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
@@ -79,8 +76,7 @@ def harness(fmus, tmp_path):
     (tmp_path / "fmus").symlink_to(fmus)
 
     def run(*arguments):
-        command = [sys.executable, "-m", "harness", *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+        return commands.harness(tmp_path, *arguments, COLUMNS="120")
 
     return run
 
@@ -310,8 +306,7 @@ def test_within_fails_on_what_is_not_a_number(tmp_path):
     (tmp_path / "good.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
     (tmp_path / "bad.csv").write_text("t [s],x [m]\n0,1\n1,nan\n2,3\n")
     for pair in (("good.csv", "bad.csv"), ("bad.csv", "good.csv"), ("bad.csv", "bad.csv")):
-        command = [sys.executable, "-m", "harness", "compare", *pair, "--within", "1e9"]
-        done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+        done = commands.harness(tmp_path, "compare", *pair, "--within", "1e9", COLUMNS="120")
         assert done.returncode == 1
         assert "x is not a finite number at t = 1 s" in done.stdout
         assert done.stderr.count("\n") == 1

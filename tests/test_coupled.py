@@ -1,14 +1,13 @@
 """Coupled scenes: the archive is valid and opens elsewhere, and the engine's answer tends to the monolithic one."""
 
 import json
-import os
 import subprocess
 import sys
 import zipfile
 from importlib.util import find_spec
 from math import cos, sqrt
-from pathlib import Path
 
+import commands
 import numpy as np
 import pytest
 from fmpy import read_model_description
@@ -19,8 +18,6 @@ from harness.truths.monolith import Bodies, solve
 
 here = all(map(find_spec, ("pyssp_standard", "ecospy")))
 pytestmark = pytest.mark.skipif(not here, reason="the extra 'coupled' is not installed")
-ROOT = Path(__file__).parent.parent
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 PAIR = """
 title = "a title"
 stop = 1.0
@@ -40,8 +37,7 @@ def couple(fmus, tmp_path):
         if "\n" in scene:
             (tmp_path / "mine.toml").write_text(scene)
             scene = "mine.toml"
-        command = [sys.executable, "-m", "harness", "couple", scene, *options]
-        return subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
+        return commands.harness(tmp_path, "couple", scene, *options)
 
     return run
 

@@ -1,27 +1,18 @@
 """The harness runs wherever it is: no letter of a path, and nothing that an FMU lacks, makes it crash."""
 
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from commands import harness
 
 from harness.errors import HarnessError
 from harness.process import room as rooms
 from harness.process.room import plain, room
 from harness.running import unpacked
 
-ROOT = Path(__file__).parent.parent
 ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
-
-
-def harness(folder, *arguments, **environment):
-    environment = os.environ | {"PYTHONPATH": str(ROOT)} | environment
-    command = [sys.executable, "-m", "harness", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
 
 
 @pytest.fixture

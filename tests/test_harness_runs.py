@@ -1,10 +1,13 @@
 """The harness on the built FMUs, through its command line, in processes of their own."""
 
 import csv
+import re
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
+import commands
 import numpy as np
 import pytest
 
@@ -12,11 +15,15 @@ ROOT = Path(__file__).parent.parent
 BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 
 
-def python(folder, *arguments, **environment):
+ENVIRONMENT = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
+TIME = r'"name": "run_time",\s+"value": [^,]+'
+harness = partial(commands.harness, base=ENVIRONMENT)
+
+
+def python(folder, *arguments):
     """The finished process of Python with these arguments, which finds the harness but is run in `folder`."""
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"} | environment
     command = [sys.executable, *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
+    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
 
 
 @pytest.fixture
@@ -25,8 +32,8 @@ def scene(place, tmp_path):
 
     def run(text, *options, **environment):
         (tmp_path / "mine.toml").write_text(text)
-        arguments = ("-m", "harness", "run", tmp_path / "mine.toml", "--out", tmp_path / "out", *options)
-        return python(place, *arguments, **environment), tmp_path / "out/mine"
+        arguments = ("run", tmp_path / "mine.toml", "--out", tmp_path / "out", *options)
+        return harness(place, *arguments, **environment), tmp_path / "out/mine"
 
     return run
 
@@ -41,7 +48,7 @@ def table(path):
 @pytest.fixture(scope="module")
 def main_job(place):
     """The finished main job and its results."""
-    done = python(place, "-m", "harness")
+    done = harness(place, fresh=True)
     return done, place / "results"
 
 
@@ -183,14 +190,33 @@ def test_a_missing_fmu_says_how_to_build_it(tmp_path):
     (tmp_path / "fmus").mkdir()
     (tmp_path / "fmus/absent.py").write_text("")
     (tmp_path / "mine.toml").write_text(BASE.replace("stickslip", "absent"))
-    done = python(tmp_path, "-m", "harness", "run", "mine.toml")
+    done = harness(tmp_path, "run", "mine.toml")
     assert done.returncode == 1
     assert "there is no fmus/absent.fmu: build the FMUs with `python build_fmus.py`" in done.stderr
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["list"],
+        ["run", "nosuch"],
+        ["run", "stickslip", "--json"],
+        ["decay", "coulomb", "--json"],
+        ["compare", "fmus/smd.fmu", "fmus/coulomb.fmu", "--json"],
+        ["couple", "two-masses", "--json"],
+        ["report", "--help"],
+    ],
+)
+def test_a_process_that_is_forked_answers_as_a_fresh_one(place, tmp_path, arguments):
+    out = ["--out", tmp_path] if "--json" in arguments else []
+    fresh, forked = (harness(place, *arguments, *out, fresh=how) for how in (True, False))
+    assert (forked.returncode, forked.stderr) == (fresh.returncode, fresh.stderr)
+    assert re.sub(TIME, "", forked.stdout) == re.sub(TIME, "", fresh.stdout)
+
+
 @pytest.mark.parametrize("arguments", [["runn"], ["run"], ["run", "nosuch"], ["--nosuch"]])
 def test_wrong_usage_has_status_two(place, arguments):
-    done = python(place, "-m", "harness", *arguments)
+    done = harness(place, *arguments)
     assert done.returncode == 2
     assert "Error: " in done.stderr
     assert "Traceback" not in done.stderr
@@ -203,7 +229,7 @@ def test_quiet_prints_nothing(scene):
 
 
 def test_list_shows_every_scene(place):
-    done = python(place, "-m", "harness", "list")
+    done = harness(place, "list")
     for path in (ROOT / "harness/scenes").glob("*.toml"):
         assert path.stem in done.stdout
 

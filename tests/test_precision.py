@@ -1,13 +1,11 @@
 """Work-precision: what is measured, what counts as a gap, what the sentences say."""
 
 import csv
-import subprocess
-import sys
 from functools import partial
 from math import nan
-from pathlib import Path
 from time import sleep
 
+import commands
 import numpy as np
 import pytest
 
@@ -19,16 +17,13 @@ from harness.studies.precision.study import FMPY, FMU, QUICK, WAYS, Extent, Job,
 from harness.truths import peers
 from harness.truths.reference import CASES, errors, load
 
-ROOT = Path(__file__).parent.parent
 CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.chatters]
 
 
 def command(place, *arguments):
     """The finished process of `python -m harness precision` in a folder."""
-    line = [sys.executable, "-m", "harness", "precision", *map(str, arguments)]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
-    return subprocess.run(line, cwd=place, env=environment, capture_output=True, text=True, timeout=120)
+    return commands.harness(place, "precision", *arguments, base={}, PATH="", COLUMNS="100")
 
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "stickslip"])

@@ -1,12 +1,10 @@
 """Work-precision of the FMI 3.0 FMUs through fmpy: its own solver in model exchange, and theirs in co-simulation."""
 
 import csv
-import subprocess
-import sys
 from html import unescape
 from math import isnan
-from pathlib import Path
 
+import commands
 import numpy as np
 import pytest
 from fmi3_hosts import built
@@ -18,7 +16,6 @@ from harness.studies.precision import advice
 from harness.studies.precision.study import CS, ME, Extent, jobs, sweep
 from harness.truths.reference import CASES, load
 
-ROOT = Path(__file__).parent.parent
 CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.chatters]
 TOLERANCES = (1e-4, 1e-6, 1e-8)
@@ -112,9 +109,7 @@ def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
 
 def harness(folder, *arguments):
     """The finished process of a command in a folder."""
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "80"}
-    line = [sys.executable, "-m", "harness", *map(str, arguments)]
-    return subprocess.run(line, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
+    return commands.harness(folder, *arguments, base={}, PATH="", COLUMNS="80")
 
 
 def test_the_command_shows_both_ways_beside_the_others_and_error_against_tolerance(both, tmp_path):

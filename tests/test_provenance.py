@@ -2,18 +2,14 @@
 
 import csv
 import json
-import os
-import subprocess
-import sys
 from hashlib import sha256
-from pathlib import Path
 
 import pytest
+from commands import harness
 from fmpy import read_model_description
 
 from tests.models import MODELS
 
-ROOT = Path(__file__).parent.parent
 COMMANDS = {  # that take seconds, and the folders of their results
     "run": (("run", "coulomb"), "coulomb"),
     "run --fmu": (("run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.25"), "coulomb"),
@@ -21,13 +17,6 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "decay": (("decay", "coulomb"), "decay/coulomb"),
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1"), "sweep/coulomb-f"),
 }
-
-
-def harness(folder, *arguments):
-    """The finished process of the harness in a folder."""
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "harness", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
 
 
 @pytest.fixture

@@ -1,16 +1,13 @@
 """The report on results of real runs: complete, self-contained, and fit for a phone."""
 
-import os
 import re
 import shutil
 import subprocess
-import sys
 from html.parser import HTMLParser
-from pathlib import Path
 
 import pytest
+from commands import harness
 
-ROOT = Path(__file__).parent.parent
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 FLAGS = (
     "--headless=new",
@@ -20,12 +17,6 @@ FLAGS = (
     "--disable-dev-shm-usage",
 )
 EMPTY = {"meta", "link", "img", "br"}
-
-
-def harness(folder, *arguments):
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "harness", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
 
 
 @pytest.fixture(scope="module")

@@ -14,6 +14,7 @@ from functools import partial
 from math import sqrt
 from pathlib import Path
 
+import commands
 import numpy as np
 import pytest
 
@@ -36,11 +37,7 @@ def harness(fmus, tmp_path):
     """harness(argument, ...): the finished process, in a folder with the built FMUs."""
     (tmp_path / "fmus").symlink_to(fmus)
 
-    def run(*arguments):
-        command = [sys.executable, "-m", "harness", *map(str, arguments)]
-        return subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, timeout=120)
-
-    return run
+    return partial(commands.harness, tmp_path)
 
 
 def opened(folder):
@@ -220,12 +217,12 @@ def test_a_sweep_asks_for_no_port_of_its_own_and_listens_to_this_machine_only(ha
         "        print(*arguments[1][:2], file=open('bound', 'a'))\n"
         "sys.addaudithook(note)\n"
     )
-    with socket.socket() as taken, pytest.MonkeyPatch.context() as patch:
+    with socket.socket() as taken:
         with contextlib.suppress(OSError):  # taken already: so much the better
             taken.bind(("127.0.0.1", 8787))
             taken.listen()
-        patch.setitem(ENVIRONMENT, "PYTHONPATH", f"{tmp_path}{os.pathsep}{ROOT}")
-        done = harness(*MAP, "--workers", 2, "--quiet")
+        patched = f"{tmp_path}{os.pathsep}{ROOT}"
+        done = harness(*MAP, "--workers", 2, "--quiet", fresh=True, PYTHONPATH=patched)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert set((tmp_path / "bound").read_text().splitlines()) == {"127.0.0.1 0"}
 
