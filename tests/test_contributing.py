@@ -1,0 +1,62 @@
+"""CONTRIBUTING.md to the letter: its files written, its changes made, its commands typed, in a copy of the project."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from builds import ROOT
+
+BLOCK = re.compile(r"^```(\w+) ?(\S*)\n(.*?)^```$", re.M | re.S)
+CHANGE = re.compile(r"((?:^-.*\n)+)((?:^\+.*\n)+)", re.M)
+PARTS = ("fmus", "harness", "tests", "build_fmus.py", "pyproject.toml", "README.md", "LICENSE")
+
+
+@pytest.fixture
+def project(tmp_path):
+    """The copy."""
+    for part in PARTS:
+        if (ROOT / part).is_dir():
+            shutil.copytree(ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns("*.fmu", "__pycache__"))
+        else:
+            shutil.copy(ROOT / part, tmp_path)
+    return tmp_path
+
+
+def typed(line, folder):
+    """A command in the folder must end well."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = os.environ | {"PATH": path, "PYTHONPATH": str(folder)}
+    done = subprocess.run(line, shell=True, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+
+
+def changed(text, change):
+    """The text after a change, each part of which is found once."""
+    assert "".join(before + after for before, after in CHANGE.findall(change)) == change
+    for before, after in CHANGE.findall(change):
+        old, new = (re.sub(r"^[-+]", "", part, flags=re.M).rstrip("\n") for part in (before, after))
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+def test_each_example_does_what_the_page_says(project):
+    files, commands = set(), []
+    for kind, name, content in BLOCK.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")):
+        file = project / name
+        if kind == "sh":
+            commands += content.splitlines()
+            for line in content.splitlines():
+                typed(line, project)
+            continue
+        assert file.exists() == (kind == "diff"), f"{name} is there already, or not yet"
+        file.write_text(changed(file.read_text(encoding="utf-8"), content) if kind == "diff" else content)
+        files.add(name)
+    assert {"build_fmus.py", "harness", "pytest"} <= {word for line in commands for word in line.split()}
+    typed(f"python -m ruff check {' '.join(sorted(files))}", project)
+    typed(f"python -m ruff format --check {' '.join(sorted(files))}", project)
+    typed("lint-imports", project)
