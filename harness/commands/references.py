@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from .terminal import JSON, QUIET, screen, tell
+from .terminal import JSON, QUIET, answer
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -26,8 +26,5 @@ def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
     from ..truths.certified import certify
 
     made = [certify(file) for file in files]
-    if as_json:
-        tell(made)
-    elif not quiet:
-        for one in made:
-            screen().print(f"{one.path}, relative difference {one.difference:.1e}", highlight=False)
+    shown = (f"{one.path}, relative difference {one.difference:.1e}" for one in made)
+    answer(quiet, as_json, made, *shown)
