@@ -16,6 +16,7 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ..scenes.fmus import fmu_of
+from ..scenes.roles import roles
 from .fmu import WARNING, begin, callbacks, described, instance, put
 from .settings import labels
 from .specification import Specification
@@ -90,15 +91,9 @@ class Refusals:
     wrong: tuple[str, ...]
 
 
-def plain(model: str) -> Specification:
-    """A model's FMU, its position, velocity and energy."""
-    motion = ("theta", "omega") if model == "pendulum" else ("x", "v")
-    return Specification(fmu_of(model), (*motion, "energy"))
-
-
 def card(model: str) -> Card:
     """The card of a model's FMU."""
-    description = described(plain(model))
+    description = described(Specification(fmu_of(model)))
     experiment, variables = description.defaultExperiment, description.modelVariables
     settable = [variable for variable in variables if variable.causality in ("parameter", "input")]
     enumerations = {v.name: v for v in settable if v.type == "Enumeration"}
@@ -117,11 +112,11 @@ def card(model: str) -> Card:
 class Probe:
     """An instance of an FMU that can be run anew and anew."""
 
-    def __init__(
-        self, outputs: tuple[str, ...], description: Any, fmu: Any, messages: list[tuple[int, str]], spoken: io.StringIO
-    ):
-        self.fmu, self.messages, self.spoken, self.outputs = fmu, messages, spoken, outputs
+    def __init__(self, description: Any, fmu: Any, messages: list[tuple[int, str]], spoken: io.StringIO) -> None:
+        self.fmu, self.messages, self.spoken = fmu, messages, spoken
         self.variables = {variable.name: variable for variable in description.modelVariables}
+        motion = roles(self.variables)
+        self.outputs = (motion["position"], motion["velocity"], "energy")
 
     def begin(self, setting: Setting) -> None:
         values = ((self.variables[name], value) for name, value in setting.values.items())
@@ -157,9 +152,9 @@ class Probe:
 def probe(model: str) -> Iterator[Probe]:
     """A fresh instance of a model's FMU, whose words are kept from the terminal."""
     functions, messages = callbacks()
-    wanted, spoken = plain(model), io.StringIO()
+    wanted, spoken = Specification(fmu_of(model)), io.StringIO()
     with redirect_stderr(spoken), instance(wanted, functions) as (description, fmu):
-        yield Probe(wanted.outputs, description, fmu, messages, spoken)
+        yield Probe(description, fmu, messages, spoken)
 
 
 def run(setting: Setting, calls: Calls, changes: Changes) -> Motion | Refusal:

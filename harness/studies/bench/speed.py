@@ -10,10 +10,9 @@ import numpy as np
 
 from ...running import loops
 from ...running.clock import best, timed
-from ...running.fmu import described
+from ...running.description import description
 from ...running.inside import Inside, embedded
 from ...running.loops import POINTS
-from ...running.probe import plain
 from ...scenes.fmus import fmu_of
 from ...truths import peers
 from ...truths.problem import Equations, Pacejka, Smd, Stickslip
@@ -86,9 +85,9 @@ def communication_step(model: str) -> Measure:
     """A communication step through fmpy with all outputs recorded, as a multiple of that of an empty FMU."""
     mine = fmu_of(model)
     with TemporaryDirectory(prefix="fmu-") as folder:
-        description = described(plain(model))
-        stop = float(description.defaultExperiment.stopTime)
-        variables = description.modelVariables
+        found = description(fmu_of(model))
+        stop = float(found.defaultExperiment.stopTime)
+        variables = found.modelVariables
         kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
         traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
         nothing = bench_empty.build(f"Empty{model.capitalize()}", traits, stop, Path(folder))
