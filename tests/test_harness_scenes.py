@@ -4,7 +4,9 @@ import pytest
 
 from harness.errors import SceneError
 from harness.results.quantity import Quantity
+from harness.scenes.coupled.scene import CoupledKeys
 from harness.scenes.scene import load, shipped
+from harness.scenes.schema import structured
 
 GOOD = {"title": '"a title"', "model": '"stickslip"', "outputs": '["x", "v", "a"]'}
 
@@ -70,6 +72,43 @@ def test_a_wrong_scene_is_told_in_one_sentence(tmp_path, keys, sentence):
     assert str(caught.value).startswith("scene mine: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+PAIR = {
+    "title": "a title",
+    "stop": 1.0,
+    "steps": [0.1],
+    "parts": {"a": {"model": "smd"}, "b": {"model": "smd"}},
+}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"parts": 3}, "parts = 3 is not a table"),
+        ({"parts": {"a": 3}}, "parts.a = 3 is not a table"),
+        (
+            {"parts": {"a": {"modle": "smd"}}},
+            "unknown key in [parts.a] 'modle' (nearest: 'model'); allowed: model, values",
+        ),
+        ({"parts": {"a": {"values": {"k": 1}}}}, "the key 'parts.a.model' is missing"),
+        ({"parts": {"a": {"model": "smd", "values": {"k": "x"}}}}, "parts.a.values.k = 'x' is not a finite number"),
+        ({"springs": {"k": 1}}, "springs = {'k': 1} is not a list"),
+        ({"springs": [{"between": ["a", "b"], "k": 1}, 3]}, "springs[1] = 3 is not a table"),
+        (
+            {"springs": [{"between": ["a", "a"], "k": 1}]},
+            "springs[0].between = ['a', 'a'] is not a list of two different",
+        ),
+        ({"connections": [{"from": 1, "to": "b", "factor": 1}]}, "connections[0].from = 1 is not a text"),
+        ({"connections": [{"from_": "a.x", "to": "b", "factor": 1}]}, "unknown key in [connections[0]] 'from_'"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_whatever_is_wrong_its_place_is_told_however_deep_it_is(wrong, sentence):
+    structured(PAIR, CoupledKeys)
+    with pytest.raises(SceneError) as caught:
+        structured(PAIR | wrong, CoupledKeys)
+    assert str(caught.value).startswith(sentence)
 
 
 def test_an_unknown_scene_is_told_the_shipped_names():

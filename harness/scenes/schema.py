@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar, get_origin
+from types import GenericAlias
+from typing import Any, TypeVar, get_args, get_origin
 
 from cattrs import Converter
-from cattrs.cols import homogenous_tuple_structure_factory
 from cattrs.errors import (
     BaseValidationError,
     ClassValidationError,
@@ -119,7 +119,8 @@ def tables(annotation: Any) -> Hook:
 
 def items(annotation: Any) -> Hook:
     """A list whose items are alike."""
-    return of_kind(LIST, homogenous_tuple_structure_factory(annotation, CONVERTER))
+    alike: Any = GenericAlias(list, get_args(annotation)[:1])
+    return of_kind(LIST, lambda value, _: tuple(CONVERTER.structure(value, alike)))
 
 
 def made_of(container: Any) -> Callable[[Any], bool]:
