@@ -81,6 +81,19 @@ def test_the_report_says_what_its_results_were_made_from(here):
     assert "k = 157.9 N/m" in page
 
 
+def test_the_report_shows_whatever_was_run(here):
+    """Each FMU and each scene of one's own, by its first and last values where nothing else was asked."""
+    (here / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = ["position"]\n')
+    for arguments in (("--fmu", "fmus/pacejka.fmu"), ("mine.toml",)):
+        assert harness(here, "run", *arguments).returncode == 0
+    assert harness(here, "report").returncode == 0
+    page = (here / "results/report.html").read_text()
+    assert "Other runs" in page
+    assert all(f"<h3>{name}</h3>" in page for name in ("pacejka", "mine"))
+    assert "<td>x [m]</td><td>0.1</td>" in page
+    assert "mine: the plots that its scene names" in page
+
+
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"files": 1}', '{"files": {}, "versions": {}}'])
 def test_a_damaged_account_is_told_in_the_page(here, content):
     assert harness(here, "run", "smd").returncode == 0

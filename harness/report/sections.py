@@ -76,10 +76,8 @@ class Section:
 
 def sections(results: Path) -> list[Section]:
     """Every section, from the results below a folder."""
-    return [
-        make(results)
-        for make in (oscillators, decays, steps, precision, stability, importers, sweeps, comparisons, coupled, bench)
-    ]
+    made = [oscillators, runs, decays, steps, precision, stability, importers, sweeps, comparisons, coupled, bench]
+    return [section for make in made if (section := make(results)).parts or section.missing]
 
 
 def read(place: Path, make: Callable[[Path], Item]) -> Item:
@@ -115,6 +113,22 @@ def oscillators(results: Path) -> Section:
 def oscillator(text: str, folder: Path) -> Item:
     picture = drawn(folder / "figure.png", f"{folder.name}: position, velocity and phase plane of the run")
     return Item(folder.name, (text,) if text else (), table(folder / "figures.csv"), picture)
+
+
+def runs(results: Path) -> Section:
+    """What was run besides: scenes and FMUs of whoever reads the page."""
+    cases = [case for cases in CASES.values() for case in cases]
+    found = folders(results, "trajectory.csv")
+    others = [folder for folder in found if folder.name not in cases or not (folder / "figures.csv").is_file()]
+    intro = "Scenes and FMUs of one's own, from their first value to their last."
+    return Section("runs", "Other runs", intro, tuple(read(folder, own) for folder in others), ())
+
+
+def own(folder: Path) -> Item:
+    figures, recorded = folder / "figures.csv", table(folder / "trajectory.csv")
+    rows = tuple(zip(recorded.heads, recorded.rows[0], recorded.rows[-1], strict=True))
+    grid = table(figures) if figures.is_file() else TableCells(("", "first", "last"), rows)
+    return Item(folder.name, (), grid, drawn(folder / "figure.png", f"{folder.name}: the plots that its scene names"))
 
 
 def decays(results: Path) -> Section:
