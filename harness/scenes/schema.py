@@ -2,7 +2,7 @@
 
 The dataclass is the schema: keys, tables in tables, and beside each type, as in `Annotated[float, POSITIVE]`, what a
 value must be and the words for that.  cattrs walks the table.  (It finds the place of what is wrong, tables by name
-included; msgspec leaves such names out, and pydantic is forty times its size.)
+included; msgspec leaves such names out, and pydantic is some forty times its size.)
 """
 
 import tomllib
@@ -144,7 +144,8 @@ def faults(error: Exception, where: str = "") -> Iterator[tuple[int, str]]:
     if isinstance(error, ClassValidationError | IterableValidationError):
         placed, others = error.group_exceptions()
         for each, note in placed:
-            yield from faults(each, below(where, note.index if isinstance(note, IterableValidationNote) else note.name))
+            key = note.index if isinstance(note, IterableValidationNote) else note.name.rstrip("_")
+            yield from faults(each, below(where, key))
         for each in others:
             yield from faults(each, where)
     elif isinstance(error, ForbiddenExtraKeysError):
@@ -160,7 +161,7 @@ def below(where: str, key: str | int) -> str:
     """The place of a key, or of an item counted from 0."""
     if isinstance(key, int):
         return f"{where}[{key}]"
-    name = key.rstrip("_") if key.isidentifier() else shown(key)
+    name = key if key.isidentifier() else shown(key)
     return f"{where}.{name}" if where else name
 
 
