@@ -6,65 +6,27 @@
    it never comes to an end, with any solver; with modes it is one event.
 """
 
+import os
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import partial
-from math import fabs, sqrt
+from functools import cache, partial
+from math import sqrt
+from pathlib import Path
 
 import numpy as np
 
-from fmus.packaging.catalogue import load
-from fmus.runtime.automaton import DryFriction
-from fmus.runtime.codes import HYBRID, ODE45
-from fmus.runtime.declare import Choice
-from fmus.runtime.march import March
-from fmus.runtime.methods import ITEMS
-
 from ...errors import HarnessError
+from ...process.child import ask
+from ...process.room import room
 from ...running.answer import Answer
-from ...running.inside import Inside, offered
+from ...running.inside import Inside, embedded, offered
+from ...scenes.fmus import fmu_of
 from ...truths import peers
 from ...truths.problem import Belt, Classic, Equations, Plain, Smoothed
 
 LIMIT = 20_000  # right-hand sides after which a run counts as without end
 RUNTIME, EVENTS = "this runtime", "events"
-
-
-class Solver(March):
-    method = Choice(ODE45, "integration method", ITEMS)
-
-
-class Block(DryFriction):
-    """Block on a belt, seen from the belt, where it sticks at zero speed: y = x - belt t.
-
-    y'' = -(y + belt t) - F_friction          m = k = F_s = 1 in SI units
-    sliding:   F_friction = sign(v)/(1 + 3 |v|)
-    stuck:     v = 0 while |y + belt t| <= 1
-    """
-
-    friction = HYBRID
-    stop_time = 50.0
-    belt = 0.2  # m/s
-
-    def __init__(self):
-        super().__init__()
-        self.solver = Solver()
-
-    def initial(self, t):
-        return 1.067, -self.belt
-
-    def rates(self, t, x, v, mode):
-        return -(x + self.belt * t) - mode / (1.0 + 3.0 * mode * v)
-
-    def jacobian(self, t, x, v, mode):
-        fall = 1.0 + 3.0 * mode * v
-        return -self.belt, -1.0, 3.0 / (fall * fall)
-
-    def hold(self, t, x, v):
-        return -(x + self.belt * t), -self.belt, 1.0
-
-    def terms(self, t, x, v):
-        return fabs(x) + fabs(self.belt * t)
 
 
 @dataclass(frozen=True)
@@ -90,13 +52,25 @@ TIGHT = {"RK23": 1e-6, "ode23": 1e-6, "DOP853": 1e-10, "dop853": 1e-10}  # and 1
 def analyse() -> Iterator[AnchorRun]:
     """Both anchors with every method of the runtime, then with the peers."""
     name = "block on a belt"
-    yield from runtime(name, Block, {}, Belt.stop, BLOCK)
+    yield from runtime(name, block(), {}, Belt.stop, BLOCK)
     yield from others(name, Belt(), BLOCK, EVENTS, {"scipy": ("RK23", "RK45", "DOP853", "LSODA"), "cvode": ("Adams",)})
     yield from others(name, Smoothed(), BLOCK, "arctan(1e6 v)", {"scipy": ("RK45", "LSODA")})
     name, values = "chattering classic", {"m": 1.0, "k": 1.0, "f": 10.0, "x0": 0.0, "v0": 5.0}
-    yield from runtime(name, load("coulomb"), values, Classic.stop, CLASSIC)
+    yield from runtime(name, embedded(fmu_of("coulomb")), values, Classic.stop, CLASSIC)
     yield from others(name, Classic(), CLASSIC, EVENTS, {"scipy": ("RK23", "RK45", "LSODA")})
     yield from others(name, Plain(), CLASSIC, "plain sign(v)", {"scipy": ("RK23", "RK45", "LSODA", "Radau")})
+
+
+@cache
+def block() -> type:
+    """The model of the block, inside the FMU that is built of block.py on the spot."""
+    home = Path(__file__)
+    with room("block-") as folder:
+        command = [sys.executable, "-m", "build_fmus", str(home.with_name("block.py")), "--out", str(folder)]
+        done = ask(command, environment=os.environ | {"PYTHONPATH": str(home.parents[3])})
+        if done.returncode:
+            raise HarnessError(f"the block on a belt cannot be built: {(done.stderr.splitlines() or ['?'])[-1]}")
+        return embedded(folder / "block.fmu")
 
 
 def runtime(
@@ -117,14 +91,14 @@ def others(
     for peer in (peer for peer in methods if peer not in peers.missing()):
         for method in methods[peer]:
             rtol = TIGHT.get(method, 1e-8)
-            ask = partial(peers.solve, peer, method, problem, times, rtol, 1e-3 * rtol, peers.at_most(LIMIT))
-            yield row(partial(AnchorRun, name, f"{peer}, {way}", method, rtol), ask, end)
+            solve = partial(peers.solve, peer, method, problem, times, rtol, 1e-3 * rtol, peers.at_most(LIMIT))
+            yield row(partial(AnchorRun, name, f"{peer}, {way}", method, rtol), solve, end)
 
 
-def row(begin: Callable[..., AnchorRun], ask: Callable[[], Answer], end: tuple[float, float]) -> AnchorRun:
+def row(begin: Callable[..., AnchorRun], solve: Callable[[], Answer], end: tuple[float, float]) -> AnchorRun:
     """One line of the table."""
     try:
-        answer = ask()
+        answer = solve()
     except HarnessError as error:
         return begin(None, float("nan"), str(error))
     return begin(answer.evaluations, float(np.abs(answer.motion[-1] - end).max()))
