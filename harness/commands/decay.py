@@ -81,7 +81,7 @@ def decay(
             raise click.UsageError("--velocity: one column is fitted; leave out --position and --quantity")
         position, quantity = velocity, "velocity"
     columns = Columns(time, position, quantity, unit, time_unit, per_count, names, begin, end)
-    with progress(quiet or as_json, 1) as report:
+    with decays.uncollected(), progress(quiet or as_json, 1) as report:
         progressed = partial(report, "standard input" if source == "-" else source)
         found, folder = decays.perform(source, columns, Known(k, m, pendulum), drag, drift, out, progressed)
     answer(quiet, as_json, decays.numbers(found), table(found), "", *sentences(found), f"Results in {folder}")

@@ -4,7 +4,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib import rc_context
@@ -46,15 +46,18 @@ WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
 
 
 @contextmanager
-def sheet(path: Path, width: float, height: float) -> Iterator[Figure]:
-    """A figure in this look, of a size in inches; saved as PNG when all has been drawn.
+def sheet(
+    path: Path, width: float, height: float, layout: Literal["constrained"] | None = "constrained"
+) -> Iterator[Figure]:
+    """A figure in this look, of a size in inches; saved as PNG when all has been drawn.  Without a `layout`, which
+    draws all of it once more to find the margins, these are given.
 
     Names and titles are drawn letter by letter, whatever is in them.  What nobody can draw, such as letters that the
     font lacks and numbers near the end of their range, is left out of the picture without a word.
     """
     with rc_context(STYLE), warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        figure = Figure(figsize=(width, height), dpi=130, layout="constrained")
+        figure = Figure(figsize=(width, height), dpi=130, layout=layout)
         yield figure
         for text in texts(figure):
             text.set_parse_math(False)

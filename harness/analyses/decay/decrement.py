@@ -10,12 +10,15 @@ Sources: Thomson, Theory of Vibration, sections 2.6 and 2.7 (logarithmic decreme
 
 from dataclasses import dataclass
 from math import log, pi, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import HarnessError
 from ...results.quantity import Quantity
-from ...running.run import Run
+
+if TYPE_CHECKING:
+    from ...running.run import Run  # a record from a file needs nothing that runs
 
 
 @dataclass(frozen=True)
@@ -29,7 +32,7 @@ class Decay:
     quantities: tuple[Quantity, ...]
 
 
-def analyse(run: Run, gives: str, first: int = 0, cycles: float | None = None) -> Decay:
+def analyse(run: "Run", gives: str, first: int = 0, cycles: float | None = None) -> Decay:
     """What the decay of the recorded position `gives` (zeta, f or T_f) from the peak `first` over so many cycles, None
     for all; HarnessError if the run does not show one."""
     times, positions = turning_points(run.time, run.motion("position"), run.motion("velocity"))
@@ -55,7 +58,7 @@ def analyse(run: Run, gives: str, first: int = 0, cycles: float | None = None) -
     return Decay(result, cycles, times, positions, (*ends, result))
 
 
-def sampled(run: Run, time: float) -> float:
+def sampled(run: "Run", time: float) -> float:
     """The larger of the two samples around a turning point: what a plot of the samples shows as the peak."""
     i = int(np.clip(np.searchsorted(run.time, time), 1, len(run.time) - 1))
     return float(np.abs(run.motion("position")[i - 1 : i + 1]).max())

@@ -17,8 +17,7 @@ COLOURS = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of 
 
 def draw(found: Identified, loss: Loss, path: Path) -> None:
     """Save the figure as PNG."""
-    with sheet(path, 1.8 * WIDTH, 3.4 * HEIGHT) as figure:
-        figure.set_layout_engine("none")  # one that seeks its margins takes as long again as the figure
+    with sheet(path, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None) as figure:
         grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
         above = figure.add_subplot(grid[0])
         below = figure.add_subplot(grid[1], sharex=above)

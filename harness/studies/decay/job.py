@@ -1,6 +1,8 @@
 """A measured record or a scene, from its file to what its decay says, in a folder of results."""
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from functools import partial
 from math import prod
@@ -44,6 +46,18 @@ def perform(
         save(found, fresh)
         told(fresh)
     return found, folder
+
+
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Without the collection of cycles: importing, fitting and drawing leave few, and to look for them, also when the
+    process ends, takes a quarter of a short command."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def load_record(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> Loaded:
