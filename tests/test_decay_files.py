@@ -111,6 +111,7 @@ FILES = {
     "logger.csv": lambda: text_of(logger()),
     "holes.csv": lambda: text_of(holes()),
     "gap.csv": lambda: text_of(gap()),
+    "late-sensor.csv": lambda: text_of("t [s],x [mm]\nnan,nan\n,\n" + rows(T, 1e3 * X)),
     "cut-off.csv": lambda: text_of("t [s],x [mm]\n" + rows(T, 1e3 * X) + "\n6.0"),
     "phone.csv": lambda: text_of(phone()),
     "gyroscope.csv": lambda: text_of('"Time (s)","Gyroscope x (rad/s)"\n' + rows(T, motion(1, sine=True))),
@@ -131,7 +132,7 @@ ASKED = {
 PENDULUMS = ("stamps.csv", "gyroscope.csv", "encoder.csv")
 QUANTITIES = {"phone.csv": "acceleration", "accelerometer-in-g.csv": "acceleration", "gyroscope.csv": "velocity"}
 SAID = {
-    "logger.csv": "rounded to 0.01 s",
+    "logger.csv": "rounded to 0.01 s; they are spread evenly, one each 0.0125004 s, which is sure to about 8e-05",
     "holes.csv": "3 of 600 rows have a missing cell",
     "cut-off.csv": "1 of 601 rows have a missing cell",
     "phone.csv": "Linear Acceleration z (m/s^2)",

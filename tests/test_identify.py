@@ -293,6 +293,24 @@ def test_a_hand_that_stops_the_motion_is_left_out_and_said():
     assert "follows the law until t = " in said(found)
 
 
+def test_samples_that_a_logger_repeats_before_and_after_the_motion_are_left_out():
+    """They are longer than the motion, and stop it in mid-swing."""
+    record = swung(0.01, 0.001, turn=0.0, noise=1e-4)
+    x = np.concatenate([np.full(900, record.x[0]), record.x, np.full(1200, record.x[-1])])
+    each = {one.name: one for one in identify(Record("padded", 0.004 * np.arange(len(x)), x), Known()).estimates}
+    assert abs(each["zeta"].value - 0.01) < 4 * each["zeta"].error < 0.002
+    assert abs(each["r"].value - 0.001) < 4 * each["r"].error < 1e-4
+
+
+@pytest.mark.parametrize("order", range(3), ids=QUANTITIES)
+def test_one_sample_far_off_bends_the_fit_no_more_than_it_counts(order):
+    record = swung(0.01, 0.001, turn=0.0, noise=1e-5 * OMEGA**order, order=order)
+    record.x[0] += 0.3 * OMEGA**order
+    found = identify(record, Known())
+    assert values(found.estimates)["zeta"] == pytest.approx(0.01, rel=1e-2)
+    assert len(found.t) == len(record.t) - 1
+
+
 def test_stray_samples_are_left_out_and_counted():
     record = swung(0.02, 0.003, noise=1e-4)
     record.x[[200, 500]] += (0.05, -0.08)

@@ -2,13 +2,20 @@
 
 import numpy as np
 
+from .record import FEWEST
+
 
 def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     """Standard deviation of the noise of x (n,), and the step of a quantiser that stands out of it, or 0.
 
     The noise is what is left of a sample by the cubic through its four neighbours, robustly by the median; also the
-    curvature that sampling is too coarse for counts.  A quantiser of step q adds at least q/sqrt(12).
+    curvature that sampling is too coarse for counts.  A quantiser of step q adds at least q/sqrt(12).  What repeats
+    itself before the first change, or after the last, is no sign of a quiet sensor.
     """
+    changes = np.flatnonzero(np.diff(x))
+    if len(changes) and changes[-1] - changes[0] > 2 * FEWEST:
+        moving = slice(changes[0], changes[-1] + 2)
+        t, x = t[moving], x[moving]
     n = len(t) - 4
     near = np.array([t[i : i + n] for i in (0, 1, 3, 4)])
     weights = np.ones((4, n))

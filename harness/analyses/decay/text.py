@@ -102,6 +102,8 @@ def first_of_numbers(rows: list[list[str]]) -> int | None:
 
 def headings(above: list[list[str]], width: int) -> list[str]:
     """The headings from the rows above the numbers: the last of that width, or two of which the second has units."""
+    while above and all(cell.lower() in MISSING for cell in above[-1]):
+        above = above[:-1]  # rows of nothing begin the numbers
     wide = [row for row in above[-3:] if abs(len(row) - width) <= (len(row) > 1)]
     wide = [[*row, ""][:width] for row in wide if not all(is_number(cell) for cell in row if cell)]
     if not wide or wide[-1] != [*above[-1], ""][:width]:

@@ -20,6 +20,7 @@ FAR = 8.0  # times the noise of a stray sample
 STRAY = 0.001  # share of the samples, beside two, that may stray
 PARTS = (0.6, 0.35)  # shares of the turning points that may be free of what disturbs the rest
 LOST = 4.0  # times the noise: where a half swing leaves the law
+PARTLY = 0.05  # of the samples of the half swing before it
 LEAST = 6  # turning points before that
 ROUNDS = 6  # of going on from there
 
@@ -172,11 +173,13 @@ def until_disturbed(
 
 
 def leaving(problem: Problem, p: np.ndarray, terms: Terms, after: float, far: float) -> float:
-    """When the first half swing begins, later than `after` in s, most of which is `far` off; the end where none is."""
+    """When the first half swing begins, later than `after` in s, most of which is `far` off, or the one before it
+    where that is partly; the end where none is."""
     e, _ = problem.off(p, terms)
     _, begins = problem.half_swings(p)
     edges = np.searchsorted(problem.t, [*begins, problem.t[-1]]).tolist()
-    for begin, (low, high) in zip(begins.tolist(), pairwise(edges), strict=True):
-        if begin >= after and high > low and typical(e[low:high]) > far:
-            return begin
+    for i, (low, high) in enumerate(pairwise(edges)):
+        if begins[i] >= after and high > low and typical(e[low:high]) > far:
+            before = np.abs(e[edges[max(i - 1, 0)] : low]) > far
+            return float(begins[i - 1] if before.any() and before.mean() > PARTLY else begins[i])
     return float(problem.t[-1])
