@@ -32,7 +32,7 @@ INTEGERS = st.sampled_from([0, 1, 2, 3, 4, 5, 99, -1, 2**31 - 1, -(2**31)])
 TIMES = st.sampled_from([0.0, 0.0, -3.0, 1e4, 1e-9, nan, inf, -inf])
 RUNS = st.sampled_from([None, None, 0.4, 1.0, 0.0, -1.0, nan, inf])
 SIZES = st.sampled_from([0.1, 0.1, 0.05, 0.3, 1e-3, 1e-9, 1e-17, 0.0, -0.0, -0.1, nan, inf])
-OFF = st.sampled_from([0.0] * 6 + [1e-17, -1e-17, 4e-16, -4e-16, 1e-8, 1e-6, -1e-3, nan, inf])  # of a point in time
+OFF = st.sampled_from([0.0] * 6 + [4e-16, -4e-16, 3e-15, -3e-15, 1e-14, 1e-11, -1e-11, 1e-8, 1e-6, -1e-3, nan, inf])
 NEW, INITIALISING, RUNNING = range(3)
 BOTH = range(2)  # places of the kinds
 
@@ -50,8 +50,12 @@ class Calls(RuleBasedStateMachine):
             [worker.instantiate(path, "twin") for worker, path in zip(self.workers, paths, strict=True)]
             for _ in range(2)
         ]
-        self.saved, self.phase, self.t, self.begun = [], NEW, 0.0, False
+        self.saved = []
+        self.anew()
         self.seen = sorted(v for v in self.declared if v != "solver.t_next")  # which looks ahead
+
+    def anew(self):
+        self.phase, self.t, self.stop, self.begun = NEW, 0.0, inf, False
 
     def both(self, function, *arguments, of=None):
         """The same call of both, or of what each of them has in `of`; what they answer, which must be the same."""
@@ -83,8 +87,8 @@ class Calls(RuleBasedStateMachine):
     @rule(start=TIMES, run=RUNS, tolerance=st.sampled_from([None, 1e-4, 0.0, 1.0, -1.0, nan]))
     def setup(self, start, run, tolerance):
         if self.free:
-            self.t = start
-            self.both("setup", start, None if run is None else start + run, tolerance)
+            self.t, self.stop = start, inf if run is None else start + run
+            self.both("setup", start, None if run is None else self.stop, tolerance)
         else:
             self.both("setup", 0.0, None, None)
 
@@ -104,7 +108,7 @@ class Calls(RuleBasedStateMachine):
     @rule(again=st.booleans())
     def reset(self, again):
         self.both("reset")
-        self.phase, self.t, self.begun = NEW, 0.0, False
+        self.anew()
         if again:
             self.both("setup", 0.0, None, None)
             self.both("enter")
@@ -116,13 +120,21 @@ class Calls(RuleBasedStateMachine):
     @precondition(lambda self: self.phase == RUNNING)
     @rule(h=SIZES, begin=OFF, end=OFF)
     def step(self, h, begin, end):
+        """Off by a share of the time, or of 1 s."""
         if not self.free and not self.begun:
             begin = 0.0  # where it begins is where the run does
         self.begun = True
-        at, size = self.t + begin, h + end if h else h
+        scale = max(1.0, abs(self.t))
+        at, size = self.t + begin * scale, h + end * scale if h else h
         python, _ = self.both("step", at, size)
         if python is not driver.Refused:
             self.t = at + size
+
+    @precondition(lambda self: self.phase == RUNNING and self.stop < inf)
+    @rule(share=st.sampled_from([0.0, 1e-12, 5e-7, 2e-6, 1e-3]))
+    def last(self, share):
+        """To the stop time, or a share of the step beyond it."""
+        self.step((self.stop - self.t) * (1.0 + share), 0.0, 0.0)
 
     @precondition(lambda self: self.phase == RUNNING)
     @rule(off=OFF)
@@ -157,12 +169,12 @@ class Calls(RuleBasedStateMachine):
         states = self.both("save")
         if as_bytes:
             states = self.both("deserialize", of=self.both("serialize", of=states))
-        self.saved.append((states, self.phase, self.t, self.begun))
+        self.saved.append((states, self.phase, self.t, self.stop, self.begun))
 
     @precondition(lambda self: self.saved)
     @rule(data=st.data())
     def restore(self, data):
-        states, self.phase, self.t, self.begun = data.draw(st.sampled_from(self.saved))
+        states, self.phase, self.t, self.stop, self.begun = data.draw(st.sampled_from(self.saved))
         self.both("restore", of=states)
 
     @rule()
