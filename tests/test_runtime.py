@@ -14,8 +14,8 @@ from fmus.runtime.declare import variables
 from fmus.runtime.slave import slave_for
 
 FMI_SIDE = [
-    *("__init__", "beside", "boundary", "declare", "failure", "hosted"),
-    *("sentences", "slave", "slave3", "state", "values"),
+    *("__init__", "boundary", "declare", "failure", "hosted"),
+    *("sentences", "slave", "slave3", "state", "values", "variables3"),
 ]
 NUMERICS = {
     path.stem: path.read_text() for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.stem not in FMI_SIDE

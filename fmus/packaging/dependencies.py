@@ -10,7 +10,7 @@ from random import Random
 from typing import Any
 
 from ..runtime.declare import Declared, Declaring
-from ..runtime.state import SETTABLE
+from ..runtime.values import SETTABLE
 
 SITUATIONS = 2000
 SIZES = 2.0  # powers of ten above and below a start value

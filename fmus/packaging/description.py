@@ -11,7 +11,7 @@ from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from ..runtime.declare import Declared, Declaring, Output
-from ..runtime.state import SETTABLE
+from ..runtime.values import SETTABLE
 from . import BuildError, __version__
 from .dependencies import at_start
 from .document import document

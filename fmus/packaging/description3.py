@@ -1,16 +1,16 @@
 """The model description of FMI 3.0, for co-simulation and model exchange (FMI 3.0.1, sections 2.4, 3.3 and 4.3).
 
 The declared variables keep the value references they have in FMI 2.0.  Behind them stand the time, the event
-indicators and the rate of a driver (runtime/beside.py).
+indicators and the rate of a driver (runtime/variables3.py).
 """
 
 from datetime import datetime
 from typing import Any, cast
 from xml.etree.ElementTree import Element, SubElement
 
-from ..runtime.beside import DERIVATIVE, TO_BREAK_AWAY, TO_REST, beside
 from ..runtime.declare import Declaring, Output
 from ..runtime.exchange import nominals
+from ..runtime.variables3 import DERIVATIVE, TO_BREAK_AWAY, TO_REST, further
 from .dependencies import at_start
 from .description import (
     Variables,
@@ -47,7 +47,7 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     for interface, abilities in ("ModelExchange", EXCHANGE), ("CoSimulation", STEPPING):
         SubElement(root, interface, {"modelIdentifier": name} | BOTH | abilities)
     declared = declared_by(model)
-    declared = declared + beside(model, declared)
+    declared = declared + further(model, declared)
     define_units(root, declared)
     _define_types(root, declared)
     log_and_experiment(root, model, "fmi3")

@@ -27,15 +27,15 @@ class Edition:
 FMI2 = Edition(
     layer="pythonfmu",
     entry="""\
-from {package} import {model}, hold
+from {package} import {model}, lend
 
-hold(globals())
+lend(globals())
 """,
     init='''\
 """{name} as an FMI 2.0 co-simulation slave."""
 
 from .{name} import {model} as Model
-from .guard import hold
+from .guard import lend
 from .runtime.slave import slave_for
 
 {model} = slave_for(Model)

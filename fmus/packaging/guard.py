@@ -18,12 +18,13 @@ import sys
 from contextlib import suppress
 from ctypes import PYFUNCTYPE, PyDLL, c_void_p, cast
 from glob import escape, glob
+from typing import Any
 
-lent: list = []
-libraries: dict = {}  # path -> address of its finalizePythonInterpreter
+lent: list[object] = []
+libraries: dict[str, Any] = {}  # path -> address of its finalizePythonInterpreter
 
 
-def hold(names):
+def lend(names: dict[str, str]) -> None:
     """Called by the entry script, with its names: when it is imported, then whenever an instance is made."""
     lent.append(names)
     if len(lent) == 1:
@@ -35,14 +36,14 @@ def hold(names):
             return
 
 
-def leave_path(resources):
+def leave_path(resources: str) -> None:
     """Called when an instance is made: its folder of resources is read, and needs to be found no more."""
     with suppress(ValueError):  # by value: another thread may have moved the places meanwhile
         sys.path.remove(resources)
     watch(resources)
 
 
-def watch(resources):
+def watch(resources: str) -> None:
     """Note where the library of the FMU in this folder has its last function."""
     if sys.platform != "linux":
         return
@@ -54,7 +55,7 @@ def watch(resources):
 
 
 @atexit.register
-def let_go():
+def let_go() -> None:
     """Call the last function of each library that is still there; asking the loader would block inside dlclose."""
     if not libraries:
         return

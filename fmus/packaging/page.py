@@ -6,7 +6,7 @@ from inspect import cleandoc
 from pathlib import Path
 
 from ..runtime.declare import Declared, Declaring
-from ..runtime.state import SETTABLE
+from ..runtime.values import SETTABLE
 from . import __version__
 from .chart import chart
 from .description import Variables

@@ -4,15 +4,18 @@ After an exception the layer gives back its references to the class, the instanc
 them back once more.
 """
 
+from __future__ import annotations
+
 import sys
 from contextlib import suppress
 from ctypes import c_ulong, py_object, pythonapi
 from functools import partial
 from threading import get_ident
+from typing import Any
 from weakref import ref
 
 
-def guarded(function):
+def guarded(function: Any) -> Any:
     """The function, all of which is one try statement, such that this holds from its first instruction on.
 
     Since Python 3.11 a signal that has come meanwhile is handled when a function is entered: before the first line of
@@ -29,7 +32,7 @@ def guarded(function):
     return function
 
 
-def _number(table, at):
+def _number(table: bytes, at: int) -> tuple[int, int]:
     number = table[at] & 63
     while table[at] & 64:
         at += 1
@@ -37,7 +40,7 @@ def _number(table, at):
     return number, at + 1
 
 
-def _written(number):
+def _written(number: int) -> bytes:
     digits = [number & 63]
     while number > 63:
         number >>= 6
@@ -45,7 +48,7 @@ def _written(number):
     return bytes(reversed(digits))
 
 
-def pass_on(error, message):
+def pass_on(error: BaseException, message: object) -> object:
     """Raise the exception in this thread again as soon as the message is gone.
 
     The layer hands the messages to the host, who may run Python for it, and drops them when the call has no more to do:
@@ -58,18 +61,18 @@ def pass_on(error, message):
     return ref(message, partial(raise_in, get_ident(), again))
 
 
-def pay(*things):
+def pay(*things: object) -> None:
     """Take the references that the layer will give back once too often."""
     for thing in things:
         pythonapi["Py_IncRef"](py_object(thing))
 
 
-def printable(text):
+def printable(text: str) -> str:
     """A text that can be handed over as UTF-8, and ends where it ends in C."""
     return text.replace("\0", "").encode("utf-8", "backslashreplace").decode()
 
 
-def announce(line):
+def announce(line: str) -> None:
     """On standard error, whatever has become of it.
 
     Past its buffer, where there is one: what cannot be written would wait there, and Python end with status 120.

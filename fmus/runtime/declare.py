@@ -4,7 +4,10 @@ A variable is an attribute of a class; it takes its name from there.  An instanc
 plain numbers of the same names.  The XML, the pages and the error messages read the declaration.
 """
 
+from __future__ import annotations
+
 from math import inf, isfinite
+from typing import Any
 
 from .rules import within
 
@@ -16,27 +19,36 @@ class Declared:
     causality = ""
     variability = ""
     initial = ""
-    start = 0.0
-    items = ()
+    start: float = 0.0
+    items: tuple[tuple[str, int, str], ...] = ()
     role = ""  # what it is to the motion: a "state", the force of a "contact"
     rate_of = ""  # the name of the state whose rate it is
     rate = ""  # the name of the parameter that is its rate for all time, as of a driver
 
-    def __init__(self, unit, text, low=-inf, high=inf, above=-inf, below=inf, display=""):
+    def __init__(
+        self,
+        unit: str,
+        text: str,
+        low: float = -inf,
+        high: float = inf,
+        above: float = -inf,
+        below: float = inf,
+        display: str = "",
+    ) -> None:
         self.name = ""
         self.unit, self.text, self.display = unit, text, display
         self.low, self.high, self.above, self.below = low, high, above, below
 
-    def __set_name__(self, owner, name):
+    def __set_name__(self, owner: object, name: str) -> None:
         self.name = name
 
     @property
-    def suffix(self):
+    def suffix(self) -> str:
         """The unit, as it stands behind a number."""
         return "" if self.unit in ("", "1") else f" {self.unit}"
 
     @property
-    def allowed(self):
+    def allowed(self) -> str:
         """The range in words."""
         if self.items:
             return "one of " + ", ".join(f"{value} ({label})" for label, value, _ in self.items)
@@ -44,7 +56,7 @@ class Declared:
         words = [f"{word} {bound!r}{self.suffix}" for word, bound in bounds if isfinite(bound)]
         return " and ".join(words) or "a finite number"
 
-    def accepts(self, value):
+    def accepts(self, value: float) -> bool:
         """Whether `value` lies in the range; NaN and infinities never do."""
         if self.items:
             return value in [number for _, number, _ in self.items]
@@ -56,7 +68,7 @@ class Parameter(Declared):
 
     causality, variability, initial = "parameter", "tunable", "exact"
 
-    def __init__(self, start, unit, text, **more):
+    def __init__(self, start: float, unit: str, text: str, **more: Any) -> None:
         super().__init__(unit, text, **more)
         self.start = start
 
@@ -72,7 +84,7 @@ class Choice(Fixed):
 
     type = "Enumeration"
 
-    def __init__(self, start, text, items):
+    def __init__(self, start: int, text: str, items: tuple[tuple[str, int, str], ...]) -> None:
         super().__init__(start, "", text)
         self.items = items
 
@@ -88,7 +100,7 @@ class Output(Declared):
 
     causality, variability, initial = "output", "continuous", "calculated"
 
-    def __init__(self, unit, text, direct=False, rate_of="", **more):
+    def __init__(self, unit: str, text: str, direct: bool = False, rate_of: str = "", **more: Any) -> None:
         super().__init__(unit, text, **more)
         self.direct, self.rate_of = direct, rate_of
 
@@ -98,7 +110,7 @@ class State(Output):
 
     role = "state"
 
-    def __init__(self, unit, text, rate="", **more):
+    def __init__(self, unit: str, text: str, rate: str = "", **more: Any) -> None:
         super().__init__(unit, text, **more)
         self.rate = rate
 
@@ -108,7 +120,7 @@ class Contact(Output):
 
     role = "contact"
 
-    def __init__(self, unit, text, **more):
+    def __init__(self, unit: str, text: str, **more: Any) -> None:
         super().__init__(unit, text, direct=True, **more)
 
 
@@ -117,7 +129,7 @@ class Mode(Output):
 
     type, variability, start = "Integer", "discrete", 0
 
-    def __init__(self, text):
+    def __init__(self, text: str) -> None:
         super().__init__("", text, direct=True, low=-1, high=1)
 
 
@@ -132,21 +144,21 @@ class Count(Local):
 
     type, start = "Integer", 0
 
-    def __init__(self, text):
+    def __init__(self, text: str) -> None:
         super().__init__("", text, low=0)
 
 
 class Declaring:
     """An instance starts with the start value of every declared variable, as plain attributes."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         for declared in declarations(type(self)):
             setattr(self, declared.name, declared.start)
 
 
-def declarations(cls):
+def declarations(cls: type) -> list[Declared]:
     """The declared variables of a class, its own before those of its bases; a class may declare one anew."""
-    found = {}
+    found: dict[str, Declared] = {}
     for base in cls.__mro__:
         for name, value in vars(base).items():
             if isinstance(value, Declared):
@@ -154,7 +166,7 @@ def declarations(cls):
     return list(found.values())
 
 
-def variables(thing, prefix=""):
+def variables(thing: Declaring, prefix: str = "") -> list[tuple[str, Declared]]:
     """Dotted name and declaration of every variable of an object and of the objects it owns, in order."""
     found = [(prefix + declared.name, declared) for declared in declarations(type(thing))]
     for name, part in vars(thing).items():

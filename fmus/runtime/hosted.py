@@ -5,18 +5,19 @@ Python would abort.  What is wrong is remembered and said in one sentence, in th
 then returns False and every calculated Real reads NaN.
 """
 
+from __future__ import annotations
+
+from typing import Any
 from weakref import WeakSet
 
 from . import rules
 from .boundary import guarded
 from .codes import OK
-from .declare import variables
-from .failure import Failing
+from .declare import Declaring, variables
 from .state import Saved, shape
-from .values import Values
 
 
-def hosting(slave, model):
+def hosting(slave: type[Hosted], model: type[Declaring]) -> Any:
     """The class of slaves of a model class, under its name.
 
     A spare instance says what there is: CPython 3.11 reads the attributes of an object whose __dict__ has been
@@ -25,21 +26,21 @@ def hosting(slave, model):
     spare = model()
     about = {"Model": model, "variables": variables(spare), "shape": shape(spare), "__module__": __name__}
     about["living"] = WeakSet()
-    made = type(model.__name__, (slave,), about)
+    made: Any = type(model.__name__, (slave,), about)
     made.bare = made  # an entry script may derive from it
     return made
 
 
-class Hosted(Values, Saved, Failing):
+class Hosted(Saved):
     """One instance of the model `Model`.
 
     A base class after this one has `instance_name` and log(sentence, status).
     """
 
-    Model = None  # of the subclass that hosting() makes
+    Model: type  # of the subclass that hosting() makes
 
     @guarded
-    def __init__(self, **kwargs):
+    def __init__(self, **kwargs: Any) -> None:
         try:
             self.begin(**kwargs)
         except Exception:
@@ -48,7 +49,7 @@ class Hosted(Values, Saved, Failing):
             self.begin(**kwargs)
             self.rescue(error)
 
-    def begin(self, **kwargs):
+    def begin(self, **kwargs: Any) -> None:
         """As after instantiation."""
         super().__init__(**kwargs)
         self.living.add(self)
@@ -57,7 +58,7 @@ class Hosted(Values, Saved, Failing):
         self.give_access()
 
     @guarded
-    def exit_initialization_mode(self):
+    def exit_initialization_mode(self) -> None:
         try:
             status = rules.begin(self.run, self.model)
             if status != OK:
@@ -66,7 +67,7 @@ class Hosted(Values, Saved, Failing):
             self.rescue(error)
 
     @guarded
-    def do_step(self, current_time, step_size):
+    def do_step(self, current_time: float, step_size: float) -> Any:
         try:
             run, model = self.run, self.model
             seen = run.observed

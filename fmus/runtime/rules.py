@@ -29,13 +29,13 @@ from .codes import (
 
 
 class Run:
-    """What makes the run of an instance, beside the numbers of its model."""
+    """What makes the run of an instance, but for the numbers of its model."""
 
     def __init__(self, tolerance):
         self.phase, self.interface = INSTANTIATED, CO_SIMULATION
         self.start_time, self.stop_time, self.tolerance = 0.0, inf, tolerance
         self.refused = 0  # how many values were set that cannot be used
-        self.changed = False  # values were set since the motion was last settled
+        self.changed = False  # values were set that are not yet in force
         self.observed = False  # the outputs are those of the present point
         self.failed = False
 
@@ -105,7 +105,7 @@ def objection(run, model):
 # ---- the run
 
 
-def settle(run, model, beginning):
+def renew(run, model, beginning):
     """Take over what was set: the motion begins, or goes on from the present point.  Status."""
     status = objection(run, model)
     if status == OK:
@@ -124,7 +124,7 @@ def begin(run, model):
     run.phase = RUNNING
     if run.failed:
         return FAILED
-    return settle(run, model, True)
+    return renew(run, model, True)
 
 
 def begin_steps(run, model, t):
@@ -150,7 +150,7 @@ def ready(run, model):
     if run.phase < RUNNING:
         return begin(run, model)
     if run.changed or run.refused > 0:
-        return settle(run, model, False)
+        return renew(run, model, False)
     return OK
 
 
@@ -197,7 +197,7 @@ def end_of_step(run, march, t, h):
 def observe(run, model):
     """Bring the outputs to the present point.  Status: DIVERGED, or that of values which cannot be used yet."""
     if run.changed or run.refused > 0 or run.phase < RUNNING:
-        status = settle(run, model, run.phase < RUNNING)
+        status = renew(run, model, run.phase < RUNNING)
         if status != OK:
             return status
     show(run, model)

@@ -4,6 +4,10 @@ Fields: t, h are the communication step that is asked for; now, t_end the presen
 the beginning of the internal step in force; start, stop are the experiment.  Numbers stand as repr writes them.
 """
 
+from __future__ import annotations
+
+from typing import Any
+
 from .codes import (
     BAD_START,
     BAD_STEP,
@@ -20,7 +24,9 @@ from .codes import (
     RULES,
     STALLED,
 )
+from .declare import Declared
 from .march import MOST_CALLS, MOST_STEPS
+from .rules import Run
 
 RUN = {
     DIVERGED: "the motion leaves the range of numbers after t = {t0!r} s; lower what drives it or check the parameters",
@@ -50,16 +56,16 @@ CALLS = {
 }
 
 
-def of_run(status, run, model, t, h):
+def of_run(status: int, run: Run, model: Any, t: float, h: float) -> str:
     """The sentence about a run, or about the rule of the model that its values break."""
     if status not in RUN:
-        return model.rules[status - RULES - 1].format_map(vars(model))
+        return str(model.rules[status - RULES - 1]).format_map(vars(model))
     march = model.solver
     present = {"now": march.t, "t0": march.step.t0, "t_end": march.step.t_end}
     return RUN[status].format(t=t, h=h, start=run.start_time, stop=run.stop_time, **present)
 
 
-def of_value(reason, name, declared, value):
+def of_value(reason: int, name: str, declared: Declared, value: float) -> str:
     """The sentence about a value that cannot be used, of a declared variable."""
     return VALUES[reason].format(
         name=name, value=repr(value), unit=declared.suffix, text=declared.text, allowed=declared.allowed

@@ -1,16 +1,20 @@
 """The FMI 2.0 side: a pythonfmu slave made from a declared model."""
 
+from __future__ import annotations
+
 from math import inf, nan
+from typing import Any
 
 from pythonfmu.fmi2slave import Fmi2Slave, Fmi2Status
 
 from . import rules
 from .boundary import guarded
+from .declare import Declaring
 from .hosted import Hosted, hosting
 from .values import getter, setter
 
 
-def slave_for(model):
+def slave_for(model: type[Declaring]) -> Any:
     """The slave of a model class, under its name."""
     return hosting(Slave, model)
 
@@ -19,7 +23,9 @@ class Slave(Hosted, Fmi2Slave):
     """One instance of a model as pythonfmu's native layer calls it."""
 
     @guarded
-    def setup_experiment(self, start_time, stop_time=None, tolerance=None):
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
+    ) -> None:
         try:
             stop_time, tolerance = inf if stop_time is None else stop_time, tolerance or 0.0
             rules.setup(self.run, start_time, stop_time, tolerance)
@@ -33,6 +39,6 @@ class Slave(Hosted, Fmi2Slave):
     get_boolean, set_boolean = getter("Boolean", False), setter("Boolean")
     get_string, set_string = getter("String", ""), setter("String")
 
-    def log(self, msg, status=Fmi2Status.ok, category=None, debug=None):
+    def log(self, msg: object, status: int = Fmi2Status.ok, category: str | None = None, debug: Any = None) -> None:
         """The native layer takes the message for a printf format."""
         super().log(str(msg).replace("%", "%%"), Fmi2Status(status), category, debug)

@@ -5,36 +5,40 @@ state machine.  So an instance is undecided until a step is asked for (co-simula
 comes (model exchange), and the run begins where the first step does.
 """
 
+from __future__ import annotations
+
 from math import fabs, nan
+from typing import Any
 
 from . import exchange, rules
-from .beside import beside, place
 from .boundary import guarded
 from .codes import CO_SIMULATION, DIVERGED, MODEL_EXCHANGE, OK, RUNNING, UNDECIDED
+from .declare import Declaring
 from .failure import ERROR
 from .hosted import Hosted, hosting
 from .step import HUGE
 from .values import getter, setter
+from .variables3 import further, place
 
 
-def slave_for(model):
+def slave_for(model: type[Declaring]) -> Any:
     """The slave of a model class, under its name."""
     made = hosting(Slave, type(model.__name__, (exchange.Exchanging, model), {}))
-    made.variables = made.variables + beside(model, made.variables)
+    made.variables = made.variables + further(model, made.variables)
     return made
 
 
 class Message:
     """What the native layer reads of one."""
 
-    def __init__(self, status, category, msg):
+    def __init__(self, status: int, category: str, msg: str) -> None:
         self.status, self.category, self.msg, self.debug = status, category, msg, False
 
 
 class Stepped:
     """What it reads after a communication step."""
 
-    def __init__(self, status):
+    def __init__(self, status: int) -> None:
         self.status, self.terminateSimulation = status, False
 
 
@@ -44,7 +48,7 @@ class Updated:
     discreteStatesNeedUpdate = nextEventTimeDefined = False
     nextEventTime = 0.0
 
-    def __init__(self, terminate=False, states=False, nominals=False):
+    def __init__(self, terminate: bool = False, states: bool = False, nominals: bool = False) -> None:
         self.terminateSimulation = terminate
         self.valuesOfContinuousStatesChanged, self.nominalContinuousStatesChanged = states, nominals
 
@@ -61,27 +65,28 @@ STEPPED, NOT_STEPPED = Stepped(0), Stepped(ERROR)
 class Instance:
     """What the native layer asks of every instance."""
 
-    def __init__(self, instance_name="", resources="", logger=0, visible=False):
-        self.instance_name, self.messages = instance_name, []
+    def __init__(self, instance_name: str = "", resources: str = "", logger: object = 0, visible: bool = False) -> None:
+        self.instance_name = instance_name
+        self.messages: list[Message] = []
 
-    def log(self, sentence, status):
+    def log(self, sentence: str, status: int) -> None:
         self.messages.append(Message(status, "logStatusError", sentence))
 
-    def _get_log_queue(self):
+    def _get_log_queue(self) -> list[Message]:
         return self.messages
 
-    def enter_initialization_mode(self):
+    def enter_initialization_mode(self) -> None:
         """Nothing arrives here, neither tolerance nor start nor stop time."""
 
-    def terminate(self):
+    def terminate(self) -> None:
         """Nothing is open."""
 
 
-def asker(function, number):
+def asker(function: Any, number: Any) -> Any:
     """The method that tells what `function` makes of the present point; NaN where there is nothing to compute with."""
 
     @guarded
-    def ask(slave):
+    def ask(slave: Slave) -> Any:
         try:
             if number(slave) and slave.ready():
                 return function(slave.model, slave.model.solver)
@@ -99,7 +104,7 @@ class Slave(Hosted, Instance):
 
     exchanges = True
 
-    def begin(self, **kwargs):
+    def begin(self, **kwargs: Any) -> None:
         super().begin(**kwargs)
         self.run.interface = UNDECIDED
         self.nominals = exchange.nominals(self.model)
@@ -114,17 +119,17 @@ class Slave(Hosted, Instance):
     get_boolean, set_boolean = getter("Boolean", False), setter("Boolean")
     get_string, set_string = getter("String", ""), setter("String")
 
-    def place(self, name):
+    def place(self, name: str) -> str:
         return place(name)
 
-    def report(self, ahead):
+    def report(self, ahead: bool) -> None:
         super().report(ahead)
         self.model.exchange.show(self.model, self.model.solver)
 
     # ---- co-simulation
 
     @guarded
-    def do_step(self, current_time, step_size):
+    def do_step(self, current_time: float, step_size: float) -> Stepped:
         try:
             run, model = self.run, self.model
             status = OK if run.interface == CO_SIMULATION else rules.begin_steps(run, model, current_time)
@@ -138,14 +143,14 @@ class Slave(Hosted, Instance):
 
     # ---- model exchange
 
-    def get_number_of_continuous_states(self):
+    def get_number_of_continuous_states(self) -> int:
         return 3 if self.model.driven else 2
 
-    def get_number_of_event_indicators(self):
+    def get_number_of_event_indicators(self) -> int:
         return 2 if self.model.dry else 0
 
     @guarded
-    def set_time(self, t):
+    def set_time(self, t: float) -> None:
         try:
             self.begin_exchange()
             exchange.move_to(self.model, self.model.solver, t)
@@ -153,14 +158,14 @@ class Slave(Hosted, Instance):
             self.rescue(error)
 
     @guarded
-    def set_continuous_states(self, states):
+    def set_continuous_states(self, states: list[float]) -> None:
         try:
             self.begin_exchange()
             exchange.put(self.model, self.model.solver, states)
         except BaseException as error:  # as above
             self.rescue(error)
 
-    def get_nominals_of_continuous_states(self, number):
+    def get_nominals_of_continuous_states(self, number: int) -> Any:
         return exchange.nominals(self.model)[:number]
 
     get_continuous_states = asker(exchange.states, get_number_of_continuous_states)
@@ -168,7 +173,7 @@ class Slave(Hosted, Instance):
     get_event_indicators = asker(exchange.indicators, get_number_of_event_indicators)
 
     @guarded
-    def update_discrete_states(self):
+    def update_discrete_states(self) -> Updated:
         try:
             self.begin_exchange()
             model, march = self.model, self.model.solver
@@ -181,14 +186,15 @@ class Slave(Hosted, Instance):
             self.rescue(error)
         return Updated(terminate=True)
 
-    def begin_exchange(self):
+    def begin_exchange(self) -> None:
+        """From here on the importer's solver steps."""
         run = self.run
         run.observed = False
         if run.interface != MODEL_EXCHANGE:
             run.interface = MODEL_EXCHANGE
             exchange.begin(self.model.solver)
 
-    def ready(self):
+    def ready(self) -> bool:
         """Whether the values can be used; a run that has begun fails if they cannot."""
         run = self.run
         if run.phase < RUNNING:
@@ -201,7 +207,7 @@ class Slave(Hosted, Instance):
         except BaseException as error:  # as above
             return self.rescue(error)
 
-    def observe(self):
+    def observe(self) -> None:
         try:
             super().observe()
         except (ArithmeticError, ValueError):

@@ -1,15 +1,19 @@
 """Saved states: what one holds, what its bytes are (a checksum, then JSON), and whether they may be taken over."""
 
+from __future__ import annotations
+
 import json
 from binascii import crc32
+from typing import Any
+from weakref import WeakSet
 
 from . import rules
 from .boundary import announce, guarded, pay, printable
 from .codes import FOREIGN_STATE
 from .sentences import CALLS
+from .values import NOWHERE, SETTABLE, Values
 
-SETTABLE = ("parameter", "input")
-NOWHERE = ""  # among the values that cannot be used: one for a variable that is not there
+Shape = dict[str, Any]  # the name of every number with None, and of every object with the shape of that
 
 LONGEST = 1 << 20  # bytes; a state has some thousand
 DEEPEST = 400  # brackets: what they nest must not overflow the parser
@@ -18,13 +22,13 @@ WIDEST = 1 << 63  # integers are those of C
 REFUSED = CALLS[FOREIGN_STATE]
 
 
-def sealed(state):
+def sealed(state: object) -> bytes:
     """The bytes of a state."""
     text = json.dumps(state).encode()
     return b"%08x" % crc32(text) + text
 
 
-def unsealed(content):
+def unsealed(content: bytes) -> Any:
     """What the bytes hold, or None where they cannot be a state."""
     seal, text = content[:8], content[8:]
     if len(text) > LONGEST or seal != b"%08x" % crc32(text) or text.count(b"[") + text.count(b"{") > DEEPEST:
@@ -35,12 +39,12 @@ def unsealed(content):
         return None
 
 
-def integer(text):
+def integer(text: str) -> int:
     """As int, which takes minutes for a million digits."""
     return int(text[:20])
 
 
-def fits(value, pattern):
+def fits(value: Any, pattern: Any) -> bool:
     """Whether a value has the very names, types and lengths of the pattern."""
     if type(value) is not type(pattern):
         return False
@@ -51,12 +55,12 @@ def fits(value, pattern):
     return type(value) is not int or -WIDEST <= value < WIDEST
 
 
-def shape(thing):
+def shape(thing: object) -> Shape:
     """The name of every number of an object with None, and of every object it owns with the shape of that."""
     return {name: shape(value) if hasattr(value, "__dict__") else None for name, value in vars(thing).items()}
 
 
-def numbers(thing, names):
+def numbers(thing: object, names: Shape) -> dict[str, Any]:
     """All numbers of an object and of the objects it owns, as its shape names them: a flat copy that JSON can hold."""
     kept = {}
     for name, inner in names.items():
@@ -65,7 +69,7 @@ def numbers(thing, names):
     return kept
 
 
-def take_over(thing, names, kept):
+def take_over(thing: object, names: Shape, kept: dict[str, Any]) -> None:
     """Put the numbers back, under the names of the shape and no others."""
     for name, inner in names.items():
         value = kept[name]
@@ -81,18 +85,21 @@ RUN = shape(rules.Run(0.0))
 class Foreign(ValueError):
     """What is not a saved state of this FMU; the layer tells the host what it reads here."""
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return REFUSED
 
 
-class Saved:
+class Saved(Values):
     """The part of an instance that saves and restores its state."""
 
-    shape = living = bare = None  # of the subclass that hosting() makes
+    # of the subclass that hosting() makes
+    shape: Shape
+    living: WeakSet[Any]
+    bare: Any
     exchanges = False  # made for model exchange as well
 
     @guarded
-    def _get_fmu_state(self):
+    def _get_fmu_state(self) -> dict[str, Any]:
         try:
             run = dict(numbers(self.run, RUN), observed=False)  # for outputs are calculated anew
             kept = {"run": run, "origin": __name__, "refused": dict(self.refused)}
@@ -103,16 +110,16 @@ class Saved:
 
     @classmethod
     @guarded
-    def _fmu_state_to_bytes(cls, state):
+    def _fmu_state_to_bytes(cls, state: object) -> bytes:
         try:
             return sealed(state)
         except BaseException:
-            cls.settle_up()
+            cls.pay_up()
             raise
 
     @classmethod
     @guarded
-    def _fmu_state_from_bytes(cls, content):
+    def _fmu_state_from_bytes(cls, content: bytes) -> Any:
         try:
             state = unsealed(content)
             if state is None or not cls.is_own(state, content):
@@ -120,18 +127,18 @@ class Saved:
                 raise Foreign
             return state
         except BaseException:
-            cls.settle_up()
+            cls.pay_up()
             raise
 
     @classmethod
-    def settle_up(cls):
+    def pay_up(cls) -> None:
         """Pay for an exception that leaves a method of the class; which instance will be let go is not told."""
         for slave in cls.living:
             pay(slave, slave._get_log_queue())
         pay(cls)
 
     @classmethod
-    def is_own(cls, state, content):
+    def is_own(cls, state: dict[str, Any], content: bytes) -> bool:
         """Whether an instance can be in a state, and would write it so."""
         spare = cls.bare(instance_name="")
         cls.living.discard(spare)
@@ -143,7 +150,7 @@ class Saved:
         except (ArithmeticError, LookupError, TypeError, ValueError):
             return False
 
-    def is_sound(self):
+    def is_sound(self) -> bool:
         """Whether run, settings and sentences are such as can come about."""
         names = {NOWHERE, *(name for name, _ in self.variables)}
         return (
@@ -159,7 +166,7 @@ class Saved:
         )
 
     @guarded
-    def _set_fmu_state(self, state):
+    def _set_fmu_state(self, state: Any) -> None:
         try:
             own = type(state) is dict and state.get("origin") == __name__
             if own:
@@ -172,7 +179,7 @@ class Saved:
                 pay(self, self._get_log_queue(), type(self))
                 raise Foreign
 
-    def be(self, state):
+    def be(self, state: dict[str, Any]) -> None:
         """Take over a state that has been found good."""
         take_over(self.run, RUN, state["run"])
         self.refused = dict(state["refused"])

@@ -1,18 +1,25 @@
 """Reading and writing variables by their value references."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
 from . import rules, sentences
 from .boundary import guarded
 from .codes import DIVERGED, NO_VARIABLE, OK
-from .state import NOWHERE, SETTABLE
+from .failure import Failing
 
+SETTABLE = ("parameter", "input")
+NOWHERE = ""  # among the values that cannot be used: one for a variable that is not there
 MOST_READERS = 64  # an importer that asks for other lists all the time costs time, not memory
 
 
-def getter(kind, blank):
+def getter(kind: str, blank: object) -> Any:
     """The method that reads variables of a kind; `blank` answers for those that are not there."""
 
     @guarded
-    def get(slave, references):
+    def get(slave: Values, references: list[int]) -> list[Any]:
         try:
             asked, values, counts, ahead = slave.asked[kind]
             if asked != references:
@@ -30,11 +37,11 @@ def getter(kind, blank):
     return get
 
 
-def setter(kind):
+def setter(kind: str) -> Any:
     """The method that writes variables of a kind."""
 
     @guarded
-    def put(slave, references, values):
+    def put(slave: Values, references: list[int], values: Sequence[float]) -> None:
         try:
             for i, reference in enumerate(references):
                 if slave.is_one(kind, reference):
@@ -47,31 +54,30 @@ def setter(kind):
     return put
 
 
-class Values:
+class Values(Failing):
     """The part of an instance that reads and writes; a value reference is a place in `variables`."""
 
-    variables = None  # name and declaration of each
-
-    def give_access(self):
+    def give_access(self) -> None:
         """To the variables of a new model."""
         self.owners = [self.owner(name) for name, _ in self.variables]
-        self.readers = {}  # kind and value references -> what reads them; the same by kind, for those last asked for
-        self.asked = dict.fromkeys(("Real", "Integer", "Boolean", "String"), (None, None, False, False))
-        self.refused = {}  # name -> sentence: values that were set and cannot be used
+        # what reads a list of value references, by kind and references; the same by kind, for those last asked for
+        self.readers: dict[tuple[object, ...], Any] = {}
+        self.asked: dict[str, Any] = dict.fromkeys(("Real", "Integer", "Boolean", "String"), (None, None, False, False))
+        self.refused = {}
 
-    def place(self, name):
+    def place(self, name: str) -> str:
         """Where in the model a variable is."""
         return name
 
-    def owner(self, name):
+    def owner(self, name: str) -> tuple[object, str]:
         """The object that holds a variable, and the name of the attribute there."""
-        thing = self.model
+        thing: object = self.model
         *path, last = self.place(name).split(".")
         for part in path:
             thing = getattr(thing, part)
         return thing, last
 
-    def is_one(self, kind, reference):
+    def is_one(self, kind: str, reference: int) -> bool:
         """Whether a reference is that of a variable of the kind."""
         if not 0 <= reference < len(self.variables):
             return False
@@ -79,12 +85,13 @@ class Values:
 
     # ---- reading
 
-    def reader(self, kind, references, blank):
+    def reader(self, kind: str, references: list[int], blank: object) -> tuple[list[int], Any, bool, bool]:
         """The references, what reads them, whether they tell of the solver, and whether it must look ahead first."""
         key = kind, *references
         if key in self.readers:
-            self.asked[kind] = self.readers[key]
-            return self.readers[key]
+            known: tuple[list[int], Any, bool, bool] = self.readers[key]
+            self.asked[kind] = known
+            return known
         there = [self.is_one(kind, reference) for reference in references]
         places = [self.place(self.variables[r][0]) if is_one else "" for r, is_one in zip(references, there)]
         terms = ["model." + place if place else "blank" for place in places]
@@ -98,11 +105,11 @@ class Values:
         self.asked[kind] = self.readers[key] = found
         return found
 
-    def report(self, ahead):
+    def report(self, ahead: bool) -> None:
         """Bring what is told of solver and events to the present point; `ahead`: also where the next step ends."""
         rules.report(self.model, ahead)
 
-    def observe(self):
+    def observe(self) -> None:
         """Bring the outputs to the present point; NaN while the values cannot be used."""
         status = rules.observe(self.run, self.model)
         if status == DIVERGED:
@@ -112,7 +119,7 @@ class Values:
 
     # ---- writing
 
-    def write(self, reference, value):
+    def write(self, reference: int, value: float) -> None:
         """Take over a value; one that cannot be used is remembered, and told by the next step."""
         name, declared = self.variables[reference]
         thing, attribute = self.owners[reference]
@@ -127,7 +134,7 @@ class Values:
         else:
             self.refuse(name, sentences.of_value(reason, name, declared, value))
 
-    def refuse(self, name, sentence):
+    def refuse(self, name: str, sentence: str) -> None:
         """Remember what is said of a value that was set, the last of all; no sentence: it can be used."""
         run = self.run
         run.observed = False
@@ -137,6 +144,6 @@ class Values:
         run.refused = len(self.refused)
 
 
-def no_variable(kind, reference):
+def no_variable(kind: str, reference: int) -> str:
     """The sentence about a value reference, which the layer hands over as if it had a sign."""
     return sentences.CALLS[NO_VARIABLE].format(reference=reference & 0xFFFFFFFF, kind=kind)

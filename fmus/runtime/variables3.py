@@ -1,4 +1,8 @@
-"""The variables of FMI 3.0 beside the declared ones: time, event indicators, rate of the driver."""
+"""The variables of FMI 3.0 that no model declares: time, event indicators, rate of the driver."""
+
+from __future__ import annotations
+
+from typing import Any
 
 from .declare import Declared, Local
 
@@ -7,7 +11,7 @@ DERIVATIVE = "der({})"  # of a state that a driver is
 PLACES = {TIME: "solver.t", TO_REST: "exchange.to_rest", TO_BREAK_AWAY: "exchange.to_break_away"}
 
 
-def place(name):
+def place(name: str) -> str:
     """Where a variable is in a model that owns an Exchange."""
     return "exchange.driver" if name.startswith(DERIVATIVE[:4]) else PLACES.get(name, name)
 
@@ -24,10 +28,10 @@ class Smooth(Local):
     variability = "continuous"
 
 
-def beside(model, declared):
-    """Name and declaration of those that a model has, whose declared variables are given likewise."""
+def further(model: Any, declared: list[tuple[str, Declared]]) -> list[tuple[str, Declared]]:
+    """Name and declaration of those that go with a model, whose declared variables are given likewise."""
     units = {name: meaning.unit for name, meaning in declared}
-    found = [(TIME, Time("s", "the independent variable"))]
+    found: list[tuple[str, Declared]] = [(TIME, Time("s", "the independent variable"))]
     if model.dry:
         (speed,) = [meaning.unit for _, meaning in declared if meaning.role == "state" and meaning.rate_of]
         (force,) = [meaning.unit for _, meaning in declared if meaning.role == "contact"]

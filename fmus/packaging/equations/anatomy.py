@@ -5,6 +5,7 @@ The contacts are looked at as a whole: A F = b for the forces that make the rate
 
 from functools import cached_property
 from keyword import iskeyword
+from typing import Any
 
 from ...runtime.methods import EXACT_ITEM, ITEMS
 from ..words import OF_C
@@ -40,7 +41,7 @@ class Anatomy:
         self._judge_parts()
         self._find_forces()
 
-    def _all(self, *kinds: type) -> list:
+    def _all(self, *kinds: type) -> list[Any]:
         return [e for e in self.declared if type(e) in kinds]
 
     def _judge_name(self, name: str, e: Expression) -> None:

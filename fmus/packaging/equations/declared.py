@@ -12,7 +12,7 @@ HYBRID, SIGN, THRESHOLD = "hybrid", "sign", "threshold"
 class Variable(Expression, declare.Declared):
     """What has a name, a unit, words and a range."""
 
-    def __set_name__(self, owner: type, name: str) -> None:
+    def __set_name__(self, owner: object, name: str) -> None:
         """It has its name since it was first assigned: D = mu_s does not change that."""
 
 

@@ -1,6 +1,7 @@
 """Units of expressions: what is declared in newtons is calculated in newtons, or the build says where it is not."""
 
 from fractions import Fraction
+from typing import Any
 
 from .. import BuildError
 from ..units import unit_of
@@ -38,7 +39,7 @@ def judge_units(an: Anatomy) -> None:
         of(rule.broken, known)
 
 
-def agree(owner: Expression, e: Operand, expected: Powers | None, begin: str, known: dict) -> None:
+def agree(owner: Expression, e: Operand, expected: Powers | None, begin: str, known: dict[Any, Any]) -> None:
     """Refuse an expression of another unit than expected; a plain number is of that unit."""
     found = of(e, known) if isinstance(e, Expression) else None
     if None not in (found, expected) and found != expected:

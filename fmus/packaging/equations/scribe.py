@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from math import pi
+from typing import Any
 
 from ...runtime.declare import Declared
 from .algebra import inside
@@ -32,7 +33,7 @@ class Scribe:
         self.known: dict[int, str] = {}  # number of an expression -> its local name
         self.names: dict[int, str] = {}
         self._uses: Counter[int] = Counter()
-        self._numbers: dict[tuple, int] = {}  # equal expressions have one number
+        self._numbers: dict[tuple[Any, ...], int] = {}  # equal expressions have one number
         self._of: dict[int, int] = {}
         self._alive: list[Operand] = []  # whose identity must not pass on to another
 
@@ -58,7 +59,7 @@ class Scribe:
     def number(self, e: Operand) -> int:
         if isinstance(e, Expression) and id(e) in self._of:
             return self._of[id(e)]
-        key: tuple
+        key: tuple[Any, ...]
         if isinstance(e, Term) and e not in self.given and not self._is_kept(e):
             key = e.op, *map(self.number, e.args)
         elif isinstance(e, Output) and e not in self.given:

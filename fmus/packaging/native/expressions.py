@@ -12,7 +12,7 @@ import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import BuiltinFunctionType, FunctionType
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from .kinds import BOOL, FLOAT, INT, Group, Kind, Known, Method, Object, Row, Scalar, kind_of, literal
 from .refusal import Refused, refused
@@ -32,14 +32,14 @@ TESTS = (math.isfinite, math.isnan, math.isinf)
 ARGUMENTS = {math.copysign: 2, math.atan2: 2, math.pow: 2, math.fmod: 2}
 
 ARITHMETIC = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}
-FOLDED: dict[type, Callable] = {
+FOLDED: dict[type, Callable[..., Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-COMPARISONS: dict[type, tuple[str, int, Callable]] = {
+COMPARISONS: dict[type, tuple[str, int, Callable[..., Any]]] = {
     ast.Lt: ("<", ORDER, operator.lt),
     ast.LtE: ("<=", ORDER, operator.le),
     ast.Gt: (">", ORDER, operator.gt),
@@ -218,7 +218,7 @@ class Expressions(ast.NodeVisitor):
             return Value(FLOAT, f"py_pow({left.text}, {right.text}, {self.fault()})")
         raise self.refused(node, "has an operator outside the subset", "use + - * / or **")
 
-    def folded(self, node: ast.AST, function: Callable, *values: object) -> object:
+    def folded(self, node: ast.AST, function: Callable[..., Any], *values: object) -> object:
         """What Python calculates from known numbers."""
         if not all(kind_of(value) for value in values):
             raise self.refused(node, "calculates with what is no number", "use floats and ints")
@@ -351,7 +351,7 @@ class Expressions(ast.NodeVisitor):
                     self.clean = True
         return Value(compiled.result or Known(None), text)
 
-    def built_in(self, node: ast.Call, function: Callable, values: list[Value]) -> Value:
+    def built_in(self, node: ast.Call, function: Callable[..., Any], values: list[Value]) -> Value:
         """A function of math, or one of the few built-in ones."""
         known = [value.kind.value for value in values if isinstance(value.kind, Known)]
         allowed = (*TOTAL, *PARTIAL, *TESTS, abs, min, max, float)

@@ -140,8 +140,7 @@ def _text(words: str) -> str:
 
 
 def _items(name: str, meaning: Declared) -> str:
-    items: tuple[tuple, ...] = meaning.items
-    values = ", ".join(str(value) for _, value, _ in items)
+    values = ", ".join(str(value) for _, value, _ in meaning.items)
     return f"static const int64_t {_of(name)}[] = {{{values}}};\n"
 
 

@@ -20,11 +20,11 @@ class Compiled:
 
 
 class Program:
-    """The numerics of one live model object, and of what stands beside it."""
+    """The numerics of one live model object, and of what else makes a run."""
 
     def __init__(self, model: object, *others: object) -> None:
         self.layout = Layout(model, *others)
-        self._done: dict[tuple, Compiled | None] = {}  # None: begun
+        self._done: dict[tuple[object, ...], Compiled | None] = {}  # None: begun
         self._texts: list[str] = []
         self._groups: dict[str, Group] = {}
         self._names: set[str] = set()

@@ -31,7 +31,7 @@ class Body(Expressions):
     def __init__(self, program: "Program", function: FunctionType, kinds: list[Kind]) -> None:
         super().__init__(program, function)
         self.result: Kind | None = None
-        self.returns = False  # a return was seen, so the result is settled
+        self.returns = False  # a return was seen, so the result is known
         self.lines: list[str] = []
         self.depth = 1
         self.temporaries = count(1)
@@ -233,7 +233,7 @@ class Body(Expressions):
         test = self.truth(node.test)
         if isinstance(test.kind, Known):
             return self.block(node.body if test.kind.value else node.orelse)
-        condition = self.settled(test)
+        condition = self.tested(test)
         before = set(self.assigned)
         falls = self.braces(f"{word} ({condition})", lambda: self.block(node.body))
         after, self.assigned = self.assigned, before
@@ -258,7 +258,7 @@ class Body(Expressions):
                     return self.branch(inner, "else if")
         return self.braces("else", lambda: self.block(statements))
 
-    def settled(self, test: Value) -> str:
+    def tested(self, test: Value) -> str:
         """The text of a test, kept in a name of its own if it may fault."""
         if not self.faulty:
             return test.text
@@ -277,7 +277,7 @@ class Body(Expressions):
         endless = isinstance(test.kind, Known) and test.kind.value is True
         if isinstance(test.kind, Known) and not endless:
             raise self.refused(node, "never runs", "leave it out")
-        condition = "true" if endless else self.settled(test)
+        condition = "true" if endless else self.tested(test)
         prelude, self.lines = self.lines, lines
         self.depth -= 1
         head = f"while ({'true' if prelude else condition})"
