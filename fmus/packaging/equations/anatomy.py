@@ -163,6 +163,14 @@ class Anatomy:
         """The derivative of an expression while every contact slides."""
         return derivative(e, by | {c: made("*", c.mode, derivative(c.slide, by)) for c in self.contacts})
 
+    def either(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
+        """The derivative of an expression while some contacts slide and others hold."""
+        forces: dict[Expression, Operand] = {}
+        for c in self.contacts:
+            held, slides = derivative(self.load[c], by), made("*", c.mode, derivative(c.slide, by))
+            forces[c] = made("choose", Term("==", c.mode, 0.0), held, slides)
+        return derivative(e, by | forces)
+
     # ---- what the runtime asks
 
     @property
@@ -174,6 +182,8 @@ class Anatomy:
     def closed_form(self) -> tuple[Operand, Operand, Operand, Operand] | None:
         """Mass, damping, stiffness and the speed of the resting point where one body moves under a linear law."""
         if len(self.states) != 2 or len(self.own) != 1 or any(depends(c.slide, self.moving) for c in self.contacts):
+            return None
+        if len(self.positions) != 1:
             return None
         (x,), (v,) = self.positions, self.own
         rate = self.law[v].means
@@ -204,6 +214,8 @@ class Anatomy:
         if len(self.drives) > 1:
             raise Mistake("the solver runs one driver so far", self.drives[1].place)
         for c in self.contacts:
+            if c not in self.lonely:
+                raise Mistake(f"{c.name} shares a body with another contact: the solver knows no such", c.place)
             if c.slip is not self.own[0]:
                 raise Mistake(
                     f"the slip of {c.name} must be the speed {self.own[0].name}: the solver knows no other so far",

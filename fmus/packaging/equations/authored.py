@@ -56,6 +56,7 @@ class Authored:
     def text(self) -> str:
         """The module as it travels."""
         try:
+            self.anatomy.judge_runtime()
             return written(self.anatomy, self.path.name)
         except Mistake as mistake:
             raise self._told(mistake) from mistake

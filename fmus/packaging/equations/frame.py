@@ -12,23 +12,21 @@ LONG = 100  # letters in a line
 
 
 class Frame:
-    """A model that the solver can run: one position, its speed, at most one driver and one contact."""
+    """A model of any states and contacts, each of which acts on a body of its own, and of at most one driver."""
 
     def __init__(self, an: Anatomy) -> None:
         self.an = an
-        (self.x,), (self.v,) = an.positions, an.own
-        self.rate = an.law[self.v]
+        self.laws = [an.law[s] for s in an.own]  # the rates that must be calculated
         self.drive = an.drives[0] if an.drives else None
-        self.contact: Contact | None = an.contacts[0] if an.contacts else None
         taken = {e.name for e in an.declared}
-        self.mode = "mode_" if "mode" in taken else "mode"
-        if self.contact is not None:
-            c, self.mode = self.contact, self.contact.mode.name
+        for c in an.contacts:
             for name, e in ("load", an.load[c]), ("slide", c.slide), ("limit", an.hold[c]):
+                name += self.tail(c)
                 if isinstance(e, Term) and not e.name and name not in taken:
                     e.name = name
-        self.states = self.x.name, self.v.name
-        self.point = "t", *self.states, self.mode
+        self.states = [s.name for s in an.states]
+        self.modes = [c.mode.name for c in an.contacts] or ["mode_" if "mode" in taken else "mode"]
+        self.point = ["t", *self.states, *self.modes]
         self.taken = taken | {"self", *self.point}
         self.constants = self._constants()
 
@@ -62,12 +60,20 @@ class Frame:
             s.given[self.drive] = self.drive.name
             s.say(f"{self.drive.name} = self.x_base + self.{self.drive.steady.name} * (t - self.t_base)")
 
-    def follow_sign(self, s: Scribe, targets: Sequence[Operand]) -> None:
-        """Where the law itself looks at the speed, that tells the direction."""
-        c = self.contact
-        if c is not None and len(c.laws) > 1 and any(depends(e, (c.mode,)) for e in targets):
-            with s.block(f"if {self.mode} == 0:"):
-                s.say(f"{self.mode} = sign({self.v.name})")
+    @property
+    def alone(self) -> Contact | None:
+        """The contact of a single body: nothing moves while it is stuck, and nobody asks for rates then."""
+        return self.an.contacts[0] if len(self.an.contacts) == 1 and len(self.an.states) == 2 else None
+
+    def tail(self, c: Contact) -> str:
+        """What tells the methods of one contact from those of another."""
+        return f"_{c.mode.name}" if len(self.an.contacts) > 1 else ""
+
+    def follow_sign(self, s: Scribe, c: Contact, targets: Sequence[Operand]) -> None:
+        """Where the law itself looks at the slip, that tells the direction."""
+        if len(c.laws) > 1 and any(depends(e, (c.mode,)) for e in targets):
+            with s.block(f"if {c.mode.name} == 0:"):
+                s.say(f"{c.mode.name} = sign({s.text(c.slip)})")
 
     def returning(self, s: Scribe, targets: Sequence[Operand]) -> list[str]:
         """The lines that return the targets: one block for each item of a choice that they look at."""
@@ -75,18 +81,23 @@ class Frame:
         if test is None:
             self.place_drive(s, targets)
             s.count(*targets)
-            texts = list(map(s.text, targets))
-            if sum(map(len, texts)) <= LONG:
-                s.say("return " + ", ".join(texts))
-            else:
-                with s.block("return ("):
-                    for text in texts:
-                        s.say(f"{text},")
-                s.say(")")
-            return s.lines
+            return returned(s, targets)
         with s.block(f"if {s.text(test)}:"):
             s.lines += self.returning(self.scribe(s.depth), [decided(e, test, True) for e in targets])
         return s.lines + self.returning(self.scribe(s.depth), [decided(e, test, False) for e in targets])
+
+
+def returned(s: Scribe, targets: Sequence[Operand]) -> list[str]:
+    """The lines, of which the last return the targets."""
+    texts = list(map(s.text, targets))
+    if sum(map(len, texts)) <= LONG:
+        s.say("return " + ", ".join(texts))
+    else:
+        with s.block("return ("):
+            for text in texts:
+                s.say(f"{text},")
+        s.say(")")
+    return s.lines
 
 
 def method(name: str, arguments: Sequence[str], lines: list[str]) -> str:

@@ -8,16 +8,16 @@ from .scribe import Scribe
 
 
 def friction(f: Frame) -> list[str]:
-    """All of them; none where nothing sticks."""
-    c = f.contact
-    return [] if c is None else [hold(f, c), terms(f, c), *departure(f, c)]
+    """All of them, for each contact."""
+    return [text for c in f.an.contacts for text in (hold(f, c), terms(f, c), *departure(f, c))]
 
 
 def hold(f: Frame, c: Contact) -> str:
     """The load on the body at rest, its rate, and the most that is held."""
-    load = f.an.load[c]
-    wanted = [load, derivative(load, f.an.by_time), f.an.hold[c]]
-    return method("hold", ["t", *f.states], f.returning(f.scribe(), wanted))
+    an = f.an
+    rate = derivative(an.load[c], an.by_time | {x: an.rate[x] for x in an.positions})
+    wanted = [an.load[c], put(rate, {c.slip: 0.0}), an.hold[c]]
+    return method(f"hold{f.tail(c)}", ["t", *f.states], f.returning(f.scribe(), wanted))
 
 
 def terms(f: Frame, c: Contact) -> str:
@@ -30,42 +30,42 @@ def terms(f: Frame, c: Contact) -> str:
         s.given[f.drive] = f.drive.name
     s.count(sizes)
     s.say(f"return {s.text(sizes)}")
-    return method("terms", ["t", *f.states], s.lines)
+    return method(f"terms{f.tail(c)}", ["t", *f.states], s.lines)
 
 
 def departure(f: Frame, c: Contact) -> list[str]:
-    """The rate at a break-away, where the load is just the limit and friction falls to what it is while it slides."""
+    """The rate of the slip at a break-away, where the load is just the limit and friction falls to that of a slide."""
     if c.hold is None or any(depends(e, f.an.moving) for e in (c.slide, c.hold)):
         return []
     less = Term("neg", Term("*", c.mode, Term("-", c.hold, c.slide)))
-    jump = derivative(f.rate.means, {c: less})
-    return [method("departure", f.point, f.returning(f.scribe(), [jump]))]
+    jump = derivative(f.an.law[c.slip].means, {c: less})
+    return [method(f"departure{f.tail(c)}", f.point, f.returning(f.scribe(), [jump]))]
 
 
 def under_the_law(f: Frame, s: Scribe, c: Contact) -> None:
     """The lines that calculate the force; the mode is told as the law has it."""
-    load = f.an.load[c]
+    load, mode, slip = f.an.load[c], c.mode.name, s.text(c.slip)
     held = s.hold(load) if isinstance(load, Term) else s.text(load)
     if THRESHOLD in c.laws:
-        with s.block(f"if {f.mode} != 0:"):
+        with s.block(f"if {mode} != 0:"):
             s.say(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
         with s.block("elif self.friction == HYBRID:"):
             s.say(f"{c.name} = {held}")
         with s.block("else:"):
             s.say(f"{c.name} = {by_threshold(f, s, c)}")
-            s.say(f"{f.mode} = sign({f.v.name}) if fabs({f.v.name}) >= {s.text(c.eps)} else 0")
+            s.say(f"{mode} = sign({slip}) if fabs({slip}) >= {s.text(c.eps)} else 0")
     else:
-        with s.block(f"if {f.mode} == 0{' and self.friction == HYBRID' if SIGN in c.laws else ''}:"):
+        with s.block(f"if {mode} == 0{' and self.friction == HYBRID' if SIGN in c.laws else ''}:"):
             s.say(f"{c.name} = {held}")
         with s.block("else:"):
-            f.follow_sign(s, [c.mode])
+            f.follow_sign(s, c, [c.mode])
             s.say(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
     s.given[c] = c.name
 
 
 def by_threshold(f: Frame, s: Scribe, c: Contact) -> str:
     """The force by the threshold law."""
-    return f"threshold({f.v.name}, {', '.join(map(s.text, (c.eps, f.an.load[c], c.slide, f.an.hold[c])))})"
+    return f"threshold({', '.join(map(s.text, (c.slip, c.eps, f.an.load[c], c.slide, f.an.hold[c])))})"
 
 
 def magnitudes(e: Operand, drive: Expression) -> list[Term]:

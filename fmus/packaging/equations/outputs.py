@@ -6,11 +6,11 @@ from .friction import under_the_law
 
 
 def observe(f: Frame) -> str:
-    an, s, c = f.an, f.scribe(), f.contact
+    an, s = f.an, f.scribe()
     f.place_drive(s, an.drives)
     s.count(*an.outputs, *an.outputs)
-    if c is not None:
-        s.count(an.load[c], an.load[c], c.slide)
+    s.count(*an.load.values(), *an.load.values(), *(c.slide for c in an.contacts))
+    for c in an.contacts:
         under_the_law(f, s, c)
     for e in an.outputs:
         if isinstance(e.means, Term):

@@ -28,12 +28,12 @@ def initial(f: Frame) -> str:
     s = f.scribe()
     if f.drive is not None:
         s.say("self.t_base, self.x_base = t, 0.0")
-    return method("initial", ["t"], f.returning(s, [f.x.begins, f.v.begins]))
+    return method("initial", ["t"], f.returning(s, [state.begins for state in f.an.states]))
 
 
 def prepare(f: Frame) -> str:
     """Constants and rules; a rule is judged as soon as it can be: what it refuses could not be divided by."""
-    s, dry = f.scribe(), f.contact is not None
+    s, dry = f.scribe(), bool(f.an.contacts)
     done: list[Term] = []
     s.kept = done
     s.count(*f.constants, *(rule.broken for rule in f.an.rules))
@@ -57,7 +57,8 @@ def prepare(f: Frame) -> str:
 
 def finest(f: Frame) -> list[str]:
     """The speed that a tolerance must resolve."""
-    return [] if f.v.finest is None else [method("finest", (), f.returning(f.scribe(), [f.v.finest]))]
+    wanted = [state.finest for state in f.an.states if state.finest is not None]
+    return [method("finest", (), f.returning(f.scribe(), wanted))] if wanted else []
 
 
 def drive(f: Frame) -> list[str]:

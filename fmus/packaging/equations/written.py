@@ -43,7 +43,6 @@ RUN = ("stop_time", "step_size", "tolerance")
 
 def written(an: Anatomy, file: str) -> str:
     """The text of the module."""
-    an.judge_runtime()
     f = Frame(an)
     first, _, rest = cleandoc(an.model.__doc__ or "").partition("\n")
     about = indent(f"{first}\n{rest}" + ("\n" if rest else ""), INDENT).strip(" ")
