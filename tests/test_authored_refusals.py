@@ -116,6 +116,39 @@ WRONG = {
         4,
         "method = 'exact' needs a linear law, and Mine has none",
     ),
+    "a macro of C": (RATE + '    NULL = Parameter(1.0, "1", "ours")\n', 17, "the name NULL is taken"),
+    "a function of ours": (RATE + '    sqrt = Parameter(1.0, "1", "ours")\n', 17, "the name sqrt is taken"),
+    "a start out of range": (
+        RATE + '    q = Parameter(0.0, "kg", "charge", above=0.0)\n',
+        17,
+        "q starts at 0.0, and must be above 0.0 kg",
+    ),
+    "a unit for a number": (
+        RATE + '    q = Parameter("kg", 1.0, "charge")\n',
+        17,
+        "q: the unit and what it is are texts",
+    ),
+    "a text for a number": (
+        RATE + '    q = Parameter("1.0", "kg", "q")\n',
+        17,
+        "q: start value and bounds are numbers",
+    ),
+    "a variable without a name": (
+        RATE.replace("F - k * x", 'Parameter(1.0, "N", "pull") - k * x'),
+        16,
+        "a uses a variable without a name, which is not declared in Mine",
+    ),
+    "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is refused: it must be above zero"),
+    "a broken rule": (
+        RATE + '    rules = Rule(k + k > k, "k = {k!r} is too much")\n',
+        4,
+        "the start values are refused: k = 100.0 is too much",
+    ),
+    "a division by zero": (
+        RATE + '    q = Output("m", "shift", x * f / (f - f))\n',
+        4,
+        "the start values lead out of the range of numbers: float division by zero",
+    ),
     "a belt": (
         DRY.replace("slip=v", "slip=v - u") + STUCK,
         17,
@@ -141,7 +174,7 @@ def test_a_mistake_is_told_in_one_sentence_with_its_line(wrong, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(HEAD + body)
     with pytest.raises(BuildError, match=re.escape(f"{path}, line {line}: {sentence}")) as told:
-        find(path).text  # noqa: B018
+        find(path).model  # noqa: B018
     assert "\n" not in str(told.value)
 
 

@@ -5,6 +5,7 @@ The contacts are looked at as a whole: A F = b for the forces that make the rate
 
 from functools import cached_property
 from keyword import iskeyword
+from math import inf
 from typing import Any
 
 from ...runtime.methods import EXACT_ITEM, ITEMS
@@ -83,6 +84,7 @@ class Anatomy:
                     if leaf not in known:
                         word = leaf.name or "a variable without a name"
                         raise Mistake(f"{e.name} uses {word}, which is not declared in {self.name}", e.place)
+            self._judge_declared(e)
         for mode in self.modes:
             owners = [c for c in self.contacts if c.mode is mode]
             if len(owners) != 1:
@@ -109,10 +111,25 @@ class Anatomy:
                 ) from None
         if self.model.method not in ("", *METHODS):
             raise Mistake(f"method = {self.model.method!r} is not known; there are {', '.join(METHODS)}", place)
+        for word, most in ("stop_time", inf), ("step_size", inf), ("tolerance", 1.0):
+            value = getattr(self.model, word)
+            if not isinstance(value, (int, float)) or not 0.0 < value < most:
+                raise Mistake(f"{word} = {value!r} is refused: it must be above zero, and below {most:g}", place)
         if not (self.model.__doc__ or "").strip():
             raise Mistake(
                 f"{self.name} has no docstring: its first line describes the FMU, the rest is its page", place
             )
+
+    @staticmethod
+    def _judge_declared(e: Variable) -> None:
+        """That words are words, numbers are numbers, and a start value is allowed."""
+        if not all(isinstance(one, str) for one in (e.unit, e.text, e.display)) or not e.text:
+            raise Mistake(f"{e.name}: the unit and what it is are texts", e.place)
+        numbers = (e.start, e.low, e.high, e.above, e.below)
+        if not all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in numbers):
+            raise Mistake(f"{e.name}: start value and bounds are numbers", e.place)
+        if isinstance(e, (Parameter, Fixed, Input)) and not e.accepts(e.start):
+            raise Mistake(f"{e.name} starts at {e.start!r}, and must be {e.allowed}", e.place)
 
     @staticmethod
     def parts(e: Variable) -> list[Operand]:

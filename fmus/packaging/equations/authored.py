@@ -13,6 +13,7 @@ from keyword import iskeyword
 from pathlib import Path
 from traceback import extract_tb
 from types import ModuleType
+from typing import Any
 
 from ...runtime.declare import Declaring
 from .. import BuildError
@@ -71,7 +72,21 @@ class Authored:
         linecache.cache[file] = (len(self.text), None, self.text.splitlines(keepends=True), file)
         sys.modules[module.__name__] = module
         exec(compile(self.text, file, "exec"), vars(module))
-        return vars(module)[self.title]
+        made = vars(module)[self.title]
+        self._judge_start(made())
+        return made
+
+    def _judge_start(self, thing: Any) -> None:
+        """Refuse start values that go nowhere: nobody could run the model as it is."""
+        try:
+            rule = thing.prepare()
+            thing.observe(0.0, *thing.initial(0.0), 0)
+        except (ArithmeticError, ValueError) as error:
+            mistake = Mistake(f"the start values lead out of the range of numbers: {error}", self.anatomy.model.place)
+            raise self._told(mistake) from error
+        if rule:
+            sentence = thing.rules[rule - 1].format_map(vars(thing))
+            raise self._told(Mistake(f"the start values are refused: {sentence}", self.anatomy.model.place))
 
     def _model(self) -> type[Model]:
         """The class in the file."""
