@@ -53,6 +53,7 @@ def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> N
 
 
 for command in (
-    *(run, precision, stability, bench, importers, list_, decay, sweep, compare, couple, references, report),
+    *(run, precision, stability, bench, importers, list_, decay),
+    *(sweep, compare, couple, references, report),
 ):
     commands.add_command(command)
