@@ -192,6 +192,14 @@ def test_a_file_holds_one_model(text, sentence, tmp_path):
         find(path).text  # noqa: B018
 
 
+@pytest.mark.parametrize("name", ["Solver", "March", "Step", "Größe"])
+def test_a_class_has_a_name_of_its_own(name, tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text((HEAD + RATE).replace("Mine", name))
+    with pytest.raises(BuildError, match=f"mine.py, line 4: the name {name} is taken, or has letters that C does not"):
+        find(path).text  # noqa: B018
+
+
 @pytest.mark.parametrize("name", ["my-model.py", "runtime.py", "1st.py", "class.py"])
 def test_a_file_has_the_name_of_a_model(name, tmp_path):
     path = tmp_path / name

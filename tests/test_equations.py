@@ -217,6 +217,16 @@ def test_a_file_is_read_anew_when_it_has_changed(tmp_path):
     assert find(path).model().k == 158.0
 
 
+def test_an_author_may_derive_variables_of_a_kind(tmp_path):
+    """They are of that kind."""
+    path = tmp_path / "mine.py"
+    text = (
+        (ROOT / "fmus" / "smd.py").read_text().replace("class Smd", "class Mass(Parameter):\n    pass\n\n\nclass Smd")
+    )
+    path.write_text(text.replace('m = Parameter(1.0, "kg"', 'm = Mass(1.0, "kg"'))
+    assert find(path).text == find("smd").text.replace("smd.py", "mine.py")
+
+
 def test_choices_and_contacts_are_walked():
     """The models of these tests have what they are to try."""
     kinds = {type(e) for source in SOURCES for e in find(source).anatomy.declared}

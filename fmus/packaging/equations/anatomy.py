@@ -25,6 +25,10 @@ class Anatomy:
 
     def __init__(self, model: type[Model]) -> None:
         self.model, self.name = model, model.__name__
+        if self.name in RESERVED or not self.name.isascii():
+            raise Mistake(
+                f"the name {self.name} is taken, or has letters that C does not take: choose another", model.place
+            )
         own = [(name, e) for name, e in vars(model).items() if isinstance(e, Expression) and e.name == name]
         for name, e in own:  # a second name for the same, as D for mu_s, is none
             self._judge_name(name, e)
@@ -43,7 +47,7 @@ class Anatomy:
         self._find_forces()
 
     def _all(self, *kinds: type) -> list[Any]:
-        return [e for e in self.declared if type(e) in kinds]
+        return [e for e in self.declared if isinstance(e, kinds)]
 
     def _judge_name(self, name: str, e: Expression) -> None:
         if name in RESERVED or name in OF_C or iskeyword(name) or name.startswith("_"):

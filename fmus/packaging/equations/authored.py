@@ -134,6 +134,6 @@ def authored(path: Path) -> Authored:
     except (OSError, UnicodeDecodeError) as error:
         raise BuildError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
     known = _known.get(path.resolve())
-    if known is None or known.source != source:
+    if known is None or (known.path, known.source) != (path, source):
         known = _known[path.resolve()] = Authored(path, source)
     return known

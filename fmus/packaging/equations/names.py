@@ -16,8 +16,9 @@ IMPORTS = {  # module -> what may be needed of it
 ATTRIBUTES = ("friction", "solver", "events", "exact", "exchange", "x_base", "t_base")
 METHODS = ("initial", "rates", "jacobian", "push", "hold", "terms", "observe")  # beside those that are inherited
 FACTS = ("stop_time", "step_size", "tolerance", "rules")  # which an author sets as such
+CLASSES = ("Solver", "Model", "Fmi3Slave")
 RESERVED = {
-    *("self", "t", *MATH, *ATTRIBUTES, *METHODS),
+    *("self", "t", *MATH, *ATTRIBUTES, *METHODS, *CLASSES),
     *(name for names in IMPORTS.values() for name in names),
     *(name for name in dir(DryFriction) if not name.startswith("__")),
 } - {*FACTS}

@@ -7,7 +7,7 @@ from textwrap import indent, wrap
 
 from ...runtime.oscillator import Oscillator
 from .anatomy import Anatomy
-from .declared import Contact, Mode, Output, State, Variable
+from .declared import Contact, Fixed, Mode, Output, State, Variable
 from .frame import Frame
 from .friction import friction
 from .motion import motion
@@ -74,7 +74,10 @@ def imports(text: str) -> str:
 
 def declarations(an: Anatomy) -> list[str]:
     """The variables in the order of the description: parameters, choices, inputs, outputs."""
-    lines = [f"{e.name} = {type(e).__name__}({float(e.start)!r}, {described(e)})" for e in an.parameters]
+    lines = [
+        f"{e.name} = {'Fixed' if isinstance(e, Fixed) else 'Parameter'}({float(e.start)!r}, {described(e)})"
+        for e in an.parameters
+    ]
     if laws := {law: None for c in an.contacts for law in c.laws}:
         items = ", ".join(f"{law.upper()}_LAW" for law in laws)
         lines.append(f'friction = Choice(HYBRID, "friction law", ({items}{"," if len(laws) == 1 else ""}))')
