@@ -1,5 +1,6 @@
 """The list that completeness walks: every model file, its declared variables, and every law with every method."""
 
+from functools import cache
 from itertools import product
 from pathlib import Path
 
@@ -19,6 +20,7 @@ def model_class(name):
     return load(name)
 
 
+@cache
 def declared(name):
     """Name and declaration of every variable of a model, in the order of the XML."""
     return dict(variables(model_class(name)()))

@@ -76,6 +76,7 @@ def play(fmu, script, threads=1, sanitizer="", shipped=True):
     return done.stdout.splitlines(), done.stderr
 
 
+@cache
 def references(name):
     """The value reference of every variable of a model."""
     return {variable: place for place, variable in enumerate(declared(name))}
