@@ -9,8 +9,8 @@ from fmus.packaging import BuildError
 from fmus.packaging.archive import build
 from fmus.packaging.catalogue import find, names
 from fmus.packaging.edition import FMI2, FMI3
-from fmus.packaging.lean import LAWS, METHODS
 from fmus.packaging.weigh import import_time
+from fmus.packaging.written import LAWS, METHODS
 
 HERE = Path(__file__).parent
 FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  # installed: in the current folder

@@ -103,9 +103,9 @@ FUNCTIONS = {"sqrt": _sqrt, "fabs": _fabs, "copysign": _copysign, "atan2": _atan
 
 
 def teach(monkeypatch):
-    """Let the models and the runtime take roots and magnitudes of quantities."""
+    """Let the models that have been written out, and their runtime, take roots and magnitudes of quantities."""
     for name, module in list(sys.modules.items()):
-        if name.startswith("fmus."):
+        if name.startswith("written_"):
             for function, taught in FUNCTIONS.items():
                 if getattr(module, function, None) is getattr(math, function):
                     monkeypatch.setattr(module, function, taught)

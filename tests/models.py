@@ -5,6 +5,7 @@ from itertools import product
 from pathlib import Path
 
 from fmus.packaging.catalogue import load
+from fmus.packaging.written import beside, written
 from fmus.runtime.declare import Choice, Input, Output, Parameter, variables
 
 ROOT = Path(__file__).parent.parent
@@ -16,14 +17,19 @@ HYBRID, SIGN, THRESHOLD = 1, 2, 3
 
 
 def model_class(name):
-    """The class of a model as it travels."""
-    return load(name)
+    """The class of a model as it travels: written out."""
+    return written(name)
+
+
+def runtime(name, part):
+    """A file of the runtime as it is written out for a model."""
+    return beside(written(name), f"runtime.{part}")
 
 
 @cache
 def declared(name):
     """Name and declaration of every variable of a model, in the order of the XML."""
-    return dict(variables(model_class(name)()))
+    return dict(variables(load(name)()))
 
 
 def outputs(name):
@@ -60,7 +66,7 @@ def experiment(name, values):
     Laws that chatter run as published, at rtol 1e-3, and not for long: where friction should hold, they take steps
     without number.
     """
-    stop, exact = model_class(name).stop_time, values["solver.method"] == EXACT
+    stop, exact = load(name).stop_time, values["solver.method"] == EXACT
     if values.get("friction", HYBRID) == HYBRID:
         return name, values if exact else {**values, "solver.rtol": 1e-5}, stop
     return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.4 * stop

@@ -1,19 +1,16 @@
 """The integration methods of the runtime, one step at a time: every claim is checked on every method it is made for."""
 
-from importlib import import_module
 from itertools import pairwise
 from math import cos, exp, fabs, isnan, log2, nan, sin, sqrt
 
 import numpy as np
 import pytest
 import scipy.integrate
-from models import MODELS, ROOT, combinations, model_class
-
-from fmus.runtime import rodas
-from fmus.runtime.step import Step
+from models import MODELS, ROOT, combinations, model_class, runtime
 
 # the order of a method, the order of its interpolant, and a step in the range where halving shows them
 METHODS = {"ode23": (3, 3, 0.05), "ode45": (5, 4, 0.1), "dop853": (8, 7, 0.25), "rodas": (4, 3, 0.05)}
+TWO_STATES = "smd"  # for which the methods are written out here
 PEERS = {"ode23": "RK23", "ode45": "RK45", "dop853": "DOP853"}
 
 every_method = pytest.mark.parametrize("name", METHODS)
@@ -27,11 +24,11 @@ class Motion:
     def at(self, t):
         return sin(self.w * t), self.w * cos(self.w * t)
 
-    def rates(self, t, x, v, mode):
+    def rates(self, t, x, v):
         at, speed = self.at(t)
         return sin(at) - self.w**2 * at + 0.3 * speed**3 - sin(x) - 0.3 * v**3
 
-    def jacobian(self, t, x, v, mode):
+    def jacobian(self, t, x, v):
         at, speed = self.at(t)
         return (cos(at) - self.w**2 - 0.9 * speed * self.w**2 * at) * speed, -cos(x), -0.9 * v**2
 
@@ -43,11 +40,11 @@ class Linear:
         self.rate, self.power, self.spring, self.damper = rate, power, spring, damper
         self.calls = []
 
-    def rates(self, t, x, v, mode):
+    def rates(self, t, x, v):
         self.calls.append((t, x, v))
         return self.rate * t**self.power + self.spring * x + self.damper * v
 
-    def jacobian(self, t, x, v, mode):
+    def jacobian(self, t, x, v):
         return self.rate * self.power * t ** (self.power - 1) if self.power else 0.0, self.spring, self.damper
 
 
@@ -55,16 +52,16 @@ class Solver:
     """A method with its numbers, and one step of it."""
 
     def __init__(self, name):
-        self.numbers = import_module(f"fmus.runtime.{name}")
+        self.numbers = runtime(TWO_STATES, name)
         self.order, self.inner, self.h = METHODS[name]
         self.method = getattr(self.numbers, name.capitalize())()
         self.inside = None
 
     def step(self, model, t, x, v, h):
         """New x, v and acceleration, and the rates of the error; the interpolant is ready."""
-        a = model.rates(t, x, v, 0)
-        new = self.method.step(model, 0, t, x, v, a, h)
-        step = Step()
+        a = model.rates(t, x, v)
+        new = self.method.propose(model, t, x, v, a, h)
+        step = runtime(TWO_STATES, "step").Step()
         step.t0, step.x0, step.v0, step.a0, step.span = t, x, v, a, h
         step.x1, step.v1, step.a1 = new[:3]
         self.method.expand(model, step)
@@ -145,7 +142,7 @@ def test_the_work_is_what_the_numbers_say_and_the_last_slope_is_the_first_of_the
     x, v, a, _, _ = solver.step(model, 0.0, 0.3, 0.2, 0.1)
     assert len(model.calls) == 1 + solver.numbers.STAGES + solver.numbers.EXTRA
     assert model.calls[solver.numbers.STAGES] == (0.1, x, v)
-    assert a == Linear(1.0, 2, -3.0, -0.5).rates(0.1, x, v, 0)
+    assert a == Linear(1.0, 2, -3.0, -0.5).rates(0.1, x, v)
 
 
 @every_method
@@ -195,7 +192,7 @@ def test_a_step_its_inside_and_its_estimated_error_are_those_of_scipy(solver, na
     motion = Motion()
     x, v, _, e_x, e_v = solver.step(motion, 0.3, 0.5, 0.7, 0.4)
     peer = getattr(scipy.integrate, PEERS[name])(
-        lambda t, y: (y[1], motion.rates(t, y[0], y[1], 0)), 0.3, [0.5, 0.7], 1e3, first_step=0.4, rtol=1e3
+        lambda t, y: (y[1], motion.rates(t, y[0], y[1])), 0.3, [0.5, 0.7], 1e3, first_step=0.4, rtol=1e3
     )
     peer.step()
     assert (x, v) == pytest.approx(tuple(peer.y), abs=1e-14)
@@ -233,10 +230,10 @@ def test_rodas_keeps_its_accuracy_on_a_slow_motion_however_stiff():
     """v' = -damper (v - cos t) - sin t, v(0) = 1: v = cos t (A. Prothero, A. Robinson, Math. Comp. 28 (1974))."""
 
     class Slow(Linear):
-        def rates(self, t, x, v, mode):
+        def rates(self, t, x, v):
             return self.damper * (v - cos(t)) - sin(t)
 
-        def jacobian(self, t, x, v, mode):
+        def jacobian(self, t, x, v):
             return self.damper * sin(t) - cos(t), 0.0, self.damper
 
     for damper in (1e1, 1e3, 1e6, 1e9):
@@ -252,18 +249,19 @@ def test_rodas_is_stiffly_accurate():
 
 def test_rodas_meets_the_conditions_of_order_four_with_an_error_estimate_of_order_three():
     """In the notation of E. Hairer and G. Wanner, IV.7: alpha and beta from the numbers of the transformed form."""
+    numbers = Solver("rodas").numbers
 
     def row(letter, i):
-        return [getattr(rodas, f"{letter}{i}{j}", 0.0) for j in range(1, 7)]
+        return [getattr(numbers, f"{letter}{i}{j}", 0.0) for j in range(1, 7)]
 
     A, G = (np.array([row(letter, i) for i in range(1, 7)]) for letter in "AG")
     A[5] = A[4] + np.eye(6)[4]
-    gamma = np.linalg.inv(np.eye(6) / rodas.GAMMA - G)
+    gamma = np.linalg.inv(np.eye(6) / numbers.GAMMA - G)
     alpha = A @ gamma
     beta = alpha + gamma
     c, b = alpha.sum(1), beta.sum(1)
-    assert c == pytest.approx([0.0, rodas.C2, rodas.C3, rodas.C4, 1.0, 1.0], abs=1e-14)
-    assert gamma.sum(1) == pytest.approx([rodas.D1, rodas.D2, rodas.D3, rodas.D4, 0.0, 0.0], abs=1e-14)
+    assert c == pytest.approx([0.0, numbers.C2, numbers.C3, numbers.C4, 1.0, 1.0], abs=1e-14)
+    assert gamma.sum(1) == pytest.approx([numbers.D1, numbers.D2, numbers.D3, numbers.D4, 0.0, 0.0], abs=1e-14)
     three = [(1 + 0 * c, 1), (b, 2), (c**2, 3), (beta @ b, 6)]
     four = [(c**3, 4), (c * (alpha @ b), 8), (beta @ c**2, 12), (beta @ beta @ b, 24)]
     weights, embedded = beta[5], alpha[5]
@@ -285,8 +283,9 @@ def test_every_jacobian_is_the_slope_of_its_acceleration(name):
             setattr(model.solver if "." in choice else model, choice.split(".")[-1], value)
         assert model.prepare() == 0
         for t, x, v, mode in ((0.3, 0.02, 0.004, 1), (1.1, -0.7, -0.4, -1), (2.0, 2.9, 1.3, 0)):
+            modes = [mode] if model.contacts else []
             slopes = [
-                (model.rates(t + p, x + q, v + r, mode) - model.rates(t - p, x - q, v - r, mode)) / (2 * d)
+                (model.rates(t + p, x + q, v + r, *modes) - model.rates(t - p, x - q, v - r, *modes)) / (2 * d)
                 for p, q, r in ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d))
             ]
-            assert model.jacobian(t, x, v, mode) == pytest.approx(slopes, rel=1e-5, abs=1e-5)
+            assert model.jacobian(t, x, v, *modes) == pytest.approx(slopes, rel=1e-5, abs=1e-5)

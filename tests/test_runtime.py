@@ -6,16 +6,14 @@ import tracemalloc
 from math import isnan, nextafter
 
 import pytest
-from models import CASES, MODELS, ROOT, SIGN, declared, label, model_class, outputs
+from models import CASES, MODELS, ROOT, SIGN, declared, label, model_class, outputs, runtime
 
 from fmus.packaging.catalogue import find
-from fmus.runtime import march, values
 from fmus.runtime.declare import variables
-from fmus.runtime.slave import slave_for
 
 FMI_SIDE = [
     *("__init__", "boundary", "declare", "failure", "hosted"),
-    *("sentences", "slave", "slave3", "state", "values", "variables3"),
+    *("sentences", "slave", "slave3", "state", "values", "variables3", "vectors"),
 ]
 NUMERICS = {
     path.stem: path.read_text() for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.stem not in FMI_SIDE
@@ -86,7 +84,7 @@ def test_no_while_relies_on_its_condition_alone(name):
 
 def slave(name, values=None, stop=4.0):
     """A slave in this process, past initialisation."""
-    made = slave_for(model_class(name))(instance_name="inside")
+    made = runtime(name, "slave").slave_for(model_class(name))(instance_name="inside")
     for reference, (variable, declaration) in enumerate(variables(made.model)):
         if variable in (values or {}):
             write = made.set_real if declaration.type == "Real" else made.set_integer
@@ -187,7 +185,7 @@ def test_lists_of_references_that_never_come_again_take_no_memory():
         for _ in range(times):
             asked = draw.choices(reals, k=8)
             assert len(made.get_real(asked)) == 8
-        assert len(made.readers) <= values.MOST_READERS
+        assert len(made.readers) <= runtime("stickslip", "values").MOST_READERS
 
     ask(200)
     tracemalloc.start()
@@ -200,7 +198,7 @@ def test_lists_of_references_that_never_come_again_take_no_memory():
 
 
 def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
-    monkeypatch.setattr(march, "ROUNDS", 2)
+    monkeypatch.setattr(runtime("pacejka", "march"), "ROUNDS", 2)
     made = slave("pacejka", {"solver.method": 2}, stop=16.0)
     assert made.do_step(0.0, 16.0) is False
     assert "internal steps" in capfd.readouterr().err
@@ -209,6 +207,7 @@ def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
 
 def test_what_many_events_cost_is_bounded_too(monkeypatch, capfd):
     """A swing of the pendulum takes as many looks for its events as right-hand sides."""
+    march = runtime("pendulum", "march")
     monkeypatch.setattr(march, "MOST_CALLS", 20 * march.ROUND)
     made = slave("pendulum", {"mu": 0.0}, stop=1e7)
     assert made.do_step(0.0, 1e7) is False

@@ -13,12 +13,11 @@ import fmi3_hosts
 import pytest
 from compare import identical
 from driver import Refused, Worker
-from models import MODELS, declared, model_class, outputs
+from models import MODELS, declared, model_class, outputs, runtime
 
-from fmus.runtime import slave, slave3
-from fmus.runtime.state import Foreign
+from fmus.packaging.written import beside
 
-BOTH = pytest.mark.parametrize("kind", [slave, slave3], ids=["FMI 2.0", "FMI 3.0"])
+BOTH = pytest.mark.parametrize("kind", ["slave", "slave3"], ids=["FMI 2.0", "FMI 3.0"])
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 REFUSAL = (
     "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
@@ -28,7 +27,7 @@ REFUSAL = (
 
 def running(kind, name):
     """The class of slaves of a model, and one of them in mid-run."""
-    made = kind.slave_for(model_class(name))
+    made = runtime(name, kind).slave_for(model_class(name))
     one = made(instance_name="saved")
     one.exit_initialization_mode()
     assert one.do_step(0.0, 0.3)
@@ -56,7 +55,7 @@ def taken(made, content):
     """Whether the bytes are taken for a state."""
     try:
         made._fmu_state_from_bytes(content)
-    except Foreign:
+    except beside(made.Model, "runtime.state").Foreign:
         return False
     return True
 

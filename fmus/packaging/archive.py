@@ -16,7 +16,6 @@ content, and two versions of an FMU live side by side.
 import os
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from functools import partial
 from io import BytesIO
 from pathlib import Path
 from stat import S_IFREG
@@ -27,8 +26,8 @@ from .catalogue import find
 from .companions import companions
 from .description import declared_by
 from .edition import FMI2, Edition
-from .lean import imported, offer, reduced
-from .modules import digest, installed, travelling, unchanged
+from .modules import digest, installed, travelling
+from .written import files_of, offer, written
 
 NEEDED = """\
 CPython 3.9 or newer, 64 bit, with its standard library and nothing else.
@@ -49,18 +48,15 @@ def build(
 ) -> Path:
     """Write the FMU of a model, given by its name or by the path of its file, into `folder`.
 
-    An older one is replaced whole or not at all.  Methods, friction laws and platforms may be chosen (lean.py); without
-    a choice it has all there are.
+    An older one is replaced whole or not at all.  Methods, friction laws and platforms may be chosen
+    (written/offer.py); without a choice it has all there are.
     """
     source, date = find(model), build_date()
-    name, cls = source.name, source.model
-    offered = offer(cls, name, methods, laws)
-    edit = partial(reduced, offered=offered) if offered else unchanged
-    sources = travelling(source, edit=edit, edition=edition)
+    name, offered = source.name, offer(source.model, source.name, methods, laws)
+    cls, texts = written(source, offered), files_of(source, offered)
+    sources = travelling(source, edit=lambda path, text: texts.get(path, text), edition=edition)
     code = digest(sources, edition.entry)
     package = f"{name}_{code[:12]}"
-    if offered:
-        cls = imported(sources, name, source.title, package)
     entries = companions(cls, source.path, declared_by(cls), edition)
     entries |= {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
     entries |= {

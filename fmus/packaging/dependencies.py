@@ -38,7 +38,7 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
         values = {name: another(meaning, sizes, chance) for name, meaning in known.items()}
         put(thing, values)
         if thing.dry and entry and begun(thing, outputs):
-            load, _, limit = thing.hold(0.0, thing.solver.x, 0.0)
+            load, _, limit = thing.hold(0.0, *thing.initial(0.0))
             values[entry] += one(LOADS, chance) * limit - load
             put(thing, values)
         before = begun(thing, outputs)
@@ -84,7 +84,7 @@ def begun(thing: Any, outputs: list[str]) -> list[float]:
             return []
         march = thing.solver
         march.start(thing, 0.0, *thing.initial(0.0), thing.stop_time, thing.tolerance)
-        thing.observe(march.t, march.x, march.v, march.mode)
+        thing.observe(march.t, *(getattr(march, name) for name in (*thing.states, *thing.contacts)))
     except (ArithmeticError, ValueError):
         return []
     values = [getattr(thing, output) for output in outputs]

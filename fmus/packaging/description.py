@@ -3,14 +3,13 @@
 What does not depend on the version of FMI is shared with description3.py.
 """
 
-import sys
 from datetime import datetime
 from math import isfinite
 from typing import cast
 from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from ..runtime.declare import Declared, Declaring, Output
+from ..runtime.declare import Declared, Declaring, Output, variables
 from ..runtime.values import SETTABLE
 from . import BuildError, __version__
 from .dependencies import at_start
@@ -84,9 +83,8 @@ def log_and_experiment(root: Element, model: type[Declaring], fmi: str) -> None:
 
 
 def declared_by(model: type[Declaring]) -> Variables:
-    """The variables of a model by the runtime that it was written with: ours, or one that travels (lean.py)."""
-    runtime = next(base.__module__ for base in model.__mro__ if base.__name__ == Declaring.__name__)
-    return sys.modules[runtime].variables(model())
+    """Name and declaration of every variable of a model."""
+    return variables(model())
 
 
 def define_units(root: Element, declared: Variables) -> None:

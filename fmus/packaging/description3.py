@@ -9,7 +9,6 @@ from typing import Any, cast
 from xml.etree.ElementTree import Element, SubElement
 
 from ..runtime.declare import Declaring, Output
-from ..runtime.exchange import nominals
 from ..runtime.variables3 import DERIVATIVE, TO_BREAK_AWAY, TO_REST, further
 from .dependencies import at_start
 from .description import (
@@ -25,6 +24,7 @@ from .description import (
     quantities,
     type_name,
 )
+from .written import beside as beside_it
 
 TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
 BOTH = {
@@ -87,7 +87,7 @@ def _of(declared: Variables, causality: str) -> list[int]:
 def _tell_states(elements: list[Element], model: type[Declaring], rates: dict[int, int]) -> None:
     """Derivatives name their states; a state has a nominal value, and the speed may be put to zero at an event."""
     thing: Any = model()
-    for (rate, state), size in zip(rates.items(), nominals(thing), strict=True):
+    for (rate, state), size in zip(rates.items(), beside_it(model, "runtime.exchange").nominals(thing), strict=True):
         elements[rate].set("derivative", str(state))
         elements[state].set("nominal", repr(size))
     if thing.dry:

@@ -1,7 +1,7 @@
-"""Dry friction as modes: backward, stuck, forward; their guards, and where they settle.
+"""Dry friction as modes, one for each contact: backward, stuck, forward; their guards, and where they settle.
 
 Sliding, the friction force is that of the model and opposes the direction of the mode.  Stuck, it is whatever
-holds the body at rest, up to the holding limit.  A mode ends where its guard does: a slide when the speed comes to
+holds the body at rest, up to the holding limit.  A mode ends where its guard does: a slide when the slip speed comes to
 zero, a stick when the load exceeds the limit (M. Otter, H. Elmqvist, S. E. Mattsson, Hybrid modeling in Modelica
 based on the synchronous data flow principle, CACSD 1999).
 """
@@ -11,6 +11,7 @@ from math import fabs, inf
 from .codes import BACKWARD, EXACT, FORWARD, HYBRID, SIGN, STUCK, THRESHOLD
 from .oscillator import Oscillator
 from .rounding import NEAR
+from .vectors import Contact, Contacts, States, place, slip
 
 HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes, every change of mode is located as an event")
 SIGN_LAW = ("sign", SIGN, "sliding force times sign(v) as it stands: no event, no stick; chatters")
@@ -35,12 +36,15 @@ def threshold(v, eps, load, slide, hold):
 class DryFriction(Oscillator):
     """An oscillator that sticks.
 
-    hold(t, x, v) tells the load on the body at rest, its rate and the holding limit; terms(t, x, v) the sum of the
-    sizes of what the load is made of, of which rounding takes its share.  While the body rests, the load is linear in
-    time.
+    For each of its contacts it says
+        hold(t, states)         the load on the contact at rest, its rate and the holding limit
+        terms(t, states)        the sum of the sizes of what the load is made of, of which rounding takes its share
+    under these names if there is one, with the name of the mode behind them if there are several: hold_mode1.  While
+    all stands still, the loads are linear in time.
     """
 
-    dry = True
+    contacts: dict[str, str] = {"mode": "v"}
+    dry = waits = True
     rules: tuple[str, ...] = (
         "friction = {friction} with solver.method = 1 (exact): the closed form holds for the hybrid law only; "
         "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
@@ -50,18 +54,18 @@ class DryFriction(Oscillator):
     def prepare(self):
         return 1 if self.friction != HYBRID and self.solver.method == EXACT else 0
 
-    def settle(self, t, x, v, near):
+    def settle(self, t, y: States, near, i: Contact):
         """The mode that holds from here on.
 
         A load of the limit is a tie, which its rate decides: outward it lets go, inward or without a rate it is held.
         The load is known but for the rounding of its terms, and, where it moves inward, the share `near` of the limit.
         """
-        if v > 0.0:
+        if y[slip[i]] > 0.0:
             return FORWARD
-        if v < 0.0:
+        if y[slip[i]] < 0.0:
             return BACKWARD
-        load, rate, limit = self.hold(t, x, v)
-        slack = NEAR * (self.terms(t, x, v) + limit)
+        load, rate, limit = self.hold(t, y, i)
+        slack = NEAR * (self.terms(t, y, i) + limit)
         if rate > 0.0 and load >= limit - slack:
             return FORWARD
         if rate < 0.0 and load <= slack - limit:
@@ -72,45 +76,82 @@ class DryFriction(Oscillator):
             return STUCK
         return FORWARD if load > 0.0 else BACKWARD
 
-    def touches(self, t, x, v, mode, near):
+    def touches(self, t, y: States, modes: Contacts, near, i: Contact):
         """Whether a slide whose speed comes to zero here only touches it: friction lets go so soon that a speed which
         is off by the share `near` would not have come to zero.
 
         After the wait s the speed grows as v = u (1 - cos(w s)), with the load's rate m w^2 u.
         """
-        load, rate, limit = self.hold(t, x, v)
+        load, rate, limit = self.hold(t, y, i)
         if rate == 0.0:
             return load == 0.0 and limit == 0.0  # nothing stops it: what is left of the speed is the method's error
-        if mode * rate < 0.0:
+        if modes[i] * rate < 0.0:
             return False
-        wait = (limit - mode * load) / fabs(rate)
-        _, stiffness, _ = self.jacobian(t, x, v, mode)
+        wait = (limit - modes[i] * load) / fabs(rate)
+        _, J = self.jacobian(t, y, modes)
+        stiffness = J[slip[i], place[i]]
         return -0.5 * stiffness * wait * wait < near
 
-    def departure(self, t, x, v, mode):
-        """The acceleration at a break-away, where the load is just the limit."""
-        return self.rates(t, x, v, mode)
+    def departure(self, t, y: States, modes: Contacts, i: Contact):
+        """The rate of a slip at a break-away, where the load is just the limit."""
+        f = self.rates(t, y, modes)
+        return f[slip[i]]
 
-    def release(self, t, x, v):
-        """When a body at rest at x breaks away, and in which direction; inf if it never does."""
-        load, rate, limit = self.hold(t, x, v)
+    def release(self, t, y: States, i: Contact):
+        """When a contact breaks away if nothing moves, and in which direction; inf if it never does."""
+        load, rate, limit = self.hold(t, y, i)
         if rate == 0.0:
             return inf, STUCK
         direction = FORWARD if rate > 0.0 else BACKWARD
         wait = (limit - direction * load) / fabs(rate)
         return t + (wait if wait > 0.0 else 0.0), direction
 
-    def reversal(self, step):
-        """When the speed leaves the direction of the mode within the step, to the last bit; inf if it does not."""
-        mode = step.mode0
-        low, high = step.t0, step.t1
-        ahead, behind = mode * step.v0, mode * step.v1
+    def guard(self, step, t, i: Contact):
+        """Positive while the mode lasts: what the load of a stuck contact lacks to the limit, or the slip speed, in the
+        direction of the mode."""
+        y = step.at(self, t)
+        if self.coupled and step.modes0[i] == STUCK:
+            return self.margin(t, y, i)
+        return step.modes0[i] * y[slip[i]]
+
+    def margin(self, t, y: States, i: Contact):
+        """What a load lacks to the limit; one that stays there, but for rounding, is held."""
+        load, _, limit = self.hold(t, y, i)
+        return limit + NEAR * (self.terms(t, y, i) + limit) - fabs(load)
+
+    def breakaway(self, step, i: Contact):
+        """When the load of a stuck contact exceeds the limit within the step, to the last bit; inf if it does not."""
+        ahead, behind = self.margin(step.t0, step.y0, i), self.margin(step.t1, step.y1, i)
+        high = step.t1
         if behind > 0.0:
-            high = self.dip(step)
+            load, rate, _ = self.hold(step.t0, step.y0, i)
+            load1, rate1, _ = self.hold(step.t1, step.y1, i)
+            if load * rate <= 0.0 or load1 * rate1 >= 0.0:
+                return inf
+            high = self.dip(step, i)
             if not high < inf:
                 return inf
-            _, v = step.at(self, high)
-            behind = mode * v
+            behind = self.guard(step, high, i)
+        return self.located(step, high, ahead, behind, i)
+
+    def reversal(self, step, i: Contact):
+        """When the slip speed leaves the direction of the mode within the step, to the last bit; inf if it does not."""
+        mode = step.modes0[i]
+        ahead, behind = mode * step.y0[slip[i]], mode * step.y1[slip[i]]
+        high = step.t1
+        if behind > 0.0:
+            if mode * step.f0[slip[i]] >= 0.0 or mode * step.f1[slip[i]] <= 0.0:
+                return inf
+            high = self.dip(step, i)
+            if not high < inf:
+                return inf
+            behind = self.guard(step, high, i)
+        return self.located(step, high, ahead, behind, i)
+
+    def located(self, step, high, ahead, behind, i: Contact):
+        """The first instant in the step at which the guard is not positive; at its beginning it is `ahead`, at `high`
+        `behind`, which is not."""
+        low = step.t0
         kept = 0  # the end of the bracket that the last secant left where it was
         looks = 0
         for _ in range(MOST_HALVINGS):
@@ -121,38 +162,34 @@ class DryFriction(Oscillator):
                 secant = low + (high - low) * (ahead / (ahead - behind))
                 if low < secant < high:
                     middle = secant
-            _, v = step.at(self, middle)
+            here = self.guard(step, middle, i)
             looks += 1
-            v *= mode
-            if v > 0.0:
-                low, ahead = middle, v
+            if here > 0.0:
+                low, ahead = middle, here
                 if kept == 1:
                     behind *= 0.5
                 kept = 1
             else:
-                high, behind = middle, v
+                high, behind = middle, here
                 if kept == -1:
                     ahead *= 0.5
                 kept = -1
         step.looked += looks
         return high
 
-    def dip(self, step):
-        """When the speed is found against the mode within a step that it enters falling and leaves rising; else inf."""
-        mode = step.mode0
-        if mode * step.a0 >= 0.0 or mode * step.a1 <= 0.0:
-            return inf
+    def dip(self, step, i: Contact):
+        """When the guard is found not positive within a step that it enters falling and leaves rising; else inf."""
         low, high = step.t0, step.t1
         step.looked += MOST_THIRDS
         for _ in range(MOST_THIRDS):
             third = (high - low) / 3.0
-            _, left = step.at(self, low + third)
-            _, right = step.at(self, high - third)
-            if mode * left <= 0.0:
+            left = self.guard(step, low + third, i)
+            right = self.guard(step, high - third, i)
+            if left <= 0.0:
                 return low + third
-            if mode * right <= 0.0:
+            if right <= 0.0:
                 return high - third
-            if mode * left < mode * right:
+            if left < right:
                 high -= third
             else:
                 low += third

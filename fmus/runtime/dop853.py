@@ -6,6 +6,8 @@ DOP853 that goes with it: its numbers, to the last bit of a double, under its na
 
 from math import sqrt
 
+from .vectors import Contacts, Rates, States, each
+
 STAGES = 12  # right-hand sides a step; the last is the first of the next step
 EXTRA = 3  # right-hand sides that the interpolant needs on top
 POWER, SAFETY, SHRINK, GROW = 1.0 / 8.0, 0.9, 1.0 / 3.0, 6.0
@@ -59,105 +61,70 @@ class Dop853:
     """One step, and the polynomial of degree 7 that keeps values and slopes of both its ends."""
 
     def __init__(self):
-        self.v6 = self.v7 = self.v8 = self.v9 = self.v10 = self.v11 = self.v12 = 0.0  # speeds and accelerations
-        self.a6 = self.a7 = self.a8 = self.a9 = self.a10 = self.a11 = self.a12 = 0.0  # at the stages
+        self.f6 = self.f7 = self.f8 = self.f9 = self.f10 = self.f11 = self.f12 = 0.0
 
-    def step(self, model, mode, t, x, v, a, h):
-        """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
-        y = x + h * (A21 * v)
-        v2 = v + h * (A21 * a)
-        a2 = model.rates(t + C2 * h, y, v2, mode)
-        y = x + h * (A31 * v + A32 * v2)
-        v3 = v + h * (A31 * a + A32 * a2)
-        a3 = model.rates(t + C3 * h, y, v3, mode)
-        y = x + h * (A41 * v + A43 * v3)
-        v4 = v + h * (A41 * a + A43 * a3)
-        a4 = model.rates(t + C4 * h, y, v4, mode)
-        y = x + h * (A51 * v + A53 * v3 + A54 * v4)
-        v5 = v + h * (A51 * a + A53 * a3 + A54 * a4)
-        a5 = model.rates(t + C5 * h, y, v5, mode)
-        y = x + h * (A61 * v + A64 * v4 + A65 * v5)
-        v6 = v + h * (A61 * a + A64 * a4 + A65 * a5)
-        a6 = model.rates(t + C6 * h, y, v6, mode)
-        y = x + h * (A71 * v + A74 * v4 + A75 * v5 + A76 * v6)
-        v7 = v + h * (A71 * a + A74 * a4 + A75 * a5 + A76 * a6)
-        a7 = model.rates(t + C7 * h, y, v7, mode)
-        y = x + h * (A81 * v + A84 * v4 + A85 * v5 + A86 * v6 + A87 * v7)
-        v8 = v + h * (A81 * a + A84 * a4 + A85 * a5 + A86 * a6 + A87 * a7)
-        a8 = model.rates(t + C8 * h, y, v8, mode)
-        y = x + h * (A91 * v + A94 * v4 + A95 * v5 + A96 * v6 + A97 * v7 + A98 * v8)
-        v9 = v + h * (A91 * a + A94 * a4 + A95 * a5 + A96 * a6 + A97 * a7 + A98 * a8)
-        a9 = model.rates(t + C9 * h, y, v9, mode)
-        y = x + h * (A101 * v + A104 * v4 + A105 * v5 + A106 * v6 + A107 * v7 + A108 * v8 + A109 * v9)
-        v10 = v + h * (A101 * a + A104 * a4 + A105 * a5 + A106 * a6 + A107 * a7 + A108 * a8 + A109 * a9)
-        a10 = model.rates(t + C10 * h, y, v10, mode)
-        y = x + h * (A111 * v + A114 * v4 + A115 * v5 + A116 * v6 + A117 * v7 + A118 * v8 + A119 * v9 + A1110 * v10)
-        v11 = v + h * (A111 * a + A114 * a4 + A115 * a5 + A116 * a6 + A117 * a7 + A118 * a8 + A119 * a9 + A1110 * a10)
-        a11 = model.rates(t + C11 * h, y, v11, mode)
-        y = A121 * v + A124 * v4 + A125 * v5 + A126 * v6 + A127 * v7
-        y = x + h * (y + A128 * v8 + A129 * v9 + A1210 * v10 + A1211 * v11)
-        v12 = A121 * a + A124 * a4 + A125 * a5 + A126 * a6 + A127 * a7
-        v12 = v + h * (v12 + A128 * a8 + A129 * a9 + A1210 * a10 + A1211 * a11)
-        a12 = model.rates(t + h, y, v12, mode)
-        p = B1 * v + B6 * v6 + B7 * v7 + B8 * v8 + B9 * v9 + B10 * v10 + B11 * v11 + B12 * v12
-        q = B1 * a + B6 * a6 + B7 * a7 + B8 * a8 + B9 * a9 + B10 * a10 + B11 * a11 + B12 * a12
-        x1, v1 = x + h * p, v + h * q
-        a1 = model.rates(t + h, x1, v1, mode)
-        self.v6, self.v7, self.v8, self.v9, self.v10, self.v11, self.v12 = v6, v7, v8, v9, v10, v11, v12
-        self.a6, self.a7, self.a8, self.a9, self.a10, self.a11, self.a12 = a6, a7, a8, a9, a10, a11, a12
-        e_x = combine(
-            ER1 * v + ER6 * v6 + ER7 * v7 + ER8 * v8 + ER9 * v9 + ER10 * v10 + ER11 * v11 + ER12 * v12,
-            p - BHH1 * v - BHH2 * v9 - BHH3 * v12,
-        )
-        e_v = combine(
-            ER1 * a + ER6 * a6 + ER7 * a7 + ER8 * a8 + ER9 * a9 + ER10 * a10 + ER11 * a11 + ER12 * a12,
-            q - BHH1 * a - BHH2 * a9 - BHH3 * a12,
-        )
-        return x1, v1, a1, e_x, e_v
+    def propose(self, model, modes: Contacts, t, y: States, f: Rates, h) -> tuple[States, Rates, States]:
+        """The new state, its rates, and the rates e of the error: the estimates are h e."""
+        y2 = y + h * (A21 * f)
+        f2 = model.rates(t + C2 * h, y2, modes)
+        y3 = y + h * (A31 * f + A32 * f2)
+        f3 = model.rates(t + C3 * h, y3, modes)
+        y4 = y + h * (A41 * f + A43 * f3)
+        f4 = model.rates(t + C4 * h, y4, modes)
+        y5 = y + h * (A51 * f + A53 * f3 + A54 * f4)
+        f5 = model.rates(t + C5 * h, y5, modes)
+        y6 = y + h * (A61 * f + A64 * f4 + A65 * f5)
+        f6 = model.rates(t + C6 * h, y6, modes)
+        y7 = y + h * (A71 * f + A74 * f4 + A75 * f5 + A76 * f6)
+        f7 = model.rates(t + C7 * h, y7, modes)
+        y8 = y + h * (A81 * f + A84 * f4 + A85 * f5 + A86 * f6 + A87 * f7)
+        f8 = model.rates(t + C8 * h, y8, modes)
+        y9 = y + h * (A91 * f + A94 * f4 + A95 * f5 + A96 * f6 + A97 * f7 + A98 * f8)
+        f9 = model.rates(t + C9 * h, y9, modes)
+        y10 = y + h * (A101 * f + A104 * f4 + A105 * f5 + A106 * f6 + A107 * f7 + A108 * f8 + A109 * f9)
+        f10 = model.rates(t + C10 * h, y10, modes)
+        y11 = y + h * (A111 * f + A114 * f4 + A115 * f5 + A116 * f6 + A117 * f7 + A118 * f8 + A119 * f9 + A1110 * f10)
+        f11 = model.rates(t + C11 * h, y11, modes)
+        u = A121 * f + A124 * f4 + A125 * f5 + A126 * f6 + A127 * f7
+        y12 = y + h * (u + A128 * f8 + A129 * f9 + A1210 * f10 + A1211 * f11)
+        f12 = model.rates(t + h, y12, modes)
+        u = B1 * f + B6 * f6 + B7 * f7 + B8 * f8 + B9 * f9 + B10 * f10 + B11 * f11 + B12 * f12
+        y1 = y + h * u
+        f1 = model.rates(t + h, y1, modes)
+        self.f6, self.f7, self.f8, self.f9, self.f10, self.f11, self.f12 = f6, f7, f8, f9, f10, f11, f12
+        e5 = ER1 * f + ER6 * f6 + ER7 * f7 + ER8 * f8 + ER9 * f9 + ER10 * f10 + ER11 * f11 + ER12 * f12
+        e3 = u - BHH1 * f - BHH2 * f9 - BHH3 * f12
+        e = combined(e5, e3)
+        return y1, f1, e
 
     def expand(self, model, step):
         """The interpolant of the step just taken."""
         inside = step.interpolant
-        h, mode = step.span, step.mode0
-        t, x, v, a = step.t0, step.x0, step.v0, step.a0
-        v1, a1 = step.v1, step.a1
-        v6, v7, v8, v9, v10, v11, v12 = self.v6, self.v7, self.v8, self.v9, self.v10, self.v11, self.v12
-        a6, a7, a8, a9, a10, a11, a12 = self.a6, self.a7, self.a8, self.a9, self.a10, self.a11, self.a12
-        y = A141 * v + A147 * v7 + A148 * v8 + A149 * v9
-        y = x + h * (y + A1410 * v10 + A1411 * v11 + A1412 * v12 + A1413 * v1)
-        v14 = A141 * a + A147 * a7 + A148 * a8 + A149 * a9
-        v14 = v + h * (v14 + A1410 * a10 + A1411 * a11 + A1412 * a12 + A1413 * a1)
-        a14 = model.rates(t + C14 * h, y, v14, mode)
-        y = A151 * v + A156 * v6 + A157 * v7 + A158 * v8
-        y = x + h * (y + A1511 * v11 + A1512 * v12 + A1513 * v1 + A1514 * v14)
-        v15 = A151 * a + A156 * a6 + A157 * a7 + A158 * a8
-        v15 = v + h * (v15 + A1511 * a11 + A1512 * a12 + A1513 * a1 + A1514 * a14)
-        a15 = model.rates(t + C15 * h, y, v15, mode)
-        y = x + h * (A161 * v + A166 * v6 + A167 * v7 + A168 * v8 + A169 * v9 + A1613 * v1 + A1614 * v14 + A1615 * v15)
-        v16 = A161 * a + A166 * a6 + A167 * a7 + A168 * a8
-        v16 = v + h * (v16 + A169 * a9 + A1613 * a1 + A1614 * a14 + A1615 * a15)
-        a16 = model.rates(t + C16 * h, y, v16, mode)
+        h, modes, t, y, f, y1, f1 = step.span, step.modes0, step.t0, step.y0, step.f0, step.y1, step.f1  # noqa: F841
+        f6, f7, f8, f9, f10, f11, f12 = self.f6, self.f7, self.f8, self.f9, self.f10, self.f11, self.f12
+        u = A141 * f + A147 * f7 + A148 * f8 + A149 * f9
+        y14 = y + h * (u + A1410 * f10 + A1411 * f11 + A1412 * f12 + A1413 * f1)
+        f14 = model.rates(t + C14 * h, y14, modes)
+        u = A151 * f + A156 * f6 + A157 * f7 + A158 * f8
+        y15 = y + h * (u + A1511 * f11 + A1512 * f12 + A1513 * f1 + A1514 * f14)
+        f15 = model.rates(t + C15 * h, y15, modes)
+        u = A161 * f + A166 * f6 + A167 * f7 + A168 * f8
+        y16 = y + h * (u + A169 * f9 + A1613 * f1 + A1614 * f14 + A1615 * f15)
+        f16 = model.rates(t + C16 * h, y16, modes)
         inside.meet(step)
         inside.degree = 7
-        p = D41 * v + D46 * v6 + D47 * v7 + D48 * v8 + D49 * v9 + D410 * v10
-        inside.p4 = h * (p + D411 * v11 + D412 * v12 + D413 * v1 + D414 * v14 + D415 * v15 + D416 * v16)
-        p = D51 * v + D56 * v6 + D57 * v7 + D58 * v8 + D59 * v9 + D510 * v10
-        inside.p5 = h * (p + D511 * v11 + D512 * v12 + D513 * v1 + D514 * v14 + D515 * v15 + D516 * v16)
-        p = D61 * v + D66 * v6 + D67 * v7 + D68 * v8 + D69 * v9 + D610 * v10
-        inside.p6 = h * (p + D611 * v11 + D612 * v12 + D613 * v1 + D614 * v14 + D615 * v15 + D616 * v16)
-        p = D71 * v + D76 * v6 + D77 * v7 + D78 * v8 + D79 * v9 + D710 * v10
-        inside.p7 = h * (p + D711 * v11 + D712 * v12 + D713 * v1 + D714 * v14 + D715 * v15 + D716 * v16)
-        p = D41 * a + D46 * a6 + D47 * a7 + D48 * a8 + D49 * a9 + D410 * a10
-        inside.q4 = h * (p + D411 * a11 + D412 * a12 + D413 * a1 + D414 * a14 + D415 * a15 + D416 * a16)
-        p = D51 * a + D56 * a6 + D57 * a7 + D58 * a8 + D59 * a9 + D510 * a10
-        inside.q5 = h * (p + D511 * a11 + D512 * a12 + D513 * a1 + D514 * a14 + D515 * a15 + D516 * a16)
-        p = D61 * a + D66 * a6 + D67 * a7 + D68 * a8 + D69 * a9 + D610 * a10
-        inside.q6 = h * (p + D611 * a11 + D612 * a12 + D613 * a1 + D614 * a14 + D615 * a15 + D616 * a16)
-        p = D71 * a + D76 * a6 + D77 * a7 + D78 * a8 + D79 * a9 + D710 * a10
-        inside.q7 = h * (p + D711 * a11 + D712 * a12 + D713 * a1 + D714 * a14 + D715 * a15 + D716 * a16)
+        u = D41 * f + D46 * f6 + D47 * f7 + D48 * f8 + D49 * f9 + D410 * f10
+        inside.c4 = h * (u + D411 * f11 + D412 * f12 + D413 * f1 + D414 * f14 + D415 * f15 + D416 * f16)
+        u = D51 * f + D56 * f6 + D57 * f7 + D58 * f8 + D59 * f9 + D510 * f10
+        inside.c5 = h * (u + D511 * f11 + D512 * f12 + D513 * f1 + D514 * f14 + D515 * f15 + D516 * f16)
+        u = D61 * f + D66 * f6 + D67 * f7 + D68 * f8 + D69 * f9 + D610 * f10
+        inside.c6 = h * (u + D611 * f11 + D612 * f12 + D613 * f1 + D614 * f14 + D615 * f15 + D616 * f16)
+        u = D71 * f + D76 * f6 + D77 * f7 + D78 * f8 + D79 * f9 + D710 * f10
+        inside.c7 = h * (u + D711 * f11 + D712 * f12 + D713 * f1 + D714 * f14 + D715 * f15 + D716 * f16)
 
 
-def combine(fifth, third):
+@each
+def combined(fifth, third):
     """The rate of the error from the two embedded formulas, of order 5 and of order 3."""
     size = fifth * fifth + 0.01 * third * third
     return fifth * fifth / sqrt(size) if size != 0.0 else 0.0

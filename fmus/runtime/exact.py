@@ -14,6 +14,7 @@ oscillator here has both.
 from math import atan2, copysign, cos, exp, expm1, fabs, inf, log1p, pi, sin, sqrt
 
 from .rounding import NEAR
+from .vectors import States
 
 UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE = 1, 2, 3, 4
 
@@ -47,7 +48,7 @@ class Exact:
         rounding."""
         self.x0, self.v0, self.a0, self.p, self.lost = x, v, a, p, lost
 
-    def at(self, t):
+    def at(self, t) -> States:
         """Position and speed t seconds after the beginning of the piece."""
         if self.kind == UNDAMPED:
             half = 0.5 * self.w * t
@@ -75,19 +76,19 @@ class Exact:
             (self.p - self.n2 * self.x0) * g + self.v0 * slope,
         )
 
-    def end(self, t):
-        """Position t seconds after the beginning, and what it lacks.
+    def end(self, t) -> tuple[States, float]:
+        """Position and speed at the next standstill, t seconds after the beginning, and what the position lacks.
 
         Only a body that goes on for ever, behind its driver, comes far enough for that to matter.
         """
         if self.kind != UNDAMPED:
             x, _ = self.at(t)
-            return x, 0.0
+            return x, 0.0, 0.0
         x0, self.x0 = self.x0, 0.0
         way, _ = self.at(t)
         self.x0, x = x0, x0 + way
         moved = x - x0
-        return x, (x0 - (x - moved)) + (way - moved)
+        return x, 0.0, (x0 - (x - moved)) + (way - moved)
 
     def overdamped(self, t):
         """G, G' and I from the two real roots, which coincide at critical damping."""

@@ -1,9 +1,9 @@
 """Model exchange: what an importer's solver asks of an oscillator, and what happens at an event.
 
-Continuous states are the position, the speed and, where there is one, the position of the driver: nobody tells when the
-importer's run begins, so nothing may depend on the time as such.  The mode of friction is a discrete state.  It changes
-in `update` only, so that the motion is smooth between events, and stands exactly still where friction holds it.
-An importer finds an event where an indicator falls to zero:
+Continuous states are those of the model and, where there is one, the position of the driver: nobody tells when the
+importer's run begins, so nothing may depend on the time as such.  The modes of friction are discrete states.  They
+change in `update` only, so that the motion is smooth between events, and stands exactly still where friction holds it.
+An importer finds an event where an indicator of a contact falls to zero:
 
     to_rest          mode v while sliding, 1 while stuck
     to_break_away    limit - |load| while stuck, 1 while sliding
@@ -18,6 +18,7 @@ from .codes import STUCK
 from .march import NOMINAL
 from .rounding import ULP
 from .step import NEARLY
+from .vectors import Contacts, contacts, every, per_contact, per_state, places, slip, speeds
 
 BEYOND, LEAST = 4.0 * ULP, 1e-300  # of the limit; of a speed and a force
 TOLERANCE = 1e-4  # taken for the importer's, which nobody tells, where solver.rtol is 0
@@ -39,65 +40,86 @@ def move_to(model, march, t):
 
 def states(model, march):
     """The continuous states."""
-    return [march.x, march.v, model.x_base] if model.driven else [march.x, march.v]
+    return [*march.y, model.x_base] if model.driven else [*march.y]
 
 
 def put(model, march, values):
     """Take over the continuous states."""
-    march.x, march.v = values[0], values[1]
+    for i in places:
+        march.y[i] = values[i]
     if model.driven:
-        model.x_base = values[2]  # at the present time, which move_to keeps
+        model.x_base = values[len(march.y)]  # at the present time, which move_to keeps
 
 
 def nominals(model):
     """The sizes of the states below which a tolerance is absolute: those of our own solver where nobody sets them."""
+    size = per_state()
+    for i in places:
+        size[i] = NOMINAL
     finest = model.finest()
-    speed = finest if finest < NOMINAL else NOMINAL
-    return [NOMINAL, speed, NOMINAL] if model.driven else [NOMINAL, speed]
+    for i in speeds:
+        size[i] = finest if finest < NOMINAL else NOMINAL
+    return [*size, NOMINAL] if model.driven else [*size]
 
 
 def rates(model, march):
     """The derivatives of the continuous states."""
-    v = a = 0.0
-    if not (march.step.sticks and march.mode == STUCK):
-        v, a = march.v, model.rates(march.t, march.x, march.v, march.mode)
-    return [v, a, model.drive()] if model.driven else [v, a]
+    if model.waits and march.step.sticks and every(march.modes == STUCK):
+        still = per_state()
+        for i in places:
+            still[i] = 0.0
+        return [*still, model.drive()] if model.driven else [*still]
+    y = march.y
+    f = model.rates(march.t, y, march.modes)
+    return [*f, model.drive()] if model.driven else [*f]
 
 
 def indicators(model, march):
-    """The event indicators of a model with dry friction; where its law knows no modes, both are 1."""
-    if not march.step.sticks:
-        return [1.0, 1.0]
-    if march.mode != STUCK:
-        return [march.mode * march.v + LEAST, 1.0]
-    load, _, limit = model.hold(march.t, march.x, march.v)
-    return [1.0, limit + BEYOND * limit + LEAST - fabs(load)]
+    """The event indicators of a model with dry friction, all to rest before all to break away; where its law knows no
+    modes, they are 1."""
+    to_rest, to_break_away = per_contact(), per_contact()
+    for i in contacts:
+        to_rest[i] = to_break_away[i] = 1.0
+        if march.step.sticks:
+            if march.modes[i] != STUCK:
+                to_rest[i] = march.modes[i] * march.y[slip[i]] + LEAST
+            else:
+                load, _, limit = model.hold(march.t, march.y, i)
+                to_break_away[i] = limit + BEYOND * limit + LEAST - fabs(load)
+    return [*to_rest, *to_break_away]
 
 
 def update(model, march):
-    """Let the mode follow the present point; whether the motion is another from here on, as solvers must know.
+    """Let the modes follow the present point; whether the motion is another from here on, as solvers must know.
 
-    The speed is set to zero where the slide has ended.  Without a reason for an event nothing changes, nor does it the
+    The speed is set to zero where a slide has ended.  Without a reason for an event nothing changes, nor does it the
     second time.
     """
-    step, mode = march.step, march.mode
-    if not step.sticks or mode * march.v > 0.0:
+    if not (model.dry and march.step.sticks):
         return False
-    stopped = mode != STUCK and march.v != 0.0
-    if stopped:
-        march.v = 0.0
     tolerance = march.rtol if march.rtol > 0.0 else TOLERANCE
-    if not model.touches(march.t, march.x, march.v, mode, 0.0):
-        march.mode = model.settle(march.t, march.x, march.v, NEARLY * tolerance)
-    changed = march.mode != mode
+    another = changed = False
+    for i in contacts:
+        mode = march.modes[i]
+        if not mode * march.y[slip[i]] > 0.0:
+            if mode != STUCK and march.y[slip[i]] != 0.0:
+                march.y[slip[i]] = 0.0
+                another = True
+            if model.coupled or not model.touches(march.t, march.y, march.modes, 0.0, i):
+                march.modes[i] = model.settle(march.t, march.y, NEARLY * tolerance, i)
+            if march.modes[i] != mode:
+                changed = True
     if changed:
-        step.before.happened += 1
-        step.before.t_event = march.t
-    return stopped or changed
+        march.step.before.happened += 1
+        march.step.before.t_event = march.t
+    return another or changed
 
 
 class Exchange:
     """What is read of it like a variable, as last shown."""
+
+    to_rest: Contacts
+    to_break_away: Contacts
 
     def __init__(self):
         self.to_rest = self.to_break_away = 1.0
@@ -105,7 +127,9 @@ class Exchange:
 
     def show(self, model, march):
         if model.dry:
-            self.to_rest, self.to_break_away = indicators(model, march)
+            found = indicators(model, march)
+            for i in contacts:
+                self.to_rest[i], self.to_break_away[i] = found[i], found[len(march.modes) + i]
         if model.driven:
             self.driver = model.drive()
 

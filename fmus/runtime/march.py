@@ -4,12 +4,13 @@ The march owns the internal step that covers the present point t, and tells the 
 beyond it, because somebody looked ahead, does not show.
 """
 
-from math import fabs, inf, nan
+from math import inf, nan
 
 from .codes import DIVERGED, ENDLESS, HYBRID, ODE23, OK, STUCK
 from .declare import Choice, Count, Declaring, Fixed, Local
 from .methods import ITEMS
 from .step import HUGE, Step
+from .vectors import Contacts, States, contacts, magnitude, slip, some, speeds, total
 
 NOMINAL = 1e-3  # size of a position or a speed, in SI units, where nobody sets one
 # Within one communication step, so that a sentence comes after half a minute at most, on a slow machine too:
@@ -36,21 +37,24 @@ class March(Declaring):
     h = Local("s", "size of the internal step in force")
     t_next = Local("s", "end of the internal step that covers the time after the present point; computed when read")
 
+    modes_then: Contacts
+
     def __init__(self):
         super().__init__()
         self.step = Step()
-        self.t = self.x = self.v = 0.0
-        self.mode = STUCK
+        self.t = self.y = 0.0
+        self.modes = STUCK
         self.run = 1.0  # length of the default run
         # what the present point was before its values were renewed
         self.renewed_at = nan
-        self.called_then = self.happened_then = self.mode_then = 0
+        self.called_then = self.happened_then = 0
+        self.modes_then = STUCK
         self.size_then = 0.0
         self.t_event_then = nan
 
     # ---- the run
 
-    def start(self, model, t, x, v, t_end, tolerance):
+    def start(self, model, t, y: States, t_end, tolerance):
         """Begin a run at t; t_end is inf where the importer does not know it."""
         step = self.step
         run = t_end - t if t_end < inf else model.stop_time
@@ -61,8 +65,8 @@ class March(Declaring):
         step.methods.choose(self.method)
         if model.dry:
             step.sticks = model.friction == HYBRID
-        self.scale(model)
-        step.begin(model, t, x, v)
+        self.fit(model)
+        step.begin(model, t, y)
         self.renewed_at = nan
         self.arrive()
 
@@ -74,7 +78,7 @@ class March(Declaring):
         step = self.step
         if self.t > step.t0:
             step.before.length = step.t1 - step.t0
-            if step.event and self.t >= step.t1:
+            if model.dry and step.event and self.t >= step.t1:
                 step.note_event()
         else:
             step.go_back()
@@ -86,23 +90,30 @@ class March(Declaring):
         else:
             self.renewed_at = self.t
             self.called_then, self.happened_then, self.size_then = step.called, before.happened, step.size
-            self.t_event_then, self.mode_then = before.t_event, self.mode
-        self.scale(model)
-        if step.sticks and self.mode_then * self.v < 0.0:
-            self.v = 0.0  # within a slide a speed against its mode is rounding
-        step.stand(model, self.t, self.x, self.v, self.mode_then, step.near(model))
-        if step.mode1 != self.mode_then:
+            self.t_event_then, self.modes_then = before.t_event, self.modes
+        self.fit(model)
+        if model.dry and step.sticks:
+            for i in contacts:
+                if self.modes_then[i] * self.y[slip[i]] < 0.0:
+                    self.y[slip[i]] = 0.0  # within a slide a speed against its mode is rounding
+        step.stand(model, self.t, self.y, self.modes_then, step.near(model))
+        if model.dry and some(step.modes1 != self.modes_then):
             step.note_event()
         self.arrive()
 
-    def scale(self, model):
-        """The sizes of position and speed below which the tolerance is absolute."""
+    def fit(self, model):
+        """The sizes of the states below which the tolerance is absolute; and what closed forms follow from."""
         step = self.step
         size = self.atol / step.tolerance if self.atol > 0.0 else NOMINAL
-        step.least_x = step.least_v = size if size > 1e-300 else 1e-300  # divisors
+        size = size if size > 1e-300 else 1e-300  # a divisor
+        step.least = size
         finest = model.finest()
-        if self.atol == 0.0 and finest < step.least_v:
-            step.least_v = finest
+        if self.atol == 0.0 and finest < size:
+            for i in speeds:
+                step.least[i] = finest
+        if model.linear:
+            mass, damping, stiffness, drift = model.piece()
+            step.methods.exact.prepare(mass, damping, stiffness, drift)
 
     # ---- the present point
 
@@ -116,13 +127,13 @@ class March(Declaring):
             if status != OK:
                 return status
         if t < step.t1:
-            self.t, self.mode = t, step.mode0
+            self.t, self.modes = t, step.modes0
             inside = step.interpolant
             if inside.ready:  # as step.at has it, and one call less in most communication steps
-                self.x, self.v = inside.at(t - step.t0)
+                self.y = inside.at(t - step.t0)
                 return OK
-            self.x, self.v = step.at(model, t)
-            if step.t1 == inf and not fabs(self.x) + fabs(self.v) < HUGE:
+            self.y = step.at(model, t)
+            if step.t1 == inf and not total(magnitude(self.y)) < HUGE:
                 return DIVERGED  # a step without end has not been judged at its end
         else:
             self.arrive()
@@ -131,8 +142,7 @@ class March(Declaring):
     def arrive(self):
         """The present point is the end of the step."""
         step = self.step
-        self.t, self.mode = step.t1, step.mode1
-        self.x, self.v = step.x1, step.v1
+        self.t, self.y, self.modes = step.t1, step.y1, step.modes1
 
     def cover(self, model, t):
         """Take internal steps until one of them covers t."""

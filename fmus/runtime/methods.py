@@ -3,9 +3,11 @@
 from . import dop853, ode23, ode45, rodas
 from .codes import DOP853, EXACT, ODE23, ODE45, RODAS
 from .dop853 import Dop853
+from .exact import Exact
 from .ode23 import Ode23
 from .ode45 import Ode45
 from .rodas import Rodas
+from .vectors import Contacts, Rates, States
 
 EXACT_ITEM = ("exact", EXACT, "closed form of each linear piece, events included; the hybrid law only")
 ITEMS = (
@@ -20,36 +22,36 @@ class Methods:
     """The method chosen for a run, and how its step size is controlled."""
 
     def __init__(self):
-        self.ode23, self.ode45, self.dop853, self.rodas = Ode23(), Ode45(), Dop853(), Rodas()
+        self.exact, self.ode23, self.ode45, self.dop853, self.rodas = Exact(), Ode23(), Ode45(), Dop853(), Rodas()
         self.chosen = self.stages = self.extra = 0
         self.power = self.safety = self.shrink = self.grow = 0.0
 
     def choose(self, method):
         """Put a method in force; between the events of the exact one there are no steps to control."""
         self.chosen = method
-        if method == ODE45:
+        if self.chosen == ODE45:
             self.stages, self.extra = ode45.STAGES, ode45.EXTRA
             self.power, self.safety, self.shrink, self.grow = ode45.POWER, ode45.SAFETY, ode45.SHRINK, ode45.GROW
-        elif method == DOP853:
+        elif self.chosen == DOP853:
             self.stages, self.extra = dop853.STAGES, dop853.EXTRA
             self.power, self.safety, self.shrink, self.grow = dop853.POWER, dop853.SAFETY, dop853.SHRINK, dop853.GROW
-        elif method == RODAS:
+        elif self.chosen == RODAS:
             self.stages, self.extra = rodas.STAGES, rodas.EXTRA
             self.power, self.safety, self.shrink, self.grow = rodas.POWER, rodas.SAFETY, rodas.SHRINK, rodas.GROW
         else:
             self.stages, self.extra = ode23.STAGES, ode23.EXTRA
             self.power, self.safety, self.shrink, self.grow = ode23.POWER, ode23.SAFETY, ode23.SHRINK, ode23.GROW
 
-    def step(self, model, mode, t, x, v, a, h):
-        """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
+    def propose(self, model, modes: Contacts, t, y: States, f: Rates, h) -> tuple[States, Rates, States]:
+        """The new state, its rates, and the rates e of the error: the estimates are h e."""
         chosen = self.chosen
         if chosen == ODE23:
-            return self.ode23.step(model, mode, t, x, v, a, h)
+            return self.ode23.propose(model, modes, t, y, f, h)
         if chosen == RODAS:
-            return self.rodas.step(model, mode, t, x, v, a, h)
+            return self.rodas.propose(model, modes, t, y, f, h)
         if chosen == DOP853:
-            return self.dop853.step(model, mode, t, x, v, a, h)
-        return self.ode45.step(model, mode, t, x, v, a, h)
+            return self.dop853.propose(model, modes, t, y, f, h)
+        return self.ode45.propose(model, modes, t, y, f, h)
 
     def expand(self, model, step):
         """The interpolant of the step just taken."""

@@ -5,6 +5,8 @@ L. F. Shampine, Some practical Runge-Kutta formulas, Math. Comp. 46 (1986) 135-1
 E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.6.
 """
 
+from .vectors import Contacts, Rates, States
+
 STAGES = 6  # right-hand sides a step; the last is the first of the next step
 EXTRA = 0  # right-hand sides that the interpolant needs on top
 POWER, SAFETY, SHRINK, GROW = 1.0 / 5.0, 0.8, 0.1, 5.0
@@ -26,41 +28,30 @@ class Ode45:
     """One step, and the quartic that keeps values and slopes of both its ends."""
 
     def __init__(self):
-        self.v3 = self.v4 = self.v5 = self.v6 = 0.0  # speeds and accelerations at the stages
-        self.a3 = self.a4 = self.a5 = self.a6 = 0.0
+        self.f3 = self.f4 = self.f5 = self.f6 = 0.0
 
-    def step(self, model, mode, t, x, v, a, h):
-        """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
-        w = h * A21
-        v2 = v + w * a
-        a2 = model.rates(t + C2 * h, x + w * v, v2, mode)
-        v3 = v + h * (A31 * a + A32 * a2)
-        a3 = model.rates(t + C3 * h, x + h * (A31 * v + A32 * v2), v3, mode)
-        v4 = v + h * (A41 * a + A42 * a2 + A43 * a3)
-        a4 = model.rates(t + C4 * h, x + h * (A41 * v + A42 * v2 + A43 * v3), v4, mode)
-        v5 = v + h * (A51 * a + A52 * a2 + A53 * a3 + A54 * a4)
-        a5 = model.rates(t + C5 * h, x + h * (A51 * v + A52 * v2 + A53 * v3 + A54 * v4), v5, mode)
-        x6 = x + h * (A61 * v + A62 * v2 + A63 * v3 + A64 * v4 + A65 * v5)
-        v6 = v + h * (A61 * a + A62 * a2 + A63 * a3 + A64 * a4 + A65 * a5)
-        a6 = model.rates(t + h, x6, v6, mode)
-        x1 = x + h * (B1 * v + B3 * v3 + B4 * v4 + B5 * v5 + B6 * v6)
-        v1 = v + h * (B1 * a + B3 * a3 + B4 * a4 + B5 * a5 + B6 * a6)
-        a1 = model.rates(t + h, x1, v1, mode)
-        self.v3, self.v4, self.v5, self.v6 = v3, v4, v5, v6
-        self.a3, self.a4, self.a5, self.a6 = a3, a4, a5, a6
-        return (
-            x1,
-            v1,
-            a1,
-            E1 * v + E3 * v3 + E4 * v4 + E5 * v5 + E6 * v6 + E7 * v1,
-            E1 * a + E3 * a3 + E4 * a4 + E5 * a5 + E6 * a6 + E7 * a1,
-        )
+    def propose(self, model, modes: Contacts, t, y: States, f: Rates, h) -> tuple[States, Rates, States]:
+        """The new state, its rates, and the rates e of the error: the estimates are h e."""
+        y2 = y + h * A21 * f
+        f2 = model.rates(t + C2 * h, y2, modes)
+        y3 = y + h * (A31 * f + A32 * f2)
+        f3 = model.rates(t + C3 * h, y3, modes)
+        y4 = y + h * (A41 * f + A42 * f2 + A43 * f3)
+        f4 = model.rates(t + C4 * h, y4, modes)
+        y5 = y + h * (A51 * f + A52 * f2 + A53 * f3 + A54 * f4)
+        f5 = model.rates(t + C5 * h, y5, modes)
+        y6 = y + h * (A61 * f + A62 * f2 + A63 * f3 + A64 * f4 + A65 * f5)
+        f6 = model.rates(t + h, y6, modes)
+        y1 = y + h * (B1 * f + B3 * f3 + B4 * f4 + B5 * f5 + B6 * f6)
+        f1 = model.rates(t + h, y1, modes)
+        self.f3, self.f4, self.f5, self.f6 = f3, f4, f5, f6
+        e = E1 * f + E3 * f3 + E4 * f4 + E5 * f5 + E6 * f6 + E7 * f1
+        return y1, f1, e
 
     def expand(self, model, step):
         """The interpolant of the step just taken: the cubic of ode23 and D s^2 (1 - s)^2."""
         inside = step.interpolant
-        h, v, a, v1, a1 = step.span, step.v0, step.a0, step.v1, step.a1
         inside.meet(step)
         inside.degree = 4
-        inside.p4 = h * (D1 * v + D3 * self.v3 + D4 * self.v4 + D5 * self.v5 + D6 * self.v6 + D7 * v1)
-        inside.q4 = h * (D1 * a + D3 * self.a3 + D4 * self.a4 + D5 * self.a5 + D6 * self.a6 + D7 * a1)
+        c4 = D1 * step.f0 + D3 * self.f3 + D4 * self.f4 + D5 * self.f5 + D6 * self.f6 + D7 * step.f1
+        inside.c4 = step.span * c4

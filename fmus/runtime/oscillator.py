@@ -13,20 +13,27 @@ class Events(Declaring):
 
 
 class Oscillator(Declaring):
-    """An oscillator of position x and speed v, whatever the model calls them.
+    """An oscillator of some states, those of one body where it does not say otherwise, under names of its own.
 
-    A model owns `solver`, a March, and says
-        initial(t)                     position and speed at the start, which is at time t
+    A model owns `solver`, a March, and says, of all its states and modes in their order,
+        initial(t)                     the states at the start, which is at time t
         prepare()                      constants that follow from the values; 0, or the number of the broken rule
-        rates(t, x, v, mode)           those that are no states: the acceleration; mode is the direction of sliding, 0
-                                       where the law itself looks at v
-        jacobian(t, x, v, mode)        derivatives of that rate by t, x and v, for rodas
-        observe(t, x, v, mode)         sets the outputs; whether they are numbers
+        rates(t, states, modes)        those that are no states; a mode is the direction of sliding, 0 where the law
+                                       itself looks at the speed
+        jacobian(t, states, modes)     for each of these its derivatives by t and by the states, for rodas
+        observe(t, states, modes)      sets the outputs; whether they are numbers
+    and if it is linear, between its modes, m v' + c v + k x = F + k u t,
+        piece()                        m, c, k and u
+        push(t, modes)                 what of the acceleration is due to forces, at x = v = 0
     """
 
+    states: dict[str, str] = {"x": "v", "v": "a"}  # name -> name of its rate, which may be a state
+    contacts: dict[str, str] = {}  # name of the mode -> the state that is its slip
     dry = False  # friction with modes: see automaton.py
+    waits = False  # while all its contacts are stuck nothing moves
+    coupled = False  # a contact may be stuck while something moves
     driven = False  # it follows a driver, who stood at x_base at the time t_base and moves at the speed drive()
-    linear = False  # piecewise linear: it owns `exact` and has push(t, mode); see exact.py
+    linear = False  # piecewise linear: see exact.py
     rules: tuple[str, ...] = ()  # one sentence for each rule that binds several values, in their names
     own_solver = 0  # the number of the rule that is about our solver, and does not bind an importer's
     stop_time = 4.0

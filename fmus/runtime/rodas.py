@@ -4,14 +4,16 @@ Every stage solves one linear system with the Jacobian J at the beginning of the
 
     (1/(GAMMA h) - J) u_i = f(t + C_i h, y + sum A_ij u_j) + sum G_ij u_j/h + D_i h f_t,    i = 1 ... 6
 
-Here y = (x, v), f = (v, a) and u_i = h (p_i, q_i).  The row of J that belongs to x is (0, 1), so p_i follows from q_i
-and one division by a number is the whole linear algebra.  Stages 5, 6 and the new point differ by one u each.
+Here u_i = h k_i.  The system is solved by elimination, written out for the states that a model has: a state whose rate
+is a state follows from it, so one body costs one division.  Stages 5, 6 and the new point differ by one u each.
 
 E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.7; G. Steinebach, Improvement of Rosenbrock-Wanner
 method RODASP, in: Progress in Differential-Algebraic Equations II, Springer 2020, 165-184 (the numbers).
 """
 
-from math import nan
+from math import nan  # noqa: F401  of a system that cannot be solved
+
+from .vectors import Contacts, Rates, States, factored, kinematic, solved
 
 STAGES = 6  # right-hand sides a step, and one Jacobian; the last is the first of the next step
 EXTRA = 0  # right-hand sides that the interpolant needs on top
@@ -42,62 +44,64 @@ H34, H35 = 18.104410789349338, -3.516963011559032
 
 
 class Rodas:
-    """One step, and between its ends a cubic: Hermite's for the position, as the stages say for the speed."""
+    """One step, and between its ends a cubic: Hermite's for a state whose rate is a state, else as the stages say."""
+
+    k1: States
+    k2: States
+    k3: States
+    k4: States
+    k5: States
 
     def __init__(self):
-        self.q1 = self.q2 = self.q3 = self.q4 = self.q5 = 0.0  # the u_i of the speed, over h
+        self.k1 = self.k2 = self.k3 = self.k4 = self.k5 = 0.0
 
-    def step(self, model, mode, t, x, v, a, h):
-        """New x, v and acceleration, and the rates e_x, e_v of the error: the estimates are h e_x and h e_v."""
-        a_t, a_x, a_v = model.jacobian(t, x, v, mode)
-        drift, s = h * a_t, GAMMA * h * a_x
-        pivot = 1.0 - GAMMA * h * (a_v + s)
-        w = GAMMA / pivot if pivot != 0.0 else nan  # a step of just this size cannot be taken: NaN refuses it
+    def propose(self, model, modes: Contacts, t, y: States, f: Rates, h) -> tuple[States, Rates, States]:
+        """The new state, its rates, and the rates e of the error: the estimates are h e."""
+        f_t, J = model.jacobian(t, y, modes)
+        drift = h * f_t
+        s = factored(GAMMA, h, J)
 
-        q1 = (a + D1 * drift + s * v) * w
-        p1 = GAMMA * (v + h * q1)
+        r = f + D1 * drift
+        k1 = solved(s, r)
 
-        vs = v + h * A21 * q1
-        r = vs + G21 * p1
-        a2 = model.rates(t + C2 * h, x + h * A21 * p1, vs, mode)
-        q2 = (a2 + G21 * q1 + D2 * drift + s * r) * w
-        p2 = GAMMA * (r + h * q2)
+        y2 = y + h * A21 * k1
+        f2 = model.rates(t + C2 * h, y2, modes)
+        r = f2 + G21 * k1 + D2 * drift
+        k2 = solved(s, r)
 
-        xs, vs = x + h * (A31 * p1 + A32 * p2), v + h * (A31 * q1 + A32 * q2)
-        r = vs + G31 * p1 + G32 * p2
-        a3 = model.rates(t + C3 * h, xs, vs, mode)
-        q3 = (a3 + G31 * q1 + G32 * q2 + D3 * drift + s * r) * w
-        p3 = GAMMA * (r + h * q3)
+        y3 = y + h * (A31 * k1 + A32 * k2)
+        f3 = model.rates(t + C3 * h, y3, modes)
+        r = f3 + G31 * k1 + G32 * k2 + D3 * drift
+        k3 = solved(s, r)
 
-        xs, vs = x + h * (A41 * p1 + A42 * p2 + A43 * p3), v + h * (A41 * q1 + A42 * q2 + A43 * q3)
-        r = vs + G41 * p1 + G42 * p2 + G43 * p3
-        a4 = model.rates(t + C4 * h, xs, vs, mode)
-        q4 = (a4 + G41 * q1 + G42 * q2 + G43 * q3 + D4 * drift + s * r) * w
-        p4 = GAMMA * (r + h * q4)
+        y4 = y + h * (A41 * k1 + A42 * k2 + A43 * k3)
+        f4 = model.rates(t + C4 * h, y4, modes)
+        r = f4 + G41 * k1 + G42 * k2 + G43 * k3 + D4 * drift
+        k4 = solved(s, r)
 
-        xs = x + h * (A51 * p1 + A52 * p2 + A53 * p3 + A54 * p4)
-        vs = v + h * (A51 * q1 + A52 * q2 + A53 * q3 + A54 * q4)
-        r = vs + G51 * p1 + G52 * p2 + G53 * p3 + G54 * p4
-        a5 = model.rates(t + h, xs, vs, mode)
-        q5 = (a5 + G51 * q1 + G52 * q2 + G53 * q3 + G54 * q4 + s * r) * w
-        p5 = GAMMA * (r + h * q5)
+        y5 = y + h * (A51 * k1 + A52 * k2 + A53 * k3 + A54 * k4)
+        f5 = model.rates(t + h, y5, modes)
+        r = f5 + G51 * k1 + G52 * k2 + G53 * k3 + G54 * k4
+        k5 = solved(s, r)
 
-        xs, vs = xs + h * p5, vs + h * q5
-        r = vs + G61 * p1 + G62 * p2 + G63 * p3 + G64 * p4 + G65 * p5
-        a6 = model.rates(t + h, xs, vs, mode)
-        q6 = (a6 + G61 * q1 + G62 * q2 + G63 * q3 + G64 * q4 + G65 * q5 + s * r) * w
-        p6 = GAMMA * (r + h * q6)
+        y6 = y5 + h * k5
+        f6 = model.rates(t + h, y6, modes)
+        r = f6 + G61 * k1 + G62 * k2 + G63 * k3 + G64 * k4 + G65 * k5
+        e = solved(s, r)
 
-        self.q1, self.q2, self.q3 = q1, q2, q3
-        self.q4, self.q5 = q4, q5
-        xs, vs = xs + h * p6, vs + h * q6
-        return xs, vs, model.rates(t + h, xs, vs, mode), p6, q6
+        y1 = y6 + h * e
+        f1 = model.rates(t + h, y1, modes)
+        self.k1, self.k2, self.k3, self.k4, self.k5 = k1, k2, k3, k4, k5
+        return y1, f1, e
 
     def expand(self, model, step):
-        """The interpolant of the step just taken; slopes of the speed are of no use where the curve is stiff."""
+        """The interpolant of the step just taken; slopes are of no use where the curve is stiff."""
         inside = step.interpolant
+        inside.meet(step)
         h = step.span
-        q1, q2, q3, q4, q5 = self.q1, self.q2, self.q3, self.q4, self.q5
-        inside.meet_values(step)
-        inside.q2 = h * (H21 * q1 + H22 * q2 + H23 * q3 + H24 * q4 + H25 * q5)
-        inside.q3 = h * (H31 * q1 + H32 * q2 + H33 * q3 + H34 * q4 + H35 * q5)
+        inside.c2 = kinematic(
+            inside.c2, h * (H21 * self.k1 + H22 * self.k2 + H23 * self.k3 + H24 * self.k4 + H25 * self.k5)
+        )
+        inside.c3 = kinematic(
+            inside.c3, h * (H31 * self.k1 + H32 * self.k2 + H33 * self.k3 + H34 * self.k4 + H35 * self.k5)
+        )

@@ -26,6 +26,7 @@ from .codes import (
     TERMINATED,
     UNDECIDED,
 )
+from .vectors import contacts
 
 
 class Run:
@@ -51,9 +52,10 @@ def is_sound(run, model, exchanges):
         return True
     march = model.solver
     step = march.step
-    within = step.t0 <= march.t <= step.t1 <= step.t_end
-    modes = -1 <= march.mode <= 1 and -1 <= step.mode0 <= 1 and -1 <= step.mode1 <= 1
-    return within and modes and step.methods.chosen == march.method
+    sound = step.t0 <= march.t <= step.t1 <= step.t_end and step.methods.chosen == march.method
+    for i in contacts:
+        sound = sound and -1 <= march.modes[i] <= 1 and -1 <= step.modes0[i] <= 1 and -1 <= step.modes1[i] <= 1
+    return sound
 
 
 # ---- values
@@ -111,8 +113,8 @@ def renew(run, model, beginning):
     if status == OK:
         march = model.solver
         if beginning:
-            x, v = model.initial(run.start_time)
-            march.start(model, run.start_time, x, v, run.stop_time, run.tolerance)
+            y = model.initial(run.start_time)
+            march.start(model, run.start_time, y, run.stop_time, run.tolerance)
         elif run.interface != MODEL_EXCHANGE:  # where nothing starts anew: the mode follows at the next event
             march.restart(model)
         run.changed = run.observed = False
@@ -207,7 +209,7 @@ def observe(run, model):
 def show(run, model):
     """Set the outputs."""
     march = model.solver
-    run.observed = model.observe(march.t, march.x, march.v, march.mode)
+    run.observed = model.observe(march.t, march.y, march.modes)
 
 
 def report(model, ahead):

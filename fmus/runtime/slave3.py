@@ -7,7 +7,7 @@ comes (model exchange), and the run begins where the first step does.
 
 from __future__ import annotations
 
-from math import fabs, nan
+from math import nan
 from typing import Any
 
 from . import exchange, rules
@@ -19,6 +19,7 @@ from .hosted import Hosted, hosting
 from .step import HUGE
 from .values import getter, setter
 from .variables3 import further, place
+from .vectors import magnitude, total
 
 
 def slave_for(model: type[Declaring]) -> Any:
@@ -144,10 +145,11 @@ class Slave(Hosted, Instance):
     # ---- model exchange
 
     def get_number_of_continuous_states(self) -> int:
-        return 3 if self.model.driven else 2
+        march = self.model.solver
+        return len(march.y) + 1 if self.model.driven else len(march.y)
 
     def get_number_of_event_indicators(self) -> int:
-        return 2 if self.model.dry else 0
+        return 2 * len(self.model.solver.modes)
 
     @guarded
     def set_time(self, t: float) -> None:
@@ -178,7 +180,7 @@ class Slave(Hosted, Instance):
             self.begin_exchange()
             model, march = self.model, self.model.solver
             if self.ready():
-                if fabs(march.x) + fabs(march.v) < HUGE:
+                if total(magnitude(march.y)) < HUGE:
                     before, self.nominals = self.nominals, exchange.nominals(model)
                     return Updated(states=exchange.update(model, march), nominals=self.nominals != before)
                 self.give_up(DIVERGED)

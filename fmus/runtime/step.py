@@ -5,12 +5,26 @@ step of a method that meets the tolerance.  Its size is controlled as the public
 ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22).
 """
 
-from math import fabs, inf
+from math import inf
 
 from .codes import DIVERGED, EXACT, OK, STALLED, STUCK
 from .interpolant import Interpolant
 from .methods import Methods
 from .rounding import NEAR, ULP
+from .vectors import (
+    Contacts,
+    States,
+    contacts,
+    every,
+    first,
+    greater,
+    largest,
+    magnitude,
+    per_contact,
+    slip,
+    some,
+    total,
+)
 
 HUGE = 1e100  # beyond it squares, as of an energy, would overflow
 MOST_TRIES = 200  # of one step, which halves each time
@@ -28,7 +42,7 @@ class Before:
 
 
 class Lost:
-    """What the doubles t0, x0, t1, x1 of a step lack.
+    """What the times t0, t1 and the positions x0, x1 of a step lack.
 
     Closed forms carry it on, so that the rounding of one event does not add to that of the others.
     """
@@ -49,17 +63,19 @@ class Step:
     takes a tenth longer.
     """
 
+    least: States
+
     def __init__(self):
         self.methods = Methods()
         # the run: tolerances in force, largest step, stop time (inf where unknown), whether zero speed is a mode
-        self.tolerance = self.longest = self.least_x = self.least_v = 0.0
+        self.tolerance = self.longest = self.least = 0.0
         self.t_end = inf
         self.sticks = False
-        # the step: its beginning, its end, the mode within and the mode after
-        self.t0 = self.x0 = self.v0 = self.a0 = 0.0
-        self.t1 = self.x1 = self.v1 = self.a1 = 0.0
-        self.mode0 = self.mode1 = STUCK
-        # it stands still; the mode changes at its end; the speed only touches zero there, and the slide goes on
+        # the step: its beginning, its end, the modes within and the modes after
+        self.t0 = self.y0 = self.f0 = 0.0
+        self.t1 = self.y1 = self.f1 = 0.0
+        self.modes0 = self.modes1 = STUCK
+        # all stands still; a mode changes at its end; a speed only touches zero there, and the slide goes on
         self.waiting = self.event = self.touches = False
         # the length of the step before an event cut it, and what holds within
         self.span = 0.0
@@ -70,25 +86,29 @@ class Step:
         self.before = Before()
         self.lost = Lost()
 
-    def begin(self, model, t, x, v):
+    def begin(self, model, t, y: States):
         """The empty step at the start of a run."""
         before = self.before
         self.taken = self.refused = self.called = before.happened = before.idle = 0
         self.size = before.length = 0.0
         before.t_event = t
         self.event = False
-        self.stand(model, t, x, v, STUCK, NEAR)
+        self.modes0 = STUCK
+        self.stand(model, t, y, self.modes0, NEAR)
 
-    def stand(self, model, t, x, v, mode, near):
-        """The empty step at t, after a mode: both its ends are there, and a step size is at hand unless the body is
-        stuck."""
-        lost = self.lost
-        lost.t1 = lost.x1 = 0.0
-        self.t1, self.x1, self.v1 = t, x, v
-        self.settle(model, mode, near)
+    def stand(self, model, t, y: States, modes: Contacts, near):
+        """The empty step at t, after these modes: both its ends are there, and a step size is at hand unless all stands
+        still."""
+        if model.linear:
+            lost = self.lost
+            lost.t1 = lost.x1 = 0.0
+        self.t1, self.y1 = t, y
+        if model.dry:
+            self.set_modes(model, modes, near)
         self.arrive(model)
-        if self.size == 0.0 and self.methods.chosen != EXACT and not (self.sticks and self.mode1 == STUCK):
-            self.size = self.first_size()
+        if not (model.waits and self.sticks and every(self.modes1 == STUCK)):
+            if self.size == 0.0 and self.methods.chosen != EXACT:
+                self.size = self.first_size()
         self.t0 = t
         self.keep_counts()
 
@@ -106,19 +126,18 @@ class Step:
 
     def take(self, model):
         """The internal step from t1 on; OK or the reason why not."""
-        if self.event:
+        if model.dry and self.event:
             self.note_event()
             self.event = False
         before = self.before
         before.length = self.t1 - self.t0
         self.keep_counts()
-        self.t0, self.x0, self.v0 = self.t1, self.x1, self.v1
-        self.a0, self.mode0 = self.a1, self.mode1
+        self.t0, self.y0 = self.t1, self.y1
+        self.f0, self.modes0 = self.f1, self.modes1
         self.waiting = self.interpolant.ready = False
-        status = OK
-        if self.sticks and (self.mode0 == STUCK or self.touches) and model.dry:
-            self.wait(model)
-        elif self.methods.chosen == EXACT and model.linear:
+        if model.waits and self.sticks and (every(self.modes0 == STUCK) or self.touches):
+            status = self.wait(model)
+        elif model.linear and self.methods.chosen == EXACT:
             status = self.take_piece(model)
         else:
             status = self.take_step(model)
@@ -137,46 +156,58 @@ class Step:
         self.before.t_event = self.t1
 
     def wait(self, model):
-        """Stand still until the load exceeds what friction holds."""
-        self.lost.carry()
+        """Stand still until a load exceeds what friction holds."""
+        if model.linear:
+            self.lost.carry()
         self.waiting, self.touches = True, False
-        self.x1, self.v1 = self.x0, 0.0
-        release, direction = model.release(self.t0, self.x0, 0.0)
-        if release <= self.t_end and release < inf:
-            self.t1, self.mode1 = release, direction
+        self.y1 = self.y0
+        for i in contacts:
+            self.y1[slip[i]] = 0.0
+        ends, ways = per_contact(), per_contact()
+        for i in contacts:
+            ends[i], ways[i] = model.release(self.t0, self.y1, i)
+        end = first(ends)
+        if end <= self.t_end and end < inf:
+            self.t1 = end
+            for i in contacts:
+                if not model.coupled or ends[i] == end:
+                    self.modes1[i] = ways[i]
             self.begin_anew(model)
-            self.a1 = model.departure(release, self.x1, 0.0, direction)
+            for i in contacts:
+                if not model.coupled or ends[i] == end:
+                    self.f1[slip[i]] = model.departure(end, self.y1, self.modes1, i)
         else:
-            self.t1, self.a1 = self.t_end, 0.0
+            self.t1, self.f1 = self.t_end, 0.0
+        return OK
 
     def take_piece(self, model):
         """One closed form, up to the next standstill or to the end of the run."""
+        exact = self.methods.exact
         lost = self.lost
         lost.carry()
-        model.exact.begin(self.x0, self.v0, self.a0, model.push(self.t0, self.mode0), lost.x0)
+        exact.begin(self.y0, self.f0, model.push(self.t0, self.modes0), lost.x0)
         self.t1 = self.t_end
         if model.dry:
-            ahead = model.exact.standstill(self.mode0)
+            ahead = exact.standstill(self.modes0)
             elapsed = ahead + lost.t0
             end = self.t0 + elapsed
             if end <= self.t_end and end < inf:
                 moved = end - self.t0
                 lost.t1 = (self.t0 - (end - moved)) + (elapsed - moved)
                 self.t1 = end
-                self.x1, lost.x1 = model.exact.end(ahead)
-                self.v1 = 0.0
+                self.y1, lost.x1 = exact.end(ahead)
                 return self.stop(model)
         if self.t1 < inf:
             lost.x1 = 0.0
-            self.x1, self.v1 = model.exact.at(self.t1 - self.t0 - lost.t0)
-            self.a1 = model.rates(self.t1, self.x1, self.v1, self.mode1)
-            if not fabs(self.x1) + fabs(self.v1) < HUGE:
+            self.y1 = exact.at(self.t1 - self.t0 - lost.t0)
+            self.f1 = model.rates(self.t1, self.y1, self.modes1)
+            if not total(magnitude(self.y1)) < HUGE:
                 return DIVERGED
         return OK
 
     def take_step(self, model):
         """One step of the method that meets the tolerance, cut where the mode changes."""
-        t, x, v, a, mode = self.t0, self.x0, self.v0, self.a0, self.mode0
+        t, y, f, modes = self.t0, self.y0, self.f0, self.modes0
         tolerance = self.tolerance
         smallest = 16.0 * ULP * (t if t > 0.0 else -t)  # a third of the time of fabs; so below, for it is in each step
         size = self.size if self.size < self.longest else self.longest
@@ -185,26 +216,22 @@ class Step:
         left = self.t_end - t
         last = 1.1 * size >= left
         h = left if last else size
-        size_x, size_v = x if x > 0.0 else -x, v if v > 0.0 else -v
-        if size_x < self.least_x:
-            size_x = self.least_x
-        if size_v < self.least_v:
-            size_v = self.least_v
+        scale = magnitude(y)
+        scale = greater(self.least, scale)
         tries = 0
         methods = self.methods
         while True:
-            x1, v1, a1, e_x, e_v = methods.step(model, mode, t, x, v, a, h)
+            y1, f1, e = methods.propose(model, modes, t, y, f, h)
             self.called += methods.stages
-            y, w = x1 if x1 > 0.0 else -x1, v1 if v1 > 0.0 else -v1
-            p = (e_x if e_x > 0.0 else -e_x) / (y if y > size_x else size_x)
-            q = (e_v if e_v > 0.0 else -e_v) / (w if w > size_v else size_v)
-            error = h * (p if p > q else q) / tolerance
-            if error <= 1.0 and y + w + p + q < HUGE:  # NaN leaves here too
+            far = magnitude(y1)
+            e = magnitude(e) / greater(far, scale)
+            error = h * largest(e) / tolerance
+            if error <= 1.0 and total(far, e) < HUGE:  # NaN leaves here too
                 break
             self.refused += 1
             tries += 1
             if h <= smallest or tries == MOST_TRIES:
-                return STALLED if error < inf and y + w < HUGE else DIVERGED
+                return STALLED if error < inf and total(far) < HUGE else DIVERGED
             shrink = methods.safety * error**-methods.power if 1.0 < error < inf and tries == 1 else 0.5
             lowest = methods.shrink if tries == 1 else 0.5
             size = h * (shrink if shrink > lowest else lowest)
@@ -217,69 +244,81 @@ class Step:
             size = h * (grow if grow < methods.grow else methods.grow)
         self.size = size
         self.span = h
-        self.t1, self.x1, self.v1, self.a1 = self.t_end if last else t + h, x1, v1, a1
-        if mode != STUCK and model.dry:
-            end = model.reversal(self)
+        self.t1, self.y1, self.f1 = self.t_end if last else t + h, y1, f1
+        if model.dry and self.sticks:
+            ends = per_contact()
+            for i in contacts:
+                if model.coupled and modes[i] == STUCK:
+                    ends[i] = model.breakaway(self, i)
+                else:
+                    ends[i] = model.reversal(self, i)
             if self.interpolant.ready:  # the search had to look inside
                 self.called += self.methods.extra
+            end = first(ends)
             if end <= self.t1:
+                self.y1 = self.at(model, end)
                 self.t1 = end
-                self.x1, _ = self.at(model, end)
-                self.v1 = 0.0
+                for i in contacts:
+                    if not model.coupled or ends[i] == end:
+                        self.y1[slip[i]] = 0.0
                 return self.stop(model)
         return OK
 
     def stop(self, model):
-        """The speed has come to zero at t1: stick, or slide the other way, or go on if it only touches zero."""
-        self.settle(model, self.mode0, self.near(model))
+        """The speed of a contact has come to zero at t1: stick, or slide the other way, or go on if it only touches
+        zero; or its load has come to the limit: let go."""
+        self.set_modes(model, self.modes0, self.near(model))
         self.begin_anew(model)
-        return OK if fabs(self.x1) < HUGE else DIVERGED
+        return OK if total(magnitude(self.y1)) < HUGE else DIVERGED
 
     def near(self, model):
         """How far what was computed up to here may be from a tie, as a share."""
-        return NEAR if self.methods.chosen == EXACT and model.linear else NEARLY * self.tolerance
+        return NEAR if model.linear and self.methods.chosen == EXACT else NEARLY * self.tolerance
 
-    def settle(self, model, mode, near):
-        """The mode that holds from t1 on, after another."""
-        self.mode1, self.touches = STUCK, False
-        if self.sticks and model.dry:
-            self.mode1 = model.settle(self.t1, self.x1, self.v1, near)
-            if self.v1 == 0.0 and self.mode1 != mode != STUCK and model.touches(self.t1, self.x1, self.v1, mode, near):
-                self.mode1, self.touches = mode, True
+    def set_modes(self, model, modes: Contacts, near):
+        """The modes that hold from t1 on, after these."""
+        self.modes1, self.touches = STUCK, False
+        if self.sticks:
+            for i in contacts:
+                self.modes1[i] = model.settle(self.t1, self.y1, near, i)
+                if not model.coupled and self.y1[slip[i]] == 0.0 and self.modes1[i] != modes[i] != STUCK:
+                    if model.touches(self.t1, self.y1, modes, near, i):
+                        self.modes1[i], self.touches = modes[i], True
 
     def arrive(self, model):
-        """The acceleration in the mode that holds from t1 on."""
-        if self.sticks and self.mode1 == STUCK:
-            self.a1 = 0.0
+        """The rates in the modes that hold from t1 on."""
+        if model.waits and self.sticks and every(self.modes1 == STUCK):
+            self.f1 = 0.0
         else:
-            self.a1 = model.rates(self.t1, self.x1, self.v1, self.mode1)
+            self.f1 = model.rates(self.t1, self.y1, self.modes1)
             self.called += 1
-            if self.sticks and self.v1 == 0.0 and self.mode1 * self.a1 < 0.0:
-                self.a1 = 0.0  # the last bit at a break-away without a jump: no body starts against its mode
+            if model.dry:
+                for i in contacts:
+                    if self.sticks and self.y1[slip[i]] == 0.0 and self.modes1[i] * self.f1[slip[i]] < 0.0:
+                        self.f1[slip[i]] = 0.0  # the last bit at a break-away: no body starts against its mode
 
     def begin_anew(self, model):
-        """The step has been cut: forget the slope, but keep the step size of the last slide, if there was one."""
-        self.event = self.mode1 != self.mode0  # a slide that only touches zero goes on
+        """The step has been cut: forget the slopes, but keep the step size of the last slide, if there was one."""
+        self.event = some(self.modes1 != self.modes0)  # a slide that only touches zero goes on
         self.arrive(model)
         if self.size == 0.0 and self.methods.chosen != EXACT:
             self.size = self.first_size()
 
     def first_size(self):
         """The step to try first, from the slopes at t1."""
-        x, v = fabs(self.x1), fabs(self.v1)
-        p = fabs(self.v1) / (x if x > self.least_x else self.least_x)
-        q = fabs(self.a1) / (v if v > self.least_v else self.least_v)
-        rate = p if p > q else q
+        far = magnitude(self.y1)
+        pace = magnitude(self.f1) / greater(far, self.least)
+        rate = largest(pace)
         size = self.methods.safety * self.tolerance**self.methods.power
         return size / rate if size < rate * self.longest else self.longest
 
-    def at(self, model, t):
-        """Position and speed at t inside the step."""
+    def at(self, model, t) -> States:
+        """The state at t inside the step."""
         inside = self.interpolant
         if not inside.ready:
-            if self.waiting:
-                return self.x0, 0.0
-            if self.methods.chosen == EXACT and model.linear:
-                return model.exact.at(t - self.t0 - self.lost.t0)
+            if model.waits and self.waiting:
+                return self.y1
+            if model.linear and self.methods.chosen == EXACT:
+                return self.methods.exact.at(t - self.t0 - self.lost.t0)
             self.methods.expand(model, self)
         return inside.at(t - self.t0)

@@ -56,20 +56,24 @@ class Inside:
         return cls(new)
 
     def begin(self, stop: float) -> None:
-        x, v = self.model.initial(0.0)
-        self.model.solver.start(self.model, 0.0, x, v, stop, self.model.tolerance)
+        self.model.solver.start(self.model, 0.0, *self.model.initial(0.0), stop, self.model.tolerance)
+
+    def here(self) -> tuple[float, float]:
+        """Position and speed at the present point."""
+        position, speed, *_ = self.model.states
+        return getattr(self.model.solver, position), getattr(self.model.solver, speed)
 
     def motion(self, times: list[float], patience: float | None = None) -> list[tuple[float, float]]:
         """Position and speed at the times, from 0 s on; HarnessError if the run fails or outlasts `patience` s."""
         model, march = self.model, self.model.solver
         self.begin(times[-1])
-        found = [(march.x, march.v)]
+        found = [self.here()]
         late = perf_counter() + patience if patience else None
         try:
             for t in times[1:]:
                 if march.advance(model, t) != OK:
                     raise HarnessError(f"the solver gave up at t = {march.step.t0:.6g} s")
-                found.append((march.x, march.v))
+                found.append(self.here())
                 if late and perf_counter() > late:
                     raise HarnessError(f"at t = {t:.3g} s after {patience:g} s of run time")
         except (ArithmeticError, ValueError):
@@ -94,5 +98,5 @@ class Inside:
             march.advance(model, march.t_next)
             march.report(model.events)
             if model.events.count > len(found):
-                found.append((march.t, march.mode))
+                found.append((march.t, getattr(march, next(iter(model.contacts)))))
         return found

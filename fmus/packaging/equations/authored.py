@@ -80,7 +80,7 @@ class Authored:
         """Refuse start values that go nowhere: nobody could run the model as it is."""
         try:
             rule = thing.prepare()
-            thing.observe(0.0, *thing.initial(0.0), 0)
+            thing.observe(0.0, *thing.initial(0.0), *(0 for _ in self.anatomy.contacts))
         except (ArithmeticError, ValueError) as error:
             mistake = Mistake(f"the start values lead out of the range of numbers: {error}", self.anatomy.model.place)
             raise self._told(mistake) from error

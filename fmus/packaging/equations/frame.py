@@ -25,7 +25,7 @@ class Frame:
                 if isinstance(e, Term) and not e.name and name not in taken:
                     e.name = name
         self.states = [s.name for s in an.states]
-        self.modes = [c.mode.name for c in an.contacts] or ["mode_" if "mode" in taken else "mode"]
+        self.modes = [c.mode.name for c in an.contacts]
         self.point = ["t", *self.states, *self.modes]
         self.taken = taken | {"self", *self.point}
         self.constants = self._constants()

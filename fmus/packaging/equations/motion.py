@@ -59,13 +59,15 @@ def jacobian(f: Frame) -> str:
 
 
 def push(f: Frame) -> list[str]:
-    """The part of the rate that is there where all states are zero, if the motion has a closed form."""
+    """Where the motion has a closed form: its constants, and the part of the rate that is there where all states are
+    zero."""
     if not f.an.closed_form:
         return []
     targets = [law.means for law in f.laws]
     targets = targets if f.alone is None else sliding_now(f.alone, targets)
     at_zero = dict.fromkeys(f.an.states, 0.0)
-    return [method("push", ["t", *f.modes], f.returning(f.scribe(), [put(e, at_zero) for e in targets]))]
+    piece = method("piece", (), f.returning(f.scribe(), f.an.closed_form))
+    return [piece, method("push", ["t", *f.modes], f.returning(f.scribe(), [put(e, at_zero) for e in targets]))]
 
 
 def sliding_now(c: Contact, targets: list[Operand]) -> list[Operand]:

@@ -8,13 +8,21 @@ IMPORTS = {  # module -> what may be needed of it
     "automaton": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
     "codes": ("DOP853", "EXACT", "HYBRID", "ODE23", "ODE45", "RODAS"),
     "declare": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
-    "exact": ("Exact",),
     "march": ("March",),
     "methods": ("EXACT_ITEM", "ITEMS"),
     "oscillator": ("Oscillator",),
 }
 ATTRIBUTES = ("friction", "solver", "events", "exact", "exchange", "x_base", "t_base")
-METHODS = ("initial", "rates", "jacobian", "push", "hold", "terms", "observe")  # beside those that are inherited
+METHODS = (
+    "initial",
+    "rates",
+    "jacobian",
+    "push",
+    "piece",
+    "hold",
+    "terms",
+    "observe",
+)  # beside those that are inherited
 FACTS = ("stop_time", "step_size", "tolerance", "rules")  # which an author sets as such
 CLASSES = ("Solver", "Model", "Fmi3Slave")
 RESERVED = {

@@ -14,8 +14,6 @@ def values(f: Frame) -> list[str]:
 def init(f: Frame) -> str:
     """Every attribute is born here."""
     lines = ["super().__init__()", "self.solver = Solver()"]
-    if f.an.closed_form:
-        lines.append("self.exact = Exact()")
     if f.drive is not None:
         lines.append("self.t_base = self.x_base = 0.0")
     if f.constants:
@@ -49,8 +47,6 @@ def prepare(f: Frame) -> str:
         with s.block(f"if {s.text(rule.broken)}:"):
             s.say(f"return {number}")
     calculate()
-    if f.an.closed_form:
-        s.say(f"self.exact.prepare({', '.join(map(s.text, f.an.closed_form))})")
     s.say("return super().prepare()" if dry else "return 0")
     return method("prepare", (), s.lines)
 

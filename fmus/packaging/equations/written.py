@@ -111,7 +111,12 @@ def described(e: Variable) -> str:
 
 def facts(an: Anatomy) -> list[str]:
     """What the runtime asks of the class."""
-    lines = [f"{word} = True" for word, holds in (("linear", an.closed_form), ("driven", an.drives)) if holds]
+    states = ", ".join(f"{quoted(s.name)}: {quoted(an.rate[s].name)}" for s in (*an.positions, *an.own))
+    lines = [f"states = {{{states}}}"]
+    if an.contacts:
+        slips = ", ".join(f"{quoted(c.mode.name)}: {quoted(s.name)}" for c, s in zip(an.contacts, an.own, strict=True))
+        lines.append(f"contacts = {{{slips}}}")
+    lines += [f"{word} = True" for word, holds in (("linear", an.closed_form), ("driven", an.drives)) if holds]
     for word in RUN:
         if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
             lines.append(f"{word} = {value!r}")

@@ -2,22 +2,20 @@
 
 from typing import Any
 
-from ...runtime import rules
 from .kinds import BOOL, FLOAT, Kind, Object
 
-RUN = Object(rules.Run)
 
-
-def entries(model: Object) -> dict[Any, list[Kind]]:
-    """Every function with what it takes; one that others call stands before them."""
+def entries(rules: Any, model: Object) -> dict[Any, list[Kind]]:
+    """Every function of the rules, as written out, with what it takes; one that others call stands before them."""
+    run = Object(rules.Run)
     return {
         rules.within: [FLOAT] * 5,
-        rules.reason: [RUN, BOOL, BOOL, BOOL],
-        rules.change: [RUN, model],
-        rules.setup: [RUN, FLOAT, FLOAT, FLOAT],
-        rules.begin: [RUN, model],
-        rules.step: [RUN, model, FLOAT, FLOAT],
-        rules.observe: [RUN, model],
+        rules.reason: [run, BOOL, BOOL, BOOL],
+        rules.change: [run, model],
+        rules.setup: [run, FLOAT, FLOAT, FLOAT],
+        rules.begin: [run, model],
+        rules.step: [run, model, FLOAT, FLOAT],
+        rules.observe: [run, model],
         rules.report: [model, BOOL],
-        rules.is_sound: [RUN, model, BOOL],
+        rules.is_sound: [run, model, BOOL],
     }

@@ -6,12 +6,9 @@ sources/                                  what they were made from, for any othe
 documentation/, model.png, extra/         page and licence, icon, certified result
 """
 
-import inspect
-import linecache
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from xml.etree.ElementTree import SubElement, fromstring
 
@@ -22,9 +19,8 @@ from ..catalogue import find
 from ..companions import companions
 from ..description import declared_by, describe
 from ..document import document
-from ..equations.authored import Authored
-from ..lean import Offer, imported, offer, reduced
-from ..modules import digest, travelling
+from ..modules import digest
+from ..written import offer, written
 from .compiler import PLATFORMS, USUAL, compiled
 from .sources import COMPILED, build_description, guid_header, sources
 
@@ -48,9 +44,7 @@ def build(
             raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
     date = build_date()
     source = find(model)
-    name, cls = source.name, source.model
-    if offered := offer(cls, name, methods, laws):
-        cls = lean(source, offered)
+    name, cls = source.name, written(source, offer(source.model, source.name, methods, laws))
     files, description = frozen(cls, name, date)
     entries = companions(cls, source.path, declared_by(cls))
     entries |= {"modelDescription.xml": description, LICENSE: licenses()[LICENSE]}
@@ -61,16 +55,6 @@ def build(
     for platform, content in zip(platforms, binaries, strict=True):
         entries[f"binaries/{platform}/{name}{PLATFORMS[platform].suffix}"] = content
     return write(folder / f"{name}.fmu", zipped(entries, date))
-
-
-def lean(source: Authored, offered: Offer) -> type[Declaring]:
-    """The model without what is not offered; `inspect` still finds its source, whose files are gone."""
-    texts = travelling(source, edit=partial(reduced, offered=offered))
-    model = imported(texts, source.name, source.title, f"frozen_{source.name}_{digest(texts)[:12]}")
-    root = Path(inspect.getfile(model)).parent
-    for path, text in texts.items():
-        linecache.cache[str(root / path)] = (len(text), None, text.splitlines(keepends=True), str(root / path))
-    return model
 
 
 def frozen(model: type[Declaring], name: str, date: datetime) -> tuple[dict[str, str], bytes]:

@@ -5,12 +5,13 @@ from collections.abc import Mapping
 from string import Formatter
 from typing import Any
 
-from ...runtime import codes, rules
+from ...runtime import codes
 from ...runtime.codes import INTEGRATED, INTERRUPTED, RULES
 from ...runtime.declare import Declared, Declaring
 from ...runtime.failure import CALCULATED
 from ...runtime.sentences import CALLS, RUN, VALUES
 from ..description import declared_by
+from ..written import beside
 from .entries import entries
 from .kinds import BOOL, FLOAT, INT, literal
 from .program import Program
@@ -98,9 +99,10 @@ ELSEWHERE = (INTEGRATED, INTERRUPTED)  # statuses of other kinds
 def header(model: type[Declaring]) -> str:
     """The text of model.h."""
     thing: Any = model()
+    rules = beside(model, "runtime.rules")
     run = rules.Run(thing.tolerance)
     program = Program(thing, run)
-    for function, kinds in entries(program.layout.model).items():
+    for function, kinds in entries(rules, program.layout.model).items():
         program.exported(function, kinds)
     layout = program.layout
     declared = declared_by(model)

@@ -5,15 +5,14 @@ fault is followed by a check that leaves the function, just where Python's excep
 """
 
 import ast
-import inspect
 import re
 from collections.abc import Callable
 from itertools import count
-from textwrap import dedent
 from types import FunctionType
 from typing import TYPE_CHECKING
 
 from ..words import OF_C
+from ..written import definition
 from .expressions import SIGN, Expressions, Value, group
 from .kinds import BOOL, FLOAT, INT, Group, Kind, Known, Object, Scalar, declare, spell
 from .refusal import place
@@ -36,8 +35,7 @@ class Body(Expressions):
         self.depth = 1
         self.temporaries = count(1)
         self.breaks: list[list[set[str]]] = []  # for every loop around: what has a value at its breaks
-        tree = ast.parse(dedent(inspect.getsource(function))).body[0]
-        assert isinstance(tree, ast.FunctionDef)
+        tree = definition(function)
         self.sentence = (ast.get_docstring(tree) or "").replace("*/", "* /").splitlines()[:1]
         self.parameters = [argument.arg for argument in tree.args.args]
         for name, kind in zip(self.parameters, kinds, strict=True):

@@ -1,0 +1,84 @@
+"""What all sources say of attributes and results, by name; their constants; functions that take vectors by number."""
+
+import ast
+from collections.abc import Iterable
+from typing import Any
+
+from .spec import CONTACTS, STATES, STEM
+
+KINDS = {"States": STATES, "Rates": STATES, "Contacts": CONTACTS}
+
+
+class Declarations(ast.NodeVisitor):
+    """Of the files of the numerics."""
+
+    def __init__(self, trees: Iterable[ast.Module]) -> None:
+        self.attributes: dict[str, str] = {}
+        self.stored: set[str] = set()
+        self.constants: dict[str, Any] = {}
+        self.each: set[str] = set()
+        self.results: dict[str, list[str | None]] = {
+            "initial": [STATES],
+            "rates": [STATES],
+            "solved": [STATES],
+            "per_state": [STATES],
+            "per_contact": [CONTACTS],
+        }
+        for tree in trees:
+            self.visit(tree)
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
+        if isinstance(node.target, ast.Name) and (kind := annotated(node)):
+            self.attributes[node.target.id] = kind
+
+    def visit_Attribute(self, node: ast.Attribute) -> None:
+        self.generic_visit(node)
+        if isinstance(node.ctx, ast.Store):
+            self.stored.add(node.attr)
+
+    def visit_Module(self, node: ast.Module) -> None:
+        for statement in node.body:
+            if isinstance(statement, ast.Assign):
+                target, value = statement.targets[0], statement.value
+                pairs = [(target, value)]
+                if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+                    pairs = list(zip(target.elts, value.elts, strict=True))
+                for one, what in pairs:
+                    if isinstance(one, ast.Name):
+                        self.constants[one.id] = label(what) or getattr(what, "value", None)
+        self.generic_visit(node)
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
+        self.generic_visit(node)
+        if kinds := returned(node):
+            self.results[node.name] = kinds
+        if any(isinstance(one, ast.Name) and one.id == "each" for one in node.decorator_list):
+            self.each.add(node.name)
+
+    def attribute(self, name: str) -> str | None:
+        """What an attribute runs over; None for a number."""
+        stem = STEM.fullmatch(name)
+        return self.attributes.get(name) or ((CONTACTS if stem[1] == "modes" else STATES) if stem else None)
+
+
+def annotated(node: ast.arg | ast.AnnAssign) -> str | None:
+    """What an annotation makes a name run over."""
+    return KINDS.get(node.annotation.id) if isinstance(node.annotation, ast.Name) else None
+
+
+def returned(node: ast.FunctionDef) -> list[str | None]:
+    """What the annotation of a result says, part by part; nothing where no vector is among them."""
+    parts = node.returns
+    if isinstance(parts, ast.Subscript):
+        parts = parts.slice
+    names = parts.elts if isinstance(parts, ast.Tuple) else [parts]
+    kinds = [KINDS.get(getattr(name, "id", "")) for name in names]
+    return kinds if any(kinds) else []
+
+
+def label(node: ast.AST) -> str:
+    """The label of an item of an enumeration, (label, value, sentence); of anything else none."""
+    match node:
+        case ast.Tuple(elts=[ast.Constant(value=str(found)), _, _]):
+            return found
+    return ""

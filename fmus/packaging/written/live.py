@@ -1,0 +1,118 @@
+"""A model in this process, as it will travel: its lines are those of the source, for tracebacks and refusals."""
+
+import ast
+import inspect
+import sys
+from copy import deepcopy
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from textwrap import dedent
+from types import FunctionType, ModuleType
+from typing import Any
+
+from ...runtime import declare
+from ...runtime.declare import Declaring
+from ..catalogue import FMUS, find
+from ..equations.authored import Authored
+from .offer import Offer
+from .sources import Files, written_out
+
+TREE = "written_out"  # in a module of a written-out package: its tree, with the lines of the source
+
+
+@dataclass(frozen=True)
+class Scalars:
+    """The text of a model in scalars: its file and its class, in this process as in what travels."""
+
+    file: str
+    text: str
+    model: type[Declaring]
+
+    @classmethod
+    def of(cls, source: str | Path | Authored) -> "Scalars":
+        """Of a model by name or path, or of an author's file."""
+        found = source if isinstance(source, Authored) else find(source)
+        return cls(f"{found.name}.py", found.text, found.model)
+
+
+@cache
+def lines_of(source: Scalars, offered: Offer | None = None) -> Files:
+    return written_out(source.model, source.file, source.text, offered)
+
+
+def files_of(source: str | Path | Authored, offered: Offer | None = None) -> dict[str, str]:
+    """Path and text of every file of the runtime, and of the model, as they travel."""
+    return {path: "\n".join(lines) for path, lines in lines_of(Scalars.of(source), offered).items()}
+
+
+def written(source: str | Path | Authored, offered: Offer | None = None) -> type[Declaring]:
+    """The class of a model as it will travel, with what the runtime is for it; the same each time."""
+    return brought_in(Scalars.of(source), offered)
+
+
+def written_by_hand(model: type[Declaring]) -> type[Declaring]:
+    """The same of a class in scalars that stands in a file of its own, and derives from those of the runtime."""
+    file = Path(inspect.getfile(model))
+    return brought_in(Scalars(file.name, file.read_text(encoding="utf-8"), model))
+
+
+@cache
+def brought_in(source: Scalars, offered: Offer | None = None) -> type[Declaring]:
+    """The model class out of a package of its files, imported under a name of its own."""
+    files, name = lines_of(source, offered), source.file.removesuffix(".py")
+    content = "".join(f"{path}\0" + "\n".join(lines) for path, lines in sorted(files.items()))
+    package = f"written_{name}_{sha256(content.encode()).hexdigest()[:12]}"
+    for parent in package, f"{package}.runtime":
+        sys.modules[parent] = ModuleType(parent)
+        sys.modules[parent].__path__ = []
+    sys.modules[f"{package}.runtime.declare"] = declare  # what is declared is what it is to everybody else
+    sys.meta_path.insert(0, Finder(package, files, {source.file: sys.modules[source.model.__module__].__file__ or "?"}))
+    return vars(import_module(f"{package}.{name}"))[source.model.__name__]
+
+
+class Finder(MetaPathFinder, Loader):
+    """Finds the modules of one written-out package."""
+
+    def __init__(self, package: str, files: Files, places: dict[str, str]) -> None:
+        self.package, self.files, self.places = package, files, places
+
+    def find_spec(self, fullname: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        return ModuleSpec(fullname, self) if self.path(fullname) in self.files else None
+
+    def path(self, fullname: str) -> str:
+        return fullname.removeprefix(f"{self.package}.").replace(".", "/") + ".py"
+
+    def exec_module(self, module: ModuleType) -> None:
+        path = self.path(module.__name__)
+        lines = self.files[path]
+        tree = ast.parse("\n".join(lines), path)
+        for node in ast.walk(tree):
+            if isinstance(node, (ast.stmt, ast.expr, ast.excepthandler, ast.arg, ast.keyword, ast.alias)):
+                node.lineno, node.col_offset = lines[node.lineno - 1].source, 0
+                node.end_lineno = node.end_col_offset = None
+        module.__file__ = str(self.places.get(path, FMUS / path))
+        vars(module)[TREE] = tree
+        exec(compile(tree, module.__file__, "exec"), vars(module))
+
+
+def beside(model: type[Declaring], path: str) -> Any:
+    """A module of the package of a written-out model, as `runtime.rules`."""
+    return import_module(f"{model.__module__.split('.', 1)[0]}.{path}")
+
+
+def definition(function: FunctionType) -> ast.FunctionDef:
+    """The tree of a function, whose lines count from that of its head in the source: as written out, if it is."""
+    if TREE not in function.__globals__:
+        found = ast.parse(dedent(inspect.getsource(function))).body[0]
+    else:
+        found = function.__globals__[TREE]
+        for name in function.__qualname__.split("."):
+            found = next(one for one in reversed(found.body) if getattr(one, "name", "") == name)
+        found = ast.increment_lineno(deepcopy(found), 1 - function.__code__.co_firstlineno)
+    assert isinstance(found, ast.FunctionDef)
+    return found

@@ -1,0 +1,179 @@
+"""What nobody needs is left out: attributes that are set and never read, functions that nobody calls, dead imports.
+
+Who reads is known by name: any file that travels, and whoever finds its way by dotted names, as those of variables.
+"""
+
+import ast
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from .text import Line
+
+DOTTED = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
+HOSTS = ("boundary", "declare", "failure", "hosted", "rules", "sentences", "slave", "slave3", "state", "values")
+CALLED_BY_NAME = {f"runtime/{name}.py" for name in HOSTS}  # by a layer of FMI
+Files = dict[str, list[Line]]
+
+
+def pruned(files: Files, model: str, names: Iterable[str]) -> Files:
+    """The files without what nobody needs; `model` is that of the model, and `names` are read by others."""
+    found = {path: readers(path, lines) for path, lines in files.items()}
+    while True:
+        wanted = live([one for part in found.values() for one in part], set(names))
+        left = {path: without(path, lines, wanted, path == model) for path, lines in files.items()}
+        changed = [path for path, lines in left.items() if lines != files[path]]
+        if not changed:
+            return files
+        files, found = left, found | {path: readers(path, left[path]) for path in changed}
+
+
+@dataclass
+class Reader:
+    """What a function reads: .attribute, name; and by which names it is called, or none if it always may be."""
+
+    called: set[str]
+    reads: set[str]
+
+
+def readers(path: str, lines: list[Line]) -> list[Reader]:
+    """The functions of a file, each with what it reads; what stands outside of them is always read."""
+    tree = ast.parse("\n".join(lines))
+    outside = Reader(set(), set())
+    found = [outside]
+    for part in tree.body:
+        inner = part.body if isinstance(part, ast.ClassDef) else [part]
+        for node in inner:
+            if not isinstance(node, ast.FunctionDef) or node.name.startswith("__") or path in CALLED_BY_NAME:
+                outside.reads |= read(node)
+            else:
+                alone = {node.name} if inner == [part] else set()
+                found.append(Reader({"." + node.name} | alone, read(node)))
+        if isinstance(part, ast.ClassDef):
+            outside.reads |= set().union(*map(read, [*part.bases, *part.decorator_list]))
+    return found
+
+
+def live(found: list[Reader], names: set[str]) -> set[str]:
+    """All that is read by what can be reached."""
+    while True:
+        reached = [one for one in found if not one.called or one.called & names]
+        more = names.union(*(one.reads for one in reached))
+        if more == names:
+            return names
+        names = more
+
+
+def read(tree: ast.AST) -> set[str]:
+    """What is read somewhere, and every word of a dotted name in a text, as an attribute."""
+    found: set[str] = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Name(id=name, ctx=ast.Load()):
+                found.add(name)
+            case ast.Attribute(attr=name, ctx=ast.Load()):
+                found.add("." + name)
+            case ast.Constant(value=str(text)) if DOTTED.fullmatch(text):
+                found |= {"." + word for word in text.split(".")}
+            case ast.Assign():
+                found |= {"." + name for name in kept_by(node)}
+            case ast.AugAssign(target=ast.Attribute(attr=name)):
+                found.add("." + name)
+    return found
+
+
+def without(path: str, lines: list[Line], wanted: set[str], is_model: bool) -> list[Line]:
+    """One file without what is not wanted."""
+    if path in CALLED_BY_NAME:
+        return lines
+    lines_before, lines, tree = lines, list(lines), ast.parse("\n".join(lines))
+    methods = {part for one in ast.walk(tree) if isinstance(one, ast.ClassDef) for part in one.body}
+    spare = [
+        one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef) and is_spare(one, wanted, one in methods)
+    ]
+    inside = {part for one in spare for part in ast.walk(one)} - {*spare}
+    assigned = [] if is_model else [one for one in ast.walk(tree) if isinstance(one, ast.Assign) and one not in inside]
+    parts: list[ast.FunctionDef | ast.Assign] = [*spare, *assigned]
+    for node in sorted(parts, key=lambda one: one.lineno, reverse=True):
+        if isinstance(node, ast.Assign):
+            unset(lines, node, wanted)
+        else:
+            cut(lines, node)
+    for node in [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef) and one not in spare]:
+        if all(isinstance(one, ast.Assign) and all(idle(*pair, wanted) for pair in single(one)) for one in node.body):
+            place = next(n for n, line in enumerate(lines) if line.source == lines_before[node.lineno - 1].source)
+            lines.insert(place + 1, Line.of(" " * (node.col_offset + 4) + "pass", lines[place].source))
+    return without_dead_imports(lines)
+
+
+def is_spare(node: ast.FunctionDef, wanted: set[str], is_method: bool) -> bool:
+    """Whether nobody calls a function."""
+    called = "." + node.name in wanted or (node.name in wanted and not is_method)
+    return not called and not node.name.startswith("__")
+
+
+def cut(lines: list[Line], node: ast.FunctionDef) -> None:
+    """Take out a function, with the blank lines above it."""
+    first = node.lineno - 1
+    while first and not lines[first - 1].strip():
+        first -= 1
+    end = node.end_lineno or first
+    if not any(line.strip() for line in lines[:first]) or lines[first - 1].lstrip().startswith("class "):
+        first = node.lineno - 1
+        while end < len(lines) and not lines[end].strip():
+            end += 1
+    del lines[first:end]
+
+
+def unset(lines: list[Line], node: ast.Assign, wanted: set[str]) -> None:
+    """Take attributes of self that nobody reads out of an assignment that does nothing else."""
+    pairs = paired(node)
+    kept = [([one for one in targets if not idle(one, value, wanted)], value) for targets, value in pairs]
+    if kept == pairs:
+        return
+    if len(pairs) > 1:
+        sides = [", ".join(map(ast.unparse, side)) for side in zip(*((t[0], v) for t, v in kept if t), strict=True)]
+    else:
+        sides = [ast.unparse(one) for one in kept[0][0]] + [ast.unparse(kept[0][1])]
+    old = lines[node.lineno - 1]
+    comment = re.search(r"  #.*$", lines[(node.end_lineno or 1) - 1])
+    text = " " * node.col_offset + " = ".join(sides) + (comment[0] if comment else "")
+    lines[node.lineno - 1 : node.end_lineno] = [Line.of(text, old.source)] if len(sides) > 1 else []
+
+
+def paired(node: ast.Assign) -> list[tuple[list[ast.expr], ast.expr]]:
+    """What is assigned, each with all that it is assigned to."""
+    target, value = node.targets[0], node.value
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
+        return [([one], what) for one, what in zip(target.elts, value.elts, strict=True)]
+    return [(node.targets, value)]
+
+
+def single(node: ast.Assign) -> list[tuple[ast.expr, ast.expr]]:
+    """What is assigned, target by target."""
+    return [(target, value) for targets, value in paired(node) for target in targets]
+
+
+def kept_by(node: ast.Assign) -> set[str]:
+    """The attributes that an assignment sets in a way that does more, or may."""
+    kept = [target for target, value in single(node) if not idle(target, value, set())]
+    return {part.attr for one in kept for part in ast.walk(one) if isinstance(part, ast.Attribute)}
+
+
+def idle(target: ast.expr, value: ast.expr, wanted: set[str]) -> bool:
+    """Whether this only sets an attribute of self, or of what self is made of, that nobody reads."""
+    makes = isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and not value.args
+    mine = isinstance(target, ast.Attribute) and ast.unparse(target.value) == "self" and "." + target.attr not in wanted
+    return mine and (makes or isinstance(value, (ast.Name, ast.Constant, ast.Attribute)))
+
+
+def without_dead_imports(lines: list[Line]) -> list[Line]:
+    tree = ast.parse("\n".join(lines))
+    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    for node in reversed([node for node in tree.body if isinstance(node, ast.ImportFrom)]):
+        kept = [alias.name for alias in node.names if alias.name in used]
+        if len(kept) < len(node.names) and not any(alias.asname for alias in node.names):
+            text = f"from {'.' * node.level}{node.module or ''} import {', '.join(kept)}"
+            new = [Line.of(text, lines[node.lineno - 1].source)] if kept else []
+            lines[node.lineno - 1 : node.end_lineno] = new
+    return lines

@@ -1,0 +1,56 @@
+"""What a model or an offer fixes is settled: flags, comparisons of choices, and the tests that follow from them."""
+
+import ast
+from typing import Any
+
+from .spec import Spec
+
+
+class Settled(ast.NodeTransformer):
+    """An expression in which what is fixed stands as True, False or a number."""
+
+    def __init__(self, spec: Spec, constants: dict[str, Any]) -> None:
+        self.spec, self.constants = spec, constants
+        self.choices = dict(spec.choices)  # those of local names as well
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        self.generic_visit(node)
+        known = self.spec.flags.get(node.attr)
+        return node if known is None or not isinstance(node.ctx, ast.Load) else ast.Constant(known)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        match node:
+            case ast.Compare(ast.Attribute() | ast.Name() as left, [ast.Eq() | ast.NotEq() as op], [ast.Name(id=name)]):
+                possible = self.choices.get(left.attr if isinstance(left, ast.Attribute) else left.id)
+                value = self.constants.get(name)
+                if possible is not None and value is not None and (value not in possible or len(possible) == 1):
+                    return ast.Constant((value in possible) == isinstance(op, ast.Eq))
+        return self.generic_visit(node)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        self.generic_visit(node)
+        decides = isinstance(node.op, ast.Or)
+        if any(truth(one) is decides for one in node.values):
+            return ast.Constant(decides)
+        node.values = [one for one in node.values if truth(one) is None]
+        return node if len(node.values) > 1 else node.values[0] if node.values else ast.Constant(not decides)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        self.generic_visit(node)
+        known = truth(node.operand)
+        if isinstance(node.op, ast.Not) and known is not None:
+            return ast.Constant(not known)
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        node.test = self.visit(node.test)
+        known = truth(node.test)
+        if known is None:
+            node.body, node.orelse = self.visit(node.body), self.visit(node.orelse)
+            return node
+        return self.visit(node.body if known else node.orelse)
+
+
+def truth(node: ast.AST) -> bool | None:
+    """True or False where it is known, else None."""
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, bool) else None

@@ -1,0 +1,280 @@
+"""The text of one file: lines that do not change are copied, with their comments, and each knows its source."""
+
+import ast
+import re
+from copy import deepcopy
+
+from .declarations import Declarations, annotated, label, returned
+from .numbers import RANGES, Numbers
+from .settled import truth
+from .spec import Spec
+
+WIDTH = 120
+
+
+class Line(str):
+    """A line of text, and the number of the line of the source that it follows from."""
+
+    __slots__ = ("source",)
+    source: int
+
+    @classmethod
+    def of(cls, text: str, source: int) -> "Line":
+        line = cls(text)
+        line.source = source
+        return line
+
+
+class Writer:
+    """A file written out, line by line; `vectors`: whether it speaks of any."""
+
+    def __init__(self, spec: Spec, declared: Declarations, path: str, text: str, vectors: bool) -> None:
+        self.spec, self.declared, self.path, self.vectors = spec, declared, path, vectors
+        self.old = [Line.of(line, n) for n, line in enumerate(text.split("\n"), 1)]
+        self.lines: list[Line] = []
+        self.after = 0  # the lines of the source that have been dealt with
+        self.numbers = self.fresh()
+        tree = ast.parse(text, path)
+        imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and is_vectors(node)]
+        self.ranges = {alias.name for node in imports for alias in node.names} & {*RANGES}
+        self.block(tree.body, 0)
+        self.lines += self.old[self.after :]
+
+    def fresh(self, index: dict[str, int] | None = None) -> Numbers:
+        return Numbers(self.spec, self.declared, self.path, self.vectors, index)
+
+    # ---- lines
+
+    def copy(self, end: int, shift: int) -> None:
+        """The lines of the source up to one, moved to the left by some blanks."""
+        for line in self.old[self.after : end]:
+            moved = line[shift:] if shift > 0 and not line[:shift].strip() else " " * -shift + line if line else line
+            self.lines.append(Line.of(moved, line.source))
+        self.after = max(self.after, end)
+
+    def write(self, text: str, node: ast.AST) -> None:
+        self.lines += [Line.of(line, getattr(node, "lineno", 0)) for line in text.split("\n")]
+
+    @staticmethod
+    def first(node: ast.stmt) -> int:
+        return min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))]) - 1
+
+    def comment(self, node: ast.AST) -> str:
+        """The comment behind a line."""
+        found = re.search(r"  #.*$", self.old[getattr(node, "end_lineno", 1) - 1])
+        return found[0] if found else ""
+
+    # ---- statements
+
+    def block(self, statements: list[ast.stmt], depth: int) -> bool:
+        """Statements in a row; whether they certainly leave the function, after which nothing follows."""
+        for node in statements:
+            mark = len(self.lines)
+            self.copy(self.first(node), node.col_offset - depth)
+            kept = len(self.lines)
+            leaves = self.statement(node, depth)
+            if len(self.lines) == kept:
+                del self.lines[mark:]  # with the comment that stood above it
+            self.after = node.end_lineno or 0
+            if leaves:
+                self.after = statements[-1].end_lineno or 0
+                return True
+        return False
+
+    def statement(self, node: ast.stmt, depth: int) -> bool:
+        shift = node.col_offset - depth
+        match node:
+            case ast.ClassDef():
+                self.copy(self.first(node.body[0]), shift)
+                self.block(node.body, depth + 4)
+            case ast.FunctionDef():
+                counted = [one.arg for one in node.args.args if is_contact(one)]
+                for i in range(len(self.spec.contacts)) if counted else [0]:
+                    self.function(node, depth, counted, i)
+            case ast.For(target=ast.Name(id=name), iter=ast.Name(id=over)) if over in self.ranges:
+                self.unrolled(node, name, over, depth)
+            case ast.If():
+                return self.branch(node, depth, "if")
+            case ast.While() | ast.For() | ast.With():
+                self.head(node, depth)
+                self.block(node.body, depth + 4)
+            case ast.Try():
+                for part in [node.body, *(one.body for one in node.handlers), node.orelse, node.finalbody]:
+                    if part:
+                        self.copy(self.first(part[0]), shift)
+                        self.block(part, depth + 4)
+            case _:
+                self.simple(node, depth)
+        return isinstance(node, (ast.Return, ast.Raise))
+
+    def unrolled(self, node: ast.For, name: str, over: str, depth: int) -> None:
+        """A loop over states or contacts, once for each."""
+        many = {"contacts": range(len(self.spec.contacts)), "places": range(len(self.spec.states))}
+        for i in many.get(over, self.spec.speeds):
+            self.numbers.index[name] = i
+            self.after = self.first(node.body[0])
+            self.block(node.body, depth)
+
+    def simple(self, node: ast.stmt, depth: int) -> None:
+        if not self.numbers.touched(node):
+            if isinstance(node, ast.Assign):
+                self.numbers.learn([name for name in ast.walk(node.targets[0]) if isinstance(name, ast.Name)])
+            self.copy(node.end_lineno or 0, node.col_offset - depth)
+            return
+        old = ast.unparse(node)
+        new: list[ast.stmt]
+        match node:
+            case ast.ImportFrom() if is_vectors(node):
+                return
+            case ast.ImportFrom(module=str(module), level=0) if module.startswith("fmus."):
+                new = [ast.ImportFrom(module.removeprefix("fmus."), node.names, 1)]
+            case ast.Import() | ast.ImportFrom():
+                new = [node]
+            case ast.Assign():
+                self.offered(node)
+                new = self.numbers.statements(deepcopy(node))
+            case _:
+                new = self.numbers.statements(deepcopy(node))
+        new = [ast.fix_missing_locations(one) for one in new]
+        if [ast.unparse(one) for one in new] == [old]:
+            self.copy(node.end_lineno or 0, node.col_offset - depth)
+            return
+        for n, one in enumerate(new):
+            self.write(folded(" " * depth + bare(one)) + self.comment(node) * (n == 0), node)
+
+    def head(self, node: ast.stmt, depth: int, word: str = "", test: ast.expr | None = None) -> None:
+        """The first line of a compound statement; copied unless its test has changed."""
+        body = self.first(node.body[0])  # type: ignore[attr-defined]
+        if isinstance(node, ast.While):
+            word, test = "while", self.numbers.visit(deepcopy(node.test))
+        if test is None or self.stands(node, word, test):
+            self.copy(body, node.col_offset - depth)
+        else:
+            text = folded(f"{' ' * depth}{word} {ast.unparse(test)}:")
+            self.write(text + self.comment(node.test), node)  # type: ignore[attr-defined]
+            self.after = body
+
+    def stands(self, node: ast.stmt, word: str, test: ast.expr) -> bool:
+        """Whether the head of a compound statement can stay as it is."""
+        same = ast.unparse(test) == ast.unparse(node.test)  # type: ignore[attr-defined]
+        return same and self.old[node.lineno - 1].lstrip().startswith(word + " ")
+
+    def function(self, node: ast.FunctionDef, depth: int, counted: list[str], i: int) -> None:
+        outer, self.numbers = self.numbers, self.fresh(dict.fromkeys(counted, i))
+        arguments = []
+        for one in node.args.args:
+            if self.vectors and (kind := annotated(one)):
+                self.numbers.kinds[one.arg] = kind
+                arguments += [ast.unparse(term) for term in self.numbers.terms(ast.Name(one.arg))]
+            elif one.arg not in counted:
+                arguments.append(one.arg)
+        body = self.first(node.body[0])
+        if any(isinstance(one, ast.Name) and one.id == "each" for one in node.decorator_list):
+            self.after = node.lineno - 1
+        if arguments == [one.arg for one in node.args.args] and not returned(node):
+            self.copy(body, node.col_offset - depth)
+        else:
+            if i:
+                self.write("", node)
+            name = node.name + (self.spec.tail(i) if counted else "")
+            self.write(folded(f"{' ' * depth}def {name}({', '.join(arguments)}):"), node)
+            self.after = body
+        mark = len(self.lines)
+        self.block(node.body, depth + 4)
+        if all(not line.strip() for line in self.lines[mark:]):
+            self.write(" " * (depth + 4) + "pass", node)
+        if name := self.numbers.clash():
+            raise self.numbers.refused(
+                node, f"uses {name} for a number, and a number of a vector gets that name; take another"
+            )
+        self.numbers = outer
+
+    def branch(self, node: ast.If, depth: int, word: str) -> bool:
+        test = self.numbers.visit(deepcopy(node.test))
+        if truth(test) is not None:
+            chosen = node.body if truth(test) else node.orelse
+            if not chosen:
+                return False
+            self.after = self.first(chosen[0])
+            return self.block(chosen, depth)
+        self.head(node, depth, word, test)
+        mark = len(self.lines)
+        leaves = self.block(node.body, depth + 4)
+        if len(self.lines) == mark:
+            self.write(" " * (depth + 4) + "pass", node)
+        if not node.orelse:
+            return False
+        other, mark = node.orelse[0], len(self.lines)
+        if isinstance(other, ast.If) and len(node.orelse) == 1 and other.col_offset == node.col_offset:
+            self.after = self.first(other)
+            if truth(self.numbers.visit(deepcopy(other.test))) is None:
+                return self.branch(other, depth, "elif") and leaves
+            self.write(" " * depth + "else:", other)
+        else:
+            self.copy(self.first(other), node.col_offset - depth)
+        leaves = self.block(node.orelse, depth + 4) and leaves
+        if all(line.lstrip().startswith(("else:", "#")) for line in self.lines[mark:]):
+            del self.lines[mark:]
+            return False
+        return leaves
+
+    def offered(self, node: ast.Assign) -> None:
+        """Take out the items that are not offered; a choice that starts with one starts with the first that is."""
+        for part in ast.walk(node.value):
+            if isinstance(part, ast.Tuple):
+                part.elts = [one for one in part.elts if not self.is_gone(one)]
+        match node:
+            case ast.Assign(
+                targets=[ast.Name(id=name)],
+                value=ast.Call(func=ast.Name(id="Choice"), args=[start, *_]) as choice,
+            ):
+                possible = self.spec.choices.get(name)
+                if possible and self.declared.constants.get(getattr(start, "id", "")) not in possible:
+                    choice.args[0] = ast.Constant(possible[0])
+
+    def is_gone(self, node: ast.expr) -> bool:
+        """Whether this is an item that is not offered, or its name."""
+        return (label(node) or self.declared.constants.get(getattr(node, "id", ""))) in self.spec.gone
+
+
+def is_vectors(node: ast.ImportFrom) -> bool:
+    """Whether this imports the vectors, which stay at home."""
+    return (node.module or "").rsplit(".", 1)[-1] == "vectors"
+
+
+def is_contact(argument: ast.arg) -> bool:
+    return isinstance(argument.annotation, ast.Name) and argument.annotation.id == "Contact"
+
+
+def bare(node: ast.stmt) -> str:
+    """The text of a simple statement, without brackets around a row."""
+    text, value = ast.unparse(node), getattr(node, "value", None)
+    if not (isinstance(value, ast.Tuple) and value.elts):
+        return text
+    return text.removesuffix(ast.unparse(value)) + ast.unparse(value)[1:-1]
+
+
+def folded(text: str) -> str:
+    """A line that is too long on several, broken inside its brackets; a row of targets on lines of their own."""
+    if len(text) <= WIDTH:
+        return text
+    blanks = text[: len(text) - len(text.lstrip())]
+    if text.count(" = ") > 1:
+        *targets, value = text.strip().split(" = ")
+        half = len(targets) // 2
+        return "\n".join(folded(f"{blanks}{' = '.join(part)} = {value}") for part in (targets[:half], targets[half:]))
+    depth, found = 0, {}
+    for n, letter in enumerate(text[:WIDTH]):
+        depth += (letter in "([") - (letter in ")]")
+        if (
+            letter == " "
+            and depth
+            and (text[n - 1] == "," or text[n - 2 : n] in (" +", " -") or text[n + 1 : n + 4] == "if ")
+        ):
+            found[depth] = n
+    if not found:
+        head, _, value = text.partition(" = ") if " = " in text else text.partition("return ")
+        word = " = " if " = " in text else "return "
+        return folded(f"{head}{word}({value})") if not value.startswith("(") else text
+    n = found[min(found)]
+    return text[:n] + "\n" + folded(f"{blanks}    {text[n + 1 :].lstrip()}" if blanks.strip() == "" else text[n + 1 :])

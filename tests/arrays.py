@@ -1,0 +1,70 @@
+"""Runs inside Python, step by step: of a model as it is written out, and of the sources on numpy arrays."""
+
+import struct
+
+import numpy as np
+
+from fmus.runtime import vectors
+
+COUNTS = ("taken", "refused", "called", "looked")
+
+
+def begun(model, values, stop):
+    """A model with its values, at the start of a run."""
+    for variable, value in values.items():
+        owner = model.solver if "." in variable else model
+        setattr(owner, variable.split(".")[-1], value)
+    assert model.prepare() == 0
+    return model
+
+
+def start(model, y, stop):
+    model.solver.start(model, 0.0, *y, stop, model.tolerance)
+
+
+def bits(numbers):
+    """Of numbers, whatever Python calls them; all that is not a number is alike."""
+    return [struct.pack("<d", float(value)) if value == value else b"NaN" for value in numbers]
+
+
+def written_steps(model, values, stop, most):
+    """For each internal step its end, the state, its own rates, the modes, the size to try next, the counts, and the
+    state in its middle."""
+    begun(model, values, stop)
+    start(model, model.initial(0.0), stop)
+    rates = [rate for rate in model.states.values() if rate not in model.states]
+
+    def spelled(step, names):
+        return [getattr(step, name + ("_" if name[-1].isdigit() else "") + "1") for name in names]
+
+    def row(step):
+        numbers = spelled(step, [*model.states, *rates, *model.contacts])
+        return [step.t1, *numbers, step.size, *counts(step), *step.at(model, 0.5 * (step.t0 + step.t1))]
+
+    return list(steps(model, row, stop, most))
+
+
+def array_steps(model, values, stop, most):
+    """The same of the sources."""
+    begun(model, values, stop)
+    model = vectors.on_arrays(model)
+    start(model, [model.initial(0.0)], stop)
+
+    def row(step):
+        middle = step.at(model, 0.5 * (step.t0 + step.t1))
+        return [step.t1, *step.y1, *step.f1[vectors.own], *step.modes1, step.size, *counts(step), *middle]
+
+    with np.errstate(all="ignore"):
+        return list(steps(model, row, stop, most))
+
+
+def counts(step):
+    return [getattr(step, name, 0) for name in COUNTS]
+
+
+def steps(model, row, stop, most):
+    step = model.solver.step
+    while step.t1 < stop and most:
+        assert step.take(model) == 0
+        yield bits(row(step))
+        most -= 1

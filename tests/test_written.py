@@ -1,0 +1,97 @@
+"""The numerics written out: the same bits as the sources on arrays, what is gone, and what is refused."""
+
+import ast
+import re
+import traceback
+
+import pytest
+from arrays import array_steps, written_steps
+from models import CASES, MODELS, ROOT, label, model_class, runtime
+
+from fmus.packaging.catalogue import load
+from fmus.packaging.written import Refused, files_of, written
+from fmus.packaging.written.declarations import Declarations
+from fmus.packaging.written.spec import Spec
+from fmus.packaging.written.text import Writer
+
+NUMERICS = ("step.py", "automaton.py", "march.py")
+STEPS = 150  # of a run, enough for some events
+EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_arrays_and_scalars_give_the_same_bits_at_every_step(case):
+    name, values, stop = case
+    scalars = written_steps(model_class(name)(), values, stop, STEPS)
+    assert scalars == array_steps(load(name)(), values, stop, STEPS)
+    assert scalars
+
+
+@EVERY_MODEL
+def test_what_travels_knows_no_vectors_says_where_it_comes_from_and_keeps_the_line_length(name):
+    for path, text in files_of(name).items():
+        tree = ast.parse(text)
+        names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+        assert not names & {"States", "Rates", "Contacts", "Contact", "contacts", "slip", "speeds"}, path
+        source = ROOT / "fmus" / path
+        if source.is_file() and source.read_text() != text:
+            states = ", ".join(model_class(name).states)
+            first, *_ = text.splitlines()
+            assert first.startswith(f"# Written out for {states}")
+            assert f" from fmus/{path} of" in first
+        assert [line for line in text.splitlines() if len(line) > 120] == [], path
+
+
+def test_what_cannot_happen_is_gone():
+    """A smooth model has no modes, one without closed forms none of theirs, and an offer no more than it says."""
+    smooth, dry = (
+        "\n".join(text for path, text in files_of(name).items() if path.split("/")[-1] in NUMERICS)
+        for name in ("pacejka", "coulomb")
+    )
+    for word in ("def set_modes", "def wait", ".sticks", "mode0", "def take_piece"):
+        assert word not in smooth
+        assert word in dry
+    assert "def breakaway" not in dry  # of a contact that is stuck while something moves
+
+
+@EVERY_MODEL
+def test_a_traceback_points_into_the_source(name):
+    model = model_class(name)()
+    model.prepare()
+    with pytest.raises(TypeError) as caught:
+        runtime(name, "entries").start(model, 0.0, "never", 1e-6)
+    frame = traceback.extract_tb(caught.value.__traceback__)[-1]
+    assert frame.filename == str(ROOT / "fmus" / "runtime" / "march.py")
+    assert frame.line == "run = t_end - t if t_end < inf else model.stop_time"
+
+
+HEAD = "class Some:\n    def step(self, model, modes: Contacts, t, y: States, f: Rates, h):\n        "
+BODIES = {
+    "f3 = model.rates(t, y, modes)": "must call the rates at y2 f2",
+    "y2 = y + h * model.rates(t, y, modes)": "give it a name on a line of its own",
+    "e = magnitude(y + f)": "would work something out twice",
+    "e = y + f\n        e += y": "write c = c + ...",
+    "if y > 0.0:\n            t = 0.0": "is a vector where a number is wanted",
+    "j = 1\n        t = y[j]": "is an index that is not known",
+    "e = y + modes": "loop over contacts",
+    "y = y + h * f": "changes under f",
+    "y2 = y + h * f\n        v2 = t": "uses v2 for a number",
+}
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_what_cannot_be_written_out_is_refused_by_file_line_and_remedy(body):
+    text = HEAD + body + "\n"
+    spec = Spec({"x": "v", "v": "a"}, {"mode": "v"})
+    with pytest.raises(Refused, match=re.escape(BODIES[body])) as caught:
+        Writer(spec, Declarations([ast.parse(text)]), "runtime/some.py", text, True)
+    assert re.match(r"runtime/some\.py:[234]: ", str(caught.value))
+
+
+def test_names_that_meet_at_a_stage_are_refused():
+    with pytest.raises(Exception, match="take another name"):
+        Spec({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, {})
+
+
+def test_a_model_is_written_out_once():
+    assert written("smd") is written("smd")
