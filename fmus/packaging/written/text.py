@@ -263,14 +263,13 @@ def folded(text: str) -> str:
         *targets, value = text.strip().split(" = ")
         half = len(targets) // 2
         return "\n".join(folded(f"{blanks}{' = '.join(part)} = {value}") for part in (targets[:half], targets[half:]))
-    depth, found = 0, {}
+    depth, quote, found = 0, "", {}
     for n, letter in enumerate(text[:WIDTH]):
-        depth += (letter in "([") - (letter in ")]")
-        if (
-            letter == " "
-            and depth
-            and (text[n - 1] == "," or text[n - 2 : n] in (" +", " -") or text[n + 1 : n + 4] == "if ")
-        ):
+        if letter in "\"'" and quote in ("", letter):
+            quote = "" if quote else letter
+        depth += 0 if quote else (letter in "([") - (letter in ")]")
+        ends = text[n - 1] == "," or text[n - 2 : n] in (" +", " -") or text[n + 1 : n + 4] == "if "
+        if letter == " " and depth and not quote and ends:
             found[depth] = n
     if not found:
         head, _, value = text.partition(" = ") if " = " in text else text.partition("return ")
