@@ -22,8 +22,6 @@ place: list[int] = []
 own: list[bool] = []  # for each state whether its rate is calculated, and is no state
 rate: list[int] = []  # the place of that rate, where it is a state
 
-DEFAULT = np.zeros  # stands for what a model does not say
-
 VECTOR = re.compile(r"(y|f|modes)(\d*|_\w+)")
 
 
@@ -161,7 +159,7 @@ def on_arrays(model):
         about[name] = called_with_numbers(cls, name)
     for name in ("hold", "terms", "departure") if dry else ():
         told = [f"{name}_{mode}" if len(modes) > 1 else name for mode in modes]
-        if not getattr(cls, told[0], DEFAULT).__module__.startswith(__package__):
+        if not getattr(cls, told[0], per_state).__module__.startswith(__package__):
             about[name] = called_of_a_contact(cls, told)
     model.__class__ = type(cls.__name__, (cls,), about)
     return model

@@ -140,7 +140,9 @@ class Writer:
             self.copy(node.end_lineno or 0, node.col_offset - depth)
             return
         for n, one in enumerate(new):
-            self.write(folded(" " * depth + bare(one)) + self.comment(node) * (n == 0), node)
+            text = " " * depth + bare(one)
+            text = text if len(text) <= WIDTH else folded(" " * depth + ast.unparse(one))
+            self.write(text + self.comment(node) * (n == 0), node)
 
     def head(self, node: ast.stmt, depth: int, word: str = "", test: ast.expr | None = None) -> None:
         """The first line of a compound statement; copied unless its test has changed."""
@@ -254,26 +256,39 @@ def bare(node: ast.stmt) -> str:
     return text.removesuffix(ast.unparse(value)) + ast.unparse(value)[1:-1]
 
 
-def folded(text: str) -> str:
-    """A line that is too long on several, broken inside its brackets; a row of targets on lines of their own."""
+def folded(text: str, depth: int = 0) -> str:
+    """A line that is too long on several, broken inside its brackets, of which `depth` are open before it."""
     if len(text) <= WIDTH:
         return text
     blanks = text[: len(text) - len(text.lstrip())]
-    if text.count(" = ") > 1:
+    if not depth and text.count(" = ") > 1:  # a row of targets
         *targets, value = text.strip().split(" = ")
         half = len(targets) // 2
         return "\n".join(folded(f"{blanks}{' = '.join(part)} = {value}") for part in (targets[:half], targets[half:]))
-    depth, quote, found = 0, "", {}
+    quote, places = "", {}
+    inner = blanks if depth else blanks + "    "
     for n, letter in enumerate(text[:WIDTH]):
         if letter in "\"'" and quote in ("", letter):
             quote = "" if quote else letter
         depth += 0 if quote else (letter in "([") - (letter in ")]")
         ends = text[n - 1] == "," or text[n - 2 : n] in (" +", " -") or text[n + 1 : n + 4] == "if "
-        if letter == " " and depth and not quote and ends:
-            found[depth] = n
-    if not found:
-        head, _, value = text.partition(" = ") if " = " in text else text.partition("return ")
-        word = " = " if " = " in text else "return "
-        return folded(f"{head}{word}({value})") if not value.startswith("(") else text
-    n = found[min(found)]
-    return text[:n] + "\n" + folded(f"{blanks}    {text[n + 1 :].lstrip()}" if blanks.strip() == "" else text[n + 1 :])
+        if letter == " " and depth > 0 and not quote and ends and n > len(inner):
+            places[depth] = n
+    if not places:
+        word = next((word for word in (" = ", "return ", "if ", "while ") if word in text), "")
+        head, _, value = text.partition(word) if word else (text, "", "")
+        value, colon = (value[:-1], ":") if value.endswith(":") else (value, "")
+        return folded(f"{head}{word}({value}){colon}") if word and not is_bracketed(value) else text
+    shallow = min(places)
+    n = places[shallow]
+    return text[:n] + "\n" + folded(inner + text[n + 1 :].lstrip(), shallow)
+
+
+def is_bracketed(text: str) -> bool:
+    """Whether one pair of brackets holds all of an expression."""
+    depth = 0
+    for n, letter in enumerate(text):
+        depth += (letter in "([") - (letter in ")]")
+        if not depth:
+            return n == len(text) - 1
+    return True
