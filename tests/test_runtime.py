@@ -176,6 +176,18 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
     assert "100 % broken" in line
 
 
+@pytest.mark.parametrize("name", MODELS)
+def test_a_run_whose_initialisation_ends_twice_goes_on(name):
+    once, twice = slave(name), slave(name)
+    for made in once, twice:
+        assert made.do_step(0.0, 0.1)
+    twice.exit_initialization_mode()
+    assert read(twice, *outputs(name)) == read(once, *outputs(name))
+    for made in once, twice:
+        assert made.do_step(0.1, 0.1)
+    assert read(twice, *outputs(name)) == pytest.approx(read(once, *outputs(name)), rel=1e-4)
+
+
 def test_lists_of_references_that_never_come_again_take_no_memory():
     """Where an importer asks for others all the time: what reads them is kept for some."""
     made, draw = slave("stickslip"), random.Random(1)

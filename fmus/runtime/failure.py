@@ -13,7 +13,7 @@ from .declare import Declared
 from .rules import Run
 
 ERROR = 3  # a status of FMI, in all its versions
-CALCULATED = ("output", "local")
+ANSWERS = ("output", "local")  # causalities of what is calculated
 
 
 class Failing:
@@ -64,5 +64,5 @@ class Failing:
     def silence(self) -> None:
         """Every calculated Real reads NaN."""
         for (_, declared), (thing, name) in zip(self.variables, self.owners):
-            if declared.type == "Real" and declared.causality in CALCULATED:
+            if declared.type == "Real" and declared.causality in ANSWERS:
                 setattr(thing, name, nan)

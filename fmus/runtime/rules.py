@@ -123,10 +123,11 @@ def renew(run, model, beginning):
 
 def begin(run, model):
     """Initialisation ends.  Status."""
+    beginning = run.phase < RUNNING  # an importer may end it twice
     run.phase = RUNNING
     if run.failed:
         return FAILED
-    return renew(run, model, True)
+    return renew(run, model, beginning)
 
 
 def begin_steps(run, model, t):

@@ -1,7 +1,8 @@
 """All that an FMU says, by its code; the native kind gets these very words.
 
 Fields: t, h are the communication step that is asked for; now, t_end the present point and where the run ends; t0 is
-the beginning of the internal step in force; start, stop are the experiment.  Numbers stand as repr writes them.
+the beginning of the internal step in force; start, stop are the experiment; text, unit and allowed are declared of the
+variable `name`.  Numbers stand as repr writes them.
 """
 
 from __future__ import annotations

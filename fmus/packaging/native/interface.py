@@ -8,7 +8,7 @@ from typing import Any
 from ...runtime import codes
 from ...runtime.codes import INTEGRATED, INTERRUPTED, RULES
 from ...runtime.declare import Declared, Declaring
-from ...runtime.failure import CALCULATED
+from ...runtime.failure import ANSWERS
 from ...runtime.sentences import CALLS, RUN, VALUES
 from ..description import declared_by
 from ..written import beside
@@ -153,7 +153,7 @@ def _of(name: str) -> str:
 def _line(name: str, meaning: Declared) -> str:
     """One variable in the table."""
     words = (name, meaning.text, meaning.suffix, meaning.allowed)
-    flags = (meaning.type == "Real", meaning.causality in CALCULATED, meaning.variability == "fixed", "." in name)
+    flags = (meaning.type == "Real", meaning.causality in ANSWERS, meaning.variability == "fixed", "." in name)
     bounds = (meaning.low, meaning.high, meaning.above, meaning.below)
     items = f"{_of(name)}, {_of(name)} + {len(meaning.items)}" if meaning.items else "NULL, NULL"
     parts = [
