@@ -1,1 +1,1 @@
-"""What is left of a run: folders, files, quantities with their units, the look of figures."""
+"""What is left of a run: folders, files, where they came from, quantities with their units, the look of figures."""
