@@ -59,11 +59,13 @@ def residuals(axes: Axes, found: Identified) -> None:
 
 
 def shares(axes: Axes, found: Identified, loss: Loss) -> None:
-    """The share of its energy that each half swing loses, with the curves of the best law and of those of one term."""
-    best = found.best
-    for law in found.laws:
-        if len(law.terms) == 1 and law is not best:
-            axes.plot(*percent(loss.curves[law.terms]), color=COLOURS[law.terms], linestyle="--", label=law.words)
+    """The share of its energy that each half swing loses, with the curves of all laws."""
+    best, others = found.best, found.laws[1:]
+    for law in (law for law in others if law.terms in COLOURS):
+        axes.plot(*percent(loss.curves[law.terms]), color=COLOURS[law.terms], linestyle="--", label=law.words)
+    for i, law in enumerate(law for law in others if law.terms not in COLOURS):
+        label_once = "" if i else "other mixed laws"
+        axes.plot(*percent(loss.curves[law.terms]), color=GREY, linestyle=":", label=label_once)
     axes.plot(*percent(loss.curves[best.terms]), color=ORANGE, linewidth=2, label=f"fit: {best.words}")
     if len(loss.amplitude):
         axes.plot(*percent((loss.amplitude, loss.share)), "o", color="black", fillstyle="none", label="turning points")
