@@ -91,10 +91,10 @@ def test_what_is_written_out_has_the_bits_of_the_equations_as_they_stand(source)
         equations = Evaluated(anatomy, values, math)
         for c in anatomy.contacts:
             values[c.name] = mode * equations.of(c.slide)
-        model.observe(t, *at.values(), mode)
+        model.observe(t, *at.values(), *(mode for _ in modes))
         for e in (*anatomy.outputs, *anatomy.contacts):
             assert same_bits(getattr(model, e.name) + 0.0, equations.of(e) + 0.0), e.name
-        rate = model.rates(t, *at.values(), mode)
+        rate = model.rates(t, *at.values(), *(mode for _ in modes))
         assert same_bits(rate + 0.0, equations.of(anatomy.law[anatomy.own[0]]) + 0.0)
         for c in anatomy.contacts:
             at[c.slip.name] = values[c.slip.name] = 0.0
@@ -114,7 +114,8 @@ def test_jacobians_are_those_of_differences_in_fifty_digits(source):
     anatomy, model, found = find(source).anatomy, find(source).model(), []
     for values, t, at, mode in situations(anatomy, model, 40):
         known = values | at | driven(anatomy, model, t) | {m.name: mode for m in anatomy.modes}
-        found += zip(model.jacobian(t, *at.values(), mode), slopes(anatomy, known), strict=True)
+        modes = [mode for _ in anatomy.modes]
+        found += zip(model.jacobian(t, *at.values(), *modes), slopes(anatomy, known), strict=True)
     size = max(abs(true) for _, true in found)
     assert all(abs(slope - true) <= 1e-12 * abs(true) + 1e-15 * size for slope, true in found)
 
@@ -132,7 +133,7 @@ def test_any_states_and_contacts_are_derived_though_the_solver_cannot_run_them_y
         for modes in product((-1, 0, 1), repeat=len(anatomy.modes)):
             known = values | at | driven(anatomy, model, t)
             known |= {m.name: mode for m, mode in zip(anatomy.modes, modes, strict=True)}
-            point = t, *at.values(), *(modes or (0,))
+            point = t, *at.values(), *modes
             for state, got in zip(anatomy.own, model.rates(*point), strict=True):
                 true = settled(anatomy, anatomy.law[state], known)
                 assert abs(got - true) < 1e-12 * (1 + abs(true))
