@@ -11,7 +11,7 @@ from fmus.runtime.declare import Choice, Input, Output, Parameter, variables
 ROOT = Path(__file__).parent.parent
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
 AUTHORED = sorted((ROOT / "tests" / "authored").glob("*.py"))  # as users write them, in files of their own
-AHEAD = sorted((ROOT / "tests" / "authored" / "ahead").glob("*.py"))  # what the solver cannot run yet
+LARGER = sorted((ROOT / "tests" / "authored" / "larger").glob("*.py"))  # of more states, or more contacts
 EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
 HYBRID, SIGN, THRESHOLD = 1, 2, 3
 

@@ -38,7 +38,8 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
         values = {name: another(meaning, sizes, chance) for name, meaning in known.items()}
         put(thing, values)
         if thing.dry and entry and begun(thing, outputs):
-            load, _, limit = thing.hold(0.0, *thing.initial(0.0))
+            tail = f"_{one(list(thing.contacts), chance)}" if len(thing.contacts) > 1 else ""
+            load, _, limit = getattr(thing, f"hold{tail}")(0.0, *thing.initial(0.0))
             values[entry] += one(LOADS, chance) * limit - load
             put(thing, values)
         before = begun(thing, outputs)

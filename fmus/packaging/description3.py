@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..runtime.declare import Declaring, Output
 from ..runtime.variables3 import DERIVATIVE, TO_BREAK_AWAY, TO_REST, further
+from . import BuildError
 from .dependencies import at_start
 from .description import (
     Variables,
@@ -47,6 +48,8 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     for interface, abilities in ("ModelExchange", EXCHANGE), ("CoSimulation", STEPPING):
         SubElement(root, interface, {"modelIdentifier": name} | BOTH | abilities)
     declared = declared_by(model)
+    if sum(meaning.role == "contact" for _, meaning in declared) > 1:
+        raise BuildError(f"{name} has several contacts, and so far FMI 3.0 is for one: leave out --fmi 3.")
     declared = declared + further(model, declared)
     define_units(root, declared)
     _define_types(root, declared)

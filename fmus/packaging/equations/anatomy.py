@@ -222,31 +222,26 @@ class Anatomy:
             speed = drive.steady
         return mass, damping, stiffness, speed
 
+    @property
+    def waits(self) -> bool:
+        """Whether nothing moves while all contacts are stuck."""
+        slips = [c.slip for c in self.contacts]
+        return all(self.rate[s] in slips or s in slips for s in self.states)
+
     def judge_runtime(self) -> None:
         """Refuse what the solver cannot run."""
-        if len(self.positions) != 1 or len(self.own) != 1 or len(self.states) != 2:
-            raise Mistake(
-                f"{self.name} has the states {', '.join(s.name for s in self.states)}: the solver runs one position "
-                "and its speed so far",
-                self.states[-1].place,
-            )
-        if len(self.contacts) > 1:
-            raise Mistake("the solver runs one contact so far", self.contacts[1].place)
         if len(self.drives) > 1:
             raise Mistake("the solver runs one driver so far", self.drives[1].place)
         for c in self.contacts:
             if c not in self.lonely:
-                raise Mistake(f"{c.name} shares a body with another contact: the solver knows no such", c.place)
-            if c.slip is not self.own[0]:
-                raise Mistake(
-                    f"the slip of {c.name} must be the speed {self.own[0].name}: the solver knows no other so far",
-                    c.place,
-                )
-            still = self.by_time
-            if depends(derivative(self.load[c], still), (TIME, *self.drives)):
-                raise Mistake(
-                    f"the load on {c.name} at rest must be linear in time: the solver knows no other", c.place
-                )
+                raise Mistake(f"{c.name} shares a body with another contact: the solver knows no such so far", c.place)
+            if c.slip not in self.own:
+                sentence = f"the slip of {c.name} must be a speed, a state of its own: the solver knows no other so far"
+                raise Mistake(sentence, c.place)
+            if len(c.laws) > 1 and len(self.states) > 2:
+                raise Mistake(f"laws beside HYBRID are for a single body, and {self.name} has more", c.place)
+            if self.waits and depends(derivative(self.load[c], self.by_time), (TIME, *self.drives)):
+                raise Mistake(f"the load on {c.name} at rest must be linear in time: the solver knows no else", c.place)
 
     @property
     def methods(self) -> list[str]:

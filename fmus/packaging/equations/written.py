@@ -111,11 +111,12 @@ def described(e: Variable) -> str:
 
 def facts(an: Anatomy) -> list[str]:
     """What the runtime asks of the class."""
-    states = ", ".join(f"{quoted(s.name)}: {quoted(an.rate[s].name)}" for s in (*an.positions, *an.own))
+    states = ", ".join(f"{quoted(s.name)}: {quoted(an.rate[s].name)}" for s in an.states)
     lines = [f"states = {{{states}}}"]
     if an.contacts:
-        slips = ", ".join(f"{quoted(c.mode.name)}: {quoted(s.name)}" for c, s in zip(an.contacts, an.own, strict=True))
+        slips = ", ".join(f"{quoted(c.mode.name)}: {quoted(c.slip.name)}" for c in an.contacts)
         lines.append(f"contacts = {{{slips}}}")
+        lines += [] if an.waits else ["waits = False"]
     lines += [f"{word} = True" for word, holds in (("linear", an.closed_form), ("driven", an.drives)) if holds]
     for word in RUN:
         if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
