@@ -7,12 +7,13 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ...analyses.decay.fit import Identified
+from ...analyses.decay.law import Terms
 from ...analyses.decay.loss import Loss
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
 
 MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
 MOST = 4000  # points of a line: more are not seen
-COLOURS = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of one term
+COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of one term
 
 
 def draw(found: Identified, loss: Loss, path: Path) -> None:
