@@ -6,7 +6,6 @@ from tempfile import TemporaryDirectory
 import builds
 import native_fmus
 import pytest
-from builds import ROOT, build  # noqa: F401 - for tests
 from driver import Worker, processes
 
 

@@ -19,7 +19,7 @@ calculated from vectors is one; y, f and modes, with a number or without, are ve
     e, k3, self.c2           any other: e_x, e_v;  k3_x, k3_v;  self.c2_x, self.c2_v
 
 A loop over contacts, places or speeds is unrolled; a function with a parameter `i: Contact` is written once for each
-contact.  The guard of all this is that arrays, scalars and C give the same bits (tests/test_written.py).
+contact.  The guard of all this is that arrays, scalars and C give the same bits (tests/written/test_written.py).
 """
 
 from .live import beside, definition, files_of, written, written_by_hand

@@ -1,0 +1,79 @@
+"""A record with a pause: both sides are used, the swings that nobody saw are counted, too few before it are told."""
+
+import json
+import os
+import subprocess
+import sys
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+from builds import ROOT
+
+from harness.analyses.decay.figures import Known
+from harness.analyses.decay.fit import identify
+from harness.analyses.decay.problem import prepare
+from harness.analyses.decay.record import Record
+from harness.analyses.decay.turning import find
+from harness.errors import HarnessError
+
+HALF, RATE = 0.25, 0.3  # s, of a half cycle; 1/s, of the decay
+OMEGA = sqrt((pi / HALF) ** 2 + RATE**2)
+
+
+def paused(begin, share, noise=0.0):
+    """The record of a decay without the samples of a `share` of a half cycle from `begin` in s on."""
+    t = 0.002 * np.arange(2000)
+    t = t[(t <= begin) | (t >= begin + share * HALF)]
+    x = 0.1 * np.exp(-RATE * t) * np.cos(pi * t / HALF)
+    return Record("paused", t, x + noise * np.random.default_rng(1).standard_normal(len(t)))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+@pytest.mark.parametrize("begin", [0.1, 0.3, 1.2, 2.2])
+@pytest.mark.parametrize("share", [0.45, 0.95, 1.3, 3.3])
+def test_a_pause_of_any_length_leaves_the_answer_right(begin, share, noise):
+    found = {each.name: each for each in identify(paused(begin, share, noise), Known()).estimates}
+    for name, truth in {"omega": OMEGA, "zeta": RATE / OMEGA}.items():
+        assert abs(found[name].value - truth) < 1e-7 * truth + 5 * found[name].error
+    assert found["omega"].error < 1e-3 * OMEGA
+
+
+@pytest.mark.parametrize("share", [0.35, 0.55, 0.7])
+def test_a_pause_in_which_no_turning_point_is_lost_costs_no_other_sample(share):
+    found = identify(paused(0.55, share), Known())
+    assert found.t[0] == 0.0
+    assert found.remarks == ()
+
+
+def test_too_few_swings_before_a_pause_are_left_out_and_said():
+    found = identify(paused(0.55, 1.3), Known())
+    assert found.t[0] > 0.55
+    assert "Before the gap that ends at t = 0.876 s are too few swings" in " ".join(found.remarks)
+
+
+def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
+    record = paused(2.03, 0.95)
+    rows = [f"{t!r},{x!r}" for t, x in zip(record.t.tolist(), record.x.tolist(), strict=True)]
+    (tmp_path / "paused.csv").write_text("\n".join(["time [s],x [m]", *rows]))
+    done = subprocess.run(
+        [sys.executable, "-m", "harness", "decay", "paused.csv", "--json"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert {each["name"]: each["value"] for each in found["fit"]}["omega"] == pytest.approx(OMEGA, rel=1e-8)
+    assert found["used"]["from"] < 2.03 < found["used"]["until"]
+
+
+@pytest.mark.parametrize("kept", [0, 3, 11])
+def test_a_window_with_fewer_samples_than_a_fit_needs_is_told(kept):
+    """Whatever has taken the others away."""
+    record = paused(2.03, 0.95)
+    problem, _ = prepare(record, find(record, False), False, False)
+    with pytest.raises(HarnessError, match=f"paused: only {kept} samples in a row follow .* and 12 are needed"):
+        problem.only(slice(kept))

@@ -1,0 +1,173 @@
+"""Ctrl-C and SIGTERM end every command at once: status, one line, nothing left behind, nothing begun anew."""
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+import pytest
+from builds import ROOT
+
+from harness.commands.terminal import progress
+from harness.process import interrupt
+from harness.process.child import Hangs, ask
+from harness.process.interrupt import Interrupted, check, interruptible, later
+
+SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
+COMMANDS = {  # and a file or folder that is there once it is under way
+    "main": ([], "out/.*"),
+    "run": (["run", "slow.toml"], "temporary/fmu-*"),
+    "precision": (["precision", "pacejka"], "out/.precision-*"),
+    "stability": (["stability"], "temporary/bounded-*"),
+    "bench": (["bench"], "out/.bench-*"),
+    "importers": (["importers"], "temporary/child-*"),
+    "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.jsonl"),
+}
+
+
+@pytest.fixture(autouse=True)
+def logging_goes_on():
+    yield
+    logging.disable(logging.NOTSET)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_signal_ends_a_command_and_leaves_nothing_of_it(place, tmp_path, command, number):
+    """To the whole group, as a terminal sends it."""
+    (tmp_path / "temporary").mkdir()
+    (tmp_path / "fmus").symlink_to(place / "fmus")
+    (tmp_path / "slow.toml").write_text(SLOW)
+    arguments, sign = COMMANDS[command]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path / "temporary")}
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a test run in the background ignores it
+    process = subprocess.Popen(
+        [sys.executable, "-m", "harness", *arguments, "--out", "out"],
+        cwd=tmp_path,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=heard,
+    )
+    while process.poll() is None and not list(tmp_path.glob(sign)):
+        time.sleep(0.01)
+    os.killpg(process.pid, number)
+    answered, said = process.communicate(timeout=60)
+    assert (process.returncode, answered, said.count("\n")) == (128 + number, "", 1), said
+    assert said.startswith(("Error: interrupted", "Error: terminated"))
+    assert list((tmp_path / "temporary").iterdir()) == []
+    left = [path.name for path in (tmp_path / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
+    if command == "sweep":
+        assert [name for name in left if not name.endswith(".jsonl")] == []  # what it has done is kept
+    elif command == "main":
+        assert [name for name in left if name.startswith(".")] == []  # scenes that were finished are whole
+        assert len(list((tmp_path / "out").iterdir())) < 8
+    else:
+        assert left == []
+
+
+def test_an_interrupt_that_something_swallowed_still_ends_it(monkeypatch):
+    monkeypatch.setattr(interrupt, "HEARD", [])
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+
+    def swallowed():
+        with interruptible():
+            with suppress(KeyboardInterrupt):  # as an FMU in Python may
+                signal.raise_signal(signal.SIGINT)
+            raise RuntimeError("a step failed, for what it is worth")
+
+    usual = signal.default_int_handler, signal.SIG_DFL  # a shell lets what it starts in the background ignore Ctrl-C
+    before = [signal.signal(number, handler) for number, handler in zip(interrupt.BOTH, usual, strict=True)]
+    try:
+        with pytest.raises(Interrupted, match="interrupted") as told:
+            swallowed()
+        assert told.value.status == 130
+        with pytest.raises(KeyboardInterrupt):
+            check()
+    finally:
+        for number, handler in zip(interrupt.BOTH, before, strict=True):
+            signal.signal(number, handler)
+
+
+def test_a_signal_in_a_beginning_waits_for_its_end(monkeypatch):
+    monkeypatch.setattr(interrupt, "HEARD", [])
+    before = signal.signal(signal.SIGTERM, interrupt.hear)
+    begun = []
+
+    def begin():
+        with later():
+            signal.raise_signal(signal.SIGTERM)
+            begun.append("whole")
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            begin()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert begun == ["whole"]
+
+
+def test_a_program_that_hangs_ends_with_all_that_it_started(tmp_path):
+    script = "sleep 100 & echo $! > pid; wait"
+    with pytest.raises(Hangs):
+        ask(["sh", "-c", f"cd '{tmp_path}'; {script}"], patience=0.5)
+    state = Path("/proc", (tmp_path / "pid").read_text().strip(), "stat")
+    for _ in range(100):
+        if not state.exists() or state.read_text().split()[2] == "Z":  # nobody asks for its status
+            return
+        time.sleep(0.05)
+    raise AssertionError("what it started lives on")
+
+
+def test_a_program_that_a_thread_waits_for_ends_with_the_command(tmp_path, monkeypatch):
+    monkeypatch.setattr(interrupt, "HEARD", [])
+    ended = []
+
+    def wait():
+        try:
+            ask(["sleep", "100"])
+        except KeyboardInterrupt:
+            ended.append("here")
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    interrupt.HEARD.append(signal.SIGINT)
+    thread.join(timeout=30)
+    assert ended == ["here"]
+
+
+def test_a_sentence_about_the_interrupt_survives_the_clean_up(monkeypatch):
+    monkeypatch.setattr(interrupt, "HEARD", [signal.SIGTERM])
+    before = signal.signal(signal.SIGTERM, interrupt.hear)
+
+    def told():
+        try:
+            raise Interrupted("half of it is kept")
+        finally:
+            with later():
+                pass
+
+    try:
+        with pytest.raises(Interrupted, match="half of it is kept") as ended:
+            told()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert ended.value.status == 143
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_whoever_tells_its_progress_hears_of_an_interrupt_that_was_swallowed(monkeypatch, quiet):
+    monkeypatch.setattr(interrupt, "HEARD", [])
+    with progress(quiet, 2) as report:
+        report("one", 0.5)
+        interrupt.HEARD.append(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            report("one", 1.0)

@@ -1,0 +1,264 @@
+"""The harness on the built FMUs, through its command line, in processes of their own."""
+
+import csv
+import re
+import subprocess
+import sys
+from functools import partial
+
+import commands
+import numpy as np
+import pytest
+from builds import ROOT
+
+BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
+
+
+ENVIRONMENT = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
+TIME = r'"name": "run_time",\s+"value": [^,]+'
+harness = partial(commands.harness, base=ENVIRONMENT)
+
+
+def python(folder, *arguments):
+    """The finished process of Python with these arguments, which finds the harness but is run in `folder`."""
+    command = [sys.executable, *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture
+def scene(place, tmp_path):
+    """scene(text, option, ...): the finished process, and the folder of results."""
+
+    def run(text, *options, **environment):
+        (tmp_path / "mine.toml").write_text(text)
+        arguments = ("run", tmp_path / "mine.toml", "--out", tmp_path / "out", *options)
+        return harness(place, *arguments, **environment), tmp_path / "out/mine"
+
+    return run
+
+
+def table(path):
+    """Header and columns of a CSV file."""
+    with path.open() as file:
+        head, *rows = csv.reader(file)
+    return head, np.array(rows, float).T
+
+
+@pytest.fixture(scope="module")
+def main_job(place):
+    """The finished main job and its results."""
+    done = harness(place, fresh=True)
+    return done, place / "results"
+
+
+def test_the_main_job_runs_every_published_case(main_job):
+    done, results = main_job
+    assert (done.returncode, done.stderr) == (0, "")
+    cases = {path.stem for path in (ROOT / "harness/scenes").glob("*.toml")}
+    assert {path.name for path in results.iterdir()} == cases
+    for case in cases:
+        assert case in done.stdout
+        assert {"trajectory.csv", "steps.csv", "figure.png"} <= {path.name for path in (results / case).iterdir()}
+
+
+@pytest.mark.parametrize(
+    ("case", "quantity", "measured"),
+    [
+        ("smd", "steps", "235"),
+        ("smd", "mean step", "17.059"),
+        ("smd", "peak 1, as sampled", "0.060305"),
+        ("smd", "peak 4, as sampled", "0.013227"),
+        ("smd", "damping ratio, 3 cycles", "0.080161"),
+        ("coulomb-sign", "friction force, 3 cycles", "0.50859"),
+        ("coulomb", "friction force, 7.5 cycles", "0.5"),
+        ("stickslip", "slip period", "3.34510449933"),
+        ("stickslip", "peak speed", "0.41736"),
+        ("stickslip", "peak acceleration", "2.9546"),
+        ("pacejka-0.01", "steps", "6667"),
+        ("pendulum", "joint torque, 5 cycles", "0.011522"),
+    ],
+)
+def test_the_table_shows_what_is_known(main_job, case, quantity, measured):
+    block = main_job[0].stdout.split(f"\n{case} ")[1].split("\n   ")[0]
+    line = next(line for line in block.splitlines() if line.strip().startswith(quantity))
+    assert line.replace(quantity, "", 1).replace("(time points)", "").split()[0] == measured
+
+
+def test_a_trajectory_reads_back_to_the_last_bit_and_in_order(main_job):
+    head, columns = table(main_job[1] / "stickslip/trajectory.csv")
+    assert head == ["t [s]", "x [m]", "v [m/s]", "a [m/s2]", "x_driver [m]", "mode"]
+    assert (np.diff(columns[0]) > 0).all()
+    assert columns[0][-1] == 16.0
+    text = (main_job[1] / "stickslip/trajectory.csv").read_text().split("\n")[700].split(",")
+    assert [repr(float(number)) for number in text[:-1]] == text[:-1]
+
+
+def test_events_are_listed_where_friction_is_dry(main_job):
+    head, (times, modes) = table(main_job[1] / "stickslip/events.csv")
+    assert head == ["t [s]", "mode"]
+    assert list(modes) == [0, 1, 0, 1, 0, 1, 0, 1, 0]
+    assert np.diff(times[1::2]) == pytest.approx(3.345104499330, rel=1e-12)
+    for smooth in ("smd", "pacejka-0.01", "coulomb-sign"):
+        assert not (main_job[1] / smooth / "events.csv").exists()
+
+
+def test_steps_add_up_to_the_run(main_job):
+    head, (times, sizes, rejected) = table(main_job[1] / "coulomb-sign/steps.csv")
+    assert head == ["t [s]", "h [s]", "rejected"]
+    assert times[-1] == 4.0
+    assert sizes.sum() == pytest.approx(4.0, rel=1e-14)
+    assert rejected.sum() > 100  # it chatters at every reversal
+
+
+def test_a_scene_leaves_only_what_it_names(scene):
+    done, results = scene(BASE + "grid = 0.25\nstop = 2")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "provenance.json"}
+    head, columns = table(results / "trajectory.csv")
+    assert head == ["t [s]", "x [m]", "v [m/s]"]
+    assert list(columns[0]) == [0.25 * i for i in range(9)]
+
+
+def test_a_grid_that_follows_has_the_grid_points_and_the_steps(scene):
+    _, results = scene(BASE + "grid = 0.1\nfollow = true")
+    times = table(results / "trajectory.csv")[1][0]
+    steps = table(results / "steps.csv")[1][0]
+    assert set(steps) <= set(times)
+    assert len(times) == 161 + len(steps) - 1  # the stop is both
+
+
+def test_the_grid_does_not_change_the_steps_of_the_solver(scene):
+    text = BASE + 'stop = 6\nmethod = "ode23"\nlaw = "hybrid"\nrtol = 1e-5\n'
+    _, results = scene(text)
+    free = table(results / "steps.csv")[1]
+    _, results = scene(text + "grid = 0.013\nfollow = true")
+    gridded = table(results / "steps.csv")[1]
+    assert free.shape == gridded.shape
+    assert gridded == pytest.approx(free, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "status", "sentence"),
+    [
+        (BASE.replace('"v"', '"vv"'), 2, "unknown output 'vv' (nearest: 'v'); allowed: F_friction, "),
+        (BASE + "[values]\nmuu_d = 1", 2, "unknown name in [values] 'muu_d' (nearest: 'mu_d')"),
+        (BASE + "[values]\nm = -1", 2, "m = -1 is outside its range; allowed: at least 0.0 kg"),
+        (BASE + "[values]\nm = nan", 2, "m = nan is outside its range"),
+        (BASE + "[values]\nx = 1", 2, "unknown name in [values] 'x'"),
+        (BASE + 'law = "sgn"', 2, "unknown value of friction 'sgn'; allowed: hybrid, threshold"),
+        (BASE.replace("stickslip", "smd") + 'law = "sign"', 2, "law = 'sign': smd has nothing to choose there"),
+        (BASE + "stop = -1", 2, "stop = -1 s is not after start = 0.0 s"),
+        (BASE + "[values]\nmu_d = 0.95", 1, "mu_d is 0.95, above mu_s = 0.9"),
+        (BASE + 'law = "threshold"\nmethod = "exact"', 1, "closed form"),
+        (BASE.replace("stickslip", "smd") + "analyses = ['decay']\n[decay]\ngives = 'f'", 1, "turning points"),
+        (BASE + "[published]\nsource = 'me'\nperiod = 3", 2, "unknown name in [published] 'period'"),
+        (BASE.replace("model", "fmu"), 1, "there is no "),
+    ],
+)
+def test_what_a_scene_gets_wrong_is_one_sentence_and_leaves_the_older_result(scene, tmp_path, text, status, sentence):
+    older = tmp_path / "out/mine/trajectory.csv"
+    older.parent.mkdir(parents=True)
+    older.write_text("older")
+    done, results = scene(text)
+    assert done.returncode == status
+    assert done.stderr.startswith("Error: scene mine: ")
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert done.stdout == ""
+    assert older.read_text() == "older"
+    assert [path.name for path in results.parent.iterdir()] == ["mine"]
+
+
+def test_a_failing_case_does_not_lose_the_others(place, tmp_path):
+    published = "\n[published]\nsource = 'me'\nrun_time = 1\n"
+    for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
+        (tmp_path / f"{name}.toml").write_text(BASE + extra + published)
+    code = (
+        "from pathlib import Path; import harness.scenes.scene as scene; from harness.__main__ import main\n"
+        f"scene.SHIPPED = Path({str(tmp_path)!r}); main()"
+    )
+    done = python(place, "-c", code, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: scene bad: mu_d is 0.95")
+    assert done.stderr.count("\n") == 1
+    assert "failed" in done.stdout.split("\nbad ")[1].split("\n")[0]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["good"]
+
+
+def test_a_missing_fmu_says_how_to_build_it(tmp_path):
+    (tmp_path / "fmus").mkdir()
+    (tmp_path / "fmus/absent.py").write_text("")
+    (tmp_path / "mine.toml").write_text(BASE.replace("stickslip", "absent"))
+    done = harness(tmp_path, "run", "mine.toml")
+    assert done.returncode == 1
+    assert "there is no fmus/absent.fmu: build the FMUs with `python build_fmus.py`" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["list"],
+        ["run", "nosuch"],
+        ["run", "stickslip", "--json"],
+        ["decay", "coulomb", "--json"],
+        ["compare", "fmus/smd.fmu", "fmus/coulomb.fmu", "--json"],
+        ["couple", "two-masses", "--json"],
+        ["report", "--help"],
+    ],
+)
+def test_a_process_that_is_forked_answers_as_a_fresh_one(place, tmp_path, arguments):
+    out = ["--out", tmp_path] if "--json" in arguments else []
+    fresh, forked = (harness(place, *arguments, *out, fresh=how) for how in (True, False))
+    assert (forked.returncode, forked.stderr) == (fresh.returncode, fresh.stderr)
+    assert re.sub(TIME, "", forked.stdout) == re.sub(TIME, "", fresh.stdout)
+
+
+@pytest.mark.parametrize("arguments", [["runn"], ["run"], ["run", "nosuch"], ["--nosuch"]])
+def test_wrong_usage_has_status_two(place, arguments):
+    done = harness(place, *arguments)
+    assert done.returncode == 2
+    assert "Error: " in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_quiet_prints_nothing(scene):
+    done, results = scene(BASE + "grid = 1", "--quiet")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert results.exists()
+
+
+def test_list_shows_every_scene(place):
+    done = harness(place, "list")
+    for path in (ROOT / "harness/scenes").glob("*.toml"):
+        assert path.stem in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("extra", "loaded"),
+    [
+        ("grid = 1", set()),
+        ("plots = ['position']", {"matplotlib"}),
+        ("outputs = ['x', 'v', 'a']\nanalyses = ['slip']", {"harness.analyses.slip"}),
+    ],
+)
+def test_a_scene_imports_only_what_it_names(place, tmp_path, extra, loaded):
+    base = BASE.replace('outputs = ["x", "v"]', "") if "outputs" in extra else BASE
+    (tmp_path / "mine.toml").write_text(base + extra)
+    optional = {"matplotlib", "harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps"}
+    code = (
+        "import sys; from pathlib import Path; from harness.studies.run.job import perform\n"
+        "from harness.scenes.scene import load\n"
+        f"perform(load({str(tmp_path / 'mine.toml')!r}), Path({str(tmp_path)!r}), print)\n"
+        f"print(sorted({optional!r} & set(sys.modules)))"
+    )
+    done = python(place, "-c", code)
+    assert done.stderr == ""
+    assert done.stdout == f"{sorted(loaded)}\n"
+
+
+@pytest.mark.parametrize(("extra", "status"), [("grid = 1", 0), ("[values]\nmu_d = 0.95", 1)])
+def test_no_files_of_an_fmu_are_left_behind(scene, tmp_path, extra, status):
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    assert scene(BASE + extra, TMPDIR=str(temporary))[0].returncode == status
+    assert list(temporary.iterdir()) == []

@@ -1,0 +1,221 @@
+"""What an author gets wrong is said when the FMU is built: one sentence, with the line."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+from builds import ROOT
+
+from fmus.packaging import BuildError
+from fmus.packaging.catalogue import find
+
+HEAD = '''"""A model."""
+from fmus import *
+
+class Mine(Model):
+    """A mass on a spring.
+
+        m a = F - k x - c v
+    """
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    k = Parameter(100.0, "N/m", "stiffness", low=0.0)
+    f = Parameter(1.0, "N", "friction", low=0.0)
+    u = Parameter(1.0, "m/s", "speed of a belt")
+    F = Input(0.0, "N", "force")
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+'''
+RATE = '    a = Output("m/s2", "acceleration", (F - k * x) / m, rate_of=v)\n'
+DRY = '    mode = Mode()\n    R = Contact("N", "friction", mode=mode, slip=v, slide=f)\n'
+STUCK = '    a = Output("m/s2", "acceleration", (F - k * x - R) / m, rate_of=v)\n'
+
+# What follows the head, the line that is told (the head has 15), and the sentence.
+WRONG = {
+    "no rate": ("", 15, "nothing is the rate of v: say rate_of=v where its derivative is declared"),
+    "two rates": (RATE + RATE.replace("a =", "b ="), 17, "b and a both say that they are the rate of v"),
+    "two equations": (RATE + RATE, 17, "a has two equations: give the second another name"),
+    "an unknown name": (RATE.replace("F -", "G -"), 16, "NameError: name 'G' is not defined"),
+    "no Python": (RATE.replace("F -", "F - -) "), 16, "this is no Python: "),
+    "units": (
+        RATE.replace("k * x", "k * v"),
+        16,
+        "F - k * v subtracts kg m/s^2 and kg m/s^3",
+    ),
+    "another unit": (
+        RATE + '    E = Output("J", "energy", k * x)\n',
+        17,
+        "E is declared in J, and k * x is in kg m/s^2",
+    ),
+    "no rate by its unit": (
+        RATE.replace("m/s2", "m").replace("(F - k * x) / m", "x"),
+        16,
+        "a in m cannot be the rate of v in m/s",
+    ),
+    "an unknown unit": (RATE.replace("m/s2", "furlong/s2"), 16, "a has the unit 'furlong/s2'; known units are"),
+    "a function of metres": (
+        RATE + '    s = Output("1", "sine", sin(x))\n',
+        17,
+        "sin(x) is of m: what is in its brackets must be a number",
+    ),
+    "an if": (RATE + "    if x > 0.0:\n        pass\n", 17, "an expression has no value yet: write choose("),
+    "a loop": (RATE + "    for y in x:\n        pass\n", 17, "x is one number: there is nothing to loop over"),
+    "a table": (
+        RATE + "    table = [1.0, 2.0]\n    y = table[x]\n",
+        18,
+        "x has no value yet, and no table can be read by it: write its law as a formula",
+    ),
+    "a power": (RATE + "    y = x ** 2\n", 17, "** rounds in ways of its own: write a product, x * x"),
+    "math.sin": (
+        RATE + "    import math\n    y = math.sin(x)\n",
+        18,
+        "x has no value yet: functions of expressions are imported from fmus",
+    ),
+    "a text": (RATE + '    y = x + "1"\n', 17, "'1' is neither a number nor an expression"),
+    "infinity": (RATE + '    y = x + float("inf")\n', 17, "inf is not a finite number"),
+    "a word of ours": (RATE + '    solver = Parameter(1.0, "1", "ours")\n', 17, "the name solver is taken"),
+    "a method of ours": (RATE + '    rates = Parameter(1.0, "1", "ours")\n', 17, "the name rates is taken"),
+    "a word of C": (RATE + '    double = Parameter(1.0, "1", "ours")\n', 17, "the name double is taken"),
+    "time": (RATE + '    t = Parameter(1.0, "s", "ours")\n', 17, "the name t is taken"),
+    "a start that moves": (
+        RATE + '    z = State("m", "more", start=x, rate=u)\n',
+        17,
+        "start of z moves: it must follow from parameters",
+    ),
+    "a law without friction": (DRY + RATE, 17, "R does not act on its own slip: nothing could hold it"),
+    "a squared force": (
+        DRY + STUCK.replace("- R)", "- R * R / f)"),
+        17,
+        "R must enter the rate of the slip of R linearly",
+    ),
+    "a force in a function": (
+        DRY + STUCK.replace("- R)", "- f * sin(R / f))"),
+        17,
+        "R must enter the rate of the slip of R linearly",
+    ),
+    "a mode of nobody": (RATE + "    mode = Mode()\n", 17, "mode is the mode of 0 contacts, and must be that of one"),
+    "a threshold without eps": (
+        DRY.replace("slide=f", "slide=f, laws=(HYBRID, THRESHOLD)") + STUCK,
+        17,
+        "eps is given with the law THRESHOLD, and with no other",
+    ),
+    "a slide of another unit": (
+        DRY.replace("slide=f", "slide=k") + STUCK,
+        17,
+        "R is declared in N, and slide k is in kg/s^2",
+    ),
+    "a rule that moves": (RATE + '    rules = Rule(x > 1.0, "far")\n', 17, "a Rule is about parameters, and this one"),
+    "a rule with another name": (
+        RATE + '    rules = Rule(k > 1.0, "{stiff!r} is much")\n',
+        17,
+        "the sentence of a Rule names 'stiff', which is no parameter",
+    ),
+    "an unknown method": (RATE + '    method = "euler"\n', 4, "method = 'euler' is not known; there are exact, ode23"),
+    "a method that does not fit": (
+        RATE.replace("k * x", "k * x * x / (x + x)") + '    method = "exact"\n',
+        4,
+        "method = 'exact' needs a linear law, and Mine has none",
+    ),
+    "a macro of C": (RATE + '    NULL = Parameter(1.0, "1", "ours")\n', 17, "the name NULL is taken"),
+    "a function of ours": (RATE + '    sqrt = Parameter(1.0, "1", "ours")\n', 17, "the name sqrt is taken"),
+    "a start out of range": (
+        RATE + '    q = Parameter(0.0, "kg", "charge", above=0.0)\n',
+        17,
+        "q starts at 0.0, and must be above 0.0 kg",
+    ),
+    "a unit for a number": (
+        RATE + '    q = Parameter("kg", 1.0, "charge")\n',
+        17,
+        "q: the unit and what it is are texts",
+    ),
+    "a text for a number": (
+        RATE + '    q = Parameter("1.0", "kg", "q")\n',
+        17,
+        "q: start value and bounds are numbers",
+    ),
+    "a variable without a name": (
+        RATE.replace("F - k * x", 'Parameter(1.0, "N", "pull") - k * x'),
+        16,
+        "a uses a variable without a name, which is not declared in Mine",
+    ),
+    "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is refused: it must be above zero"),
+    "a broken rule": (
+        RATE + '    rules = Rule(k + k > k, "k = {k!r} is too much")\n',
+        4,
+        "the start values are refused: k = 100.0 is too much",
+    ),
+    "a division by zero": (
+        RATE + '    q = Output("m", "shift", x * f / (f - f))\n',
+        4,
+        "the start values lead out of the range of numbers: float division by zero",
+    ),
+    "a belt": (
+        DRY.replace("slip=v", "slip=v - u") + STUCK,
+        17,
+        "the slip of R must be a speed, a state of its own: the solver knows no other so far",
+    ),
+    "two contacts of a body": (
+        DRY + '    other = Mode()\n    S = Contact("N", "friction", mode=other, slip=v, slide=f)\n'
+        "    a = Output('m/s2', 'acceleration', (F - k * x - R - S) / m, rate_of=v)\n",
+        17,
+        "R shares a body with another contact: the solver knows no such so far",
+    ),
+    "two drivers": (
+        RATE + '    p = State("m", "one", rate=u)\n    q = State("m", "another", rate=u)\n',
+        18,
+        "the solver runs one driver so far",
+    ),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_mistake_is_told_in_one_sentence_with_its_line(wrong, tmp_path):
+    body, line, sentence = WRONG[wrong]
+    path = tmp_path / "mine.py"
+    path.write_text(HEAD + body)
+    with pytest.raises(BuildError, match=re.escape(f"{path}, line {line}: {sentence}")) as told:
+        find(path).model  # noqa: B018
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "a file holds one class that derives from Model; this one has none"),
+        (HEAD + RATE + HEAD.replace("Mine", "Other") + RATE, "this one has 2 of them, Mine, Other"),
+    ],
+)
+def test_a_file_holds_one_model(text, sentence, tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(text)
+    with pytest.raises(BuildError, match=sentence):
+        find(path).text  # noqa: B018
+
+
+@pytest.mark.parametrize("name", ["Solver", "March", "Größe"])
+def test_a_class_has_a_name_of_its_own(name, tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text((HEAD + RATE).replace("Mine", name))
+    with pytest.raises(BuildError, match=f"mine.py, line 4: the name {name} is taken, or has letters that C does not"):
+        find(path).text  # noqa: B018
+
+
+@pytest.mark.parametrize("name", ["my-model.py", "runtime.py", "1st.py", "class.py"])
+def test_a_file_has_the_name_of_a_model(name, tmp_path):
+    path = tmp_path / name
+    path.write_text(HEAD + RATE)
+    with pytest.raises(BuildError, match="a model has the name of its file, in letters, digits and _"):
+        find(path).text  # noqa: B018
+
+
+def test_the_command_says_it_without_a_traceback(tmp_path):
+    (tmp_path / "mine.py").write_text(HEAD)
+    call = [sys.executable, str(ROOT / "build_fmus.py")]
+    run = subprocess.run([*call, "mine.py"], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert run.returncode == 1
+    assert (
+        run.stderr
+        == "Error: mine.py, line 15: nothing is the rate of v: say rate_of=v where its derivative is declared.\n"
+    )
+    missing = subprocess.run([*call, "nowhere.py"], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (missing.returncode, missing.stderr) == (2, "Error: There is no file nowhere.py.\n")

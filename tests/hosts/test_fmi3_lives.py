@@ -1,0 +1,168 @@
+"""Many lives of FMI 3.0 FMUs, for co-simulation and for model exchange, in turn, at once, in threads and processes,
+beside those of FMI 2.0; every host is a process of its own (fmi3_lives.py), which must end well and say nothing."""
+
+import json
+import subprocess
+import sys
+import zipfile
+from functools import partial
+
+import driver
+import fmi3_hosts
+import pytest
+from builds import ROOT, SUPPORT
+from compare import close, identical
+from models import CASES, MODELS, counts, declared, label, model_class, outputs
+
+from tests.hosts.test_hosting import PYTHONS, interpreter, request
+
+host = partial(driver.host, "fmi3_lives.py")
+
+
+fresh = fmi3_hosts.fresh
+
+
+@pytest.fixture(scope="module")
+def each():
+    """Every FMI 3.0 FMU twice: it is taken for co-simulation, then for model exchange."""
+    return [str(fmi3_hosts.built() / f"{name}.fmu") for name in MODELS for _ in range(2)]
+
+
+@pytest.fixture(scope="module")
+def older(fmus):
+    """The FMI 2.0 FMUs."""
+    return [str(fmus / f"{name}.fmu") for name in MODELS]
+
+
+def test_lives_one_after_another_leave_little_behind(each, record_property):
+    """Eighty for each of ten, each with a reset: seen are 2 kB a life, all of it early, and nothing in sys.path."""
+    told = host("one_after_another", each, 800)
+    early, late = told["memory"]
+    record_property("kB a life", (late - early) / 720)
+    assert told["runs"] == [1] * len(each)
+    assert told["path"] == []
+    assert late - early < 720 * 4.0
+
+
+def test_instances_of_both_kinds_and_both_versions_live_side_by_side(each, older):
+    """All alive at once and stepped in turns: every instance of an FMU gives the same run."""
+    assert host("side_by_side", each + older, 6)["runs"] == 1
+
+
+def test_an_fmu_unpacked_anew_for_every_run_is_let_go(each, record_property):
+    """As fmpy's simulate_fmu does: memory and libraries of earlier runs are given back."""
+    told = host("unpacked_anew", each[0], 100)
+    early, late = told["memory"]
+    record_property("kB a run", (late - early) / 90)
+    assert told["libraries"] <= 2
+    assert told["path"] == []
+    assert late - early < 90 * 20.0
+
+
+def test_threads_do_not_feel_each_other(each, older):
+    paths = each + older
+    assert host("in_threads", paths, 6, 2) == {"runs": [1] * len(paths), "errors": []}
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+@pytest.mark.parametrize("name", ["stickslip", "pendulum"])
+def test_children_carry_on_what_they_were_given_and_begin_anew(name, method):
+    assert host("in_processes", str(fmi3_hosts.built() / f"{name}.fmu"), method) == {"same": True, "codes": [0] * 4}
+
+
+def test_a_host_that_holds_the_sources_and_a_pythonfmu_changes_nothing(each):
+    """Co-simulation of every model: a folder for model exchange stands between two of them."""
+    told = host("beside_sources", str(ROOT), each)
+    assert told["foreign"] == []
+    assert told["rows"][::2] == [host("in_folder", path, None) for path in each[::2]]
+
+
+@pytest.mark.parametrize("folder", ["with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200])
+def test_a_folder_may_have_any_name(each, folder, tmp_path):
+    """But one with %20, which the native layer takes for a space."""
+    (tmp_path / folder).parent.mkdir(exist_ok=True)
+    assert host("in_folder", each[0], str(tmp_path / folder)) == host("in_folder", each[0], None)
+
+
+def test_a_process_may_end_with_instances_alive(fresh):
+    """The fixture asks for a good end; so that is not luck, of all FMUs at once."""
+    for name in MODELS:
+        for make in (fresh.instantiate, fresh.exchange, fresh.instantiate):
+            make(fmi3_hosts.built() / f"{name}.fmu").begin().get(outputs(name)[0])
+
+
+# ---- the two versions of FMI in one process
+
+
+@pytest.fixture(scope="module")
+def process():
+    """A process that must end well."""
+    worker = fmi3_hosts.Worker()
+    yield worker
+    assert worker.close() == 0
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_co_simulation_is_that_of_fmi_2_to_the_last_bit(process, fmus, case):
+    """On the same grid, with a change of input in mid-run, where neither knows a stop time."""
+    name, values, stop = case
+    names, times = outputs(name) + counts(name), [stop * i / 100 for i in range(101)]
+    force = next(v for v, d in declared(name).items() if d.causality == "input")
+    changes = {times[30]: {force: 0.004 if name == "pendulum" else 3.0}, times[60]: {force: 0.0}}
+    rows = []
+    for folder in (fmi3_hosts.built(), fmus):
+        fmu = process.instantiate(folder / f"{name}.fmu").begin(values)
+        rows.append(fmu.through(times, names, changes))
+        fmu.free()
+    identical(*rows, names)
+
+
+def test_the_code_that_runs_is_the_code_in_the_fmu(fresh):
+    """Not the sources, and nothing of pythonfmu or pythonfmu3."""
+    before = set(fresh.modules())
+    for name in MODELS:
+        path = fmi3_hosts.built() / f"{name}.fmu"
+        for make in (fresh.instantiate, fresh.exchange):
+            instance = make(path).begin()
+            instance.get(outputs(name)[0])
+            instance.free()
+        own, new = fresh.directory(path), set(fresh.modules()) - before
+        assert len([file for file in new if file.startswith(own)]) >= 4
+        strangers = [file for file in new if not file.startswith(own)]
+        assert [file for file in strangers if "pythonfmu" in file or str(ROOT / "fmus") in file] == []
+        before |= new
+
+
+# ---- other Pythons
+
+
+@pytest.fixture(scope="module")
+def requests(tmp_path_factory):
+    """What fmi3_embedded.py is asked to run: the default experiment of every model."""
+    resources = tmp_path_factory.mktemp("resources")
+    for name in MODELS:
+        with zipfile.ZipFile(fmi3_hosts.built() / f"{name}.fmu") as archive:
+            archive.extractall(resources / name)
+    return [request(resources, name, {}, model_class(name).stop_time) for name in MODELS]
+
+
+def embedded(python, requests):
+    command = [python, "-I", SUPPORT / "fmi3_embedded.py"]
+    done = subprocess.run(command, input=json.dumps(requests), capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("version", PYTHONS)
+def test_the_embedded_code_runs_alike_on_every_python(process, requests, version):
+    """As in the process of fmpy, for co-simulation; and both kinds as in this Python."""
+    python = interpreter(version)
+    if python is None:
+        pytest.skip(f"there is no Python {version} here")
+    told, here = embedded(python, requests), embedded(sys.executable, requests)
+    for name, asked, rows, expected in zip(MODELS, requests, told, here, strict=True):
+        names = [v for v in outputs(name) if declared(name)[v].type == "Real"]
+        close(rows, expected, names, 1e-14)
+        fmu = process.instantiate(fmi3_hosts.built() / f"{name}.fmu").begin()
+        close(rows[: len(asked["times"])], fmu.run(asked["times"], names), names, 1e-14)
+        fmu.free()

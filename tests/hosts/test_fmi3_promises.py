@@ -1,0 +1,73 @@
+"""What the FMI 2.0 FMUs promise for co-simulation, the FMI 3.0 FMUs keep: the same claims, put to them word for word.
+
+Left out is what needs the stop time or the tolerance of the importer, which never arrive.
+"""
+
+import fmi3_hosts
+import numpy as np
+import pytest
+from compare import identical
+from models import MODELS, model_class, outputs, tunable
+
+from harness.truths.reference import POINTS, load, relative
+from tests.runtime.test_changes import (  # noqa: F401
+    test_a_changed_value_acts_from_its_communication_point_on,
+    test_a_pendulum_twisted_in_motion_and_at_rest,
+    test_a_sled_whose_values_all_change_at_random,
+)
+from tests.runtime.test_exact import test_a_stuck_mass_moves_exactly_nothing_in_a_million_seconds  # noqa: F401
+from tests.runtime.test_free_running import (  # noqa: F401
+    test_a_changed_driver_speed_moves_nothing_suddenly,
+    test_a_later_start_shifts_the_motion_and_nothing_else,
+    test_a_run_without_stop_time_goes_on,
+    test_outputs_balance,
+    test_reading_changes_nothing_at_any_time,
+    test_setting_a_value_to_what_it_is_changes_nothing,
+)
+from tests.runtime.test_state import (  # noqa: F401
+    test_a_restored_state_continues_bit_for_bit,
+    test_a_restored_state_recovers_from_a_failure_and_brings_a_pending_one_back,
+    test_a_state_holds_the_parameters_also_those_not_yet_in_force,
+)
+from tests.truths.test_references import test_the_built_fmu_comes_to_the_same_reference  # noqa: F401
+
+fmus, worker, _workers = fmi3_hosts.FIXTURES
+REACH = dict.fromkeys(MODELS, 1e-13) | {"pendulum": 1e-9, "pacejka": 1e-6}  # by default, relative
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_default_experiment_in_fmpy_reaches_the_reference(worker, fmus, name):
+    truth = load("pacejka-0.01" if name == "pacejka" else name)
+    interval = model_class(name).stop_time / (POINTS - 1)
+    columns = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
+    assert columns["time"] == truth.times.tolist()
+    motion = np.array([columns[v] for v in outputs(name)[:2]]).T
+    assert relative(motion, truth.motion).max() < REACH[name]
+    if "mode" in columns:
+        assert columns["mode"][-1] == truth.modes[-1][1]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_value_set_after_initialisation_counts_from_the_first_step_on(launch, name):
+    """The start time, that of the first step, is not known before: nothing has moved until then."""
+    names, times = outputs(name), [7.3 + 0.1 * i for i in range(20)]
+    values = {v: 0.9 * d.start for v, d in tunable(name).items()}
+    expected = launch(name, values, start=7.3).run(times, names)[1:]
+    fmu = launch(name, start=7.3)
+    fmu.set(values)
+    identical(fmu.run(times, names)[1:], expected, names)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_time_and_the_indicators_read_as_they_stand(launch, name):
+    """The indicators of model exchange tell in co-simulation too how far the next event is."""
+    fmu, stop, dry = launch(name), model_class(name).stop_time, "mode" in outputs(name)
+    names = ["time", *(["mode", outputs(name)[1], "events.to_rest", "events.to_break_away"] if dry else [])]
+    times = [stop * i / 200 for i in range(201)]
+    for t, row in zip(times, fmu.run(times, names), strict=True):
+        assert row[0] == t
+        if dry:
+            mode, v, to_rest, to_break_away = row[1:]
+            assert to_rest == (mode * v + 1e-300 if mode else 1.0)  # never zero once an event is handled
+            assert to_break_away > 0.0
+            assert mode == 0 or to_break_away == 1.0

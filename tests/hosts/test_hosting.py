@@ -1,0 +1,130 @@
+"""What a host may do with the FMUs: load several, in several versions, often, and with any Python from 3.9 on."""
+
+import json
+import re
+import shutil
+import subprocess
+import zipfile
+from itertools import pairwise
+from pathlib import Path
+
+import evidence
+import pytest
+from builds import ROOT, SUPPORT, build
+from compare import close, identical
+from driver import Refused
+from evidence import Trajectory
+from models import CASES, MODELS, counts, declared, label, outputs
+
+PYTHONS = ["3.9", "3.10", "3.11", "3.12", "3.13"]
+
+
+def test_the_code_that_runs_is_the_code_in_the_fmu(fresh, fmus):
+    """Not the sources, and not the pythonfmu of the host."""
+    before = set(fresh.modules())
+    for name in MODELS:
+        path = fmus / f"{name}.fmu"
+        instance = fresh.instantiate(path).begin()
+        instance.step(0.0, 0.1)
+        files, own = set(fresh.modules()), fresh.directory(path)
+        assert len([file for file in files if file.startswith(own)]) >= 4
+        assert not [file for file in files if file.startswith(str(ROOT / "fmus"))]
+        strangers = [file for file in files - before if not file.startswith(own)]
+        assert not [file for file in strangers if "pythonfmu" in file or "friction" in file]
+        before = files
+        instance.free()
+
+
+def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, tmp_path):
+    """The sled edited, rebuilt and run beside the one it was made from."""
+    for part in ("fmus", "harness/references", "build_fmus.py", "LICENSE", "pyproject.toml"):
+        source = ROOT / part
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / part)
+    file = tmp_path / "fmus" / "stickslip.py"
+    edited, number = re.subn(r"(\n    k = Parameter\()[^,]+", r"\g<1>900.0", file.read_text())
+    assert number == 1
+    file.write_text(edited)
+    paths = [fmus / "stickslip.fmu", build(tmp_path, tmp_path / "out", "stickslip") / "stickslip.fmu"]
+    times = [0.1 * i for i in range(161)]
+    for path, k in [*zip(paths, (742.5, 900.0), strict=True)] * 2:
+        fmu = worker.instantiate(path).begin(stop=16.0)
+        assert fmu.get("k") == k
+        motion = Trajectory([(0.0, evidence.stickslip(k=k))], 0.0, 0.0, 17.0)
+        for t, (x,) in zip(times, fmu.run(times, ["x"]), strict=True):
+            assert abs(x - motion.at(t)[0]) < 1e-12
+        fmu.free()
+
+
+def test_instances_side_by_side_do_not_feel_each_other(launch):
+    """All models, laws and methods at once, stepped in turns."""
+    times = [0.02 * i for i in range(50)]
+    alone = [launch(name, values, stop=stop).run(times, outputs(name)) for name, values, stop in CASES]
+    fleet = [(launch(name, values, stop=stop), outputs(name)) for name, values, stop in CASES]
+    rows = [[fmu.get(*names)] for fmu, names in fleet]
+    for t, ahead in pairwise(times):
+        for (fmu, names), mine in zip(fleet, rows, strict=True):
+            fmu.step(t, ahead - t)
+            mine.append(fmu.get(*names))
+    for (_, names), mine, expected in zip(fleet, rows, alone, strict=True):
+        identical(mine, expected, names)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_fifty_lives_in_one_process_end_alike_and_end_well(fresh, fmus, name):
+    """Created, run, reset, run again, failed and freed."""
+    first, names = None, outputs(name) + counts(name)
+    for _ in range(50):
+        fmu = fresh.instantiate(fmus / f"{name}.fmu").begin(stop=0.3)
+        rows = fmu.run([0.0, 0.1, 0.2, 0.3], names)
+        first = first or rows
+        identical(rows, first, names)
+        fmu.terminate()
+        fmu.reset()
+        identical(fmu.begin(stop=0.3).run([0.0, 0.1, 0.2, 0.3], names), first, names)
+        with pytest.raises(Refused):
+            fmu.step(0.3, 1.0)
+        fmu.free()
+
+
+def interpreter(version):
+    """An interpreter of this version, or None."""
+    installed = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
+    return str(installed[-1]) if installed else shutil.which(f"python{version}")
+
+
+def request(resources, name, values, stop):
+    """What embedded.py is asked to run."""
+    references = {v: i for i, v in enumerate(declared(name))}
+    real = {v: declared(name)[v].type == "Real" for v in references}
+    return {
+        "resources": str(resources / name / "resources"),
+        "reals": {references[v]: x for v, x in values.items() if real[v]},
+        "integers": {references[v]: x for v, x in values.items() if not real[v]},
+        "times": [stop * i / 40 for i in range(41)],
+        "outputs": [references[v] for v in outputs(name) if real[v]],
+    }
+
+
+@pytest.fixture(scope="module")
+def requests(fmus, tmp_path_factory):
+    """One run of every case on the unpacked FMUs."""
+    resources = tmp_path_factory.mktemp("resources")
+    for name in MODELS:
+        with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
+            archive.extractall(resources / name)
+    return [request(resources, *case) for case in CASES]
+
+
+@pytest.mark.parametrize("version", PYTHONS)
+def test_the_embedded_code_runs_alike_on_every_python(launch, requests, version):
+    python = interpreter(version)
+    if python is None:
+        pytest.skip(f"there is no Python {version} here")
+    command = [python, "-I", SUPPORT / "embedded.py"]
+    done = subprocess.run(command, input=json.dumps(requests), capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    for case, asked, rows in zip(CASES, requests, json.loads(done.stdout), strict=True):
+        name, values, stop = case
+        names = [v for v in outputs(name) if declared(name)[v].type == "Real"]
+        expected = launch(name, values, stop=stop).run(asked["times"], names)
+        close(rows, expected, [f"{label(case)}: {v}" for v in names], 1e-14)

@@ -1,0 +1,80 @@
+"""A thousand instances: in turn, at once, in threads and processes, in hosts that hold what could be mistaken for them.
+
+Both kinds of FMU; every host is a process of its own (lives.py), which must end well.  Memory is measured where
+/proc tells it, on Linux.
+"""
+
+from functools import partial
+
+import driver
+import native_fmus
+import pytest
+from builds import ROOT
+from models import MODELS
+
+KINDS = ("python", "native")
+EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def folder(request, fmus):
+    """The FMUs of one kind."""
+    return fmus if request.param == "python" else native_fmus.built()
+
+
+@pytest.fixture
+def paths(folder):
+    """All FMUs of one kind."""
+    return [str(folder / f"{name}.fmu") for name in MODELS]
+
+
+host = partial(driver.host, "lives.py")
+
+
+def test_a_thousand_lives_leave_little_behind(paths, record_property):
+    """Seen: 1 kB a life; nothing in sys.path."""
+    told = host("one_after_another", paths, 1000)
+    early, late = told["memory"]
+    record_property("kB a life", (late - early) / 900)
+    assert told["runs"] == [1] * len(paths)
+    assert told["path"] == []
+    assert late - early < 900 * 4.0
+
+
+def test_a_thousand_instances_live_side_by_side(paths, record_property):
+    told = host("side_by_side", paths, 200)
+    record_property("kB an instance", told["each"])
+    assert told["runs"] == 1
+    assert told["each"] < 90.0  # of which fmpy takes 45
+
+
+def test_an_fmu_unpacked_anew_for_every_run_is_let_go(paths, record_property):
+    """As fmpy's simulate_fmu does: memory and libraries of earlier runs are given back."""
+    told = host("unpacked_anew", paths[-1], 100)
+    early, late = told["memory"]
+    record_property("kB a run", (late - early) / 90)
+    assert told["libraries"] <= 2
+    assert told["path"] == []
+    assert late - early < 90 * 20.0
+
+
+def test_threads_do_not_feel_each_other(paths):
+    assert host("in_threads", paths, 8, 5) == {"runs": [1] * len(paths), "errors": []}
+
+
+@EVERY_MODEL
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_children_carry_on_what_they_were_given_and_begin_anew(folder, name, method):
+    assert host("in_processes", str(folder / f"{name}.fmu"), method) == {"same": True, "codes": [0] * 4}
+
+
+def test_a_host_that_holds_the_sources_and_a_pythonfmu_changes_nothing(paths):
+    told = host("beside_sources", str(ROOT), paths)
+    assert told["foreign"] == []
+    assert told["rows"] == [host("in_folder", path, None) for path in paths]
+
+
+@EVERY_MODEL
+def test_a_folder_may_have_spaces_in_its_name(folder, name, tmp_path):
+    path = str(folder / f"{name}.fmu")
+    assert host("in_folder", path, str(tmp_path / "with  two")) == host("in_folder", path, None)

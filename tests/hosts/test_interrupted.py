@@ -1,0 +1,66 @@
+"""An interrupt is the host's: it ends the step, and reaches the host when the call is over; in a clean process."""
+
+import json
+import subprocess
+import sys
+import zipfile
+
+import fmi3_hosts
+import pytest
+from builds import SUPPORT
+from interrupted import HANDLERS
+
+from tests.hosts.test_hosting import PYTHONS, interpreter
+
+
+@pytest.fixture(params=[2, 3], ids=["FMI 2.0", "FMI 3.0"])
+def fmu(request, fmus):
+    return (fmi3_hosts.built() if request.param == 3 else fmus) / "smd.fmu"
+
+
+def host(function, *arguments):
+    """What it prints, and the lines on standard error."""
+    script = SUPPORT / "interrupted.py"
+    call = [sys.executable, "-I", script, function, json.dumps(arguments, default=str)]
+    done = subprocess.run(call, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout), done.stderr.splitlines()
+
+
+@pytest.mark.parametrize("handler", HANDLERS)
+def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
+    """As the very exception that the handler of the host has raised, once, and no later than the call is over."""
+    answer, said = host("long", fmu, handler)
+    arguments = {"KeyboardInterrupt": [], "SystemExit": [143], "Stop": ["enough", 3]}
+    assert answer["reached"] == [handler, arguments[handler]]
+    ((status, category, sentence),) = answer["log"]
+    assert (status, category) == (3, "logStatusError")
+    assert sentence == "the run was interrupted after t = 0.0 s; reset the FMU to run again"
+    assert said == [f"Smd (interrupted): {sentence}"]
+    assert answer["x"]
+    assert answer["recovers"]
+
+
+def test_an_interrupt_at_any_moment_of_any_call_reaches_the_host(fmu):
+    """Also where it is handled as a function of the FMU is entered, before its first line."""
+    answer, said = host("short", fmu, 300)
+    assert answer == [["KeyboardInterrupt"], 300]
+    assert all("was interrupted" in line for line in said)
+
+
+@pytest.mark.parametrize("version", PYTHONS)
+def test_every_entry_is_guarded_from_its_first_instruction_on_every_python(fmu, tmp_path, version):
+    python = interpreter(version)
+    if python is None:
+        pytest.skip(f"there is no Python {version} here")
+    with zipfile.ZipFile(fmu.with_name("stickslip.fmu")) as archive:
+        archive.extractall(tmp_path)
+    script = SUPPORT / "interrupted_embedded.py"
+    command = [python, "-I", script, tmp_path / "resources"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    answers = json.loads(done.stdout)
+    assert len(answers) >= 7
+    for entry, (error, arguments, sentence) in answers.items():
+        assert (error, arguments) == ("Stop", ["enough", 3]), entry
+        assert "the run was interrupted" in sentence, entry

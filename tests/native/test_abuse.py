@@ -1,0 +1,87 @@
+"""The sources of the native FMUs under the address and undefined-behaviour sanitizers, in the hands of an importer that
+does whatever it must not; tests/support/abuse.c says what it does."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from models import MODELS
+from native_fmus import built
+from native_host import SOURCE, compiler, folder, sanitized, unpacked
+
+from fmus.packaging.native.compiler import STRICT
+
+SANITIZERS = "address,undefined,float-cast-overflow"
+STATES = 100_000  # damaged ones, over all models
+SENTENCE = (
+    "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
+    "save a state anew and pass it on unchanged"
+)
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def abuse(request):
+    """The program for a model: it must end well, and tells what went to its outputs."""
+    out = folder("abuse") / request.param
+    sources = unpacked(built() / f"{request.param}.fmu") / "sources"
+    command = [compiler(), *STRICT, "-O1", "-g", *sanitized(SANITIZERS), f"-I{sources}"]
+    subprocess.run([*command, str(SOURCE.with_name("abuse.c")), "-o", str(out), "-lm"], check=True)
+
+    def run(*words, **options):
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+        done = subprocess.run([str(out), *map(str, words)], timeout=120, **streams)
+        assert done.returncode == 0, f"{done.returncode}: {done.stdout[-300:]} {(done.stderr or b'')[-3000:]}"
+        return done.stdout, done.stderr
+
+    return run
+
+
+def test_a_state_with_any_bit_flipped_cut_extended_or_exchanged_is_refused_and_nobody_changes(abuse):
+    told, noise = abuse("flips")
+    assert int(told) > STATES / len(MODELS)
+    assert noise.count(SENTENCE.encode()) >= int(told)
+
+
+def test_a_state_that_cannot_be_is_refused_though_its_checksum_is_right(abuse):
+    abuse("forged")
+
+
+def test_calls_in_any_order_with_anything_in_them_end_in_a_status_and_leave_other_instances_alone(abuse):
+    abuse("calls", 1, 50_000)
+
+
+NAMES = [
+    *(b"", b"100 %s %n", "na\u00efve".encode(), rb"\xff\xfe", rb"cut \xe2\x82", rb"\xed\xa0\x80", rb"\xc0\xaf"),
+    *("\U0001f30d".encode(), rb"\xf5\x80\x80\x80", b"%" * 10_000, b""),
+]
+
+
+def test_any_name_reaches_the_log_as_utf_8_and_never_as_a_format(abuse):
+    """Each name twice: of an instance, and of one that is refused."""
+    told, noise = abuse("names", env={**os.environ, "ALOUD": "1"})
+    assert [line.split(b"|")[0] for line in told.splitlines()] == [name for name in NAMES for _ in range(2)]
+    assert all(b"(" + name + b"): fmi2" in noise for name in NAMES)
+    told.decode()
+    noise.decode()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/dev/full is Linux's")
+@pytest.mark.parametrize("lost", ["closed", "full", "unread", "by the host", "not writable"])
+def test_a_refusal_survives_the_loss_of_standard_error(abuse, lost):
+    """The signal of a pipe that nobody reads would end a host that does not ignore it, as this one."""
+    if lost == "closed":
+        abuse("failures", preexec_fn=lambda: os.close(2), stderr=None)
+    elif lost == "full":
+        with open("/dev/full", "w") as full:
+            abuse("failures", stderr=full)
+    elif lost == "not writable":
+        with open(os.devnull) as null:
+            abuse("failures", stderr=null)
+    elif lost == "unread":
+        reader, writer = os.pipe()
+        os.close(reader)
+        abuse("failures", stderr=writer)
+        os.close(writer)
+    else:
+        abuse("failures", "closes")

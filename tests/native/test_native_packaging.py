@@ -1,0 +1,273 @@
+"""Native FMUs in the file: what they hold, that it is the same everywhere, and that other tools can compile it."""
+
+import os
+import shutil
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+import zipfile
+from hashlib import sha256
+from pathlib import Path
+from struct import unpack_from
+
+import lief
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from fmpy.build import build_platform_binary
+from fmpy.model_description import read_build_description
+from fmpy.validation import validate_fmu
+from models import MODELS, ROOT
+from native_fmus import built
+from native_host import compiler, unpacked
+
+from fmus.packaging import native
+from fmus.packaging.native.compiler import PLATFORMS, USUAL
+from fmus.packaging.native.sources import FMI_HEADERS, WRITTEN
+from tests.packaging.test_packaging import entries
+
+SYSTEM = {
+    "linux64": {"libc.so.6", "libm.so.6"},
+    "aarch64-linux": {"libc.so.6", "libm.so.6"},
+    "win64": {"kernel32.dll"},  # and the C runtime, api-ms-win-crt-*
+    "darwin64": {"@rpath/smd.dylib", "/usr/lib/libSystem.B.dylib"},
+}
+
+
+def run(*arguments, cwd=ROOT, **environment):
+    command = [sys.executable, "build_fmus.py", *map(str, arguments)]
+    return subprocess.run(
+        command, cwd=cwd, capture_output=True, text=True, timeout=600, env={**os.environ, **environment}
+    )
+
+
+@pytest.fixture(scope="module")
+def smd(tmp_path_factory):
+    """smd for every platform, and what was printed."""
+    built()  # tells why, if there is no compiler
+    out = tmp_path_factory.mktemp("platforms")
+    done = run("--native", "smd", *(word for p in PLATFORMS for word in ("--platform", p)), "--out", out)
+    assert done.returncode == 0, done.stderr
+    return out / "smd.fmu", done.stdout
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_fmpy_finds_nothing_wrong(name):
+    assert validate_fmu(str(built() / f"{name}.fmu")) == []
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_description_is_that_of_the_python_fmu_but_for_the_sources_and_the_guid(fmus, name):
+    roots = [ET.fromstring(entries(folder / f"{name}.fmu")["modelDescription.xml"]) for folder in (fmus, built())]
+    guids = [root.attrib.pop("guid") for root in roots]
+    interface = roots[1].find("CoSimulation")
+    interface.remove(interface.find("SourceFiles"))
+    for root in roots:
+        ET.indent(root)
+        root.find("CoSimulation").text = None
+    assert ET.tostring(roots[0]) == ET.tostring(roots[1])
+    assert guids[0] != guids[1]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_fmpy_simulates_it_to_the_same_digits(fmus, name):
+    results = [simulate_fmu(str(folder / f"{name}.fmu")) for folder in (fmus, built())]
+    assert results[0].tobytes() == results[1].tobytes()
+
+
+def test_what_is_in_the_file(smd):
+    fmu, printed = smd
+    binaries = {f"binaries/{name}/smd{platform.suffix}" for name, platform in PLATFORMS.items()}
+    assert {name for name in entries(fmu) if name.startswith("binaries/")} == binaries
+    sources = {f"sources/{file}" for file in (*WRITTEN, *FMI_HEADERS, "model.h", "guid.h", "buildDescription.xml")}
+    found = entries(fmu)
+    told = {path for path in found if path.split("/")[0] in ("documentation", "extra", "model.png")}
+    assert set(found) - told == binaries | sources | {"modelDescription.xml"}
+    assert "documentation/licenses/license.txt" in told
+    digest = sha256(fmu.read_bytes()).hexdigest()
+    assert printed == f"smd.fmu  {len(fmu.read_bytes()) / 1000:4.0f} kB  {digest[:16]}\n"
+
+
+def test_only_what_the_model_needs_is_compiled():
+    text = entries(built() / "smd.fmu")["sources/model.h"].decode()
+    assert "Exact_overdamped" in text
+    assert "DryFriction" not in text
+    text = entries(built() / "pacejka.fmu")["sources/model.h"].decode()
+    assert "Exact" not in text
+
+
+def test_methods_and_laws_can_be_chosen_as_for_the_python_fmu(tmp_path):
+    built()
+    chosen = ("stickslip", "--method", "exact", "--law", "hybrid", "--platform", "linux64")
+    for folder, kind in (("python", ()), ("native", ("--native",))):
+        done = run(*chosen, *kind, "--out", tmp_path / folder)
+        assert done.returncode == 0, done.stderr
+    lean = entries(tmp_path / "native" / "stickslip.fmu")
+    text = lean["sources/model.h"].decode()
+    assert len(text) < 0.6 * len(entries(built() / "stickslip.fmu")["sources/model.h"])
+    assert "Rodas" not in text
+    assert b'name="ode45"' not in lean["modelDescription.xml"]
+    results = [simulate_fmu(str(tmp_path / folder / "stickslip.fmu")) for folder in ("python", "native")]
+    assert results[0].tobytes() == results[1].tobytes()
+
+
+# ---- binaries
+
+
+@pytest.fixture(params=PLATFORMS)
+def binary(request, smd):
+    """A platform, the bytes of its binary, and every library in it, parsed."""
+    fmu, _ = smd
+    content = entries(fmu)[f"binaries/{request.param}/smd{PLATFORMS[request.param].suffix}"]
+    parsed = lief.MachO.parse(content) if request.param == "darwin64" else [lief.parse(content)]
+    return request.param, content, parsed
+
+
+def test_every_binary_exports_fmi_and_nothing_else_needs_only_the_system(binary):
+    platform, _, libraries = binary
+    assert len(libraries) == len(PLATFORMS[platform].targets)
+    for place in range(len(libraries)):
+        library = libraries[place] if platform != "darwin64" else libraries.at(place)
+        needed = {getattr(each, "name", each) for each in library.libraries}
+        if platform == "win64":
+            needed = {name.lower() for name in needed if not name.startswith("api-ms-win-crt-")}
+        assert needed == SYSTEM[platform]
+        exported = {function.name.lstrip("_") for function in library.exported_functions}
+        assert exported - {"mh_dylib_header", "dso_handle"} == functions()
+
+
+def functions():
+    """The functions of FMI 2.0 co-simulation."""
+    text = (unpacked(built() / "smd.fmu") / "sources/fmi2Functions.h").read_text()
+    found = {line.split()[-1].rstrip(";") for line in text.splitlines() if "FMI2_Export fmi2" in line}
+    model_exchange = ("Event", "Continuous", "Discrete", "SetTime", "Completed", "GetDerivatives", "Nominals")
+    return {name for name in found if not any(word in name for word in model_exchange)}
+
+
+def test_no_binary_tells_where_it_was_built(binary):
+    _, content, _ = binary
+    for place in (str(ROOT), os.path.expanduser("~"), "/tmp", "fmi2.c", "ziglang"):
+        assert place.encode() not in content
+
+
+def test_macos_libraries_are_for_both_processors_and_the_signature_of_the_one_that_needs_it_holds(smd):
+    content = entries(smd[0])["binaries/darwin64/smd.dylib"]
+    magic, count = unpack_from(">II", content)
+    assert (magic, count) == (0xCAFEBABE, 2)
+    intel, arm = (
+        content[place : place + size]
+        for _, _, place, size, _ in (unpack_from(">IIIII", content, 8 + 20 * i) for i in range(count))
+    )
+    assert [unpack_from("<I", library, 4)[0] for library in (intel, arm)] == [0x01000007, 0x0100000C]
+    parsed = lief.MachO.parse(arm)  # which owns what is taken from it
+    check_signature(arm, parsed.at(0).code_signature.data_offset)
+
+
+def check_signature(library, place):
+    """The page hashes of the code directory (Apple, xnu, bsd/sys/codesign.h)."""
+    magic, _, count = unpack_from(">III", library, place)
+    assert magic == 0xFADE0CC0
+    blobs = [unpack_from(">II", library, place + 12 + 8 * i)[1] for i in range(count)]
+    directory = next(place + blob for blob in blobs if unpack_from(">I", library, place + blob)[0] == 0xFADE0C02)
+    hashes, _, _, pages, limit = unpack_from(">IIIII", library, directory + 16)
+    size, kind, _, bits = unpack_from(">BBBB", library, directory + 36)
+    assert (size, kind, limit) == (32, 2, place)  # sha256 over everything before the signature
+    for page in range(pages):
+        code = library[page << bits : min((page + 1) << bits, limit)]
+        start = directory + hashes + size * page
+        assert library[start : start + size] == sha256(code).digest()
+
+
+# ---- builds
+
+
+def test_builds_are_the_same_from_another_folder_with_another_cache(tmp_path, smd):
+    """Not for win64, whose C runtime takes a new cache minutes to compile."""
+    source = tmp_path / "another place"
+    for part in ("fmus", "harness/references"):
+        shutil.copytree(ROOT / part, source / part)
+    for part in ("build_fmus.py", "LICENSE"):
+        shutil.copy(ROOT / part, source)
+    done = run(
+        "--native",
+        "smd",
+        "--platform",
+        "linux64",
+        "--platform",
+        "darwin64",
+        "--out",
+        "out",
+        cwd=source,
+        ZIG_GLOBAL_CACHE_DIR=str(tmp_path / "cache"),
+        ZIG_LOCAL_CACHE_DIR=str(tmp_path / "local"),
+    )
+    assert done.returncode == 0, done.stderr
+    expected = entries(smd[0])
+    again = entries(source / "out" / "smd.fmu")
+    assert "binaries/darwin64/smd.dylib" in again
+    assert again == {name: expected[name] for name in again}
+
+
+def test_the_build_date_reaches_the_description_and_the_zip_only(tmp_path):
+    built()
+    for epoch in ("0", "1700000000"):
+        done = run("--native", "smd", "--platform", "linux64", "--out", tmp_path / epoch, SOURCE_DATE_EPOCH=epoch)
+        assert done.returncode == 0, done.stderr
+    first, second = (entries(tmp_path / epoch / "smd.fmu") for epoch in ("0", "1700000000"))
+    assert [name for name in first if first[name] != second[name]] == ["modelDescription.xml"]
+
+
+def test_without_a_platform_it_is_built_for_the_usual_three():
+    assert USUAL == ("linux64", "win64", "darwin64")
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_any_compiler_makes_the_same_of_the_sources(tmp_path, name):
+    compiler()
+    pytest.importorskip("cmake", reason="fmpy compiles with CMake: pip install cmake")
+    fmu = tmp_path / f"{name}.fmu"
+    shutil.copy(built() / f"{name}.fmu", fmu)
+    before = simulate_fmu(str(fmu))
+    folder = tmp_path / "unpacked"
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder)
+    (folder / "binaries" / "linux64" / f"{name}.so").unlink()
+    (tmp_path / "cmake").mkdir()
+    build_platform_binary(folder, tmp_path / "cmake")
+    assert simulate_fmu(str(folder)).tobytes() == before.tobytes()
+
+
+def test_the_build_description_names_the_file_that_its_description_names(smd):
+    fmu, _ = smd
+    (configuration,) = read_build_description(fmu)
+    assert configuration.modelIdentifier == "smd"
+    described = read_model_description(fmu).buildConfigurations[0]
+    for each in (configuration, described):
+        assert [file for files in each.sourceFileSets for file in files.sourceFiles] == ["fmi2.c"]
+
+
+# ---- mistakes on the command line
+
+
+def test_a_mistake_is_told_in_one_sentence():
+    for arguments, words in (
+        (("--native", "--platform", "amiga"), "There is no platform 'amiga'; known are linux64, win64, darwin64"),
+        (("--native", "unheard"), "There is no model 'unheard'"),
+    ):
+        done = run(*arguments)
+        assert done.returncode != 0
+        assert words in done.stderr
+        assert "Traceback" not in done.stderr
+
+
+def test_without_a_compiler_it_says_what_to_install(tmp_path):
+    hide = "import sys; sys.modules['ziglang'] = None; sys.argv[1:] = ['--native', 'smd', '--out', sys.argv[1]]\n"
+    code = hide + "import runpy; runpy.run_path('build_fmus.py', run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", code, str(tmp_path)], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "pip install -e '.[native]'" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_files_of_c_travel_with_the_package():
+    assert all((Path(native.__file__).parent / file).is_file() for file in WRITTEN)

@@ -1,0 +1,304 @@
+"""What a built FMI 3.0 FMU carries, what it says about itself, and that both are true and the same everywhere."""
+
+import subprocess
+import sys
+from functools import partial
+from html.parser import HTMLParser
+from math import inf
+from pathlib import Path
+from zipfile import ZipFile
+
+import driver
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
+from models import ROOT, model_class, runtime
+
+from fmus.packaging.catalogue import load, names
+from fmus.packaging.modules import installed
+from fmus.runtime.declare import variables
+from tests.packaging.test_packaging import (  # noqa: F401
+    EVERY_MODEL,
+    command,
+    described,
+    entries,
+    other_checkout,
+    test_the_command_prints_name_size_import_time_and_digest_of_every_model,
+    test_validation_finds_nothing,
+)
+
+HERE = Path(__file__).parent
+DRY = {name for name in names() if load(name).dry}
+DRIVEN = {name for name in names() if load(name).driven}
+TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
+STRUCTURE = ("Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator")
+# Nothing is without effect, and friction often holds.
+PARAMETERS = {"coulomb": {"c": 0.7, "k": 1.0}, "pendulum": {"r": 0.5}}
+
+
+@pytest.fixture(scope="module")
+def building(tmp_path_factory):
+    """All FMUs, built once by the command, and what it printed."""
+    out = tmp_path_factory.mktemp("built")
+    run = command("--fmi", "3", "--out", out)
+    assert run.returncode == 0, run.stderr
+    return out, run.stdout
+
+
+@pytest.fixture(scope="module")
+def fmu(building):
+    return lambda name: building[0] / f"{name}.fmu"
+
+
+look = partial(driver.host, "fmi3_look.py", timeout=120)  # where the FMU is all there is to see
+
+
+def beside(name):
+    """The names of what follows the declared variables."""
+    indicators = ["events.to_rest", "events.to_break_away"] if name in DRY else []
+    return ["time", *indicators, *(["der(x_driver)"] if name in DRIVEN else [])]
+
+
+def structure(root, kind):
+    """Reference, dependencies and their kinds of every unknown of a kind."""
+    found = root.findall(f"ModelStructure/{kind}")
+    return [
+        (int(u.get("valueReference")), [int(r) for r in u.get("dependencies", "").split()], u.get("dependenciesKind"))
+        for u in found
+    ]
+
+
+@EVERY_MODEL
+def test_one_fmu_offers_model_exchange_and_co_simulation(fmu, name):
+    root = described(fmu(name))
+    assert (root.get("fmiVersion"), root.get("modelName")) == ("3.0", name)
+    for kind in ("ModelExchange", "CoSimulation"):
+        able = root.find(kind).attrib
+        assert able["modelIdentifier"] == name
+        assert able["canGetAndSetFMUState"] == able["canSerializeFMUState"] == "true"
+        assert able["needsExecutionTool"] == able["canBeInstantiatedOnlyOncePerProcess"] == "false"
+    assert root.find("CoSimulation").get("canHandleVariableCommunicationStepSize") == "true"
+
+
+@EVERY_MODEL
+def test_the_declared_variables_keep_their_references_and_what_is_said_of_them(fmu, fmus, name):
+    two = read_model_description(fmus / f"{name}.fmu").modelVariables
+    three = read_model_description(fmu(name)).modelVariables
+    for variable, as_before in zip(three, two, strict=False):
+        for key in ("name", "valueReference", "description", "causality", "variability", "initial", "start"):
+            assert getattr(variable, key) == getattr(as_before, key)
+        for key in ("unit", "displayUnit", "min", "max"):
+            assert getattr(variable, key) == getattr(as_before, key)
+        assert variable.type == TYPES[as_before.type]
+    assert [variable.name for variable in three[len(two) :]] == beside(name)
+    assert [variable.valueReference for variable in three] == list(range(len(three)))
+
+
+@EVERY_MODEL
+def test_every_number_has_a_unit_and_every_enumeration_its_items(fmu, name):
+    root = described(fmu(name))
+    units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
+    assert {element.get("unit") for element in root.iterfind("ModelVariables/Float64")} == units
+    types = {kind.get("name"): kind for kind in root.find("TypeDefinitions")}
+    for variable, meaning in variables(load(name)()):
+        if meaning.items:
+            element = root.find(f"ModelVariables/Enumeration[@name='{variable}']")
+            items = types[element.get("declaredType")].findall("Item")
+            assert [(i.get("name"), int(i.get("value")), i.get("description")) for i in items] == list(meaning.items)
+
+
+@EVERY_MODEL
+def test_every_derivative_names_its_state_and_stands_in_the_order_of_the_states(fmu, name):
+    description = read_model_description(fmu(name))
+    rates = [unknown.variable for unknown in description.derivatives]
+    outputs = [variable.name for variable in description.modelVariables if variable.causality == "output"]
+    driver = ["x_driver"] if name in DRIVEN else []
+    assert [rate.derivative.name for rate in rates] == [*outputs[:2], *driver]
+    assert [rate.name for rate in rates] == [*outputs[1:3], *(f"der({state})" for state in driver)]
+    assert [variable for variable in description.modelVariables if variable.derivative] == sorted(
+        rates, key=lambda rate: rate.valueReference
+    )
+
+
+@EVERY_MODEL
+def test_the_structure_lists_all_unknowns_in_the_order_of_the_schema(fmu, name):
+    root = described(fmu(name))
+    kinds = [element.tag for element in root.find("ModelStructure")]
+    assert kinds == sorted(kinds, key=STRUCTURE.index)
+    found = [variable.name for variable in read_model_description(fmu(name)).modelVariables]
+    indicators = [found[reference] for reference, _, _ in structure(root, "EventIndicator")]
+    assert indicators == [name for name in beside(name) if name.startswith("events.")]
+
+
+@EVERY_MODEL
+def test_only_the_speed_may_jump_and_only_where_friction_is_dry(fmu, name):
+    jumping = [element.get("name") for element in described(fmu(name)).findall("ModelVariables/*[@reinit='true']")]
+    _, speed, *_ = [variable for variable, meaning in variables(load(name)()) if meaning.causality == "output"]
+    assert jumping == ([speed] if name in DRY else [])
+
+
+@EVERY_MODEL
+def test_nominal_values_are_the_sizes_that_our_own_solver_takes(fmu, name):
+    model, nominals = model_class(name)(), runtime(name, "exchange").nominals
+    model.prepare()
+    model.solver.start(model, 0.0, *model.initial(0.0), inf, model.tolerance)
+    step = model.solver.step
+    position, speed = (getattr(step, f"least_{state}") for state in model.states)
+    sizes = [position, speed, position][: len(nominals(model))]
+    rates = [unknown.variable for unknown in read_model_description(fmu(name)).derivatives]
+    assert nominals(model) == sizes == [float(rate.derivative.nominal) for rate in rates]
+
+
+def test_a_finer_creep_makes_the_nominal_speed_smaller_and_the_event_tells(fmu, tmp_path):
+    usual, fine = [1e-3, 1e-3, 1e-3], [1e-3, 1e-5, 1e-3]
+    told = look("nominals", fmu("pacejka"), "x_m", 1e-5, folder=tmp_path)
+    assert told == [[False, usual], [True, fine], [False, fine]]
+
+
+@EVERY_MODEL
+def test_what_follows_from_what_is_true(fmu, name, tmp_path):
+    """A nudge shows in nothing that is not said to follow; all that rates and indicators follow from shows, too."""
+    root = described(fmu(name))
+    told = {kind: structure(root, kind) for kind in ("Output", "ContinuousStateDerivative", "EventIndicator")}
+    seen = look("factors", fmu(name), PARAMETERS.get(name, {}), folder=tmp_path)
+    seen = {int(unknown): {int(known): f for known, f in row.items()} for unknown, row in seen.items()}
+    for reference, knowns, _ in [row for rows in told.values() for row in rows]:
+        assert set(seen.get(reference, {})) <= set(knowns)
+    for reference, knowns, _ in told["ContinuousStateDerivative"] + told["EventIndicator"]:
+        assert set(seen.get(reference, {})) == set(knowns)
+    (push,) = [int(e.get("valueReference")) for e in root.findall("ModelVariables/*[@causality='input']")]
+    for reference, knowns, _ in told["Output"]:
+        continuous = root.find(f"ModelVariables/*[@valueReference='{reference}']").get("variability") == "continuous"
+        assert (push in seen.get(reference, {})) == (push in knowns and continuous)
+
+
+@EVERY_MODEL
+def test_factors_are_told_where_they_are_known_and_are_the_same_at_every_point(fmu, name, tmp_path):
+    rates = structure(described(fmu(name)), "ContinuousStateDerivative")
+    expected = {"smd": ["constant", "tunable tunable tunable"], "pacejka": ["constant", None, None]}
+    assert [kinds for _, _, kinds in rates] == expected.get(name, [None] * len(rates))
+    seen = look("factors", fmu(name), {}, folder=tmp_path) if name in expected else {}
+    for reference, knowns, kinds in rates:
+        for known, kind in zip(knowns, (kinds or "").split(), strict=bool(kinds)):
+            factors = seen[str(reference)][str(known)]
+            assert factors == pytest.approx([1.0 if kind == "constant" else factors[0]] * len(factors), rel=1e-9)
+
+
+@EVERY_MODEL
+def test_an_instance_starts_with_the_values_of_the_xml_takes_others_and_loads_all_that_travels(fmu, name, tmp_path):
+    told = look("variables", fmu(name), folder=tmp_path)
+    elements = described(fmu(name)).find("ModelVariables")
+    starts = {e.get("name"): e.get("start") for e in elements if e.get("start") is not None}
+    assert set(told["starts"]) == {e.get("name") for e in elements}
+    assert starts == {variable: told["starts"][variable] for variable in starts}
+    settable = {
+        variable for variable, meaning in variables(load(name)()) if meaning.causality in ("parameter", "input")
+    }
+    assert set(told["after"]) == settable == set(starts)
+    for e in elements:
+        if e.tag == "Float64" and e.get("start") is not None:
+            assert float(told["after"][e.get("name")]) == 0.5 * float(e.get("start")) + 0.0625
+    assert set(told["inside"]) == {path for path in entries(fmu(name)) if path.endswith(".py")}
+    assert not [module for module in told["modules"] if module.startswith(("fmus", "pythonfmu."))]
+
+
+@EVERY_MODEL
+def test_the_files_are_those_of_fmi_3_and_nothing_of_the_python_of_pythonfmu3(fmu, name):
+    content = entries(fmu(name))
+    layer = installed("pythonfmu3") / "resources/binaries"
+    for platform, file in ("x86_64-linux", "libpythonfmu-export.so"), ("x86_64-windows", "pythonfmu-export.dll"):
+        suffix = Path(file).suffix
+        assert content.pop(f"binaries/{platform}/{name}{suffix}") == (layer / platform / file).read_bytes()
+    assert b"NTNU" in content.pop("documentation/licenses/pythonfmu3.txt")
+    assert content.pop("documentation/licenses/license.txt").decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
+    sources = {path: text for path, text in content.items() if path.startswith("resources/")}
+    assert not [path for path, text in sources.items() if b"pythonfmu3" in text or "pythonfmu" in path]
+    certified = {"fmi-ls-manifest.xml", f"{name}_out.csv"}
+    assert set(content) - set(sources) == {
+        "documentation/externalDependencies.txt",
+        "documentation/index.html",
+        "modelDescription.xml",
+        "terminalsAndIcons/icon.png",
+        *(f"extra/org.fmi-standard.fmi-ls-ref/{file}" for file in certified),
+    }
+
+
+@EVERY_MODEL
+def test_the_page_shows_the_icon_where_it_is_and_tells_of_model_exchange(fmu, name):
+    content, found = entries(fmu(name)), []
+
+    class Reader(HTMLParser):
+        def handle_starttag(self, tag, attributes):
+            found.extend(value for key, value in attributes if (tag, key) == ("img", "src"))
+
+    text = content["documentation/index.html"].decode()
+    Reader().feed(text)
+    assert [source.removeprefix("../") for source in found] == ["terminalsAndIcons/icon.png"]
+    assert "In model exchange" in text
+
+
+def test_two_builds_in_different_folders_are_byte_identical(building, tmp_path):
+    run = command(
+        *("--fmi", "3", "--out", tmp_path / "out"),
+        root=other_checkout(tmp_path),
+        PYTHONHASHSEED="7",
+        TZ="Pacific/Auckland",
+    )
+    assert run.returncode == 0, run.stderr
+    for name in names():
+        assert (tmp_path / f"out/{name}.fmu").read_bytes() == (building[0] / f"{name}.fmu").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "sentence"),
+    [
+        (("--native",), 2, "There are no native FMUs of FMI 3.0: leave out --native, or --fmi 3."),
+        (
+            ("--platform", "darwin64"),
+            1,
+            "pythonfmu3 has no binary for darwin64, only for linux64, win64: leave out --fmi 3 and add --native.",
+        ),
+        (("--method", "euler"), 2, None),
+        (("--law", "sign"), 1, "smd has no friction law 'sign'; it has none to choose."),
+    ],
+)
+def test_what_is_not_there_is_refused_in_one_sentence_and_nothing_is_built(arguments, status, sentence, tmp_path):
+    run = command("--fmi", "3", *arguments, "smd", "--out", tmp_path)
+    assert (run.returncode, run.stdout) == (status, "")
+    assert sentence is None or run.stderr == f"Error: {sentence}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_pythonfmu3_the_command_says_what_to_install(tmp_path):
+    hidden = "import runpy, sys; sys.modules['pythonfmu3'] = None; runpy.run_path(sys.argv.pop(1), run_name='__main__')"
+    call = [sys.executable, "-c", hidden, str(ROOT / "build_fmus.py"), "--fmi", "3", "smd", "--out", str(tmp_path)]
+    run = subprocess.run(call, capture_output=True, text=True, cwd=ROOT, timeout=60)
+    assert run.returncode == 1
+    assert run.stderr == (
+        "Error: pythonfmu3 is not installed, and an FMU carries a part of it: try 'pip install pythonfmu3'.\n"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "gone"),
+    [
+        ("stickslip", ("--method", "ode23", "--law", "hybrid"), {"exact", "ode45", "dop853", "rodas"}),
+        ("coulomb", ("--method", "rodas", "--law", "sign"), {"exact", "ode45", "dop853"}),
+        ("smd", ("--method", "exact"), {"ode45", "dop853", "rodas", "automaton"}),
+    ],
+)
+def test_a_lean_fmu_carries_what_it_offers_and_runs_both_ways(name, options, gone, tmp_path):
+    run = command("--fmi", "3", name, *options, "--platform", "linux64", "--out", tmp_path)
+    assert run.returncode == 0, run.stderr
+    path = tmp_path / f"{name}.fmu"
+    assert validate_fmu(str(path)) == []
+    with ZipFile(path) as archive:
+        inside = archive.namelist()
+    assert not gone & {Path(file).stem for file in inside if file.endswith(".py")}
+    assert [file for file in inside if file.startswith("binaries/")] == [f"binaries/x86_64-linux/{name}.so"]
+    runs = [
+        simulate_fmu(str(path), fmi_type=kind, stop_time=0.1, output_interval=0.01, relative_tolerance=1e-9)
+        for kind in ("CoSimulation", "ModelExchange")
+    ]
+    assert len(runs[0]) == len(runs[1])
+    assert runs[0]["x"] == pytest.approx(runs[1]["x"], abs=1e-6)

@@ -1,0 +1,115 @@
+"""FMUs built with --method, --law and --platform: they offer just those, carry just their code, and run alike."""
+
+import subprocess
+import sys
+from zipfile import ZipFile
+
+import pytest
+from builds import ROOT
+from compare import identical
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+from models import CASES, MODELS, counts, declared, label, outputs
+
+from fmus.packaging.written import LAWS, METHODS
+
+LABELS = {"solver.method": "--method", "friction": "--law"}
+
+
+def command(*arguments):
+    """The build command in a process of its own."""
+    call = [sys.executable, "build_fmus.py", *map(str, arguments)]
+    return subprocess.run(call, cwd=ROOT, capture_output=True, text=True, timeout=120)
+
+
+def chosen(name, values):
+    """The labels of the choices of a case, by the option that asks for them."""
+    found = {}
+    for variable, option in LABELS.items():
+        for item in declared(name)[variable].items if variable in values else ():
+            if item[1] == values[variable]:
+                found[option] = item[0]
+    return found
+
+
+@pytest.fixture(scope="module")
+def lean(tmp_path_factory):
+    """lean(case): the FMU that offers the method and the law of a case and nothing else, for Linux."""
+
+    def build(case):
+        out = tmp_path_factory.mktemp("lean")
+        options = [word for pair in chosen(*case[:2]).items() for word in pair]
+        run = command(case[0], *options, "--platform", "linux64", "--out", out)
+        assert run.returncode == 0, run.stderr
+        return out / f"{case[0]}.fmu"
+
+    return build
+
+
+EVERY_CASE = pytest.mark.parametrize("case", [case for case in CASES if case[1].get("pin_load", 1) == 1], ids=label)
+
+
+@EVERY_CASE
+def test_a_lean_fmu_offers_one_method_carries_its_code_alone_and_runs_alike(lean, launch, worker, case):
+    name, values, stop = case
+    path = lean(case)
+    assert validate_fmu(str(path)) == []
+    options = chosen(name, values)
+    description = read_model_description(path)
+    for variable in description.modelVariables:
+        if variable.name in LABELS:
+            assert [item.name for item in variable.declaredType.items] == [options[LABELS[variable.name]]]
+            assert int(variable.start) == values[variable.name]
+    with ZipFile(path) as archive:
+        files = {entry.rsplit("/", 1)[1] for entry in archive.namelist() if "/runtime/" in entry}
+        assert {entry.split("/")[1] for entry in archive.namelist() if entry.startswith("binaries")} == {"linux64"}
+        page = archive.read("documentation/index.html").decode()
+    shown = {label for label in (*METHODS, *LAWS) if f"<b>{label}</b>" in page}
+    assert shown == set(options.values())
+    methods = {"exact.py", "ode23.py", "ode45.py", "dop853.py", "rodas.py"}
+    assert files & methods == {f"{options['--method']}.py"}
+    times = [stop * i / 40 for i in range(41)]
+    names = outputs(name) + counts(name)
+    fmu = worker.instantiate(path).begin({v: x for v, x in values.items() if v not in LABELS}, stop=stop)
+    identical(fmu.run(times, names), launch(name, values, stop=stop).run(times, names), names)
+    fmu.free()
+
+
+def test_several_may_be_asked_for_and_the_first_of_them_is_the_start(tmp_path):
+    assert command("pendulum", "--method", "rodas", "--method", "ode45", "--out", tmp_path).returncode == 0
+    (method,) = [
+        v for v in read_model_description(tmp_path / "pendulum.fmu").modelVariables if v.name == "solver.method"
+    ]
+    assert [(item.name, item.value) for item in method.declaredType.items] == [("ode45", "3"), ("rodas", "5")]
+    assert method.start == "3"
+
+
+def test_two_lean_builds_are_byte_identical_and_differ_from_the_whole(tmp_path, fmus):
+    for folder in ("one", "other"):
+        assert command("smd", "--method", "exact", "--out", tmp_path / folder).returncode == 0
+    one, other = (tmp_path / folder / "smd.fmu" for folder in ("one", "other"))
+    assert one.read_bytes() == other.read_bytes()
+    guids = {read_model_description(path).guid for path in (one, fmus / "smd.fmu")}
+    assert len(guids) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("pacejka", "--method", "exact"), ("pacejka", "exact", "ode23, ode45, dop853, rodas")),
+        (("smd", "--law", "sign"), ("smd", "sign", "none")),
+        (("stickslip", "--law", "sign"), ("stickslip", "sign", "hybrid, threshold")),
+        (("coulomb", "--law", "sign", "--method", "exact"), ("coulomb", "exact", "hybrid")),
+        (("smd", "--platform", "amiga"), ("amiga", "linux64")),
+    ],
+)
+def test_what_a_model_does_not_have_is_refused_in_one_sentence(arguments, words, tmp_path):
+    run = command(*arguments, "--out", tmp_path)
+    assert run.returncode == 1
+    assert run.stderr.count("\n") == 1
+    assert all(word in run.stderr for word in words), run.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_model_is_among_the_cases():
+    assert {case[0] for case in CASES} == set(MODELS)

@@ -1,0 +1,419 @@
+"""What a built FMU carries, what it says about itself, and that both are the same wherever it is built."""
+
+import ast
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from datetime import UTC, datetime
+from hashlib import sha256
+from io import BytesIO
+from math import pi
+from pathlib import Path, PurePosixPath
+from types import SimpleNamespace
+from xml.etree import ElementTree
+from zipfile import ZipFile
+
+import pytest
+from builds import ROOT
+from fmpy.validation import validate_fmu
+
+from fmus.packaging import BuildError
+from fmus.packaging.archive import write
+from fmus.packaging.catalogue import load, names
+from fmus.packaging.description import describe
+from fmus.packaging.modules import installed, travelling
+from fmus.runtime.declare import Declaring, Fixed, Output, Parameter, variables
+
+EVERY_MODEL = pytest.mark.parametrize("name", names())
+
+# Runs built FMUs in a process that never saw their sources, and cannot see pythonfmu.
+PROBE = """
+import json, os, shutil, sys
+sys.modules["pythonfmu"] = None
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+told = []
+for path in sys.argv[1:]:
+    folder = str(extract(path))
+    description = read_model_description(folder)
+    fmu = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier=description.modelName)
+    fmu.instantiate()
+    starts = {}
+    for variable in description.modelVariables:
+        if variable.start is not None:
+            read = fmu.getReal if variable.type == "Real" else fmu.getInteger
+            starts[variable.name] = repr(read([variable.valueReference])[0])
+    files = [getattr(module, "__file__", None) or "" for module in sys.modules.values()]
+    inside = [os.path.relpath(file, folder).replace(os.sep, "/") for file in files if file.startswith(folder)]
+    told.append({"starts": starts, "inside": inside, "modules": list(sys.modules)})
+    fmu.freeInstance()
+    shutil.rmtree(folder)
+print(json.dumps(told))
+"""
+
+
+def command(*arguments, root=ROOT, **environment):
+    """The build command in a process of its own."""
+    call = [sys.executable, str(root / "build_fmus.py"), *map(str, arguments)]
+    return subprocess.run(call, capture_output=True, text=True, env=os.environ | environment, timeout=120)
+
+
+def probe(*fmus, folder):
+    """What instances of the FMUs, made one after another in one clean process, tell about themselves."""
+    call = [sys.executable, "-c", PROBE, *map(str, fmus)]
+    run = subprocess.run(call, capture_output=True, text=True, cwd=folder, timeout=120)
+    assert run.returncode == 0, run.stderr
+    return json.loads(run.stdout)
+
+
+def other_checkout(folder):
+    """A copy of the project in another place."""
+    ignored = shutil.ignore_patterns("*.fmu", "__pycache__")
+    for part in ("fmus", "harness/references"):
+        shutil.copytree(ROOT / part, folder / part, ignore=ignored)
+    for file in ("build_fmus.py", "LICENSE"):
+        shutil.copy(ROOT / file, folder)
+    return folder
+
+
+def entries(fmu):
+    """Content of every file in an FMU."""
+    with ZipFile(fmu) as archive:
+        return {path: archive.read(path) for path in archive.namelist()}
+
+
+def described(fmu):
+    """The root of the model description."""
+    return ElementTree.fromstring(entries(fmu)["modelDescription.xml"])
+
+
+def modules_of(fmu):
+    """Paths of the sources that travel, without the package name."""
+    found = [PurePosixPath(path).parts for path in entries(fmu) if path.endswith(".py")]
+    return {"/".join(parts[2:]) for parts in found if len(parts) > 2}
+
+
+@pytest.fixture(scope="module")
+def building(tmp_path_factory):
+    """All FMUs, built once by the command, and what it printed."""
+    out = tmp_path_factory.mktemp("built")
+    run = command("--out", out)
+    assert run.returncode == 0, run.stderr
+    return out, run.stdout
+
+
+@pytest.fixture(scope="module")
+def fmu(building):
+    return lambda name: building[0] / f"{name}.fmu"
+
+
+def test_the_command_prints_name_size_import_time_and_digest_of_every_model(building):
+    out, printed = building
+    for name, line in zip(names(), printed.splitlines(), strict=True):
+        content = (out / f"{name}.fmu").read_bytes()
+        size, digest = f"{len(content) / 1000:.0f}", sha256(content).hexdigest()[:16]
+        assert re.fullmatch(rf"{name}.fmu +{size} kB +\d+ ms  {digest}", line)
+    assert {path.name for path in out.iterdir()} == {f"{name}.fmu" for name in names()}
+
+
+@EVERY_MODEL
+def test_validation_finds_nothing(fmu, name):
+    assert validate_fmu(str(fmu(name))) == []
+
+
+@EVERY_MODEL
+def test_the_xml_says_what_is_declared(fmu, name):
+    scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
+    for place, (scalar, (variable, meaning)) in enumerate(zip(scalars, variables(load(name)()), strict=True)):
+        value = scalar[0]
+        assert (scalar.get("name"), scalar.get("valueReference"), value.tag) == (variable, str(place), meaning.type)
+        assert (scalar.get("description"), scalar.get("causality")) == (meaning.text, meaning.causality)
+        assert (scalar.get("variability"), scalar.get("initial", "")) == (meaning.variability, meaning.initial)
+        assert value.get("unit", "") == meaning.unit
+        assert (value.get("start") is None) == (meaning.initial == "calculated")
+        if value.get("start") is not None:
+            assert value.get("start") == repr(meaning.start)
+        if not meaning.items:
+            assert float(value.get("min", "-inf")) == max(meaning.low, meaning.above)
+            assert float(value.get("max", "inf")) == min(meaning.high, meaning.below)
+
+
+@EVERY_MODEL
+def test_every_real_has_a_unit_every_angle_is_shown_in_degrees(fmu, name):
+    root = described(fmu(name))
+    shown = {unit.get("name"): unit.find("DisplayUnit") for unit in root.findall("UnitDefinitions/Unit")}
+    for real in root.iterfind("ModelVariables/ScalarVariable/Real"):
+        assert real.get("unit") in shown
+        if real.get("unit") == "rad":
+            assert real.get("displayUnit") == shown["rad"].get("name") == "deg"
+            assert float(shown["rad"].get("factor")) * pi == pytest.approx(180.0, rel=1e-15)
+
+
+@EVERY_MODEL
+def test_enumerations_list_their_items(fmu, name):
+    root = described(fmu(name))
+    types = {kind.get("name"): kind for kind in root.findall("TypeDefinitions/SimpleType")}
+    choices = {variable: meaning for variable, meaning in variables(load(name)()) if meaning.items}
+    assert "solver.method" in choices
+    for variable, meaning in choices.items():
+        value = root.find(f"ModelVariables/ScalarVariable[@name='{variable}']/Enumeration")
+        items = types[value.get("declaredType")].findall("Enumeration/Item")
+        assert [(i.get("name"), int(i.get("value")), i.get("description")) for i in items] == list(meaning.items)
+
+
+@EVERY_MODEL
+def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name):
+    root = described(fmu(name))
+    meanings = [meaning for _, meaning in variables(load(name)())]
+    (force,) = [place for place, meaning in enumerate(meanings, 1) if meaning.causality == "input"]
+    outputs = {int(u.get("index")): u.get("dependencies") for u in root.findall("ModelStructure/Outputs/Unknown")}
+    assert outputs == {
+        place: str(force) if meaning.direct else ""
+        for place, meaning in enumerate(meanings, 1)
+        if isinstance(meaning, Output)
+    }
+    unknowns = root.findall("ModelStructure/InitialUnknowns/Unknown")
+    assert [int(u.get("index")) for u in unknowns] == sorted(outputs)
+
+
+@EVERY_MODEL
+def test_capabilities_and_experiment_are_those_of_the_contract(fmu, name):
+    root, model = described(fmu(name)), load(name)
+    able = root.find("CoSimulation").attrib
+    assert able["modelIdentifier"] == root.get("modelName") == name
+    for flag in ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"):
+        assert able[flag] == "true"
+    assert able["needsExecutionTool"] == able["canBeInstantiatedOnlyOncePerProcess"] == "false"
+    experiment = root.find("DefaultExperiment")
+    times = [float(experiment.get(key)) for key in ("startTime", "stopTime", "tolerance", "stepSize")]
+    assert times == [0.0, model.stop_time, model.tolerance, model.step_size]
+
+
+@EVERY_MODEL
+def test_an_instance_starts_with_the_values_of_the_xml_and_loads_all_that_travels(fmu, name, tmp_path):
+    (told,) = probe(fmu(name), folder=tmp_path)
+    scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
+    assert told["starts"] == {s.get("name"): s[0].get("start") for s in scalars if s[0].get("start") is not None}
+    # Two routes to the same list: the files that are reached by reading imports, the modules that Python loads.
+    assert set(told["inside"]) == {path for path in entries(fmu(name)) if path.endswith(".py")}
+    assert not [module for module in told["modules"] if module.startswith(("fmus", "pythonfmu."))]
+
+
+@EVERY_MODEL
+def test_what_travels_needs_the_standard_library_only(fmu, name):
+    for path, content in entries(fmu(name)).items():
+        if path.count("/") > 1 and path.endswith(".py"):
+            for node in ast.walk(ast.parse(content)):
+                modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.ImportFrom) and not node.level:
+                    modules = [node.module]
+                assert {module.split(".")[0] for module in modules} <= sys.stdlib_module_names, path
+
+
+def test_a_model_carries_no_method_or_mode_that_it_does_not_offer(fmu):
+    assert "runtime/automaton.py" not in modules_of(fmu("smd")) | modules_of(fmu("pacejka"))
+    assert "runtime/exact.py" not in modules_of(fmu("pacejka")) | modules_of(fmu("pendulum"))
+    assert modules_of(fmu("stickslip")) >= {"stickslip.py", "runtime/automaton.py", "runtime/exact.py"}
+
+
+@EVERY_MODEL
+def test_entry_script_and_package_carry_the_digest_of_their_content(fmu, name):
+    content = entries(fmu(name))
+    entry = content["resources/slavemodule.txt"].decode()
+    assert re.fullmatch(rf"{name}_[0-9a-f]{{12}}_fmu", entry)
+    assert content[f"resources/{entry}.py"].decode().startswith(f"from {entry.removesuffix('_fmu')} import ")
+    top = {path.split("/")[1] for path in content if path.startswith("resources/")}
+    assert top == {"slavemodule.txt", f"{entry}.py", entry.removesuffix("_fmu")}
+
+
+@EVERY_MODEL
+def test_nothing_tells_where_it_was_built(fmu, name):
+    places = [str(place).encode() for place in (ROOT, fmu(name).parent, installed("pythonfmu"))]
+    for path, content in entries(fmu(name)).items():
+        assert not [place for place in places if place in content], path
+
+
+@EVERY_MODEL
+def test_both_licences_travel(fmu, name):
+    content = entries(fmu(name))
+    assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
+    assert b"NTNU" in content["documentation/licenses/pythonfmu.txt"]
+
+
+def test_two_builds_in_different_folders_are_byte_identical(building, tmp_path):
+    checkout = other_checkout(tmp_path)
+    for path in checkout.rglob("*"):
+        os.utime(path, (1.0e9, 1.0e9))
+    run = command("--out", tmp_path / "out", root=checkout, PYTHONHASHSEED="7", TZ="Pacific/Auckland")
+    assert run.returncode == 0, run.stderr
+    for name in names():
+        assert (tmp_path / f"out/{name}.fmu").read_bytes() == (building[0] / f"{name}.fmu").read_bytes()
+
+
+def test_the_source_date_changes_the_date_and_nothing_else(fmu, tmp_path):
+    name, moment = names()[0], datetime(2024, 2, 29, 12, 30, 14, tzinfo=UTC)
+    assert command(name, "--out", tmp_path, SOURCE_DATE_EPOCH=str(int(moment.timestamp()))).returncode == 0
+    dated, plain = tmp_path / f"{name}.fmu", fmu(name)
+    with ZipFile(dated) as archive:
+        assert {info.date_time for info in archive.infolist()} == {(2024, 2, 29, 12, 30, 14)}
+    stamp = described(plain).get("generationDateAndTime")
+    replaced = entries(plain)["modelDescription.xml"].replace(stamp.encode(), b"2024-02-29T12:30:14Z")
+    assert entries(dated) == entries(plain) | {"modelDescription.xml": replaced}
+
+
+def test_two_versions_of_one_fmu_live_in_one_process(fmu, tmp_path):
+    checkout = other_checkout(tmp_path)
+    source = checkout / "fmus/smd.py"
+    text = source.read_text(encoding="utf-8")
+    source.write_text(text.replace("157.9,", "158.9,"), encoding="utf-8")
+    assert command("smd", "--out", tmp_path, root=checkout).returncode == 0
+    old, new = fmu("smd"), tmp_path / "smd.fmu"
+    assert described(old).get("guid") != described(new).get("guid")
+    stiffness = [told["starts"]["k"] for told in probe(old, new, old, folder=tmp_path)]
+    assert stiffness == ["157.9", "158.9", "157.9"]
+
+
+@EVERY_MODEL
+def test_one_process_can_make_many_instances(fmu, name, tmp_path):
+    told = probe(*[fmu(name)] * 8, folder=tmp_path)
+    assert [instance["starts"] for instance in told] == [told[0]["starts"]] * 8
+
+
+@pytest.mark.parametrize("arguments", [("bogus",), ("smd", "bogus")])
+def test_an_unknown_name_is_refused_with_the_known_ones_before_anything_is_built(arguments, tmp_path):
+    run = command(*arguments, "--out", tmp_path)
+    assert (run.returncode, run.stdout) == (2, "")
+    known = ", ".join(names())
+    assert run.stderr == f"Error: There is no model 'bogus'; known are {known}, and any .py file by its path.\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_written_is_named_in_one_sentence(tmp_path):
+    (tmp_path / "file").write_text("")
+    run = command("smd", "--out", tmp_path / "file")
+    assert (run.returncode, run.stdout) == (1, "")
+    assert run.stderr.startswith(f"Error: Cannot write {tmp_path / 'file' / 'smd.fmu'}: ")
+    assert run.stderr.endswith("; try another folder with --out.\n")
+
+
+@pytest.mark.parametrize("epoch", ["yesterday", "-1", "1e9", "", "99999999999"])
+def test_a_bad_source_date_is_refused(epoch, tmp_path):
+    run = command("smd", "--out", tmp_path, SOURCE_DATE_EPOCH=epoch)
+    assert run.returncode == 1
+    assert run.stderr == f"Error: SOURCE_DATE_EPOCH is {epoch!r}; allowed are whole seconds from 0 to 4354732800.\n"
+
+
+def test_without_pythonfmu_the_command_says_what_to_install(tmp_path):
+    hidden = "import runpy, sys; sys.modules['pythonfmu'] = None; runpy.run_path(sys.argv.pop(1), run_name='__main__')"
+    call = [sys.executable, "-c", hidden, str(ROOT / "build_fmus.py"), "smd", "--out", str(tmp_path)]
+    run = subprocess.run(call, capture_output=True, text=True, cwd=ROOT, timeout=60)
+    assert run.returncode == 1
+    assert run.stderr.startswith("Error: pythonfmu is not installed")
+    assert "pip install pythonfmu" in run.stderr
+    assert run.stderr.count("\n") == 1
+
+
+def test_a_failed_write_leaves_the_older_fmu_and_nothing_else(tmp_path, monkeypatch):
+    older = tmp_path / "smd.fmu"
+    older.write_bytes(b"older")
+
+    def full(self, target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(BuildError, match="No space left on device"):
+        write(older, b"newer")
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"smd.fmu": b"older"}
+
+
+def odd(text):
+    """A model by that name, written out as this text."""
+    return SimpleNamespace(name="odd", title="Odd", text=text)
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("import numpy", "imports numpy; inside an FMU only the standard library"),
+        ("from fmus.runtime import declare", "imports fmus; inside an FMU only the standard library"),
+        ("import pythonfmu.enums", "imports pythonfmu.enums; inside an FMU only"),
+        ("from pythonfmu import Fmi2Slave", "imports Fmi2Slave from pythonfmu, which no FMU carries"),
+        ("from . import __version__", "imports __version__ from the package itself, which no FMU carries"),
+        ("from .nowhere import thing", "imports thing from nowhere, which no FMU carries"),
+        ("def late():\n    import math", "imports inside a block in line 2"),
+    ],
+)
+def test_an_import_that_no_fmu_can_serve_stops_the_build(line, sentence, tmp_path):
+    with pytest.raises(BuildError, match=re.escape(f"odd.py {sentence}")):
+        travelling(odd(line), tmp_path)
+
+
+def test_imports_are_followed_through_packages_and_line_ends_do_not_matter(tmp_path):
+    (tmp_path / "runtime/deep").mkdir(parents=True)
+    files = {
+        "odd.py": b"from .runtime import helper\r\nfrom .runtime.deep.well import water\r\n",
+        "runtime/__init__.py": b"",
+        "runtime/helper.py": b"import math\n",
+        "runtime/idle.py": b"import numpy\n",
+        "runtime/slave.py": b"from pythonfmu.logmsg import LogMsg\n",
+        "runtime/deep/__init__.py": b"",
+        "runtime/deep/well.py": b"from ..helper import math as water\n",
+    }
+    for path, content in files.items():
+        (tmp_path / path).write_bytes(content)
+    found = travelling(odd((tmp_path / "odd.py").read_text()), tmp_path)
+    assert set(found) == set(files) - {"runtime/idle.py"} | {
+        "__init__.py",
+        "guard.py",
+        "pythonfmu/__init__.py",
+        "pythonfmu/logmsg.py",
+    }
+    assert found["runtime/slave.py"] == "from ..pythonfmu.logmsg import LogMsg\n"
+    assert "\r" not in "".join(found.values())
+
+
+class Sketch(Declaring):
+    """A model for the description alone.
+
+    x' = -x
+    """
+
+    stop_time, step_size, tolerance = 1.0, 0.1, 1e-6
+
+
+def sketch(**declared):
+    """The description of a model with these variables."""
+    made = type("Sketch", (Sketch,), {"__doc__": Sketch.__doc__} | declared)
+    for name, meaning in declared.items():
+        meaning.__set_name__(made, name)
+    return describe(made, "sketch", "code", datetime(2024, 1, 1, tzinfo=UTC)).decode()
+
+
+def test_start_values_survive_the_xml_to_the_last_bit():
+    text = sketch(m=Parameter(0.1 + 0.2, "kg", "A sum <&> 'more'."))
+    root = ElementTree.parse(BytesIO(text.encode())).getroot()
+    assert root.find("ModelVariables/ScalarVariable/Real").get("start") == "0.30000000000000004"
+    assert root.find("ModelVariables/ScalarVariable").get("description") == "A sum <&> 'more'."
+    assert root.get("description") == "A model for the description alone."
+
+
+def test_the_guid_follows_the_content():
+    def guid(text):
+        return ElementTree.fromstring(text).get("guid")
+
+    first, again = sketch(m=Parameter(1.0, "kg", "Mass.")), sketch(m=Parameter(1.0, "kg", "Mass."))
+    assert first == again
+    assert guid(first) != guid(sketch(m=Parameter(2.0, "kg", "Mass.")))
+    date = datetime(2024, 1, 1, tzinfo=UTC)
+    codes = [guid(describe(Sketch, "sketch", code, date)) for code in ("a", "b")]
+    assert codes[0] != codes[1]
+
+
+def test_an_unknown_unit_is_refused_by_the_name_of_its_variable():
+    with pytest.raises(BuildError, match=r"w has the unit 'furlong'; known units are 1, s, kg"):
+        sketch(w=Fixed(1.0, "furlong", "Width."))
+    with pytest.raises(BuildError, match=r"phi has the display unit 'turn'; allowed for rad is 'rad' or 'deg'"):
+        sketch(phi=Fixed(1.0, "rad", "Angle.", display="turn"))

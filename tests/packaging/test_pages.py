@@ -1,0 +1,180 @@
+"""What an FMU tells people: its page, its icon, its certified result."""
+
+import csv
+import re
+import shutil
+import struct
+import subprocess
+from html.parser import HTMLParser
+from io import StringIO
+from xml.etree import ElementTree
+
+import native_fmus
+import pytest
+from models import MODELS, declared, model_class, outputs
+
+from fmus.packaging.chart import ticks
+from fmus.packaging.description import declared_by
+from fmus.packaging.page import page, typeset
+from tests.packaging.test_packaging import entries
+
+EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+PAGE, ICON, EXTRA = "documentation/index.html", "model.png", "extra/org.fmi-standard.fmi-ls-ref/"
+VOID = {"meta", "img"}
+NAMESPACE = "{http://fmi-standard.org/fmi-ls-manifest}"
+
+
+@pytest.fixture
+def content(fmus):
+    """content(name): the files of an FMU."""
+    return lambda name: entries(fmus / f"{name}.fmu")
+
+
+@EVERY_MODEL
+def test_a_native_fmu_tells_the_same(content, name):
+    told = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
+    native = entries(native_fmus.built() / f"{name}.fmu")
+    assert len(told) == 4
+    assert told == {path: native.get(path) for path in told}
+
+
+class Reader(HTMLParser):
+    """The words of a page, its headings, what it refers to, and the elements still open."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.words, self.headings, self.referred = [], [], [], []
+        self.feed(text)
+        self.close()
+        self.text = " ".join("".join(self.words).split())
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in VOID:
+            self.open.append(tag)
+        self.referred += [value for key, value in attributes if key in ("src", "href")]
+
+    def handle_startendtag(self, tag, attributes):
+        """An element of a drawing."""
+
+    def handle_endtag(self, tag):
+        omitted = ("p", "td", "tr", "th")
+        while self.open[-1] != tag and self.open[-1] in omitted:
+            self.open.pop()
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != "style":
+            self.words.append(data)
+        if self.open and self.open[-1] == "h2":
+            self.headings.append(data.strip())
+
+
+@EVERY_MODEL
+def test_the_page_tells_every_variable_law_and_method(content, name):
+    reader = Reader(content(name)[PAGE].decode())
+    assert reader.open == []
+    for variable, d in declared(name).items():
+        assert variable in reader.text
+        assert d.text in reader.text.lower() or d.text in reader.text
+        for label, _, sentence in d.items:
+            assert label in reader.text
+            assert sentence in reader.text
+    assert model_class(name).__doc__.strip().splitlines()[0] in reader.text
+    assert {"Equations", "Default run", "Parameters", "Input", "Outputs", "Use"} <= set(reader.headings)
+
+
+@EVERY_MODEL
+def test_the_page_needs_nothing_but_what_the_fmu_carries(content, name):
+    carried = content(name)
+    text = carried[PAGE].decode()
+    assert "http" not in text.lower()
+    assert "<script" not in text
+    for target in Reader(text).referred:
+        path = target.removeprefix("../") if target.startswith("../") else f"documentation/{target}"
+        assert [file for file in carried if file.startswith(path)]
+
+
+@EVERY_MODEL
+def test_the_icon_is_a_square_picture_of_some_size(content, name):
+    icon = content(name)[ICON]
+    assert icon[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">II", icon[16:24]) == (256, 256)
+    assert len(icon) > 2000
+
+
+@EVERY_MODEL
+def test_the_manifest_names_the_certified_result_and_where_it_comes_from(content, name):
+    carried = content(name)
+    root = ElementTree.fromstring(carried[f"{EXTRA}fmi-ls-manifest.xml"])
+    assert root.tag == "fmiReferences"
+    assert root.get(f"{NAMESPACE}fmi-ls-name") == "org.fmi-standard.fmi-ls-ref"
+    assert root.get(f"{NAMESPACE}fmi-ls-version")
+    (related,) = root.findall("Related")
+    assert (related.get("role"), related.get("type")) == ("result", "text/csv")
+    assert f"{EXTRA}{related.get('source')}" in carried
+    assert re.search(r"difference [\d.]+e-1[0-9]\.", related.get("description"))
+
+
+@EVERY_MODEL
+def test_the_fmu_reproduces_the_result_that_it_carries(content, launch, name):
+    """Position and speed of the default run: the share of the largest that the contract allows."""
+    text = content(name)[f"{EXTRA}{name}_out.csv"].decode()
+    heads, *rows = csv.reader(StringIO(text))
+    assert heads == ["time", *outputs(name)[:2]]
+    table = [[float(word) for word in row] for row in rows]
+    times = [row[0] for row in table]
+    assert (times[0], times[-1]) == (0.0, model_class(name).stop_time)
+    mine = launch(name, stop=times[-1]).run(times, heads[1:])
+    allowed = {"pacejka": 1e-6, "pendulum": 1e-9}.get(name, 1e-13)
+    for column, expected in zip(zip(*mine, strict=True), list(zip(*table, strict=True))[1:], strict=True):
+        largest = max(map(abs, expected))
+        assert max(abs(a - b) for a, b in zip(column, expected, strict=True)) <= allowed * largest
+
+
+def test_a_model_without_a_certified_result_has_a_page_all_the_same():
+    model = model_class("smd")
+    reader = Reader(page(model, "sixth", declared_by(model), None).decode())
+    assert "Default run" not in reader.headings
+    assert "sixth" in reader.text
+
+
+def test_names_are_set_as_people_write_them_and_nothing_becomes_markup():
+    assert typeset("a < b & mu_s^2 - k x") == "a &lt; b &amp; &mu;<sub>s</sub><sup>2</sup> &minus; k x"
+
+
+@pytest.mark.parametrize(("low", "high"), [(-1.0, 1.0), (0.0, 16.0), (-3e-7, 2e-7), (1e5, 1.2e5)])
+def test_ticks_are_round_few_and_inside(low, high):
+    found = ticks(low, high)
+    assert 3 <= len(found) <= 7
+    assert all(low <= tick <= high for tick in found)
+
+
+MEASURE = """<!doctype html><iframe id=f src="{page}" width={width} height=800></iframe><p id=p></p><script>
+f.onload = () => {{ const d = f.contentDocument.documentElement; p.textContent = `wide ${{d.scrollWidth}}`; }};
+</script>"""
+
+
+@pytest.mark.parametrize("width", [360, 1200])
+@EVERY_MODEL
+def test_no_page_is_wider_than_the_window(content, name, width, tmp_path):
+    """In a real browser."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("there is no chromium here")
+    for path, data in content(name).items():
+        if path in (PAGE, ICON):
+            (tmp_path / path).parent.mkdir(exist_ok=True)
+            (tmp_path / path).write_bytes(data)
+    measure = tmp_path / "measure.html"
+    measure.write_text(MEASURE.format(page=PAGE, width=width))
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    options += [
+        "--allow-file-access-from-files",
+        f"--user-data-dir={tmp_path / 'profile'}",
+        "--virtual-time-budget=9000",
+    ]
+    done = subprocess.run(
+        [browser, *options, "--dump-dom", measure.as_uri()], capture_output=True, text=True, timeout=60
+    )
+    (found,) = re.findall(r"wide (\d+)", done.stdout)
+    assert int(found) <= width

@@ -1,0 +1,197 @@
+"""Result folders are replaced whole or not at all."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from builds import ROOT
+
+from harness.errors import HarnessError
+from harness.results import folder as folders
+from harness.results.folder import replacing
+
+OURS = ("a.csv", "b.csv")
+
+
+def contents(folder):
+    return {path.name: path.read_text() for path in folder.iterdir()}
+
+
+@pytest.fixture
+def older(tmp_path):
+    """A folder with an older result, the only thing in its parent."""
+    folder = tmp_path / "case"
+    folder.mkdir()
+    (folder / "a.csv").write_text("old")
+    return folder
+
+
+def test_a_new_result_takes_the_place_of_the_old_one(older):
+    with replacing(older, OURS) as fresh:
+        (fresh / "b.csv").write_text("new")
+        assert contents(older) == {"a.csv": "old"}
+    assert contents(older) == {"b.csv": "new"}
+    assert list(older.parent.iterdir()) == [older]
+
+
+@pytest.mark.parametrize("reason", [HarnessError("no"), KeyboardInterrupt()])
+def test_what_fails_half_way_leaves_the_old_result_and_nothing_else(older, reason):
+    def fail():
+        with replacing(older, OURS) as fresh:
+            (fresh / "b.csv").write_text("half")
+            raise reason
+
+    with pytest.raises(type(reason)):
+        fail()
+    assert contents(older) == {"a.csv": "old"}
+    assert list(older.parent.iterdir()) == [older]
+
+
+def test_a_folder_with_other_files_is_not_replaced(older):
+    (older / "notes.txt").write_text("mine")
+    with pytest.raises(HarnessError, match=r"holds notes\.txt"), replacing(older, OURS):
+        pass
+    assert contents(older) == {"a.csv": "old", "notes.txt": "mine"}
+
+
+def test_a_file_in_the_way_is_told(tmp_path):
+    (tmp_path / "results").write_text("a file")
+    with pytest.raises(HarnessError, match="cannot write below"), replacing(tmp_path / "results/case", OURS):
+        pass
+
+
+@pytest.fixture(params=["one step", "two steps"])
+def steps(request, monkeypatch):
+    """A system that exchanges two folders in one step, and one that does not."""
+    if request.param == "two steps":
+        monkeypatch.setattr(folders, "exchanged", lambda one, two: False)
+    return request.param
+
+
+def test_whichever_way_folders_are_exchanged_nothing_is_left_beside(older, steps):
+    with replacing(older, OURS) as fresh:
+        (fresh / "b.csv").write_text("new")
+    assert contents(older) == {"b.csv": "new"}
+    assert list(older.parent.iterdir()) == [older]
+
+
+def test_an_exchange_that_fails_half_way_leaves_the_old_result(older, monkeypatch):
+    monkeypatch.setattr(folders, "exchanged", lambda one, two: False)
+    rename = Path.rename
+
+    def fail(self, target):
+        if self.suffix == folders.FRESH:
+            raise OSError(28, "No space left on device")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", fail)
+    with pytest.raises(HarnessError, match=r"cannot write .*case: No space left on device"), replacing(older, OURS):
+        pass
+    assert contents(older) == {"a.csv": "old"}
+    assert list(older.parent.iterdir()) == [older]
+
+
+KILLED = """
+import json, os, sys
+from pathlib import Path
+from harness.results import folder as folders
+if sys.argv[2] == "two":
+    folders.exchanged = lambda one, two: False
+place, ours = Path(sys.argv[1]), ("a.csv", "b.csv")
+
+def replace(last):
+    calls = 0
+    def counted(frame, event, call):
+        nonlocal calls
+        calls += event in ("c_call", "c_return") and getattr(call, "__module__", "") in ("posix", None)
+        if calls == last:
+            os.kill(os.getpid(), 9)
+    with folders.replacing(place, ours) as fresh:
+        (fresh / "b.csv").write_text("new")
+        sys.setprofile(counted)
+    sys.setprofile(None)
+
+seen, status, last = [], 9, 0
+while status:
+    last += 1
+    child = os.fork()
+    if not child:
+        replace(last)
+        os._exit(0)
+    status = os.waitpid(child, 0)[1]
+    found = os.listdir(place) if place.exists() else []
+    try:
+        with folders.replacing(place, ours):
+            raise folders.HarnessError("the next run, which fails")
+    except folders.HarnessError:
+        pass
+    seen.append((found, os.listdir(place), os.listdir(place.parent)))
+    (place / "b.csv").unlink(missing_ok=True)
+    (place / "a.csv").write_text("old")
+print(json.dumps(seen))
+"""
+
+
+@pytest.mark.parametrize("steps", ["one", "two"])
+def test_a_kill_at_any_moment_leaves_the_old_result_or_the_new_one_to_be_found(older, steps):
+    """Before and after every call of the system, from the end of the writing on; the next run clears what was left."""
+    command = [sys.executable, "-c", KILLED, str(older), steps]
+    seen = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True, timeout=120).stdout)
+    assert len(seen) > 10
+    results = [["a.csv"], ["b.csv"]]
+    for at_once, after, beside in seen:
+        assert at_once in results or (steps == "two" and at_once == [])
+        assert after in results
+        assert beside == [older.name]
+    assert seen[0][0] == ["a.csv"]
+    assert seen[-1][0] == ["b.csv"]
+    assert ([] in [at_once for at_once, _, _ in seen]) == (steps == "two")
+
+
+def test_what_a_killed_run_left_is_removed_but_neither_another_ones_nor_what_is_not_ours(older):
+    beside = [older.with_name(name) for name in (".case-abcdefgh.new", ".case-abcdefgi.old", ".case-sign-abcdefgh.new")]
+    foreign = older.with_name(".case-abcdefgk.new")
+    for folder in (*beside, foreign):
+        folder.mkdir()
+    (foreign / "notes.txt").write_text("mine")
+    with replacing(older, OURS) as other:
+        (other / "b.csv").write_text("of a run that goes on")
+        with replacing(older, OURS) as fresh:
+            (fresh / "a.csv").write_text("of one that is quicker")
+        assert contents(other) == {"b.csv": "of a run that goes on"}
+        assert not beside[0].exists()
+        assert not beside[1].exists()
+    assert contents(older) == {"b.csv": "of a run that goes on"}
+    assert sorted(older.parent.iterdir()) == sorted([older, foreign, beside[2]])
+
+
+@pytest.mark.parametrize("target", ["elsewhere", "nowhere"])
+def test_a_result_folder_that_is_a_link_is_refused_and_stays(tmp_path, target):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "case").symlink_to(tmp_path / target)
+    with pytest.raises(HarnessError, match="case is a link"), replacing(tmp_path / "case", OURS):
+        pass
+    assert (tmp_path / "case").is_symlink()
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
+def test_a_result_folder_that_is_a_file_is_refused_and_stays(tmp_path):
+    (tmp_path / "case").write_text("mine")
+    with pytest.raises(HarnessError, match="case holds a file of that name"), replacing(tmp_path / "case", OURS):
+        pass
+    assert (tmp_path / "case").read_text() == "mine"
+
+
+def test_a_full_disk_is_told_and_the_old_result_stays(older):
+    def fill():
+        with replacing(older, OURS) as fresh:
+            (fresh / "b.csv").write_text("half")
+            with open("/dev/full", "w") as full:
+                full.write("the rest")
+
+    with pytest.raises(HarnessError, match=r"cannot write .*case: No space left on device"):
+        fill()
+    assert contents(older) == {"a.csv": "old"}
+    assert list(older.parent.iterdir()) == [older]

@@ -1,0 +1,104 @@
+"""`python -m harness` as its user sees it: exit status and streams of a process of its own, in a folder of his.
+
+The process is forked from one that has loaded the harness and its libraries, for to load them takes a second, and there
+are hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).
+"""
+
+import atexit
+import json
+import os
+import runpy
+import select
+import signal
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from pkgutil import walk_packages
+
+from builds import ROOT
+
+PATIENCE = 300.0  # s
+
+
+def harness(folder, *arguments, base=os.environ, fresh=False, text="", **environment):
+    """The finished process; it reads `text`, and has the environment `base` with what is named."""
+    words, environment = [*map(str, arguments)], {**base, "PYTHONPATH": str(ROOT)} | environment
+    if not fresh:
+        return _server().run(words, str(folder), environment, text)
+    command = [sys.executable, "-m", "harness", *words]
+    options = {"cwd": folder, "env": environment, "capture_output": True, "text": True, "timeout": PATIENCE}
+    return subprocess.run(command, input=text, **options)
+
+
+@cache
+def _server():
+    server = Server()
+    atexit.register(server.close)
+    return server
+
+
+class Server:
+    """The process from which the others are forked."""
+
+    def __init__(self):
+        self.room = tempfile.TemporaryDirectory()
+        self.files = [Path(self.room.name, name) for name in ("in", "out", "err")]
+        command, environment = [sys.executable, __file__], os.environ | {"PYTHONPATH": str(ROOT)}
+        pipe = subprocess.PIPE
+        self.process = subprocess.Popen(
+            command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=self.room.name, start_new_session=True
+        )
+
+    def run(self, words, folder, environment, text):
+        for file in self.files:
+            file.write_text(text if file.name == "in" else "")
+        asked = {"words": words, "folder": folder, "environment": environment, "files": [*map(str, self.files)]}
+        print(json.dumps(asked), file=self.process.stdin, flush=True)
+        if not select.select([self.process.stdout], [], [], PATIENCE)[0]:
+            os.killpg(self.process.pid, signal.SIGKILL)
+            _server.cache_clear()
+            raise AssertionError(f"harness {' '.join(words)} did not end within {PATIENCE:.0f} s")
+        status = int(self.process.stdout.readline())
+        return subprocess.CompletedProcess(words, status, *(file.read_bytes().decode() for file in self.files[1:]))
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.wait(30)
+        self.process.stdout.close()
+        self.room.cleanup()
+
+
+def serve():
+    """Load all that can be; then fork for every line that is read, and answer with the exit status."""
+    for module in walk_packages(import_module("harness").__path__, "harness."):
+        with suppress(ImportError):  # an extra that is not installed
+            if not module.name.endswith("__main__"):
+                import_module(module.name)
+    for line in sys.stdin:
+        child = os.fork()
+        if not child:
+            become(**json.loads(line))
+            runpy.run_module("harness", run_name="__main__", alter_sys=True)
+            return
+        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
+def become(words, folder, environment, files):
+    """What a process has that was started with these."""
+    os.chdir(folder)
+    os.environ.clear()
+    os.environ.update(environment)
+    sys.argv, sys.path[0], tempfile.tempdir = ["harness", *words], folder, None
+    for number, file in enumerate(files):
+        opened = os.open(file, os.O_RDWR)
+        os.dup2(opened, number)
+        os.close(opened)
+    sys.stdin = open(0, closefd=False)  # noqa: SIM115 - what was read ahead is not the command's
+
+
+if __name__ == "__main__":
+    serve()

@@ -1,0 +1,93 @@
+"""The list that completeness walks: every model file, its declared variables, and every law with every method."""
+
+from functools import cache
+from itertools import product
+
+from builds import ROOT
+
+from fmus.packaging.catalogue import load
+from fmus.packaging.written import beside, written
+from fmus.runtime.declare import Choice, Input, Output, Parameter, variables
+
+MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
+AUTHORED = sorted((ROOT / "tests" / "authored").glob("*.py"))  # as users write them, in files of their own
+LARGER = sorted((ROOT / "tests" / "authored" / "larger").glob("*.py"))  # of more states, or more contacts
+EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
+HYBRID, SIGN, THRESHOLD = 1, 2, 3
+
+
+def model_class(name):
+    """The class of a model as it travels: written out."""
+    return written(name)
+
+
+def runtime(name, part):
+    """A file of the runtime as it is written out for a model."""
+    return beside(written(name), f"runtime.{part}")
+
+
+@cache
+def declared(name):
+    """Name and declaration of every variable of a model, in the order of the XML."""
+    return dict(variables(load(name)()))
+
+
+def outputs(name):
+    """Names of the outputs; position and speed come first."""
+    return [v for v, d in declared(name).items() if isinstance(d, Output)]
+
+
+def parameters(name):
+    """Names and declarations of what takes a number: parameters and inputs, but no choices."""
+    kinds = (Parameter, Input)
+    return {v: d for v, d in declared(name).items() if isinstance(d, kinds) and not isinstance(d, Choice)}
+
+
+def tunable(name):
+    """Those of them that may change in mid-run."""
+    return {v: d for v, d in parameters(name).items() if d.variability != "fixed"}
+
+
+def allowed(choices):
+    """Whether a combination of choices makes sense: the closed form needs the hybrid law."""
+    return not (choices.get("solver.method") == EXACT and choices.get("friction", HYBRID) != HYBRID)
+
+
+def combinations(name):
+    """Every allowed combination of a model's choices, as values to set."""
+    choices = {v: d for v, d in declared(name).items() if isinstance(d, Choice)}
+    items = [[value for _, value, _ in declaration.items] for declaration in choices.values()]
+    return [values for values in (dict(zip(choices, row, strict=True)) for row in product(*items)) if allowed(values)]
+
+
+def experiment(name, values):
+    """One run that tests share: (model, values, stop time).
+
+    Laws that chatter run as published, at rtol 1e-3, and not for long: where friction should hold, they take steps
+    without number.
+    """
+    stop, exact = load(name).stop_time, values["solver.method"] == EXACT
+    if values.get("friction", HYBRID) == HYBRID:
+        return name, values if exact else {**values, "solver.rtol": 1e-5}, stop
+    return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.4 * stop
+
+
+CASES = [experiment(name, values) for name in MODELS for values in combinations(name)]
+
+
+def label(case):
+    """A readable test id: the model and the labels of its choices."""
+    name, values, _ = case
+    names = [item[0] for v, value in values.items() for item in declared(name)[v].items if item[1] == value]
+    return "-".join([name, *names])
+
+
+def counts(name):
+    """Names of the counts and of the time of the last event, where the model has them: a run's whole history."""
+    wanted = ("solver.steps", "solver.rejected", "solver.evaluations", "solver.h", "events.count", "events.t_last")
+    return [v for v in declared(name) if v in wanted]
+
+
+def push(name):
+    """The input of a model, and a size that overcomes its friction."""
+    return ("T_ext", 0.02) if name == "pendulum" else ("F_ext", 200.0)

@@ -1,0 +1,88 @@
+"""The C host of tests/support, compiled by the system's compiler, and scripts for it."""
+
+import shutil
+import subprocess
+import zipfile
+from functools import cache
+from pathlib import Path
+from xml.etree.ElementTree import fromstring
+
+import fmpy
+import pytest
+from models import declared
+from native_fmus import room
+
+from fmus.packaging.native.compiler import LIBRARY, SAME_BITS, STRICT
+
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+SOURCE = Path(__file__).with_name("host.c")
+
+
+def compiler():
+    """The system's C compiler."""
+    found = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    return found or pytest.skip("there is no C compiler on this machine: install gcc")
+
+
+@cache
+def folder(kind):
+    """A folder for binaries of one kind."""
+    path = Path(room().name) / (kind or "plain")
+    path.mkdir()
+    return path
+
+
+@cache
+def host(sanitizer=""):
+    """The host, as a program."""
+    out = folder(sanitizer) / "host"
+    command = [compiler(), *STRICT, "-g", *sanitized(sanitizer), f"-I{HEADERS}", str(SOURCE), "-o", str(out)]
+    subprocess.run([*command, "-ldl", "-lpthread"], check=True)
+    return out
+
+
+def sanitized(kind):
+    return [f"-fsanitize={kind}", "-fno-sanitize-recover=all"] if kind else []
+
+
+@cache
+def unpacked(fmu):
+    """The folder of an extracted FMU."""
+    out = folder("unpacked") / fmu.stem
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(out)
+    return out
+
+
+def guid(fmu):
+    return fromstring((unpacked(fmu) / "modelDescription.xml").read_bytes()).attrib["guid"]
+
+
+@cache
+def compiled_here(fmu, sanitizer=""):
+    """The library from the sources in the FMU, by the system's compiler."""
+    out = folder(sanitizer) / f"{fmu.stem}.so"
+    command = [compiler(), *STRICT, *SAME_BITS, *LIBRARY, "-g", *sanitized(sanitizer), "fmi2.c", "-o", str(out), "-lm"]
+    subprocess.run(command, cwd=unpacked(fmu) / "sources", check=True)
+    return out
+
+
+def play(fmu, script, threads=1, sanitizer="", shipped=True):
+    """What the script answers, line by line, and what went to standard error."""
+    library = unpacked(fmu) / "binaries" / "linux64" / f"{fmu.stem}.so" if shipped else compiled_here(fmu, sanitizer)
+    command = [str(host(sanitizer)), str(library), guid(fmu), str(threads)]
+    done = subprocess.run(command, input="\n".join(script), capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return done.stdout.splitlines(), done.stderr
+
+
+@cache
+def references(name):
+    """The value reference of every variable of a model."""
+    return {variable: place for place, variable in enumerate(declared(name))}
+
+
+def begin(instance, values=(), stop="nan"):
+    """The script from instantiation to the first step; values are (reference, value)."""
+    sets = [f"{instance} setr {reference} {value!r}" for reference, value in values]
+    return [f"{instance} new", *sets, f"{instance} setup nan 0 {stop}", f"{instance} enter", f"{instance} exit"]
