@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from models import MODELS
+from models import MODELS, declared
 from native_fmus import built
 from native_host import SOURCE, compiler, folder, sanitized, unpacked
 
@@ -25,7 +25,8 @@ def abuse(request):
     """The program for a model: it must end well, and tells what went to its outputs."""
     out = folder("abuse") / request.param
     sources = unpacked(built() / f"{request.param}.fmu") / "sources"
-    command = [compiler(), *STRICT, "-O1", "-g", *sanitized(SANITIZERS), f"-I{sources}"]
+    dry = ["-DDRY"] if "mode" in declared(request.param) else []
+    command = [compiler(), *STRICT, "-O1", "-g", *sanitized(SANITIZERS), f"-I{sources}", *dry]
     subprocess.run([*command, str(SOURCE.with_name("abuse.c")), "-o", str(out), "-lm"], check=True)
 
     def run(*words, **options):

@@ -244,7 +244,9 @@ static void forged(void)
         }
         if (i >= 3 && i != 7) {
             FORGED(state.model.solver.t = 1e9);
+#ifdef DRY
             FORGED(state.model.solver.step.mode0 = 5);
+#endif
             FORGED(state.model.solver.step.methods.chosen++);
         }
         fmi2FreeInstance(it);
