@@ -480,7 +480,7 @@ print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harnes
     done = subprocess.run(
         [sys.executable, "-c", program],
         cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])},
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests/support")])},
         capture_output=True,
         text=True,
         timeout=120,
