@@ -1,8 +1,10 @@
 """The model of a built FMU, run in this process by the code that the FMU carries, without FMI."""
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
+from operator import attrgetter
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -58,22 +60,24 @@ class Inside:
     def begin(self, stop: float) -> None:
         self.model.solver.start(self.model, 0.0, *self.model.initial(0.0), stop, self.model.tolerance)
 
-    def here(self) -> tuple[float, float]:
-        """Position and speed at the present point."""
+    @property
+    def read(self) -> Callable[[Any], tuple[float, float]]:
+        """What tells position and speed at the present point of the solver."""
         position, speed, *_ = self.model.states
-        return getattr(self.model.solver, position), getattr(self.model.solver, speed)
+        return attrgetter(position, speed)
 
     def motion(self, times: list[float], patience: float | None = None) -> list[tuple[float, float]]:
         """Position and speed at the times, from 0 s on; HarnessError if the run fails or outlasts `patience` s."""
         model, march = self.model, self.model.solver
         self.begin(times[-1])
-        found = [self.here()]
+        read = self.read
+        found = [read(march)]
         late = perf_counter() + patience if patience else None
         try:
             for t in times[1:]:
                 if march.advance(model, t) != OK:
                     raise HarnessError(f"the solver gave up at t = {march.step.t0:.6g} s")
-                found.append(self.here())
+                found.append(read(march))
                 if late and perf_counter() > late:
                     raise HarnessError(f"at t = {t:.3g} s after {patience:g} s of run time")
         except (ArithmeticError, ValueError):
