@@ -2,46 +2,43 @@
 
 import ctypes
 import subprocess
-import sys
 from math import exp, fabs
 from pathlib import Path
 
 import numpy as np
 import pytest
 from arrays import array_steps, begun, bits, start, written_steps
-from models import DOP853, ODE23, ODE45, RODAS, ROOT
+from models import DOP853, LARGER, ODE23, ODE45, RODAS
 from native_host import compiler
 from scipy.integrate import solve_ivp
 
 import fmus.packaging.native as native
+from fmus.packaging.catalogue import load
 from fmus.packaging.native.compiler import SAME_BITS, STRICT
 from fmus.packaging.native.kinds import FLOAT
 from fmus.packaging.native.program import Program
-from fmus.packaging.written import written_by_hand
+from fmus.packaging.written import written
 
-sys.path.append(str(ROOT / "tests" / "by_hand"))
-import lugre
-import sleds
-
-BY_HAND = {"lugre": (lugre.Lugre, 4.0), "sleds": (sleds.Sleds, 16.0)}
+FILES = {path.stem: path for path in LARGER}
+STOPS = {"lugre": 4.0, "sleds": 16.0}
 RTOL = {ODE23: 1e-6, ODE45: 1e-9, DOP853: 1e-11, RODAS: 1e-8}
 EVERY_METHOD = pytest.mark.parametrize("method", RTOL)
 STEPS = 200
 
 
 @EVERY_METHOD
-@pytest.mark.parametrize("name", BY_HAND)
+@pytest.mark.parametrize("name", STOPS)
 def test_arrays_and_scalars_give_the_same_bits_at_every_step(name, method):
-    model, stop = BY_HAND[name]
+    file, stop = FILES[name], STOPS[name]
     values = {"solver.method": method, "solver.rtol": 1e-5}
-    scalars = written_steps(written_by_hand(model)(), values, stop, STEPS)
-    assert scalars == array_steps(model(), values, stop, STEPS)
+    scalars = written_steps(written(file)(), values, stop, STEPS)
+    assert scalars == array_steps(load(file)(), values, stop, STEPS)
     assert len(scalars) > 30
 
 
-def run(model, method, stop):
+def run(name, method):
     """A run of the written-out model: the state at the stop, and time and modes of every event."""
-    one = written_by_hand(model)()
+    one, stop = written(FILES[name])(), STOPS[name]
     begun(one, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]}, stop)
     start(one, one.initial(0.0), stop)
     step, events = one.solver.step, []
@@ -61,7 +58,7 @@ def test_bristles_move_as_an_independent_solver_says(method):
         return v, (742.5 * (0.034 * t - x) - 1e4 * z - 300.0 * u - 0.4 * v) / 12.5, u
 
     truth = solve_ivp(rates, (0.0, 4.0), [0.0] * 3, method="Radau", rtol=1e-12, atol=1e-15).y[:, -1]
-    found, _ = run(lugre.Lugre, method, 4.0)
+    found, _ = run("lugre", method)
     assert np.abs(np.array(found) - truth).max() < max(2e3 * RTOL[method] * np.abs(truth).max(), 1e-11)
 
 
@@ -114,7 +111,7 @@ def truth():
 @EVERY_METHOD
 def test_two_sleds_stick_and_slip_when_an_independent_solver_says(truth, method):
     events, end = truth
-    found, seen = run(sleds.Sleds, method, 16.0)
+    found, seen = run("sleds", method)
     assert [modes for _, *modes in seen] == [modes for _, *modes in events]
     assert len(seen) > 10
     room = max(2e3 * RTOL[method], 1e-10)
@@ -123,7 +120,7 @@ def test_two_sleds_stick_and_slip_when_an_independent_solver_says(truth, method)
 
 
 def test_a_stuck_sled_stands_on_its_speed_of_zero_while_the_other_moves():
-    one = written_by_hand(sleds.Sleds)()
+    one = written(FILES["sleds"])()
     begun(one, {"solver.method": DOP853, "solver.rtol": 1e-9}, 16.0)
     start(one, one.initial(0.0), 16.0)
     step, seen = one.solver.step, 0
@@ -149,11 +146,11 @@ def take(model):
 
 
 @EVERY_METHOD
-@pytest.mark.parametrize("name", BY_HAND)
+@pytest.mark.parametrize("name", STOPS)
 def test_c_does_what_the_scalars_do_to_the_last_bit(tmp_path, name, method):
-    model, stop = BY_HAND[name]
+    file, stop = FILES[name], STOPS[name]
     values = {"solver.method": method, "solver.rtol": 1e-5}
-    one = begun(written_by_hand(model)(), values, stop)
+    one = begun(written(file)(), values, stop)
     program = Program(one)
     program.entry("begin", {"lugre": begin_lugre, "sleds": begin_sleds}[name], FLOAT, FLOAT)
     program.entry("take", take)

@@ -22,8 +22,8 @@ A loop over contacts, places or speeds is unrolled; a function with a parameter 
 contact.  The guard of all this is that arrays, scalars and C give the same bits (tests/written/test_written.py).
 """
 
-from .live import beside, definition, files_of, written, written_by_hand
+from .live import beside, definition, files_of, written
 from .numbers import Refused
 from .offer import LAWS, METHODS, offer
 
-__all__ = ["LAWS", "METHODS", "Refused", "beside", "definition", "files_of", "offer", "written", "written_by_hand"]
+__all__ = ["LAWS", "METHODS", "Refused", "beside", "definition", "files_of", "offer", "written"]

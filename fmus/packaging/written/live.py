@@ -4,7 +4,6 @@ import ast
 import inspect
 import sys
 from copy import deepcopy
-from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
@@ -25,54 +24,38 @@ from .sources import Files, written_out
 TREE = "written_out"  # in a module of a written-out package: its tree, with the lines of the source
 
 
-@dataclass(frozen=True)
-class Scalars:
-    """The text of a model in scalars: its file and its class, in this process as in what travels."""
-
-    file: str
-    text: str
-    model: type[Declaring]
-
-    @classmethod
-    def of(cls, source: str | Path | Authored) -> "Scalars":
-        """Of a model by name or path, or of an author's file."""
-        found = source if isinstance(source, Authored) else find(source)
-        return cls(f"{found.name}.py", found.text, found.model)
+def read(source: str | Path | Authored) -> Authored:
+    """The model of a name or a path, or of an author's file."""
+    return source if isinstance(source, Authored) else find(source)
 
 
 @cache
-def lines_of(source: Scalars, offered: Offer | None = None) -> Files:
-    return written_out(source.model, source.file, source.text, offered)
+def lines_of(source: Authored, offered: Offer | None = None) -> Files:
+    return written_out(source.model, f"{source.name}.py", source.text, offered)
 
 
 def files_of(source: str | Path | Authored, offered: Offer | None = None) -> dict[str, str]:
     """Path and text of every file of the runtime, and of the model, as they travel."""
-    return {path: "\n".join(lines) for path, lines in lines_of(Scalars.of(source), offered).items()}
+    return {path: "\n".join(lines) for path, lines in lines_of(read(source), offered).items()}
 
 
 def written(source: str | Path | Authored, offered: Offer | None = None) -> type[Declaring]:
     """The class of a model as it will travel, with what the runtime is for it; the same each time."""
-    return brought_in(Scalars.of(source), offered)
-
-
-def written_by_hand(model: type[Declaring]) -> type[Declaring]:
-    """The same of a class in scalars that stands in a file of its own, and derives from those of the runtime."""
-    file = Path(inspect.getfile(model))
-    return brought_in(Scalars(file.name, file.read_text(encoding="utf-8"), model))
+    return brought_in(read(source), offered)
 
 
 @cache
-def brought_in(source: Scalars, offered: Offer | None = None) -> type[Declaring]:
+def brought_in(source: Authored, offered: Offer | None = None) -> type[Declaring]:
     """The model class out of a package of its files, imported under a name of its own."""
-    files, name = lines_of(source, offered), source.file.removesuffix(".py")
+    files, name, model = lines_of(source, offered), source.name, source.model
     content = "".join(f"{path}\0" + "\n".join(lines) for path, lines in sorted(files.items()))
     package = f"written_{name}_{sha256(content.encode()).hexdigest()[:12]}"
     for parent in package, f"{package}.runtime":
         sys.modules[parent] = ModuleType(parent)
         sys.modules[parent].__path__ = []
     sys.modules[f"{package}.runtime.declare"] = declare  # what is declared is what it is to everybody else
-    sys.meta_path.insert(0, Finder(package, files, {source.file: sys.modules[source.model.__module__].__file__ or "?"}))
-    return vars(import_module(f"{package}.{name}"))[source.model.__name__]
+    sys.meta_path.insert(0, Finder(package, files, {f"{name}.py": sys.modules[model.__module__].__file__ or "?"}))
+    return vars(import_module(f"{package}.{name}"))[model.__name__]
 
 
 class Finder(MetaPathFinder, Loader):
