@@ -8,6 +8,7 @@ from math import sqrt
 
 from .vectors import Contacts, Rates, States, each
 
+NUMBER, TEXT = 4, "Dormand-Prince 8(5,3); for tight tolerances"
 STAGES = 12  # right-hand sides a step; the last is the first of the next step
 EXTRA = 3  # right-hand sides that the interpolant needs on top
 POWER, SAFETY, SHRINK, GROW = 1.0 / 8.0, 0.9, 1.0 / 3.0, 6.0

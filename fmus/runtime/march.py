@@ -6,7 +6,8 @@ beyond it, because somebody looked ahead, does not show.
 
 from math import inf, nan
 
-from .codes import DIVERGED, ENDLESS, HYBRID, ODE23, OK, STUCK
+from . import ode23
+from .codes import DIVERGED, ENDLESS, HYBRID, OK, STUCK
 from .declare import Choice, Count, Declaring, Fixed, Local
 from .methods import ITEMS
 from .step import HUGE, Step
@@ -22,7 +23,7 @@ MOST_CALLS = 8_000_000  # right-hand sides, and looks inside a step for its even
 class March(Declaring):
     """Solver settings, counts, and the present point."""
 
-    method = Choice(ODE23, "integration method", ITEMS)
+    method = Choice(ode23.NUMBER, "integration method", ITEMS)
     rtol = Fixed(0.0, "1", "relative tolerance; 0 takes the importer's", low=0.0, below=1.0)
     atol = Fixed(
         0.0,

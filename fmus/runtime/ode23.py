@@ -6,6 +6,7 @@ L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1
 
 from .vectors import Contacts, Rates, States
 
+NUMBER, TEXT = 2, "Bogacki-Shampine 3(2), with the step control of MATLAB's program; for loose tolerances"
 STAGES = 3  # right-hand sides a step; the last is the first of the next step
 EXTRA = 0  # right-hand sides that the interpolant needs on top
 POWER, SAFETY, SHRINK, GROW = 1.0 / 3.0, 0.8, 0.5, 5.0

@@ -7,6 +7,7 @@ E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 
 
 from .vectors import Contacts, Rates, States
 
+NUMBER, TEXT = 3, "Dormand-Prince 5(4), with the step control of MATLAB's program; for moderate tolerances"
 STAGES = 6  # right-hand sides a step; the last is the first of the next step
 EXTRA = 0  # right-hand sides that the interpolant needs on top
 POWER, SAFETY, SHRINK, GROW = 1.0 / 5.0, 0.8, 0.1, 5.0

@@ -15,6 +15,7 @@ from math import nan  # noqa: F401  of a system that cannot be solved
 
 from .vectors import Contacts, Rates, States, factored, kinematic, solved
 
+NUMBER, TEXT = 5, "Rosenbrock 4(3), L-stable; for stiff friction curves"
 STAGES = 6  # right-hand sides a step, and one Jacobian; the last is the first of the next step
 EXTRA = 0  # right-hand sides that the interpolant needs on top
 POWER, SAFETY, SHRINK, GROW = 1.0 / 4.0, 0.9, 0.1, 6.0

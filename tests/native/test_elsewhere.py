@@ -9,11 +9,9 @@ import subprocess
 import sys
 
 import pytest
-from models import CASES, HYBRID, MODELS, declared, label, outputs
+from models import CASES, HYBRID, MODELS, RODAS, declared, label, outputs
 from native_fmus import built, room
 from native_host import HEADERS, SOURCE, begin, folder, guid, play, references, unpacked
-
-from fmus.runtime.codes import RODAS
 
 ROWS = 50
 ARM = "/usr/aarch64-linux-gnu"  # where Debian puts the C library

@@ -44,9 +44,18 @@ def changed(text, change):
     return text
 
 
+PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("what", ["model", "law", "method"])
+def test_what_is_added_is_a_diff_of_one_file(what):
+    (part,) = (part for part in PAGE.split("\n## ") if part.startswith(f"A {what}\n"))
+    assert len({name for kind, name, _ in BLOCK.findall(part) if kind != "sh"}) == 1
+
+
 def test_each_example_does_what_the_page_says(project):
     files, commands = set(), []
-    for kind, name, content in BLOCK.findall((ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")):
+    for kind, name, content in BLOCK.findall(PAGE):
         file = project / name
         if kind == "sh":
             commands += content.splitlines()

@@ -8,6 +8,8 @@ import pytest
 import scipy.integrate
 from models import MODELS, ROOT, combinations, model_class, runtime
 
+from fmus.runtime import found
+
 # the order of a method, the order of its interpolant, and a step in the range where halving shows them
 METHODS = {"ode23": (3, 3, 0.05), "ode45": (5, 4, 0.1), "dop853": (8, 7, 0.25), "rodas": (4, 3, 0.05)}
 TWO_STATES = "smd"  # for which the methods are written out here
@@ -86,6 +88,12 @@ def distance(one, other):
 def test_every_method_of_the_runtime_is_tested_here():
     files = (ROOT / "fmus" / "runtime").glob("*.py")
     assert {file.stem for file in files if "\nSTAGES = " in file.read_text()} == set(METHODS)
+
+
+def test_a_number_that_another_method_has_is_refused(monkeypatch):
+    monkeypatch.setattr(found.methods[1][1], "NUMBER", found.methods[0][1].NUMBER)
+    with pytest.raises(ValueError, match=r"^ode23\.py: the number 2 is taken; the next is 6$"):
+        found.found()
 
 
 @every_method

@@ -1,12 +1,14 @@
 """The names that a written-out model takes for itself; an author's are others."""
 
 from ...runtime.automaton import DryFriction
+from ...runtime.found import methods
 from .expressions import FUNCTIONS
 
 MATH = ("copysign", "inf", "pi", *FUNCTIONS)
 IMPORTS = {  # module -> what may be needed of it
+    "": tuple(label for label, _, _ in methods),
     "automaton": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
-    "codes": ("DOP853", "EXACT", "HYBRID", "ODE23", "ODE45", "RODAS"),
+    "codes": ("EXACT", "HYBRID"),
     "declare": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
     "march": ("March",),
     "methods": ("EXACT_ITEM", "ITEMS"),

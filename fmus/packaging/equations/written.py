@@ -5,6 +5,7 @@ from inspect import cleandoc
 from math import isfinite
 from textwrap import indent, wrap
 
+from ...runtime.methods import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
 from .anatomy import Anatomy
 from .declared import Contact, Fixed, Mode, Output, State, Variable
@@ -50,7 +51,7 @@ def written(an: Anatomy, file: str) -> str:
         first=first,
         file=file,
         imports="{imports}",
-        method=an.method.upper(),
+        method="EXACT" if an.method == EXACT_ITEM[0] else f"{an.method}.NUMBER",
         items="(EXACT_ITEM, *ITEMS)" if an.closed_form else "ITEMS",
         name=an.name,
         base="DryFriction" if an.contacts else "Oscillator",
@@ -68,7 +69,7 @@ def imports(text: str) -> str:
     lines = [f"from math import {', '.join(names)}\n"] if (names := sorted(used & set(MATH))) else []
     for module, offered in IMPORTS.items():
         if names := [name for name in offered if name in used]:
-            lines.append(f"from .runtime.{module} import {', '.join(names)}")
+            lines.append(f"from {f'.runtime.{module}'.rstrip('.')} import {', '.join(names)}")
     return "\n".join(lines)
 
 

@@ -19,7 +19,8 @@ calculated from vectors is one; y, f and modes, with a number or without, are ve
     e, k3, self.c2           any other: e_x, e_v;  k3_x, k3_v;  self.c2_x, self.c2_v
 
 A loop over contacts, places or speeds is unrolled; a function with a parameter `i: Contact` is written once for each
-contact.  The guard of all this is that arrays, scalars and C give the same bits (tests/written/test_written.py).
+contact.  A loop over the methods is unrolled for those that are offered; one that tests each of them becomes a chain.
+The guard of all this is that arrays, scalars and C give the same bits (tests/written/test_written.py).
 """
 
 from .live import beside, definition, files_of, written

@@ -16,6 +16,7 @@ CHOSEN = {"largest": ">", "first": "<"}  # one of the numbers
 BLANK = ("per_state", "per_contact")
 LINEAR = ("factored", "solved")
 RANGES = ("places", "speeds", "contacts")  # what a loop may run over
+METHODS = "methods"  # or (label, file, class) of every one
 LOOKED_UP = ("slip", "place")
 
 
@@ -38,6 +39,7 @@ class Numbers(Settled):
         self.zeros: set[str] = set()
         self.systems: dict[str, tuple[str, str]] = {}
         self.slopes: set[str] = set()  # names that are a Jacobian
+        self.named: dict[str, ast.expr] = {}  # of a loop over the methods: name -> what it stands for
 
     def refused(self, node: ast.AST, why: str) -> Refused:
         return Refused(f"{self.path}:{getattr(node, 'lineno', '?')}: '{ast.unparse(node)[:60]}' {why}.")
@@ -137,7 +139,21 @@ class Numbers(Settled):
 
     # ---- what is a number
 
+    def stands_for(self, target: ast.expr, label: str) -> None:
+        """What the names of a loop over the methods, label, file and class, stand for at one of them."""
+        parts = ast.Constant(label), ast.Name(label), expression(f"{label}.{self.spec.methods[label]}")
+        assert isinstance(target, ast.Tuple)
+        self.named = {getattr(name, "id", ""): part for name, part in zip(target.elts, parts, strict=True)}
+
+    def at_method(self, item: ast.expr, target: ast.expr, label: str) -> ast.expr:
+        self.stands_for(target, label)
+        found = self.visit(deepcopy(item))
+        self.named = {}
+        return found
+
     def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id in self.named:
+            return self.named[node.id]
         if self.kinds.get(node.id):
             raise self.refused(node, "is a vector where a number is wanted")
         return ast.Constant(self.index[node.id]) if node.id in self.index else node
@@ -181,6 +197,11 @@ class Numbers(Settled):
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         match node:
+            case ast.Call(ast.Name(id="getattr"), [thing, ast.Name(id=name)]) if name in self.named:
+                return ast.Attribute(self.visit(thing), ast.literal_eval(self.named[name]), ast.Load())
+            case ast.Call(func=ast.Name(id="tuple"), args=[ast.GeneratorExp(elt=item, generators=[each])]):
+                if isinstance(each.iter, ast.Name) and each.iter.id == METHODS:
+                    return ast.Tuple([self.at_method(item, each.target, label) for label in self.spec.methods])
             case ast.Call(func=ast.Name(id="len"), args=[one]) if kind := self.kind(one):
                 return ast.Constant(len(self.spec.parts(kind)))
             case ast.Call(func=ast.Name(id="total"), args=args):
@@ -211,7 +232,7 @@ class Numbers(Settled):
 
     def touched(self, node: ast.AST) -> bool:
         """Whether anything in a node may become something else."""
-        known_names = self.kinds, self.index, self.slopes, LINEAR
+        known_names = self.kinds, self.index, self.slopes, self.named, LINEAR
         for one in ast.walk(node):
             match one:
                 case ast.Name(id=name) | ast.Attribute(attr=name) if name in self.spec.flags or name in self.choices:
@@ -233,6 +254,9 @@ class Numbers(Settled):
                 return []
             case ast.AugAssign(target=target) if self.kind(target):
                 raise self.refused(node, "writes into a vector, which another name may share; write c = c + ...")
+            case ast.Expr(ast.Call(ast.Name(id="setattr"), [thing, ast.Name(id=name), value])) if name in self.named:
+                place = ast.Attribute(self.visit(thing), ast.literal_eval(self.named[name]), ast.Store())
+                return [ast.Assign([place], self.visit(value))]
             case ast.Return(value=ast.Tuple(elts=parts)):
                 return [ast.Return(row([term for one in parts for term in self.terms(one)]))]
             case ast.Return(value=value) if value and self.kind(value):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ...runtime.automaton import HYBRID_LAW, SIGN_LAW, THRESHOLD_LAW
 from ...runtime.declare import Declaring, variables
+from ...runtime.found import methods
 from ...runtime.methods import EXACT_ITEM, ITEMS
 from .. import BuildError
 
@@ -67,3 +68,8 @@ def choices(model: type[Declaring], offered: Offer | None) -> dict[str, tuple[in
 def gone(offered: Offer | None) -> frozenset[str]:
     """The labels of what is not offered."""
     return frozenset({*METHODS, *LAWS} - {*offered.methods, *offered.laws}) if offered else frozenset()
+
+
+def stepping(offered: Offer | None) -> dict[str, str]:
+    """Label and class of the methods with steps that are offered."""
+    return {label: cls.__name__ for label, _, cls in methods if offered is None or label in offered.methods}

@@ -9,19 +9,19 @@ from ...runtime.declare import Declaring, variables
 from .. import __version__
 from .declarations import Declarations
 from .needed import pruned
-from .offer import Offer, choices, gone
+from .offer import Offer, choices, gone, stepping
 from .spec import Spec
 from .text import Line, Writer
 
 FMUS = Path(__file__).resolve().parents[2]
-AT_HOME = "vectors.py"  # never travels
+AT_HOME = ("vectors.py", "found.py")  # never travel
 Files = dict[str, list[Line]]
 
 
 @cache
 def runtime() -> dict[str, str]:
     """Path and text of every file of the numerics and of what hosts them."""
-    paths = [path for path in sorted((FMUS / "runtime").glob("*.py")) if path.name not in (AT_HOME, "__init__.py")]
+    paths = [path for path in sorted((FMUS / "runtime").glob("*.py")) if path.name not in (*AT_HOME, "__init__.py")]
     return {f"runtime/{path.name}": path.read_text(encoding="utf-8") for path in paths}
 
 
@@ -32,7 +32,7 @@ def spec_of(model: type[Declaring], offered: Offer | None) -> Spec:
     closed = thing.linear and (offered is None or offered.closed)
     flags = {"dry": dry, "waits": dry and thing.waits, "driven": thing.driven, "linear": closed}
     flags["coupled"] = len(thing.contacts) > 1 or (dry and not thing.waits)
-    return Spec(thing.states, thing.contacts, flags, choices(model, offered), gone(offered))
+    return Spec(thing.states, thing.contacts, flags, choices(model, offered), gone(offered), stepping(offered))
 
 
 def written_out(model: type[Declaring], file: str, text: str, offered: Offer | None = None) -> Files:

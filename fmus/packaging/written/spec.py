@@ -19,6 +19,7 @@ class Spec:
     flags       attribute -> its value: dry, linear, ...
     choices     attribute -> all the values that it can have: chosen, friction, ...
     gone        labels of what is not offered
+    methods     label -> class, of those methods with steps that are offered
     """
 
     states: dict[str, str]
@@ -26,6 +27,7 @@ class Spec:
     flags: dict[str, bool] = field(default_factory=dict)
     choices: dict[str, tuple[int, ...]] = field(default_factory=dict)
     gone: frozenset[str] = frozenset()
+    methods: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         names = {*self.states, *self.states.values(), *self.contacts}

@@ -5,7 +5,7 @@ import re
 from copy import deepcopy
 
 from .declarations import Declarations, annotated, label, returned
-from .numbers import RANGES, Numbers
+from .numbers import METHODS, RANGES, Numbers
 from .settled import truth
 from .spec import Spec
 
@@ -35,8 +35,8 @@ class Writer:
         self.after = 0  # the lines of the source that have been dealt with
         self.numbers = self.fresh()
         tree = ast.parse(text, path)
-        imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and is_vectors(node)]
-        self.ranges = {alias.name for node in imports for alias in node.names} & {*RANGES}
+        imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and stays_at_home(node)]
+        self.ranges = {alias.name for node in imports for alias in node.names} & {*RANGES, METHODS}
         self.block(tree.body, 0)
         self.lines += self.old[self.after :]
 
@@ -93,6 +93,8 @@ class Writer:
                     self.function(node, depth, counted, i)
             case ast.For(target=ast.Name(id=name), iter=ast.Name(id=over)) if over in self.ranges:
                 self.unrolled(node, name, over, depth)
+            case ast.For(iter=ast.Name(id=over)) if over == METHODS and over in self.ranges:
+                return self.chosen(node, depth) if isinstance(node.body[0], ast.If) else self.of_methods(node, depth)
             case ast.If():
                 return self.branch(node, depth, "if")
             case ast.While() | ast.For() | ast.With():
@@ -115,6 +117,30 @@ class Writer:
             self.after = self.first(node.body[0])
             self.block(node.body, depth)
 
+    def of_methods(self, node: ast.For, depth: int) -> bool:
+        """A loop over the methods that are offered, once for each."""
+        for name in self.spec.methods:
+            self.numbers.stands_for(node.target, name)
+            self.after = self.first(node.body[0])
+            self.block(node.body, depth)
+        self.numbers.named = {}
+        return False
+
+    def chosen(self, node: ast.For, depth: int) -> bool:
+        """A loop that looks for the method in force: a chain of tests, the last of which is not asked for."""
+        (test,) = node.body
+        assert isinstance(test, ast.If)
+        many, leaves = len(self.spec.methods), True
+        for n, name in enumerate(self.spec.methods, 1):
+            self.numbers.stands_for(node.target, name)
+            if many > 1:
+                asked = f"{'if' if n == 1 else 'elif'} {ast.unparse(self.numbers.visit(deepcopy(test.test)))}:"
+                self.write(" " * depth + (asked if n < many else "else:"), test)
+            self.after = self.first(test.body[0])
+            leaves = self.block(test.body, depth + (4 if many > 1 else 0)) and leaves
+        self.numbers.named = {}
+        return leaves and many > 0
+
     def simple(self, node: ast.stmt, depth: int) -> None:
         if not self.numbers.touched(node):
             if isinstance(node, ast.Assign):
@@ -124,7 +150,10 @@ class Writer:
         old = ast.unparse(node)
         new: list[ast.stmt]
         match node:
-            case ast.ImportFrom() if is_vectors(node):
+            case ast.ImportFrom(module="found"):
+                names = [ast.alias(name) for name in sorted(self.spec.methods)]
+                new = [ast.ImportFrom(None, names, 1)] if names else []
+            case ast.ImportFrom() if stays_at_home(node):
                 return
             case ast.ImportFrom(module=str(module), level=0) if module.startswith("fmus."):
                 new = [ast.ImportFrom(module.removeprefix("fmus."), node.names, 1)]
@@ -231,7 +260,8 @@ class Writer:
                 value=ast.Call(func=ast.Name(id="Choice"), args=[start, *_]) as choice,
             ):
                 possible = self.spec.choices.get(name)
-                if possible and self.declared.constants.get(getattr(start, "id", "")) not in possible:
+                kept = ast.unparse(start).removesuffix(".NUMBER") in self.spec.methods
+                if possible and not kept and self.declared.constants.get(getattr(start, "id", "")) not in possible:
                     choice.args[0] = ast.Constant(possible[0])
 
     def is_gone(self, node: ast.expr) -> bool:
@@ -239,9 +269,9 @@ class Writer:
         return (label(node) or self.declared.constants.get(getattr(node, "id", ""))) in self.spec.gone
 
 
-def is_vectors(node: ast.ImportFrom) -> bool:
-    """Whether this imports the vectors, which stay at home."""
-    return (node.module or "").rsplit(".", 1)[-1] == "vectors"
+def stays_at_home(node: ast.ImportFrom) -> bool:
+    """Whether this imports what does not travel: the vectors, and the methods that are found."""
+    return (node.module or "").rsplit(".", 1)[-1] in ("vectors", "found")
 
 
 def is_contact(argument: ast.arg) -> bool:
