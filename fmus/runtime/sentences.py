@@ -2,7 +2,7 @@
 
 Fields: t, h are the communication step that is asked for; now, t_end the present point and where the run ends; t0 is
 the beginning of the internal step in force; start, stop are the experiment; text, unit and allowed are declared of the
-variable `name`.  Numbers stand as repr writes them.
+variable `name`.  Of a call: word is what it is about, a type, an address, phases.  Numbers stand as repr writes them.
 """
 
 from __future__ import annotations
@@ -14,16 +14,27 @@ from .codes import (
     BAD_STEP,
     BAD_STOP,
     CALCULATED,
+    CO_SIMULATES,
     DIVERGED,
     ENDLESS,
     FIXED,
     FOREIGN_STATE,
+    INITIALISING,
+    INSTANTIATED,
     INTEGRATED,
     INTERRUPTED,
+    NO_ADDRESS,
+    NO_MEMORY,
     NO_VARIABLE,
+    NOT_OFFERED,
+    OUT_OF_ORDER,
     OUT_OF_RANGE,
     RULES,
+    RUNNING,
     STALLED,
+    TERMINATED,
+    TOO_SHORT,
+    WRONG_TOKEN,
 )
 from .declare import Declared
 from .march import MOST_CALLS, MOST_STEPS
@@ -50,10 +61,23 @@ VALUES = {
     OUT_OF_RANGE: "{name} = {value}{unit} is refused: {text} must be {allowed}",
 }
 CALLS = {
-    NO_VARIABLE: "value reference {reference} is refused: it is not that of a variable of type {kind}; the model "
+    NO_VARIABLE: "value reference {reference} is refused: it is not that of a variable of type {word}; the model "
     "description of this very FMU has those that are",
     FOREIGN_STATE: "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; save a state "
     "anew and pass it on unchanged",
+    OUT_OF_ORDER: "{function} is refused: the FMU is {phase}, the call is allowed when it is {word}",
+    NO_ADDRESS: "{function} is refused: an address is missing, {word} is NULL",
+    NO_MEMORY: "{function} failed: no memory is left",
+    NOT_OFFERED: "{function} is refused: this FMU does not offer it, see its description",
+    TOO_SHORT: "{function} is refused: a state does not fit into so few bytes",
+    WRONG_TOKEN: "{function} is refused: the GUID must be {word}, that of modelDescription.xml",
+    CO_SIMULATES: "{function} is refused: this FMU is for co-simulation only",
+}
+PHASES = {
+    INSTANTIATED: "instantiated",
+    INITIALISING: "in initialisation mode",
+    RUNNING: "running",
+    TERMINATED: "terminated",
 }
 
 

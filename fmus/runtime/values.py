@@ -146,4 +146,4 @@ class Values(Failing):
 
 def no_variable(kind: str, reference: int) -> str:
     """The sentence about a value reference, which the layer hands over as if it had a sign."""
-    return sentences.CALLS[NO_VARIABLE].format(reference=reference & 0xFFFFFFFF, kind=kind)
+    return sentences.CALLS[NO_VARIABLE].format(reference=reference & 0xFFFFFFFF, word=kind)

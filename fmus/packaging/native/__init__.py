@@ -5,7 +5,8 @@
     expressions.py, statements.py    one function of the numerics, specialised to the kinds of its arguments
     program.py       all functions that the FMI layer reaches, each once
     interface.py     the declared variables and the sentences, as C tables
-    numerics.h, text.h, fmi2.c       written by hand: Python's arithmetic, Python's numbers as text, FMI 2.0
+    numerics.h, text.h               written by hand: Python's arithmetic, Python's numbers as text
+    instance.h, fmi2.c               what an instance is; FMI 2.0
     sources.py       the folder sources/ of an FMU, which any tool can compile
     compiler.py, universal.py        the binaries
     fmu.py           the file

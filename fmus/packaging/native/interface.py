@@ -9,7 +9,7 @@ from ...runtime import codes
 from ...runtime.codes import INTEGRATED, INTERRUPTED, RULES
 from ...runtime.declare import Declared, Declaring
 from ...runtime.failure import ANSWERS
-from ...runtime.sentences import CALLS, RUN, VALUES
+from ...runtime.sentences import CALLS, PHASES, RUN, VALUES
 from ..description import declared_by
 from ..written import beside
 from .entries import entries
@@ -76,8 +76,12 @@ static void tell_value(Text *text, int64_t reason, const Variable *variable, dou
 {values}    }}
 }}
 
-/* Why a call is refused: there is no such variable of the type, or a state is foreign. */
-static void tell_call(Text *text, int64_t reason, int64_t reference, const char *type)
+enum {{ PHASES = {count_of_phases} }};
+
+static const char *const phases[PHASES] = {{{phases}}};
+
+/* Why a call is refused. */
+static void tell_call(Text *text, int64_t reason, const Call *call)
 {{
     switch (reason) {{
 {calls}    }}
@@ -91,7 +95,8 @@ PLACES = {  # field of a sentence -> what adds it to the text
     **{"now": "add_real(text, model->solver.t)", "t0": "add_real(text, model->solver.step.t0)"},
     **{"t_end": "add_real(text, model->solver.step.t_end)", "value": "add_value(text, variable, value)"},
     **{name: f"add(text, variable->{name})" for name in ("name", "unit", "text", "allowed")},
-    **{"reference": "add_integer(text, reference)", "kind": "add(text, type)"},
+    **{name: f"add(text, call->{name})" for name in ("function", "word", "phase")},
+    "reference": "add_integer(text, call->reference)",
 }
 ELSEWHERE = (INTEGRATED, INTERRUPTED)  # statuses of other kinds
 
@@ -133,6 +138,8 @@ def header(model: type[Declaring]) -> str:
         statuses=_cases(statuses, PLACES) + _cases(broken, own),
         values=_cases(VALUES, PLACES),
         calls=_cases(CALLS, PLACES),
+        phases=", ".join(_text(PHASES[phase]) for phase in range(len(PHASES))),
+        count_of_phases=len(PHASES),
     )
 
 

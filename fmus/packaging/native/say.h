@@ -1,4 +1,4 @@
-/* Sentences to the importer's logger and to standard error, wherever that may lead. */
+/* Sentences to standard error, wherever that may lead; names as loggers expect them. */
 #ifndef SAY_H
 #define SAY_H
 
@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmi2Functions.h"
 #include "text.h"
 
 #if defined(_WIN32)
@@ -80,20 +79,13 @@ static void copy_name(char *copy, const char *name)
     *copy = '\0';
 }
 
-static void announce(const fmi2CallbackFunctions *functions, const char *instance, bool logging, const Text *text)
+/* On standard error, whatever has become of it. */
+static void announce(const char *instance, const char *sentence)
 {
-    size_t length = strlen(MODEL_NAME) + strlen(instance) + text->length + strlen(" (): \n");
+    size_t length = strlen(MODEL_NAME) + strlen(instance) + strlen(sentence) + strlen(" (): \n");
     char *line = malloc(length + 1);
-    if (logging && functions->logger) {
-        Text format = {0}; /* the message is taken for a printf format */
-        for (const char *c = text->line; *c; c++) {
-            char piece[3] = {*c, *c == '%' ? '%' : '\0', '\0'};
-            add(&format, piece);
-        }
-        functions->logger(functions->componentEnvironment, instance, fmi2Error, "logStatusError", format.line);
-    }
     if (!line) return;
-    snprintf(line, length + 1, "%s (%s): %s\n", MODEL_NAME, instance, text->line);
+    snprintf(line, length + 1, "%s (%s): %s\n", MODEL_NAME, instance, sentence);
     put_on_standard_error(line, length);
     free(line);
 }

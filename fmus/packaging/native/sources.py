@@ -10,7 +10,7 @@ from ..document import document
 from .interface import header
 
 COMPILED = "fmi2.c"  # includes all the others
-WRITTEN = (COMPILED, "numerics.h", "say.h", "state.h", "text.h", "variable.h")
+WRITTEN = (COMPILED, "instance.h", "numerics.h", "say.h", "state.h", "text.h", "variable.h")
 FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")  # 2-clause BSD
 
 

@@ -32,6 +32,13 @@ typedef struct {
     bool is_bool; /* otherwise an int64_t */
 } Member;
 
+/* What is told of a call that is refused. */
+typedef struct {
+    const char *function, *word; /* what it is about: a type, an address, phases */
+    const char *phase;
+    uint32_t reference;
+} Call;
+
 static inline void add_value(Text *text, const Variable *variable, double value)
 {
     if (variable->is_real) add_real(text, value);

@@ -1,0 +1,349 @@
+/* An instance of the model in model.h in the hands of an importer, whatever the version of FMI.
+ *
+ * Every call does what it does in the Python FMU of the same model, by the same rules (rules_... in model.h) and with
+ * the same sentences: a value that cannot be used is remembered and told by the next step; a run that cannot begin or
+ * go on answers Error, and every calculated Real reads NaN from then on.  On top, calls out of order, wrong references
+ * and missing addresses are refused: such a call changes nothing.
+ *
+ * All that an instance changes is in one struct, and nothing is shared: instances may run side by side in threads.
+ * Who includes this says what a Host and a Status are, and how a sentence gets into the log.
+ */
+#ifndef INSTANCE_H
+#define INSTANCE_H
+
+#include "model.h"
+#include "say.h"
+#include "state.h"
+
+typedef struct {
+    State state;
+    bool logging;
+    Host host;
+    char name[];
+} Instance;
+
+/* What a call answers, by the numbers that all versions of FMI have for it. */
+#define DONE ((Status)0)
+#define DISCARDED ((Status)2)
+#define REFUSED ((Status)3)
+
+/* A type of FMI, and what of our variables is of it. */
+typedef struct {
+    const char *name;
+    bool is_real;
+} Type;
+
+/* Phases as bits. */
+enum { NEW = 1 << INSTANTIATED, SETTING_UP = NEW | 1 << INITIALISING, ALIVE = SETTING_UP | 1 << RUNNING };
+enum { ANY = ALIVE | 1 << TERMINATED };
+
+/* ---- saying what is wrong */
+
+static void log_to(const Host *host, const char *name, const char *sentence);
+
+static void say(const Host *host, const char *name, bool logging, const Text *text)
+{
+    if (logging) log_to(host, name, text->line);
+    announce(name, text->line);
+}
+
+static void say_of(const Instance *it, const Text *text) { say(&it->host, it->name, it->logging, text); }
+
+/* A mistake of the importer, which leaves the motion as it is. */
+static Status refuse_call(const Instance *it, int64_t reason, const Call *call)
+{
+    Text text = {0};
+    tell_call(&text, reason, call);
+    say_of(it, &text);
+    return REFUSED;
+}
+
+static Status refuse(const Instance *it, int64_t reason, const char *function, const char *word)
+{
+    return refuse_call(it, reason, &(Call){.function = function, .word = word});
+}
+
+static Status refuse_order(const Instance *it, int allowed, const char *function)
+{
+    Text words = {0};
+    if (!it) return REFUSED;
+    for (int i = 0; i < PHASES; i++) {
+        if (!(allowed & 1 << i)) continue;
+        if (words.length) add(&words, " or ");
+        add(&words, phases[i]);
+    }
+    return refuse_call(it, OUT_OF_ORDER, &(Call){function, words.line, phases[it->state.run.phase], 0});
+}
+
+static Status refuse_reference(const Instance *it, uint32_t reference, const char *type)
+{
+    return refuse_call(it, NO_VARIABLE, &(Call){.word = type, .reference = reference});
+}
+
+/* The instance, if the call is allowed in its phase. */
+#define ENTER(handle, allowed) \
+    Instance *it = handle;     \
+    if (!it || !(1 << it->state.run.phase & (allowed))) return refuse_order(it, (allowed), __func__)
+
+/* An address that the call cannot do without. */
+#define NEED(address) \
+    if (!(address)) return refuse(it, NO_ADDRESS, __func__, #address)
+
+/* ---- failure */
+
+static void silence(Model *model)
+{
+    for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
+        if (variable->is_real && variable->is_calculated) *(double *)place(model, variable) = NAN;
+    }
+}
+
+/* The refused value that came first. */
+static const Refusal *refused(const State *state)
+{
+    const Refusal *first = NULL, *end = state->refused + VARIABLES;
+    for (const Refusal *refusal = state->refused; refusal < end; refusal++) {
+        if (refusal->reason != OK && (!first || refusal->turn < first->turn)) first = refusal;
+    }
+    return first;
+}
+
+/* Fail for the reason that the rules give, in a communication step of h from t. */
+static Status give_up(Instance *it, int64_t status, double t, double h)
+{
+    State *state = &it->state;
+    Text text = {0};
+    if (status == FAILED) return REFUSED; /* which has been told */
+    if (status == BAD_VALUE) {
+        const Refusal *first = refused(state);
+        tell_value(&text, first->reason, &variables[first - state->refused], first->value);
+    } else {
+        tell_status(&text, status, &state->run, &state->model, t, h);
+    }
+    state->run.failed = true;
+    state->run.observed = false;
+    silence(&state->model);
+    say_of(it, &text);
+    return REFUSED;
+}
+
+/* What becomes of a call for which the rules found a status, and whether something faulted: where Python would raise. */
+static Status judged_by(Instance *it, int64_t status, bool fault, double t, double h)
+{
+    return status == OK && !fault ? DONE : give_up(it, fault ? DIVERGED : status, t, h);
+}
+
+/* ---- reading and writing */
+
+static bool is_one(uint32_t reference, const Type *type)
+{
+    return reference < VARIABLES && variables[reference].is_real == type->is_real;
+}
+
+/* Refuse a call unless every reference is that of a variable of the type, and there is room for the values. */
+static Status check(const Instance *it, const Type *type, const uint32_t vr[], size_t n, const void *value,
+                    const char *function)
+{
+    if (n && (!vr || !value)) return refuse(it, NO_ADDRESS, function, "vr or value");
+    for (size_t i = 0; i < n; i++) {
+        if (!is_one(vr[i], type)) return refuse_reference(it, vr[i], type->name);
+    }
+    return DONE;
+}
+
+/* Make the values ready to be read; DISCARDED after a fault. */
+static Status ready(Instance *it, const Type *type, const uint32_t vr[], size_t n, const void *value,
+                    const char *function)
+{
+    State *state = &it->state;
+    bool reported = false, ahead = false, fault = false;
+    if (!vr || !value) return check(it, type, vr, n, value, function);
+    for (size_t i = 0; i < n; i++) {
+        if (!is_one(vr[i], type)) return check(it, type, vr, n, value, function);
+        reported |= variables[vr[i]].is_reported;
+        ahead |= vr[i] == T_NEXT;
+    }
+    if (!state->run.observed && !state->run.failed) {
+        int64_t status = rules_observe(&state->run, &state->model, &fault);
+        if (status == DIVERGED) fault = true;
+        else if (status != OK) silence(&state->model);
+    }
+    if (reported && state->run.observed && !fault) rules_report(&state->model, ahead, &fault);
+    if (!fault) return DONE;
+    give_up(it, DIVERGED, NAN, NAN);
+    return DISCARDED;
+}
+
+/* Take over a value, or remember that it cannot be used.  False after a fault. */
+static bool write_one(Instance *it, uint32_t reference, double value)
+{
+    State *state = &it->state;
+    const Variable *variable = &variables[reference];
+    Refusal *refusal = &state->refused[reference];
+    bool allowed = accepts(variable, value), fault = false;
+    if (value == value_of(&state->model, variable) && refusal->reason == OK) return true;
+    state->run.observed = false;
+    state->run.refused -= refusal->reason != OK;
+    refusal->reason = rules_reason(&state->run, variable->is_calculated, variable->is_fixed, allowed, &fault);
+    if (refusal->reason != OK) {
+        state->run.refused++;
+        refusal->value = value;
+        refusal->turn = ++state->turns;
+        return true;
+    }
+    rules_change(&state->run, &state->model, &fault);
+    if (fault) {
+        give_up(it, DIVERGED, NAN, NAN);
+        return false;
+    }
+    if (variable->is_real) *(double *)place(&state->model, variable) = value;
+    else *(int64_t *)place(&state->model, variable) = (int64_t)value;
+    return true;
+}
+
+static double real_at(const Instance *it, uint32_t reference)
+{
+    return *(const double *)((const char *)&it->state.model + variables[reference].offset);
+}
+
+static int64_t integer_at(const Instance *it, uint32_t reference)
+{
+    return *(const int64_t *)((const char *)&it->state.model + variables[reference].offset);
+}
+
+/* Reading and writing by the functions of a version of FMI; after a fault each value is `blank`. */
+#define READ(it, type, vr, n, value, at, blank)                                            \
+    Status status = ready(it, type, vr, n, value, __func__);                               \
+    if (status == REFUSED) return REFUSED;                                                 \
+    for (size_t i = 0; i < (n); i++) value[i] = status ? (blank) : at(it, vr[i]);          \
+    return DONE
+
+#define WRITE(it, type, vr, n, value)                                            \
+    if (check(it, type, vr, n, value, __func__)) return REFUSED;                 \
+    for (size_t i = 0; i < (n) && write_one(it, vr[i], value[i]); i++) continue; \
+    return DONE
+
+/* Of a type that no variable is of. */
+#define REFUSE_ALL(it, vr, n, type) \
+    if (!(n)) return DONE;          \
+    NEED(vr);                       \
+    return refuse_reference(it, vr[0], type)
+
+/* ---- from instantiation to the end */
+
+/* A new instance; NULL with a sentence if there is no memory. */
+static Instance *instantiate(const char *name, const Host *host, bool logging, const char *function)
+{
+    Text why = {0};
+    Instance *it = calloc(1, sizeof *it + 4 * strlen(name) + 1);
+    if (!it) {
+        tell_call(&why, NO_MEMORY, &(Call){.function = function});
+        say(host, "", logging, &why);
+        return NULL;
+    }
+    copy_name(it->name, name);
+    it->host = *host;
+    it->logging = logging;
+    memcpy(&it->state, &initial, sizeof initial);
+    return it;
+}
+
+/* None: such an instance cannot be. */
+static Instance *dismissed(Instance *it, int64_t reason, const char *function, const char *word)
+{
+    refuse(it, reason, function, word);
+    free(it);
+    return NULL;
+}
+
+/* Every message is of the category logStatusError. */
+static Status choose_log(Instance *it, bool logging, size_t n, const char *const categories[])
+{
+    it->logging = logging && n == 0;
+    for (size_t i = 0; i < n; i++) {
+        const char *category = categories[i] ? categories[i] : "";
+        it->logging |= logging && (!strcmp(category, "logStatusError") || !strcmp(category, "logAll"));
+    }
+    return DONE;
+}
+
+/* The run begins. */
+static Status begin(Instance *it)
+{
+    bool fault = false;
+    int64_t status = rules_begin(&it->state.run, &it->state.model, &fault);
+    return judged_by(it, status, fault, NAN, NAN);
+}
+
+static Status step_by(Instance *it, double t, double h)
+{
+    bool fault = false;
+    int64_t status = rules_step(&it->state.run, &it->state.model, t, h, &fault);
+    return judged_by(it, status, fault, t, h);
+}
+
+/* ---- state */
+
+static Status refuse_state(const Instance *it) { return refuse(it, FOREIGN_STATE, "", ""); }
+
+/* Keep a state in memory, in place of an older one if there is one. */
+static Status keep(const Instance *it, const State *state, void **kept, const char *function)
+{
+    if (*kept && !is_ours(*kept)) return refuse_state(it);
+    if (!*kept && !(*kept = malloc(sizeof(Sealed)))) return refuse(it, NO_MEMORY, function, "");
+    seal(*kept, state);
+    return DONE;
+}
+
+static Status save(Instance *it, void **kept, const char *function)
+{
+    it->state.run.observed = false; /* here and there, outputs are calculated anew */
+    return keep(it, &it->state, kept, function);
+}
+
+static Status restore(Instance *it, void *kept)
+{
+    const State *state = unsealed(kept);
+    if (!state) return refuse_state(it);
+    memcpy(&it->state, state, sizeof *state);
+    return DONE;
+}
+
+static Status forget(const Instance *it, void **kept)
+{
+    if (!kept || !*kept) return DONE;
+    if (!is_ours(*kept)) return refuse_state(it);
+    free(*kept);
+    *kept = NULL;
+    return DONE;
+}
+
+static Status measure(const Instance *it, void *kept, size_t *size)
+{
+    if (!is_ours(kept)) return refuse_state(it);
+    *size = sizeof(Sealed);
+    return DONE;
+}
+
+static Status serialize(const Instance *it, void *kept, void *bytes, size_t size, const char *function)
+{
+    if (!unsealed(kept)) return refuse_state(it);
+    if (size < sizeof(Sealed)) return refuse(it, TOO_SHORT, function, "");
+    memset(bytes, 0, size);
+    memcpy(bytes, kept, sizeof(Sealed));
+    return DONE;
+}
+
+static Status deserialize(const Instance *it, const void *bytes, size_t size, void **kept, const char *function)
+{
+    if (size != sizeof(Sealed)) return refuse_state(it);
+    Sealed *sealed = malloc(sizeof *sealed); /* for bytes may lie where a state cannot */
+    if (!sealed) return refuse(it, NO_MEMORY, function, "");
+    memcpy(sealed, bytes, size);
+    const State *state = unsealed(sealed);
+    Status status = state ? keep(it, state, kept, function) : refuse_state(it);
+    free(sealed);
+    return status;
+}
+
+#endif
