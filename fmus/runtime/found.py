@@ -11,7 +11,7 @@ from types import ModuleType
 def found() -> list[tuple[str, ModuleType, type]]:
     """Label, file and class of each, in the order of their numbers."""
     paths = Path(__file__).parent.glob("*.py")
-    labels = [path.stem for path in paths if "\nSTAGES = " in path.read_text(encoding="utf-8")]
+    labels = [path.stem for path in paths if "\nSTAGES" in path.read_text(encoding="utf-8")]
     files = {label: import_module(f"{__package__}.{label}") for label in sorted(labels)}
     numbers = {label: file.NUMBER for label, file in files.items()}
     for label, number in numbers.items():

@@ -1,22 +1,13 @@
-"""The command line: one file a command; parse, one call, print."""
+"""The command line: one file a command, all that there are; parse, one call, print."""
 
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 
 import click
 
 from ..errors import HarnessError
-from .bench import bench
-from .compare import compare
-from .couple import couple
-from .decay import decay
-from .importers import importers
-from .list_ import list_
-from .precision import precision
-from .references import references
-from .report import report
-from .run import figures, run
-from .stability import stability
-from .sweep import sweep
+from .run import figures
 from .terminal import answer, progress, results
 
 
@@ -52,8 +43,7 @@ def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> N
             raise HarnessError("\n".join(failed))
 
 
-for command in (
-    *(run, precision, stability, bench, importers, list_, decay),
-    *(sweep, compare, couple, references, report),
-):
-    commands.add_command(command)
+for file in iter_modules(__path__):
+    for command in vars(import_module(f"{__name__}.{file.name}")).values():
+        if isinstance(command, click.Command):
+            commands.add_command(command)

@@ -47,7 +47,7 @@ def changed(text, change):
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("what", ["model", "law", "method"])
+@pytest.mark.parametrize("what", ["model", "law", "method", "command", "test"])
 def test_what_is_added_is_a_diff_of_one_file(what):
     (part,) = (part for part in PAGE.split("\n## ") if part.startswith(f"A {what}\n"))
     assert len({name for kind, name, _ in BLOCK.findall(part) if kind != "sh"}) == 1
