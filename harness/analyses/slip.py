@@ -13,18 +13,20 @@ import numpy as np
 from ..errors import HarnessError
 from ..results.quantity import Quantity
 from ..running.run import Run
+from . import samples
 
 
 @dataclass(frozen=True)
 class Slips:
-    """Number of slips; start of the first and period in s; `duration` (s) where modes show it; peaks in m/s, m/s2."""
+    """Number of slips; start of the first and period in s; `duration` (s) where modes show it; peak speed in m/s, and
+    peak acceleration in m/s2 where the acceleration is recorded."""
 
     count: int
     first: float
     period: float
     duration: float | None
     peak_speed: float
-    peak_acceleration: float
+    peak_acceleration: float | None
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
@@ -33,33 +35,40 @@ class Slips:
             Quantity("first_slip", self.first, "s", "first slip"),
             Quantity("period", self.period, "s", "slip period"),
             Quantity("peak_speed", self.peak_speed, "m/s", "peak speed"),
-            Quantity("peak_acceleration", self.peak_acceleration, "m/s2", "peak acceleration"),
         ]
+        if self.peak_acceleration is not None:
+            found.append(Quantity("peak_acceleration", self.peak_acceleration, "m/s2", "peak acceleration"))
         if self.duration is not None:
             found.insert(3, Quantity("slip_time", self.duration, "s", "duration of a slip"))
         return tuple(found)
 
 
 def analyse(run: Run) -> Slips:
-    """The slips of a sled; HarnessError with fewer than two."""
+    """The slips of a sled; HarnessError with fewer than two, or too few samples in one."""
     driver = run.parameter("v_driver", "the analysis 'slip'")
-    v, a = run.motion("velocity"), run.motion("acceleration")
+    v = run.motion("velocity")
     if not driver:
         raise HarnessError("the analysis 'slip' needs a driver that moves, and v_driver is 0 m/s")
+    ahead = v * np.sign(driver) - abs(driver)  # of the driver
     if run.events is not None and len(run.events.t) > 1:
         starts, durations = slips_of_modes(run.events.t, run.events.mode)
+        ends = starts[: len(durations)] + durations
     else:
-        starts, durations = crossings(run.time, v * np.sign(driver) - abs(driver)), np.array([])
+        starts, durations = crossings(run.time, ahead), np.array([])
+        ends = crossings(run.time, -ahead)
+        ends = ends[np.searchsorted(ends, starts[:1]).sum() :]  # a slip that was under way is no slip that started
     if len(starts) < 2:
         raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: take a later stop")
-    fast = v * np.sign(driver) >= abs(driver)
+    samples.check(run.time, starts[: len(ends)], ends, "slip")
+    fast = ahead >= 0
+    accelerated = "acceleration" in run.wanted.motion
     return Slips(
         count=len(starts),
         first=float(starts[0]),
         period=float(np.mean(np.diff(starts))),
         duration=float(np.mean(durations)) if len(durations) else None,
         peak_speed=crest(run.time, np.abs(v), fast),
-        peak_acceleration=crest(run.time, np.abs(a), widened(fast)),
+        peak_acceleration=crest(run.time, np.abs(run.motion("acceleration")), widened(fast)) if accelerated else None,
     )
 
 

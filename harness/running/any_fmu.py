@@ -4,7 +4,6 @@ One of ours runs at its solver's own steps.  Another does not tell where these e
 halved until two results agree.
 """
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,17 +31,7 @@ def own(path: Path, stop: float | None, values: dict[str, Any], grid: float | No
     if found.fmiVersion != "2.0" or any(name not in names for name in NEEDED):
         return None
     outputs = tuple(variable.name for variable in found.modelVariables if variable.causality == "output")
-    return gridded(Specification(path, outputs, values, stop=stop, grid=grid))
-
-
-def gridded(wanted: Specification) -> Specification:
-    """The same with a grid, its own or one that runs of anyone's FMUs meet."""
-    if wanted.grid is not None:
-        return wanted
-    experiment = description(wanted.fmu).defaultExperiment
-    start = float(experiment.startTime or 0) if wanted.start is None else wanted.start
-    stop = float(experiment.stopTime) if wanted.stop is None else wanted.stop
-    return replace(wanted, grid=(stop - start) / POINTS)
+    return Specification(path, outputs, values, stop=stop, grid=grid, even=POINTS)
 
 
 def run(

@@ -9,7 +9,7 @@ from array import array
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr
 from ctypes import byref, c_double, c_int, c_uint, c_void_p
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from time import perf_counter
 from typing import Any
@@ -126,6 +126,8 @@ def planned(wanted: Specification, description: Any) -> Plan:
     stop = float(experiment.stopTime) if wanted.stop is None else wanted.stop
     if not stop > start:
         raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
+    if wanted.grid is None and wanted.even:
+        wanted = replace(wanted, grid=(stop - start) / wanted.even or None)
     if wanted.grid is not None and (points := (stop - start) / wanted.grid) > MOST_POINTS:
         sentence = f"grid = {wanted.grid!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
         raise SceneError(f"{sentence}; at most {MOST_POINTS}: take a larger one")

@@ -16,6 +16,7 @@ SHORT = {
     "atol": "solver.atol",
     "h_max": "solver.h_max",
 }
+EVEN = 4096  # communication steps of a scene that says nothing of them: enough to draw and to measure
 
 
 @dataclass(frozen=True)
@@ -23,8 +24,8 @@ class Specification:
     """One run of an FMU of ours, from `start` to `stop` in s (None: its own).
 
     `values` are set by the names of variables, enumerations by label or number.  The communication points are those of
-    the `grid` (a step in s, if there is one), and where it is to `follow` them the ends of the solver's own steps.  It
-    is timed as often as it is to `repeat`.
+    the `grid` (a step in s, if there is one; `even`: without one, that of so many steps), and where it is to `follow`
+    them the ends of the solver's own steps.  It is timed as often as it is to `repeat`.
     """
 
     fmu: Path
@@ -33,6 +34,7 @@ class Specification:
     start: float | None = None
     stop: float | None = None
     grid: float | None = None
+    even: int = 0
     follow: bool = True
     repeat: int = 1
 
@@ -59,6 +61,7 @@ def of_scene(scene: Scene) -> Specification:
         start=scene.start,
         stop=scene.stop,
         grid=scene.grid,
-        follow=scene.follow,
+        even=EVEN if scene.follow is None else 0,
+        follow=scene.follows,
         repeat=scene.repeat,
     )

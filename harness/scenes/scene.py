@@ -6,11 +6,13 @@
     method, law               solver.method and friction by name; left out: the FMU's own
     rtol, atol, h_max         solver.rtol, solver.atol (m), solver.h_max (s); left out: the FMU's own
     outputs = ["x", "v"]      the columns to record
-    grid                      communication step in s; left out: the ends of the solver's own steps
-    follow = true             with a grid: visit the ends of the solver's own steps as well
+    grid                      communication step in s
+    follow = true             visit the ends of the solver's own steps as well; without a grid: these alone
+                              both left out: 4096 even steps and the solver's own
     repeat = 3                time the run as often, and report the fastest
     analyses = ["decay"]      decay, slip, steps
-    plots = ["phase"]         position, velocity, acceleration, phase, steps
+    plots = ["phase"]         position, velocity, acceleration, phase, steps, any output by its name; [] for none;
+                              left out: every output, and the phase plane
     [values]                  parameters and inputs by name, SI units; enumerations by name
     [decay]                   gives = "zeta", "f" or "T_f"; first = peaks to skip; cycles = how many to use (all)
     [published]               source = "..."; measured names with a number, [number, "unit"] or words
@@ -45,9 +47,10 @@ from .schema import (
 
 SHIPPED = Path(__file__).parent
 MOST_REPEATS = 1000
+MOST_PLOTS = 6  # over time that are drawn unasked
 
 # What may be asked for, and the roles that it needs among the outputs.
-ANALYSES = {"decay": ("position", "velocity"), "slip": ("velocity", "acceleration"), "steps": ()}
+ANALYSES = {"decay": ("position", "velocity"), "slip": ("velocity",), "steps": ()}
 PLOTS = {
     "position": ("position",),
     "velocity": ("velocity",),
@@ -101,7 +104,7 @@ class SceneKeys:
     follow: Annotated[bool | None, FLAG] = None
     repeat: Annotated[int, REPEATS] = 1
     analyses: Annotated[tuple[str, ...], NAMES] = ()
-    plots: Annotated[tuple[str, ...], NAMES] = ()
+    plots: Annotated[tuple[str, ...] | None, NAMES] = None
     values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)
     decay: Envelope = field(default_factory=Envelope)
     published: dict[str, Annotated[Any, FIGURE]] = field(default_factory=dict)
@@ -113,12 +116,17 @@ class Scene(SceneKeys):
 
     name: str
     file: Path
-    follow: bool
+    plots: tuple[str, ...]
 
     @property
     def motion(self) -> dict[str, str]:
         """The output that plays each role, of those recorded."""
         return roles(self.outputs)
+
+    @property
+    def follows(self) -> bool:
+        """Whether the ends of the solver's own steps are visited."""
+        return self.grid is None if self.follow is None else self.follow
 
 
 def shipped() -> list[Path]:
@@ -144,14 +152,22 @@ def load(scene: str | Path) -> Scene:
 def build(path: Path, table: dict[str, Any]) -> Scene:
     """A scene from the table that its file holds."""
     keys = structured(table, SceneKeys)
-    for key, names, allowed in (("analyses", keys.analyses, ANALYSES), ("plots", keys.plots, PLOTS)):
+    plots = usual(keys.outputs) if keys.plots is None else keys.plots
+    for key, names, allowed in (("analyses", keys.analyses, ANALYSES), ("plots", plots, (*PLOTS, *keys.outputs))):
         for name in names:
             if name not in allowed:
                 raise SceneError(unknown(f"name in {key}", name, allowed))
-    follow = keys.grid is None if keys.follow is None else keys.follow
-    scene = Scene(**vars(keys) | {"name": path.stem, "file": find(path, keys), "follow": follow})
+    scene = Scene(**vars(keys) | {"name": path.stem, "file": find(path, keys), "plots": plots})
     check_needs(scene)
     return scene
+
+
+def usual(outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """The plots of a scene that names none."""
+    motion = roles(outputs)
+    names = {output: role for role, output in motion.items()}
+    phase = ("phase",) if all(role in motion for role in PLOTS["phase"]) else ()
+    return (*[names.get(output, output) for output in outputs][:MOST_PLOTS], *phase)
 
 
 def check_needs(scene: Scene) -> None:
@@ -164,13 +180,13 @@ def check_needs(scene: Scene) -> None:
     )
     for kind, names, needs in asked:
         for name in names:
-            for role in needs[name]:
+            for role in needs.get(name, ()):
                 if role not in scene.motion:
                     wanted = " or ".join(ROLES[role])
                     raise SceneError(f"the {kind} '{name}' needs the {role}: add {wanted} to the outputs")
-            if name == "steps" and not scene.follow:
+            if name == "steps" and not scene.follows:
                 raise SceneError(f"the {kind} 'steps' needs follow = true, or no grid")
-    if not scene.follow and scene.grid is None:
+    if not scene.follows and scene.grid is None:
         raise SceneError("follow = false needs a grid: name the communication step, as in grid = 0.01")
     if ("decay" in scene.analyses) != (scene.decay.gives is not None):
         raise SceneError("the analysis 'decay' and the table [decay] with gives = 'zeta', 'f' or 'T_f' come together")

@@ -16,7 +16,8 @@ from harness.errors import HarnessError
 from harness.scenes.scene import SceneKeys
 from harness.scenes.schema import keys
 
-SCENE = {"title": '"a title"', "model": '"smd"', "outputs": '["x", "v"]', "stop": "0.1"}
+SCENE = {"title": '"a title"', "model": '"smd"', "outputs": '["x", "v"]', "stop": "0.1", "plots": "[]"}
+PLOTS = '["position", "phase", "steps"]'
 HUGE = "9" * 400
 VALUES = (  # as TOML writes them
     *("0", "-1", "1e308", "-1e308", "1e-300", "5e-324", "inf", "nan", HUGE, "9" * 5000, "true", "1979-05-27", "{}"),
@@ -146,17 +147,17 @@ def test_whatever_a_file_holds_it_is_a_scene_or_refused(here):
 
 @pytest.mark.parametrize("title", ["$x_{$", "$", "\\$", "a_{b^c", "\u5b57\u0378", "%d {0} {x}"])
 def test_a_title_is_drawn_letter_by_letter(here, title):
-    plots = 'plots = ["position", "phase", "steps"]\n'
-    lines = "".join(f"{name} = {told}\n" for name, told in (SCENE | {"title": f"'{title}'"}).items())
-    (here / "mine.toml").write_text(lines + plots, encoding="utf-8")
+    changed = {"title": f"'{title}'", "plots": PLOTS}
+    lines = "".join(f"{name} = {told}\n" for name, told in (SCENE | changed).items())
+    (here / "mine.toml").write_text(lines, encoding="utf-8")
     assert ended("run", "mine.toml", "--quiet") == (0, "")
     assert (here / "results/mine/figure.png").stat().st_size > 1000
 
 
 def test_numbers_near_the_end_of_their_range_are_drawn_or_refused(here):
     for values in ("x0 = 1e308", "x0 = 1e-308", "k = 1e300", "v0 = -1e300", "x0 = 5e-324\nv0 = 1e250", "m = 1e308"):
-        lines = "".join(f"{name} = {told}\n" for name, told in SCENE.items())
-        (here / "mine.toml").write_text(f'{lines}plots = ["position", "phase", "steps"]\n[values]\n{values}\n')
+        lines = "".join(f"{name} = {told}\n" for name, told in (SCENE | {"plots": PLOTS}).items())
+        (here / "mine.toml").write_text(f"{lines}[values]\n{values}\n")
         check(*ended("run", "mine.toml", "--quiet"), values)
 
 

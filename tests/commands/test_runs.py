@@ -1,6 +1,7 @@
 """The harness on the built FMUs, through its command line, in processes of their own."""
 
 import csv
+import json
 import re
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import commands
 import numpy as np
 import pytest
 from builds import ROOT
+from models import MODELS, outputs
 
 BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 
@@ -114,10 +116,62 @@ def test_steps_add_up_to_the_run(main_job):
 def test_a_scene_leaves_only_what_it_names(scene):
     done, results = scene(BASE + "grid = 0.25\nstop = 2")
     assert (done.returncode, done.stderr) == (0, "")
-    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "provenance.json"}
+    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "figure.png", "provenance.json"}
     head, columns = table(results / "trajectory.csv")
     assert head == ["t [s]", "x [m]", "v [m/s]"]
     assert list(columns[0]) == [0.25 * i for i in range(9)]
+
+
+def test_a_scene_that_wants_no_plots_has_none(scene):
+    _, results = scene(BASE + "grid = 1\nplots = []")
+    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "provenance.json"}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_scene_without_a_grid_is_dense_enough_to_draw_and_has_the_steps_of_its_solver(scene, model):
+    text = f"title = 'a title'\nmodel = '{model}'\noutputs = {outputs(model)[:2]}\nplots = []\n"
+    _, results = scene(text)
+    times = table(results / "trajectory.csv")[1][0]
+    assert np.diff(times).max() <= (times[-1] - times[0]) / 4096 * (1 + 1e-9)
+    steps = table(results / "steps.csv")[1]
+    assert set(steps[0]) <= set(times)
+    _, results = scene(text + "follow = true\n")
+    assert table(results / "steps.csv")[1] == pytest.approx(steps, rel=1e-9)
+    assert len(table(results / "trajectory.csv")[1][0]) == len(steps[0]) + 1
+
+
+SLIP = 'model = "stickslip"\noutputs = ["x", "v", "a"]\nanalyses = ["slip"]\n'
+SWING = 'model = "smd"\noutputs = ["x", "v"]\nanalyses = ["decay"]\n'
+END = 'plots = []\n[decay]\ngives = "zeta"\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "coarse", "name", "value"),
+    [
+        (SLIP, "grid = 0.2\n", "peak_speed", 0.41736),
+        (SLIP, "grid = 0.2\nfollow = true\n", "peak_speed", 0.41736),
+        (SLIP, "follow = true\n", "peak_acceleration", 2.9546),  # a closed form steps from event to event
+        (SLIP + 'method = "ode23"\nlaw = "threshold"\n', "grid = 0.15\n", "peak_speed", 0.41736),
+        (SWING, "grid = 0.3\n", "zeta", 0.0796),
+        (SWING, "grid = 0.04\n", "zeta", 0.0796),
+    ],
+)
+def test_a_measure_that_its_samples_cannot_support_is_refused_and_the_remedy_helps(scene, text, coarse, name, value):
+    text = 'title = "a title"\n' + text
+    text += "" if text.endswith(SLIP[-20:]) or "law" in text else END
+    done, _ = scene(text.replace("\nanalyses", f"\n{coarse}analyses"))
+    assert done.returncode == 1
+    (step,) = re.findall(r"8 samples are needed in each .* has \d: take a grid of (\S+) s\n", done.stderr)
+    done, _ = scene(text.replace("\nanalyses", f"\ngrid = {step}\nanalyses"), "--json")
+    found = {each["name"]: each["value"] for each in json.loads(done.stdout)["quantities"]}
+    assert found[name] == pytest.approx(value, rel=1e-3)
+
+
+def test_slips_are_measured_without_the_acceleration(scene):
+    done, _ = scene(BASE + "plots = []\nanalyses = ['slip']", "--json")
+    names = [each["name"] for each in json.loads(done.stdout)["quantities"]]
+    assert "peak_speed" in names
+    assert "peak_acceleration" not in names
 
 
 def test_a_grid_that_follows_has_the_grid_points_and_the_steps(scene):
@@ -151,7 +205,11 @@ def test_the_grid_does_not_change_the_steps_of_the_solver(scene):
         (BASE + "stop = -1", 2, "stop = -1 s is not after start = 0.0 s"),
         (BASE + "[values]\nmu_d = 0.95", 1, "mu_d is 0.95, above mu_s = 0.9"),
         (BASE + 'law = "threshold"\nmethod = "exact"', 1, "closed form"),
-        (BASE.replace("stickslip", "smd") + "analyses = ['decay']\n[decay]\ngives = 'f'", 1, "turning points"),
+        (
+            BASE.replace("stickslip", "smd") + "stop = 0.1\nanalyses = ['decay']\n[decay]\ngives = 'f'",
+            1,
+            "turning points",
+        ),
         (BASE + "[published]\nsource = 'me'\nperiod = 3", 2, "unknown name in [published] 'period'"),
         (BASE.replace("model", "fmu"), 1, "there is no "),
     ],
@@ -240,9 +298,9 @@ def test_list_shows_every_scene(place):
 @pytest.mark.parametrize(
     ("extra", "loaded"),
     [
-        ("grid = 1", set()),
+        ("plots = []", set()),
         ("plots = ['position']", {"matplotlib"}),
-        ("outputs = ['x', 'v', 'a']\nanalyses = ['slip']", {"harness.analyses.slip"}),
+        ("outputs = ['x', 'v']\nplots = []\nanalyses = ['slip']", {"harness.analyses.slip"}),
     ],
 )
 def test_a_scene_imports_only_what_it_names(place, tmp_path, extra, loaded):
@@ -252,7 +310,7 @@ def test_a_scene_imports_only_what_it_names(place, tmp_path, extra, loaded):
     code = (
         "import sys; from pathlib import Path; from harness.studies.run.job import perform\n"
         "from harness.scenes.scene import load\n"
-        f"perform(load({str(tmp_path / 'mine.toml')!r}), Path({str(tmp_path)!r}), print)\n"
+        f"perform(load({str(tmp_path / 'mine.toml')!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
         f"print(sorted({optional!r} & set(sys.modules)))"
     )
     done = python(place, "-c", code)

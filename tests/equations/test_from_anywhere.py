@@ -213,16 +213,6 @@ def test_a_result_is_certified_by_two_methods_that_agree_and_goes_into_the_next_
     )
 
 
-def test_the_model_of_the_readme_is_built_runs_and_is_certified(tmp_path):
-    """As it stands there, by the commands that stand there."""
-    _, said = (ROOT / "README.md").read_text().split("## A model of your own")
-    (tmp_path / "cart.py").write_text(said.split("```python\n")[1].split("```")[0])
-    assert command("cart.py", cwd=tmp_path).returncode == 0
-    assert validate_fmu(str(tmp_path / "cart.fmu")) == []
-    assert harness("references", "cart.py", cwd=tmp_path).returncode == 0
-    assert harness("run", "--fmu", "cart.fmu", cwd=tmp_path).returncode == 0
-
-
 DUFFING = '''
 from fmus import Model, Output, Parameter, State, cos
 

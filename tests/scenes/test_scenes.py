@@ -29,12 +29,27 @@ def test_every_shipped_scene_loads_and_names_its_source(path):
 def test_what_a_scene_leaves_out_is_left_to_the_fmu(tmp_path):
     scene = load(write(tmp_path))
     assert {scene.method, scene.law, scene.rtol, scene.start, scene.stop, scene.grid} == {None}
-    assert (scene.analyses, scene.plots, scene.values, scene.follow) == ((), (), {}, True)
+    assert (scene.analyses, scene.values, scene.follow, scene.follows) == ((), {}, None, True)
 
 
 def test_a_grid_does_not_follow_the_solver_unless_asked(tmp_path):
-    assert not load(write(tmp_path, grid="0.1")).follow
-    assert load(write(tmp_path, grid="0.1", follow="true")).follow
+    assert not load(write(tmp_path, grid="0.1")).follows
+    assert load(write(tmp_path, grid="0.1", follow="true")).follows
+
+
+@pytest.mark.parametrize(
+    ("outputs", "plots"),
+    [
+        ('["x", "v", "a"]', ("position", "velocity", "acceleration", "phase")),
+        ('["x", "v", "mode"]', ("position", "velocity", "mode", "phase")),
+        ('["mode"]', ("mode",)),
+        ('["x", "v", "a", "mode", "energy", "F_spring", "F_friction"]', 6),
+    ],
+)
+def test_a_scene_that_names_no_plots_has_those_of_its_outputs(tmp_path, outputs, plots):
+    found = load(write(tmp_path, outputs=outputs)).plots
+    assert found == plots if isinstance(plots, tuple) else len(found) == plots + 1
+    assert load(write(tmp_path, outputs=outputs, plots="[]")).plots == ()
 
 
 @pytest.mark.parametrize(

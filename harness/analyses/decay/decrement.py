@@ -16,6 +16,7 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...results.quantity import Quantity
+from .. import samples
 
 if TYPE_CHECKING:
     from ...running.run import Run  # a record from a file needs nothing that runs
@@ -37,6 +38,7 @@ def analyse(run: "Run", gives: str, first: int = 0, cycles: float | None = None)
     for all; HarnessError if the run does not show one."""
     times, positions = turning_points(run.time, run.motion("position"), run.motion("velocity"))
     times, positions, cycles = chosen(times, positions, first, cycles)
+    samples.check(run.time, times[:-1], times[1:], "half swing")
     x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
     if gives == "zeta":
         result = Quantity("zeta", damping_ratio(x_0, x_n, cycles), "1", f"damping ratio, {cycles:g} cycles")

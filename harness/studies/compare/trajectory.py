@@ -9,7 +9,7 @@ import numpy as np
 from ...analyses.decay.columns import numeric, split
 from ...analyses.decay.units import TIMES
 from ...errors import HarnessError, SceneError, shown
-from ...running.any_fmu import gridded, run
+from ...running.any_fmu import POINTS, run
 from ...running.fmu import simulate
 from ...running.specification import of_scene
 from ...running.trajectory import Trajectory, of_run
@@ -74,7 +74,7 @@ def ran(
     scene = load_scene(source)
     check_built(scene.file)
     wanted = of_scene(scene)
-    found = of_run(simulate(replace(wanted, grid=grid) if grid else gridded(wanted), report))
+    found = of_run(simulate(replace(wanted, grid=grid or wanted.grid, even=POINTS), report))
     return replace(found, name=scene.name)
 
 

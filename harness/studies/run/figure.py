@@ -11,7 +11,7 @@ from ...results.style import BLUE, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
 from ...running.run import Run
 from ...scenes.scene import Scene
 
-OVER_TIME = ("position", "velocity", "acceleration")  # left, one below the other; the others stand on the right
+BESIDE = ("phase", "steps")  # on the right; what is over time stands on the left, one below the other
 EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
 
 Results = dict[str, Any]  # by the name of the analysis
@@ -20,24 +20,23 @@ Results = dict[str, Any]  # by the name of the analysis
 def draw(scene: Scene, run: Run, results: Results, path: Path) -> None:
     """Save the figure of all plots that the scene names as a PNG file."""
     columns = [
-        [name for name in scene.plots if (name in OVER_TIME) == left]
-        for left in (True, False)
-        if any((name in OVER_TIME) == left for name in scene.plots)
+        names for right in (False, True) if (names := [name for name in scene.plots if (name in BESIDE) == right])
     ]
     height = HEIGHT * max(2, *map(len, columns), 2)
     with sheet(path, WIDTH * len(columns), height) as figure:
         figure.suptitle(f"{scene.title}\n{run.setting}", fontsize=11)
         parts = figure.subfigures(1, len(columns), squeeze=False)[0]
         for part, names in zip(parts, columns, strict=True):
-            over_time = names[0] in OVER_TIME
+            over_time = names[0] not in BESIDE
             for axes, name in zip(part.subplots(len(names), sharex=over_time, squeeze=False)[:, 0], names, strict=True):
-                PANELS[name](axes, run, results)
+                PANELS[name](axes, run, results) if name in PANELS else history(axes, run, name)
 
 
-def history(axes: Axes, run: Run, role: str) -> None:
-    """One output over time."""
-    name = run.wanted.motion[role]
-    axes.plot(run.time, drawable(run.columns[name]), color=BLUE, label=name)
+def history(axes: Axes, run: Run, name: str) -> None:
+    """One output over time, or what plays its role."""
+    name = run.wanted.motion.get(name, name)
+    style = "steps-post" if run.columns[name].dtype.kind == "i" else "default"
+    axes.plot(run.time, drawable(run.columns[name]), color=BLUE, drawstyle=style, label=name)
     axes.set_title(run.descriptions[name])
     axes.set_ylabel(label(name, run.units[name]))
     axes.set_xlabel("t [s]")
@@ -55,14 +54,6 @@ def position(axes: Axes, run: Run, results: Results) -> None:
         axes.plot(decay.times, decay.positions, "o", color=ORANGE, fillstyle="none", label="turning points used")
     if len(axes.lines) > 1:
         axes.legend()
-
-
-def velocity(axes: Axes, run: Run, results: Results) -> None:
-    history(axes, run, "velocity")
-
-
-def acceleration(axes: Axes, run: Run, results: Results) -> None:
-    history(axes, run, "acceleration")
 
 
 def phase(axes: Axes, run: Run, results: Results) -> None:
@@ -89,10 +80,4 @@ def steps(axes: Axes, run: Run, results: Results) -> None:
 
 
 Panel = Callable[[Axes, Run, Results], None]
-PANELS: dict[str, Panel] = {
-    "position": position,
-    "velocity": velocity,
-    "acceleration": acceleration,
-    "phase": phase,
-    "steps": steps,
-}
+PANELS: dict[str, Panel] = {"position": position, "phase": phase, "steps": steps}

@@ -65,7 +65,9 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     quantities += run.cost.quantities
     check_published(scene, quantities)
     run.save(folder)
-    as_run = replace(scene, start=float(run.time[0]), stop=float(run.time[-1]))
+    as_run = replace(
+        scene, start=float(run.time[0]), stop=float(run.time[-1]), grid=run.wanted.grid, follow=run.wanted.follow
+    )
     record(folder, [scene.file], run.in_force, as_run)
     if scene.published:
         from .table import save

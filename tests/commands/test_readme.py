@@ -1,0 +1,167 @@
+"""README.md to the letter: its scene and its model in files, its commands typed where those files are."""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import time
+from math import atan2, pi, sqrt
+from pathlib import Path
+
+import fmi3_hosts
+import numpy as np
+import pytest
+from builds import ROOT
+from commands import harness
+from decays import swung
+from fmpy.validation import validate_fmu
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = [*re.finditer(r"^```(\w*)\n(.*?)^```$", README, re.M | re.S)]
+LINES = [re.split(r"  +", line)[0] for block in BLOCKS if not block[1] for line in block[2].splitlines()]
+LISTED = [line for line in LINES if line.startswith(("python ", "fmpy "))]
+INLINE = re.findall(r"`((?:python|fmpy) [^`]+)`", README)
+ELSEWHERE = {  # what takes long, or another machine, and the tests that have it run; .ci/run has the block `sh`
+    "python -m harness": "commands/test_runs.py",
+    "python -m harness precision": "studies/test_precision.py",
+    "python -m harness stability": "studies/test_stability.py",
+    "python -m harness bench": "studies/test_bench.py",
+    "python -m harness importers": "hosts/test_importers.py",
+    "python build_fmus.py --fmi 3": "support/fmi3_hosts.py",
+    "python build_fmus.py --native": "support/native_fmus.py",
+    "python build_fmus.py pacejka --method rodas --platform linux64": "packaging/test_lean.py",
+    "python -m build_fmus stickslip": "packaging/test_wheel.py",
+    "fmpy simulate fmus/stickslip.fmu": "models/test_conformance.py",
+    "fmpy compile": "native/test_native_packaging.py",
+}
+MODEL = [line for line in LISTED if "cart" in line]  # each needs the one before
+HERE = [line for line in LISTED if line not in (*ELSEWHERE, *MODEL)]
+TRUTH = {"zeta": 0.01, "r": 4e-4}
+SCREEN = ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY")
+# a browser that keeps the page it is sent to
+BROWSER = "python -c 'import sys, urllib.request as web; web.urlretrieve(sys.argv[1], \"page.html\")' %s &"
+
+
+def scene():
+    return next(block[2] for block in BLOCKS if block[1] == "toml")
+
+
+@pytest.fixture
+def here(fmus, tmp_path):
+    """A folder with all that the commands name."""
+    (tmp_path / "fmus").mkdir()
+    for file in fmus.glob("*.fmu"):
+        (tmp_path / "fmus" / file.name).symlink_to(file)
+    for name, file in (("a.fmu", "smd.fmu"), ("b.fmu", "coulomb.fmu")):
+        shutil.copy(fmus / file, tmp_path / name)
+    (tmp_path / "build_fmus.py").symlink_to(ROOT / "build_fmus.py")
+    (tmp_path / "my_scene.toml").write_text(scene())
+    (tmp_path / "cart.py").write_text(next(block[2] for block in BLOCKS if block[1] == "python"))
+    return tmp_path
+
+
+def recorded(head, size, **how):
+    """The rows of a record of a known decay, under a heading, in a unit of that size."""
+    record = swung(**TRUTH, noise=1e-5 * (12.566**2 if how.get("order") else 1), **how)
+    return [head, *zip(record.t.tolist(), (record.x / size).tolist(), strict=True)]
+
+
+def my_record(path):
+    np.savetxt(path, recorded((), 1e-3)[1:], header="t [s],x [mm]", delimiter=",", comments="")
+
+
+def raw_data(path):
+    rows = recorded(("Time (s)", "Linear Acceleration z (m/s^2)"), 1.0, order=2)
+    path.write_text("\n".join(",".join(json.dumps(cell) for cell in row) for row in rows))
+
+
+def swing(path):
+    openpyxl = pytest.importorskip("openpyxl", reason="only tests write spreadsheets")
+    book = openpyxl.Workbook()
+    for row in recorded(("time [s]", "angle [deg]"), pi / 180, sine=True):
+        book.active.append(row)
+    book.save(path)
+
+
+RECORDS = {"my_record.csv": my_record, "Raw Data.csv": raw_data, "swing.xlsx": swing}
+
+
+def typed(line, folder, **environment):
+    """What a command says; it must end well, with nothing on standard error."""
+    words = shlex.split(line)
+    if words[:3] == ["python", "-m", "harness"]:
+        done = harness(folder, *words[3:])
+    else:
+        path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+        usual = {name: value for name, value in os.environ.items() if name not in SCREEN}
+        environment = usual | {"PATH": path, "PYTHONPATH": str(ROOT)} | environment
+        done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stderr) == (0, ""), f"{line}\n{done.stdout}{done.stderr}"
+    return done.stdout
+
+
+def test_every_command_of_the_readme_is_typed_here_or_elsewhere():
+    assert len(HERE) > 10
+    assert len(MODEL) == 3
+    assert set(INLINE) <= {*LISTED, *ELSEWHERE}
+    for line, file in ELSEWHERE.items():
+        assert line in (*LISTED, *INLINE), f"{line} has gone from the README"
+        assert (ROOT / "tests" / file).is_file()
+
+
+@pytest.mark.parametrize("line", HERE)
+def test_a_command_does_what_the_readme_says(here, line):
+    for name in shlex.split(line):
+        if name in RECORDS:
+            RECORDS[name](here / name)
+        elif name.startswith("fmus/fmi3/"):
+            (here / "fmus" / "fmi3").symlink_to(fmi3_hosts.built())
+    if line.endswith("report"):
+        typed("python -m harness run stickslip", here)
+    said = typed(line, here)
+    if " -m harness " in line and not line.endswith(" list"):
+        place = here / said.split("Report in " if line.endswith("report") else "Results in ")[1].strip()
+        assert place.is_file() or (place / "provenance.json").is_file()
+    if " decay " in line:
+        found = json.loads((place / "decay.json").read_text())
+        for each in found["fit"]:
+            if each["name"] in TRUTH:
+                assert each["value"] == pytest.approx(TRUTH[each["name"]], abs=5 * each["error"]), each["name"]
+
+
+def test_the_first_line_draws_in_a_browser(here):
+    line, page = next(line for line in HERE if "--show-plot" in line), here / "page.html"
+    assert typed(line, here, BROWSER=BROWSER) == ""
+    for _ in range(600):
+        text = page.read_text(encoding="utf-8") if page.exists() else ""
+        if text.rstrip().endswith("</html>"):
+            break
+        time.sleep(0.05)
+    assert "F_friction [N]" in text
+
+
+def test_the_model_is_built_run_and_certified(here):
+    for line in MODEL:
+        typed(line, here)
+    assert validate_fmu(str(here / "cart.fmu")) == []
+    assert (here / "cart.csv").is_file()
+    assert (here / "results/cart/trajectory.csv").is_file()
+
+
+def test_the_scene_is_measured_and_drawn(here):
+    """Against its closed form: break-away, then the arc of a circle about where friction and spring balance."""
+    m, k, mu_s, mu_d, g, driver = 12.5, 742.5, 0.3, 0.2, 9.81, 0.034
+    omega, d = sqrt(k / m), (mu_s - mu_d) * 12.5 * g / k
+    amplitude, slip = sqrt(d * d + (driver / omega) ** 2), 2 * (pi - atan2(d * omega, driver)) / omega
+    done = harness(here, "run", "my_scene.toml", "--json")
+    found = {each["name"]: each["value"] for each in json.loads(done.stdout)["quantities"]}
+    assert found["first_slip"] == pytest.approx(mu_s * m * g / (k * driver), rel=1e-12)
+    assert found["slip_time"] == pytest.approx(slip, rel=1e-9)
+    assert found["period"] == pytest.approx(slip + 2 * d / driver, rel=1e-9)
+    assert found["peak_speed"] == pytest.approx(driver + omega * amplitude, rel=1e-5)
+    table = np.loadtxt(here / "results/my_scene/trajectory.csv", delimiter=",", skiprows=1)
+    assert np.diff(table[:, 0]).max() < 0.02 * found["slip_time"]
+    assert (here / "results/my_scene/figure.png").stat().st_size > 10_000
