@@ -38,8 +38,7 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
         values = {name: another(meaning, sizes, chance) for name, meaning in known.items()}
         put(thing, values)
         if thing.dry and entry and begun(thing, outputs):
-            tail = f"_{one(list(thing.contacts), chance)}" if len(thing.contacts) > 1 else ""
-            load, _, limit = getattr(thing, f"hold{tail}")(0.0, *thing.initial(0.0))
+            load, limit = at_rest(thing, chance)
             values[entry] += one(LOADS, chance) * limit - load
             put(thing, values)
         before = begun(thing, outputs)
@@ -50,6 +49,16 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
                     found[output].add(name)
             put(thing, {name: values[name]})
     return {output: [name for name in known if name in found[output]] for output in outputs}
+
+
+def at_rest(thing: Any, chance: Random) -> tuple[float, float]:
+    """The load on a contact at the start, if all are stuck, and its limit."""
+    if not thing.coupled:
+        load, _, limit = thing.hold(0.0, *thing.initial(0.0))
+        return load, limit
+    many = len(thing.contacts)
+    found = thing.forces(0.0, *thing.initial(0.0), *(0 for _ in range(many)))
+    return one(list(zip(found[:many], found[many : 2 * many], strict=True)), chance)
 
 
 def another(meaning: Declared, sizes: dict[str, list[float]], chance: Random) -> float:

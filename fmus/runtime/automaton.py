@@ -1,4 +1,4 @@
-"""Dry friction as modes, one for each contact: backward, stuck, forward; their guards, and where they settle.
+"""Dry friction as a mode: backward, stuck, forward; its guard, and where it settles.  coupled.py has several contacts.
 
 Sliding, the friction force is that of the model and opposes the direction of the mode.  Stuck, it is whatever
 holds the body at rest, up to the holding limit.  A mode ends where its guard does: a slide when the slip speed comes to
@@ -34,13 +34,12 @@ def threshold(v, eps, load, slide, hold):
 
 
 class DryFriction(Oscillator):
-    """An oscillator that sticks.
+    """An oscillator of one body, which stands still while it sticks.
 
-    For each of its contacts it says
-        hold(t, states)         the load on the contact at rest, its rate and the holding limit
+    It says of its contact
+        hold(t, states)         the load on it at rest, its rate and the holding limit
         terms(t, states)        the sum of the sizes of what the load is made of, of which rounding takes its share
-    under these names if there is one, with the name of the mode behind them if there are several: hold_mode1.  While
-    all stands still, the loads are linear in time.
+    While the body stands still, the load is linear in time.
     """
 
     contacts: dict[str, str] = {"mode": "v"}
@@ -107,32 +106,9 @@ class DryFriction(Oscillator):
         return t + (wait if wait > 0.0 else 0.0), direction
 
     def guard(self, step, t, i: Contact):
-        """Positive while the mode lasts: what the load of a stuck contact lacks to the limit, or the slip speed, in the
-        direction of the mode."""
+        """Positive while the mode lasts: the speed, in the direction of the mode."""
         y = step.at(self, t)
-        if self.coupled and step.modes0[i] == STUCK:
-            return self.margin(t, y, i)
         return step.modes0[i] * y[slip[i]]
-
-    def margin(self, t, y: States, i: Contact):
-        """What a load lacks to the limit; one that stays there, but for rounding, is held."""
-        load, _, limit = self.hold(t, y, i)
-        return limit + NEAR * (self.terms(t, y, i) + limit) - fabs(load)
-
-    def breakaway(self, step, i: Contact):
-        """When the load of a stuck contact exceeds the limit within the step, to the last bit; inf if it does not."""
-        ahead, behind = self.margin(step.t0, step.y0, i), self.margin(step.t1, step.y1, i)
-        high = step.t1
-        if behind > 0.0:
-            load, rate, _ = self.hold(step.t0, step.y0, i)
-            load1, rate1, _ = self.hold(step.t1, step.y1, i)
-            if load * rate <= 0.0 or load1 * rate1 >= 0.0:
-                return inf
-            high = self.dip(step, i)
-            if not high < inf:
-                return inf
-            behind = self.guard(step, high, i)
-        return self.located(step, high, ahead, behind, i)
 
     def reversal(self, step, i: Contact):
         """When the slip speed leaves the direction of the mode within the step, to the last bit; inf if it does not."""
@@ -142,16 +118,15 @@ class DryFriction(Oscillator):
         if behind > 0.0:
             if mode * step.f0[slip[i]] >= 0.0 or mode * step.f1[slip[i]] <= 0.0:
                 return inf
-            high = self.dip(step, i)
+            high = self.dip(step, step.t0, step.t1, i)
             if not high < inf:
                 return inf
             behind = self.guard(step, high, i)
-        return self.located(step, high, ahead, behind, i)
+        return self.located(step, step.t0, high, ahead, behind, i)
 
-    def located(self, step, high, ahead, behind, i: Contact):
-        """The first instant in the step at which the guard is not positive; at its beginning it is `ahead`, at `high`
-        `behind`, which is not."""
-        low = step.t0
+    def located(self, step, low, high, ahead, behind, i: Contact):
+        """The first instant at which the guard is not positive; at `low` it is `ahead`, at `high` `behind`, which is
+        not."""
         kept = 0  # the end of the bracket that the last secant left where it was
         looks = 0
         for _ in range(MOST_HALVINGS):
@@ -177,9 +152,8 @@ class DryFriction(Oscillator):
         step.looked += looks
         return high
 
-    def dip(self, step, i: Contact):
-        """When the guard is found not positive within a step that it enters falling and leaves rising; else inf."""
-        low, high = step.t0, step.t1
+    def dip(self, step, low, high, i: Contact):
+        """When the guard is found not positive where it falls at first and rises at last; else inf."""
         step.looked += MOST_THIRDS
         for _ in range(MOST_THIRDS):
             third = (high - low) / 3.0

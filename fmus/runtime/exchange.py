@@ -18,7 +18,7 @@ from .codes import STUCK
 from .march import NOMINAL
 from .rounding import ULP
 from .step import NEARLY
-from .vectors import Contacts, contacts, every, per_contact, per_state, places, slip, speeds
+from .vectors import Contacts, contacts, every, per_contact, per_state, places, slip, some, speeds
 
 BEYOND, LEAST = 4.0 * ULP, 1e-300  # of the limit; of a speed and a force
 TOLERANCE = 1e-4  # taken for the importer's, which nobody tells, where solver.rtol is 0
@@ -80,7 +80,18 @@ def indicators(model, march):
     to_rest, to_break_away = per_contact(), per_contact()
     for i in contacts:
         to_rest[i] = to_break_away[i] = 1.0
-        if march.step.sticks:
+    if not (model.dry and march.step.sticks):
+        return [*to_rest, *to_break_away]
+    if model.coupled:
+        slips = model.slips(march.t, march.y)
+        force, most, _terms = model.forces(march.t, march.y, march.modes)
+        for i in contacts:
+            if march.modes[i] != STUCK:
+                to_rest[i] = march.modes[i] * slips[i] + LEAST
+            else:
+                to_break_away[i] = most[i] + BEYOND * most[i] + LEAST - fabs(force[i])
+    else:
+        for i in contacts:
             if march.modes[i] != STUCK:
                 to_rest[i] = march.modes[i] * march.y[slip[i]] + LEAST
             else:
@@ -97,18 +108,23 @@ def update(model, march):
     """
     if not (model.dry and march.step.sticks):
         return False
-    tolerance = march.rtol if march.rtol > 0.0 else TOLERANCE
+    near = NEARLY * (march.rtol if march.rtol > 0.0 else TOLERANCE)
     another = changed = False
-    for i in contacts:
-        mode = march.modes[i]
-        if not mode * march.y[slip[i]] > 0.0:
-            if mode != STUCK and march.y[slip[i]] != 0.0:
-                march.y[slip[i]] = 0.0
-                another = True
-            if model.coupled or not model.touches(march.t, march.y, march.modes, 0.0, i):
-                march.modes[i] = model.settle(march.t, march.y, NEARLY * tolerance, i)
-            if march.modes[i] != mode:
-                changed = True
+    if model.coupled:
+        y, modes, _fits = model.begun(march.t, march.y, march.modes, near)
+        another, changed = some(y != march.y), some(modes != march.modes)
+        march.y, march.modes = y, modes
+    else:
+        for i in contacts:
+            mode = march.modes[i]
+            if not mode * march.y[slip[i]] > 0.0:
+                if mode != STUCK and march.y[slip[i]] != 0.0:
+                    march.y[slip[i]] = 0.0
+                    another = True
+                if not model.touches(march.t, march.y, march.modes, 0.0, i):
+                    march.modes[i] = model.settle(march.t, march.y, near, i)
+                if march.modes[i] != mode:
+                    changed = True
     if changed:
         march.step.before.happened += 1
         march.step.before.t_event = march.t

@@ -93,7 +93,7 @@ class March(Declaring):
             self.called_then, self.happened_then, self.size_then = step.called, before.happened, step.size
             self.t_event_then, self.modes_then = before.t_event, self.modes
         self.fit(model)
-        if model.dry and step.sticks:
+        if model.dry and step.sticks and not model.coupled:
             for i in contacts:
                 if self.modes_then[i] * self.y[slip[i]] < 0.0:
                     self.y[slip[i]] = 0.0  # within a slide a speed against its mode is rounding

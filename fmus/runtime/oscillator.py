@@ -30,7 +30,7 @@ class Oscillator(Declaring):
     states: dict[str, str] = {"x": "v", "v": "a"}  # name -> name of its rate, which may be a state
     contacts: dict[str, str] = {}  # name of the mode -> the state that is its slip
     dry = False  # friction with modes: see automaton.py
-    waits = False  # while all its contacts are stuck nothing moves
+    waits = False  # while its contact is stuck nothing moves
     coupled = False  # a contact may be stuck while something moves
     driven = False  # it follows a driver, who stood at x_base at the time t_base and moves at the speed drive()
     linear = False  # piecewise linear: see exact.py

@@ -8,6 +8,7 @@ ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci
 from math import inf
 
 from .codes import DIVERGED, EXACT, OK, STALLED, STUCK
+from .coupled import UNSETTLED
 from .interpolant import Interpolant
 from .methods import Methods
 from .rounding import NEAR, ULP
@@ -18,11 +19,13 @@ from .vectors import (
     every,
     first,
     greater,
+    kinematic,
     largest,
     magnitude,
     per_contact,
     slip,
     some,
+    speeds_of,
     total,
 )
 
@@ -77,6 +80,7 @@ class Step:
         self.modes0 = self.modes1 = STUCK
         # all stands still; a mode changes at its end; a speed only touches zero there, and the slide goes on
         self.waiting = self.event = self.touches = False
+        self.fits = True  # whether there are modes that agree with the forces
         # the length of the step before an event cut it, and what holds within
         self.span = 0.0
         self.interpolant = Interpolant()
@@ -126,6 +130,8 @@ class Step:
 
     def take(self, model):
         """The internal step from t1 on; OK or the reason why not."""
+        if model.coupled and not self.fits:
+            return UNSETTLED
         if model.dry and self.event:
             self.note_event()
             self.event = False
@@ -170,12 +176,10 @@ class Step:
         if end <= self.t_end and end < inf:
             self.t1 = end
             for i in contacts:
-                if not model.coupled or ends[i] == end:
-                    self.modes1[i] = ways[i]
+                self.modes1[i] = ways[i]
             self.begin_anew(model)
             for i in contacts:
-                if not model.coupled or ends[i] == end:
-                    self.f1[slip[i]] = model.departure(end, self.y1, self.modes1, i)
+                self.f1[slip[i]] = model.departure(end, self.y1, self.modes1, i)
         else:
             self.t1, self.f1 = self.t_end, 0.0
         return OK
@@ -247,10 +251,10 @@ class Step:
         self.t1, self.y1, self.f1 = self.t_end if last else t + h, y1, f1
         if model.dry and self.sticks:
             ends = per_contact()
-            for i in contacts:
-                if model.coupled and modes[i] == STUCK:
-                    ends[i] = model.breakaway(self, i)
-                else:
+            if model.coupled:
+                ends = model.ends(self)
+            else:
+                for i in contacts:
                     ends[i] = model.reversal(self, i)
             if self.interpolant.ready:  # the search had to look inside
                 self.called += self.methods.extra
@@ -258,16 +262,22 @@ class Step:
             if end <= self.t1:
                 self.y1 = self.at(model, end)
                 self.t1 = end
-                for i in contacts:
-                    if not model.coupled or ends[i] == end:
+                if model.coupled:
+                    self.y1, self.modes1, self.fits = model.after(self, ends, self.near(model))
+                else:
+                    for i in contacts:
                         self.y1[slip[i]] = 0.0
                 return self.stop(model)
+            if model.coupled:
+                self.y1 = model.at_rest(self.t1, self.y1, modes)
+                self.f1 = kinematic(speeds_of(self.y1), self.f1)
         return OK
 
     def stop(self, model):
         """The speed of a contact has come to zero at t1: stick, or slide the other way, or go on if it only touches
         zero; or its load has come to the limit: let go."""
-        self.set_modes(model, self.modes0, self.near(model))
+        if not model.coupled:
+            self.set_modes(model, self.modes0, self.near(model))
         self.begin_anew(model)
         return OK if total(magnitude(self.y1)) < HUGE else DIVERGED
 
@@ -279,11 +289,14 @@ class Step:
         """The modes that hold from t1 on, after these."""
         self.modes1, self.touches = STUCK, False
         if self.sticks:
-            for i in contacts:
-                self.modes1[i] = model.settle(self.t1, self.y1, near, i)
-                if not model.coupled and self.y1[slip[i]] == 0.0 and self.modes1[i] != modes[i] != STUCK:
-                    if model.touches(self.t1, self.y1, modes, near, i):
-                        self.modes1[i], self.touches = modes[i], True
+            if model.coupled:
+                self.y1, self.modes1, self.fits = model.begun(self.t1, self.y1, modes, near)
+            else:
+                for i in contacts:
+                    self.modes1[i] = model.settle(self.t1, self.y1, near, i)
+                    if self.y1[slip[i]] == 0.0 and self.modes1[i] != modes[i] != STUCK:
+                        if model.touches(self.t1, self.y1, modes, near, i):
+                            self.modes1[i], self.touches = modes[i], True
 
     def arrive(self, model):
         """The rates in the modes that hold from t1 on."""
@@ -292,7 +305,7 @@ class Step:
         else:
             self.f1 = model.rates(self.t1, self.y1, self.modes1)
             self.called += 1
-            if model.dry:
+            if model.dry and not model.coupled:
                 for i in contacts:
                     if self.sticks and self.y1[slip[i]] == 0.0 and self.modes1[i] * self.f1[slip[i]] < 0.0:
                         self.f1[slip[i]] = 0.0  # the last bit at a break-away: no body starts against its mode

@@ -79,6 +79,11 @@ def kinematic(a, b):
     return np.where(own, b, a)
 
 
+def speeds_of(y):
+    """The rates that are states, each at the place of the state whose rate it is."""
+    return np.array([y[i] for i in rate])
+
+
 def each(function):
     """A function of numbers, taken number by number."""
 
@@ -145,7 +150,7 @@ def on_arrays(model):
     rates, slips = list(model.states.values()), list(model.contacts.values())
     places[:], contacts[:] = range(len(states)), range(len(modes))
     speeds[:] = [states.index(name) for name in states if name in rates]
-    slip[:] = [states.index(name) for name in slips]
+    slip[:] = [states.index(name) if name in states else -1 for name in slips]
     place[:] = [rates.index(name) if name in rates else -1 for name in slips]
     own[:] = [name not in states for name in rates]
     rate[:] = [states.index(name) if name in states else -1 for name in rates]
@@ -153,14 +158,14 @@ def on_arrays(model):
     if model.linear:
         methods = model.solver.step.methods
         methods.exact = exact_on_arrays(methods.exact)
-    cls, dry = type(model), bool(modes)
-    about = {"dry": dry, "waits": dry and cls.waits, "coupled": len(modes) > 1 or (dry and not cls.waits)}
-    for name in ("rates", "jacobian", "push", "observe"):
+    cls = type(model)
+    alone, all_of_them = ("hold", "terms", "departure"), ("slips", "slip_terms", "forces", "changes", "struck")
+    about = {}
+    for name in ("rates", "jacobian", "push", "observe", *(all_of_them if cls.coupled else ())):
         about[name] = called_with_numbers(cls, name)
-    for name in ("hold", "terms", "departure") if dry else ():
-        told = [f"{name}_{mode}" if len(modes) > 1 else name for mode in modes]
-        if not getattr(cls, told[0], per_state).__module__.startswith(__package__):
-            about[name] = called_of_a_contact(cls, told)
+    for name in alone if modes and not cls.coupled else ():
+        if not getattr(cls, name).__module__.startswith(__package__):
+            about[name] = called_of_a_contact(cls, name)
     model.__class__ = type(cls.__name__, (cls,), about)
     return model
 
@@ -197,17 +202,21 @@ def called_with_numbers(cls, name):
                 if own[i]:
                     f_t[i], J[i] = next(found), [next(found) for _ in places]
             return f_t, J
+        if name in ("slips", "slip_terms", "forces", "changes", "struck"):
+            found = np.array(found if isinstance(found, tuple) else (found,))
+            parts = len(found) // (len(places) if name == "struck" else len(contacts))
+            return found if parts == 1 else np.split(found, parts)
         return found
 
     return call
 
 
-def called_of_a_contact(cls, names):
-    """What a model says of each of its contacts, called with vectors and the number of the contact."""
+def called_of_a_contact(cls, name):
+    """What a model says of its only contact, called with vectors and the number of the contact."""
 
     def call(self, t, *vectors):
-        *vectors, i = vectors
-        return getattr(cls, names[i])(self, t, *numbers(vectors))
+        *vectors, _ = vectors
+        return getattr(cls, name)(self, t, *numbers(vectors))
 
     return call
 

@@ -119,7 +119,8 @@ def test_jacobians_are_those_of_differences_in_fifty_digits(source):
 
 @pytest.mark.parametrize("source", LARGER, ids=lambda source: source.stem)
 def test_any_states_and_contacts_are_derived(source):
-    """Rates and Jacobian in every mode, of three states and of two contacts; what is stuck does not move."""
+    """Rates and Jacobian in every mode, of three states and of two contacts; what is stuck to the ground does not
+    move."""
     anatomy = find(source).anatomy
     model = find(source).model()
     for values, t, at, _ in situations(anatomy, model, 30):
@@ -127,10 +128,11 @@ def test_any_states_and_contacts_are_derived(source):
             known = values | at | driven(anatomy, model, t)
             known |= {m.name: mode for m, mode in zip(anatomy.modes, modes, strict=True)}
             point = t, *at.values(), *modes
-            for state, got in zip(anatomy.own, model.rates(*point), strict=True):
+            rates = model.rates(*point)
+            for state, got in zip(anatomy.own, rates if len(anatomy.own) > 1 else [rates], strict=True):
                 true = settled(anatomy, anatomy.law[state], known)
                 assert abs(got - true) < 1e-12 * (1 + abs(true))
-                stuck = [c for c in anatomy.contacts if c.slip is state and known[c.mode.name] == 0]
+                stuck = [c for c in anatomy.lonely if c.slip is state and known[c.mode.name] == 0]
                 assert got == 0.0 or not stuck
             for got, true in zip(model.jacobian(*point), slopes(anatomy, known), strict=True):
                 assert abs(got - true) < 1e-11 * (1 + abs(true))
@@ -154,16 +156,32 @@ def slopes(anatomy, known):
 
 @mpmath.workdps(DIGITS)
 def settled(anatomy, law, known):
-    """The law in many digits, with the force of each contact: that of a slide, or the one that keeps its slip."""
+    """The law in many digits, with the force of each contact: that of a slide, or the one that keeps its slip.
+
+    Slips are linear in the speeds, and their rates in the forces, so that differences say how they hang together.
+    """
     modes = {m.name for m in anatomy.modes}
     values = {name: value if name in modes else mpmath.mpf(value) for name, value in known.items()}
     equations = Evaluated(anatomy, values, mpmath.mp)
+    stuck = [c for c in anatomy.contacts if values[c.mode.name] == 0]
     for c in anatomy.contacts:
-        values[c.name] = values[c.mode.name] * equations.of(c.slide)
-        if values[c.mode.name] == 0:
-            without = equations.of(anatomy.law[c.slip])
+        values[c.name] = values[c.mode.name] * equations.of(c.slide) + mpmath.mpf(0)
+
+    def rates():
+        h = mpmath.mpf(10) ** -15
+        flow = {s.name: h * equations.of(anatomy.rate[s]) for s in anatomy.states}
+        flow |= {d.name: h * values[d.steady.name] for d in anatomy.drives}
+        later = Evaluated(anatomy, values | {name: values[name] + way for name, way in flow.items()}, mpmath.mp)
+        return [(later.of(c.slip) - equations.of(c.slip)) / h for c in stuck]
+
+    if stuck:
+        without, columns = rates(), []
+        for c in stuck:
             values[c.name] = mpmath.mpf(1)
-            values[c.name] = without / (without - equations.of(anatomy.law[c.slip]))
+            columns.append([b - a for a, b in zip(rates(), without, strict=True)])
+            values[c.name] = mpmath.mpf(0)
+        forces = mpmath.lu_solve(mpmath.matrix(columns).T, mpmath.matrix(without))
+        values |= {c.name: force for c, force in zip(stuck, forces, strict=True)}
     return equations.of(law)
 
 

@@ -7,7 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 from builds import ROOT
+from by_hand import BY_HAND, followed
 from compare import identical
+from fmpy import read_model_description
 from models import LARGER
 from scipy.integrate import solve_ivp
 
@@ -38,37 +40,6 @@ def lugre(t, y):
     return [v, (742.5 * (0.034 * t - x) - (1e4 * z + 300.0 * u + 0.4 * v)) / 12.5, u]
 
 
-def sleds(stop):
-    """The two sleds by hand: states and modes, piece by piece, each ended by scipy's events."""
-    m, slide, hold = (12.5, 8.0), (73.575, 40.0), (110.3625, 66.0)
-    y, t, modes, events = np.zeros(4), 0.0, [0, 0], []
-
-    def load(t, y, i):
-        link = 1100.0 * (y[0] - y[2])
-        return 742.5 * (0.034 * t - y[0]) - link if i == 0 else link
-
-    def rates(t, y):
-        a = [(load(t, y, i) - modes[i] * slide[i]) / m[i] if modes[i] else 0.0 for i in (0, 1)]
-        return [y[1] * bool(modes[0]), a[0], y[3] * bool(modes[1]), a[1]]
-
-    def ending(i):
-        def left(t, y):
-            return modes[i] * y[2 * i + 1] if modes[i] else hold[i] - abs(load(t, y, i))
-
-        left.terminal, left.direction = True, -1
-        return left
-
-    while True:
-        run = solve_ivp(rates, (t, stop), y, "DOP853", events=[ending(0), ending(1)], rtol=1e-12, atol=1e-13)
-        t, y = run.t[-1], run.y[:, -1].copy()
-        if run.status != 1:
-            return y, events
-        i = 0 if len(run.t_events[0]) else 1
-        y[2 * i + 1] = 0.0
-        modes[i] = 0 if modes[i] and abs(load(t, y, i)) <= hold[i] else int(np.sign(load(t, y, i)))
-        events.append(t)
-
-
 def test_three_states_are_those_of_the_equations_written_by_hand(built, worker):
     """LuGre: position, speed and bristles, within 1e-9 of their sizes."""
     true = solve_ivp(lugre, (0.0, STOP), (0.0, 0.0, 0.0), "Radau", rtol=1e-11, atol=1e-14).y[:, -1]
@@ -78,29 +49,54 @@ def test_three_states_are_those_of_the_equations_written_by_hand(built, worker):
     assert np.abs(np.array(found) - true).max() < 1e-9
 
 
-def test_two_contacts_stick_and_slip_each_when_the_equations_say(built, worker):
-    """Two sleds: every event, and where they are at the end; a sled that is stuck has no speed."""
-    end, events = sleds(STOP)
-    fmu = worker.instantiate(built("sleds", "")).begin({"solver.rtol": 1e-11, "solver.method": DOP853}, stop=STOP)
-    t, found = 0.0, []
-    while t < STOP:
-        ahead = fmu.get("solver.t_next")
-        fmu.step(t, ahead - t)
-        t = ahead
-        count, last, *state = fmu.get("events.count", "events.t_last", "x1", "v1", "x2", "v2", "mode1", "mode2")
-        if count > len(found):
-            found.append(last)
-        assert all(mode or speed == 0.0 for mode, speed in zip(state[4:], state[1:4:2], strict=True))
+def run(fmu, physics, changes):
+    """Time and modes of the events, and the last state, in steps to every internal one, with values changed on the
+    way."""
+    t, events = 0.0, []
+
+    def look():
+        count, *event = fmu.get("events.count", "events.t_last", *physics.modes)
+        if count > len(events):
+            events.append(event)
+
+    for end, name, value in (*changes, (physics.stop, "", 0.0)):
+        while t < end:
+            ahead = min(fmu.get("solver.t_next"), end)
+            fmu.step(t, ahead - t)
+            t = ahead
+            look()
+        if name:
+            fmu.set({name: value})
+            look()
+    return events, fmu.get(*physics.states)
+
+
+RUNS = [(name, ()) for name in BY_HAND] + [(name, one.changes) for name, one in BY_HAND.items() if one.changes]
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"), RUNS, ids=lambda one: one if isinstance(one, str) else f"changed{len(one)}"
+)
+def test_contacts_stick_and_slip_when_equations_written_by_hand_say(built, worker, name, changes):
+    """On a belt, in a clutch, each on its own body or both on one: every event, and the state at the end; also where
+    a belt is set to another speed, and a clutch opened, on the way."""
+    physics = BY_HAND[name]()
+    true, end = followed(physics, changes)
+    fmu = worker.instantiate(built(name, ""))
+    fmu.begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=physics.stop)
+    events, found = run(fmu, physics, changes)
     fmu.free()
-    assert len(found) == len(events) >= 4
-    assert np.abs(np.array(found) - events).max() < 1e-9
-    assert np.abs(np.array(state[:4]) - end).max() < 1e-9
+    assert [modes for _, *modes in events] == [modes for _, *modes in true]
+    assert np.abs(np.array([t for t, *_ in events]) - [t for t, *_ in true]).max() < 1e-9
+    assert np.abs(np.array(found) - end).max() < 1e-9
 
 
-@pytest.mark.parametrize("name", ["lugre", "sleds"])
+@pytest.mark.parametrize("name", [path.stem for path in LARGER])
 def test_python_and_native_have_the_same_bits(built, worker, name):
-    wanted = ["x", "v", "z", "a"] if name == "lugre" else ["x1", "v1", "x2", "v2", "F1", "F2", "mode1", "mode2"]
-    wanted += ["solver.steps", "solver.evaluations", "events.count"]
+    """Outputs and counts."""
+    described = read_model_description(built(name, ""))
+    wanted = [v.name for v in described.modelVariables if v.causality == "output"]
+    wanted += ["solver.steps", "solver.evaluations", "events.count"][: 3 if name in BY_HAND else 2]
     rows = []
     for kind in ("", "native"):
         fmu = worker.instantiate(built(name, kind)).begin({"solver.rtol": 1e-8}, stop=STOP)

@@ -149,16 +149,30 @@ WRONG = {
         4,
         "the start values lead out of the range of numbers: float division by zero",
     ),
-    "a belt": (
-        DRY.replace("slip=v", "slip=v - u") + STUCK,
-        17,
-        "the slip of R must be a speed, a state of its own: the solver knows no other so far",
+    "a squared force in another rate": (
+        DRY + STUCK + '    w = State("m/s", "another speed")\n'
+        '    b = Output("m/s2", "acceleration", R * R / (f * m), rate_of=w)\n',
+        20,
+        "R must enter b linearly",
     ),
-    "two contacts of a body": (
-        DRY + '    other = Mode()\n    S = Contact("N", "friction", mode=other, slip=v, slide=f)\n'
-        "    a = Output('m/s2', 'acceleration', (F - k * x - R - S) / m, rate_of=v)\n",
+    "a force that drives": (
+        DRY + STUCK.replace("- R)", "+ R)"),
         17,
-        "R shares a body with another contact: the solver knows no such so far",
+        "R drives its own slip on, and does not oppose it: change its sign in the rates",
+    ),
+    "two contacts that hold the same": (
+        DRY + '    other = Mode()\n    S = Contact("N", "friction", mode=other, slip=v - u, slide=f)\n'
+        "    a = Output('m/s2', 'acceleration', (F - k * x - R - S) / m, rate_of=v)\n",
+        19,
+        "S holds at rest what R already holds: nobody can say which bears how much; leave one out",
+    ),
+    "contacts of several laws": (
+        DRY + '    other = Mode()\n    w = State("m/s", "another speed")\n'
+        '    S = Contact("N", "friction", mode=other, slip=w, slide=f, laws=(HYBRID, SIGN))\n'
+        + STUCK
+        + "    b = Output('m/s2', 'acceleration', -S / m, rate_of=w)\n",
+        20,
+        "S has other laws than R: give all contacts the same",
     ),
     "two drivers": (
         RATE + '    p = State("m", "one", rate=u)\n    q = State("m", "another", rate=u)\n',

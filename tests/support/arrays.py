@@ -27,15 +27,17 @@ def bits(numbers):
     return [struct.pack("<d", float(value)) if value == value else b"NaN" for value in numbers]
 
 
+def spelled(step, names):
+    """Numbers of a vector at the end of a step, by the names of their parts: x1 of x, x1_1 of x1."""
+    return [getattr(step, name + ("_" if name[-1].isdigit() else "") + "1") for name in names]
+
+
 def written_steps(model, values, stop, most):
     """For each internal step its end, the state, its own rates, the modes, the size to try next, the counts, and the
     state in its middle."""
     begun(model, values, stop)
     start(model, model.initial(0.0), stop)
     rates = [rate for rate in model.states.values() if rate not in model.states]
-
-    def spelled(step, names):
-        return [getattr(step, name + ("_" if name[-1].isdigit() else "") + "1") for name in names]
 
     def row(step):
         numbers = spelled(step, [*model.states, *rates, *model.contacts])

@@ -218,6 +218,13 @@ def undone(e: Operand, leaf: Expression) -> Operand:
     return right
 
 
+def is_sum(e: Operand, leaf: Expression) -> bool:
+    """Whether the leaf is one of the terms that an expression adds up."""
+    if not isinstance(e, Term):
+        return e is leaf or any(is_sum(one, leaf) for one in inside(e))
+    return occurrences(e, leaf) == 1 and e.op in ("+", "-", "neg") and any(is_sum(one, leaf) for one in e.args)
+
+
 def size(e: Operand) -> Operand:
     """The sum of the sizes of what an expression is made of, of which rounding takes its share."""
     if not isinstance(e, Expression):

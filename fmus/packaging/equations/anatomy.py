@@ -3,6 +3,7 @@
 The contacts are looked at as a whole: A F = b for the forces that make the rates of all slips zero.
 """
 
+from collections.abc import Collection
 from functools import cached_property
 from keyword import iskeyword
 from math import inf
@@ -10,10 +11,10 @@ from typing import Any
 
 from ...runtime.methods import EXACT_ITEM, ITEMS
 from ..words import OF_C
-from .algebra import degree, depends, derivative, leaves, made, negative, occurrences, put, same, undone
+from .algebra import degree, depends, derivative, is_sum, leaves, made, negative, occurrences, put, same, undone
 from .declared import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 from .expressions import COMPARISONS, Expression, Mistake, Operand, Term
-from .names import RESERVED
+from .names import RESERVED, RESERVED_WHERE_COUPLED
 
 METHODS = [label for label, _, _ in (EXACT_ITEM, *ITEMS)]
 TIME = Expression()
@@ -45,12 +46,14 @@ class Anatomy:
         self.flow = {s: self.rate[s] for s in self.states} | {d: d.steady for d in self.drives} | {TIME: 1.0}
         self._judge_parts()
         self._find_forces()
+        for name, e in own if self.contacts and not self.waits else ():
+            self._judge_name(name, e, RESERVED_WHERE_COUPLED)
 
     def _all(self, *kinds: type) -> list[Any]:
         return [e for e in self.declared if isinstance(e, kinds)]
 
-    def _judge_name(self, name: str, e: Expression) -> None:
-        if name in RESERVED or name in OF_C or iskeyword(name) or name.startswith("_"):
+    def _judge_name(self, name: str, e: Expression, reserved: Collection[str] = RESERVED) -> None:
+        if name in reserved or name in OF_C or iskeyword(name) or name.startswith("_"):
             raise Mistake(f"the name {name} is taken: it has a meaning in the solver or in C; choose another", e.place)
         if not name.isascii():
             raise Mistake(f"the name {name} has letters that C does not take: choose another", e.place)
@@ -164,6 +167,7 @@ class Anatomy:
             if same(self.A[c, c], 0.0):
                 raise Mistake(f"{c.name} does not act on its own slip: nothing could hold it", c.place)
         self.lonely = [c for c in self.contacts if all(same(self.A[c, d], 0.0) for d in self.contacts if d is not c)]
+        self.shared = [c for c in self.contacts if c not in self.lonely]
         self.hold: dict[Contact, Operand] = {}
         self.load: dict[Contact, Operand] = {}
         for c in self.contacts:
@@ -184,14 +188,6 @@ class Anatomy:
         """The derivative of an expression while every contact slides."""
         return derivative(e, by | {c: made("*", c.mode, derivative(c.slide, by)) for c in self.contacts})
 
-    def either(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
-        """The derivative of an expression while some contacts slide and others hold."""
-        forces: dict[Expression, Operand] = {}
-        for c in self.contacts:
-            held, slides = derivative(self.load[c], by), made("*", c.mode, derivative(c.slide, by))
-            forces[c] = made("choose", Term("==", c.mode, 0.0), held, slides)
-        return derivative(e, by | forces)
-
     # ---- what the runtime asks
 
     @property
@@ -203,6 +199,8 @@ class Anatomy:
     def closed_form(self) -> tuple[Operand, Operand, Operand, Operand] | None:
         """Mass, damping, stiffness and the speed of the resting point where one body moves under a linear law."""
         if len(self.states) != 2 or len(self.own) != 1 or any(depends(c.slide, self.moving) for c in self.contacts):
+            return None
+        if self.contacts and not self.waits:
             return None
         if len(self.positions) != 1:
             return None
@@ -222,26 +220,71 @@ class Anatomy:
             speed = drive.steady
         return mass, damping, stiffness, speed
 
-    @property
+    @cached_property
     def waits(self) -> bool:
-        """Whether nothing moves while all contacts are stuck."""
-        slips = [c.slip for c in self.contacts]
-        return all(self.rate[s] in slips or s in slips for s in self.states)
+        """Whether nothing moves while the only contact is stuck, whose load is then linear in time."""
+        if len(self.contacts) != 1 or len(self.positions) != 1 or self.own != [self.contacts[0].slip]:
+            return False
+        return not depends(derivative(self.load[self.contacts[0]], self.by_time), (TIME, *self.drives))
+
+    @property
+    def pins(self) -> list[tuple[Contact, State, Operand]]:
+        """For contacts whose slip is a sum of speeds, one that makes it zero to the last bit, and its value; in an
+        order in which no later one disturbs those before."""
+        found: list[tuple[Contact, State, Operand]] = []
+        left = list(self.contacts)
+        while True:
+            alone = [
+                (c, s)
+                for c in left
+                for s in self.own
+                if is_sum(c.slip, s) and not any(depends(d.slip, (s,)) for d in left if d is not c)
+            ]
+            if not alone:
+                return found
+            c, s = alone[0]
+            found.insert(0, (c, s, undone(c.slip, s)))
+            left.remove(c)
 
     def judge_runtime(self) -> None:
         """Refuse what the solver cannot run."""
         if len(self.drives) > 1:
             raise Mistake("the solver runs one driver so far", self.drives[1].place)
         for c in self.contacts:
-            if c not in self.lonely:
-                raise Mistake(f"{c.name} shares a body with another contact: the solver knows no such so far", c.place)
-            if c.slip not in self.own:
-                sentence = f"the slip of {c.name} must be a speed, a state of its own: the solver knows no other so far"
+            if c.laws != self.contacts[0].laws:
+                raise Mistake(
+                    f"{c.name} has other laws than {self.contacts[0].name}: give all contacts the same", c.place
+                )
+            for law in self.law.values():
+                if depends(derivative(law, {c: 1.0}), (*self.contacts, *self.modes)):
+                    raise Mistake(f"{c.name} must enter {law.name} linearly", law.place)
+        self._judge_loads()
+
+    def _judge_loads(self) -> None:
+        """That contacts at rest have loads at the start values: each opposes its own slip, and none holds again what
+        others hold."""
+        start: dict[Expression, Operand] = dict.fromkeys((*self.moving, TIME), 0.0)
+        start |= {e: float(e.start) for e in (*self.parameters, *self.choices, *self.inputs)}
+        start |= {s: put(s.begins, start) for s in self.states}
+        A = {key: put(e, start) for key, e in self.A.items()}
+        if any(isinstance(e, Expression) for e in A.values()):
+            return  # which hangs on a choice
+        left = {c: A[c, c] for c in self.contacts}
+        for n, c in enumerate(self.contacts):
+            if not left[c] > 0.0:
+                sentence = f"{c.name} drives its own slip on, and does not oppose it: change its sign in the rates"
                 raise Mistake(sentence, c.place)
-            if len(c.laws) > 1 and len(self.states) > 2:
-                raise Mistake(f"laws beside HYBRID are for a single body, and {self.name} has more", c.place)
-            if self.waits and depends(derivative(self.load[c], self.by_time), (TIME, *self.drives)):
-                raise Mistake(f"the load on {c.name} at rest must be linear in time: the solver knows no else", c.place)
+            if not A[c, c] > 1e-12 * left[c]:
+                others = " and ".join(d.name for d in self.contacts[:n] if not same(self.A[c, d], 0.0))
+                raise Mistake(
+                    f"{c.name} holds at rest what {others} already holds: nobody can say which bears how much; leave "
+                    "one out, or put a spring between them",
+                    c.place,
+                )
+            for d in self.contacts[n + 1 :]:
+                share = A[d, c] / A[c, c]
+                for e in self.contacts[n + 1 :]:
+                    A[d, e] -= share * A[c, e]
 
     @property
     def methods(self) -> list[str]:
@@ -259,7 +302,8 @@ class Anatomy:
         """Whether an output follows an input at once."""
         if isinstance(e, (Contact, Mode)):
             (c,) = (c for c in self.contacts if e in (c, c.mode))
-            return depends(self.load.get(c, self.slip_rate[c]), self.inputs) or depends(c.slide, self.inputs)
+            near = [self.load[c]] if c in self.lonely else [self.slip_rate[d] for d in self.contacts]
+            return any(depends(one, self.inputs) for one in (*near, c.slide))
         return depends(e, self.inputs) or any(depends(e, (c,)) and self.direct(c) for c in self.contacts)
 
     @property

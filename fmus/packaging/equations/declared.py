@@ -89,9 +89,10 @@ class Mode(Variable, declare.Mode):
 class Contact(Variable, declare.Output):
     """The force of dry friction in a contact, an unknown of the equations; positive where it opposes a positive slip.
 
-    mode: its declared Mode.  slip: the relative speed.  slide: the force while it slides, at least 0.  hold: the most
-    that it holds; left out, the sliding force at zero slip.  laws: HYBRID, and beside it SIGN or THRESHOLD, which needs
-    eps, the slip below which it holds.
+    mode: its declared Mode.  slip: the relative speed, a state or an expression of such, as v - v_belt; several of them
+    may push one body.  slide: the force while it slides, at least 0.  hold: the most that it holds, at least as much;
+    left out, the sliding force at zero slip.  laws: HYBRID, and beside it SIGN or THRESHOLD, which needs eps, the slip
+    below which it holds.
     """
 
     def __init__(

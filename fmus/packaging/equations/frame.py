@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from .algebra import depends, inside, made, same
+from .algebra import depends, inside, made, put, same
 from .anatomy import TIME, Anatomy
 from .declared import Choice, Contact
 from .expressions import Expression, Operand, Term
@@ -12,7 +12,7 @@ LONG = 100  # letters in a line
 
 
 class Frame:
-    """A model of any states and contacts, each of which acts on a body of its own, and of at most one driver."""
+    """A model of any states and contacts."""
 
     def __init__(self, an: Anatomy) -> None:
         self.an = an
@@ -20,10 +20,13 @@ class Frame:
         self.drive = an.drives[0] if an.drives else None
         taken = {e.name for e in an.declared}
         for c in an.contacts:
-            for name, e in ("load", an.load[c]), ("slide", c.slide), ("limit", an.hold[c]):
-                name += self.tail(c)
+            for name, e in ("load", an.load.get(c)), ("slide", c.slide), ("limit", an.hold[c]):
+                name += "" if an.waits else f"_{c.name}"
                 if isinstance(e, Term) and not e.name and name not in taken:
                     e.name = name
+        for (c, d), e in an.A.items():
+            if isinstance(e, Term) and not e.name and not depends(e, an.inputs) and f"A_{c.name}_{d.name}" not in taken:
+                e.name = f"A_{c.name}_{d.name}"
         self.states = [s.name for s in an.states]
         self.modes = [c.mode.name for c in an.contacts]
         self.point = ["t", *self.states, *self.modes]
@@ -42,7 +45,7 @@ class Frame:
                     walk(one)
 
         for c in an.contacts:
-            for e in (c.slide, an.hold[c], c.eps):
+            for e in (c.slide, an.hold[c], c.eps, *(an.A[c, d] for d in an.contacts if not an.waits)):
                 walk(e)
         for e in an.outputs:
             walk(e)
@@ -63,11 +66,7 @@ class Frame:
     @property
     def alone(self) -> Contact | None:
         """The contact of a single body: nothing moves while it is stuck, and nobody asks for rates then."""
-        return self.an.contacts[0] if len(self.an.contacts) == 1 and len(self.an.states) == 2 else None
-
-    def tail(self, c: Contact) -> str:
-        """What tells the methods of one contact from those of another."""
-        return f"_{c.mode.name}" if len(self.an.contacts) > 1 else ""
+        return self.an.contacts[0] if self.an.waits else None
 
     def follow_sign(self, s: Scribe, c: Contact, targets: Sequence[Operand]) -> None:
         """Where the law itself looks at the slip, that tells the direction."""
@@ -98,6 +97,25 @@ def returned(s: Scribe, targets: Sequence[Operand]) -> list[str]:
                 s.say(f"{text},")
         s.say(")")
     return s.lines
+
+
+def place_sizes(f: Frame, s: Scribe, sizes: list[Operand]) -> list[Operand]:
+    """Sizes of what is added up, where the driver's is that of what his position is made of."""
+    drive = f.drive
+    if drive is None or not any(depends(e, (drive,)) for e in sizes):
+        return sizes
+    reach = Expression()
+    reach.name = drive.name if drive not in s.given else s.fresh(f"reach_of_{drive.name}")
+    s.say(f"{reach.name} = fabs(self.x_base) + fabs(self.{drive.steady.name}) * (fabs(t) + fabs(self.t_base))")
+    s.given[reach] = reach.name
+    return [put(e, dict.fromkeys(magnitudes(e, drive), reach)) for e in sizes]
+
+
+def magnitudes(e: Operand, drive: Expression) -> list[Term]:
+    """Where the size of the position of a driver is asked for."""
+    if isinstance(e, Term) and e.op == "fabs" and e.args[0] is drive:
+        return [e]
+    return [found for one in inside(e) for found in magnitudes(one, drive)]
 
 
 def method(name: str, arguments: Sequence[str], lines: list[str]) -> str:

@@ -1,15 +1,16 @@
-"""The methods of a written-out model about its contact at rest, and the force under the law in force."""
+"""The methods of a written-out model about the contact of its only body, and the force under the law in force."""
 
-from .algebra import depends, derivative, inside, put, size
+from .algebra import depends, derivative, put, size
 from .declared import SIGN, THRESHOLD, Contact
-from .expressions import Expression, Operand, Term
-from .frame import Frame, method
+from .expressions import Term
+from .frame import Frame, method, place_sizes
 from .scribe import Scribe
 
 
 def friction(f: Frame) -> list[str]:
-    """All of them, for each contact."""
-    return [text for c in f.an.contacts for text in (hold(f, c), terms(f, c), *departure(f, c))]
+    """All of them."""
+    c = f.alone
+    return [] if c is None else [hold(f, c), terms(f, c), *departure(f, c)]
 
 
 def hold(f: Frame, c: Contact) -> str:
@@ -17,20 +18,16 @@ def hold(f: Frame, c: Contact) -> str:
     an = f.an
     rate = derivative(an.load[c], an.by_time | {x: an.rate[x] for x in an.positions})
     wanted = [an.load[c], put(rate, {c.slip: 0.0}), an.hold[c]]
-    return method(f"hold{f.tail(c)}", ["t", *f.states], f.returning(f.scribe(), wanted))
+    return method("hold", ["t", *f.states], f.returning(f.scribe(), wanted))
 
 
 def terms(f: Frame, c: Contact) -> str:
     """The sum of the sizes of what the load is made of."""
-    s, sizes = f.scribe(), size(f.an.load[c])
-    if f.drive is not None and depends(sizes, (f.drive,)):
-        way = f"fabs(self.{f.drive.steady.name}) * (fabs(t) + fabs(self.t_base))"
-        s.say(f"{f.drive.name} = fabs(self.x_base) + {way}")
-        sizes = put(sizes, dict.fromkeys(magnitudes(sizes, f.drive), f.drive))
-        s.given[f.drive] = f.drive.name
+    s = f.scribe()
+    (sizes,) = place_sizes(f, s, [size(f.an.load[c])])
     s.count(sizes)
     s.say(f"return {s.text(sizes)}")
-    return method(f"terms{f.tail(c)}", ["t", *f.states], s.lines)
+    return method("terms", ["t", *f.states], s.lines)
 
 
 def departure(f: Frame, c: Contact) -> list[str]:
@@ -39,7 +36,7 @@ def departure(f: Frame, c: Contact) -> list[str]:
         return []
     less = Term("neg", Term("*", c.mode, Term("-", c.hold, c.slide)))
     jump = derivative(f.an.law[c.slip].means, {c: less})
-    return [method(f"departure{f.tail(c)}", f.point, f.returning(f.scribe(), [jump]))]
+    return [method("departure", f.point, f.returning(f.scribe(), [jump]))]
 
 
 def under_the_law(f: Frame, s: Scribe, c: Contact) -> None:
@@ -66,10 +63,3 @@ def under_the_law(f: Frame, s: Scribe, c: Contact) -> None:
 def by_threshold(f: Frame, s: Scribe, c: Contact) -> str:
     """The force by the threshold law."""
     return f"threshold({', '.join(map(s.text, (c.slip, c.eps, f.an.load[c], c.slide, f.an.hold[c])))})"
-
-
-def magnitudes(e: Operand, drive: Expression) -> list[Term]:
-    """Where the size of the position of a driver is asked for."""
-    if isinstance(e, Term) and e.op == "fabs" and e.args[0] is drive:
-        return [e]
-    return [found for one in inside(e) for found in magnitudes(one, drive)]

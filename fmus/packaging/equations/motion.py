@@ -1,10 +1,11 @@
 """The methods of a written-out model that solvers ask: rates, Jacobian, constant push."""
 
-from .algebra import put
+from .algebra import derivative, put
+from .coupled import follow_law, force, slope, solve
 from .declared import THRESHOLD, Contact
 from .expressions import Expression, Operand, Term
 from .frame import Frame, method, returned
-from .friction import by_threshold, under_the_law
+from .friction import by_threshold
 from .scribe import Scribe
 
 
@@ -20,32 +21,30 @@ def rates(f: Frame) -> str:
     if c is not None and THRESHOLD not in c.laws:
         targets = sliding_now(c, targets)
         f.follow_sign(s, c, targets)
-    elif an.contacts:
-        f.place_drive(s, [*targets, *an.load.values()])
-        s.count(*targets, *an.load.values(), *(each for one in an.contacts for each in (one.slide, one.slide)))
-        for one in an.contacts:
-            force(f, s, one)
-        return method("rates", f.point, returned(s, targets))
-    return method("rates", f.point, f.returning(s, targets))
-
-
-def force(f: Frame, s: Scribe, c: Contact) -> None:
-    """The force of a contact, at a mode that it may have here."""
-    if f.alone is None:
-        under_the_law(f, s, c)
-    else:
-        s.count(f.an.hold[c])
+    elif c is not None:
+        f.place_drive(s, [*targets, an.load[c]])
+        s.count(*targets, an.load[c], c.slide, c.slide, an.hold[c])
         sliding = s.text(Term("*", c.mode, c.slide))
         s.say(f"{c.name} = {sliding} if {c.mode.name} != 0 else {by_threshold(f, s, c)}")
         s.given[c] = c.name
+        return method("rates", f.point, returned(s, targets))
+    elif an.contacts:
+        terms = force(f).terms
+        f.place_drive(s, [*targets, *terms])
+        s.count(*targets, *terms)
+        follow_law(f, s)
+        return method("rates", f.point, returned(s, targets))
+    return method("rates", f.point, f.returning(s, targets))
 
 
 def jacobian(f: Frame) -> str:
     """For each of these rates its derivatives by time and by each state."""
     an, s, c = f.an, f.scribe(), f.alone
     ways: list[dict[Expression, Operand]] = [an.by_time, *({state: 1.0} for state in an.states)]
+    if c is None and an.contacts:
+        return method("jacobian", f.point, slopes(f, s, ways))
     if c is None:
-        return method("jacobian", f.point, f.returning(s, [an.either(law, by) for law in f.laws for by in ways]))
+        return method("jacobian", f.point, f.returning(s, [derivative(law, by) for law in f.laws for by in ways]))
     targets = [an.sliding(law, by) for law in f.laws for by in ways]
     if THRESHOLD in c.laws:
         with s.block(f"if {c.mode.name} == 0 and fabs({s.text(c.slip)}) < {s.text(c.eps)}:"):
@@ -56,6 +55,18 @@ def jacobian(f: Frame) -> str:
             s.lines += inner.lines
     f.follow_sign(s, c, targets)
     return method("jacobian", f.point, f.returning(s, targets))
+
+
+def slopes(f: Frame, s: Scribe, ways: list[dict[Expression, Operand]]) -> list[str]:
+    """The lines that return the derivatives of the rates where some contacts slide and others hold."""
+    forces = [slope(f, f"by_{next(iter(by)).name}", by) for by in ways]
+    targets = [derivative(law, by | u.stands) for law in f.laws for by, u in zip(ways, forces, strict=True)]
+    terms = [e for u in (force(f), *forces) for e in u.terms]
+    f.place_drive(s, [*terms, *targets])
+    s.count(*terms, *targets)
+    follow_law(f, s)
+    solve(f, s, forces, law=True)
+    return returned(s, targets)
 
 
 def push(f: Frame) -> list[str]:

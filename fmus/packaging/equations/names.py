@@ -1,6 +1,7 @@
 """The names that a written-out model takes for itself; an author's are others."""
 
 from ...runtime.automaton import DryFriction
+from ...runtime.coupled import CoupledFriction
 from ...runtime.found import methods
 from .expressions import FUNCTIONS
 
@@ -9,6 +10,7 @@ IMPORTS = {  # module -> what may be needed of it
     "": tuple(label for label, _, _ in methods),
     "automaton": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
     "codes": ("EXACT", "HYBRID"),
+    "coupled": ("CoupledFriction",),
     "declare": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
     "march": ("March",),
     "methods": ("EXACT_ITEM", "ITEMS"),
@@ -25,6 +27,7 @@ METHODS = (
     "terms",
     "observe",
 )  # beside those that are inherited
+COUPLED_METHODS = ("slips", "slip_terms", "forces", "changes", "struck")
 FACTS = ("stop_time", "step_size", "tolerance", "rules")  # which an author sets as such
 CLASSES = ("Solver", "Model", "Fmi3Slave")
 RESERVED = {
@@ -32,3 +35,4 @@ RESERVED = {
     *(name for names in IMPORTS.values() for name in names),
     *(name for name in dir(DryFriction) if not name.startswith("__")),
 } - {*FACTS}
+RESERVED_WHERE_COUPLED = {*dir(CoupledFriction), *COUPLED_METHODS} - {*FACTS}

@@ -1,5 +1,6 @@
 """The method of a written-out model that sets its outputs, and says whether they are numbers."""
 
+from .coupled import follow_law
 from .expressions import Term
 from .frame import Frame, method
 from .friction import under_the_law
@@ -10,8 +11,10 @@ def observe(f: Frame) -> str:
     f.place_drive(s, an.drives)
     s.count(*an.outputs, *an.outputs)
     s.count(*an.load.values(), *an.load.values(), *(c.slide for c in an.contacts))
-    for c in an.contacts:
-        under_the_law(f, s, c)
+    if f.alone is not None:
+        under_the_law(f, s, f.alone)
+    elif an.contacts:
+        follow_law(f, s)
     for e in an.outputs:
         if isinstance(e.means, Term):
             s.hold(e)

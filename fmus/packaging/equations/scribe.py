@@ -46,6 +46,13 @@ class Scribe:
         if (text := self.text(e)) != target:
             self.say(f"{target} = {text}")
 
+    def fresh(self, name: str) -> str:
+        """The name, or another where it is taken: from here on it is."""
+        if name in self.taken and name not in self.given.values():
+            name = next(n for i in range(1, 1000) if (n := f"{name}_{i}") not in self.taken)
+        self.taken.add(name)
+        return name
+
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
         """The lines below a head; what is calculated there is not known behind it."""
@@ -92,6 +99,10 @@ class Scribe:
                 self._uses[number] += 1
                 if self._uses[number] == 1:
                     self.count(*inside(e))
+
+    def is_shared(self, e: Operand) -> bool:
+        """Whether a term has been counted more than once."""
+        return isinstance(e, Term) and self._uses[self.number(e)] > 1
 
     def text(self, e: Operand) -> str:
         return ast.unparse(ast.fix_missing_locations(self._node(e)))

@@ -8,6 +8,7 @@ from textwrap import indent, wrap
 from ...runtime.methods import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
 from .anatomy import Anatomy
+from .coupled import coupled
 from .declared import Contact, Fixed, Mode, Output, State, Variable
 from .frame import Frame
 from .friction import friction
@@ -54,13 +55,18 @@ def written(an: Anatomy, file: str) -> str:
         method="EXACT" if an.method == EXACT_ITEM[0] else f"{an.method}.NUMBER",
         items="(EXACT_ITEM, *ITEMS)" if an.closed_form else "ITEMS",
         name=an.name,
-        base="DryFriction" if an.contacts else "Oscillator",
+        base=base(an),
         about=about.rstrip(" ") + (INDENT if rest else ""),
         declarations=indent("\n".join(declarations(an)), INDENT),
         facts=indent("\n".join(facts(an)), INDENT),
-        methods="\n\n".join([*values(f), *motion(f), *friction(f), observe(f)]),
+        methods="\n\n".join([*values(f), *motion(f), *friction(f), *coupled(f), observe(f)]),
     )
     return text.replace("{imports}", imports(text), 1)
+
+
+def base(an: Anatomy) -> str:
+    """The class of the runtime that it derives from."""
+    return "DryFriction" if an.waits else "CoupledFriction" if an.contacts else "Oscillator"
 
 
 def imports(text: str) -> str:
@@ -115,15 +121,14 @@ def facts(an: Anatomy) -> list[str]:
     states = ", ".join(f"{quoted(s.name)}: {quoted(an.rate[s].name)}" for s in an.states)
     lines = [f"states = {{{states}}}"]
     if an.contacts:
-        slips = ", ".join(f"{quoted(c.mode.name)}: {quoted(c.slip.name)}" for c in an.contacts)
+        slips = ", ".join(f"{quoted(c.mode.name)}: {quoted(c.slip.name if an.waits else '')}" for c in an.contacts)
         lines.append(f"contacts = {{{slips}}}")
-        lines += [] if an.waits else ["waits = False"]
     lines += [f"{word} = True" for word, holds in (("linear", an.closed_form), ("driven", an.drives)) if holds]
     for word in RUN:
         if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
             lines.append(f"{word} = {value!r}")
     if an.rules:
-        inherited = [f"{INDENT}*DryFriction.rules,"] if an.contacts else []
+        inherited = [f"{INDENT}*{base(an)}.rules,"] if an.contacts else []
         sentences = [f"{INDENT}{lines_of(rule.sentence)}," for rule in an.rules]
         lines += ["rules = (", *inherited, *sentences, ")"]
     return lines

@@ -20,6 +20,12 @@ class Declarations(ast.NodeVisitor):
         self.results: dict[str, list[str | None]] = {
             "initial": [STATES],
             "rates": [STATES],
+            "speeds_of": [STATES],
+            "struck": [STATES],
+            "slips": [CONTACTS],
+            "slip_terms": [CONTACTS],
+            "forces": [CONTACTS] * 3,
+            "changes": [CONTACTS] * 4,
             "solved": [STATES],
             "per_state": [STATES],
             "per_contact": [CONTACTS],

@@ -377,7 +377,7 @@ def expression(text: str) -> ast.expr:
 
 
 def row(terms: list[ast.expr]) -> ast.expr:
-    return ast.Tuple(terms, ast.Load()) if len(terms) > 1 else terms[0]
+    return ast.Tuple(terms, ast.Load()) if len(terms) != 1 else terms[0]
 
 
 def uses(node: ast.AST) -> set[str]:

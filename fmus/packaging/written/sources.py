@@ -30,8 +30,7 @@ def spec_of(model: type[Declaring], offered: Offer | None) -> Spec:
     thing: Any = model()
     dry = bool(thing.contacts)
     closed = thing.linear and (offered is None or offered.closed)
-    flags = {"dry": dry, "waits": dry and thing.waits, "driven": thing.driven, "linear": closed}
-    flags["coupled"] = len(thing.contacts) > 1 or (dry and not thing.waits)
+    flags = {"dry": dry, "waits": thing.waits, "coupled": thing.coupled, "driven": thing.driven, "linear": closed}
     return Spec(thing.states, thing.contacts, flags, choices(model, offered), gone(offered), stepping(offered))
 
 

@@ -15,7 +15,7 @@ class Spec:
     """What is fixed when the numerics are written out.
 
     states      each state, with the name of its rate, which may be another state
-    contacts    the mode of each contact, with the state that is its slip
+    contacts    the mode of each contact, with the state that is its slip, if one is
     flags       attribute -> its value: dry, linear, ...
     choices     attribute -> all the values that it can have: chosen, friction, ...
     gone        labels of what is not offered
@@ -35,7 +35,7 @@ class Spec:
             if (other := name.rstrip("0123456789")) in names - {name}:
                 raise BuildError(f"{name} is what {other} is called at a stage of a step; take another name.")
         for mode, state in self.contacts.items():
-            if state not in self.states:
+            if state and state not in self.states:
                 raise BuildError(f"The slip of {mode} is {state}, which is no state; states are {self.told}.")
 
     @property
@@ -57,12 +57,14 @@ class Spec:
         return [place for place, state in enumerate(self.states) if state in self.states.values()]
 
     def slip(self, contact: int) -> int:
-        """The place of the slip of a contact among the states."""
-        return list(self.states).index(list(self.contacts.values())[contact])
+        """The place of the slip of a contact among the states; of one that is an expression nobody needs it."""
+        name = list(self.contacts.values())[contact]
+        return list(self.states).index(name) if name else -1
 
     def place(self, contact: int) -> int:
         """The place of the state whose rate the slip of a contact is."""
-        return list(self.states.values()).index(list(self.contacts.values())[contact])
+        name = list(self.contacts.values())[contact]
+        return list(self.states.values()).index(name) if name else -1
 
     def tail(self, contact: int) -> str:
         """What tells what belongs to one contact from what belongs to another."""

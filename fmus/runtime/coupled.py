@@ -1,0 +1,211 @@
+"""Dry friction where a contact may be stuck while something moves: several contacts, a belt, bodies that they share.
+
+A slip is any expression that is linear in the speeds, so that a contact at rest bears what the equations ask for: the
+loads of all stuck contacts together solve A F = b, where A says how each acts on the slips of all.  Where contacts come
+to rest, impulses in them take what is left of their slips, which keeps the momentum.  Which of them then hold is a
+linear complementarity problem (F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts, chapters 5 and 6):
+all are held; whatever bears more than it holds is let go, and what would slip against its own force is held again.
+"""
+
+from math import fabs, inf
+
+from .automaton import DryFriction, sign
+from .codes import RULES, STUCK
+from .rounding import NEAR, ULP
+from .vectors import Contact, Contacts, States, contacts, largest, per_contact
+
+LOOKS = 5  # parts of a step in which something may end, each looked at by its end
+CLOSE = 0.25  # of what a guard spans in a step: below, it is looked at more closely
+TOUCHING = 1e-3  # m/s or rad/s: the size of a slip, where it is of no size itself
+ALIKE = 1.0 - 1e-9  # of the greatest load, as a share of what is held: what is let go with it
+MOST_ROUNDS = 60  # of letting go and holding again, and then of changing one contact at a time
+MOST_IMPULSES = 3  # for slips that are not linear in positions
+LEAST = 1e-300  # a force
+UNSETTLED = RULES + 1  # status: no modes fit the forces, as the first rule has it
+
+
+class CoupledFriction(DryFriction):
+    """An oscillator that sticks in one contact while it moves in another, or with a belt.
+
+    It says, in the order of its contacts,
+        slips(t, states)               their slips
+        slip_terms(t, states)          the sums of the sizes of what these are made of
+        forces(t, states, modes)       their forces, the limits of these, and the sums of the sizes of what they are
+        changes(t, states, modes)      the rates of forces and limits; what each force lacks to hold its contact, and
+                                       the rate of that
+        struck(t, states, modes)       the states after impulses in the stuck contacts, which end their slips
+    """
+
+    coupled, waits = True, False
+    rules = (
+        "the contacts can neither hold nor slip: one of them slides with a larger force than it holds; let no sliding "
+        "force be above the holding force",
+    )
+    own_solver = 0
+
+    def prepare(self):
+        return 0
+
+    # ---- where modes end
+
+    def guards(self, t, y: States, modes: Contacts) -> Contacts:
+        """Positive while the modes last: what the load of a stuck contact lacks to the limit, where one that stays
+        there, but for rounding, is held; or the slip, in the direction of the mode."""
+        slips = self.slips(t, y)
+        force, limit, terms = self.forces(t, y, modes)
+        left = per_contact()
+        for i in contacts:
+            if modes[i] == STUCK:
+                left[i] = limit[i] + NEAR * (terms[i] + limit[i]) - fabs(force[i])
+            else:
+                left[i] = modes[i] * slips[i]
+        return left
+
+    def guard(self, step, t, i: Contact):
+        """That of one contact, within a step."""
+        y = step.at(self, t)
+        left = self.guards(t, y, step.modes0)
+        return left[i]
+
+    def comes_close(self, step):
+        """Whether a guard comes near zero within the step, as far as the cubic with the values and slopes of its ends
+        tells: no interpolant is worked out for that."""
+        h = step.t1 - step.t0
+        c1 = step.y1 - step.y0
+        c2 = h * step.f0 - c1
+        c3 = 2.0 * c1 - h * (step.f0 + step.f1)
+        s, r = 1.0 / 3.0, 2.0 / 3.0
+        y2 = step.y0 + s * (c1 + r * (c2 + s * c3))
+        y3 = step.y0 + r * (c1 + s * (c2 + r * c3))
+        first = self.guards(step.t0, step.y0, step.modes0)
+        second = self.guards(step.t0 + s * h, y2, step.modes0)
+        third = self.guards(step.t0 + r * h, y3, step.modes0)
+        last = self.guards(step.t1, step.y1, step.modes0)
+        close = False
+        for i in contacts:
+            low = min(first[i], second[i], third[i], last[i])
+            high = max(first[i], second[i], third[i], last[i])
+            close = close or last[i] <= 0.0 or low <= CLOSE * (high - low)
+        return close
+
+    def ends(self, step) -> Contacts:
+        """When each mode ends within the step, to the last bit; inf where it does not.
+
+        A guard that falls to zero and rises again within the step is found as well.
+        """
+        found, before = per_contact(), per_contact()
+        for i in contacts:
+            found[i], before[i] = inf, -inf
+        if self.comes_close(step):
+            step.looked += LOOKS
+            here = self.guards(step.t0, step.y0, step.modes0)
+            t_before = t_here = step.t0
+            for part in range(1, LOOKS + 1):
+                t, y = step.t1, step.y1
+                if part < LOOKS:
+                    t = step.t0 + (step.t1 - step.t0) * part / LOOKS
+                    y = step.at(self, t)
+                ahead = self.guards(t, y, step.modes0)
+                for i in contacts:
+                    if found[i] == inf and ahead[i] <= 0.0:
+                        found[i] = self.located(step, t_here, t, here[i], ahead[i], i)
+                    elif found[i] == inf and before[i] > here[i] and ahead[i] > here[i]:  # lowest in between
+                        low = self.dip(step, t_before, t, i)
+                        if low < inf:
+                            least = self.guard(step, low, i)
+                            found[i] = self.located(step, t_before, low, before[i], least, i)
+                before, here = here, ahead
+                t_before, t_here = t_here, t
+        return found
+
+    def after(self, step, ends: Contacts, near) -> tuple[States, Contacts, bool]:
+        """State and modes at the end of a step that has been cut there, and whether the modes fit."""
+        t, room = step.t1, 4.0 * ULP * fabs(step.t1)
+        rest, first = per_contact(), per_contact()
+        for i in contacts:
+            rest[i] = step.modes0[i] == STUCK or ends[i] - t <= room
+            first[i] = STUCK if rest[i] else step.modes0[i]
+        y = self.at_rest(t, step.y1, first)
+        force, _limit, _terms = self.forces(t, y, first)
+        for i in contacts:
+            if step.modes0[i] == STUCK and ends[i] - t <= room:
+                first[i] = sign(force[i])
+        modes, fit = self.settled(t, y, first, rest, near)
+        return y, modes, fit
+
+    def begun(self, t, y: States, modes: Contacts, near) -> tuple[States, Contacts, bool]:
+        """The same where a motion begins, or values have changed, after these modes: what has a slip slides."""
+        slips = self.slips(t, y)
+        terms = self.slip_terms(t, y)
+        rest, first = per_contact(), per_contact()
+        for i in contacts:
+            known = near * (terms[i] + TOUCHING) if modes[i] * slips[i] <= 0.0 else NEAR * terms[i]
+            rest[i] = fabs(slips[i]) <= known
+            first[i] = STUCK if rest[i] else sign(slips[i])
+        y = self.at_rest(t, y, first)
+        after, fit = self.settled(t, y, first, rest, near)
+        return y, after, fit
+
+    # ---- which contacts hold
+
+    def at_rest(self, t, y: States, modes: Contacts) -> States:
+        """The nearest state whose stuck contacts have no slip: impulses in these keep the momentum."""
+        for _ in range(MOST_IMPULSES):
+            slips = self.slips(t, y)
+            still = True
+            for i in contacts:
+                if modes[i] == STUCK and slips[i] != 0.0:
+                    still = False
+            if still:
+                break
+            y = self.struck(t, y, modes)
+        return y
+
+    def settled(self, t, y: States, modes: Contacts, rest: Contacts, near) -> tuple[Contacts, bool]:
+        """The modes that hold from here on, of which those of contacts at rest may be others than these; and whether
+        they fit the forces.
+
+        What would slip against its own force is held; else what bears most of what it holds is let go, and what bears
+        as much with it.  If that comes to no end, one contact is changed at a time, the first that has to.
+        """
+        after = per_contact()
+        for i in contacts:
+            after[i] = modes[i]
+        for turn in range(2 * MOST_ROUNDS):
+            urgency, other = self.urges(t, y, after, rest, near)
+            worst = largest(urgency)
+            if not worst > 0.0:
+                return after, True
+            least = 0.0 if turn >= MOST_ROUNDS else ALIKE * worst
+            changed = False
+            for i in contacts:
+                if urgency[i] > 0.0 and urgency[i] >= least and not (changed and least == 0.0):
+                    after[i], changed = other[i], True
+        return modes, False
+
+    def urges(self, t, y: States, modes: Contacts, rest: Contacts, near) -> tuple[Contacts, Contacts]:
+        """How urgently each contact at rest must change, not at all where its mode fits, and to which mode.
+
+        Near a tie the next derivative decides.  A load is known but for the rounding of what it is made of, and, where
+        it moves inward, the share `near` of the limit.
+        """
+        force, limit, terms = self.forces(t, y, modes)
+        force_rate, limit_rate, pull, pull_rate = self.changes(t, y, modes)
+        urgency, other = per_contact(), per_contact()
+        for i in contacts:
+            urgency[i], other[i] = 0.0, STUCK
+            slack = NEAR * (terms[i] + limit[i])
+            if rest[i] and modes[i] == STUCK:
+                other[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
+                outward = other[i] * force_rate[i] - limit_rate[i]
+                if outward > 0.0:
+                    slack = -slack
+                elif outward < 0.0:
+                    slack += near * limit[i]
+                if other[i] != STUCK and fabs(force[i]) > limit[i] + slack:
+                    urgency[i] = fabs(force[i]) / (limit[i] + LEAST)
+            elif rest[i]:
+                ahead = modes[i] * pull[i]
+                if ahead < -slack or (ahead <= slack and modes[i] * pull_rate[i] < 0.0):
+                    urgency[i] = inf
+        return urgency, other
