@@ -16,8 +16,8 @@ from driver import Refused, Worker
 from models import HYBRID, MODELS, combinations, declared, label, model_class, parameters, tunable
 from native_fmus import built
 
-LIVES, EVENTS = 4, 30  # of every model, law and method; in a life
-BREAKDOWNS = 12  # of every model, law and method
+LIVES, EVENTS = 2, 30  # of every model, law and method; in a life
+BREAKDOWNS = 6  # of every model, law and method
 CASES = [(name, values, model_class(name).stop_time) for name in MODELS for values in combinations(name)]
 
 

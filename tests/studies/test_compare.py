@@ -126,14 +126,6 @@ def test_one_of_ours_is_run_at_its_own_steps(harness, tmp_path):
     assert (tmp_path / "results/coulomb/trajectory.csv").exists()
 
 
-def test_json_may_be_asked_for_before_any_command(harness):
-    done = harness("--json", "precision", "smd", "--quick")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert {point["method"] for point in found["points"]["smd"]} >= {"exact", "dop853", "Radau"}
-    assert found["advice"][0].startswith("smd: use exact")
-
-
 def test_a_run_as_json_is_json_and_nothing_else(harness, foreign):
     done = harness("run", "--fmu", foreign / "Theirs.fmu", "--tolerance", 1e-3, "--json")
     assert (done.returncode, done.stderr) == (0, "")

@@ -1,6 +1,7 @@
 """Work-precision of the FMI 3.0 FMUs through fmpy: its own solver in model exchange, and theirs in co-simulation."""
 
 import csv
+import json
 from html import unescape
 from math import isnan
 
@@ -134,9 +135,15 @@ def test_the_command_shows_both_ways_beside_the_others_and_error_against_toleran
     assert told == [[advice.power(float(number)) if number else "-" for number in row] for row in table]
 
 
-def test_the_page_has_error_against_tolerance_or_names_the_commands_that_make_it(both, fmus, tmp_path):
+def test_json_holds_all_of_it_and_the_page_has_error_against_tolerance_or_names_the_commands_that_make_it(
+    both, fmus, tmp_path
+):
     def page(folder):
-        assert harness(folder, "precision", "smd", "--quick", "--quiet", "--out", tmp_path).returncode == 0
+        done = harness(folder, "--json", "precision", "smd", "--quick", "--out", tmp_path)  # before any command
+        assert done.returncode == 0, done.stderr
+        found = json.loads(done.stdout)
+        assert {point["method"] for point in found["points"]["smd"]} >= {"exact", "dop853", "Radau"}
+        assert found["advice"][0].startswith("smd: use exact")
         assert harness(folder, "report", "--quiet", "--out", tmp_path).returncode == 0
         return unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
 

@@ -42,7 +42,7 @@ def host(sanitizer=""):
 
 
 def sanitized(kind):
-    return [f"-fsanitize={kind}", "-fno-sanitize-recover=all"] if kind else []
+    return [f"-fsanitize={kind}", "-fno-sanitize-recover=all", "-O1"] if kind else []  # whose bits nobody compares
 
 
 @cache
