@@ -1,14 +1,11 @@
 """A model in a file anywhere, as a user writes it: built by its path, in every kind, and right."""
 
-import os
-import subprocess
-import sys
-from functools import cache
 from zipfile import ZipFile
 
+import commands
 import numpy as np
 import pytest
-from builds import ROOT
+from builds import ROOT, of_file
 from compare import identical
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
@@ -23,29 +20,17 @@ KINDS = {"": [], "fmi3": ["--fmi", "3"], "native": ["--native", "--platform", "l
 
 def command(*arguments, cwd):
     """The build command, in a folder of the user's."""
-    call = [sys.executable, str(ROOT / "build_fmus.py"), *map(str, arguments)]
-    return subprocess.run(call, cwd=cwd, capture_output=True, text=True, timeout=300)
+    return commands.build(*arguments, folder=cwd)
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """built(path, kind): the FMU, beside a copy of the file in a folder outside the project."""
-
-    @cache
-    def build(path, kind):
-        folder = tmp_path_factory.mktemp("elsewhere")
-        (folder / path.name).write_text(path.read_text())
-        run = command(path.name, *KINDS[kind], cwd=folder)
-        assert (run.returncode, run.stderr) == (0, "")
-        assert run.stdout.startswith(f"{path.stem}.fmu ")
-        return folder / kind / f"{path.stem}.fmu"
-
-    return build
+def built(path, kind):
+    """The FMU, beside a copy of the file in a folder outside the project."""
+    return of_file(path, *KINDS[kind]) / kind / f"{path.stem}.fmu"
 
 
 @EVERY_FILE
 @pytest.mark.parametrize("kind", KINDS)
-def test_it_is_built_beside_its_file_in_every_kind_and_is_valid(built, path, kind):
+def test_it_is_built_beside_its_file_in_every_kind_and_is_valid(path, kind):
     fmu = built(path, kind)
     assert validate_fmu(str(fmu)) == []
     assert read_model_description(fmu).modelName == path.stem
@@ -58,7 +43,7 @@ def test_it_is_built_beside_its_file_in_every_kind_and_is_valid(built, path, kin
 
 
 @EVERY_FILE
-def test_python_and_native_have_the_same_bits(built, path, worker):
+def test_python_and_native_have_the_same_bits(path, worker):
     """Outputs and counts, up to the stop time of its default run."""
     described = read_model_description(built(path, ""))
     wanted = [v.name for v in described.modelVariables if v.causality == "output" or v.name == "solver.steps"]
@@ -86,7 +71,7 @@ def bumper(t, y):
 
 
 @pytest.mark.parametrize(("law", "start"), [(viscous_pendulum, (0.3, 0.0)), (bumper, (0.0, 0.1))])
-def test_its_motion_is_that_of_its_equations_written_by_hand(built, law, start):
+def test_its_motion_is_that_of_its_equations_written_by_hand(law, start):
     """Within 1e-9, by scipy's DOP853."""
     path = next(path for path in AUTHORED if path.stem == law.__name__)
     stop = model_class(path).stop_time
@@ -123,7 +108,7 @@ def rotor_brake(stop):
         found.append((t, phi))
 
 
-def test_its_friction_holds_and_lets_go_when_the_equations_say(built, worker):
+def test_its_friction_holds_and_lets_go_when_the_equations_say(worker):
     """The events of the brake, and a rest that is one."""
     path = next(path for path in AUTHORED if path.stem == "rotor_brake")
     stop = model_class(path).stop_time
@@ -186,9 +171,7 @@ def test_what_lies_beside_the_file_under_its_name_goes_into_the_fmu_and_nothing_
 
 def harness(*arguments, cwd):
     """A command of the harness, in a folder of the user's."""
-    call = [sys.executable, "-m", "harness", *map(str, arguments)]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    return subprocess.run(call, cwd=cwd, env=environment, capture_output=True, text=True, timeout=300)
+    return commands.harness(cwd, *arguments)
 
 
 def test_a_result_is_certified_by_two_methods_that_agree_and_goes_into_the_next_build(oil):
@@ -250,7 +233,7 @@ def test_a_result_that_is_none_is_refused(oil, table):
     assert run.stderr.count("\n") == 1
 
 
-def test_a_run_of_it_by_the_harness_shows_its_events_by_whatever_name_its_mode_has(built, tmp_path):
+def test_a_run_of_it_by_the_harness_shows_its_events_by_whatever_name_its_mode_has(tmp_path):
     fmu = built(next(path for path in AUTHORED if path.stem == "rotor_brake"), "")
     (tmp_path / "brake.toml").write_text(f'title = "Brake"\nfmu = "{fmu}"\noutputs = ["phi", "omega", "alpha"]\n')
     run = harness("run", "brake.toml", "--out", "results", cwd=tmp_path)

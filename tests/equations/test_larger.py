@@ -1,12 +1,8 @@
 """Models of more states or contacts, from files as users write them: right by physics written a second time."""
 
-import subprocess
-import sys
-from functools import cache
-
 import numpy as np
 import pytest
-from builds import ROOT
+from builds import of_file
 from by_hand import BY_HAND, followed
 from compare import identical
 from fmpy import read_model_description
@@ -16,21 +12,10 @@ from scipy.integrate import solve_ivp
 STOP, DOP853 = 8.0, 4
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """built(name, kind): the FMU of one of the files, in a folder outside the project."""
-
-    @cache
-    def build(name, kind):
-        folder = tmp_path_factory.mktemp(name)
-        (file,) = (file for file in LARGER if file.stem == name)
-        options = ["--native", "--platform", "linux64"] if kind == "native" else []
-        call = [sys.executable, str(ROOT / "build_fmus.py"), str(file), "--out", str(folder), *options]
-        run = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=300)
-        assert (run.returncode, run.stderr) == (0, "")
-        return folder / f"{name}.fmu"
-
-    return build
+def built(name, kind):
+    """The FMU of one of the files, in a folder outside the project."""
+    (file,) = (file for file in LARGER if file.stem == name)
+    return of_file(file, *(["--native", "--platform", "linux64"] if kind else [])) / kind / f"{name}.fmu"
 
 
 def lugre(t, y):
@@ -40,7 +25,7 @@ def lugre(t, y):
     return [v, (742.5 * (0.034 * t - x) - (1e4 * z + 300.0 * u + 0.4 * v)) / 12.5, u]
 
 
-def test_three_states_are_those_of_the_equations_written_by_hand(built, worker):
+def test_three_states_are_those_of_the_equations_written_by_hand(worker):
     """LuGre: position, speed and bristles, within 1e-9 of their sizes."""
     true = solve_ivp(lugre, (0.0, STOP), (0.0, 0.0, 0.0), "Radau", rtol=1e-11, atol=1e-14).y[:, -1]
     fmu = worker.instantiate(built("lugre", "")).begin({"solver.rtol": 1e-11}, stop=STOP)
@@ -77,7 +62,7 @@ RUNS = [(name, ()) for name in BY_HAND] + [(name, one.changes) for name, one in 
 @pytest.mark.parametrize(
     ("name", "changes"), RUNS, ids=lambda one: one if isinstance(one, str) else f"changed{len(one)}"
 )
-def test_contacts_stick_and_slip_when_equations_written_by_hand_say(built, worker, name, changes):
+def test_contacts_stick_and_slip_when_equations_written_by_hand_say(worker, name, changes):
     """On a belt, in a clutch, each on its own body or both on one: every event, and the state at the end; also where
     a belt is set to another speed, and a clutch opened, on the way."""
     physics = BY_HAND[name]()
@@ -92,7 +77,7 @@ def test_contacts_stick_and_slip_when_equations_written_by_hand_say(built, worke
 
 
 @pytest.mark.parametrize("name", [path.stem for path in LARGER])
-def test_python_and_native_have_the_same_bits(built, worker, name):
+def test_python_and_native_have_the_same_bits(worker, name):
     """Outputs and counts."""
     described = read_model_description(built(name, ""))
     wanted = [v.name for v in described.modelVariables if v.causality == "output"]

@@ -1,11 +1,9 @@
 """What an author gets wrong is said when the FMU is built: one sentence, with the line."""
 
 import re
-import subprocess
-import sys
 
 import pytest
-from builds import ROOT
+from commands import build
 
 from fmus.packaging import BuildError
 from fmus.packaging.catalogue import find
@@ -224,12 +222,11 @@ def test_a_file_has_the_name_of_a_model(name, tmp_path):
 
 def test_the_command_says_it_without_a_traceback(tmp_path):
     (tmp_path / "mine.py").write_text(HEAD)
-    call = [sys.executable, str(ROOT / "build_fmus.py")]
-    run = subprocess.run([*call, "mine.py"], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    run = build("mine.py", folder=tmp_path)
     assert run.returncode == 1
     assert (
         run.stderr
         == "Error: mine.py, line 15: nothing is the rate of v: say rate_of=v where its derivative is declared.\n"
     )
-    missing = subprocess.run([*call, "nowhere.py"], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    missing = build("nowhere.py", folder=tmp_path)
     assert (missing.returncode, missing.stderr) == (2, "Error: There is no file nowhere.py.\n")

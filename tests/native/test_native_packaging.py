@@ -12,6 +12,7 @@ from struct import unpack_from
 
 import lief
 import pytest
+from commands import build
 from fmpy import read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.model_description import read_build_description
@@ -34,6 +35,8 @@ SYSTEM = {
 
 
 def run(*arguments, cwd=ROOT, **environment):
+    if cwd == ROOT:
+        return build(*arguments, **environment)
     command = [sys.executable, "build_fmus.py", *map(str, arguments)]
     return subprocess.run(
         command, cwd=cwd, capture_output=True, text=True, timeout=600, env={**os.environ, **environment}

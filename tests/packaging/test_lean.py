@@ -1,25 +1,18 @@
 """FMUs built with --method, --law and --platform: they offer just those, carry just their code, and run alike."""
 
-import subprocess
-import sys
 from zipfile import ZipFile
 
 import pytest
-from builds import ROOT
+from commands import build as command
 from compare import identical
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from models import CASES, MODELS, counts, declared, label, outputs
 
+from fmus.packaging import archive
 from fmus.packaging.written import LAWS, METHODS
 
 LABELS = {"solver.method": "--method", "friction": "--law"}
-
-
-def command(*arguments):
-    """The build command in a process of its own."""
-    call = [sys.executable, "build_fmus.py", *map(str, arguments)]
-    return subprocess.run(call, cwd=ROOT, capture_output=True, text=True, timeout=120)
 
 
 def chosen(name, values):
@@ -37,11 +30,9 @@ def lean(tmp_path_factory):
     """lean(case): the FMU that offers the method and the law of a case and nothing else, for Linux."""
 
     def build(case):
-        out = tmp_path_factory.mktemp("lean")
-        options = [word for pair in chosen(*case[:2]).items() for word in pair]
-        run = command(case[0], *options, "--platform", "linux64", "--out", out)
-        assert run.returncode == 0, run.stderr
-        return out / f"{case[0]}.fmu"
+        options = chosen(*case[:2])
+        asked = [[options[word]] if word in options else [] for word in LABELS.values()]
+        return archive.build(case[0], tmp_path_factory.mktemp("lean"), *asked, ["linux64"])
 
     return build
 

@@ -6,8 +6,9 @@ from fcntl import LOCK_EX, flock
 from pathlib import Path
 from tempfile import mkdtemp
 
-SUPPORT = Path(__file__).parent
-ROOT = SUPPORT.parents[1]
+import commands
+from commands import ROOT, SUPPORT  # noqa: F401 - both are told here as well
+
 room = Path()  # conftest.py tells where
 
 
@@ -21,9 +22,27 @@ def build(root, out, *words, timeout=120):
 
 def once(name, *words, timeout=120):
     """The folder `name` of the room, with the FMUs that the build command makes of these words."""
+    return made(name, lambda folder: build(ROOT, folder, *words, timeout=timeout))
+
+
+def of_file(path, *words):
+    """The folder of a user's file, outside the project, with what the build command makes beside it of these words."""
+
+    def make(folder):
+        (folder / path.name).write_text(path.read_text())
+        done = commands.build(path.name, *words, folder=folder)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.startswith(f"{path.stem}.fmu ")
+
+    return made("-".join((path.stem, *words)), make)
+
+
+def made(name, make):
+    """The folder `name` of the room, which whoever asks first makes."""
     folder = room / name
     with (room / f"{name}.lock").open("w") as lock:
         flock(lock, LOCK_EX)
         if not folder.exists():
-            build(ROOT, Path(mkdtemp(dir=room)), *words, timeout=timeout).rename(folder)
+            make(fresh := Path(mkdtemp(dir=room)))
+            fresh.rename(folder)
     return folder

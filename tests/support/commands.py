@@ -1,7 +1,8 @@
-"""`python -m harness` as its user sees it: exit status and streams of a process of its own, in a folder of his.
+"""`python -m harness` and `python build_fmus.py` as their user sees them: exit status and streams of a process of its
+own, in a folder of his.
 
-The process is forked from one that has loaded the harness and its libraries, for to load them takes a second, and there
-are hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).
+The process is forked from one that has loaded both and their libraries, for to load them takes a second, and there are
+hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).
 """
 
 import atexit
@@ -19,19 +20,24 @@ from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
 
-from builds import ROOT
-
+SUPPORT = Path(__file__).parent
+ROOT = SUPPORT.parents[1]
 PATIENCE = 300.0  # s
 
 
-def harness(folder, *arguments, base=os.environ, fresh=False, text="", **environment):
+def harness(folder, *arguments, base=os.environ, fresh=False, text="", module="harness", **environment):
     """The finished process; it reads `text`, and has the environment `base` with what is named."""
     words, environment = [*map(str, arguments)], {**base, "PYTHONPATH": str(ROOT)} | environment
     if not fresh:
-        return _server().run(words, str(folder), environment, text)
-    command = [sys.executable, "-m", "harness", *words]
+        return _server().run(module, words, str(folder), environment, text)
+    command = [sys.executable, "-m", module, *words]
     options = {"cwd": folder, "env": environment, "capture_output": True, "text": True, "timeout": PATIENCE}
     return subprocess.run(command, input=text, **options)
+
+
+def build(*arguments, folder=ROOT, **environment):
+    """The finished build."""
+    return harness(folder, *arguments, module="build_fmus", **environment)
 
 
 @cache
@@ -53,15 +59,15 @@ class Server:
             command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=self.room.name, start_new_session=True
         )
 
-    def run(self, words, folder, environment, text):
+    def run(self, module, words, folder, environment, text):
         for file in self.files:
             file.write_text(text if file.name == "in" else "")
         asked = {"words": words, "folder": folder, "environment": environment, "files": [*map(str, self.files)]}
-        print(json.dumps(asked), file=self.process.stdin, flush=True)
+        print(json.dumps([module, asked]), file=self.process.stdin, flush=True)
         if not select.select([self.process.stdout], [], [], PATIENCE)[0]:
             os.killpg(self.process.pid, signal.SIGKILL)
             _server.cache_clear()
-            raise AssertionError(f"harness {' '.join(words)} did not end within {PATIENCE:.0f} s")
+            raise AssertionError(f"{module} {' '.join(words)} did not end within {PATIENCE:.0f} s")
         status = int(self.process.stdout.readline())
         return subprocess.CompletedProcess(words, status, *(file.read_bytes().decode() for file in self.files[1:]))
 
@@ -74,15 +80,17 @@ class Server:
 
 def serve():
     """Load all that can be; then fork for every line that is read, and answer with the exit status."""
-    for module in walk_packages(import_module("harness").__path__, "harness."):
-        with suppress(ImportError):  # an extra that is not installed
-            if not module.name.endswith("__main__"):
-                import_module(module.name)
+    for package in ("harness", "fmus.packaging"):
+        for module in walk_packages(import_module(package).__path__, f"{package}."):
+            with suppress(ImportError):  # an extra that is not installed
+                if not module.name.endswith("__main__"):
+                    import_module(module.name)
     for line in sys.stdin:
         child = os.fork()
         if not child:
-            become(**json.loads(line))
-            runpy.run_module("harness", run_name="__main__", alter_sys=True)
+            module, asked = json.loads(line)
+            become(**asked)
+            runpy.run_module(module, run_name="__main__", alter_sys=True)
             return
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 
@@ -92,7 +100,7 @@ def become(words, folder, environment, files):
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
-    sys.argv, sys.path[0], tempfile.tempdir = ["harness", *words], folder, None
+    sys.argv, sys.path[0], tempfile.tempdir = ["", *words], folder, None
     for number, file in enumerate(files):
         opened = os.open(file, os.O_RDWR)
         os.dup2(opened, number)
