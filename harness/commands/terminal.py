@@ -56,8 +56,9 @@ STOP = click.option("--stop", type=NUMBER, help="Stop time in s (the FMU's own).
 
 
 def prepare() -> None:
-    """Let standard output take every letter, a closed stream take everything, and temporary files lie where every
-    library finds them."""
+    """Let standard output take every letter, a closed stream take everything, temporary files lie where every library
+    finds them, and numpy's products be summed by one thread: several sum in another order, and mostly wait."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:

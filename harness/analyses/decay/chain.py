@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .halves import Halves, halves
+from .halves import Halves, halves, slopes
 from .law import at_rest
 
 NODES, NODES_SINE, NODES_WIDE = 32, 40, 80  # of a spring, a pendulum, and one beyond WIDE rad
@@ -28,13 +28,16 @@ class Chain:
     weights: np.ndarray
     swings: Halves
 
-    @property
-    def series(self) -> np.ndarray:
-        """Of the motion, (ORDER + 1, S, P, N): the S-th of a half swing holds from swings.begins[S] on."""
-        laws, count, nodes = self.weights.shape
-        pieces, terms, _ = self.swings.series.shape
-        at_nodes = self.swings.series.reshape(pieces * terms, laws, nodes).transpose(1, 2, 0)
-        return np.matmul(self.weights, at_nodes).reshape(laws, count, pieces, terms).transpose(3, 2, 0, 1)
+    def series(self, order: int) -> np.ndarray:
+        """Of the derivative of that order of the motion, (P, terms, S N): the S-th of the N-th half swing, which holds
+        from swings.begins[S] on, is in column S N + n."""
+        laws, _, nodes = self.weights.shape
+        at_nodes = self.swings.series
+        for _ in range(order):
+            at_nodes = slopes(at_nodes)
+        terms = len(at_nodes)
+        by_law = at_nodes.reshape(-1, laws, nodes).transpose(1, 0, 2)
+        return np.matmul(by_law, self.weights.transpose(0, 2, 1)).reshape(laws, terms, -1)
 
 
 def chain(laws: np.ndarray, sine: bool, floor: float, most: int = MOST, until: float = np.inf) -> Chain:

@@ -21,7 +21,7 @@ MOST = 100  # series in a half swing
 
 @dataclass(frozen=True)
 class Halves:
-    """L half swings: where they `end` (L,), their `duration` (L,) in theta, and their series (S, ORDER + 1, L), the
+    """L half swings: where they `end` (L,), their `duration` (L,) in theta, and their series (ORDER + 1, S, L), the
     S-th of which holds from begins[S] on."""
 
     end: np.ndarray
@@ -95,7 +95,7 @@ def halves(a: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: 
         if not np.isnan(end).any() or not np.isfinite(y).all():
             break
         at += h
-    return Halves(end, duration, np.array(begins), np.array(series))
+    return Halves(end, duration, np.array(begins), np.stack(series, axis=1))
 
 
 def reach(c: np.ndarray, small: float) -> float:

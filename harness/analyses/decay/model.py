@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from .chain import chain
-from .halves import slopes
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, ZETA, B, R
 
 SHARE = 0.75  # of the terms of a series are enough for a derivative
@@ -47,10 +46,8 @@ class Model:
         laws, places, changes = self.varied(p, unknowns)
         theta = p[OMEGA] * (t - p[T0])
         found = chain(laws, self.sine, self.floor, until=float(theta[-1]) if len(t) else 0.0)
-        amplitudes, begins, series = found.amplitudes, found.begins, found.series
+        amplitudes, begins, series = found.amplitudes, found.begins, found.series(self.order)
         count = len(amplitudes) - 1
-        for _ in range(self.order):
-            series = slopes(series)
 
         half = np.searchsorted(begins[:, 0], theta, "right") - 1
         if self.order and count:
@@ -63,7 +60,7 @@ class Model:
         way = self.side * np.where(half % 2, -1.0, 1.0) * p[OMEGA] ** self.order
         still = self.side * (self.order == 0) * np.array([1.0, (-1.0) ** count])  # before and after the motion
 
-        y, rate = with_slope(series[:, :, 0].reshape(len(series), -1), which, h)
+        y, rate = with_slope(series[0], which, h)
         signal = around(held, way * y, len(t) - left, still * amplitudes[[0, -1], 0])
         jacobian = np.zeros((len(t), len(unknowns)))
         column = {place: i for i, place in enumerate(unknowns.tolist())}
@@ -71,11 +68,10 @@ class Model:
         jacobian[held:left, column[OMEGA]] = (
             way * rate * (t[held:left] - p[T0]) + self.order / p[OMEGA] * signal[held:left]
         )
-        short = series[: int(SHARE * len(series))]
+        short = series[:, : int(SHARE * series.shape[1])]
         for i, (place, change) in enumerate(zip(places.tolist(), changes.tolist(), strict=True), 1):
-            differences = ((short[:, :, i] - short[:, :, 0]) / change).reshape(len(short), -1)
             later = (begins[:-1, i] - begins[:-1, 0]) / change
-            slope = way * (summed(differences, which, h) - rate * later[half])
+            slope = way * (summed((short[i] - short[0]) / change, which, h) - rate * later[half])
             ends = still * (amplitudes[[0, -1], i] - amplitudes[[0, -1], 0]) / change
             jacobian[:, column[place]] = around(held, slope, len(t) - left, ends)
         jacobian[:, column[REST]] = 1.0
@@ -115,18 +111,21 @@ class Model:
 
 def summed(series: np.ndarray, which: np.ndarray, h: np.ndarray) -> np.ndarray:
     """The series in the columns `which` (n,) at h (n,), by Horner's rule."""
-    total = series[-1][which]
+    total = series[-1].take(which)
     for term in series[-2::-1]:
-        total = total * h + term[which]
+        total *= h
+        total += term.take(which)
     return total
 
 
 def with_slope(series: np.ndarray, which: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same, and the derivatives (n,)."""
-    total, slope = series[-1][which], np.zeros_like(h)
+    total, slope = series[-1].take(which), np.zeros_like(h)
     for term in series[-2::-1]:
-        slope = slope * h + total
-        total = total * h + term[which]
+        slope *= h
+        slope += total
+        total *= h
+        total += term.take(which)
     return total, slope
 
 
