@@ -16,10 +16,11 @@ from scipy.integrate import solve_ivp
 from scipy.stats import norm
 from scipy.stats import t as student_t
 
+from harness.analyses.decay.bounded import bounded
 from harness.analyses.decay.decrement import damping_ratio, friction
 from harness.analyses.decay.figures import Known
 from harness.analyses.decay.fit import identify
-from harness.analyses.decay.intervals import bounded, student
+from harness.analyses.decay.intervals import student
 from harness.analyses.decay.law import LAWS, TERMS, unknowns_of
 from harness.analyses.decay.model import Model
 from harness.analyses.decay.record import Record
@@ -209,8 +210,21 @@ def test_stiffness_or_mass_give_force_damping_and_drag(known, expected):
 def test_the_interval_of_what_cannot_be_negative_holds_it_in_95_percent(mean):
     """By the shares of a normal distribution, of each mean and of each thing measured."""
     z = mean + norm.ppf((np.arange(400) + 0.5) / 400)
-    held = [low <= mean <= high for low, high in map(bounded, z.tolist())]
-    assert np.mean(held) == pytest.approx(0.95, abs=0.004)
+    intervals = [bounded(np.array([each]), np.eye(1)) for each in z.tolist()]
+    assert np.mean([low <= mean <= high for low, high in intervals]) == pytest.approx(0.95, abs=0.004)
+
+
+@pytest.mark.parametrize("rho", [-0.98, 0.5])
+@pytest.mark.parametrize("means", [(0.0, 0.0), (0.0, 1.0), (0.0, 5.0), (0.3, 0.0), (2.0, 0.0), (2.0, 2.0)])
+def test_the_interval_beside_what_cannot_be_negative_either_holds_it_in_95_percent(means, rho):
+    """Of 200 draws; more only where both are zero, and there the interval is the shorter for it."""
+    correlation = np.array([[1.0, rho], [rho, 1.0]])
+    z = np.random.default_rng(1).multivariate_normal(means, correlation, 200)
+    low, high = np.array([bounded(each, correlation) for each in z]).T
+    assert 0.9 < np.mean((low <= means[0]) & (means[0] <= high)) < (1.0 if means == (0.0, 0.0) else 0.985)
+    if means == (0.0, 0.0) and rho < 0:
+        alone = np.array([bounded(each[:1], np.eye(1)) for each in z])
+        assert np.mean(high) < 0.5 * np.mean(alone[:, 1])
 
 
 def test_students_t_is_that_of_scipy():

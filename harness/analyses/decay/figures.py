@@ -11,7 +11,7 @@ import numpy as np
 
 from .choice import Law
 from .intervals import SIDE, Spread, interval
-from .law import DRIFT, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
+from .law import DRIFT, OMEGA, REST, UNKNOWNS, ZETA, B, R
 from .problem import Problem
 from .record import Record
 
@@ -76,21 +76,20 @@ def estimates(
     """Everything that is told: of terms that the law has not, the largest value that the record allows."""
     found = {}
     bound = any(full.p[UNKNOWNS.index(term)] <= 0 for term in full.terms)  # elsewhere the fit is where it would be
+    free = spread.free if bound else full.p[spread.unknowns]
+    ends = {
+        int(place): interval(i, spread.unknowns, free, spread.errors, spread.correlation, spread.freedom)
+        for i, place in enumerate(spread.unknowns)
+    }
+    if any(not low <= law.p[place] <= high for place, (low, high) in ends.items()):
+        law = full
+    errors = dict(zip(ends, spread.errors.tolist(), strict=True))
     for place, (name, unit, text) in symbols(record).items():
-        if place == DRIFT and not problem.drift:
-            continue
-        value, error, low, high = float(law.p[place]), 0.0, 0.0, 0.0
-        at = np.flatnonzero(spread.unknowns == place)
-        if len(at):
-            free, error = float(spread.free[at[0]] if bound else full.p[place]), float(spread.errors[at[0]])
-            low, high = interval(place, free, error, spread.freedom)
-            low, high = min(low, value), max(high, value)
-        elif UNKNOWNS[place] in TERMS:
-            continue  # was not to be tried
-        size, level = sizes(problem)[place], problem.level if place == REST else 0.0
-        found[place] = Estimate(
-            name, size * value + level, size * error, size * low + level, size * high + level, unit, text
-        )
+        if place in ends:  # elsewhere it was not to be tried
+            value, (low, high) = float(law.p[place]), ends[place]
+            size, level = sizes(problem)[place], problem.level if place == REST else 0.0
+            low, high = size * min(low, value) + level, size * max(high, value) + level
+            found[place] = Estimate(name, size * value + level, size * errors[place], low, high, unit, text)
     return (*found.values(), *forces(record, found, known))
 
 

@@ -4,16 +4,16 @@ Residuals that resemble their neighbours carry less than their number says.  Wit
 blocks, the covariance (J'J)^-1 (sum of g g' over blocks) (J'J)^-1 allows for that (W. K. Newey, K. D. West,
 Econometrica 55 (1987), with blocks for their kernel); of several lengths of blocks the widest is taken.
 
-A loss z errors from zero (z may be negative: one linear step beyond the bound) has the interval of G. J. Feldman and
-R. D. Cousins, Physical Review D 57 (1998), section IV B: it holds the truth in 95 % of cases also where that is zero.
+Of losses near zero, and of those beside them, bounded.py tells the intervals, from where the fit would be if losses
+could be negative: one linear step beyond the bound.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
 
+from .bounded import FAR, bounded
 from .law import OMEGA, ZETA, Terms
 from .problem import Problem
 from .squares import scales
@@ -28,11 +28,12 @@ ALIKE = 4.5  # standard deviations of the correlation of white residuals
 
 @dataclass(frozen=True)
 class Spread:
-    """Of the `unknowns`: standard `errors`, and `free`, where they would be if losses could be negative.  Of the
-    residuals: rms, correlation `rho` of neighbours, and whether they are `alike`."""
+    """Of the `unknowns` (n,): standard `errors`, their `correlation` (n, n), and `free`, where they would be if losses
+    could be negative.  Of the residuals: rms, correlation `rho` of neighbours, and whether they are `alike`."""
 
     unknowns: np.ndarray
     errors: np.ndarray
+    correlation: np.ndarray
     free: np.ndarray
     rms: float
     rho: float
@@ -58,7 +59,13 @@ def spread(problem: Problem, p: np.ndarray, terms: Terms) -> Spread:
         variance = np.max([white, *(by_blocks(jacobian, e, inverse, count) for count in sorted(counts))], axis=0)
     free = p[unknowns] - inverse @ (jacobian.T @ e) / scale
     rms = float(np.sqrt(np.mean(e**2)))
-    return Spread(unknowns, np.sqrt(variance) / scale, free, rms, rho, alike, freedom)
+    return Spread(unknowns, np.sqrt(variance) / scale, correlated(inverse), free, rms, rho, alike, freedom)
+
+
+def correlated(covariance: np.ndarray) -> np.ndarray:
+    """The correlations (n, n) in a covariance (n, n)."""
+    sizes = np.sqrt(np.diag(covariance))
+    return covariance / np.where(sizes > 0, np.outer(sizes, sizes), 1.0)
 
 
 def likeness(e: np.ndarray, width: int) -> tuple[float, bool]:
@@ -91,42 +98,16 @@ def student(freedom: int) -> float:
     return z + first / v + second / v**2 + third / v**3
 
 
-def interval(place: int, free: float, error: float, freedom: int) -> tuple[float, float]:
-    """The 95 % interval of the unknown at `place` in UNKNOWNS."""
-    wide = error * student(freedom) / SIDE
-    if place < ZETA or not wide > 0:
-        return free - SIDE * wide, free + SIDE * wide
-    low, high = bounded(free / wide)
-    return low * wide, high * wide
-
-
-def bounded(z: float) -> tuple[float, float]:
-    """Feldman and Cousins' 95 % interval, in errors, of a mean >= 0 that was measured as z.
-
-    A mean m accepts what lies between two values of equal likelihood ratio; the one below is 2 m - x as long as that
-    is not negative, and x (2 m - x)/(2 m) beyond.
-    """
-    high = z + SIDE if z >= 0 else root(lambda m: partner(accepted(m), m) - z, 0.0, SIDE)
-    if z >= 2 * SIDE:
-        return z - SIDE, high
-    return (0.0 if z <= accepted(0.0) else root(lambda m: accepted(m) - z, 0.0, SIDE)), high
-
-
-def partner(x: float, m: float) -> float:
-    """The value below m that is as likely as x above it, each beside its own likeliest mean >= 0."""
-    if 2 * m >= x:
-        return 2 * m - x
-    return x * (2 * m - x) / (2 * m) if m > 0 else -np.inf
-
-
-def accepted(m: float) -> float:
-    """The upper end of what a mean m accepts."""
-    return root(lambda x: NORMAL.cdf(x - m) - NORMAL.cdf(partner(x, m) - m) - 0.95, m + 1.0, m + 2.5)
-
-
-def root(rising: Callable[[float], float], low: float, high: float) -> float:
-    """Where a rising function is zero, by halving."""
-    for _ in range(40):
-        middle = (low + high) / 2
-        low, high = (middle, high) if rising(middle) < 0 else (low, middle)
-    return (low + high) / 2
+def interval(
+    i: int, unknowns: np.ndarray, free: np.ndarray, errors: np.ndarray, correlation: np.ndarray, freedom: int
+) -> tuple[float, float]:
+    """The 95 % interval of the i-th of the `unknowns` (places in UNKNOWNS) that were measured as `free`."""
+    wide = errors * student(freedom) / SIDE
+    losses = (unknowns >= ZETA) & (wide > 0)
+    z = free / np.where(losses, wide, 1.0)
+    near = losses & (z < FAR)
+    if not losses[i] or not near.any():
+        return float(free[i] - SIDE * wide[i]), float(free[i] + SIDE * wide[i])
+    some = [i, *(j for j in np.flatnonzero(near).tolist() if j != i)]
+    low, high = bounded(z[some], correlation[np.ix_(some, some)])
+    return float(low * wide[i]), float(high * wide[i])

@@ -14,7 +14,7 @@ from .chain import chain
 from .choice import Law
 from .decrement import damping_ratio, friction
 from .figures import Estimate, Known, forces, sizes, symbols
-from .intervals import interval
+from .intervals import correlated, interval
 from .law import AMPLITUDE, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
 from .model import Model
 from .problem import Problem
@@ -61,10 +61,11 @@ def by_turning_points(
     scale = scales(jacobian)
     covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * cost / freedom
     found = {OMEGA: omega}
-    for place, error in zip(unknowns.tolist(), (np.sqrt(np.diag(covariance)) / scale).tolist(), strict=True):
+    errors, correlation = np.sqrt(np.diag(covariance)) / scale, correlated(covariance)
+    for i, place in enumerate(unknowns.tolist()):
         if place != AMPLITUDE:
-            low, high = interval(place, float(p[place]), error, freedom)
-            found[place] = in_record(record, problem, place, float(p[place]), error, low, high)
+            low, high = interval(i, unknowns, p[unknowns], errors, correlation, freedom)
+            found[place] = in_record(record, problem, place, float(p[place]), float(errors[i]), low, high)
     told = (*(each for place, each in found.items() if place != OMEGA), *forces(record, found, known))
     return told, ""
 
