@@ -45,14 +45,20 @@ class Number(click.FloatRange):
 
 
 NUMBER, POSITIVE = Number(), Number(min=0, min_open=True)
-TOLERANCE = click.option(
-    "--tolerance",
-    type=POSITIVE,
-    default=1e-6,
-    show_default=True,
-    help="To which an FMU that does not show its steps is run, relative.",
-)
 STOP = click.option("--stop", type=NUMBER, help="Stop time in s (the FMU's own).")
+FOREIGN = (  # what is said of an FMU that does not show its solver's steps
+    click.option("--tolerance", type=POSITIVE, default=1e-6, show_default=True, help="To which it is run, relative."),
+    click.option("--exchange", is_flag=True, help="Run it by model exchange, where it offers both."),
+    click.option("--lenient", is_flag=True, help="Run it though it breaks the standard."),
+    click.option("--patience", type=POSITIVE, default=60.0, show_default=True, help="For one call of it, in s."),
+)
+
+
+def anyones(command: Callable[..., Any]) -> Callable[..., Any]:
+    """The options of commands that run anyone's FMUs: fields of a Specification."""
+    for option in reversed((STOP, *FOREIGN)):
+        command = option(command)
+    return command
 
 
 def prepare() -> None:

@@ -2,7 +2,7 @@
 
 import os
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from time import monotonic
 
@@ -18,10 +18,15 @@ class Hangs(HarnessError):
 
 
 def ask(
-    command: Sequence[str], text: str = "", environment: Mapping[str, str] = os.environ, patience: float = inf
+    command: Sequence[str],
+    text: str = "",
+    environment: Mapping[str, str] = os.environ,
+    patience: float = inf,
+    meanwhile: Callable[[], object] = check,
 ) -> subprocess.CompletedProcess[str]:
     """The ended process, what it answered to the text on its standard input, and what it said; Hangs after `patience`
-    s.  Its temporary files are where every compiler and library can read their path."""
+    s.  Its temporary files are where every compiler and library can read their path.  What is done `meanwhile` checks
+    whether a signal has come."""
     late = monotonic() + patience
     process = None
     with room("child-") as folder:
@@ -43,7 +48,7 @@ def ask(
                     return subprocess.CompletedProcess(command, process.returncode, answered, said)
                 except subprocess.TimeoutExpired:
                     text = ""  # it is under way
-                check()
+                meanwhile()
                 if monotonic() > late:
                     raise Hangs(f"no answer after {patience:g} s")
         except BaseException:

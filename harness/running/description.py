@@ -2,17 +2,41 @@
 
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
+from zipfile import ZipFile
 
 import fmpy
+from fmpy.model_description import ValidationError
 
 from ..errors import HarnessError, SceneError, reason
 
+MOST = 50  # faults that are told
 
-def description(path: Path) -> Any:
-    """What an FMU says of itself; HarnessError if it cannot be read."""
+
+def description(path: Path, lenient: bool = False) -> Any:
+    """What an FMU says of itself; HarnessError if it cannot be read, is of a version that nobody here runs, or, unless
+    one is lenient, breaks the standard."""
     if not path.is_file():
         raise SceneError(f"there is no {path}")
     try:
-        return fmpy.read_model_description(path)
+        old = version(path)
+        found = None if old.startswith("1.") else fmpy.read_model_description(path, validate=not lenient)
+    except ValidationError as error:
+        faults = [" ".join(fault.split()) for fault in error.problems]
+        told = "\n- ".join(faults[:MOST] + [f"and {len(faults) - MOST} more"] * (len(faults) > MOST))
+        count = "1 place" if len(faults) == 1 else f"{len(faults)} places"
+        raise HarnessError(
+            f"{path.name} breaks the FMI standard in {count}:\n- {told}\n"
+            "--lenient (run, compare) or lenient = true (a scene) runs it all the same, where it can run"
+        ) from None
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
         raise HarnessError(f"{path.name} cannot be read: {reason(error)}") from None
+    if found is None:
+        raise HarnessError(f"{path.name} is an FMU of FMI {old}; FMI 2.0 and 3.0 are run here: export it anew as one")
+    return found
+
+
+def version(path: Path) -> str:
+    """The version of FMI that the file names."""
+    with ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        return next(ElementTree.iterparse(file, ["start"]))[1].get("fmiVersion", "")

@@ -21,9 +21,10 @@ from fmpy.fmi1 import FMICallException as FMICallException  # which those that r
 from ..errors import HarnessError, SceneError, reason
 from .description import description
 from .run import Cost, Events, Run, Steps
-from .settings import check_fmu, labels, settings, unit
+from .settings import check_fmu, settings
 from .specification import Specification
 from .unpacked import unpacked
+from .values import labels, unit
 
 Report = Callable[[float], None]  # told how far the run is, as a share of it
 

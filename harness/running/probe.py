@@ -18,8 +18,8 @@ from fmpy.fmi1 import FMICallException
 from ..scenes.fmus import fmu_of
 from ..scenes.roles import roles
 from .fmu import WARNING, begin, callbacks, described, instance, put
-from .settings import labels
 from .specification import Specification
+from .values import labels
 
 Calls = list[tuple[float, float]]  # communication steps: from, size in s
 Changes = dict[float, dict[str, float]]  # values by the time from which they hold, in s

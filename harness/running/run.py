@@ -47,8 +47,8 @@ class Cost:
 
 @dataclass(frozen=True)
 class Run:
-    """One run: `time` (n,) in s, `columns` name to (n,); `units` of these and of the parameters; `steps` and `events`
-    where the FMU shows them."""
+    """One run: `time` (n,) in s, `columns` name to (n,); `units` of these and of the parameters; `steps`, `events` and
+    `cost` where the FMU shows them.  `note` says how exact it is, and `failed` why it is not whole."""
 
     wanted: Specification
     time: np.ndarray
@@ -56,13 +56,15 @@ class Run:
     units: dict[str, str]
     descriptions: dict[str, str]
     parameters: dict[str, float | str]
-    steps: Steps | None
-    events: Events | None
-    cost: Cost
+    steps: Steps | None = None
+    events: Events | None = None
+    cost: Cost | None = None
+    note: str = ""
+    failed: str = ""
 
     @property
     def setting(self) -> str:
-        """Method, law and tolerance in force, for titles."""
+        """Method, law and tolerance in force, for titles; nothing of somebody's FMU."""
         words = [str(self.parameters[name]) for name in ("solver.method", "friction") if name in self.parameters]
         if "solver.rtol" in self.wanted.values:
             words.append(f"rtol {self.wanted.values['solver.rtol']:g}")

@@ -21,11 +21,15 @@ EVEN = 4096  # communication steps of a scene that says nothing of them: enough 
 
 @dataclass(frozen=True)
 class Specification:
-    """One run of an FMU of ours, from `start` to `stop` in s (None: its own).
+    """One run of an FMU, from `start` to `stop` in s (None: its own).
 
     `values` are set by the names of variables, enumerations by label or number.  The communication points are those of
     the `grid` (a step in s, if there is one; `even`: without one, that of so many steps), and where it is to `follow`
     them the ends of the solver's own steps.  It is timed as often as it is to `repeat`.
+
+    Somebody else's FMU does not show its solver's steps: what is followed are ever shorter ones, until two results
+    agree to the `tolerance`.  It is run by model exchange if `exchange` or if it offers nothing else; if `lenient` also
+    when it breaks the standard; and one call of it may take `patience` s.
     """
 
     fmu: Path
@@ -37,6 +41,10 @@ class Specification:
     even: int = 0
     follow: bool = True
     repeat: int = 1
+    tolerance: float = 1e-6
+    exchange: bool = False
+    lenient: bool = False
+    patience: float = 60.0
 
     @property
     def model(self) -> str:

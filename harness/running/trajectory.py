@@ -14,7 +14,7 @@ from .run import Run
 class Trajectory:
     """`columns` name to (n,) over `time` (n,) in s, with their units; the times of `events` and the modes that begin
     there (m, 2), the start included, where they are known.  `note`, `file` and `parameters` say where it
-    came from."""
+    came from, `failed` why it is not whole."""
 
     name: str
     time: np.ndarray
@@ -24,6 +24,7 @@ class Trajectory:
     note: str = ""
     file: Path | None = None
     parameters: Mapping[str, tuple[object, str]] = field(default_factory=dict)
+    failed: str = ""
 
     def save(self, path: Path) -> None:
         """Write it as CSV."""
@@ -34,8 +35,9 @@ class Trajectory:
 
 
 def of_run(run: Run) -> Trajectory:
-    """The trajectory of a run of one of our FMUs."""
+    """The trajectory of a run."""
     events = None if run.events is None else np.column_stack([run.events.t, run.events.mode])
-    note = f"solver: {run.setting}"
+    note = run.note or f"solver: {run.setting}"
     units = {name: run.units[name] for name in run.columns}
-    return Trajectory(run.wanted.model, run.time, run.columns, units, events, note, run.wanted.fmu, run.in_force)
+    fmu, told = run.wanted.fmu, run.in_force
+    return Trajectory(run.wanted.model, run.time, run.columns, units, events, note, fmu, told, run.failed)

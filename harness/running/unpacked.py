@@ -8,6 +8,8 @@ lie where the URI needs no escape, and an FMU in Python that lacks what its libr
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shutil import disk_usage
+from zipfile import ZipFile
 
 import fmpy
 
@@ -22,6 +24,10 @@ def unpacked(fmu: Path) -> Iterator[Path]:
     """The folder of an FMU's files; HarnessError if it cannot be unpacked, or if its library would crash."""
     with room() as folder:
         try:
+            with ZipFile(fmu) as archive:
+                size = sum(each.file_size for each in archive.infolist())
+            if size > disk_usage(folder).free:
+                raise OSError(f"its {size:.3g} bytes are more than the temporary folder has room for")
             fmpy.extract(fmu, folder)
         except Exception as error:  # fmpy raises bare Exceptions, and those of zip readers
             raise HarnessError(f"{fmu.name} cannot be unpacked: {reason(error)}") from None

@@ -38,7 +38,7 @@ class Arrays(Fmi3Slave):
         self.register_variable(Float64("omega", causality=parameter, variability=Fmi3Variability.tunable))
         sense = Enumeration("sense", causality=parameter, variability=fixed)
         self.register_variable(sense, var_type=types)
-        going.dimensions = sense.dimensions = []  # pythonfmu3 0.3.4 asks for them
+        going.dimensions, going.size = sense.dimensions, sense.size = [], lambda variables: 1
         begin = {"getter": lambda: self.begin, "setter": self.put}
         self.register_variable(Float64("begin", causality=parameter, variability=fixed, dimensions=[two], **begin))
         self.register_variable(String("label", causality=parameter, variability=fixed))

@@ -1,11 +1,10 @@
-"""Runs and comparisons of FMUs that are not ours, built with plain pythonfmu, and of ours."""
+"""Comparisons of FMUs, ours and others, and of results."""
 
 import json
-import subprocess
-import sys
 from math import cos, sqrt
 
 import commands
+import foreign
 import numpy as np
 import pytest
 
@@ -14,61 +13,11 @@ from harness.running.trajectory import Trajectory
 from harness.studies.compare.difference import compare
 from harness.studies.compare.trajectory import read
 
-FOREIGN = '''
-from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
-
-
-class {name}(Fmi2Slave):
-    """An undamped oscillator by the midpoint rule, one step for each communication step."""
-
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.default_experiment = DefaultExperiment(0.0, 1.0, 0.01)
-        self.x, self.v, self.k, self.limit = 1.0, 0.0, 40.0, 1e9
-        for output in ("x", "v"):
-            self.register_variable(Real(output, causality=Fmi2Causality.output))
-        for parameter in ("k", "limit"):
-            self.register_variable(
-                Real(parameter, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
-            )
-
-    def do_step(self, t, h):
-        x, v = self.x + h / 2 * self.v, self.v - h / 2 * {factor} * self.k * self.x
-        self.x, self.v = self.x + h * v, self.v - h * {factor} * self.k * x
-        return t < self.limit
-'''
-
-
-FOREIGN_3 = """
-from pythonfmu3 import DefaultExperiment, Float64, Fmi3Causality, Fmi3Slave, Fmi3Variability
-
-
-class Third(Fmi3Slave):
-    def __init__(self, **kwargs):
-        super().__init__(**kwargs)
-        self.default_experiment = DefaultExperiment(0.0, 1.0, 0.01)
-        self.time, self.x, self.v = 0.0, 1.0, 0.0
-        continuous = Fmi3Variability.continuous
-        self.register_variable(Float64("time", causality=Fmi3Causality.independent, variability=continuous))
-        self.register_variable(Float64("x", causality=Fmi3Causality.output))
-        self.register_variable(Float64("v", causality=Fmi3Causality.output))
-
-    def do_step(self, t, h):
-        x, v = self.x + h / 2 * self.v, self.v - h / 2 * 40.0 * self.x
-        self.x, self.v = self.x + h * v, self.v - h * 40.0 * x
-        return True
-"""
-
 
 @pytest.fixture(scope="module")
-def foreign(tmp_path_factory):
-    """The folder of Theirs.fmu and Other.fmu; the second has a spring stiffer by 1 %."""
-    folder = tmp_path_factory.mktemp("foreign")
-    for name, factor in (("Theirs", 1.0), ("Other", 1.01)):
-        (folder / f"{name}.py").write_text(FOREIGN.format(name=name, factor=factor))
-        command = [sys.executable, "-m", "pythonfmu", "build", "-f", f"{name}.py"]
-        subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=60)
-    return folder
+def theirs():
+    """The folder of FMUs that are not ours, built with plain pythonfmu."""
+    return foreign.built()
 
 
 @pytest.fixture
@@ -81,43 +30,6 @@ def harness(fmus, tmp_path):
     return run
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
-def test_an_fmu_that_hides_its_steps_is_run_until_two_results_agree(harness, foreign, tmp_path, tolerance):
-    done = harness("run", "--fmu", foreign / "Theirs.fmu", "--set", "k=50", "--tolerance", tolerance)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "half of it changes no output by more than" in done.stdout
-    table = np.loadtxt(tmp_path / "results/Theirs/trajectory.csv", delimiter=",", skiprows=1)
-    assert table[-1, 0] == pytest.approx(1.0)
-    assert table[-1, 1] == pytest.approx(cos(sqrt(50)), abs=2 * tolerance)
-
-
-def test_an_fmu_of_fmi_3_gives_what_that_of_fmi_2_gives(harness, foreign, tmp_path):
-    pytest.importorskip("pythonfmu3", reason="pythonfmu3 is not installed")
-    (tmp_path / "Third.py").write_text(FOREIGN_3)
-    command = [sys.executable, "-m", "pythonfmu3", "build", "-f", "Third.py"]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=60)
-    done = harness("compare", "Third.fmu", foreign / "Theirs.fmu", "--tolerance", 1e-4, "--within", 1e-15)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "Third: communication step" in done.stdout
-
-
-@pytest.mark.parametrize(
-    ("arguments", "status", "sentence"),
-    [
-        (["--set", "limit=0.5"], 1, "stopped at t = "),
-        (["--tolerance", "1e-16"], 1, "the last halving still changes an output by"),
-        (["--set", "mass=1"], 2, "unknown variable to set 'mass'"),
-        (["--stop", "-1"], 2, "stop = -1.0 s is not after start"),
-    ],
-)
-def test_what_an_fmu_cannot_do_is_one_sentence(harness, foreign, arguments, status, sentence):
-    done = harness("run", "--fmu", foreign / "Theirs.fmu", *arguments)
-    assert done.returncode == status
-    assert sentence in done.stderr
-    assert done.stderr.count("Error") == 1
-    assert "Traceback" not in done.stderr
-
-
 def test_one_of_ours_is_run_at_its_own_steps(harness, tmp_path):
     values = ("--set", "f=1", "--set", "solver.method=ode45")
     done = harness("run", "--fmu", "fmus/coulomb.fmu", *values)
@@ -126,8 +38,8 @@ def test_one_of_ours_is_run_at_its_own_steps(harness, tmp_path):
     assert (tmp_path / "results/coulomb/trajectory.csv").exists()
 
 
-def test_a_run_as_json_is_json_and_nothing_else(harness, foreign):
-    done = harness("run", "--fmu", foreign / "Theirs.fmu", "--tolerance", 1e-3, "--json")
+def test_a_run_as_json_is_json_and_nothing_else(harness, theirs):
+    done = harness("run", "--fmu", theirs / "Midpoint.fmu", "--tolerance", 1e-3, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["final"]["x"] == pytest.approx(cos(sqrt(40)), abs=2e-3)
     done = harness("run", "coulomb", "--json")
@@ -136,8 +48,10 @@ def test_a_run_as_json_is_json_and_nothing_else(harness, foreign):
     assert found["f"] == pytest.approx(0.5, rel=1e-12)
 
 
-def test_two_fmus_are_compared_as_their_closed_forms_differ(harness, foreign, tmp_path):
-    arguments = (foreign / "Theirs.fmu", foreign / "Other.fmu", "--tolerance", 1e-5)
+def test_two_fmus_are_compared_as_their_closed_forms_differ(harness, theirs, tmp_path):
+    stiffer = {"resources/Midpoint.py": lambda text: text.replace("40.0", "40.4")}
+    other = foreign.edited(theirs / "Midpoint.fmu", tmp_path / "Other.fmu", stiffer)
+    arguments = (theirs / "Midpoint.fmu", other, "--tolerance", 1e-5)
     done = harness("compare", *arguments, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     found = json.loads(done.stdout)
@@ -146,7 +60,7 @@ def test_two_fmus_are_compared_as_their_closed_forms_differ(harness, foreign, tm
     (x,) = (each for each in found["variables"] if each["name"] == "x")
     assert x["largest"] == pytest.approx(off.max(), rel=1e-2)
     assert x["rms"] == pytest.approx(np.sqrt(np.mean(off * off)), rel=1e-2)
-    folder = tmp_path / "results/compare/Theirs-Other"
+    folder = tmp_path / "results/compare/Midpoint-Other"
     assert {file.name for file in folder.iterdir()} == {"compare.json", "figure.png", "provenance.json"}
     assert harness("compare", *arguments, "--within", 0.1, "--quiet").returncode == 0
     done = harness("compare", *arguments, "--within", 0.01, "--quiet")

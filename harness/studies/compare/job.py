@@ -11,17 +11,17 @@ from ...results.files import as_text
 from ...results.folder import replacing
 from ...results.provenance import record
 from ...running.fmu import Report
+from ...running.specification import Specification
 from . import trajectory
 from .difference import Comparison, compare
 
 
-def perform_compare(
-    sources: tuple[str, str], stop: float | None, tolerance: float, out: Path, report: Report
-) -> tuple[Comparison, Path]:
-    """Compare two FMUs, scenes, result folders or CSV files, and write the differences to out/compare/<one>-<two>."""
+def perform_compare(sources: tuple[str, str], how: Specification, out: Path, report: Report) -> tuple[Comparison, Path]:
+    """Compare two FMUs, scenes, result folders or CSV files, and write the differences to out/compare/<one>-<two>;
+    `how` says how FMUs are run."""
     from .figure import draw
 
-    one, two = trajectory.both(sources, stop, tolerance, report)
+    one, two = trajectory.both(sources, how, report)
     found = compare(one, two)
     folder = out / "compare" / f"{one.name}-{two.name}"
     with replacing(folder, ("compare.json", "figure.png")) as fresh:

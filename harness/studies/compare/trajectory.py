@@ -10,8 +10,7 @@ from ...analyses.decay.columns import numeric, split
 from ...analyses.decay.units import TIMES
 from ...errors import HarnessError, SceneError, shown
 from ...running.any_fmu import POINTS, run
-from ...running.fmu import simulate
-from ...running.specification import of_scene
+from ...running.specification import Specification, of_scene
 from ...running.trajectory import Trajectory, of_run
 from ...scenes.fmus import check_built
 from ...scenes.scene import load as load_scene
@@ -44,13 +43,15 @@ def read(path: Path) -> Trajectory:
 
 
 def both(
-    sources: tuple[str, str], stop: float | None, tolerance: float, report: Callable[[float], None]
+    sources: tuple[str, str], how: Specification, report: Callable[[float], None]
 ) -> tuple[Trajectory, Trajectory]:
     """The trajectories of two folders, CSV files, FMUs' paths or shipped scenes' names.  Where one is recorded and the
-    other can be run, it is run to the same times."""
+    other can be run, it is run to the same times; `how` says the rest."""
     found = [recorded(source) for source in sources]
     grid = next((spacing(each.time) for each in found if each), None)
-    one, two = (each or ran(source, stop, tolerance, grid, report) for each, source in zip(found, sources, strict=True))
+    one, two = (
+        each or ran(source, replace(how, grid=grid), report) for each, source in zip(found, sources, strict=True)
+    )
     return one, two
 
 
@@ -64,17 +65,15 @@ def recorded(source: str) -> Trajectory | None:
     return None
 
 
-def ran(
-    source: str, stop: float | None, tolerance: float, grid: float | None, report: Callable[[float], None]
-) -> Trajectory:
-    """The trajectory of an FMU's path or a shipped scene's name, run anew; the grid in s is for one of ours."""
+def ran(source: str, how: Specification, report: Callable[[float], None]) -> Trajectory:
+    """The trajectory of an FMU's path or a shipped scene's name, run anew."""
     path = Path(source)
     if path.suffix == ".fmu":
-        return run(path, stop, tolerance, {}, report, grid)
+        return of_run(run(replace(how, fmu=path, even=POINTS), report))
     scene = load_scene(source)
     check_built(scene.file)
     wanted = of_scene(scene)
-    found = of_run(simulate(replace(wanted, grid=grid or wanted.grid, even=POINTS), report))
+    found = of_run(run(replace(wanted, grid=how.grid or wanted.grid, even=POINTS), report))
     return replace(found, name=scene.name)
 
 

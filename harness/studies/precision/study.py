@@ -216,6 +216,7 @@ def through_fmpy(
         repeat=repeats(taken[rtol], extent.budget),
     )
     run = simulate(wanted)
+    assert run.cost  # ours tell it
     columns = np.column_stack([run.columns[name] for name in case.outputs])
     return Answer(columns, None, run.cost.evaluations), run.cost.seconds
 

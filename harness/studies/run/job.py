@@ -62,7 +62,7 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     for name in scene.analyses:
         results[name] = ANALYSE[name](run, scene)
     quantities = tuple(quantity for result in results.values() for quantity in result.quantities)
-    quantities += run.cost.quantities
+    quantities += run.cost.quantities if run.cost else ()
     check_published(scene, quantities)
     run.save(folder)
     as_run = replace(

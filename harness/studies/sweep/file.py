@@ -13,7 +13,7 @@ from ...errors import SceneError, unknown
 from ...results.files import heading
 from ...results.folder import replacing
 from ...results.provenance import record
-from ...running.settings import unit
+from ...running.values import unit
 from ...scenes.assigned import assigned
 from ...scenes.fmus import check_built, fmu_of
 from .measures import columns

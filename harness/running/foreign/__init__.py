@@ -1,0 +1,1 @@
+"""Runs somebody else's FMU, in a process of its own: what hangs, crashes or prints there is a sentence here."""

@@ -1,0 +1,165 @@
+"""How exact somebody's FMU is, which does not tell its error: runs of ever shorter steps, until two results agree.
+
+By co-simulation the communication steps are halved, by model exchange the tolerance of the solver is taken ten times
+smaller.  Where halving changes nothing at all, the FMU has steps of its own, and its error cannot be seen from outside;
+unless a smaller tolerance, which it is told at the start, does change something.
+"""
+
+from collections.abc import Callable
+from math import ceil, inf
+from typing import Any
+
+import numpy as np
+
+from .passes import Pass
+from .request import Answer, Request
+from .rows import Rows
+
+FINEST = 2**18  # communication steps
+SEEN = 2**12  # communication steps in which a step of the FMU's own shows
+POINTS = 512  # of model exchange
+TENTHS = 6  # of the tolerance of model exchange, at most
+SHARP, SHARPEST = 0.1, 1e-13  # the tolerance that an FMU is told, as a share of ours; that of any solver
+
+Run = Callable[[float, float], Pass]  # with a communication step in s, and a tolerance
+
+
+def agreed(asked: Request, found: Any, run: Run) -> Answer:
+    """The pass to take, with what is known of its error."""
+    span = asked.stop - asked.start
+    if asked.exchange:
+        return by_tolerance(asked, asked.grid or span / (asked.coarsest * ceil(POINTS / asked.coarsest)), run)
+    own = found.coSimulation.fixedInternalStepSize
+    if own:
+        h = float(own) * ceil(span / float(own) / FINEST)
+        return taken(
+            run(h, told(asked)), f"its own step is fixed at {float(own):g} s, as it declares, its error unknown"
+        )
+    if asked.grid:
+        return taken(
+            run(asked.grid, told(asked)), f"communication step {asked.grid:g} s, as asked; its error is unknown"
+        )
+    answer = by_halving(asked, run)
+    usual = found.defaultExperiment.stepSize if found.defaultExperiment else None
+    if answer.taken is None and usual:  # it has not taken one step
+        one = run(float(usual), told(asked))
+        if not one.sentence:
+            return taken(
+                one, f"communication step {float(usual):g} s, which it declares, its error unknown: {answer.failed}"
+            )
+    return answer
+
+
+def taken(one: Pass, note: str) -> Answer:
+    return Answer(one.number, note, one.sentence)
+
+
+def told(asked: Request) -> float:
+    """The tolerance for an FMU with a solver of its own."""
+    return SHARP * asked.tolerance
+
+
+def by_halving(asked: Request, run: Run) -> Answer:
+    """Communication steps are halved until two results agree at the times of the coarsest."""
+    span, steps, off = asked.stop - asked.start, asked.coarsest, inf
+    before: Pass | None = None
+    while steps <= max(FINEST, 2 * asked.coarsest):
+        now = run(span / steps, told(asked))
+        if now.sentence and not (now.ended or now.refused):
+            return farthest(before, now)
+        if before and not (now.refused or before.refused):
+            off = apart(before.rows, now.rows, asked)
+            if off == 0.0:
+                return unmoved(asked, span / steps, now, run)
+            if off <= asked.tolerance:
+                h = span / steps
+                return taken(now, f"communication step {h:.4g} s; half of it changes no output by more than {off:.2g}")
+        before, steps = now, 2 * steps
+    if now.refused:
+        return farthest(None, now)
+    still = (
+        f"with {FINEST} communication steps the last halving still changes an output by {off:.2g} of its largest value"
+    )
+    return Answer(now.number, "", f"{still}, more than the tolerance of {asked.tolerance:g}; raise --tolerance")
+
+
+def farthest(before: Pass | None, now: Pass) -> Answer:
+    """Why the last pass is not whole, with the one of the two that came farther."""
+    begun = [each for each in (now, before) if each and len(each.rows.time) > 1]
+    best = max(begun, key=lambda each: float(each.rows.time[-1]), default=None)
+    return Answer(best.number if best else None, "", now.sentence)
+
+
+def unmoved(asked: Request, h: float, now: Pass, run: Run) -> Answer:
+    """Halving has changed nothing at all."""
+    if not any(np.ptp(column) for column in now.rows.columns.values()):
+        return taken(now, f"communication step {h:.4g} s; no output changes")
+    tolerance = told(asked)
+    for _ in range(3):
+        tolerance = max(tolerance / 100, SHARPEST)
+        finer = run((asked.stop - asked.start) / max(SEEN, 4 * asked.coarsest), tolerance)
+        off = apart(now.rows, finer.rows, asked)
+        if off == 0.0:
+            own = fixed(finer.rows)
+            what = f"its own step is fixed, at {own:.3g} s" if own else "it takes steps of its own"
+            change = "neither shorter communication steps nor a smaller tolerance change anything at all"
+            return taken(finer, f"{what}, its error unknown: {change}")
+        if off <= asked.tolerance:
+            note = f"it takes steps of its own, by the tolerance that it is told, {tolerance:.2g}"
+            return taken(finer, f"{note}; a hundred times as much changes no output by more than {off:.2g}")
+        now = finer
+    return taken(finer, f"it takes steps of its own; its error is about {off:.2g}, at a tolerance of {tolerance:.2g}")
+
+
+def fixed(rows: Rows) -> float | None:
+    """The own step of an FMU in s, seen where its numbers stand still between even times; None if they do not."""
+    moves = np.zeros(len(rows.time) - 1, bool)
+    for column in rows.columns.values():
+        if column.dtype.kind == "f":
+            moves |= np.diff(column) != 0
+    at = np.flatnonzero(moves)
+    gaps = np.diff(at)
+    if len(at) < 3 or gaps.min() < 2 or np.ptp(gaps) > 1:
+        return None
+    return float((rows.time[at[-1]] - rows.time[at[0]]) / (len(at) - 1))
+
+
+def by_tolerance(asked: Request, h: float, run: Run) -> Answer:
+    """The tolerance of the solver is taken ten times smaller until two results agree at the points."""
+    rtol, off = asked.tolerance, inf
+    before: Pass | None = None
+    for _ in range(TENTHS):
+        now = run(h, rtol)
+        if now.sentence and not now.ended:
+            return farthest(before, now)
+        if before:
+            off = apart(before.rows, now.rows, asked)
+            if off <= asked.tolerance:
+                what = f"fmpy's CVode at rtol {rtol:.2g}; ten times as much changes no output by more than {off:.2g}"
+                return taken(now, what)
+        before, rtol = now, max(rtol / 10, SHARPEST)
+    still = (
+        f"fmpy's CVode at rtol {10 * rtol:.2g} still differs from ten times as much by {off:.2g} of the largest value"
+    )
+    return Answer(now.number, "", f"{still}, more than the tolerance of {asked.tolerance:g}; raise --tolerance")
+
+
+def apart(one: Rows, two: Rows, asked: Request) -> float:
+    """The largest difference of two passes, as a share of each variable's largest value, at the coarsest times."""
+    end = min(one.time[-1], two.time[-1])
+    at = np.linspace(asked.start, asked.stop, asked.coarsest + 1)
+    at = at[at <= end + 1e-9 * (asked.stop - asked.start)]
+    if len(at) < 2:
+        return inf
+    worst = 0.0
+    for name, column in two.columns.items():
+        left, right = one.columns[name][last(one.time, at)].astype(float), column[last(two.time, at)].astype(float)
+        size = float(np.abs(right).max())
+        worst = max(worst, float(np.abs(left - right).max()) / size if size else float(np.abs(left).max() > 0))
+    return worst
+
+
+def last(time: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The last rows at the times, or just before."""
+    near = 1e-9 * (time[-1] - time[0])
+    return np.searchsorted(time, at + near, "right") - 1

@@ -1,0 +1,60 @@
+"""One pass of co-simulation: equal communication steps from start to stop."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any
+
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
+
+from .passes import Ended, Refused, Span
+
+
+def cosimulate(fmu: Any, version: str, span: Span, sample: Callable[[float], None], heed: Callable[..., Any]) -> None:
+    """Step and sample; Ended if the FMU ends itself, Refused if it does not take a step."""
+    step = step2 if version == "2.0" else step3
+    start, stop, h = span.start, span.stop, span.h
+    count = max(1, round((stop - start) / h))
+    even = abs(start + count * h - stop) < 1e-6 * h  # else the last step is a shorter one
+    count += start + count * h < stop and not even
+    t = start
+    sample(t)
+    for i in range(1, count + 1):
+        target = stop if i == count else start + i * h
+        heed(span.share(t))
+        try:
+            step(fmu, t, h if even else target - t)  # who takes even steps only may look at the last bit
+        except Ended as end:
+            if end.t is not None and t < end.t:
+                sample(end.t)
+            raise
+        t = target
+        sample(t)
+
+
+def step2(fmu: Any, t: float, h: float) -> None:
+    """fmi2DoStep."""
+    try:
+        fmu.doStep(t, h)
+    except FMICallException as error:
+        if error.status != fmi2Discard:
+            raise
+        ended, last = False, None
+        with suppress(FMICallException):  # it need not tell
+            ended = fmu.getBooleanStatus(fmi2Terminated)
+            last = fmu.getRealStatus(fmi2LastSuccessfulTime)
+        if ended:
+            raise Ended(last, "fmi2DoStep answered Discard, and fmi2Terminated is true") from None
+        raise Refused(f"fmi2DoStep answered Discard to a step of {h:.4g} s at t = {t:.9g} s") from None
+
+
+def step3(fmu: Any, t: float, h: float) -> None:
+    """fmi3DoStep."""
+    try:
+        _, terminate, early, last = fmu.doStep(t, h)
+    except FMICallException as error:
+        if error.status != fmi2Discard:
+            raise
+        raise Refused(f"fmi3DoStep answered Discard to a step of {h:.4g} s at t = {t:.9g} s") from None
+    if terminate:
+        raise Ended(last if early else t + h, "fmi3DoStep answered terminateSimulation")

@@ -1,0 +1,64 @@
+"""An instance of somebody's FMU: FMI 2.0 or 3.0, for co-simulation or for model exchange."""
+
+from typing import Any
+
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+
+from ..fmu import WARNING, callbacks
+
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+LONGEST = 50  # messages of the log that are kept
+MESSAGES = callbacks()[1]
+
+
+def instantiated(found: Any, folder: str, exchange: bool) -> Any:
+    """A new instance."""
+    old = found.fmiVersion == "2.0"
+    kind = {(True, True): FMU2Model, (True, False): FMU2Slave, (False, True): FMU3Model, (False, False): FMU3Slave}
+    identifier = (found.modelExchange if exchange else found.coSimulation).modelIdentifier
+    fmu = kind[old, exchange](guid=found.guid or "", unzipDirectory=folder, modelIdentifier=identifier)
+    fmu.instantiate(loggingOn=True, **({"callbacks": callbacks()[0]} if old else {"logMessage": keep}))
+    return fmu
+
+
+def keep(environment: Any, status: int, category: bytes, text: bytes) -> None:
+    """The logger of FMI 3.0."""
+    MESSAGES.append((status, (text or b"").decode("utf-8", "replace")))
+
+
+def words() -> str:
+    """The last that the FMU has logged beyond a warning, in one line; empty if it says nothing."""
+    told = [text for status, text in MESSAGES if status > WARNING and text.strip()]
+    return " ".join(told[-1].split()) if told else ""
+
+
+def forget() -> None:
+    """Keep the last messages only."""
+    del MESSAGES[:-LONGEST]
+
+
+def begin(fmu: Any, found: Any, values: dict[str, Any], start: float, stop: float, tolerance: float) -> None:
+    """Set values, and initialise: times in s."""
+    variables = {variable.name: variable for variable in found.modelVariables}
+    structural = [name for name in values if variables[name].causality == "structuralParameter"]
+    if structural:
+        fmu.enterConfigurationMode()
+        for name in structural:
+            put(fmu, found, variables[name], values[name])
+        fmu.exitConfigurationMode()
+    experiment = {"tolerance": tolerance, "startTime": start, "stopTime": stop}
+    if found.fmiVersion == "2.0":
+        fmu.setupExperiment(**experiment)
+    for name, value in values.items():
+        if name not in structural:
+            put(fmu, found, variables[name], value)
+    fmu.enterInitializationMode(**({} if found.fmiVersion == "2.0" else experiment))
+    fmu.exitInitializationMode()
+
+
+def put(fmu: Any, found: Any, variable: Any, value: Any) -> None:
+    """Set one variable, of whatever type and shape."""
+    whole = "Integer" if found.fmiVersion == "2.0" else "Int64"
+    setter = getattr(fmu, "set" + (whole if variable.type == "Enumeration" else variable.type))
+    setter([variable.valueReference], value if isinstance(value, list) else [value])

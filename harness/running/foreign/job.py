@@ -1,0 +1,211 @@
+"""One run of somebody's FMU, from this side: what is asked of the process that holds it, and what comes of it."""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+
+from ...errors import LONGEST, HarnessError, SceneError, unknown
+from ...process.child import ask
+from ...process.interrupt import check
+from ...process.room import room
+from ..run import Run
+from ..specification import Specification
+from ..unpacked import unpacked
+from ..values import accepted, labels, unit
+from .request import ANSWER, COARSEST, HUNG, SAID, SHARE, TEXTS, Answer, Request
+from .rows import RECORDED, Rows, Shaped, elements, read
+
+HARNESS = Path(__file__).parents[3]
+SETTABLE = ("parameter", "structuralParameter", "input")
+
+
+def simulate(wanted: Specification, found: Any, report: Callable[[float], None]) -> Run:
+    """The run that is wanted of the FMU so described; what it lacks, and why, is in `failed`.
+
+    HarnessError in one sentence if there is none at all, SceneError if the FMU has not got what is wanted.
+    """
+    variables = {variable.name: variable for variable in found.modelVariables}
+    exchange = wanted.exchange or found.coSimulation is None
+    if exchange and found.modelExchange is None:
+        offered = " and ".join(ways(found)) or "no interface"
+        raise HarnessError(f"{wanted.fmu.name} offers {offered}; model exchange is not among them")
+    values = set_values(wanted, variables)
+    chosen = recorded(wanted, variables, values)
+    start, stop = span(wanted, found)
+    with unpacked(wanted.fmu) as folder, room("rows-") as place:
+        check_library(wanted.fmu, found, exchange, folder)
+        request = Request(
+            folder=str(folder),
+            room=str(place),
+            exchange=exchange,
+            start=start,
+            stop=stop,
+            tolerance=wanted.tolerance,
+            patience=wanted.patience,
+            grid=None if wanted.follow else wanted.grid,
+            coarsest=round((stop - start) / wanted.grid) if wanted.grid else COARSEST,
+            values=values,
+            outputs={variable.name: list(shape) for variable, shape in chosen},
+        )
+        answer = asked(request, place, report)
+        path = place / f"rows-{answer.taken}"
+        rows = read(path, chosen) if answer.taken is not None else Rows(np.zeros(0), {})
+        texts = [json.loads(line) for line in lines(place / TEXTS)]
+        said = lines(place / SAID)
+    failed = f"{wanted.fmu.name}: {answer.failed}" if answer.failed else ""
+    if failed and len(rows.time) and " at t = " not in failed:
+        failed += f", after t = {rows.time[-1]:.9g} s"
+    if len(rows.time) < 2:
+        raise HarnessError(failed or f"{wanted.fmu.name} gives nothing to record")
+    return result(wanted, variables, values, chosen, rows, texts, answer.note, failed, said)
+
+
+def ways(found: Any) -> list[str]:
+    """The interfaces that an FMU without model exchange offers."""
+    offered = {"co-simulation": found.coSimulation, "scheduled execution": found.scheduledExecution}
+    return [way for way, interface in offered.items() if interface]
+
+
+def span(wanted: Specification, found: Any) -> tuple[float, float]:
+    """Start and stop in s."""
+    experiment = found.defaultExperiment
+    start = float(experiment.startTime or 0.0) if experiment else 0.0
+    start = start if wanted.start is None else wanted.start
+    if wanted.stop is None and not (experiment and experiment.stopTime):
+        raise SceneError(f"{wanted.fmu.name} names no stop time; name one, as in --stop 10")
+    stop = float(experiment.stopTime) if wanted.stop is None else wanted.stop
+    if not stop > start:
+        raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
+    return start, stop
+
+
+def set_values(wanted: Specification, variables: dict[str, Any]) -> dict[str, Any]:
+    """What is set, as it is set; lists for arrays."""
+    settable = [
+        name
+        for name, one in variables.items()
+        if one.causality in SETTABLE or (one.initial in ("exact", "approx") and one.variability != "constant")
+    ]
+    values: dict[str, Any] = {}
+    for name in sorted(wanted.values, key=lambda name: name in variables and bool(variables[name].dimensions)):
+        if name not in settable:
+            raise SceneError(unknown("variable to set", name, settable))
+        values[name] = accepted(variables[name], wanted.values[name], shape(variables[name], values))
+    return values
+
+
+def shape(variable: Any, values: dict[str, Any]) -> tuple[int, ...]:
+    """The shape of an array, () of a scalar; a dimension may be a structural parameter, and that is set."""
+    sizes = []
+    for dimension in variable.dimensions:
+        named = dimension.variable
+        size = int(dimension.start if named is None else values.get(named.name, named.start))
+        if size < 0:
+            raise SceneError(f"{variable.name} would have {size} elements")
+        sizes.append(size)
+    return tuple(sizes)
+
+
+def recorded(wanted: Specification, variables: dict[str, Any], values: dict[str, Any]) -> list[Shaped]:
+    """The variables to record, whole, whether one names them or some of their elements."""
+    shapes = {name: shape(one, values) for name, one in variables.items() if one.type in RECORDED}
+    owner = {element: name for name, each in shapes.items() for element in (name, *elements(name, each))}
+    for name in wanted.outputs:
+        if name not in owner:
+            raise SceneError(unknown("output", name, owner))
+    chosen = dict.fromkeys(owner[name] for name in wanted.outputs)
+    return [(variables[name], shapes[name]) for name in chosen]
+
+
+def check_library(fmu: Path, found: Any, exchange: bool, folder: Path) -> None:
+    """There is a binary for this machine."""
+    identifier = (found.modelExchange if exchange else found.coSimulation).modelIdentifier
+    here = fmpy.platform if found.fmiVersion == "2.0" else fmpy.platform_tuple
+    if (folder / "binaries" / here / f"{identifier}{fmpy.sharedLibraryExtension}").is_file():
+        return
+    others = sorted(file.name for file in folder.glob("binaries/*"))
+    has = f"it has {', '.join(others)}" if others else "it has no binaries at all"
+    sources = "; it carries C sources: `fmpy compile` may make one" if any(folder.glob("sources/*.c")) else ""
+    raise HarnessError(f"{fmu.name} has no binary {here}/{identifier} for this machine: {has}{sources}")
+
+
+def asked(request: Request, place: Path, report: Callable[[float], None]) -> Answer:
+    """What a process of its own answers, or, if it does not, why, with the pass that came farthest."""
+
+    def meanwhile() -> None:
+        check()
+        with suppress(OSError, ValueError):  # it is just being written
+            report(float((place / SHARE).read_text()))
+
+    path = os.pathsep.join(filter(None, (str(HARNESS), os.environ.get("PYTHONPATH", ""))))
+    command = [sys.executable, "-m", f"{__package__}.child"]
+    done = ask(command, json.dumps(asdict(request)), os.environ | {"PYTHONPATH": path}, meanwhile=meanwhile)
+    if (place / ANSWER).is_file():
+        return Answer(**json.loads((place / ANSWER).read_text(encoding="utf-8")))
+    if lines(place / HUNG):
+        sentence = f"a call of it has not come back after {request.patience:g} s; --patience waits longer"
+    elif done.returncode < 0:
+        sentence = f"its binary has crashed ({signal.strsignal(-done.returncode)})"
+    else:
+        sentence = f"its binary has ended the process, with status {done.returncode}"
+    passes = sorted(place.glob("rows-*"), key=lambda file: (file.stat().st_size, file.name))
+    taken = int(passes[-1].name.removeprefix("rows-")) if passes else None
+    return Answer(taken, "", sentence)
+
+
+def lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
+
+
+def result(
+    wanted: Specification,
+    variables: dict[str, Any],
+    values: dict[str, Any],
+    chosen: list[Shaped],
+    rows: Rows,
+    texts: list[str],
+    note: str,
+    failed: str,
+    said: list[str],
+) -> Run:
+    """The run that the rows show."""
+    columns, units, descriptions = {}, {}, {}
+    for variable, each in chosen:
+        for name in elements(variable.name, each):
+            if name in wanted.outputs or variable.name in wanted.outputs:
+                column = rows.columns[name]
+                columns[name] = np.array(texts)[column] if variable.type == "String" else column
+                units[name], descriptions[name] = unit(variable), variable.description or name
+    parameters: dict[str, Any] = {}
+    for name, one in variables.items():
+        if one.causality in SETTABLE or name in values:
+            parameters[name], units[name] = in_force(one, values.get(name, one.start)), unit(one)
+    prints = f"it prints: {said[-1][:LONGEST]}" if said else ""
+    return Run(
+        wanted=replace(wanted, outputs=tuple(columns)),
+        time=rows.time,
+        columns=columns,
+        units=units,
+        descriptions=descriptions,
+        parameters=parameters,
+        note="; ".join(filter(None, (note, prints))),
+        failed=failed,
+    )
+
+
+def in_force(variable: Any, value: Any) -> Any:
+    """A parameter's value as a result tells it: a number, a label or a text."""
+    if variable.type == "Enumeration":
+        return labels(variable).get(int(value), value) if value is not None else value
+    with suppress(TypeError, ValueError):
+        return float(value) if isinstance(value, str) and variable.type != "String" else value
+    return value

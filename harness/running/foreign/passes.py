@@ -1,0 +1,46 @@
+"""One pass, from start to stop, and how it may end before."""
+
+from dataclasses import dataclass
+
+from .rows import Rows
+
+
+@dataclass(frozen=True)
+class Span:
+    """From `start` to `stop` in steps of `h`, all in s."""
+
+    start: float
+    stop: float
+    h: float
+
+    def share(self, t: float) -> float:
+        """How far a time is, as a share of it."""
+        return (t - self.start) / (self.stop - self.start)
+
+
+@dataclass(frozen=True)
+class Pass:
+    """The number of a pass, its rows, and the sentence why it is not whole, empty if it is: the FMU has `ended` itself,
+    has `refused` a step, or has failed."""
+
+    number: int
+    rows: Rows
+    sentence: str = ""
+    ended: bool = False
+    refused: bool = False
+
+
+class Ended(Exception):
+    """The FMU has ended the simulation, at `t` in s if it tells."""
+
+    def __init__(self, t: float | None, how: str) -> None:
+        super().__init__(how)
+        self.t = t
+
+
+class Refused(Exception):
+    """The FMU does not take a step of this size; it may take a shorter one."""
+
+
+class Failed(Exception):
+    """It cannot go on."""

@@ -1,0 +1,38 @@
+"""What the process that holds an FMU is asked, and what it answers; both as JSON."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+ANSWER, SHARE, SAID, HUNG, TEXTS = "answer.json", "share", "said", "hung", "texts"  # files in the room
+COARSEST = 64  # communication steps
+
+
+@dataclass(frozen=True)
+class Request:
+    """Run the FMU that is unpacked in a `folder`, and write rows of its `outputs`, names with their shapes,
+    into a `room`.
+
+    The communication steps are those of the `grid` in s, or, None, ever shorter ones, so many in the `coarsest` pass,
+    until two results agree to the `tolerance`.  A call that takes more than `patience` s hangs.
+    """
+
+    folder: str
+    room: str
+    exchange: bool
+    start: float
+    stop: float
+    tolerance: float
+    patience: float
+    grid: float | None = None
+    coarsest: int = COARSEST
+    values: dict[str, Any] = field(default_factory=dict)
+    outputs: dict[str, list[int]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The number of the pass to take, None if there is none; how exact it is, and what it lacks, empty if nothing."""
+
+    taken: int | None
+    note: str
+    failed: str = ""

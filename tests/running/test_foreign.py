@@ -1,0 +1,256 @@
+"""FMUs that are not ours: each is run, or refused in one sentence; nothing hangs, nothing is lost."""
+
+import csv
+import json
+from math import cos, exp, sin, sqrt
+from types import SimpleNamespace
+from zipfile import ZipFile
+
+import commands
+import foreign
+import numpy as np
+import pytest
+
+from harness.running.foreign.agreement import agreed
+from harness.running.foreign.passes import Pass
+from harness.running.foreign.request import Request
+from harness.running.foreign.rows import Rows
+
+
+@pytest.fixture(scope="module")
+def theirs():
+    """The folder of nine FMUs that are not ours."""
+    return foreign.built()
+
+
+@pytest.fixture
+def run(theirs, tmp_path):
+    """run(name, ...): the finished `run --fmu`, and the rows of its result by the names of the columns."""
+
+    def run(name, *arguments):
+        fmu = name if name.endswith(".fmu") else theirs / f"{name}.fmu"
+        done = commands.harness(tmp_path, "run", "--fmu", fmu, *arguments, COLUMNS="120")
+        assert "Traceback" not in done.stderr
+        assert "np." not in done.stdout + done.stderr
+        return done, table(tmp_path / "results" / name.removesuffix(".fmu") / "trajectory.csv")
+
+    return run
+
+
+def table(file):
+    """The columns of a result by their headings, if there is one: numbers, or texts."""
+    if not file.is_file():
+        return None
+    with file.open(encoding="utf-8", newline="") as lines:
+        heads, *rows = csv.reader(lines)
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return {
+        head: column if head == "says" else column.astype(float) for head, column in zip(heads, columns, strict=True)
+    }
+
+
+def fine(done):
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def refused(done, status, *sentences):
+    assert done.returncode == status
+    assert done.stderr.startswith("Error: ")
+    assert done.stderr.count("Error: ") == 1
+    for sentence in sentences:
+        assert sentence in done.stderr
+
+
+@pytest.mark.parametrize("name", ["Midpoint", "Third", "Exchange"])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def test_an_fmu_that_hides_its_steps_is_run_until_two_results_agree(run, name, tolerance):
+    done, rows = run(name, "--set", "k=50", "--tolerance", tolerance)
+    fine(done)
+    assert "changes no output by more than" in done.stdout
+    time, position, *_ = rows.values()
+    assert time[-1] == 1.0
+    assert np.abs(position - np.cos(sqrt(50) * time)).max() < 2 * tolerance
+
+
+def test_an_fmu_whose_own_step_is_fixed_is_told_as_such(run):
+    done, rows = run("FixedStep")
+    fine(done)
+    assert "its own step is fixed, at 0.1 s, its error unknown" in done.stdout
+    assert rows["x"][-1] == pytest.approx(0.9**100)  # 41 % off
+    assert abs(0.9**100 / exp(-10) - 1) > 0.4
+
+
+def test_booleans_integers_and_texts_are_recorded_and_set(run):
+    done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007")
+    fine(done)
+    assert {*rows["on"]} == {0, 1}
+    assert rows["switched"][-1] == 3
+    assert {*rows["says"]} == {"cold", "007 cold", "007 warm"}
+    assert "says: from cold to 007 " in done.stdout
+    done, rows = run("Switching", "--set", "enabled=FALSE", "--set", "most=3.0")
+    fine(done)
+    assert not rows["on"][-1]
+
+
+def test_arrays_and_enumerations_are_recorded_element_by_element_and_set(run):
+    done, rows = run("Arrays", "--set", "begin=0,2", "--set", "sense=right", "--set", "omega=1.5")
+    fine(done)
+    turn = [f"turn[{i},{j}]" for i in (1, 2) for j in (1, 2)]
+    assert [*rows] == ["t [s]", *turn, "place[1]", "place[2]", "going", "says"]
+    assert rows["place[1]"][-1] == pytest.approx(2 * sin(1.5))
+    assert rows["turn[2,1]"][-1] == pytest.approx(-sin(1.5))
+    assert rows["turn[2,2]"][-1] == pytest.approx(cos(1.5))
+    assert {*rows["going"]} == {2}
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "end", "told"),
+    [
+        (
+            "Falling",
+            ["--set", "height=1.22625"],
+            0.5,
+            "fmi2Terminated is true at t = 0.5 s: the stone is on the ground",
+        ),
+        (
+            "Third",
+            ["--set", "limit=0.5", "--tolerance", "1e-3"],
+            0.5,
+            "fmi3DoStep answered terminateSimulation at t = 0.5",
+        ),
+    ],
+)
+def test_an_fmu_that_ends_itself_is_told_by_its_status_and_keeps_what_it_computed(run, name, arguments, end, told):
+    done, rows = run(name, *arguments)
+    refused(done, 1, f"{name}.fmu: it ends itself: ", told, f"until then is in results/{name}")
+    assert rows["t [s]"][-1] == pytest.approx(end, abs=1e-3)
+    assert len(rows["t [s]"]) > 60
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        (1, "a call of it has not come back after 1.5 s; --patience waits longer, after t = 0.5 s"),
+        (2, "its binary has crashed (Segmentation fault), after t = 0.5 s"),
+        (3, "fmi2DoStep answered Fatal at t = 0.5 s: "),
+        (5, "x is nan at t = 0.515625 s"),
+        (6, "it ends itself: fmi2DoStep answered Discard, and fmi2Terminated is true at t = 0.5 s"),
+    ],
+)
+def test_what_hangs_crashes_raises_or_is_lost_is_one_sentence_and_keeps_what_it_computed(run, kind, told):
+    done, rows = run("Trouble", "--set", f"kind={kind}", "--patience", "1.5")
+    refused(done, 1, f"Trouble.fmu: {told}")
+    assert done.stderr.count("\n") == 1
+    assert rows["t [s]"][-1] == 0.5
+    assert (rows["x"] == rows["t [s]"]).all()
+
+
+def test_what_an_fmu_prints_is_told_and_spoils_nothing(run):
+    done, rows = run("Trouble", "--set", "kind=4", "--json")
+    fine(done)
+    assert "it prints: I am at 1.0" in json.loads(done.stdout)["note"]
+    assert rows["x"][-1] == 1.0
+
+
+def test_what_breaks_the_standard_is_told_in_full_and_runs_where_one_is_lenient(run):
+    done, rows = run("Breaking")
+    refused(
+        done, 1, "Breaking.fmu breaks the FMI standard in 2 places:", '"count" (line 16)', '"up" (line 19)', "--lenient"
+    )
+    assert rows is None
+    done, rows = run("Breaking", "--lenient")
+    fine(done)
+    assert rows["x"][-1] == pytest.approx(cos(sqrt(40)))
+    assert (rows["up"] == (rows["x"] > 0)).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "status", "sentence"),
+    [
+        ("Midpoint", ["--set", "mass=1"], 2, "unknown variable to set 'mass'; allowed: k"),
+        ("Midpoint", ["--set", "k=abc"], 2, "k = 'abc' is outside its range; allowed: any finite number"),
+        ("Midpoint", ["--set", "k=1e999"], 2, "k = inf is outside its range"),
+        ("Midpoint", ["--stop", "-1"], 2, "stop = -1.0 s is not after start"),
+        ("Midpoint", ["--exchange"], 1, "offers co-simulation; model exchange is not among them"),
+        ("Switching", ["--set", "enabled=5"], 2, "enabled = 5.0 is no truth; allowed: true, false"),
+        ("Switching", ["--set", "most=1.5"], 2, "most = 1.5 is outside its range; allowed: any whole number"),
+        ("Switching", ["--set", "most=3000000000"], 2, "most = 3000000000.0 is outside its range"),
+        ("Arrays", ["--set", "begin=1,2,3"], 2, "begin = '1,2,3' has 3 elements, not 2"),
+        ("Arrays", ["--set", "begin=1,x"], 2, "begin = 'x' is outside its range; allowed: any finite number"),
+        ("Arrays", ["--set", "sense=up"], 2, "unknown value of sense 'up'; allowed: left, right"),
+    ],
+)
+def test_what_an_fmu_cannot_do_is_one_sentence(run, name, arguments, status, sentence):
+    done, _ = run(name, *arguments)
+    refused(done, status, sentence)
+
+
+def described(change):
+    return {"modelDescription.xml": change}
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "sentence"),
+    [
+        (
+            "Midpoint",
+            described(lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"')),
+            "is an FMU of FMI 1.0",
+        ),
+        ("Midpoint", described(lambda text: text.replace('"v"', '"x"')), 'The variable name "x" (line'),
+        ("Midpoint", described(lambda text: text.replace(' start="40"', "")), 'Variable "k" (line'),
+        ("Midpoint", described(lambda text: text.replace("<ModelVariables", "<Nonsense")), "cannot be read: "),
+        ("Midpoint", described(lambda text: text.replace('stopTime="1.0"', "")), "names no stop time; name one"),
+        ("Midpoint", {"modelDescription.xml": None}, "cannot be read: "),
+        (
+            "Midpoint",
+            {"binaries/linux64/Midpoint.so": None},
+            "has no binary linux64/Midpoint for this machine",
+        ),
+        ("Midpoint", {"binaries/linux64/Midpoint.so": b"\\x7fELF"}, "Failed to load shared library"),
+        ("Third", {"binaries/x86_64-linux/Third.so": None}, "has no binary x86_64-linux/Third for this machine"),
+    ],
+)
+def test_a_damaged_file_is_one_sentence(run, theirs, tmp_path, name, changes, sentence):
+    foreign.edited(theirs / f"{name}.fmu", tmp_path / "damaged.fmu", changes)
+    done, _ = run("damaged.fmu")
+    assert done.returncode in (1, 2)
+    refused(done, done.returncode, "damaged.fmu", sentence)
+
+
+def test_names_beyond_ascii_and_no_units_are_as_good_as_others(run, theirs, tmp_path):
+    foreign.edited(
+        theirs / "Midpoint.fmu",
+        tmp_path / "\u03c9.fmu",
+        described(lambda text: text.replace('name="x"', 'name="\u03c6, \u3042"')),
+    )
+    done, _ = run("\u03c9.fmu", "--tolerance", "1e-3")
+    fine(done)
+    assert "\u03c6, \u3042: from 1 to 0.99" in done.stdout
+
+
+def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, theirs, tmp_path):
+    with ZipFile(foreign.edited(theirs / "Midpoint.fmu", tmp_path / "huge.fmu", {}), "a") as archive:
+        archive.writestr("resources/huge", b"")
+        archive.infolist()[-1].file_size = 2**60
+    done, _ = run("huge.fmu")
+    refused(done, 1, "huge.fmu", "more than the temporary folder has room for")
+
+
+@pytest.mark.parametrize("exchange", [False, True])
+def test_two_results_that_never_agree_are_kept_with_what_they_differ_by(exchange):
+    """A made-up FMU whose output is the number of the pass."""
+    passes = []
+
+    def run(h, tolerance):
+        time = np.linspace(0.0, 1.0, 65)
+        passes.append(Pass(len(passes), Rows(time, {"x": np.full(65, 1.0 + len(passes) % 2)})))
+        return passes[-1]
+
+    asked = Request("", "", exchange, 0.0, 1.0, tolerance=1e-6, patience=1.0)
+    answer = agreed(
+        asked, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
+    )
+    assert answer.taken == len(passes) - 1
+    assert "still changes an output by 0.5 of its largest value, more than the tolerance of 1e-06" in answer.failed
+    assert len(passes) < 20
