@@ -43,7 +43,10 @@ def run(
     with progress(quiet or as_json, 1) as report:
         outcome = job.perform(chosen, out, partial(report, chosen.name))
     table = comparison([outcome], everything=True)
-    answer(quiet, as_json, figures(outcome), table, f"Results in {out / chosen.name}")
+    folder, note = out / chosen.name, outcome.run.note if outcome.run else ""
+    answer(quiet, as_json, figures(outcome), table, *filter(None, [note]), f"Results in {folder}")
+    if outcome.error:
+        raise HarnessError(f"{outcome.error}; what it computed until then is in {folder}")
 
 
 def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], out: Path, quiet: bool, as_json: bool) -> None:

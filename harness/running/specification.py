@@ -72,4 +72,8 @@ def of_scene(scene: Scene) -> Specification:
         even=EVEN if scene.follow is None else 0,
         follow=scene.follows,
         repeat=scene.repeat,
+        tolerance=scene.tolerance,
+        exchange=scene.exchange,
+        lenient=scene.lenient,
+        patience=scene.patience,
     )

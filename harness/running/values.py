@@ -15,7 +15,8 @@ TRUTHS = {"true": True, "false": False, 1: True, 0: False}
 def accepted(variable: Any, value: Any, shape: tuple[int, ...] = ()) -> Any:
     """What is set for a value: for an array of that shape a list, row by row; SceneError if it is not allowed."""
     if shape:
-        parts = read(value) if isinstance(value, str) else np.ravel(value).tolist()
+        texts = value.replace(",", " ").split() if isinstance(value, str) else []
+        parts = [*map(element, texts)] or np.ravel(value).tolist()
         if len(parts) != prod(shape):
             has = f"{variable.name} = {shown(value)} has {len(parts)} elements"
             raise SceneError(f"{has}, not {' x '.join(map(str, shape))}; name them row by row, with commas between")
@@ -42,13 +43,12 @@ def accepted(variable: Any, value: Any, shape: tuple[int, ...] = ()) -> Any:
     return number_of(variable, value)
 
 
-def read(text: str) -> list[float | str]:
-    """The elements of an array as they are written: 1,2,3."""
-    parts = text.replace(",", " ").split()
+def element(text: str) -> float | str:
+    """A number as it is written, or the text if it is none."""
     try:
-        return [float(part) for part in parts]
+        return float(text)
     except ValueError:
-        return [*parts]
+        return text
 
 
 def number_of(variable: Any, value: Any) -> float | int:

@@ -10,6 +10,9 @@
     follow = true             visit the ends of the solver's own steps as well; without a grid: these alone
                               both left out: 4096 even steps and the solver's own
     repeat = 3                time the run as often, and report the fastest
+    tolerance = 1e-6          to which an FMU is run that does not show its solver's steps; and of such a one also
+    exchange, lenient = true  run it by model exchange; run it though it breaks the standard
+    patience = 60             s, for one call of it
     analyses = ["decay"]      decay, slip, steps
     plots = ["phase"]         position, velocity, acceleration, phase, steps, any output by its name; [] for none;
                               left out: every output, and the phase plane
@@ -103,6 +106,10 @@ class SceneKeys:
     grid: Annotated[float | None, POSITIVE] = None
     follow: Annotated[bool | None, FLAG] = None
     repeat: Annotated[int, REPEATS] = 1
+    tolerance: Annotated[float, POSITIVE] = 1e-6
+    exchange: Annotated[bool, FLAG] = False
+    lenient: Annotated[bool, FLAG] = False
+    patience: Annotated[float, POSITIVE] = 60.0
     analyses: Annotated[tuple[str, ...], NAMES] = ()
     plots: Annotated[tuple[str, ...] | None, NAMES] = None
     values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)

@@ -31,22 +31,18 @@ def agreed(asked: Request, found: Any, run: Run) -> Answer:
         return by_tolerance(asked, asked.grid or span / (asked.coarsest * ceil(POINTS / asked.coarsest)), run)
     own = found.coSimulation.fixedInternalStepSize
     if own:
-        h = float(own) * ceil(span / float(own) / FINEST)
-        return taken(
-            run(h, told(asked)), f"its own step is fixed at {float(own):g} s, as it declares, its error unknown"
-        )
+        one = run(float(own) * ceil(span / float(own) / FINEST), told(asked))
+        return taken(one, f"its own step is fixed, at {float(own):g} s as it declares, its error unknown")
     if asked.grid:
-        return taken(
-            run(asked.grid, told(asked)), f"communication step {asked.grid:g} s, as asked; its error is unknown"
-        )
+        one = run(asked.grid, told(asked))
+        return taken(one, f"communication step {asked.grid:g} s, as asked, its error unknown")
     answer = by_halving(asked, run)
     usual = found.defaultExperiment.stepSize if found.defaultExperiment else None
     if answer.taken is None and usual:  # it has not taken one step
         one = run(float(usual), told(asked))
         if not one.sentence:
-            return taken(
-                one, f"communication step {float(usual):g} s, which it declares, its error unknown: {answer.failed}"
-            )
+            declared = f"communication step {float(usual):g} s, as it declares, its error unknown"
+            return taken(one, f"{declared}: {answer.failed}")
     return answer
 
 
@@ -77,10 +73,13 @@ def by_halving(asked: Request, run: Run) -> Answer:
         before, steps = now, 2 * steps
     if now.refused:
         return farthest(None, now)
-    still = (
-        f"with {FINEST} communication steps the last halving still changes an output by {off:.2g} of its largest value"
-    )
-    return Answer(now.number, "", f"{still}, more than the tolerance of {asked.tolerance:g}; raise --tolerance")
+    return apart_still(f"the last halving, to {steps // 2} communication steps,", now, off, asked)
+
+
+def apart_still(what: str, now: Pass, off: float, asked: Request) -> Answer:
+    """The last pass, and that it does not agree with the one before."""
+    change = f"{what} still changes an output by {off:.2g} of its largest value"
+    return Answer(now.number, "", f"{change}, more than the tolerance of {asked.tolerance:g}; raise --tolerance")
 
 
 def farthest(before: Pass | None, now: Pass) -> Answer:
@@ -98,6 +97,8 @@ def unmoved(asked: Request, h: float, now: Pass, run: Run) -> Answer:
     for _ in range(3):
         tolerance = max(tolerance / 100, SHARPEST)
         finer = run((asked.stop - asked.start) / max(SEEN, 4 * asked.coarsest), tolerance)
+        if finer.sentence and not finer.ended:
+            return farthest(now, finer)
         off = apart(now.rows, finer.rows, asked)
         if off == 0.0:
             own = fixed(finer.rows)
@@ -108,7 +109,7 @@ def unmoved(asked: Request, h: float, now: Pass, run: Run) -> Answer:
             note = f"it takes steps of its own, by the tolerance that it is told, {tolerance:.2g}"
             return taken(finer, f"{note}; a hundred times as much changes no output by more than {off:.2g}")
         now = finer
-    return taken(finer, f"it takes steps of its own; its error is about {off:.2g}, at a tolerance of {tolerance:.2g}")
+    return apart_still(f"a hundredth of the tolerance that it is told, {tolerance:.2g},", now, off, asked)
 
 
 def fixed(rows: Rows) -> float | None:
@@ -138,15 +139,12 @@ def by_tolerance(asked: Request, h: float, run: Run) -> Answer:
                 what = f"fmpy's CVode at rtol {rtol:.2g}; ten times as much changes no output by more than {off:.2g}"
                 return taken(now, what)
         before, rtol = now, max(rtol / 10, SHARPEST)
-    still = (
-        f"fmpy's CVode at rtol {10 * rtol:.2g} still differs from ten times as much by {off:.2g} of the largest value"
-    )
-    return Answer(now.number, "", f"{still}, more than the tolerance of {asked.tolerance:g}; raise --tolerance")
+    return apart_still("a tenth of the tolerance of fmpy's CVode", now, off, asked)
 
 
 def apart(one: Rows, two: Rows, asked: Request) -> float:
     """The largest difference of two passes, as a share of each variable's largest value, at the coarsest times."""
-    end = min(one.time[-1], two.time[-1])
+    end = min(each.time[-1] if len(each.time) else asked.start for each in (one, two))
     at = np.linspace(asked.start, asked.stop, asked.coarsest + 1)
     at = at[at <= end + 1e-9 * (asked.stop - asked.start)]
     if len(at) < 2:

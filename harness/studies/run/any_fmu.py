@@ -8,14 +8,19 @@ from ...running.any_fmu import run
 from ...running.fmu import Report
 from ...running.specification import Specification
 from ...running.trajectory import Trajectory, of_run
+from ...scenes.scene import usual
 from .job import FILES
 
 
 def perform_run(wanted: Specification, out: Path, report: Report) -> tuple[Trajectory, Path]:
     """Run an FMU, and write its outputs to out/<name of the file>."""
+    from .figure import draw
+
     folder = out / wanted.model
     with replacing(folder, FILES) as fresh:
-        found = of_run(run(wanted, report))
-        found.save(fresh / "trajectory.csv")
+        done = run(wanted, report)
+        found = of_run(done)
+        found.save(fresh / FILES[0])
+        draw(wanted.fmu.name, usual(tuple(found.columns)), done, {}, fresh / "figure.png")
         record(fresh, [wanted.fmu], found.parameters, wanted)
     return found, folder

@@ -1,6 +1,6 @@
 """Figures of a run, one panel for each plot that its scene names; as a scene asks for them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 
 from ...results.style import BLUE, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
 from ...running.run import Run
-from ...scenes.scene import Scene
 
 BESIDE = ("phase", "steps")  # on the right; what is over time stands on the left, one below the other
 EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
@@ -17,14 +16,15 @@ EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start a
 Results = dict[str, Any]  # by the name of the analysis
 
 
-def draw(scene: Scene, run: Run, results: Results, path: Path) -> None:
-    """Save the figure of all plots that the scene names as a PNG file."""
-    columns = [
-        names for right in (False, True) if (names := [name for name in scene.plots if (name in BESIDE) == right])
-    ]
+def draw(title: str, plots: Iterable[str], run: Run, results: Results, path: Path) -> None:
+    """Save the figure of these plots as a PNG file; of an array every element, of a text nothing."""
+    chosen = [each for name in plots for each in drawn(name, run)]
+    columns = [names for right in (False, True) if (names := [name for name in chosen if (name in BESIDE) == right])]
+    if not columns:
+        return
     height = HEIGHT * max(2, *map(len, columns), 2)
     with sheet(path, WIDTH * len(columns), height) as figure:
-        figure.suptitle(f"{scene.title}\n{run.setting}", fontsize=11)
+        figure.suptitle(f"{title}\n{run.setting}", fontsize=11)
         parts = figure.subfigures(1, len(columns), squeeze=False)[0]
         for part, names in zip(parts, columns, strict=True):
             over_time = names[0] not in BESIDE
@@ -32,10 +32,18 @@ def draw(scene: Scene, run: Run, results: Results, path: Path) -> None:
                 PANELS[name](axes, run, results) if name in PANELS else history(axes, run, name)
 
 
+def drawn(name: str, run: Run) -> list[str]:
+    """What is drawn for one plot that is named."""
+    if name in PANELS or name in run.wanted.motion:
+        return [name]
+    own = [each for each in run.columns if each == name or each.startswith(f"{name}[")]
+    return [each for each in own if run.columns[each].dtype.kind != "U"]
+
+
 def history(axes: Axes, run: Run, name: str) -> None:
     """One output over time, or what plays its role."""
     name = run.wanted.motion.get(name, name)
-    style = "steps-post" if run.columns[name].dtype.kind == "i" else "default"
+    style = "steps-post" if run.columns[name].dtype.kind in "iu" else "default"
     axes.plot(run.time, drawable(run.columns[name]), color=BLUE, drawstyle=style, label=name)
     axes.set_title(run.descriptions[name])
     axes.set_ylabel(label(name, run.units[name]))

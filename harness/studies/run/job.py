@@ -14,7 +14,7 @@ from ...process.interrupt import check
 from ...results.folder import replacing
 from ...results.provenance import record
 from ...results.quantity import Quantity
-from ...running.fmu import simulate
+from ...running import any_fmu
 from ...running.run import Run
 from ...running.specification import of_scene
 from ...scenes.fmus import check_built
@@ -57,27 +57,35 @@ def perform(scene: Scene, out: Path, report: Callable[[float], None]) -> Outcome
 def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome:
     """Run and analyse a scene, and write its results into an empty folder."""
     check_built(scene.file)
-    run = simulate(of_scene(scene), report)
+    run = any_fmu.run(of_scene(scene), report)
+    check_steps(scene, run)
     results: dict[str, Any] = {}
-    for name in scene.analyses:
+    for name in () if run.failed else scene.analyses:
         results[name] = ANALYSE[name](run, scene)
     quantities = tuple(quantity for result in results.values() for quantity in result.quantities)
     quantities += run.cost.quantities if run.cost else ()
-    check_published(scene, quantities)
+    if not run.failed:
+        check_published(scene, quantities)
     run.save(folder)
     as_run = replace(
         scene, start=float(run.time[0]), stop=float(run.time[-1]), grid=run.wanted.grid, follow=run.wanted.follow
     )
     record(folder, [scene.file], run.in_force, as_run)
-    if scene.published:
+    if scene.published and not run.failed:
         from .table import save
 
         save(quantities, scene.published, folder / "figures.csv")
     if scene.plots:
         from .figure import draw
 
-        draw(scene, run, results, folder / "figure.png")
-    return Outcome(scene.name, scene, run, quantities, None)
+        draw(scene.title, scene.plots, run, results, folder / "figure.png")
+    return Outcome(scene.name, scene, run, quantities, run.failed or None)
+
+
+def check_steps(scene: Scene, run: Run) -> None:
+    """The FMU shows its solver's steps, where they are asked for."""
+    if run.steps is None and "steps" in (*scene.analyses, *scene.plots):
+        raise SceneError(f"'steps' in analyses or plots: {scene.file.name} does not show the steps of its solver")
 
 
 def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
