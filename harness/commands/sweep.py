@@ -1,14 +1,20 @@
 """sweep: many runs over parameters."""
 
 import os
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ..errors import LONGEST, HarnessError
 from .terminal import STOP, progress, results, tell
 
+if TYPE_CHECKING:
+    from ..studies.sweep.file import Swept
+
+SHOWN = 10  # kinds of failures
 WORKERS = click.IntRange(1, 1024)
 
 
@@ -22,7 +28,7 @@ WORKERS = click.IntRange(1, 1024)
     "--random", type=click.IntRange(min=1), help="So many points of a Latin hypercube; then --vary NAME=LO:HI."
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the Latin hypercube.")
-@click.option("--measure", default="final,events", show_default=True, help="What to measure, with commas between.")
+@click.option("--measure", help="What to measure, with commas between (final, and events where the FMU counts them).")
 @STOP
 @click.option("--workers", type=WORKERS, default=lambda: os.cpu_count() or 1, help="Processes on this machine.")
 @click.option("--scheduler", metavar="ADDRESS", help="An existing Dask cluster, as in tcp://host:8786.")
@@ -34,7 +40,7 @@ def sweep(
     values: tuple[str, ...],
     random: int | None,
     seed: int,
-    measure: str,
+    measure: str | None,
     stop: float | None,
     workers: int,
     scheduler: str | None,
@@ -43,15 +49,17 @@ def sweep(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    """Run MODEL (a name, or the path of an FMU) over many parameters, and measure every run.
+    """Run MODEL (a name, or the path of anyone's FMU) over many parameters, and measure every run.
 
-    Measures: final, events, steps, evaluations, run_time; along the path also slips, period, unsteady, peak_speed,
-    stuck, rest, zeta, f_over_k.  Interrupted, the same command goes on where it was.
+    Measures of every FMU: final, smallest, largest, run_time; of ours also events, steps, evaluations, peak_speed, and
+    where the model has them slips, period, unsteady, stuck, rest, zeta, f_over_k.  Exit status 1 if a run fails.
+    Interrupted, the same command goes on where it was.
 
     \b
     Examples:
       python -m harness sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.5:60 --measure slips,period
       python -m harness sweep pacejka --vary x_m=0.001:0.1:40:log --measure unsteady,steps
+      python -m harness sweep theirs.fmu --vary mu=0,0.1,0.2 --measure final,largest
       python -m harness sweep coulomb --vary f=0.1:2 --vary k=50:500 --random 1000 --scheduler tcp://host:8786
     """
     if name is not None and (name.startswith(".") or Path(name).name != name):
@@ -60,26 +68,29 @@ def sweep(
         from ..studies.sweep import file as sweep_file
     except ImportError as error:
         raise HarnessError(f"a sweep needs {error.name}: python -m pip install 'friction-fmus[sweep]'") from None
-    measures = tuple(dict.fromkeys(word.strip() for word in measure.split(",")))
+    measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
     asked = sweep_file.Asked(model, vary, values, random, seed, measures, stop, name)
     with progress(quiet or as_json, 1) as report:
         swept = sweep_file.carry_out(asked, out, scheduler, workers, partial(report, model))
-    runs = swept.data["error"].size
-    told = {
-        "runs": runs,
-        "done before": swept.before,
-        "damaged": swept.damaged,
-        "failed": swept.failed,
-        "seconds": swept.seconds,
-        "folder": str(swept.folder),
-    }
     if as_json:
-        tell(told)
+        tell(swept)
     elif not quiet:
-        fresh = runs - swept.before
-        click.echo(f"{runs} runs, {swept.before} of them done before, {swept.failed} failed")
+        fresh = swept.runs - swept.before
+        click.echo(f"{swept.runs} runs, {swept.before} of them done before, {swept.failed} failed")
         if swept.damaged:
             click.echo(f"{swept.damaged} damaged lines of the earlier sweep's journal were left out, and run again")
         if fresh:
             click.echo(f"{fresh} runs in {swept.seconds:.3g} s: {fresh / swept.seconds:.4g} runs/s")
         click.echo(f"Results in {swept.folder}")
+    if swept.failed:
+        raise HarnessError("\n".join(told(swept)))
+
+
+def told(swept: "Swept") -> Iterator[str]:
+    """How runs failed, alike ones together."""
+    yield f"{swept.failed} of {swept.runs} runs failed; each has its sentence in {swept.folder / 'sweep.csv'}"
+    for each in swept.failures[:SHOWN]:
+        where = ", ".join(f"{name} = {value!r}" for name, value in each.where.items())
+        yield f"{each.runs} like {where}: {each.sentence}"
+    if len(swept.failures) > SHOWN:
+        yield f"and {len(swept.failures) - SHOWN} other kinds"

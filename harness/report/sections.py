@@ -246,10 +246,13 @@ def sweeps(results: Path) -> Section:
 
 
 def swept(folder: Path) -> Item:
-    found = table(folder / "sweep.csv", cut=False)
-    failed = sum(bool(row[found.heads.index("error")]) for row in found.rows)
-    measured = [head for head in found.heads if head != "error"]
-    text = f"{len(found.rows)} runs, {failed} failed. Columns: {', '.join(measured)}."
+    with (folder / "sweep.csv").open(encoding="utf-8", newline="") as file:
+        rows = csv.reader(file)  # one at a time: there may be millions
+        heads = next(rows)
+        place = heads.index("error")
+        failed = Counter(bool(row[place]) for row in rows)
+    measured = ", ".join(heads[:place])
+    text = f"{failed.total()} runs, {failed[True]} failed. Columns: {measured}."
     return Item(folder.name, (text,), None, drawn(folder / "figure.png", f"Sweep {folder.name}. {text}"))
 
 

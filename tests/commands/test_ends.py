@@ -27,7 +27,7 @@ COMMANDS = {  # and a file or folder that is there once it is under way
     "stability": (["stability"], "temporary/bounded-*"),
     "bench": (["bench"], "out/.bench-*"),
     "importers": (["importers"], "temporary/child-*"),
-    "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.jsonl"),
+    "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.journal"),
 }
 
 
@@ -66,7 +66,7 @@ def test_a_signal_ends_a_command_and_leaves_nothing_of_it(place, tmp_path, comma
     assert list((tmp_path / "temporary").iterdir()) == []
     left = [path.name for path in (tmp_path / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
     if command == "sweep":
-        assert [name for name in left if not name.endswith(".jsonl")] == []  # what it has done is kept
+        assert [name for name in left if not name.endswith(".journal")] == []  # what it has done is kept
     elif command == "main":
         assert [name for name in left if name.startswith(".")] == []  # scenes that were finished are whole
         assert len(list((tmp_path / "out").iterdir())) < 8

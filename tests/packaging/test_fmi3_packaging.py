@@ -215,6 +215,7 @@ def test_the_files_are_those_of_fmi_3_and_nothing_of_the_python_of_pythonfmu3(fm
     assert not [path for path, text in sources.items() if b"pythonfmu3" in text or "pythonfmu" in path]
     certified = {"fmi-ls-manifest.xml", f"{name}_out.csv"}
     assert set(content) - set(sources) == {
+        "documentation/boundaries.toml",
         "documentation/externalDependencies.txt",
         "documentation/index.html",
         "modelDescription.xml",

@@ -14,7 +14,7 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "run --fmu": (("run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.25"), "coulomb"),
     "compare": (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), "compare/coulomb-smd"),
     "decay": (("decay", "coulomb"), "decay/coulomb"),
-    "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1"), "sweep/coulomb-f"),
+    "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
 }
 
 

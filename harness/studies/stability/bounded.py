@@ -1,7 +1,5 @@
 """A function in a process of its own, with a time limit: a hang or a crash there is a sentence here."""
 
-import multiprocessing
-import os
 import tempfile
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -12,26 +10,15 @@ from typing import Any
 
 from ...errors import HarnessError
 from ...process.child import OFTEN
+from ...process.crew import context
 from ...process.interrupt import check, deaf_children
 from ...process.room import room
 
 ALONE = Lock()  # a start looks after all processes there are, and may take the exit code of one that is waited for
 # imported once, where processes are forked from
-PRELOAD = ["__main__", "harness.running.probe", "harness.truths.linear", "harness.truths.smooth"]
-LONGEST = 70  # bytes, of the path of temporary files: below it is a socket, whose path may have 107 (unix(7))
+PRELOAD = ["harness.running.probe", "harness.truths.linear", "harness.truths.smooth"]
 
-
-def context() -> Any:
-    """How processes are made: forked from a server, where there is one and its socket has room for its path."""
-    short = len(os.fsencode(tempfile.gettempdir())) <= LONGEST
-    if not short or "forkserver" not in multiprocessing.get_all_start_methods():
-        return multiprocessing.get_context("spawn")
-    made = multiprocessing.get_context("forkserver")
-    made.set_forkserver_preload(PRELOAD)
-    return made
-
-
-CONTEXT: Any = context()
+CONTEXT: Any = context(PRELOAD)
 
 
 def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:

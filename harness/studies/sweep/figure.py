@@ -1,44 +1,60 @@
-"""The figure of a sweep: curves for one parameter, maps for two, points for a sample or for more."""
+"""The figure of a sweep: curves for one parameter, maps for two, points for a sample or for more.
+
+An axis is logarithmic where its values were spread so or lie over decades.  Of very many runs only some are drawn,
+evenly among them.
+"""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from ...results.style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, label, sheet
-from .boundaries import known
+from .boundaries import Boundary
 
 FAILED = "#bbbbbb"
-LINES = (ORANGE, "#CC79A7", GREEN)  # of known boundaries
+COLOURS = (ORANGE, "#CC79A7", GREEN)  # of known boundaries
+HATCHES = ("//", "\\\\", "..")  # of the side below
+DECADES = 100.0  # the largest value over the smallest from which on an axis is logarithmic
+MOST = 20_000  # runs that are drawn as curves and points
+CELLS = 300  # along each side of a map
+FINE = 401  # points along an axis where a boundary is looked for
 
 
-def draw(data: xarray.Dataset, path: Path) -> None:
-    """Save the figure as PNG: a panel for each measure, in points for each measure and parameter."""
-    measures = [str(name) for name in data.data_vars if name != "error"]
-    varied = [str(name) for name in data.coords]
-    grid = "run" not in data.dims
-    across = len(varied) if not grid or len(varied) > 2 else min(len(measures), 2)
-    down = len(measures) if not grid or len(varied) > 2 else -(-len(measures) // 2)
-    height = HEIGHT * (1.7 if grid and len(varied) == 2 else 1.2)
+def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) -> None:
+    """Save the figure of a sweep's netCDF file as PNG: a panel for each measure, in points for each measure and
+    parameter."""
+    with xarray.open_dataset(file, engine="scipy", drop_variables="error") as whole:
+        many = len(whole.dims)
+        most = CELLS if many == 2 else int(MOST ** (1 / many))
+        data = whole.isel({name: slice(None, None, -(-size // most)) for name, size in whole.sizes.items()}).load()
+    measures, varied = [str(name) for name in data.data_vars], [str(name) for name in data.coords]
+    scattered = "run" in data.dims or len(varied) > 2
+    across = len(varied) if scattered else min(len(measures), 2)
+    down = len(measures) if scattered else -(-len(measures) // 2)
+    height = HEIGHT * (1.2 if scattered or len(varied) == 1 else 1.7)
     with sheet(path, max(1.2, across) * WIDTH, height * down + 0.6) as figure:
-        failed = int((data["error"] != "").sum())
         figure.suptitle(f"{data.attrs['title']}{f' ({failed} runs failed)' if failed else ''}", fontsize=11)
         panels = figure.subplots(down, across, squeeze=False)
-        if not grid or len(varied) > 2:
+        if scattered:
             for row, measure in zip(panels, measures, strict=True):
                 for axes, name in zip(row, varied, strict=True):
                     scatter(axes, data, measure, name)
         else:
             for axes, measure in zip(panels.flat, measures, strict=False):
-                (curve if len(varied) == 1 else chart)(axes, data, measure)
+                (curve if len(varied) == 1 else chart)(axes, data, measure, boundaries)
             for axes in panels.flat[len(measures) :]:
                 axes.remove()
-        lines = {line.get_label(): line for axes in figure.axes for line in axes.lines if line.get_linestyle() == "--"}
-        if lines:
-            figure.legend(list(lines.values()), list(map(str, lines)), loc="outside lower center", ncols=1)
+        shown: dict[str, Artist] = {}
+        for axes in figure.axes:
+            shown |= {text: drawn for drawn, text in zip(*axes.get_legend_handles_labels(), strict=True)}
+        if shown:
+            figure.legend(handles=list(shown.values()), labels=list(shown), loc="outside lower center", ncols=2)
 
 
 def words(data: xarray.Dataset, name: str) -> str:
@@ -48,40 +64,60 @@ def words(data: xarray.Dataset, name: str) -> str:
 
 
 def scale(data: xarray.Dataset, name: str) -> str:
-    """The kind of axis a parameter was spread on: linear or log."""
-    return str(data[name].attrs["scale"])
+    """The kind of axis for the values of a parameter or measure: linear or log."""
+    values = data[name].to_numpy()
+    values = values[np.isfinite(values)]
+    decades = len(values) and values.min() > 0 and values.max() >= DECADES * values.min()
+    return "log" if decades or data[name].attrs.get("scale") == "log" else "linear"
 
 
-def curve(axes: Axes, data: xarray.Dataset, measure: str) -> None:
+def spread(data: xarray.Dataset, name: str) -> np.ndarray:
+    """Many values over the range of a parameter."""
+    low, high = float(data[name].min()), float(data[name].max())
+    return np.geomspace(low, high, FINE) if scale(data, name) == "log" else np.linspace(low, high, FINE)
+
+
+def curve(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
     """A measure over the one parameter; a failed run is a gap."""
     (name,) = map(str, data.dims)
     axes.plot(data[name], data[measure], color=BLUE, marker="." if data.sizes[name] < 100 else None)
-    axes.set_xscale(scale(data, name))
-    fine = np.linspace(float(data[name].min()), float(data[name].max()), 2001)
-    for each, color in zip(known(data.attrs["model"], (name,)), LINES, strict=False):
-        quantity = np.broadcast_to(each.quantity(parameters(data) | {name: fine}, stop(data)), fine.shape)
-        for at in fine[1:][np.diff(np.sign(quantity - 1)) != 0]:
+    axes.set(xscale=scale(data, name), yscale=scale(data, measure))
+    fine = spread(data, name)
+    for each, color in zip(boundaries, COLOURS, strict=False):
+        below = np.broadcast_to(each.at(parameters(data) | {name: fine}, stop(data)), fine.shape) < 1
+        for at in fine[1:][np.diff(below)]:
             axes.axvline(at, color=color, linestyle="--", label=each.text)
+        if below.any() and not below.all():
+            shade = axes.fill_between(fine, 0, 1, below, transform=axes.get_xaxis_transform(), label=each.below)
+            shade.set(color=color, alpha=0.15)
     axes.set_title(data[measure].attrs["long_name"])
     axes.set_xlabel(words(data, name))
     axes.set_ylabel(words(data, measure))
 
 
-def chart(axes: Axes, data: xarray.Dataset, measure: str) -> None:
-    """A measure over two parameters, the first to the right; failed runs are grey, the known boundary is dashed."""
+def chart(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
+    """A measure over two parameters, the first to the right; failed runs are grey, known boundaries are dashed, and the
+    side below is hatched."""
     across, up = map(str, data.dims)
-    x, y = data[across].to_numpy(), data[up].to_numpy()
     axes.set_facecolor(FAILED)
-    image = axes.pcolormesh(x, y, data[measure].to_numpy().T, shading="nearest", cmap="viridis")
+    image = axes.pcolormesh(
+        *(data[name].to_numpy() for name in (across, up)),
+        data[measure].to_numpy().T,
+        shading="nearest",
+        cmap="viridis",
+        norm=scale(data, measure),
+    )
     axes.figure.colorbar(image, ax=axes, label=words(data, measure))
-    edges = axes.get_xlim(), axes.get_ylim()
-    plane = dict(zip((across, up), np.meshgrid(np.linspace(*edges[0], 401), np.linspace(*edges[1], 401)), strict=True))
-    for each, color in zip(known(data.attrs["model"], (across, up)), LINES, strict=False):
-        quantity = np.broadcast_to(each.quantity(parameters(data) | plane, stop(data)), plane[up].shape)
-        if np.min(quantity) < 1 < np.max(quantity):
-            axes.contour(plane[across], plane[up], quantity, levels=[1.0], colors=color, linestyles="--")
+    plane = dict(zip((across, up), np.meshgrid(spread(data, across), spread(data, up)), strict=True))
+    for each, color, hatch in zip(boundaries, COLOURS, HATCHES, strict=False):
+        quantity = np.broadcast_to(each.at(parameters(data) | plane, stop(data)), plane[up].shape)
+        if np.nanmin(quantity) < 1 < np.nanmax(quantity):
+            axes.contour(*plane.values(), quantity, levels=[1.0], colors=color, linestyles="--")
+            shade = axes.contourf(*plane.values(), quantity, levels=[-np.inf, 1.0], colors="none", hatches=[hatch])
+            shade.set_edgecolor(color)
             axes.plot([], [], color=color, linestyle="--", label=each.text)
-    axes.set(xscale=scale(data, across), yscale=scale(data, up), xlim=edges[0], ylim=edges[1])
+            axes.fill([], [], facecolor="none", edgecolor=color, hatch=hatch, linewidth=0, label=each.below)
+    axes.set(xscale=scale(data, across), yscale=scale(data, up))
     axes.grid(visible=False)
     axes.set_title(data[measure].attrs["long_name"])
     axes.set_xlabel(words(data, across))
@@ -92,7 +128,7 @@ def scatter(axes: Axes, data: xarray.Dataset, measure: str, name: str) -> None:
     """A measure over one of the parameters, every run a point."""
     where = data[name].broadcast_like(data[measure]).to_numpy()
     axes.plot(where.ravel(), data[measure].to_numpy().ravel(), ".", color=BLUE, markersize=3, alpha=0.6)
-    axes.set_xscale(scale(data, name))
+    axes.set(xscale=scale(data, name), yscale=scale(data, measure))
     axes.set_xlabel(words(data, name))
     axes.set_ylabel(words(data, measure))
 

@@ -1,28 +1,46 @@
-"""A sweep's results: one labelled file that xarray opens, the same as a table for pandas, and the figure."""
+"""A sweep from what is asked to its files: one labelled file that xarray opens, the same as a table for pandas, and the
+figure.  The files are written block by block; sweep.nc holds
 
+    <parameter>     the values varied: a dimension of its own on a grid, over `run` in a sample; units, long_name, scale
+    <measure>       one number of each run, NaN where it failed or has none; units, long_name
+    error           why a run failed; empty if it did not
+    title, model    what was swept, and the FMU, whose digest is fmu_sha256
+    parameters      the values of all parameters that were not varied, as JSON, in the units of the FMU
+    stop_time       at which every run ended, in s
+    sample          the grid, or the kind of sample and its seed
+"""
+
+import csv
 import json
+import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray
 
-from ...errors import SceneError, unknown
+from ...errors import HarnessError, SceneError, unknown
 from ...results.files import heading
 from ...results.folder import replacing
+from ...results.netcdf import NetCDF, Variable
 from ...results.provenance import record
-from ...running.values import unit
+from ...running.description import description
+from ...running.values import REALS, unit
 from ...scenes.assigned import assigned
 from ...scenes.fmus import check_built, fmu_of
-from .measures import columns
+from .boundaries import Boundary, known
+from .journal import Block, Journal
+from .measures import Column
 from .rerun import Runs, ready
-from .space import Axis, axis, points
-from .study import Sweep, forget, perform
+from .space import Points, axis
+from .study import Sweep, perform
 
 FOLDER = "sweep"
 FILES = ("sweep.nc", "sweep.csv", "figure.png")
+NOT_NUMBERS = ("String", "Binary", "Clock")
+NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)
@@ -40,16 +58,41 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Swept:
-    """The finished sweep: its `data`, where its files are, how many runs were done before, how many lines about them
-    were damaged, how many of all failed, and the seconds that the new ones took without the start of the workers."""
+class Failure:
+    """Runs that failed alike, but for the numbers in the `sentence` of the first of them."""
 
-    data: xarray.Dataset
+    runs: int
+    sentence: str
+    where: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Swept:
+    """The finished sweep: its runs, where its files are, how many runs were done before, how many lines about them
+    were damaged, how the others failed, the most frequent first, and the seconds that the new ones took."""
+
+    runs: int
     folder: Path
     before: int
     damaged: int
-    failed: int
+    failures: tuple[Failure, ...]
     seconds: float
+
+    @property
+    def failed(self) -> int:
+        return sum(each.runs for each in self.failures)
+
+
+@dataclass(frozen=True)
+class About:
+    """What an FMU says of a sweep: unit and sentence of what is varied, the columns, value and unit of the parameters
+    that are not, the stop time in s, and the known boundaries."""
+
+    varied: dict[str, tuple[str, str]]
+    columns: tuple[Column, ...]
+    constants: dict[str, tuple[object, str]]
+    stop: float
+    boundaries: tuple[Boundary, ...]
 
 
 def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, report: Callable[[float], None]) -> Swept:
@@ -59,18 +102,19 @@ def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, repo
     names = tuple(each.name for each in axes)
     if len(set(names)) < len(names):
         raise SceneError("--vary names a parameter twice")
-    runs = Runs(file.stem, names, dict(map(assigned, asked.values)), asked.stop, asked.measures)
-    described = describe(runs, axes, file)
-    places = points(axes, asked.random, asked.seed)
-    sweep = Sweep(runs, axes, places, asked.random, asked.seed, file.read_bytes(), len(described["columns"]))
-    folder = out / FOLDER / (asked.name or "-".join((runs.model, *names)))
+    points = Points(axes, asked.random, asked.seed)
+    runs = Runs(file.stem, names, tuple(map(assigned, asked.values)), asked.stop, asked.measures)
+    about = describe(runs, points, file)
+    sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
+    kept = sweep.journal(out / FOLDER)
+    before = kept.done
+    folder = out / FOLDER / (asked.name or "-".join((runs.model, *names, sweep.key[:8])))
     with replacing(folder, FILES) as fresh:  # from before the runs on: a place that cannot be written is told at once
-        rows, before, damaged, seconds = perform(sweep, out / FOLDER, scheduler, workers, report)
-        data = dataset(sweep, rows, described)
-        save(data, fresh)
-        record(fresh, [file], described["constants"], asked)
-    forget(sweep, out / FOLDER)
-    return Swept(data, folder, before, damaged, sum(1 for _, error in rows if error), seconds)
+        seconds = perform(sweep, kept, scheduler, workers, report)
+        failures = save(sweep, kept, about, fresh)
+        record(fresh, [file], about.constants, asked)
+    kept.forget()
+    return Swept(len(points), folder, before, kept.damaged, failures, seconds)
 
 
 def fmu_file(model: str) -> Path:
@@ -80,73 +124,117 @@ def fmu_file(model: str) -> Path:
     return file
 
 
-def describe(runs: Runs, axes: tuple[Axis, ...], file: Path) -> dict[str, Any]:
-    """Units and sentences of what is varied and measured and the values of the rest, from the FMU itself.
+def describe(runs: Runs, points: Points, file: Path) -> About:
+    """What the FMU says of the sweep; SceneError where it cannot be done.
 
-    A first run from the FMU's own values shows what is wrong with the sweep before workers are started.
+    Some first runs show what is wrong with it before workers are started.
     """
-    with ready(replace(runs, varied=(), measures=()), file) as rerun:
-        variables = {variable.name: variable for variable in rerun.description.modelVariables}
-        settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
-        for name in runs.varied:
-            if name not in settable:
-                raise SceneError(unknown("parameter to vary", name, settable))
-            if name in runs.values:
-                raise SceneError(f"{name} is both varied and set")
-        for each in axes:
-            if variables[each.name].type != "Real" and any(value % 1 for value in each.values):
-                raise SceneError(f"{each.name} is a choice: vary it over whole numbers, as in {each.name}=1,2")
-        measured = columns(runs.measures, variables)
-        constants, names = rerun.constants(), runs.varied
-        stop = rerun.plan.stop
-    return {
-        "varied": {name: (unit(variables[name]), variables[name].description) for name in runs.varied},
-        "columns": measured,
-        "constants": {name: (value, unit(variables[name])) for name, value in constants.items() if name not in names},
-        "stop": stop,
-    }
+    variables = {variable.name: variable for variable in description(file).modelVariables}
+    settable = [name for name, variable in variables.items() if is_settable(variable)]
+    for each in points.axes:
+        if each.name not in settable:
+            raise SceneError(unknown("parameter to vary", each.name, settable))
+        if each.name in dict(runs.values):
+            raise SceneError(f"{each.name} is both varied and set")
+        if variables[each.name].type not in REALS and any(value % 1 for value in each.values):
+            raise SceneError(f"{each.name} is a choice: vary it over whole numbers, as in {each.name}=1,2")
+    with ready(runs, file) as runner:
+        for number in (len(points) - 1, len(points) // 2, 0):
+            (spot,) = points.between(number, number + 1).tolist()
+            measured = runner.run(spot)
+            if not isinstance(measured, str):
+                break
+        else:
+            raise HarnessError(f"none of three runs of the sweep comes to its end: {measured}")
+        constants = {name: value for name, value in runner.constants().items() if name not in runs.varied}
+        varied = {name: (unit(variables[name]), variables[name].description or name) for name in runs.varied}
+        numbers = {name: value for name, (value, _) in constants.items() if isinstance(value, float)}
+        return About(varied, runner.columns, constants, runner.stop, known(file, runs.varied, numbers))
 
 
-def dataset(sweep: Sweep, rows: list[Any], about: dict[str, Any]) -> xarray.Dataset:
-    """The results with their labels: a dimension for each axis of a grid, or the dimension `run` of a sample."""
-    names = sweep.runs.varied
-    if sweep.random is None:
-        dims, shape = names, tuple(len(each.values) for each in sweep.axes)
-        coordinates = {each.name: ((each.name,), np.array(each.values)) for each in sweep.axes}
-    else:
-        dims, shape = ("run",), (len(rows),)
-        coordinates = {name: (("run",), sweep.points[:, i]) for i, name in enumerate(names)}
-    width = len(about["columns"])
-    table = np.array([values or [np.nan] * width for values, _ in rows]).reshape(*shape, width)
-    data = {column.name: (dims, table[..., i]) for i, column in enumerate(about["columns"])}
-    data["error"] = (dims, np.array([error for _, error in rows], dtype=str).reshape(shape))
-    found = xarray.Dataset(data, coordinates)
-    for column in about["columns"]:
-        found[column.name].attrs = {"units": column.unit or "1", "long_name": column.text}
-    for name, (size, text) in about["varied"].items():
-        spread = "log" if next(each for each in sweep.axes if each.name == name).log else "linear"
-        found[name].attrs = {"units": size or "1", "long_name": text or name, "scale": spread}
-    found["error"].attrs = {"long_name": "why a run failed; empty if it did not"}
-    found.attrs = {
+def is_settable(variable: Any) -> bool:
+    """Whether a variable takes a number before a run."""
+    return variable.causality in ("parameter", "input") and variable.type not in NOT_NUMBERS and not variable.dimensions
+
+
+def save(sweep: Sweep, kept: Journal, about: About, folder: Path) -> tuple[Failure, ...]:
+    """Write the netCDF file, the table and the figure; returns how runs failed."""
+    from .figure import draw
+
+    failures, longest = counted(sweep, kept)
+    grid, names, length = sweep.points.random is None, sweep.runs.varied, len(sweep.points)
+    dimensions = names if grid else ("run",)
+    sizes = {each.name: len(each.values) for each in sweep.points.axes} if grid else {"run": length}
+    letters = f"string{longest}"
+    variables = [Variable(name, (name,) if grid else ("run",), said) for name, said in labels(sweep, about).items()]
+    where: dict[str, str] = {} if grid else {"coordinates": " ".join(names)}
+    for column in about.columns:
+        said = {"units": column.unit or "1", "long_name": column.text}
+        variables.append(Variable(column.name, dimensions, said | where))
+    said = {"long_name": "why a run failed; empty if it did not", "_Encoding": "utf-8"}
+    variables.append(Variable("error", (*dimensions, letters), said | where, longest))
+    attributes: dict[str, str | float] = {
         "title": f"{sweep.runs.model} over {', '.join(names)}",
         "model": sweep.runs.model,
         "fmu_sha256": sweep.digest,
-        "stop_time": about["stop"],
-        "parameters": json.dumps({name: value for name, (value, _) in about["constants"].items()}, sort_keys=True),
-        "sample": "grid" if sweep.random is None else f"Latin hypercube, seed {sweep.seed}",
+        "stop_time": about.stop,
+        "parameters": json.dumps({name: value for name, (value, _) in about.constants.items()}, sort_keys=True),
+        "sample": "grid" if grid else f"Latin hypercube, seed {sweep.points.seed}",
     }
+    with (
+        (folder / "sweep.nc").open("wb") as file,
+        (folder / "sweep.csv").open("w", encoding="utf-8", newline="") as text,
+    ):
+        data = NetCDF(file, sizes | {letters: longest}, variables, attributes)
+        table = csv.writer(text, lineterminator="\n")
+        heads = [(each.name, str(each.attributes.get("units", "1"))) for each in variables]
+        table.writerow([heading(name, "" if size == "1" else size) for name, size in heads])
+        for each in sweep.points.axes if grid else ():
+            data.put(each.name, 0, np.array(each.values))
+        for block in kept.blocks():
+            spots = sweep.points.between(block.first, block.last)
+            for name, column in zip(names, () if grid else spots.T, strict=not grid):
+                data.put(name, block.first, column)
+            for column, values in zip(about.columns, block.values.T, strict=True):
+                data.put(column.name, block.first, values)
+            data.put("error", block.first, np.array([sentence.encode() for sentence in sentences(block)]))
+            table.writerows(rows(spots, block))
+    draw(folder / "sweep.nc", folder / "figure.png", about.boundaries, sum(each.runs for each in failures))
+    return failures
+
+
+def labels(sweep: Sweep, about: About) -> dict[str, dict[str, str]]:
+    """The attributes of what is varied."""
+    found = {}
+    for each in sweep.points.axes:
+        size, text = about.varied[each.name]
+        found[each.name] = {"units": size or "1", "long_name": text, "scale": "log" if each.log else "linear"}
     return found
 
 
-def save(data: xarray.Dataset, folder: Path) -> None:
-    """Write the netCDF file, the table and the figure."""
-    from .figure import draw
+def sentences(block: Block) -> list[str]:
+    """Why each run of a block failed."""
+    return [block.sentences.get(i, "") for i in range(len(block.values))]
 
-    data.to_netcdf(folder / "sweep.nc", engine="scipy")
-    table = data.to_dataframe().reset_index()
-    if "run" in table.columns:
-        table = table[[*(name for name in data.coords if name != "run"), *data.data_vars]]
-    units = {name: data[name].attrs.get("units", "1") for name in table.columns}
-    table.columns = [heading(name, "" if units[name] == "1" else units[name]) for name in table.columns]
-    table.to_csv(folder / "sweep.csv", index=False, lineterminator="\n")
-    draw(data, folder / "figure.png")
+
+def rows(spots: np.ndarray, block: Block) -> Any:
+    """The rows of a block in the table; what there is not is empty."""
+    values = np.column_stack([spots, block.values]).astype(object)
+    values[values != values] = None
+    return ([*row, sentence] for row, sentence in zip(values, sentences(block), strict=True))
+
+
+def counted(sweep: Sweep, kept: Journal) -> tuple[tuple[Failure, ...], int]:
+    """How runs failed, the most frequent first, and the bytes of the longest sentence, one at least."""
+    runs: Counter[str] = Counter()
+    first: dict[str, Failure] = {}
+    longest = 1
+    for block in kept.blocks():
+        for place, sentence in block.sentences.items():
+            kind = NUMBER.sub("#", sentence)
+            runs[kind] += 1
+            longest = max(longest, len(sentence.encode()))
+            if kind not in first:
+                (spot,) = sweep.points.between(block.first + place, block.first + place + 1)
+                first[kind] = Failure(0, sentence, dict(zip(sweep.runs.varied, spot.tolist(), strict=True)))
+    return tuple(replace(first[kind], runs=count) for kind, count in runs.most_common()), longest

@@ -3,7 +3,7 @@
 A measure that a run does not have (the period of a single slip, the rest of what still moves) is NaN.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +11,9 @@ import numpy as np
 
 from ...analyses.decay.decrement import damping_ratio, friction, turning_points
 from ...analyses.slip import crest, crossings, slips_of_modes
-from ...errors import HarnessError, SceneError, unknown
+from ...errors import HarnessError
 from ...running.run import Run
+from ...running.values import unit
 from ...scenes.roles import roles
 
 PIECES = 400  # communication steps along a path; the ends of the solver's own steps come on top
@@ -29,12 +30,16 @@ class Column:
 
 @dataclass(frozen=True)
 class AlongPath:
-    """A measure along the path; it needs the `variable` in the FMU."""
+    """A measure along the path.  It needs the variables named, a law with modes if it is of `modes`, and no driver if
+    it is of a `decay`; `like`: the role of the output whose unit it has."""
 
-    variable: str
+    needs: tuple[str, ...]
     unit: str
     text: str
     measure: Callable[[Run], float]
+    modes: bool = False
+    decay: bool = False
+    like: str = ""
 
 
 def starts(run: Run) -> np.ndarray:
@@ -96,37 +101,64 @@ AT_END = {  # and the variable that tells it
     "steps": (Column("steps", "", "steps of the solver"), "solver.steps"),
     "evaluations": (Column("evaluations", "", "right-hand sides"), "solver.evaluations"),
 }
+DRIVER = "v_driver"
+SWING = "swing of the speed in the later half, over that of the driver"
+ENVELOPE = "friction over stiffness by linear envelope"
 ON_PATH = {
-    "slips": AlongPath("v_driver", "", "slips", lambda run: float(len(starts(run)))),
-    "period": AlongPath("v_driver", "s", "slip period", period),
-    "unsteady": AlongPath("v_driver", "1", "swing of the speed in the later half, over that of the driver", unsteady),
-    "peak_speed": AlongPath("solver.steps", "", "peak speed", peak_speed),
-    "stuck": AlongPath("mode", "s", "time stuck", stuck),
-    "rest": AlongPath("mode", "", "rest position", rest),
-    "zeta": AlongPath("solver.steps", "1", "damping ratio by logarithmic decrement", zeta),
-    "f_over_k": AlongPath("solver.steps", "", "friction over stiffness by linear envelope", f_over_k),
+    "slips": AlongPath((DRIVER,), "", "slips", lambda run: float(len(starts(run)))),
+    "period": AlongPath((DRIVER,), "s", "slip period", period),
+    "unsteady": AlongPath((DRIVER,), "1", SWING, unsteady),
+    "peak_speed": AlongPath((), "", "peak speed", peak_speed, like="velocity"),
+    "stuck": AlongPath(("mode",), "s", "time stuck", stuck, modes=True),
+    "rest": AlongPath(("mode",), "", "rest position", rest, modes=True, like="position"),
+    "zeta": AlongPath(("c",), "1", "damping ratio by logarithmic decrement", zeta, decay=True),
+    "f_over_k": AlongPath(("mode",), "", ENVELOPE, f_over_k, decay=True, like="position"),
 }
-LIKE = {"peak_speed": "velocity", "rest": "position", "f_over_k": "position"}  # measured in the unit of
+OF_OUTPUTS: dict[
+    str, tuple[Callable[[np.ndarray], Any], str]
+] = {  # of every output that is recorded: its measure, and in words
+    "final": (lambda column: column[-1], "at the end"),
+    "smallest": (np.min, "smallest at the points of the run"),
+    "largest": (np.max, "largest at the points of the run"),
+}
+USUAL = ("final", "events")
 
 
-def columns(measures: tuple[str, ...], variables: dict[str, Any]) -> tuple[Column, ...]:
-    """The columns of these measures, for an FMU with these variables; SceneError for what it does not offer."""
-    offered = ["final", "run_time", *(name for name, (_, variable) in AT_END.items() if variable in variables)]
-    offered += [name for name, path in ON_PATH.items() if path.variable in variables]
+def offered(variables: Collection[str], ours: bool, values: Mapping[str, object]) -> list[str]:
+    """The measures that an FMU with these variables gives, with these values set; one that is not ours shows neither
+    its steps nor its modes."""
+    found = [*OF_OUTPUTS, "run_time"]
+    if not ours:
+        return found
+    found += [name for name, (_, variable) in AT_END.items() if variable in variables]
+    if {"position", "velocity"} <= set(roles(variables)):
+        for name, path in ON_PATH.items():
+            lawful = not path.modes or values.get("friction", "hybrid") in ("hybrid", 1)
+            if lawful and set(path.needs) <= set(variables) and not (path.decay and DRIVER in variables):
+                found.append(name)
+    return found
+
+
+def columns(measures: Iterable[str], variables: Mapping[str, Any], recorded: Iterable[str]) -> tuple[Column, ...]:
+    """The columns of measures that are offered, of an FMU with these variables, of which some are recorded."""
     found: list[Column] = []
     for measure in measures:
-        if measure not in offered:
-            raise SceneError(unknown("measure", measure, offered))
-        if measure == "final":
-            for role in ("position", "velocity"):
-                name = roles(variables)[role]
-                found.append(Column(f"final_{name}", variables[name].unit, f"{variables[name].description} at the end"))
+        if measure in OF_OUTPUTS:
+            for name in recorded:
+                variable = variables.get(name) or variables[name.partition("[")[0]]  # of an element of an array
+                text = f"{variable.description or name} {OF_OUTPUTS[measure][1]}"
+                found.append(Column(f"{measure}_{name}", unit(variable), text))
         elif measure == "run_time":
             found.append(Column("run_time", "s", "run time"))
         elif measure in AT_END:
             found.append(AT_END[measure][0])
         else:
             path = ON_PATH[measure]
-            like = roles(variables).get(LIKE.get(measure, ""))
-            found.append(Column(measure, variables[like].unit if like else path.unit, path.text))
+            like = roles(variables).get(path.like) if not path.unit else None
+            found.append(Column(measure, unit(variables[like]) if like else path.unit, path.text))
     return tuple(found)
+
+
+def of_outputs(measure: str, outputs: Mapping[str, np.ndarray]) -> list[float]:
+    """A measure of every output."""
+    return [float(OF_OUTPUTS[measure][0](column)) for column in outputs.values()]

@@ -1,135 +1,186 @@
-"""One instance of an FMU run again and again by reset: what a sweep does in each of its workers."""
+"""One FMU run again and again: what a sweep does in each of its workers.
+
+Of ours one instance is reset before each run, and the room for what is set and read is made once: a run by closed form
+takes 40 microseconds.  Others are run as `run --fmu` runs them, with steps that are halved until two results agree.
+"""
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr
 from ctypes import c_double, c_int, c_void_p
 from dataclasses import dataclass, replace
-from math import nan
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, Protocol
 
-from ...errors import HarnessError
-from ...running.fmu import (
-    WARNING,
-    FMICallException,
-    begin,
-    buffer,
-    callbacks,
-    gather,
-    instance,
-    parameters,
-    planned,
-    traced,
-)
+from ...errors import HarnessError, SceneError, unknown
+from ...running import any_fmu
+from ...running.description import description
+from ...running.fmu import WARNING, FMICallException, buffer, callbacks, gather, instance, parameters, planned, traced
 from ...running.settings import settings
 from ...running.specification import Specification
+from ...running.values import unit
 from ...scenes.roles import roles
-from .measures import AT_END, ON_PATH, PIECES
+from .measures import AT_END, OF_OUTPUTS, ON_PATH, PIECES, USUAL, Column, columns, of_outputs, offered
 
 
 @dataclass(frozen=True)
 class Runs:
-    """What the runs of a sweep share: the `varied` names, `values` and `stop` (None: the FMU's) for all, `measures`."""
+    """What the runs of a sweep share: the `varied` names, `values` and `stop` (None: the FMU's) for all, `measures`
+    (none: the usual ones)."""
 
     model: str
     varied: tuple[str, ...]
-    values: dict[str, float | str]
+    values: tuple[tuple[str, float | str], ...]
     stop: float | None
     measures: tuple[str, ...]
 
 
-Measured = tuple[list[float], str]  # the measured columns, or the sentence that says why there are none
+class Runner(Protocol):
+    """The FMU's `variables` by name, the `columns` that are measured in a run, and the time in s at which one stops."""
+
+    variables: dict[str, Any]
+    columns: tuple[Column, ...]
+    stop: float
+
+    def run(self, point: Sequence[float]) -> list[float] | str:
+        """The measures at a point of the varied values, or the sentence why there are none."""
+
+    def constants(self) -> dict[str, tuple[object, str]]:
+        """The value of every parameter in the last run, and its unit."""
 
 
-class Rerun:
-    """The instance, and the room for what is set and read, made once: a run by closed form takes a tenth of a ms."""
+class Ours:
+    """An instance of an FMU of ours.  The library is called as it stands: fmpy's own calls take as long as a run."""
 
-    def __init__(self, runs: Runs, description: Any, fmu: Any, wanted: Specification) -> None:
-        self.runs, self.fmu, self.description = runs, fmu, description
-        variables = {variable.name: variable for variable in description.modelVariables}
-        motion = roles(variables)
-        self.plan = planned(replace(wanted, outputs=(motion["position"], motion["velocity"])), description)
-        if runs.stop is not None:
-            self.plan = replace(self.plan, stop=runs.stop)
-        self.fixed = settings(wanted, variables)
-        self.varied = [variables[name] for name in runs.varied]
-        self.along = [name for name in runs.measures if name in ON_PATH]
+    def __init__(self, runs: Runs, found: Any, fmu: Any, wanted: Specification) -> None:
+        self.fmu, self.component, self.messages = fmu, c_void_p(fmu.component), callbacks()[1]
+        self.variables = {variable.name: variable for variable in found.modelVariables}
+        measures = chosen(runs, self.variables, ours=True)
+        motion = roles(self.variables)
+        outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
+        if len(outputs) < 2:
+            outputs = tuple(name for name in any_fmu.outputs(found) if self.variables[name].type == "Real")
+        self.plan = planned(replace(wanted, outputs=outputs), found)
+        self.stop = self.plan.stop
+        ends = [name for name in measures if name in AT_END]
+        self.along = [name for name in measures if name in ON_PATH or (name in OF_OUTPUTS and name != "final")]
         if self.along:
-            grid = (self.plan.stop - self.plan.start) / PIECES
-            self.plan = replace(
-                planned(replace(self.plan.wanted, grid=grid, follow=True), description), stop=self.plan.stop
-            )
-        self.ends = [AT_END[name][1] for name in runs.measures if name in AT_END]
-        self.n_whole, self.whole_at, self.whole = buffer(variables, self.ends, c_int)
-        self.n_real, self.real_at, self.real = buffer(variables, list(self.plan.wanted.outputs), c_double)
-        self.component = c_void_p(fmu.component)
-        self.messages = callbacks()[1]
+            grid = (self.stop - self.plan.start) / PIECES
+            self.plan = planned(replace(self.plan.wanted, grid=grid, follow=True), found)
+        self.n_real, self.real_at, self.real = buffer(self.variables, list(outputs), c_double)
+        self.n_whole, self.whole_at, self.whole = buffer(self.variables, [AT_END[name][1] for name in ends], c_int)
+        self.columns = columns(measures, self.variables, outputs)
+        read = [each.name for each in columns(["final", *ends, "run_time", *self.along], self.variables, outputs)]
+        self.order = [read.index(column.name) for column in self.columns]
+        self.slots: list[tuple[Any, int, type]] = []
+        self.calls = self.prepared(settings(self.plan.wanted, self.variables), runs.varied)
 
-    def run(self, point: list[float]) -> Measured:
-        """The measures at a point of the varied values, or the FMU's sentence why it has none."""
+    def prepared(self, fixed: list[tuple[Any, float]], varied: Sequence[str]) -> list[tuple[str, Any, tuple[Any, ...]]]:
+        """The calls that reset, set and initialise; `slots` tells where they take each varied value from, as what."""
+        values = {variable.name: value for variable, value in fixed}
+        calls: list[tuple[Any, ...]] = [("fmi2Reset",)]
+        slots = {}
+        for function, kind, number in (("fmi2SetReal", c_double, float), ("fmi2SetInteger", c_int, int)):
+            names = [name for name in (*values, *varied) if (self.variables[name].type == "Real") is (number is float)]
+            n, at, held = buffer(self.variables, names, kind)
+            for i, name in enumerate(names):
+                held[i], slots[name] = values.get(name, 0), (held, i, number)
+            calls += [(function, at, n, held)] if n else []
+        self.slots = [slots[name] for name in varied]
+        calls += [("fmi2SetupExperiment", 0, 0.0, self.plan.start, 1, self.stop)]
+        calls += [("fmi2EnterInitializationMode",), ("fmi2ExitInitializationMode",)]
+        return [(name, getattr(self.fmu.dll, name), (self.component, *rest)) for name, *rest in calls]
+
+    def run(self, point: Sequence[float]) -> list[float] | str:
         self.messages.clear()
         try:
-            self.begin(point)
-            begun = perf_counter()
-            along = self.follow(begun) if self.along else self.leap()
-            return self.read(along, perf_counter() - begun), ""
+            return self.measured(point)
         except FMICallException as error:
             lines = [text for status, text in self.messages if status > WARNING]
-            return [], lines[-1] if lines else str(error)
+            return lines[-1] if lines else str(error)
         except HarnessError as error:
-            return [], str(error)
+            return str(error)
 
-    def constants(self) -> dict[str, float | str]:
-        """The value of every parameter in a run; HarnessError with the FMU's sentence if it refuses the values."""
-        _, error = self.run([])
-        if error:
-            raise HarnessError(error)
-        return parameters(self.plan, self.fmu)
+    def measured(self, point: Sequence[float]) -> list[float]:
+        """The measures; an exception if the run fails."""
+        for (held, i, number), value in zip(self.slots, point, strict=True):
+            held[i] = number(value)
+        for name, function, arguments in self.calls:
+            heed(name, function(*arguments))
+        start, dll = self.plan.start, self.fmu.dll
+        begun, along = perf_counter(), []
+        if self.along:
+            run = gather(self.plan, self.fmu, traced(self.plan, self.fmu, lambda share: None, 0), 0.0)
+            for name in self.along:
+                along += of_outputs(name, run.columns) if name in OF_OUTPUTS else [ON_PATH[name].measure(run)]
+        else:
+            heed("fmi2DoStep", dll.fmi2DoStep(self.component, start, self.stop - start, 1))
+        seconds = perf_counter() - begun
+        heed("fmi2GetReal", dll.fmi2GetReal(self.component, self.real_at, self.n_real, self.real))
+        heed("fmi2GetInteger", dll.fmi2GetInteger(self.component, self.whole_at, self.n_whole, self.whole))
+        read = [*self.real, *self.whole, seconds, *along]
+        return [read[i] for i in self.order]
 
-    def begin(self, point: list[float]) -> None:
-        """Reset, set and initialise."""
-        self.fmu.reset()
-        values = (*self.fixed, *zip(self.varied, point, strict=True))
-        begin(self.fmu, values, self.plan.start, self.plan.stop)
+    def constants(self) -> dict[str, tuple[object, str]]:
+        return {name: (value, unit(self.variables[name])) for name, value in parameters(self.plan, self.fmu).items()}
 
-    def leap(self) -> dict[str, float]:
-        """One communication step to the stop: nothing along the path."""
-        start, stop = self.plan.start, self.plan.stop
-        status = self.fmu.dll.fmi2DoStep(self.component, start, stop - start, 1)
-        if status > WARNING:
-            raise FMICallException("fmi2DoStep", status)
-        return {}
 
-    def follow(self, begun: float) -> dict[str, float]:
-        """Step along the path, and measure there."""
-        trace = traced(self.plan, self.fmu, lambda share: None, 0)
-        run = gather(self.plan, self.fmu, trace, perf_counter() - begun)
-        return {name: ON_PATH[name].measure(run) for name in self.along}
+def heed(function: str, status: int) -> None:
+    if status > WARNING:
+        raise FMICallException(function, status)
 
-    def read(self, along: dict[str, float], seconds: float) -> list[float]:
-        """The columns in the order of the measures."""
-        dll = self.fmu.dll
-        dll.fmi2GetReal(self.component, self.real_at, self.n_real, self.real)
-        dll.fmi2GetInteger(self.component, self.whole_at, self.n_whole, self.whole)
-        whole = dict(zip(self.ends, self.whole, strict=True))
+
+class Theirs:
+    """An FMU that does not show its steps; each run is in a process of its own, and is whole or a sentence."""
+
+    def __init__(self, runs: Runs, found: Any, wanted: Specification) -> None:
+        self.varied, self.stop = runs.varied, 0.0
+        self.variables = {variable.name: variable for variable in found.modelVariables}
+        self.measures = chosen(runs, self.variables, ours=False)
+        texts = {name for name, variable in self.variables.items() if variable.type == "String"}
+        outputs = tuple(name for name in any_fmu.outputs(found) if name not in texts)
+        self.wanted = replace(wanted, outputs=outputs)
+        self.columns = columns(self.measures, self.variables, outputs)
+        self.told: dict[str, tuple[object, str]] = {}
+
+    def run(self, point: Sequence[float]) -> list[float] | str:
+        values = {**self.wanted.values, **dict(zip(self.varied, point, strict=True))}
+        begun = perf_counter()
+        try:
+            found = any_fmu.run(replace(self.wanted, values=values), lambda share: None)
+        except HarnessError as error:
+            return str(error)
+        seconds = perf_counter() - begun
+        if found.failed:
+            return found.failed
+        self.told, self.stop = found.in_force, float(found.time[-1])
         row: list[float] = []
-        for name in self.runs.measures:
-            if name == "final":
-                row += self.real
-            elif name == "run_time":
-                row.append(seconds)
-            elif name in AT_END:
-                row.append(float(whole[AT_END[name][1]]))
-            else:
-                row.append(along.get(name, nan))
+        for name in self.measures:
+            row += [seconds] if name == "run_time" else of_outputs(name, found.columns)
         return row
+
+    def constants(self) -> dict[str, tuple[object, str]]:
+        return self.told
+
+
+def chosen(runs: Runs, variables: dict[str, Any], ours: bool) -> tuple[str, ...]:
+    """The measures of an FMU; SceneError if it cannot give one."""
+    there = offered(variables, ours, dict(runs.values))
+    for name in runs.measures:
+        if name not in there:
+            raise SceneError(unknown(f"measure of {runs.model}", name, there))
+    return runs.measures or tuple(name for name in USUAL if name in there)
 
 
 @contextmanager
-def ready(runs: Runs, file: Path) -> Iterator[Rerun]:
-    """The FMU in a file, loaded and ready to run; what it writes to standard error is kept back."""
-    wanted = Specification(file, values=runs.values, grid=1.0, follow=False)
-    with redirect_stderr(io.StringIO()), instance(wanted, callbacks()[0]) as (description, fmu):
-        yield Rerun(runs, description, fmu, wanted)
+def ready(runs: Runs, file: Path) -> Iterator[Runner]:
+    """The FMU in a file, ready to run; what it writes to standard error through Python is kept back."""
+    found = description(file)
+    wanted = Specification(file, values=dict(runs.values), stop=runs.stop, follow=False)
+    with redirect_stderr(io.StringIO()):
+        if any_fmu.shows_steps(found):
+            with instance(wanted, callbacks()[0]) as (_, fmu):
+                yield Ours(runs, found, fmu, wanted)
+        else:
+            yield Theirs(runs, found, replace(wanted, follow=True))

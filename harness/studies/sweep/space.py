@@ -1,7 +1,7 @@
 """The points of a sweep: every combination on a grid, or a Latin hypercube between the bounds."""
 
 from dataclasses import dataclass
-from itertools import product
+from functools import cached_property
 from math import isfinite, log, prod
 
 import numpy as np
@@ -59,21 +59,38 @@ def spread(low: float, high: float, count: int, ratio: bool) -> tuple[float, ...
         return tuple(np.linspace(low, high, count).tolist())
 
 
-def points(axes: tuple[Axis, ...], random: int | None, seed: int) -> np.ndarray:
-    """The points (n, len(axes)): the grid with the last axis fastest, or `random` points of a Latin hypercube.
+@dataclass(frozen=True)
+class Points:
+    """The points of a sweep: the grid of its axes with the last one fastest, made where it is asked for, or `random`
+    points of a Latin hypercube, which are all held.
 
     M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979).
     """
-    count = prod(len(each.values) for each in axes) if random is None else random
-    if count > MOST:
-        raise SceneError(f"{count} runs are more than {MOST}; take fewer values")
-    if random is None:
-        return np.array(list(product(*(each.values for each in axes))))
-    from scipy.stats import qmc
 
-    share = qmc.LatinHypercube(len(axes), rng=seed).random(random)
-    columns = []
-    for each, column in zip(axes, share.T, strict=True):
-        low, high = each.values
-        columns.append(np.exp(log(low) + column * (log(high) - log(low))) if each.log else low + column * (high - low))
-    return np.array(columns).T
+    axes: tuple[Axis, ...]
+    random: int | None = None
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        if len(self) > MOST:
+            raise SceneError(f"{len(self)} runs are more than {MOST}; take fewer values")
+
+    def __len__(self) -> int:
+        return prod(len(each.values) for each in self.axes) if self.random is None else self.random
+
+    def between(self, first: int, last: int) -> np.ndarray:
+        """Those from number `first` to before `last`, (last - first, axes)."""
+        if self.random is not None:
+            return self.sample[first:last]
+        places = np.unravel_index(np.arange(first, last), [len(each.values) for each in self.axes])
+        return np.column_stack([np.array(each.values)[at] for each, at in zip(self.axes, places, strict=True)])
+
+    @cached_property
+    def sample(self) -> np.ndarray:
+        from scipy.stats import qmc
+
+        spots: np.ndarray = qmc.LatinHypercube(len(self.axes), rng=self.seed).random(self.random)
+        for each, column in zip(self.axes, spots.T, strict=True):
+            low, high = map(log, each.values) if each.log else each.values
+            column[:] = np.exp(low + column * (high - low)) if each.log else low + column * (high - low)
+        return spots
