@@ -1,4 +1,4 @@
-"""Build FMUs: python build_fmus.py [NAME | FILE.py ...] [--fmi 3] [--native] [--method M] [--law L] ..."""
+"""Build FMUs: python build_fmus.py [NAME | FILE.py ...] [--fmi 3] [--native] [--web] [--method M] [--law L] ..."""
 
 from hashlib import sha256
 from pathlib import Path
@@ -9,10 +9,12 @@ from fmus.packaging import BuildError
 from fmus.packaging.archive import build
 from fmus.packaging.catalogue import find, names
 from fmus.packaging.edition import FMI2, FMI3
+from fmus.packaging.equations.authored import Authored
 from fmus.packaging.weigh import import_time
 from fmus.packaging.written import LAWS, METHODS
 
 HERE = Path(__file__).parent
+SCENES = HERE / "harness" / "scenes"
 FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  # installed: in the current folder
 
 
@@ -20,6 +22,7 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  #
 @click.argument("models", metavar="[NAME | FILE.py]...", nargs=-1)
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="Version; 3 has model exchange as well.")
 @click.option("--native", "compiled", is_flag=True, help="Compiled to machine code: no Python in the FMU.")
+@click.option("--web", is_flag=True, help="No FMUs but one page, web/index.html, that runs them in a browser.")
 @click.option("--method", "methods", multiple=True, type=click.Choice(list(METHODS)), help="Offer this; repeatable.")
 @click.option("--law", "laws", multiple=True, type=click.Choice(list(LAWS)), help="Offer this law; repeatable.")
 @click.option("--platform", "platforms", multiple=True, help="For this only, as linux64; repeatable.")
@@ -28,6 +31,7 @@ def main(
     models: tuple[str, ...],
     fmi: str,
     compiled: bool,
+    web: bool,
     methods: tuple[str, ...],
     laws: tuple[str, ...],
     platforms: tuple[str, ...],
@@ -39,11 +43,18 @@ def main(
     """
     if compiled and fmi == "3":
         raise Mistake("There are no native FMUs of FMI 3.0: leave out --native, or --fmi 3.")
+    if web and (compiled or platforms or fmi == "3"):
+        raise Mistake("--web makes a page and no FMU: leave out --native, --platform and --fmi 3.")
     edition, kind = (FMI3, "fmi3") if fmi == "3" else (FMI2, "native" if compiled else "")
     try:
         wanted = {model: find(model) for model in models or names()}
     except BuildError as error:
         raise Mistake(str(error)) from error
+    if web:
+        ours = any(model in names() for model in wanted)
+        place = out or (FMUS if ours else next(iter(wanted.values())).path.parent) / "web"
+        tell(page(list(wanted.values()), place, methods, laws))
+        return
     for model, source in wanted.items():
         folder = out or (FMUS if model in names() else source.path.parent) / kind
         try:
@@ -55,8 +66,13 @@ def main(
                 weight = f"  {1000 * import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
-        content = path.read_bytes()
-        click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB{weight}  {sha256(content).hexdigest()[:16]}")
+        tell(path, weight)
+
+
+def tell(path: Path, weight: str = "") -> None:
+    """One line about a file that was built."""
+    content = path.read_bytes()
+    click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB{weight}  {sha256(content).hexdigest()[:16]}")
 
 
 def native(
@@ -66,6 +82,16 @@ def native(
     from fmus.packaging.native import build
 
     return build(model, folder, methods, laws, platforms)
+
+
+def page(models: list[Authored], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...]) -> Path:
+    """The page that runs them."""
+    from fmus.packaging.web import build
+
+    try:
+        return build(models, folder, methods, laws, SCENES.glob("*.toml"))
+    except BuildError as error:
+        raise click.ClickException(str(error)) from error
 
 
 class Mistake(click.ClickException):

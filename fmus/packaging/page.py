@@ -33,7 +33,7 @@ def page(
     first, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
     title = f"<h1>{escape(name)}</h1><p>{escape(first)}</p>"
     parts = [f"<header><img src='../{edition.icon}' alt=''><div>{title}</div></header>", "<h2>Equations</h2>"]
-    parts += map(_block, blocks)
+    parts += map(block, blocks)
     if found is not None:
         parts += _figure(found, declared)
     choices = [(variable, meaning) for variable, meaning in declared if meaning.items]
@@ -54,7 +54,7 @@ def page(
     return "\n".join((begin, *parts, "</body></html>\n")).encode()
 
 
-def _block(block: str) -> str:
+def block(block: str) -> str:
     """A paragraph of the docstring; what is indented there is equations."""
     if block.startswith("    "):
         return f"<pre>{typeset(cleandoc(block))}</pre>"

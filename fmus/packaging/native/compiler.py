@@ -3,7 +3,7 @@
 import math
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -46,21 +46,22 @@ USUAL = ("linux64", "win64", "darwin64")
 
 def compiled(name: str, files: Mapping[str, str], platform: str) -> bytes:
     """The binary of the FMU `name` from its sources, which depends on nothing else."""
+    chosen = PLATFORMS[platform]
+    options = (*LIBRARY, *(option.format(name=name) for option in chosen.options))
+    slices = [linked(files, target, f"{name}{chosen.suffix}", options) for target in chosen.targets]
+    return slices[0] if len(slices) == 1 else universal(slices)
+
+
+def linked(files: Mapping[str, str], target: str, out: str, options: Iterable[str]) -> bytes:
+    """What the compiler makes of the sources for a target; `out` is a name without a folder, so that none gets in."""
     if find_spec("ziglang") is None:
         raise BuildError("Native FMUs need the compiler in the package ziglang: try pip install -e '.[native]'.")
-    chosen = PLATFORMS[platform]
-    options = [option.format(name=name) for option in chosen.options]
     with TemporaryDirectory() as folder:
         for file, text in files.items():
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
-        slices = []
-        for target in chosen.targets:
-            # Names without a folder, so that none gets into the binary.
-            out = f"{name}{chosen.suffix}"
-            command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *LIBRARY, "-s"]
-            command += [*options, COMPILED, "-o", out, "-lm"]
-            done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-            if done.returncode:
-                raise BuildError(f"{name} does not compile for {target}:\n{done.stderr.strip()}")
-            slices.append((Path(folder) / out).read_bytes())
-    return slices[0] if len(slices) == 1 else universal(slices)
+        command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
+        command += [COMPILED, "-o", out, "-lm"]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        if done.returncode:
+            raise BuildError(f"{out} does not compile for {target}:\n{done.stderr.strip()}")
+        return (Path(folder) / out).read_bytes()

@@ -1,0 +1,128 @@
+"""A headless chromium, spoken to through a pair of pipes (Chrome DevTools Protocol): one browser, a page at a time."""
+
+import fcntl
+import itertools
+import json
+import os
+import shutil
+import subprocess
+from base64 import b64decode
+from tempfile import TemporaryDirectory
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-dev-shm-usage"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars"),
+)
+READS, WRITES = 3, 4  # what chromium takes for its pipes
+
+
+class Browser:
+    """The process; `said` collects what its pages write to the console, `asked` the addresses that they load."""
+
+    def __init__(self):
+        self.room = TemporaryDirectory(ignore_cleanup_errors=True)  # chromium's last child may still write
+        ours, theirs = zip(*(self.pipe(i) for i in (1, 0)), strict=True)
+
+        def place():
+            os.dup2(theirs[0], READS)
+            os.dup2(theirs[1], WRITES)
+
+        own = (f"--user-data-dir={self.room.name}/profile", "--remote-debugging-pipe", "about:blank")
+        quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        self.process = subprocess.Popen([CHROMIUM, *FLAGS, *own], pass_fds=(READS, WRITES), preexec_fn=place, **quiet)
+        for each in theirs:
+            os.close(each)
+        self.out, self.into = os.fdopen(ours[0], "wb", 0), os.fdopen(ours[1], "rb")
+        self.numbers, self.buffer = itertools.count(1), b""
+        self.said, self.asked, self.session = [], [], None
+        targets = self.call("Target.getTargets")["targetInfos"]
+        target = next(each["targetId"] for each in targets if each["type"] == "page")
+        self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+        self.loaded = False
+
+    @staticmethod
+    def pipe(ours):
+        """Our end and theirs of a pipe, on numbers that are not in the way; `ours`: 1 to write, 0 to read."""
+        ends = os.pipe()
+        high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 20) for end in ends]
+        for end in ends:
+            os.close(end)
+        return high[ours], high[1 - ours]
+
+    def call(self, method, **parameters):
+        """The result of a command; events that come before it are noted."""
+        number = next(self.numbers)
+        message = {"id": number, "method": method, "params": parameters}
+        if self.session:
+            message["sessionId"] = self.session
+        self.out.write(json.dumps(message).encode() + b"\0")
+        while True:
+            found = self.receive()
+            if found.get("id") == number:
+                assert "error" not in found, (method, found)
+                return found["result"]
+
+    def receive(self):
+        while b"\0" not in self.buffer:
+            piece = self.into.read1(1 << 16)
+            assert piece, "the browser is gone"
+            self.buffer += piece
+        text, self.buffer = self.buffer.split(b"\0", 1)
+        found = json.loads(text)
+        parameters = found.get("params", {})
+        match found.get("method"):
+            case "Runtime.consoleAPICalled":
+                self.said.append(str([each.get("value") for each in parameters["args"]]))
+            case "Runtime.exceptionThrown":
+                self.said.append(parameters["exceptionDetails"].get("exception", {}).get("description", "?"))
+            case "Log.entryAdded":
+                self.said.append(parameters["entry"]["text"])
+            case "Network.requestWillBeSent":
+                self.asked.append(parameters["request"]["url"])
+            case "Page.loadEventFired":
+                self.loaded = True
+        return found
+
+    def open(self, address):
+        """Load an address, until it has loaded."""
+        self.call("Page.navigate", url="about:blank")
+        self.loaded, self.said, self.asked = False, [], []
+        self.call("Page.navigate", url=address)
+        while not self.loaded:
+            self.receive()
+
+    def run(self, script):
+        """The value of an expression in the page; a promise is awaited."""
+        how = {"awaitPromise": True, "returnByValue": True, "userGesture": True}
+        found = self.call("Runtime.evaluate", expression=script, **how)
+        assert "exceptionDetails" not in found, found["exceptionDetails"]
+        return found["result"].get("value")
+
+    def size(self, width, height=900, touch=False):
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=touch)
+
+    def dark(self, dark=True):
+        features = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
+        self.call("Emulation.setEmulatedMedia", features=features)
+
+    def picture(self, whole=False):
+        """What the page looks like, as PNG."""
+        return b64decode(self.call("Page.captureScreenshot", captureBeyondViewport=whole)["data"])
+
+    def pdf(self):
+        return b64decode(self.call("Page.printToPDF", printBackground=True, preferCSSPageSize=True)["data"])
+
+    def mouse(self, kind, x, y, buttons=1):
+        button = {"button": "left", "buttons": buttons, "clickCount": 1}
+        self.call("Input.dispatchMouseEvent", type=f"mouse{kind}", x=x, y=y, **button)
+
+    def close(self):
+        self.session = None
+        self.call("Browser.close")
+        self.process.wait(30)
+        self.out.close()
+        self.into.close()
+        self.room.cleanup()

@@ -1,0 +1,84 @@
+"""The page that runs, built once, in one browser."""
+
+import json
+
+import builds
+import pytest
+
+READY = "new Promise(done => { const wait = () => globalThis.bench?.desk.runs.one && Object.values(bench.desk.runs)"
+READY += ".every(run => run.done) ? requestAnimationFrame(() => done(true)) : setTimeout(wait, 5); wait() })"
+
+
+def built(name, *words):
+    """The page of a room of its own."""
+    pytest.importorskip("ziglang", reason="the page is compiled by the package ziglang: pip install -e '.[native]'")
+    return builds.once(name, "--web", *words, timeout=600) / "index.html"
+
+
+class Page:
+    """The page at an address, as a visitor has it."""
+
+    def __init__(self, browser, file):
+        self.browser, self.file = browser, file
+
+    def open(self, hash=""):
+        """Load it anew, with this behind the #; wait until all runs are done."""
+        self.browser.open(f"{self.file.as_uri()}#{hash}")
+        return self.run(READY)
+
+    def run(self, script):
+        return self.browser.run(script)
+
+    def settled(self, script):
+        """The value of an expression after something has been done and every run has ended."""
+        self.run(READY)
+        return self.run(script)
+
+    def put(self, name, text):
+        """Type into a number field."""
+        field = json.dumps(f"field-{name}")
+        change = "e.dispatchEvent(new Event('change'))"
+        self.run(f"(() => {{ const e = document.getElementById({field}); e.value = {json.dumps(text)}; {change} }})()")
+        self.run(READY)
+
+    def choose(self, name, value):
+        """Choose from a list."""
+        self.run(
+            f"(() => {{ const e = document.getElementById({json.dumps(name)}); e.value = {json.dumps(str(value))}; "
+            "e.dispatchEvent(new Event('change')) })()"
+        )
+        self.run(READY)
+
+    def check(self, id, on):
+        """Tick a box, or not."""
+        click = f"e => {{ if (e.checked !== {json.dumps(on)}) e.click() }}"
+        self.run(f"({click})(document.getElementById({json.dumps(id)}))")
+
+    def click(self, selector):
+        self.run(f"document.querySelector({json.dumps(selector)}).click()")
+        self.run(READY)
+
+    def seek(self, t):
+        """Put the cursor at a time."""
+        self.run(f"bench.seek({t!r})")
+
+    def middle(self, selector):
+        """Where an element has its middle, in the window."""
+        box = f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()"
+        return self.run(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({box})")
+
+    def table(self, caption):
+        """Row heading -> cells of the table with a caption."""
+        rows = "[...t.tBodies[0].rows].map(r => [...r.cells].map(c => c.textContent))"
+        find = f"[...document.querySelectorAll('table')].find(t => t.caption.textContent === {json.dumps(caption)})"
+        return {head: cells for head, *cells in self.run(f"(t => {rows})({find})")}
+
+    def wait(self, condition):
+        """Until an expression is true."""
+        look = f"const look = () => {condition} ? done(true) : setTimeout(look, 10);"
+        return self.run(f"new Promise(done => {{ {look} look() }})")
+
+
+def number(text):
+    """The number at the beginning of a cell."""
+    return float(text.split()[0].replace("\N{MINUS SIGN}", "-"))

@@ -1,0 +1,326 @@
+"""The page as a visitor has it: what he does, he sees; nothing is loaded, nothing is said, everything has a name."""
+
+import json
+import re
+from dataclasses import replace
+from math import pi, sqrt
+
+import builds
+import native_fmus
+import pytest
+import web_page
+from builds import ROOT
+from models import AUTHORED, LARGER, MODELS, declared, parameters
+
+from fmus.packaging.web.page import HERE, MODULES
+from harness.running.fmu import simulate
+from harness.running.specification import of_scene
+from harness.scenes.scene import load, shipped
+from harness.studies.run.job import ANALYSE
+
+WIDTHS = (360, 768, 1280)
+CONTROLS = {"button", "checkbox", "combobox", "radio", "slider", "spinbutton", "textbox", "link", "DisclosureTriangle"}
+
+
+@pytest.fixture(autouse=True)
+def quiet(browser):
+    """No test may leave a word in the console, or ask for anything but the page itself."""
+    browser.said.clear()
+    yield
+    assert browser.said == []
+    assert {address.split("#")[0] for address in browser.asked if not address.startswith(("data:", "blob:"))} <= {
+        address.split("#")[0] for address in browser.asked[:1]
+    }
+
+
+# ---- the file
+
+
+def test_five_models_take_less_than_600_kb_and_may_load_nothing(page):
+    text = page.file.read_text(encoding="utf-8")
+    assert len(text.encode()) < 600_000
+    assert "default-src 'none'" in text
+    assert not re.findall(r"(?:src|href)\s*=\s*[\"'](?!data:)", text)
+    page.open()
+    refused = "fetch('data:text/plain,x').then(() => 'came', () => 'refused')"
+    assert page.run(refused) == "refused"
+    assert page.browser.said.pop()  # the policy says so
+    assert len(page.browser.said) <= 1
+    page.browser.said.clear()
+
+
+def test_every_module_imports_what_is_there_and_only_from_those_before_it():
+    exports = {}
+    assert {path.stem for path in (HERE / "script").glob("*.js")} == set(MODULES)
+    for name in MODULES:
+        text = (HERE / "script" / f"{name}.js").read_text(encoding="utf-8")
+        for names, source in re.findall(r'^import \{ ([^}]+) \} from "\./(\w+)\.js";$', text, re.M):
+            assert set(names.split(", ")) <= exports[source], (name, source)
+            body = re.sub(r"^import .*$", "", text, flags=re.M)
+            assert all(re.search(rf"\b{each}\b", body) for each in names.split(", ")), (name, names)
+        exports[name] = set(re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", text, re.M))
+
+
+# ---- what is seen
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_no_width_makes_it_scroll_sideways_and_every_control_has_a_name(page, name):
+    page.open(f".model={name}")
+    for width in WIDTHS:
+        page.browser.size(width)
+        assert page.run("document.documentElement.scrollWidth") <= width
+    tree = page.browser.call("Accessibility.getFullAXTree")["nodes"]
+    found = [node for node in tree if node.get("role", {}).get("value") in CONTROLS and not node["ignored"]]
+    nameless = [node for node in found if not node.get("name", {}).get("value", "").strip()]
+    assert nameless == []
+    said = " ".join(node["name"]["value"] for node in found)
+    for variable, meaning in parameters(name).items():
+        if "." not in variable:
+            assert meaning.text in said
+    assert "The mechanism:" in json.dumps(tree)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_parameter_has_a_slider_and_a_field_that_show_its_start_and_its_unit(page, name):
+    page.open(f".model={name}")
+    for variable, meaning in parameters(name).items():
+        if variable == "solver.rtol":  # a list
+            continue
+        field = f"document.getElementById('field-{variable}')"
+        factor = 180 / pi if meaning.display else 1.0
+        assert page.run(f"Number({field}.value)") == pytest.approx(meaning.start * factor, rel=1e-6)
+        unit = meaning.display or meaning.suffix.strip()
+        assert page.run(f"{field}.closest('.field').querySelector('.unit').textContent") == (
+            unit.replace("2", "²").replace(".", "·")
+        )
+        assert page.run(f"{field}.closest('.field').querySelector('input[type=range]').max") == "400"
+
+
+# ---- what is done
+
+
+def test_a_slider_changes_the_run_and_what_it_says_is_what_is_run(page):
+    page.open(".model=stickslip")
+    page.run(
+        "(() => { const e = document.querySelector('#field-mu_d').closest('.field').querySelector('input[type=range]');"
+        "e.value = 100; e.dispatchEvent(new Event('input')) })()"
+    )
+    mu = page.settled("bench.state().values.mu_d")
+    assert 0 < mu < 0.6
+    assert page.run("Number(document.getElementById('field-mu_d').value)") == mu
+    d = {name: meaning.start for name, meaning in declared("stickslip").items()}
+    omega = sqrt(d["k"] / d["m"])
+    peak = d["v_driver"] + sqrt(((d["mu_s"] - mu) * d["m"] * d["g"] / d["k"] * omega) ** 2 + d["v_driver"] ** 2)
+    assert page.run("Math.max(...bench.desk.runs.one.columns.v)") == pytest.approx(peak, rel=1e-3)
+
+
+def test_a_law_beside_another_shows_the_difference_and_the_counts(page):
+    page.open(".model=coulomb")
+    page.choose("other", "coulomb")
+    assert page.run("bench.desk.runs.other.setting.values.friction") == 2
+    page.wait("document.getElementById('tables').textContent.includes('largest difference in x')")
+    apart = page.run(
+        "(() => { const { one, other } = bench.desk.runs; return Math.max(...one.grid.map((row, i) => "
+        "Math.abs(one.columns.x[row] - other.columns.x[other.grid[i]]))) })()"
+    )
+    assert 1e-6 < apart < 1e-2
+    rows = page.table("What it costs")
+    assert web_page.number(rows["largest difference in x"][1]) == pytest.approx(apart, rel=1e-2)
+    assert rows["largest error of x against the closed form"][0] == "is the closed form"
+    one, other = (int(cell) for cell in rows["evaluations of the right-hand side"])
+    assert other > 20 * one
+    assert not page.run("document.getElementById('panel-error').hidden")
+
+
+def test_another_model_takes_the_values_of_the_same_names(page):
+    page.open(".model=stickslip&k=500&.beside=pacejka&.beside.x_m=0.005")
+    assert page.run("bench.desk.runs.other.setting.values.k") == 500
+    assert page.run("bench.desk.runs.other.setting.values.x_m") == 0.005
+    assert page.run("bench.desk.runs.other.columns.v.some((v, i) => i > 99 && v > 0 && v < 0.01)")  # it creeps
+
+
+def test_a_change_while_it_plays_acts_from_there_on_and_not_before(page):
+    page.open(".model=smd")
+    whole = page.run("[...bench.desk.runs.one.columns.x]")
+    page.click("#play")
+    page.wait("bench.state().t > 0.2")
+    page.put("c", "20")
+    page.click("#play")
+    (change,) = page.run("bench.state().changes")
+    assert change["name"] == "c"
+    assert 0.2 < change["t"] < 4
+    assert page.run("bench.state().values") == {}
+    now = page.settled("({ t: bench.desk.runs.one.time, x: bench.desk.runs.one.columns.x })")
+    before = [x for t, x in zip(now["t"], now["x"], strict=True) if t < change["t"]]
+    assert before == whole[: len(before)]
+    assert max(map(abs, now["x"][-200:])) < 0.1 * max(map(abs, whole[-200:]))
+    assert page.run("bench.desk.runs.before.columns.x.length") == len(whole)
+
+
+def test_playing_paints_no_curve_anew_and_a_curve_is_no_more_points_than_pixels_allow(page):
+    page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=1")
+    assert page.run("bench.desk.runs.one.time.length") > 60000
+    painted = "[...bench.plots.values()].reduce((sum, { plot }) => sum + plot.paints, 0)"
+    before = page.run(painted)
+    page.click("#play")
+    page.wait("bench.state().t > 1.2")
+    page.click("#play")
+    assert page.run(painted) == before
+    width = page.run("bench.plots.get('step').plot.host.clientWidth")
+    count = (
+        "(() => { const { plot, panel } = bench.plots.get('step'); const [curve] = panel.content.curves;"
+        "let points = 0; const context = { lineTo: () => points++ };"
+        "const all = new Proxy(context, { get: (it, key) => it[key] ?? (() => ({ width: 0 })) });"
+        "plot.curve(all, curve, {}, plot.places(plot.host.clientWidth, plot.host.clientHeight)); return points })()"
+    )
+    assert width < page.run(count) < 4 * width
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_dragged_body_begins_where_it_is_let_go(page, name):
+    page.browser.size(1280)
+    page.open(f".model={name}")
+    body = page.run("bench.desk.portraits.get(bench.state().model).bodies[0]")
+    x, y = page.middle("#mechanism .body")
+    page.browser.mouse("Pressed", x, y)
+    page.browser.mouse("Moved", x + 30, y)
+    page.browser.mouse("Moved", x + 60, y)
+    page.wait(f"bench.state().values[{body['start']!r}] !== undefined")
+    start = page.run(f"bench.state().values[{body['start']!r}]")
+    page.browser.mouse("Released", x + 60, y, buttons=0)
+    page.wait("bench.state().t > 0")
+    page.click("#play")
+    assert start > declared(name)[body["start"]].start
+    assert page.settled(f"bench.desk.runs.one.columns[{body['position']!r}][0]") == start
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_body_pulled_while_it_runs_feels_a_force_until_it_is_let_go(page, name):
+    page.browser.size(1280)
+    page.open(f".model={name}&.t=0.3")
+    body = page.run("bench.desk.portraits.get(bench.state().model).bodies[0]")
+    x, y = page.middle("#mechanism .body")
+    page.browser.mouse("Pressed", x, y)
+    page.browser.mouse("Moved", x + 80, y)
+    page.wait("bench.state().changes.length > 0")
+    page.browser.mouse("Released", x + 80, y, buttons=0)
+    page.click("#play")
+    changes = page.settled("bench.state().changes")
+    assert {change["name"] for change in changes} == {body["input"]}
+    assert max(change["value"] for change in changes) > 0
+    assert changes[-1]["value"] == 0
+    apart = "bench.desk.runs.one.columns[p].at(-1) !== bench.desk.runs.before.columns[p].at(-1)"
+    assert page.run(f"(p => {apart})({body['position']!r})")
+
+
+def test_a_kick_is_a_push_that_ends(page):
+    page.open(".model=stickslip&.t=1")
+    page.click("#kick")
+    first, last = page.settled("bench.state().changes")
+    assert (first["name"], first["t"], last["value"]) == ("F_ext", 1, 0)
+    assert 1 < last["t"] < 2
+    assert page.run("Math.max(...bench.desk.runs.one.columns.v.slice(100, 300))") > 0
+
+
+def test_a_link_carries_everything(page):
+    page.open(".model=stickslip")
+    page.put("mu_d", "0.45")
+    page.choose("other", "pacejka")
+    page.seek(5.0)
+    page.check("live", True)
+    page.put("v_driver", "0.05")
+    page.wait("location.hash.includes('v_driver')")
+    hash, state = page.run("location.hash.slice(1)"), page.run("bench.state()")
+    end = page.run("Object.values(bench.desk.runs).map(run => run.columns.x.at(-1))")
+    page.open(hash)
+    assert page.run("bench.state()") == state
+    assert page.run("Object.values(bench.desk.runs).map(run => run.columns.x.at(-1))") == end
+    page.open(".model=smd&mu_d=0.3&k=100&.change=1 nothing 2")
+    assert page.run("bench.state().values") == {"k": 100}
+    assert "mu_d" in page.run("document.getElementById('status').textContent")
+
+
+def test_what_the_fmu_refuses_is_told_in_its_own_sentence(page):
+    page.open(".model=stickslip")
+    page.put("mu_d", "0.95")
+    alert = "document.getElementById('alert')"
+    assert "mu_d is 0.95, above mu_s = 0.9" in page.run(f"{alert}.textContent")
+    page.put("mu_d", "0.5")
+    assert page.run(f"{alert}.hidden")
+    page.put("m", "-1")
+    assert "m cannot be -1" in page.run(f"{alert}.textContent") or "m" in page.run(f"{alert}.textContent")
+
+
+# ---- what was published
+
+
+def test_every_published_case_measures_what_the_terminal_does(page):
+    """To the digits that are shown, but where chatter makes the steps hang on rounding; and beside the same figures."""
+    page.open()
+    names = page.run("[...bench.desk.presets.keys()]")
+    scenes = {scene.name: scene for scene in map(load, shipped()) if scene.published}
+    assert sorted(names) == sorted(scenes)
+    for name, scene in scenes.items():
+        page.choose("preset", name)
+        page.wait(
+            f"bench.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
+            "bench.desk.presets.get(bench.state().preset).title"
+        )
+        rows = iter(page.table(scene.title).values())
+        native = native_fmus.built() / f"{scene.model}.fmu"
+        run = simulate(replace(of_scene(scene), fmu=native, repeat=1))
+        quantities = {each.name: each for kind in scene.analyses for each in ANALYSE[kind](run, scene).quantities}
+        for figure, published in scene.published.items():
+            if figure == "source":
+                continue
+            measured, beside, _ = next(rows)
+            assert beside.startswith(str(published[0] if isinstance(published, tuple) else published)), (name, figure)
+            if figure != "run_time" and not (name == "stickslip-threshold" and "step" in figure):
+                size, *unit = measured.replace("\N{MIDDLE DOT}", ".").split()
+                there = quantities[figure]
+                value = there.in_unit(*unit) if unit and unit != [there.unit] else there.value
+                assert float(size) == pytest.approx(value, rel=2e-4), (name, figure)
+
+
+# ---- what is taken away
+
+
+def test_the_csv_file_holds_the_run_and_the_picture_is_a_png(page):
+    page.open(".model=coulomb&.beside=coulomb&.beside.friction=2&.beside.solver.method=2")
+    page.run("HTMLAnchorElement.prototype.click = function () { globalThis.taken = fetched(this.href, this.download) }")
+    page.run("URL.createObjectURL = blob => { globalThis.blob = blob; return 'blob:x' }; URL.revokeObjectURL = () => 0")
+    page.run("globalThis.fetched = (href, name) => name")
+    page.click("#csv")
+    head, *rows = page.run("blob.text()").splitlines()
+    assert head.startswith("t [s],x [m],v [m/s],a [m/s2]")
+    assert "beside.x [m]" in head
+    assert len(rows) == 1601
+    assert float(rows[-1].split(",")[1]) == page.run("bench.desk.runs.one.columns.x.at(-1)")
+    page.click("#png")
+    page.wait("taken === 'coulomb.png'")
+    assert page.run("blob.slice(1, 4).text()") == "PNG"
+    assert page.run("blob.size") > 20000
+
+
+def test_paper_is_white_and_everything_is_on_it(page):
+    page.browser.dark()
+    page.open(".model=stickslip")
+    assert page.browser.pdf().startswith(b"%PDF")
+    page.browser.dark(False)
+
+
+# ---- of anybody
+
+
+def test_models_of_users_run_and_are_drawn_by_what_they_declare(browser, tmp_path):
+    files = [path for path in (*AUTHORED, *LARGER) if path.stem != "sleds"]
+    out = builds.build(ROOT, tmp_path, "--web", *map(str, files), timeout=600)
+    page = web_page.Page(browser, out / "index.html")
+    kinds = {}
+    for path in files:
+        page.open(f".model={path.stem}")
+        assert page.run("bench.desk.runs.one.failure") == ""
+        kinds[path.stem] = page.run("bench.desk.portraits.get(bench.state().model).bodies[0].kind")
+        assert page.run("document.querySelectorAll('#mechanism .body').length") == 1
+    assert kinds == {"viscous_pendulum": "pendulum", "rotor_brake": "rotor", "bumper": "block", "lugre": "block"}
