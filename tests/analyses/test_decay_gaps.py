@@ -75,5 +75,5 @@ def test_a_window_with_fewer_samples_than_a_fit_needs_is_told(kept):
     """Whatever has taken the others away."""
     record = paused(2.03, 0.95)
     problem, _ = prepare(record, find(record, False), False, False)
-    with pytest.raises(HarnessError, match=f"paused: only {kept} samples in a row follow .* and 12 are needed"):
+    with pytest.raises(HarnessError, match=f"has only {kept} samples in a row that follow .* and 12 are needed"):
         problem.only(slice(kept))

@@ -394,6 +394,26 @@ def test_what_is_no_decay_is_refused_in_one_sentence(x, sentence):
     assert "\n" not in str(refusal.value)
 
 
+@pytest.mark.parametrize(("sine", "order"), [(False, 0), (True, 0), (False, 2)])
+@pytest.mark.parametrize("drift", [0.05, 1.0])
+def test_a_drift_too_large_for_a_fit_is_named_with_its_remedy(sine, order, drift):
+    size = 0.1 * OMEGA**order
+    record = swung(
+        0.01, sine=sine, drift=drift * size, noise=1e-3 * size, order=order, turn=0.0, t=np.linspace(0, 9, 900)
+    )
+    with pytest.raises(HarnessError, match="over the record: --drift fits that as well") as refusal:
+        identify(record, Known(pendulum=sine))
+    over = float(str(refusal.value).split("drifts, by ")[1].split()[0])
+    assert over == pytest.approx(9 * drift * size, rel=0.02)
+
+
+@pytest.mark.parametrize("a", [2.8, 3.0])
+def test_the_two_peaks_of_a_large_angular_acceleration_are_named_with_their_remedy(a):
+    record = swung(0.01, sine=True, a=a, omega=6.0, noise=0.05, order=2, turn=0.0, t=np.linspace(0, 10, 1500))
+    with pytest.raises(HarnessError, match="two peaks a swing: record the angle or its rate"):
+        identify(record, Known(pendulum=True))
+
+
 def test_a_pendulum_that_is_not_said_to_be_one_is_hinted_at():
     record = swung(0.005, 0.001, sine=True, a=1.5, noise=1e-3, t=np.linspace(0, 10, 2000))
     with pytest.raises(HarnessError, match="say --pendulum"):

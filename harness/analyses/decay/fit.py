@@ -11,6 +11,7 @@ Steps 2 and 4 follow J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998), and
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,7 @@ from .peaks import by_turning_points, by_two_peaks
 from .problem import Problem
 from .record import Record
 from .remarks import ROUGH, halves_apart, refuse, remarks
+from .squares import Unfit
 from .turning import Turns, find
 from .window import free_motion
 
@@ -92,7 +94,33 @@ def identify(
     report: Callable[[float], None] = lambda share: None,
 ) -> Identified:
     """Identify a decay; without `drag` its laws are left out, with `drift` the rest position moves at a steady rate.
-    HarnessError where there is no decay, or no fit."""
+    HarnessError where there is no decay, or no fit, with what would mend it where that is known."""
+    try:
+        return identified(record, known, drag, drift, report)
+    except Unfit as unfit:
+        raise HarnessError(f"{record.name} {unfit}; {mended(record, known, drag, drift) or unfit.advice}") from None
+
+
+def mended(record: Record, known: Known, drag: bool, drift: bool) -> str:
+    """What would let a record be fitted, where that is known."""
+    if known.pendulum and record.order == 2:
+        return (
+            "beyond 90 degrees the angular acceleration of a pendulum has two peaks a swing: record the angle or its "
+            "rate, or leave out the large swings with --from"
+        )
+    if not drift:
+        with suppress(HarnessError):
+            found = identified(record, known, drag, True, lambda share: None)
+            over = next(each.value for each in found.estimates if each.name == "drift") * np.ptp(record.t)
+            if not found.problem.rough(found.best.squares):
+                return (
+                    f"the rest position drifts, by {over:.3g} {record.unit} over the record: --drift fits that as well"
+                )
+    return ""
+
+
+def identified(record: Record, known: Known, drag: bool, drift: bool, report: Callable[[float], None]) -> Identified:
+    """The same; Unfit where no law fits."""
     if known.pendulum and record.base != "rad":
         raise HarnessError(
             f"a pendulum is measured by its angle or its rate, and {record.name} is in {record.unit} (an accelerometer "

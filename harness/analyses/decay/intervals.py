@@ -64,8 +64,9 @@ def spread(problem: Problem, p: np.ndarray, terms: Terms) -> Spread:
 
 def correlated(covariance: np.ndarray) -> np.ndarray:
     """The correlations (n, n) in a covariance (n, n)."""
-    sizes = np.sqrt(np.diag(covariance))
-    return covariance / np.where(sizes > 0, np.outer(sizes, sizes), 1.0)
+    squares = np.diag(covariance)
+    sizes = np.sqrt(np.where(squares > 0, squares, 1.0))
+    return covariance / np.outer(sizes, sizes)
 
 
 def likeness(e: np.ndarray, width: int) -> tuple[float, bool]:

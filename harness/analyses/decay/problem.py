@@ -9,13 +9,12 @@ from typing import Self
 
 import numpy as np
 
-from ...errors import HarnessError
 from .chain import MOST, chain
 from .energy import losses
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, Terms, unknowns_of
 from .model import LAW, Model
 from .record import FEWEST, Record
-from .squares import least_squares
+from .squares import Unfit, least_squares
 from .turning import Turns
 
 LEAST_NOISE = 1e-13  # share of the amplitude: no record is exact beyond
@@ -31,10 +30,9 @@ Fitted = tuple[np.ndarray, float]  # the values of UNKNOWNS, and the squares the
 
 @dataclass(frozen=True)
 class Problem:
-    """Samples `t`, `x` (n,) of the record `name` to be fitted by `model`; `origin` s, `level` and `unit` turn them back
+    """Samples `t`, `x` (n,) to be fitted by `model`; `origin` s, `level` and `unit` turn them back
     into the record's; `noise` of a sample; with or without `drift`."""
 
-    name: str
     t: np.ndarray
     x: np.ndarray
     model: Model
@@ -53,12 +51,13 @@ class Problem:
         return unknowns_of(terms, self.drift)
 
     def only(self, keep: np.ndarray | slice) -> Self:
-        """The same with some of the samples; HarnessError where these are too few to be fitted."""
+        """The same with some of the samples; Unfit where these are too few to be fitted."""
         some = replace(self, t=self.t[keep], x=self.x[keep])
         if len(some.t) < FEWEST:
-            raise HarnessError(
-                f"{self.name}: only {len(some.t)} samples in a row follow the free decay of one oscillator, and "
-                f"{FEWEST} are needed: is it one? Sample finer, or cut out what is with --from and --until"
+            raise Unfit(
+                f"has only {len(some.t)} samples in a row that follow the free decay of one oscillator, and {FEWEST} "
+                "are needed",
+                "sample finer, or cut out what is one with --from and --until",
             )
         return some
 
@@ -134,9 +133,7 @@ def prepare(record: Record, turns: Turns, pendulum: bool, drift: bool) -> tuple[
         slope = (middle[-1] - middle[0]) / (times[-1] - times[0]) / unit
         seed[DRIFT] += slope
         seed[REST] += slope * (model.middle - times[-1])
-    problem = Problem(
-        record.name, record.t - origin, (record.x - level) / unit, model, origin, level, unit, noise, drift
-    )
+    problem = Problem(record.t - origin, (record.x - level) / unit, model, origin, level, unit, noise, drift)
     return problem, seed
 
 

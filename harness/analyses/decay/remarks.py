@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...errors import HarnessError
 from .choice import Law
 from .figures import Estimate, sizes
 from .intervals import Spread, spread
 from .law import AMPLITUDE, DRIFT, OMEGA, UNKNOWNS, ZETA
 from .problem import Problem
 from .record import Record
+from .squares import Unfit
 
 ROUGH = 1.5  # times the noise: residuals beyond are no noise of single samples
 UNFIT = 0.1  # share of the motion: residuals beyond are no free decay of one oscillator
@@ -24,7 +24,7 @@ FEWEST = 100  # samples of a half that is fitted apart
 
 
 def refuse(record: Record, problem: Problem, full: Law, spread: Spread, pendulum: bool) -> None:
-    """HarnessError where the best fit is no answer."""
+    """Unfit where the best fit is no answer."""
     e, _ = problem.off(full.p, full.terms)
     motion = float(np.sqrt(np.mean((problem.x - problem.x.mean()) ** 2)))
     share = spread.rms / motion
@@ -32,15 +32,13 @@ def refuse(record: Record, problem: Problem, full: Law, spread: Spread, pendulum
         advice = "cut the record there with --from or --until"
         if record.base == "rad" and not pendulum:
             advice = "say --pendulum if it is one, or " + advice
-        raise HarnessError(
-            f"{record.name} is not a free decay of one oscillator: the best fit leaves {100 * share:.0f} % of the "
-            f"motion, most of it about t = {worst(problem, full.p, e):.6g} s; {advice}"
+        raise Unfit(
+            f"is not a free decay of one oscillator: the best fit leaves {100 * min(share, 1.0):.0f} % of the "
+            f"motion, most of it about t = {worst(problem, full.p, e):.6g} s",
+            advice,
         )
     if gains(problem, full) < -GAINS:
-        raise HarnessError(
-            f"{record.name} gains energy: the damping ratio that fits it best is negative, so it is driven, and has no "
-            "decay to measure"
-        )
+        raise Unfit("gains energy, so it is driven: the damping ratio that fits it best is negative")
 
 
 def worst(problem: Problem, p: np.ndarray, e: np.ndarray) -> float:

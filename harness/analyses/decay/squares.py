@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...errors import HarnessError
 from .law import AMPLITUDE, OMEGA, ZETA, R
 
 Residual = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -16,14 +17,25 @@ NEGLIGIBLE = 1e-2  # gain in squares, in variances of a sample, at which a fit h
 STUCK = 1e4  # damping at which no step is left to try
 
 
+class Unfit(HarnessError):
+    """No law fits, and what to try; the text goes on after the name of the record."""
+
+    def __init__(self, text: str, advice: str = "cut out what is one with --from and --until") -> None:
+        super().__init__(text)
+        self.advice = advice
+
+
 def least_squares(
     residual: Residual, p: np.ndarray, unknowns: np.ndarray, steps: int = 30
 ) -> tuple[np.ndarray, float, np.ndarray, np.ndarray]:
     """The values p of UNKNOWNS at which residual(p) is least over those in `unknowns`; with the sum of squares, the
-    residuals (n,) and their Jacobian (n, unknowns)."""
+    residuals (n,) and their Jacobian (n, unknowns).  Unfit where there is no motion to begin with."""
     lowest = np.where(unknowns >= ZETA, 0.0, -np.inf)
-    r, jacobian = residual(p)
-    cost, damping = float(r @ r), 0.0
+    with np.errstate(all="ignore"):
+        r, jacobian = residual(p)
+        cost, damping = float(r @ r), 0.0
+    if not (np.isfinite(cost) and np.isfinite(jacobian).all()):
+        raise Unfit("does not turn where a free decay of one oscillator would")
     for _ in range(steps):
         scale = scales(jacobian)
         matrix, slope = (jacobian / scale).T @ (jacobian / scale), (jacobian / scale).T @ r
@@ -35,7 +47,7 @@ def least_squares(
         if better:
             with np.errstate(all="ignore"):
                 new_r, new_jacobian = residual(new)
-            new_cost = float(new_r @ new_r)
+                new_cost = float(new_r @ new_r)
             better = np.isfinite(new_cost) and bool(np.isfinite(new_jacobian).all()) and new_cost <= cost * (1 + 1e-12)
         arrived = gain < NEGLIGIBLE * cost / max(len(r) - len(unknowns), 1)
         if better:
