@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from fmus.packaging import BuildError
+from fmus.packaging import BuildError, __version__
 from fmus.packaging.archive import build
 from fmus.packaging.catalogue import find, names
 from fmus.packaging.edition import FMI2, FMI3
@@ -27,6 +27,7 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  #
 @click.option("--law", "laws", multiple=True, type=click.Choice(list(LAWS)), help="Offer this law; repeatable.")
 @click.option("--platform", "platforms", multiple=True, help="For this only, as linux64; repeatable.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder; fmus, or beside FILE.py, without.")
+@click.version_option(__version__, prog_name="friction-fmus", message="%(prog)s %(version)s")
 def main(
     models: tuple[str, ...],
     fmi: str,

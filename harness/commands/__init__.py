@@ -11,8 +11,18 @@ from .run import figures
 from .terminal import answer, progress, results
 
 
+def version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    """Print the versions that every result tells, and end."""
+    if wanted:
+        from ..results.provenance import versions
+
+        click.echo(", ".join(f"{name} {number}" for name, number in versions().items()))
+        context.exit()
+
+
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @results
+@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=version, help="Print versions.")
 @click.pass_context
 def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> None:
     """Run the built FMUs, measure what they do, and set it beside what was published.

@@ -2,17 +2,33 @@
 
 import click
 
+from .terminal import JSON, answer
+
 
 @click.command("list")
-def list_() -> None:
-    """List the scenes that come with the harness."""
-    from rich.console import Console
+@JSON
+def list_(as_json: bool) -> None:
+    """List the scenes that come with the harness: those to `run`, and those of several FMUs to `couple`.
+
+    \b
+    Example:
+      python -m harness list --json
+    """
     from rich.table import Table
 
+    from ..scenes.coupled import scene as coupled
     from ..scenes.scene import load, shipped
+    from ..scenes.schema import read, structured
 
-    table = Table("scene", "model", "title", box=None)
-    for file in shipped():
-        scene = load(file)
-        table.add_row(scene.name, scene.file.stem, scene.title)
-    Console().print(table)
+    rows = [("run", scene.name, scene.file.stem, scene.title) for scene in map(load, shipped())]
+    for file in coupled.shipped():
+        keys = structured(read(file), coupled.CoupledKeys)
+        models = ", ".join(part.model for part in keys.parts.values())
+        rows.append(("couple", file.stem, models, keys.title))
+    table = Table(*HEADS, box=None, padding=(0, 1, 0, 0))
+    for row in rows:
+        table.add_row(*row)
+    answer(False, as_json, [dict(zip(HEADS, row, strict=True)) for row in rows], table)
+
+
+HEADS = ("command", "scene", "model", "title")

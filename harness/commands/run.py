@@ -1,10 +1,13 @@
 """run: one scene, or one FMU of any origin."""
 
+import shlex
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from ..errors import HarnessError
 from .terminal import answer, anyones, progress, results, tell
@@ -16,10 +19,19 @@ from .terminal import answer, anyones, progress, results, tell
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="With --fmu: a value to set.")
 @anyones
 @results
+@click.pass_context
 def run(
-    scene: str | None, fmu: Path | None, values: tuple[str, ...], out: Path, quiet: bool, as_json: bool, **how: Any
+    context: click.Context,
+    scene: str | None,
+    fmu: Path | None,
+    values: tuple[str, ...],
+    out: Path,
+    quiet: bool,
+    as_json: bool,
+    **how: Any,
 ) -> None:
-    """Run one SCENE: a shipped name (see list) or the path of a TOML file.  Or run an FMU of any origin.
+    """Run one SCENE: a shipped name (see list) or the path of a TOML file.  Or run an FMU of any origin.  Or run again
+    what made a folder of results.
 
     An FMU that does not show its solver's steps is run with ever shorter communication steps, until halving them
     changes no output by more than the tolerance.
@@ -28,6 +40,7 @@ def run(
     Examples:
       python -m harness run pendulum
       python -m harness run ./my-scene.toml --out elsewhere
+      python -m harness run results/pendulum
       python -m harness run --fmu theirs.fmu --set mass=2 --stop 10 --tolerance 1e-4
     """
     if fmu is not None and scene is None:
@@ -35,18 +48,35 @@ def run(
         return
     if scene is None or fmu is not None or values or how["stop"] is not None:
         raise click.UsageError("name one SCENE, or --fmu PATH; --set and --stop go with --fmu")
-    from ..scenes.scene import load
+    from ..results.provenance import trusted
+    from ..scenes.scene import again, load, shipped
     from ..studies.run import job
     from ..studies.run.table import comparison
 
-    chosen = load(scene)
+    place = Path(scene)
+    if place.is_dir() and scene not in [file.stem for file in shipped()]:
+        told = trusted(place)
+        if not (place / job.FILES[0]).is_file() or "title" not in (told["scene"] or {}):
+            repeat(context, told["command"])
+            return
+        chosen = again(told["scene"])
+        out = out if context.get_parameter_source("out") is ParameterSource.COMMANDLINE else place.parent
+    else:
+        chosen = load(scene)
     with progress(quiet or as_json, 1) as report:
         outcome = job.perform(chosen, out, partial(report, chosen.name))
     table = comparison([outcome], everything=True)
-    folder, note = out / chosen.name, outcome.run.note if outcome.run else ""
-    answer(quiet, as_json, figures(outcome), table, *filter(None, [note]), f"Results in {folder}")
+    folder, said = out / chosen.name, (outcome.run.note if outcome.run else "", *outcome.said)
+    answer(quiet, as_json, figures(outcome), table, *filter(None, said), f"Results in {folder}")
     if outcome.error:
         raise HarnessError(f"{outcome.error}; what it computed until then is in {folder}")
+
+
+def repeat(context: click.Context, command: str) -> None:
+    """Run a command again that made a result."""
+    root, sys.argv[1:] = context.find_root(), shlex.split(command)[3:]  # which the new result tells as its command
+    with root.command.make_context(root.info_name, sys.argv[1:]) as fresh:
+        root.command.invoke(fresh)
 
 
 def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], out: Path, quiet: bool, as_json: bool) -> None:
@@ -58,7 +88,7 @@ def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], out: Path,
 
     with progress(quiet or as_json, 1) as report:
         wanted = Specification(path, values=dict(map(assigned, values)), even=EVEN, **how)
-        found, folder = perform_run(wanted, out, partial(report, path.stem))
+        found, folder, said = perform_run(wanted, out, partial(report, path.stem))
     ends = {name: column[-1].item() for name, column in found.columns.items()}
     if as_json:
         tell({"fmu": found.name, "note": found.note, "failed": found.failed, "final": ends, "folder": str(folder)})
@@ -66,7 +96,7 @@ def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], out: Path,
         for name, value in ends.items():
             first = found.columns[name][0].item()
             click.echo(f"{heading(name, found.units[name])}: from {shown(first)} to {shown(value)}")
-        click.echo(f"{found.note}\nResults in {folder}" if found.note else f"Results in {folder}")
+        click.echo("\n".join(filter(None, [found.note, *said, f"Results in {folder}"])))
     if found.failed:
         raise HarnessError(f"{found.failed}; what it computed until then is in {folder}")
 

@@ -29,9 +29,21 @@ QUIET = click.option("--quiet", is_flag=True, help="Print errors only.")
 JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 
 
+def overwrite(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+    """Say so where results are written."""
+    from ..results.folder import OVERWRITE as allowed
+
+    allowed.set(allowed.get() or wanted)
+
+
+OVERWRITE = click.option(
+    "--overwrite", is_flag=True, expose_value=False, callback=overwrite, help="Replace the result of something else."
+)
+
+
 def results(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options of all commands that have results."""
-    return OUT(QUIET(JSON(command)))
+    return OUT(OVERWRITE(QUIET(JSON(command))))
 
 
 class Number(click.FloatRange):
@@ -112,5 +124,6 @@ def answer(quiet: bool, as_json: bool, result: Any, *shown: Any) -> None:
     if as_json:
         tell(result)
     elif not quiet:
+        console = Console(markup=False, highlight=False)  # units and names have brackets, too
         for each in shown:
-            Console().print(each, highlight=False)
+            console.print(each)

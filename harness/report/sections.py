@@ -7,11 +7,16 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from math import nan
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import reason
 from ..results import provenance
+from ..results.quantity import interval as spelled_interval
+from ..results.steps import sizes as step_sizes
 
 MODELS = {
     "smd": "Spring, mass and viscous damper. Every swing loses the same share: the envelope is an exponential.",
@@ -112,7 +117,7 @@ def oscillators(results: Path) -> Section:
 
 def oscillator(text: str, folder: Path) -> Item:
     picture = drawn(folder / "figure.png", f"{folder.name}: position, velocity and phase plane of the run")
-    return Item(folder.name, (text,) if text else (), table(folder / "figures.csv"), picture)
+    return Item(folder.name, (text,) if text else (), table(folder / "figures.csv", cut=False), picture)
 
 
 def runs(results: Path) -> Section:
@@ -127,7 +132,7 @@ def runs(results: Path) -> Section:
 def own(folder: Path) -> Item:
     figures, recorded = folder / "figures.csv", table(folder / "trajectory.csv")
     rows = tuple(zip(recorded.heads, recorded.rows[0], recorded.rows[-1], strict=True))
-    grid = table(figures) if figures.is_file() else TableCells(("", "first", "last"), rows)
+    grid = table(figures, cut=False) if figures.is_file() else TableCells(("", "first", "last"), rows)
     return Item(folder.name, (), grid, drawn(folder / "figure.png", f"{folder.name}: the plots that its scene names"))
 
 
@@ -164,7 +169,7 @@ def steps(results: Path) -> Section:
     cases = [case for cases in CASES.values() for case in cases if (results / case / "steps.csv").is_file()]
     made = [read(results / case, sizes) for case in cases]
     rows = [row for part in made if part.grid for row in part.grid.rows]
-    heads = ("case", "steps", "smallest [ms]", "mean [ms]", "largest [ms]", "refused")
+    heads = next((part.grid.heads for part in made if part.grid), ())
     parts = [Item("The solver's own steps", (), TableCells(heads, tuple(rows)))] if rows else []
     parts += [part for part in made if not part.grid]
     intro = (
@@ -176,11 +181,10 @@ def steps(results: Path) -> Section:
 
 def sizes(folder: Path) -> Item:
     """The row of one case."""
-    rows = table(folder / "steps.csv", cut=False).rows
-    h = [float(cells[1]) for cells in rows]
-    figures = (f"{1e3 * size:.4g}" for size in (min(h), sum(h) / len(h), max(h)))
-    row = (folder.name, str(len(h)), *figures, f"{sum(float(cells[2]) for cells in rows):g}")
-    return Item(folder.name, grid=TableCells((), (row,)))
+    _, h, rejected = np.array(table(folder / "steps.csv", cut=False).rows, float).T
+    told = step_sizes(h, int(rejected.sum())).quantities
+    row = (folder.name, *(" ".join(each.told()).strip() for each in told))
+    return Item(folder.name, grid=TableCells(("case", *(each.text for each in told)), (row,)))
 
 
 def precision(results: Path) -> Section:
@@ -266,7 +270,11 @@ def comparisons(results: Path) -> Section:
 def comparison(folder: Path) -> Item:
     found = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
     rows = tuple(
-        (each["name"], digits(each["largest"], 3), digits(each["rms"], 3), digits(each["relative"], 2), each["unit"])
+        (
+            each["name"],
+            *(digits(each[key], how) for key, how in (("largest", ".3e"), ("rms", ".3e"), ("relative", ".2e"))),
+            each["unit"],
+        )
         for each in found["variables"]
     )
     grid = TableCells(("variable", "largest", "rms", "relative", "unit"), rows)
@@ -332,20 +340,19 @@ def shortened(cell: str) -> str:
         return cell
 
 
-def digits(number: float | None, count: int) -> str:
-    """A number with so many digits; none where JSON had no number for it."""
-    return "not finite" if number is None else f"{number:.{count}g}"
+def digits(number: float | None, how: str) -> str:
+    """A number written so; none where JSON had no number for it."""
+    return "not finite" if number is None else f"{number:{how}}"
 
 
 def interval(each: dict[str, Any] | None) -> str:
-    """Value and half of its 95 % interval, where there is one."""
+    """Value and 95 % interval, where there is one."""
     if each is None:
         return ""
     if each["value"] is None:
         return "not finite"
-    if each["high"] is None:
-        return f"{each['value']:.5g}"
-    return f"{each['value']:.7g} ± {each['high'] - each['value']:.1g}"
+    low, high = (nan if each[end] is None else each[end] for end in ("low", "high"))
+    return spelled_interval(each["value"], low, high)
 
 
 def unit(each: dict[str, Any]) -> str:

@@ -15,30 +15,34 @@ import re
 import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from shutil import rmtree
 from tempfile import mkdtemp
 
 from ..errors import HarnessError
 from ..process.interrupt import later
-from .provenance import FILE
+from .provenance import FILE, load
 
 if sys.platform != "win32":
     import fcntl
 
+OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of something else may be replaced
 FRESH, OLD = ".new", ".old"  # endings of the folders beside, after the name of the result and eight letters
 AT_FDCWD, RENAME_EXCHANGE, RENAME_SWAP = -100, 2, 2  # of Linux and macOS
 
 
 @contextmanager
-def replacing(folder: Path, ours: Collection[str]) -> Iterator[Path]:
+def replacing(folder: Path, ours: Collection[str], source: str = "") -> Iterator[Path]:
     """A new folder beside `folder` to write into; it takes its place if nothing is raised, and is removed otherwise.
 
-    Refused with HarnessError if the old folder is a link, or holds a file not named in `ours`, which would be lost.
+    Refused with HarnessError if the old folder is a link, holds a file not named in `ours`, which would be lost, or,
+    unless that is what the user wants, a result of another `source`.
     """
     try:
         ours = {*ours, FILE}
         refuse(folder, ours)
+        keep(folder, source)
         folder.parent.mkdir(parents=True, exist_ok=True)
         tidy(folder, ours)
     except OSError as error:
@@ -68,6 +72,16 @@ def refuse(folder: Path, ours: Collection[str]) -> None:
         foreign = sorted(set(held) - set(ours))
         if foreign:
             raise HarnessError(f"{folder} holds {foreign[0]}, which is not a result; move it or choose another --out")
+
+
+def keep(folder: Path, source: str, account: str = FILE) -> None:
+    """HarnessError if a result of another source is there, and the user did not say that it may be replaced."""
+    older = load(folder, account)
+    if older.get("source", source) != source and not OVERWRITE.get():
+        made = f"`{older['command']}`" + (f", from {older['source']}" if older["source"] else "")
+        raise HarnessError(
+            f"{folder} holds the result of {made}: keep it and name another --out, or replace it with --overwrite"
+        )
 
 
 def begun(folder: Path) -> tuple[Path, int]:

@@ -9,31 +9,54 @@ from datetime import datetime
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
+from ..errors import HarnessError
 from .files import as_text
 
 FILE = "provenance.json"
 HARNESS = "friction-fmus"
+IMPLIED = {"values", "name", "file", "source"}  # of a scene: in its parameters, or in what it was made from
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 
 Parameters = Mapping[str, tuple[object, str]]  # by name: the value in force, and its unit
 
 
 def record(
-    folder: Path, files: Iterable[Path], parameters: Parameters | None = None, scene: object = None, name: str = FILE
+    folder: Path,
+    files: Iterable[Path],
+    parameters: Parameters | None = None,
+    scene: object = None,
+    name: str = FILE,
+    source: str = "",
 ) -> None:
     """Write into a folder of results where they come from: the digests of the `files` that were read, FMUs and
-    records, all `parameters` in force, and the `scene` as it was run."""
+    records, all `parameters` in force, the `scene` as it was run, and the `source` that was named."""
     told = {
+        "source": source,
         "command": shlex.join(["python", "-m", "harness", *sys.argv[1:]]),
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "versions": {"python": platform.python_version(), **{package: installed(package) for package in PACKAGES}},
+        "versions": versions(),
         "platform": platform.platform(),
-        "files": {str(file): sha256(file.read_bytes()).hexdigest() for file in files if file.is_file()},
+        "files": {str(file): digest(file) for file in files if file.is_file()},
         "parameters": {name: {"value": value, "unit": unit} for name, (value, unit) in (parameters or {}).items()},
         "scene": scene,
     }
     (folder / name).write_text(as_text(told) + "\n", encoding="utf-8")
+
+
+def named(*sources: str) -> str:
+    """What a result was made from, for its account: paths of what is there in full, other words as they are."""
+    return ", ".join(str(Path(each).resolve()) if Path(each).exists() else each for each in sources)
+
+
+def digest(file: Path) -> str:
+    return sha256(file.read_bytes()).hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """Of the harness, and of what its numbers hang on."""
+    return {package: installed(package) for package in PACKAGES} | {"python": platform.python_version()}
 
 
 def installed(package: str) -> str:
@@ -41,6 +64,58 @@ def installed(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "not installed"
+
+
+def load(folder: Path, name: str = FILE) -> dict[str, Any]:
+    """What a folder of results says of its origin; nothing where it does not."""
+    try:
+        told = json.loads((folder / name).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return told if isinstance(told, dict) and whole(told) else {}
+
+
+def whole(told: dict[str, Any]) -> bool:
+    """Whether all is there that others ask for."""
+    texts = all(isinstance(told.get(name), str) for name in ("command", "date"))
+    tables = all(isinstance(told.get(name), dict) for name in ("files", "parameters")) and "scene" in told
+    return texts and tables and all(isinstance(each, dict) and len(each) == 2 for each in told["parameters"].values())
+
+
+def since(older: Path, fresh: Path, file: str) -> tuple[str, ...]:
+    """What a fresh result says of the older one whose place it takes: what that was made with, if it was not the same,
+    and whether a file of both is the same."""
+    before, after = load(older), load(fresh)
+    if not before:
+        return ()
+    had = [worded(name, **each) for name, each in before["parameters"].items() if each != after["parameters"].get(name)]
+    scene = before["scene"] or {}
+    kept = [name for name in scene if name in IMPLIED or scene[name] == after["scene"].get(name)]
+    had += [f"{name} = {value}" if value else f"no {name}" for name, value in scene.items() if name not in kept]
+    had += [f"another {name}" for name, told in before["files"].items() if told != after["files"].get(name)]
+    if had:
+        return (f"It takes the place of the result of {before['date']}, which had {', '.join(sorted(had))}.",)
+    same = (older / file).is_file() and digest(older / file) == digest(fresh / file)
+    return (
+        f"The result of {before['date']} was {'the same, bit for bit' if same else 'not the same to the last bit'}.",
+    )
+
+
+def trusted(folder: Path) -> dict[str, Any]:
+    """What a folder of results says of its origin; HarnessError if it says nothing, or if a file is not what it was."""
+    told = load(folder)
+    if not told:
+        raise HarnessError(f"{folder} holds no result that tells what made it: name one with a whole {FILE}")
+    for name, before in told["files"].items():
+        file = Path(name)
+        if not file.is_file():
+            raise HarnessError(f"{file}, from which this was made, is not here: run from the folder where it is")
+        if (now := digest(file)) != before:
+            raise HarnessError(
+                f"{file} has changed since this was made from it (sha256 {before[:12]} then, {now[:12]} now): put it "
+                f"back, or make a new result with `{told['command']}`"
+            )
+    return told
 
 
 def sentences(file: Path) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """A number with its name, unit and sentence, as measured or as published."""
 
 from dataclasses import dataclass
-from math import pi
+from math import ceil, isfinite, log10, pi
 
 # Units in which figures are published: the SI unit and the size of one in it.
 UNITS = {
@@ -9,6 +9,8 @@ UNITS = {
     "deg": ("rad", pi / 180),
     "lbf.in": ("N.m", 0.45359237 * 9.80665 * 0.0254),
 }
+
+UNEVEN = 0.1  # of an interval: beyond, its ends are told rather than its half
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,13 @@ class Quantity:
     unit: str
     text: str
 
+    def told(self) -> tuple[str, str]:
+        """Value and unit as people read them: five digits, times below a second in ms."""
+        value, unit = self.value, self.unit
+        if unit == "s" and abs(value) < 1:
+            value, unit = 1e3 * value, "ms"
+        return spelled(value), "" if unit == "1" else unit
+
     def in_unit(self, unit: str) -> float:
         """The value in another unit of the table; KeyError if it does not measure the same thing."""
         if unit == self.unit:
@@ -28,3 +37,24 @@ class Quantity:
         if base != self.unit:
             raise KeyError(unit)
         return self.value / size
+
+
+def spelled(value: float, digits: int = 5) -> str:
+    """A number with so many digits; a count with all of its own."""
+    return str(value) if isinstance(value, int) else f"{value:.{digits}g}"
+
+
+def interval(value: float, low: float, high: float) -> str:
+    """A value, with the digits that its interval leaves, and half of it; its ends where they are not alike; the value
+    alone where there is none (NaN or infinity)."""
+    below, above = value - low, high - value
+    if not isfinite(above):
+        return f"{value:.5g}"
+    if value == 0:
+        return f"< {high:.2g}"
+    margin = max(below, above)
+    digits = min(max(ceil(log10(abs(value) / margin)) + 1, 1), 8) if margin > 0 else 8
+    if abs(above - below) <= UNEVEN * (above + below):
+        return f"{value:.{digits}g} ± {margin:.2g}"
+    digits = max(digits, 2)
+    return f"{value:.{digits}g} ({low:.{digits}g} to {high:.{digits}g})"

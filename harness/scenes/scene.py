@@ -24,7 +24,7 @@ Only title, outputs and one of model and fmu are needed.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any
@@ -119,9 +119,11 @@ class SceneKeys:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene(SceneKeys):
-    """One scene, under the name of its file, with the file of its FMU."""
+    """One scene, under the name of its file, with the file of its FMU; `source`: where it was read, or its own name
+    if it comes with the harness."""
 
     name: str
+    source: str
     file: Path
     plots: tuple[str, ...]
 
@@ -149,14 +151,26 @@ def load(scene: str | Path) -> Scene:
         if path not in shipped():
             names = [file.stem for file in shipped()]
             raise SceneError(f"{unknown('scene', scene, names)}, or the path of a .toml file")
+    source = path.stem if path.parent.resolve() == SHIPPED.resolve() else str(path.resolve())
     table = read(path)
     try:
-        return build(path, table)
+        return build(path, table, source)
     except SceneError as error:
         raise SceneError(f"scene {path.stem}: {error}") from None
 
 
-def build(path: Path, table: dict[str, Any]) -> Scene:
+def again(told: dict[str, Any]) -> Scene:
+    """The scene that a result says was run; SceneError if it does not."""
+    try:
+        table = {each.name: told[each.name] for each in fields(SceneKeys) if told[each.name] is not None}
+        table["decay"] = {name: value for name, value in told["decay"].items() if value is not None}
+        path, source, file = Path(told["name"]), str(told["source"]), Path(told["file"])
+    except (AttributeError, KeyError, TypeError):
+        raise SceneError("its provenance.json holds no scene") from None
+    return replace(build(path, table, source), file=file, name=path.name)
+
+
+def build(path: Path, table: dict[str, Any], source: str) -> Scene:
     """A scene from the table that its file holds."""
     keys = structured(table, SceneKeys)
     plots = usual(keys.outputs) if keys.plots is None else keys.plots
@@ -164,7 +178,7 @@ def build(path: Path, table: dict[str, Any]) -> Scene:
         for name in names:
             if name not in allowed:
                 raise SceneError(unknown(f"name in {key}", name, allowed))
-    scene = Scene(**vars(keys) | {"name": path.stem, "file": find(path, keys), "plots": plots})
+    scene = Scene(**vars(keys) | {"name": path.stem, "source": source, "file": find(path, keys), "plots": plots})
     check_needs(scene)
     return scene
 

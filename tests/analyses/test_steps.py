@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from harness.analyses.slip import crest, crossings, slips_of_modes
-from harness.analyses.steps import collapse_at_reversals, published_mean
+from harness.analyses.steps import collapse_at_reversals
+from harness.results.steps import published_mean
 
 
 def test_the_published_mean_counts_the_last_step_twice():

@@ -37,7 +37,7 @@ def test_the_table_lists_every_model():
 
 def test_a_tool_that_is_not_asked_is_named_with_the_reason():
     shown = table.table([table.Checked("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")])
-    assert r"Ecos was not asked: it is not installed: pip install -e '.\[importers]'" in shown.caption
+    assert "Ecos was not asked: it is not installed: pip install -e '.[importers]'" in shown.caption
 
 
 def test_fmus_of_another_version_of_fmi_are_refused_in_one_sentence():

@@ -2,12 +2,17 @@
 
 import csv
 import json
+import re
+import shutil
 from hashlib import sha256
 
+import numpy as np
 import pytest
 from commands import harness
 from fmpy import read_model_description
 from models import MODELS
+
+from harness.scenes.scene import shipped
 
 COMMANDS = {  # that take seconds, and the folders of their results
     "run": (("run", "coulomb"), "coulomb"),
@@ -100,3 +105,114 @@ def test_a_damaged_account_is_told_in_the_page(here, content):
     done = harness(here, "report")
     assert (done.returncode, done.stderr) == (0, "")
     assert "smd cannot be shown" in (here / "results/report.html").read_text()
+
+
+def files(folder):
+    """What a result holds, but for its account, which has a date, and its figures, which have a run time."""
+    return {
+        path.name: path.read_bytes() for path in folder.iterdir() if path.name not in ("provenance.json", "figures.csv")
+    }
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_result_is_made_again_by_its_folder_and_to_the_last_bit(here, command):
+    arguments, folder = COMMANDS[command]
+    assert harness(here, *arguments).returncode == 0
+    before, account = files(here / "results" / folder), told(here / "results" / folder)
+    done = harness(here, "run", f"results/{folder}")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert files(here / "results" / folder) == before
+    for key in ("files", "parameters", "scene", "source"):
+        assert told(here / "results" / folder)[key] == account[key]
+    if command.startswith("run"):
+        assert "the same, bit for bit" in done.stdout
+    assert harness(here, "run", f"results/{folder}", "--quiet").returncode == 0  # and again
+
+
+@pytest.mark.parametrize("scene", [path.stem for path in shipped() if path.stem not in ("coulomb", "pacejka-0.001")])
+def test_every_shipped_scene_is_run_again_to_the_last_bit(here, scene):
+    assert harness(here, "run", scene).returncode == 0
+    assert "the same, bit for bit" in harness(here, "run", f"results/{scene}").stdout
+
+
+MINE = 'title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = []\nstop = 1.0\n[values]\nc = 3.0\n'
+
+
+def test_a_result_is_made_again_though_its_scene_is_gone_and_goes_where_it_is_wanted(here):
+    (here / "mine.toml").write_text(MINE)
+    assert harness(here, "run", "mine.toml", "--out", "there").returncode == 0
+    before = files(here / "there/mine")
+    (here / "mine.toml").unlink()
+    for out in ((), ("--out", "elsewhere")):
+        assert harness(here, "run", "there/mine", *out).returncode == 0
+    assert files(here / "there/mine") == files(here / "elsewhere/mine") == before
+    assert sorted(path.name for path in here.iterdir()) == ["elsewhere", "fmus", "there"]
+
+
+def test_a_result_whose_fmu_has_changed_or_gone_is_not_made_again_as_if_it_were_the_same(here, fmus):
+    shutil.copy(fmus / "smd.fmu", here / "mine.fmu")
+    (here / "mine.toml").write_text(MINE.replace('model = "smd"', 'fmu = "mine.fmu"'))
+    assert harness(here, "run", "mine.toml").returncode == 0
+    before = files(here / "results/mine")
+    shutil.copy(fmus / "coulomb.fmu", here / "mine.fmu")
+    done = harness(here, "run", "results/mine")
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "mine.fmu has changed since this was made from it" in done.stderr
+    assert "`python -m harness run mine.toml`" in done.stderr
+    (here / "mine.fmu").unlink()
+    assert "mine.fmu, from which this was made, is not here" in harness(here, "run", "results/mine").stderr
+    assert files(here / "results/mine") == before
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "folder"),
+    [
+        (("run", "coulomb"), ("run", "--fmu", "fmus/coulomb.fmu"), "coulomb"),
+        (("run", "--fmu", "fmus/coulomb.fmu"), ("run", "coulomb"), "coulomb"),
+        (("run", "a/mine.toml"), ("run", "b/mine.toml"), "mine"),
+        (("run", "--fmu", "fmus/smd.fmu"), ("run", "--fmu", "a/smd.fmu"), "smd"),
+        (("decay", "coulomb"), ("decay", "a/coulomb.csv"), "decay/coulomb"),
+        (("compare", "fmus/smd.fmu", "fmus/smd.fmu"), ("compare", "fmus/smd.fmu", "a/smd.fmu"), "compare/smd-smd"),
+    ],
+)
+def test_a_result_of_something_else_is_replaced_only_by_the_word_for_it(here, fmus, first, second, folder):
+    for place in ("a", "b"):
+        (here / place).mkdir()
+        (here / place / "mine.toml").write_text(MINE)
+        shutil.copy(fmus / "smd.fmu", here / place)
+    t = np.linspace(0, 4, 400)
+    rows = np.column_stack([t, np.exp(-t) * np.cos(12 * t)])
+    np.savetxt(here / "a/coulomb.csv", rows, header="t [s],x [m]", delimiter=",", comments="")
+    assert harness(here, *first).returncode == 0
+    before = files(here / "results" / folder)
+    done = harness(here, *second)
+    assert (done.returncode, done.stderr.count("\n"), done.stdout) == (1, 1, "")
+    assert f"results/{folder} holds the result of `python -m harness {' '.join(first)}`" in done.stderr
+    assert "name another --out, or replace it with --overwrite" in done.stderr
+    assert files(here / "results" / folder) == before
+    assert harness(here, *second, "--out", "other").returncode == 0
+    assert harness(here, *second, "--overwrite").returncode == 0
+    assert told(here / "results" / folder)["source"] == told(here / "other" / folder)["source"]
+
+
+def test_a_result_of_other_values_is_not_replaced_in_silence(here):
+    (here / "mine.toml").write_text(MINE)
+    assert "place" not in harness(here, "run", "mine.toml").stdout
+    (here / "mine.toml").write_text(MINE.replace("3.0", "4.0").replace("1.0", "2.0"))
+    said = harness(here, "run", "mine.toml", COLUMNS="200").stdout
+    assert re.search(r"It takes the place of the result of [-\dT:+]+, which had c = 3.0 N.s/m, .*stop = 1.0", said)
+    assert harness(here, "run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.25").returncode == 0
+    assert "which had f = 0.25 N" in harness(here, "run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.5").stdout
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"command": 1}', None])
+def test_a_folder_that_does_not_say_what_made_it_is_not_run(here, content):
+    assert harness(here, "run", "smd").returncode == 0
+    if content is None:
+        (here / "results/smd/provenance.json").unlink()
+    else:
+        (here / "results/smd/provenance.json").write_text(content)
+    done = harness(here, "run", "results/smd")
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "results/smd holds no result that tells what made it" in done.stderr
+    assert harness(here, "run", "smd").returncode == 0

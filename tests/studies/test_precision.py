@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from harness.errors import HarnessError
+from harness.results.provenance import record
 from harness.running.answer import Answer
 from harness.running.inside import Inside, embedded, offered
 from harness.studies.precision import advice, laws
-from harness.studies.precision.study import FMPY, FMU, QUICK, WAYS, Extent, Job, Point, Study, jobs, sweep
+from harness.studies.precision.study import FMPY, FMU, FULL, QUICK, WAYS, Extent, Job, Point, Study, jobs, sweep
+from harness.studies.precision.survey import survey
 from harness.truths import peers
 from harness.truths.reference import CASES, errors, load
 
@@ -127,6 +129,29 @@ def test_the_advice_is_read_off_the_points():
     )
     nothing = Study("stickslip", (CASE["stickslip"],), points[:1])
     assert advice.advise(nothing, []) == "stickslip: no method of the FMU gets there."
+
+
+def test_advice_is_not_given_where_the_figures_do_not_carry_it():
+    """Of a quick run, where another solver comes near or before the best method; of a whole one, a peer that is before
+    it is named as one."""
+    own, slower = point("rodas", 2e-3, 1e-7), point("ode23", 4e-3, 1e-7)
+    untold = "stickslip: a quick run does not tell what to use, `python -m harness precision stickslip` does."
+    for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
+        study = Study("stickslip", (CASE["stickslip"],), (own, slower, point("LSODA", peer, 1e-7, "scipy")))
+        quick, whole = (advice.advise(study, [], clear) for clear in (QUICK.clear, FULL.clear))
+        assert (quick == whole) == carried
+        assert carried or quick == untold
+        assert whole.startswith("stickslip: use rodas: ")
+        assert ("only scipy LSODA, which is no method of the FMU, 0.85 of that" in whole) == (peer < own.seconds)
+    assert advice.advise(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.clear) == untold
+
+
+def test_a_quick_run_does_not_take_the_place_of_a_whole_one(tmp_path):
+    folder = tmp_path / "precision"
+    folder.mkdir()
+    record(folder, [], name="smd.json")
+    with pytest.raises(HarnessError, match="keep it and name another --out, or replace it with --overwrite"):
+        survey(["smd"], QUICK, tmp_path, print)
 
 
 def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from ...results.files import as_text
 from ...results.folder import replacing
-from ...results.provenance import record
+from ...results.provenance import named, record
 from ...running.fmu import Report
 from ...running.specification import Specification
 from . import trajectory
@@ -24,12 +24,12 @@ def perform_compare(sources: tuple[str, str], how: Specification, out: Path, rep
     one, two = trajectory.both(sources, how, report)
     found = compare(one, two)
     folder = out / "compare" / f"{one.name}-{two.name}"
-    with replacing(folder, ("compare.json", "figure.png")) as fresh:
+    with replacing(folder, ("compare.json", "figure.png"), named(*sources)) as fresh:
         (fresh / "compare.json").write_text(as_text(numbers(found)) + "\n", encoding="utf-8")
         draw(found, fresh / "figure.png")
         sides = (("one", one), ("two", two))
         values = {f"{side}: {name}": told for side, each in sides for name, told in each.parameters.items()}
-        record(fresh, [each.file for each in (one, two) if each.file], values)
+        record(fresh, [each.file for each in (one, two) if each.file], values, source=named(*sources))
     return found, folder
 
 

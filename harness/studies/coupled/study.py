@@ -13,7 +13,7 @@ from ...process.child import ask
 from ...process.room import room
 from ...results.files import write as write_csv
 from ...results.folder import replacing
-from ...results.provenance import record
+from ...results.provenance import named, record
 from ...running.description import description
 from ...scenes.coupled.scene import MODELS, Coupled, load
 from ...scenes.fmus import fmu_of
@@ -41,7 +41,7 @@ def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[Co
             raise HarnessError(f"scene {scene.name}: part {part.name} ({part.model}) has no parameter {unknown[0]}")
     files = (f"{scene.name}.ssp", "trajectory.csv", "error.csv", "figure.png")
     folder = out / FOLDER / scene.name
-    with replacing(folder, files) as fresh, room("ssp-") as plain:
+    with replacing(folder, files, named(source)) as fresh, room("ssp-") as plain:
         archive.write(scene, plain / files[0])
         copy(plain / files[0], fresh)
         found = study(scene, plain / files[0], defaults, report)
@@ -51,7 +51,7 @@ def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[Co
         columns = [np.array(found.steps), np.array(found.errors)]
         write_csv(fresh / "error.csv", ["communication step [s]", "largest error [m]"], columns)
         draw(found, fresh / "figure.png")
-        record(fresh, {part.fmu for part in scene.parts}, scene=scene)
+        record(fresh, {part.fmu for part in scene.parts}, scene=scene, source=named(source))
     return found, folder
 
 

@@ -26,7 +26,7 @@ FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.png")
 
 
-Loaded = tuple[Record, Known, Callable[[Path], None]]  # and what writes into a folder where they come from
+Loaded = tuple[Record, Known, Callable[..., None]]  # and what writes into a folder where they come from
 
 
 def perform(
@@ -42,9 +42,10 @@ def perform(
     record, known, told = load_record(source, columns, known, report)
     found = identify(record, known, drag, drift, report)
     folder = out / FOLDER / record.name
-    with replacing(folder, FILES) as fresh:
+    named = provenance.named(source)
+    with replacing(folder, FILES, named) as fresh:
         save(found, fresh)
-        told(fresh)
+        told(fresh, source=named)
     return found, folder
 
 

@@ -1,13 +1,11 @@
 """What was found, for the terminal: three ways side by side, and the sentences that belong to them."""
 
-import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from ...analyses.decay.figures import Estimate
 from ...analyses.decay.fit import Identified
-
-UNEVEN = 0.1  # of an interval: beyond, its ends are told rather than its half
+from ...results.quantity import interval
 
 
 def table(found: Identified) -> Table:
@@ -27,19 +25,8 @@ def table(found: Identified) -> Table:
 
 
 def told(each: Estimate) -> str:
-    """Value, with the digits that its interval leaves, and half of it; its ends where they are not alike; the value
-    alone where there is none."""
-    below, above = each.value - each.low, each.high - each.value
-    if not np.isfinite(above):
-        return f"{each.value:.5g}"
-    if each.value == 0:
-        return f"< {each.high:.2g}"
-    margin = max(below, above)
-    digits = int(np.clip(np.ceil(np.log10(abs(each.value) / margin)) + 1, 1, 8)) if margin > 0 else 8
-    if abs(above - below) <= UNEVEN * (above + below):
-        return f"{each.value:.{digits}g} ± {margin:.1e}"
-    digits = max(digits, 2)
-    return f"{each.value:.{digits}g} ({each.low:.{digits}g} to {each.high:.{digits}g})"
+    """As every result tells it."""
+    return interval(each.value, each.low, each.high)
 
 
 def sentences(found: Identified) -> list[str]:

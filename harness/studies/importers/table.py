@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from rich.markup import escape
 from rich.table import Table
 
 from ...results.files import write_rows
@@ -60,12 +59,12 @@ def table(found: list[Checked]) -> Table:
     """The rows for reading; below them what the words mean, and which tools were not asked."""
     notes = [f"{row.importer} was not asked: {row.reason}" for row in found if row.reason]
     words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers, or the tool ends"
-    caption = escape("\n".join([words, *notes]))
+    caption = "\n".join([words, *notes])
     shown = Table("importer", "check", *MODELS, box=None, caption=caption, caption_justify="left")
     last = ""
     for row in found:
         if row.check:
-            shown.add_row(row.importer if row.importer != last else "", row.check, *map(escape, row.cells))
+            shown.add_row(row.importer if row.importer != last else "", row.check, *row.cells)
             last = row.importer
     return shown
 

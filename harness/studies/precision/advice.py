@@ -11,6 +11,7 @@ from .study import FMPY, FMU, WAYS, Point, Study
 TARGET = 1e-6
 TARGETS = (1e-3, TARGET, 1e-9)
 NOBODY = "no method of the FMU gets there"
+UNTOLD = "a quick run does not tell what to use, `python -m harness precision {}` does"
 
 
 def needed(curve: Iterable[Point], target: float, beside_dry: bool = False) -> Point | None:
@@ -26,18 +27,27 @@ def ranking(study: Study, case: Case, target: float) -> list[Point]:
     return sorted(found, key=lambda point: point.seconds)
 
 
-def advise(study: Study, laws: Iterable[Shortcut]) -> str:
-    """One sentence on what to use for a model."""
+def advise(study: Study, laws: Iterable[Shortcut], clear: float = 0.0) -> str:
+    """One sentence on what to use for a model; of what takes less than `clear` times as long as another, none."""
     best = [(case, ranking(study, case, TARGET)) for case in study.cases if not case.chatters]
+    nothing = UNTOLD.format(study.model) if clear else NOBODY
     parts = []
-    for method, cases in groupby(best, key=lambda pair: next((p.method for p in pair[1] if p.tool == FMU), "")):
-        parts.append(f"use {method}: " + series([price(*each) for each in cases]) if method else NOBODY)
+    for method, cases in groupby(best, key=lambda pair: choice(pair[1], clear)):
+        parts.append(f"use {method}: " + series([price(*each) for each in cases]) if method else nothing)
     parts += [shortcut(study, case) for case in study.cases if case.chatters]
     off = {law.case: law.largest for law in laws}
     smooth = [f"{off[case.name]:.2g}" for case in study.cases if case.name in off and not case.chatters]
     if smooth:
         parts.append(f"however well integrated, these laws are {series(smooth)} of the motion away from dry friction")
     return f"{study.model}: " + "; ".join(parts) + "."
+
+
+def choice(ranks: list[Point], clear: float) -> str:
+    """The best method of the FMU; none where another solver, the FMU's own or a peer, comes near it or before it."""
+    best = next((point for point in ranks if point.tool == FMU), None)
+    if best is None or any(point.seconds < clear * best.seconds for point in ranks if point is not best):
+        return ""
+    return best.method
 
 
 def price(case: Case, ranks: list[Point]) -> str:
@@ -49,8 +59,11 @@ def price(case: Case, ranks: list[Point]) -> str:
     text = f"{power(first.largest)} of the motion takes {1e3 * first.seconds:.2g} ms{where} ({case.law}"
     others = [(point.method, point) for point in own[1:2]]
     others += [(f"{point.tool} {point.method}", point) for point in peers[:1]]
-    ratios = [f"{name} {point.seconds / first.seconds:.2g} times" for name, point in others]
-    return text + (f"; for {power(TARGET)} {series(ratios)} as long)" if ratios else ")")
+    ratios = [(name, point.seconds / first.seconds) for name, point in others]
+    longer = [f"{name} {ratio:.2g} times" for name, ratio in ratios if ratio >= 1]
+    less = [f"{name}, which is no method of the FMU, {ratio:.2g} of that" for name, ratio in ratios if ratio < 1]
+    said = [f"{series(longer)} as long"] * bool(longer) + [f"only {each}" for each in less]
+    return text + (f"; for {power(TARGET)} {series(said)})" if said else ")")
 
 
 def shortcut(study: Study, case: Case) -> str:

@@ -36,15 +36,16 @@ WAYS = {CS: fmi3.COSIMULATION, ME: fmi3.EXCHANGE}
 @dataclass(frozen=True)
 class Extent:
     """How far a sweep goes: `patience` in s is for one run, and where one takes longer tighter ones are not tried;
-    `budget` in s is for the timed runs of one point."""
+    `budget` in s is for the timed runs of one point; solvers are told apart by run times that differ `clear` times."""
 
     tolerances: tuple[float, ...]
     patience: float
     budget: float
+    clear: float = 0.0
 
 
 FULL = Extent(tuple(float(f"1e-{n}") for n in range(2, 13)), 0.5, 0.04)
-QUICK = Extent((1e-3, 1e-6, 1e-9), 0.1, 0.005)
+QUICK = Extent((1e-3, 1e-6, 1e-9), 0.1, 0.005, clear=1.5)
 
 
 @dataclass(frozen=True)

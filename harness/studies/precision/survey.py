@@ -9,7 +9,7 @@ from shutil import copytree, ignore_patterns
 
 from ...errors import SceneError, unknown
 from ...results.files import heading, write_rows
-from ...results.folder import replacing
+from ...results.folder import keep, replacing
 from ...results.provenance import record
 from ...running.inside import embedded
 from ...scenes.fmus import fmu_of
@@ -17,9 +17,10 @@ from ...truths.peers import missing
 from ...truths.reference import CASES, MODELS
 from . import anchors, laws
 from .advice import advise
-from .study import Extent, Point, Study, study
+from .study import QUICK, Extent, Point, Study, study
 
 FOLDER = "precision"
+QUICKLY = "a quick run"  # which takes no other's place
 UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and rad/s
     **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry"), "1"),
     **dict.fromkeys(("seconds", "events", "period"), "s"),
@@ -47,12 +48,14 @@ def survey(models: Sequence[str], extent: Extent, out: Path, report: Callable[[s
     for model in models:
         if model not in MODELS:
             raise SceneError(unknown("model", model, MODELS))
+        if extent == QUICK:
+            keep(out / FOLDER, QUICKLY, f"{model}.json")
     with replacing(out / FOLDER, FILES) as folder:
         if (out / FOLDER).exists():
             stale = ignore_patterns(*(f"{model}[.-]*" for model in models))
             copytree(out / FOLDER, folder, ignore=stale, dirs_exist_ok=True)
         found = gather(models, extent, report)
-        write(found, folder)
+        write(found, folder, QUICKLY if extent == QUICK else "")
     return found
 
 
@@ -69,7 +72,7 @@ def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float],
         tuple(studies),
         tuple(told),
         rows,
-        tuple(advise(each, [law for law in told if law.model == each.model]) for each in studies),
+        tuple(advise(each, [law for law in told if law.model == each.model], extent.clear) for each in studies),
         (
             *map(gaps, studies),
             *reasons(studies),
@@ -89,12 +92,12 @@ def reasons(found: Iterable[Study]) -> Iterable[str]:
     return dict.fromkeys(p.failure for study in found for p in study.points if p.failure and isnan(p.rtol))
 
 
-def write(found: Survey, folder: Path) -> None:
-    """Tables and figures of what was found."""
+def write(found: Survey, folder: Path, source: str) -> None:
+    """Tables and figures of what was found, and whether they come from a quick run."""
     from .figure import draw
 
     for each, sentence in zip(found.studies, found.advice, strict=True):
-        record(folder, [fmu_of(each.model)], name=f"{each.model}.json")
+        record(folder, [fmu_of(each.model)], name=f"{each.model}.json", source=source)
         (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
         save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
         exchanged = each.exchanged()

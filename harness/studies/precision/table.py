@@ -5,6 +5,7 @@ from math import isnan
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+from rich.text import Text
 
 from .advice import TARGETS, needed, power
 from .anchors import AnchorRun
@@ -20,7 +21,7 @@ def work(study: Study) -> Table:
         table.add_column("calls", justify="right")
     for case in study.cases:
         table.add_section()
-        table.add_row(f"[bold]{case.law}[/bold]")
+        table.add_row(Text(case.law, style="bold"))
         for tool, method in study.solvers(case):
             cells = []
             for target in TARGETS:
@@ -66,7 +67,7 @@ def anchors(rows: Iterable[AnchorRun]) -> Table:
     for row in rows:
         if row.problem != last:
             table.add_section()
-            table.add_row(f"[bold]{row.problem}[/bold]")
+            table.add_row(Text(row.problem, style="bold"))
         calls = "-" if row.evaluations is None else f"{row.evaluations}"
         table.add_row(f"  {row.solver}", row.method, power(row.rtol), calls, row.failure or f"{row.error:.1e}")
         last = row.problem

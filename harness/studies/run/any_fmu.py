@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...results.folder import replacing
-from ...results.provenance import record
+from ...results.provenance import named, record, since
 from ...running.any_fmu import run
 from ...running.fmu import Report
 from ...running.specification import Specification
@@ -12,15 +12,16 @@ from ...scenes.scene import usual
 from .job import FILES
 
 
-def perform_run(wanted: Specification, out: Path, report: Report) -> tuple[Trajectory, Path]:
-    """Run an FMU, and write its outputs to out/<name of the file>."""
+def perform_run(wanted: Specification, out: Path, report: Report) -> tuple[Trajectory, Path, tuple[str, ...]]:
+    """Run an FMU, and write its outputs to out/<name of the file>; last, what is said of the older result there."""
     from .figure import draw
 
-    folder = out / wanted.model
-    with replacing(folder, FILES) as fresh:
+    folder, source = out / wanted.model, named(str(wanted.fmu))
+    with replacing(folder, FILES, source) as fresh:
         done = run(wanted, report)
         found = of_run(done)
         found.save(fresh / FILES[0])
         draw(wanted.fmu.name, usual(tuple(found.columns)), done, {}, fresh / "figure.png")
-        record(fresh, [wanted.fmu], found.parameters, wanted)
-    return found, folder
+        record(fresh, [wanted.fmu], found.parameters, wanted, source=source)
+        said = since(folder, fresh, FILES[0])
+    return found, folder, said

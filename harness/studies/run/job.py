@@ -12,7 +12,7 @@ from typing import Any
 from ...errors import HarnessError, SceneError, unknown
 from ...process.interrupt import check
 from ...results.folder import replacing
-from ...results.provenance import record
+from ...results.provenance import record, since
 from ...results.quantity import Quantity
 from ...running import any_fmu
 from ...running.run import Run
@@ -48,8 +48,9 @@ ANALYSE = {"decay": decay, "slip": slip, "steps": steps}
 def perform(scene: Scene, out: Path, report: Callable[[float], None]) -> Outcome:
     """Run, analyse and write results to out/<scene>; HarnessError leaves older results as they are."""
     try:
-        with replacing(out / scene.name, FILES) as folder:
-            return fill(scene, folder, report)
+        with replacing(out / scene.name, FILES, scene.source) as folder:
+            outcome = fill(scene, folder, report)
+            return replace(outcome, said=since(out / scene.name, folder, FILES[0]))
     except HarnessError as error:
         raise type(error)(f"scene {scene.name}: {error}") from None
 
@@ -67,11 +68,13 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     if not run.failed:
         check_published(scene, quantities)
     run.save(folder)
-    as_run = replace(
-        scene, start=float(run.time[0]), stop=float(run.time[-1]), grid=run.wanted.grid, follow=run.wanted.follow
-    )
-    record(folder, [scene.file], run.in_force, as_run)
-    if scene.published and not run.failed:
+    as_run = replace(scene, start=float(run.time[0]), grid=run.wanted.grid)
+    if not run.failed:
+        as_run = replace(as_run, stop=float(run.time[-1]))
+    if run.wanted.grid is not None:
+        as_run = replace(as_run, follow=run.wanted.follow)
+    record(folder, [scene.file], run.in_force, as_run, source=scene.source)
+    if results:
         from .table import save
 
         save(quantities, scene.published, folder / "figures.csv")

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ...results.files import write_rows
-from ...results.quantity import Quantity
+from ...results.quantity import Quantity, spelled
 from .outcome import Outcome
 
 ELSEWHERE = "elsewhere: the published run time is that of another machine"
@@ -42,28 +42,29 @@ def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
 
 def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
     """Text, measured, published, unit and difference; in the unit of the published figure where it has one."""
-    value, unit, digits = quantity.value, quantity.unit, 5
-    published = difference = ""
+    text, value, unit = f"  {quantity.text}", quantity.value, quantity.unit
     if isinstance(figure, tuple):
         figure, unit = figure
         value = quantity.in_unit(unit)
-    if isinstance(figure, int | float):
-        published = repr(figure)
-        digits = max(digits, len(published.replace(".", "").lstrip("0")))
-        if quantity.name == "run_time":
-            difference = "elsewhere"
-        elif figure:
-            difference = f"{100 * (value / figure - 1):+.2g} %"
-    else:
-        published = str(figure or "")
-        if unit == "s" and abs(value) < 1:
-            value, unit = 1e3 * value, "ms"
-    measured = str(value) if isinstance(value, int) else f"{value:.{digits}g}"
-    return f"  {quantity.text}", measured, published, "" if unit == "1" else unit, difference
+    if not isinstance(figure, int | float):
+        measured, unit = quantity.told()
+        return text, measured, str(figure or ""), unit, ""
+    published = repr(figure)
+    measured = spelled(value, max(5, len(published.replace(".", "").lstrip("0"))))
+    difference = f"{100 * (value / figure - 1):+.2g} %" if figure else ""
+    return (
+        text,
+        measured,
+        published,
+        "" if unit == "1" else unit,
+        "elsewhere" if quantity.name == "run_time" else difference,
+    )
 
 
 def save(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) -> None:
     """Write what the table shows of a scene as CSV, with the source of the published figures in its heading."""
-    heads = ["", "measured", f"published ({published['source']})", "unit", "difference"]
-    told = (row(each, published.get(each.name)) for each in quantities if each.name in published or each.name in ALWAYS)
-    write_rows(path, heads, ((text.strip(), *cells) for text, *cells in told))
+    told = [(text.strip(), *cells) for text, *cells in (row(each, published.get(each.name)) for each in quantities)]
+    if not published:
+        write_rows(path, ["", "measured", "unit"], ((text, measured, unit) for text, measured, _, unit, _ in told))
+        return
+    write_rows(path, ["", "measured", f"published ({published['source']})", "unit", "difference"], told)

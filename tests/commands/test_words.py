@@ -1,0 +1,162 @@
+"""What stands on the screen: it fits, keeps its brackets, and says of a quantity what every file and the page say."""
+
+import csv
+import html
+import json
+import re
+import subprocess
+import sys
+from importlib.metadata import version
+
+import numpy as np
+import pytest
+from builds import ROOT
+from commands import harness
+from rich.console import Console
+
+from harness.scenes.coupled import scene as coupled
+from harness.scenes.scene import load, shipped
+from harness.studies.bench.measure import Beside, Measure
+from harness.studies.bench.table import numbers
+from harness.studies.importers import table as importers
+from harness.studies.importers.checks import CHECKS
+from harness.studies.precision import laws, table
+from harness.studies.precision.anchors import AnchorRun
+from harness.studies.precision.study import FMU, ME, Point, Study
+from harness.truths.reference import CASES, MODELS
+
+WIDTH = 80
+PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
+
+
+@pytest.fixture
+def here(fmus, tmp_path):
+    (tmp_path / "fmus").symlink_to(fmus)
+    return tmp_path
+
+
+def fits(said, *headings):
+    """Whether lines are short enough, nothing is cut, and the headings are there."""
+    lines = said.splitlines()
+    assert max(map(len, lines)) <= WIDTH, max(lines, key=len)
+    assert "\u2026" not in said
+    for heading in headings:
+        assert heading in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "headings"),
+    [
+        (("list",), ("scene", "couple")),
+        (("run", "stickslip"), ("measured", "0.430665996656  0.430665996656 s")),
+        (("run", "coulomb-sign"), ("half of smd's ms",)),
+        (("decay", "coulomb"), ("two peaks",)),
+        (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), ("at t [s]",)),
+    ],
+)
+def test_the_tables_of_a_command_fit_into_80_columns(here, arguments, headings):
+    done = harness(here, *arguments, **PLAIN)
+    assert (done.returncode, done.stderr) == (0, "")
+    fits(done.stdout, *headings)
+
+
+POINTS = [
+    Point(case.name, tool, "dop853", 1e-6, 1e-9, 0.4567, 123456, largest=1.23e-7)
+    for case in CASES
+    for tool in (FMU, ME)
+]
+TABLES = {  # whose commands take long, filled with long words
+    "precision": (
+        [table.work(Study(m, tuple(c for c in CASES if c.model == m), tuple(POINTS))) for m in MODELS],
+        "1e-3:",
+    ),
+    "laws": (
+        [table.laws([laws.Shortcut("stickslip", "stickslip-threshold", "threshold", *(1.2e-5,) * 4, 3.3451, 0.877)])],
+        "creep [m/s]",
+    ),
+    "anchors": (
+        [table.anchors([AnchorRun("block on a belt", "scipy, arctan(1e6 v)", "DOP853", 1e-10, 123456, 1.2e-5)])],
+        "error [SI]",
+    ),
+    "bench": (
+        [numbers([Measure("16 s of " + 9 * "words ", 0.0123, "s", 0.02, (Beside("an empty FMU in Python", 0.1),))])],
+        "to reach",
+    ),
+    "importers": (
+        [importers.table([importers.Checked("libcosim 0.0.6", check, ("1.23e-16",) * 5) for check in CHECKS])],
+        "pendulum",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_the_tables_of_long_commands_fit_into_80_columns(name):
+    shown, heading = TABLES[name]
+    for each in shown:
+        console = Console(width=WIDTH, markup=False, highlight=False)
+        with console.capture() as said:
+            console.print(each)
+        fits(said.get(), heading)
+
+
+def test_names_with_brackets_are_shown_as_they_are(tmp_path):
+    for name, off in (("one", 0.0), ("two", 0.5)):
+        (tmp_path / f"{name}.csv").write_text(f"t [s],x[1] [m],[bold] [m]\n0,0,1\n1,{1 + off},2\n2,3,4\n")
+    said = harness(tmp_path, "compare", "one.csv", "two.csv", **PLAIN).stdout
+    assert "\nx[1] " in said
+    assert "\n[bold] " in said
+
+
+def test_the_versions_are_told(tmp_path):
+    own = f"friction-fmus {version('friction-fmus')}"
+    said = harness(tmp_path, "--version").stdout
+    assert said.startswith(f"{own}, fmpy {version('fmpy')}, ")
+    command = [sys.executable, ROOT / "build_fmus.py", "--version"]
+    assert subprocess.run(command, capture_output=True, text=True, cwd=tmp_path).stdout == f"{own}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_list_as_json_is_what_the_commands_take(here):
+    found = json.loads(harness(here, "list", "--json").stdout)
+    assert [each["scene"] for each in found if each["command"] == "run"] == [file.stem for file in shipped()]
+    assert [each["scene"] for each in found if each["command"] == "couple"] == [file.stem for file in coupled.shipped()]
+    for each in found:
+        if each["command"] == "run":
+            scene = load(each["scene"])
+            assert (each["title"], each["model"]) == (scene.title, scene.file.stem)
+
+
+@pytest.mark.parametrize("scene", ["stickslip-threshold", "pendulum"])
+def test_a_quantity_is_spelled_alike_on_the_screen_in_its_file_and_on_the_page(here, scene):
+    """Every one that is measured: the same digits and the same unit."""
+    said = harness(here, "run", scene, **PLAIN).stdout
+    assert harness(here, "report").returncode == 0
+    page = html.unescape((here / "results/report.html").read_text(encoding="utf-8"))
+    with (here / f"results/{scene}/figures.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) > 10
+    for row in rows:
+        told = re.search(
+            rf"  {re.escape(row[''])} +{re.escape(row['measured'])}(?= ) *.*{re.escape(row['unit'])}", said
+        )
+        assert told, row
+        cells = f"<td>{row['']}</td><td>{row['measured']}</td>"
+        assert cells in page, row
+    steps = page.split('<section id="steps">')[1].split("</section>")[0]
+    told = dict(zip(*(re.findall(f"<{tag}[^>]*>([^<]*)</{tag}>", steps) for tag in ("th", "td")), strict=True))
+    for row in rows:
+        if row[""] in told:
+            assert told[row[""]] == f"{row['measured']} {row['unit']}".strip()
+    assert len(told) == 6
+
+
+def test_an_interval_is_spelled_alike_on_the_screen_and_on_the_page(here):
+    t = np.linspace(0.0, 10.0, 800)
+    x = np.exp(-0.2 * t) * np.cos(12 * t) + 1e-3 * np.random.default_rng(1).standard_normal(800)
+    np.savetxt(here / "mine.csv", np.column_stack([t, x]), header="t [s],x [m]", delimiter=",", comments="")
+    said = harness(here, "decay", "mine.csv", COLUMNS="200", PATH="").stdout
+    assert harness(here, "report").returncode == 0
+    page = html.unescape((here / "results/report.html").read_text(encoding="utf-8"))
+    told = re.findall(r"\S+ \u00b1 \S+|\S+ \(\S+ to \S+\)|< \S+", said.split("Best")[0])
+    assert len(told) > 4
+    assert all(f"<td>{each}</td>" in page for each in told)
