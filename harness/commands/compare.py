@@ -1,7 +1,6 @@
 """compare: how far two results or FMUs are apart."""
 
 from functools import partial
-from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +14,32 @@ from .terminal import Number, answer, anyones, progress, results
 @click.argument("one", metavar="A")
 @click.argument("two", metavar="B")
 @anyones
-@click.option("--within", type=Number(min=0), help="Exit status 1 if a relative difference is larger.")
+@click.option("--rtol", "--within", type=Number(min=0), help="Share of its largest value by which each may differ.")
+@click.option("--atol", type=Number(min=0), help="What each may differ by on top, in its unit.")
 @results
 def compare(
     one: str,
     two: str,
-    within: float | None,
+    rtol: float | None,
+    atol: float | None,
     out: Path,
     quiet: bool,
     as_json: bool,
     **how: Any,
 ) -> None:
-    """Show how far A and B are apart: FMUs of any origin (FMI 2.0, 3.0), scenes, result folders or CSV files.
+    """Show how far A and B are apart: FMUs of any origin (FMI 2.0, 3.0), scenes, result folders or files, those of
+    other tools too (fmpy's CSV; OpenModelica's and Dymola's .csv and .mat; any table whose first column is the time).
+
+    What can be run is run to the times of the other.  Between its samples a variable follows its rate where that was
+    recorded, otherwise it stays between its neighbours, and what is whole numbers holds.  Exit status 0: no difference
+    is larger than rtol and atol allow together, if either is given, and events match; 1: one is, or a run failed;
+    2: wrong usage.
 
     \b
     Examples:
       python -m harness compare results/stickslip results/stickslip-threshold
       python -m harness compare fmus/coulomb.fmu theirs.fmu --stop 2
-      python -m harness compare results/smd measured.csv --within 1e-3
+      python -m harness compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
     """
     from ..running.specification import Specification
     from ..studies.compare import job
@@ -43,9 +50,7 @@ def compare(
     shown = (job.table(found), "", *job.sentences(found), f"Results in {folder}")
     answer(quiet, as_json, job.numbers(found), *shown)
     failed = [each.failed for each in (found.one, found.two) if each.failed]
+    if rtol is not None or atol is not None:
+        failed += found.beyond(rtol or 0.0, atol or 0.0)
     if failed:
         raise HarnessError("\n".join(failed))
-    if within is not None and not (found.worst <= within and (found.shift is None or found.shift == found.shift)):
-        if isnan(found.worst):
-            raise HarnessError(f"{one} or {two} holds what is not a finite number, which is in no bound")
-        raise HarnessError(f"{one} and {two} differ by {found.worst:.3g} of the largest value, more than {within:g}")

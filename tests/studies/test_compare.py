@@ -1,17 +1,19 @@
 """Comparisons of FMUs, ours and others, and of results."""
 
 import json
+from itertools import combinations
 from math import cos, sqrt
 
 import commands
 import foreign
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from harness.errors import HarnessError
 from harness.running.trajectory import Trajectory
 from harness.studies.compare.difference import compare
-from harness.studies.compare.trajectory import read
+from harness.studies.compare.files import read
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +129,7 @@ def test_a_jump_is_compared_as_a_jump(late):
     assert largest["a"] == 0.0
     assert largest["v"] <= 2.1 * late + 1e-15
     assert largest["x"] <= 2.1 * late + 1e-15
-    assert found.shift == pytest.approx(late, rel=1e-6, abs=1e-15)
+    assert found.pairs.shift == pytest.approx(late, rel=1e-6, abs=1e-15)
 
 
 def test_a_time_that_stands_twice_has_both_sides_of_a_jump(tmp_path):
@@ -179,17 +181,162 @@ def test_what_shares_no_variable_is_refused():
 @pytest.mark.parametrize(
     ("second", "sentence", "shift"),
     [
-        ([[0, 0], [1, 1], [2.5, 0]], "2 changes of mode in both, at most 0.5 s apart", 0.5),
-        ([[0, 0], [1, 1]], "2 changes of mode in one, 1 in two", np.nan),
-        ([[0, 0], [1, -1], [2, 0]], "change of mode 1 is to 1 in one and to -1 in two", np.nan),
+        ([[1, 1], [2.5, 0]], "2 changes of mode in both, at most 0.5 s apart", 0.5),
+        ([[1.25, 1]], "1 changes of mode in both, at most 0.25 s apart; only in one: to 0 at t = 2 s", np.nan),
+        (
+            [[1, -1], [2, 0]],
+            "1 changes of mode in both, at most 0 s apart; only in one: to 1 at t = 1 s; only in two: to -1 at t = 1 s",
+            np.nan,
+        ),
+        (
+            [[0.5, 1], [1.125, 1], [2, 0], [3, 1], [4, 1], [5, 1], [6, 1]],
+            "2 changes of mode in both, at most 0.125 s apart; "
+            "only in two: to 1 at t = 0.5 s, to 1 at t = 3 s, to 1 at t = 4 s, 2 more",
+            np.nan,
+        ),
+        ([], "0 changes of mode in both, at most 0 s apart; only in one: to 1 at t = 1 s, to 0 at t = 2 s", np.nan),
     ],
 )
-def test_changes_of_mode_are_paired(second, sentence, shift):
+def test_events_are_matched_by_kind_and_time(second, sentence, shift):
     t = np.arange(20.0)
     one = Trajectory("one", t, {"x": t}, {"x": "m"}, np.array([[0, 0], [1, 1], [2, 0.0]]))
-    found = compare(one, Trajectory("two", t, {"x": t}, {"x": "m"}, np.array(second, float)))
-    assert found.events == sentence
-    assert found.shift == pytest.approx(shift, nan_ok=True)
+    two = Trajectory("two", t, {"x": t}, {"x": "m"}, np.array([[0, 0], *second], float))
+    pairs = compare(one, two).pairs
+    assert pairs.sentence(("one", "two")) == sentence
+    assert pairs.shift == pytest.approx(shift, nan_ok=True)
+
+
+def test_an_event_that_is_matched_from_afar_hides_no_difference():
+    """The other one jumps back in between, so that what lies between is no one's jump."""
+    t = np.linspace(0, 3, 301)
+    one = Trajectory("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, np.array([[0, 0], [1, 1.0]]))
+    step = (t >= 0.5) & (t < 0.8) | (t >= 2)
+    two = Trajectory("two", t, {"y": step + 0.5}, {"y": "m"}, np.array([[0, 0], [0.5, 2], [0.8, 0], [2, 1.0]]))
+    assert compare(one, two).differences[0].largest == 1.0
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "factor"),
+    [
+        *(("m/s2", other, 1.0) for other in ("m/s^2", "m.s-2", "m s^-2", "m·s⁻²", "m/s²", "m/s/s", "m*s**-2")),
+        ("N.m", "Nm", 1.0),
+        ("N.m", "N·m", 1.0),
+        ("kg.m2", "kg*m^2", 1.0),
+        ("N/(m.s)", "N/m/s", 1.0),
+        ("rad", "deg", np.pi / 180),
+        ("rad/s", "rpm", np.pi / 30),
+        ("m", "mm", 1e-3),
+        ("N", "kN", None),
+        ("m", "rad", None),
+        ("m/s", "m", None),
+    ],
+)
+def test_units_have_one_spelling_and_are_converted_or_refused(left, right, factor):
+    t = np.arange(20.0)
+    pair = (
+        Trajectory(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", left), ("two", right))
+    )
+    found = compare(*pair)
+    if factor is None:
+        assert found.left_out == (f"y is in {left} in one and in {right} in two, and is left out",)
+        return
+    (y, _) = found.differences
+    assert y.unit == left
+    assert y.largest == pytest.approx(19 * (1 - factor))
+    assert bool(found.left_out) == (factor != 1.0)
+
+
+OTHERS = {
+    "fmpy.csv": '"time","x","on","turn"\n0.0,1.0,True,1 2\n1.0,2.0,False,3 4\n2.0,3.0,True,5 6\n',
+    "openmodelica.csv": '"time","x","on","turn[1]","turn[2]"\n0,1,1,1,2\n1,2,0,3,4\n2,3,1,5,6\n',
+    "ours.csv": "t [s],x,on,turn[1],turn[2]\n0,1,1,1,2\n1,2,0,3,4\n2,3,1,5,6\n",
+    "instrument.csv": "t in s;x;on;turn[1];turn[2]\n0;1,0;1;1;2\n1;2,0;0;3;4\n2;3,0;1;5;6\n",
+}
+
+
+@pytest.mark.parametrize("pair", [*combinations([*OTHERS, "modelica.mat"], 2)], ids=" and ".join)
+def test_results_of_other_tools_compare(tmp_path, pair):
+    for name, text in OTHERS.items():
+        (tmp_path / name).write_text(text)
+    modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4], [2, 3, 1, 5, 6]]))
+    found = compare(*(read(tmp_path / name) for name in pair))
+    assert {each.name: each.largest for each in found.differences} == {"x": 0, "on": 0, "turn[1]": 0, "turn[2]": 0}
+
+
+def modelica(file, rows):
+    """A result as OpenModelica writes it: a MATLAB file of version 4, turned; one variable is an alias with a sign."""
+    names = ["time", "x", "on", "turn[1]", "turn[2]", "minus", "p"]
+    letters = {
+        "Aclass": ["Atrajectory", "1.1", "", "binTrans"],
+        "name": names,
+        "description": ["time [s]", "place [m|mm]", "", "", "", "", ""],
+    }
+    turned = {"Aclass": np.array(letters.pop("Aclass"))}
+    for key, texts in letters.items():  # a name is a column of letters
+        turned[key] = np.array(["".join(row) for row in zip(*(text.ljust(16) for text in texts), strict=True)])
+    info = [[0, 1, 0, -1], *([2, i, 0, -1] for i in range(2, 6)), [2, -2, 0, -1], [1, 2, 0, -1]]
+    constants = np.array([[0.0, 2.0], [7.0, 7.0]])
+    savemat(file, turned | {"dataInfo": np.array(info, np.int32).T, "data_1": constants, "data_2": rows.T}, format="4")
+
+
+def test_units_and_signs_of_a_modelica_result_are_read(tmp_path):
+    modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4]]))
+    found = read(tmp_path / "modelica.mat")
+    assert found.units["x"] == "m"
+    assert [*found.columns] == ["x", "on", "turn[1]", "turn[2]", "minus"]
+    assert found.columns["minus"].tolist() == [-1.0, -2.0]
+
+
+def test_texts_are_compared_as_texts(tmp_path):
+    (tmp_path / "one.csv").write_text("t [s],says,x\n0,cold,1\n1,cold,1\n2,warm,1\n")
+    (tmp_path / "two.csv").write_text("t [s],says,x\n0,cold,1\n1,warm,1\n2,warm,one\n")
+    found = compare(*(read(tmp_path / name) for name in ("one.csv", "two.csv")))
+    (says,) = found.differences
+    assert (says.name, says.largest, says.at) == ("says", 1.0, 1.0)
+    assert found.left_out == ("x is a text in two and a number in one, and is left out",)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "status"),
+    [
+        (["--rtol", "0.1"], 0),
+        (["--rtol", "0.01"], 1),
+        (["--within", "0.01"], 1),
+        (["--atol", "0.3"], 0),
+        (["--atol", "0.2"], 1),
+        (["--rtol", "0.05", "--atol", "0.1"], 0),
+    ],
+)
+def test_rtol_and_atol_say_what_may_differ(tmp_path, bounds, status):
+    (tmp_path / "one.csv").write_text("t [s],x [m]\n0,1\n1,4\n2,3\n")
+    (tmp_path / "two.csv").write_text("t [s],x [m]\n0,1\n1,3.75\n2,3\n")
+    done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds, "--quiet")
+    assert done.returncode == status
+    assert ("x differs by 0.25 m at t = 1 s, more than" in done.stderr) == bool(status)
+
+
+@pytest.mark.parametrize(
+    ("pair", "told"),
+    [
+        (("Midpoint", "Exchange"), "fmpy's CVode at rtol"),
+        (("Third", "Breaking"), "Breaking: it takes steps of its own"),
+        (("FixedStep", "FixedStep"), "its own step is fixed"),
+        (("Switching", "Switching"), "says"),
+        (("Arrays", "Arrays"), "turn[1,2]"),
+    ],
+)
+def test_fmus_that_are_not_ours_are_compared(harness, theirs, pair, told):
+    one, two = (theirs / f"{name}.fmu" for name in pair)
+    done = harness("compare", one, two, "--tolerance", 1e-4, "--rtol", 2e-4, "--lenient")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert told in done.stdout
+
+
+def test_an_fmu_that_ends_itself_is_compared_as_far_as_it_came(harness, theirs):
+    done = harness("compare", theirs / "Falling.fmu", theirs / "Falling.fmu", "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["variables"][0]["largest"] == 0.0
+    assert "it ends itself: fmi2DoStep answered Discard" in done.stderr
 
 
 @pytest.mark.parametrize("lost", [np.nan, np.inf])

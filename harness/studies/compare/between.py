@@ -12,8 +12,8 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ...running.trajectory import Trajectory
+from .units import is_rate
 
-PER_SECOND = {"m": "m/s", "m/s": "m/s2", "rad": "rad/s", "rad/s": "rad/s2"}
 LARGE, REDUCED = 1e150, 2.0**-600  # differences of larger values have no number: they are reckoned in a smaller unit
 ALIKE = 0.02  # share of its way by which a variable may miss the integral of its rate
 
@@ -66,11 +66,11 @@ def follow(t: np.ndarray, y: np.ndarray, slope: np.ndarray | None, at: np.ndarra
 def rate(path: Trajectory, name: str, scale: float) -> np.ndarray | None:
     """The recorded rate (n,) of a variable: of a unit per second, with an integral that is the variable's own way; all
     values times the scale."""
-    wanted, y = PER_SECOND.get(path.units[name]), scale * path.columns[name]
+    y = scale * path.columns[name]
     h, way = np.diff(path.time), np.diff(y)
     found = {}
     for other, slope in path.columns.items():
-        if path.units[other] == wanted and np.isfinite(slope).all():
+        if slope.dtype.kind != "U" and is_rate(path.units[other], path.units[name]) and np.isfinite(slope).all():
             slope = scale * slope
             missed = np.abs(way - h * (slope[1:] + slope[:-1]) / 2)[h > 0].sum()
             if missed <= ALIKE * np.abs(way).sum():

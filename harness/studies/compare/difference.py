@@ -1,14 +1,16 @@
 """How far two trajectories are apart: largest and root-mean-square difference of each variable, and event times."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import isnan
 
 import numpy as np
 
-from ...analyses.decay.units import plain
 from ...errors import HarnessError
 from ...running.trajectory import Trajectory
 from .between import Sides, sides
+from .pairs import Pairs, paired
 from .trajectory import common
+from .units import size
 
 ENOUGH = 0.5  # share of the coarser one's times that are common, which makes interpolation needless
 SAME = 1e-9  # share of the stretch: times this close are one
@@ -17,8 +19,8 @@ SAME = 1e-9  # share of the stretch: times this close are one
 @dataclass(frozen=True)
 class Difference:
     """One variable: the `largest` difference and where it is (`at`, s), the root mean square, in `unit`; `relative`:
-    the largest over the largest value of either.  `left`, `right` (n,): the two at the times compared.  Where one of
-    them is not a finite number, which is then at `at`, the differences are NaN."""
+    the largest over the largest value of either, the `size`.  `left`, `right` (n,): the two at the times compared; of
+    texts 0, and 1 where they differ.  Where one is not a finite number, which is then at `at`, all is NaN."""
 
     name: str
     unit: str
@@ -26,14 +28,15 @@ class Difference:
     at: float
     rms: float
     relative: float
+    size: float
     left: np.ndarray
     right: np.ndarray
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two trajectories at the `time` (n,) of comparison; `events`: the sentence about their events, and the largest
-    difference of event times in s, NaN where events cannot be paired and None where they are not known."""
+    """Two trajectories at the `time` (n,) of comparison, with the `pairs` of their events, None where they are not
+    known."""
 
     one: Trajectory
     two: Trajectory
@@ -41,13 +44,27 @@ class Comparison:
     interpolated: bool
     differences: tuple[Difference, ...]
     left_out: tuple[str, ...]
-    events: str
-    shift: float | None
+    pairs: Pairs | None
 
     @property
     def worst(self) -> float:
         """The largest relative difference; NaN if any is."""
         return float(np.max([each.relative for each in self.differences]))
+
+    def beyond(self, rtol: float, atol: float) -> list[str]:
+        """What differs by more than atol, in the unit of each, and rtol of its largest value together; a sentence each,
+        and one about events that do not match."""
+        said = [
+            f"{each.name} differs by {each.largest:.3g}{f' {each.unit}' if each.unit else ''} at t = {each.at:.6g} s, "
+            f"more than {atol + rtol * each.size:.3g}"
+            for each in self.differences
+            if not isnan(each.largest) and each.largest > atol + rtol * each.size
+        ]
+        lost = [each.name for each in self.differences if isnan(each.largest)]
+        said += [f"{name} holds what is not a finite number, which is in no bound" for name in lost]
+        if self.pairs and isnan(self.pairs.shift):
+            said.append(f"their events do not match: {self.pairs.sentence((self.one.name, self.two.name))}")
+        return said
 
 
 def compare(one: Trajectory, two: Trajectory) -> Comparison:
@@ -58,30 +75,56 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
         raise HarnessError(f"{' and '.join(has)} have no variable in common")
     begin, end = common(one, two)
     time, interpolated = times(one, two, begin, end)
-    said, shift, jumps = events(one, two, begin, end)
+    pairs, jumps = events(one, two, begin, end)
     differences, left_out = [], []
     for name in shared:
-        unit, differs = units(one, two, name)
+        unit, factor, differs = units(one, two, name)
         left_out += [differs] if differs else []
         if unit is not None:
-            left, right = nearest(*(sides(each, name, time, at) for each, at in zip((one, two), jumps, strict=True)))
+            same = alike(one, two, name, factor)
+            left, right = nearest(*(sides(each, name, time, at) for each, at in zip(same, jumps, strict=True)))
+            if textual(one, name):
+                left, right = np.zeros(len(time)), (left != right).astype(float)
             differences.append(difference(name, unit, time, left, right))
     if not differences:
         raise HarnessError(f"nothing to compare: {'; '.join(left_out)}")
     for each, other in ((one, two), (two, one)):
         alone = [name for name in each.columns if name not in other.columns]
         left_out += [f"only in {each.name}: {', '.join(alone)}"] if alone else []
-    return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), said, shift)
+    return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs)
 
 
-def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, str]:
-    """The unit in which a variable is compared, None where that cannot be, and what is to be said of it."""
+def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, float, str]:
+    """The unit in which a variable is compared, None where that cannot be, how large the other's is in it, and what is
+    to be said of that."""
     left, right = (each.units[name] for each in (one, two))
-    if plain(left) == plain(right):
-        return left, ""
-    if left and right:
-        return None, f"{name} is in {left} in {one.name} and in {right} in {two.name}, and is left out"
-    return left or right, f"{name} has no unit in {(two if left else one).name}; it is taken to be in {left or right}"
+    if textual(one, name) != textual(two, name):
+        text, number = (one, two) if textual(one, name) else (two, one)
+        return None, 1.0, f"{name} is a text in {text.name} and a number in {number.name}, and is left out"
+    if bool(left) != bool(right):
+        lacks = (two if left else one).name
+        return left or right, 1.0, f"{name} has no unit in {lacks}; it is taken to be in {left or right}"
+    factor = size(right, left)
+    if factor is None:
+        return None, 1.0, f"{name} is in {left} in {one.name} and in {right} in {two.name}, and is left out"
+    return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; it is compared in {left}"
+
+
+def textual(path: Trajectory, name: str) -> bool:
+    return path.columns[name].dtype.kind == "U"
+
+
+def alike(one: Trajectory, two: Trajectory, name: str, factor: float) -> tuple[Trajectory, Trajectory]:
+    """Both with a variable in the unit of the first; of texts, the place of each among all."""
+    left, right = one.columns[name], two.columns[name]
+    if textual(one, name):
+        known = np.unique(np.concatenate([left, right]))
+        left, right = (np.searchsorted(known, each).astype(float) for each in (left, right))
+    elif factor == 1.0:
+        return one, two
+    else:
+        right = factor * right
+    return replace(one, columns=one.columns | {name: left}), replace(two, columns=two.columns | {name: right})
 
 
 def nearest(left: Sides, right: Sides) -> tuple[np.ndarray, np.ndarray]:
@@ -95,12 +138,12 @@ def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: 
     lost = ~(np.isfinite(left) & np.isfinite(right))
     if lost.any():
         at = float(time[int(np.argmax(lost))])
-        return Difference(name, unit, np.nan, at, np.nan, np.nan, left, right)
+        return Difference(name, unit, np.nan, at, np.nan, np.nan, np.nan, left, right)
     size = float(max(np.abs(left).max(), np.abs(right).max()))
     off = np.abs(left / size - right / size) if size else np.zeros(len(time))
     i, rms = int(np.argmax(off)), float(np.sqrt(np.mean(off * off)))
     relative = float(off[i])
-    return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, left, right)
+    return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, size, left, right)
 
 
 def times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[np.ndarray, bool]:
@@ -118,20 +161,15 @@ def times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[n
 
 def events(
     one: Trajectory, two: Trajectory, begin: float, end: float
-) -> tuple[str, float | None, tuple[np.ndarray, np.ndarray]]:
-    """A sentence about the changes of mode, the largest difference of their times in s, and the stretches of time in
-    which each of the two jumps (k, 2): where events are of one kind, from the earlier to the later of a pair."""
+) -> tuple[Pairs | None, tuple[np.ndarray, np.ndarray]]:
+    """The events of both in pairs, and the stretches of time in s in which each of the two jumps (k, 2): from the
+    earlier to the later of a pair, and where one alone has an event."""
     known = [np.zeros((1, 2)) if each.events is None else each.events for each in (one, two)]
     first, second = (rows[1:][(rows[1:, 0] >= begin) & (rows[1:, 0] <= end)] for rows in known)
-    jumps = np.column_stack([first[:, 0], first[:, 0]]), np.column_stack([second[:, 0], second[:, 0]])
     if one.events is None or two.events is None:
-        return "", None, jumps
-    if len(first) != len(second):
-        return f"{len(first)} changes of mode in {one.name}, {len(second)} in {two.name}", np.nan, jumps
-    if not (first[:, 1] == second[:, 1]).all():
-        i = int(np.argmax(first[:, 1] != second[:, 1]))
-        text = f"change of mode {i + 1} is to {first[i, 1]:g} in {one.name} and to {second[i, 1]:g} in {two.name}"
-        return text, np.nan, jumps
-    shift = float(np.abs(first[:, 0] - second[:, 0]).max()) if len(first) else 0.0
-    pairs = np.sort(np.column_stack([first[:, 0], second[:, 0]]), axis=1)
-    return f"{len(first)} changes of mode in both, at most {shift:.3g} s apart", shift, (pairs, pairs)
+        return None, (first[:, [0, 0]], second[:, [0, 0]])
+    pairs = paired(first, second)
+    near = pairs.stretches[pairs.alone(np.sort(np.concatenate([first[:, 0], second[:, 0]])))]
+    own = [rows[~np.isin(rows[:, 0], near)][:, [0, 0]] for rows in (first, second)]
+    left, right = (np.vstack([near, rows]) for rows in own)
+    return pairs, (left, right)

@@ -5,14 +5,17 @@ from pathlib import Path
 import numpy as np
 
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
-from .difference import Comparison
+from .difference import Comparison, textual
 
 MOST = 8  # variables drawn, those that differ most
 
 
 def draw(found: Comparison, path: Path) -> None:
-    """Save the figure as PNG."""
-    chosen = sorted(found.differences, key=lambda each: -each.relative)[:MOST]
+    """Save the figure as PNG, if there is anything but texts to draw."""
+    numbers = [each for each in found.differences if not textual(found.one, each.name)]
+    chosen = sorted(numbers, key=lambda each: -each.relative)[:MOST]
+    if not chosen:
+        return
     with sheet(path, 2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(chosen)) as figure:
         figure.suptitle(f"{found.one.name} and {found.two.name}", fontsize=11)
         panels = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)

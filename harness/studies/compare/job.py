@@ -52,8 +52,21 @@ def numbers(found: Comparison) -> dict[str, Any]:
             for each in found.differences
         ],
         "left_out": list(found.left_out),
-        "events": found.events,
-        "event_shift": found.shift,
+        **events(found),
+    }
+
+
+def events(found: Comparison) -> dict[str, Any]:
+    """The events, for JSON: changes of mode as times in s and new modes, NaN for a shift where one side has more."""
+    pairs = found.pairs
+    if pairs is None:
+        return {"events": "", "event_shift": None}
+    return {
+        "events": pairs.sentence((found.one.name, found.two.name)),
+        "event_shift": pairs.shift,
+        "matched": {"one": pairs.one.tolist(), "two": pairs.two.tolist(), "shift": pairs.apart},
+        "only_one": pairs.only[0].tolist(),
+        "only_two": pairs.only[1].tolist(),
     }
 
 
@@ -83,5 +96,5 @@ def sentences(found: Comparison) -> list[str]:
             if isnan(each.largest)
         ),
         *found.left_out,
-        *([found.events] if found.events else []),
+        *([found.pairs.sentence((found.one.name, found.two.name))] if found.pairs else []),
     ]

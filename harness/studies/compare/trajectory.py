@@ -1,4 +1,4 @@
-"""A trajectory, wherever it comes from: a result folder, a CSV file, or a run of any FMU."""
+"""The trajectories that are compared, wherever they come from: a result folder, a file, or a run of any FMU."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,75 +6,55 @@ from pathlib import Path
 
 import numpy as np
 
-from ...analyses.decay.columns import numeric, split
-from ...analyses.decay.units import TIMES
-from ...errors import HarnessError, SceneError, shown
-from ...running.any_fmu import POINTS, run
+from ...errors import HarnessError, SceneError
+from ...running.any_fmu import POINTS, run, stop_of
 from ...running.specification import Specification, of_scene
 from ...running.trajectory import Trajectory, of_run
 from ...scenes.fmus import check_built
-from ...scenes.scene import load as load_scene
+from ...scenes.scene import load
+from .files import read
 
-LATEST = 1e100  # s, either way
+FILES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
+SUFFIXES = (".fmu", ".toml")  # of what is run
 
-
-def read(path: Path) -> Trajectory:
-    """The trajectory in a CSV file or a result folder; SceneError in one sentence if there is none."""
-    file = path / "trajectory.csv" if path.is_dir() else path
-    if path.is_dir() and not file.is_file():
-        raise SceneError(f"{path} is no result folder: it has no trajectory.csv")
-    heads, table = numeric(file)
-    names, units = zip(*map(split, heads), strict=True)
-    twice = [name for i, name in enumerate(names) if name in names[:i]]
-    if twice:
-        raise SceneError(f"{file.name}: two columns are named {shown(twice[0])}")
-    if units[0] not in (None, *TIMES):
-        raise SceneError(f"{file.name}: the first column must be the time, and its unit is '{units[0]}'")
-    time = table[:, 0] * TIMES[units[0] or "s"]
-    if not ((np.abs(time) < LATEST).all() and (np.diff(time) >= 0).all()):
-        raise SceneError(f"{file.name}: the time in its first column must rise, within {LATEST:g} s")
-    columns = {name: table[:, i] for i, name in enumerate(names) if i}
-    events = path / "events.csv" if path.is_dir() else None
-    known = numeric(events)[1] if events and events.is_file() else None
-    if known is not None and (known.shape[1] != 2 or not np.isfinite(known).all()):
-        raise SceneError(f"{events} holds no times and modes")
-    told = dict(zip(names, (unit or "" for unit in units), strict=True))
-    return Trajectory(path.stem, time, columns, told, known, file=file)
+Report = Callable[[float], None]
 
 
-def both(
-    sources: tuple[str, str], how: Specification, report: Callable[[float], None]
-) -> tuple[Trajectory, Trajectory]:
-    """The trajectories of two folders, CSV files, FMUs' paths or shipped scenes' names.  Where one is recorded and the
-    other can be run, it is run to the same times; `how` says the rest."""
+def both(sources: tuple[str, str], how: Specification, report: Report) -> tuple[Trajectory, Trajectory]:
+    """The trajectories of two folders, files, FMUs' paths or scenes.  What can be run is run to the same times, those
+    of the other one if that is recorded, and to the same stop; `how` says the rest."""
     found = [recorded(source) for source in sources]
+    runs = [None if each else wanted(source, how) for each, source in zip(found, sources, strict=True)]
     grid = next((spacing(each.time) for each in found if each), None)
-    one, two = (
-        each or ran(source, replace(how, grid=grid), report) for each, source in zip(found, sources, strict=True)
-    )
-    return one, two
+    stops = {stop_of(each) for each in runs if each} | {float(each.time[-1]) for each in found if each}
+    stop = how.stop if None in stops or len(stops) == 1 else min(filter(None, stops))
+    sides = []
+    for each, asked, source in zip(found, runs, sources, strict=True):
+        if asked:
+            asked = replace(asked, grid=grid or asked.grid, even=POINTS, stop=stop if how.stop is None else how.stop)
+            each = replace(of_run(run(asked, report)), name=Path(source).stem if source.endswith(SUFFIXES) else source)
+        assert each
+        sides.append(each)
+    return sides[0], sides[1]
+
+
+def wanted(source: str, how: Specification) -> Specification:
+    """What runs an FMU's path, or a scene."""
+    if Path(source).suffix == ".fmu":
+        return replace(how, fmu=Path(source))
+    scene = load(source)
+    check_built(scene.file)
+    return of_scene(scene)
 
 
 def recorded(source: str) -> Trajectory | None:
-    """The trajectory of a folder or a CSV file; None for what has to be run."""
+    """The trajectory of a folder or a file; None for what has to be run."""
     path = Path(source)
-    if path.exists() and path.suffix not in (".fmu", ".toml"):
+    if path.exists() and path.suffix not in SUFFIXES:
         return read(path)
-    if path.suffix in (".csv", ".txt"):
+    if path.suffix in FILES:
         raise SceneError(f"there is no {path}")
     return None
-
-
-def ran(source: str, how: Specification, report: Callable[[float], None]) -> Trajectory:
-    """The trajectory of an FMU's path or a shipped scene's name, run anew."""
-    path = Path(source)
-    if path.suffix == ".fmu":
-        return of_run(run(replace(how, fmu=path, even=POINTS), report))
-    scene = load_scene(source)
-    check_built(scene.file)
-    wanted = of_scene(scene)
-    found = of_run(run(replace(wanted, grid=how.grid or wanted.grid, even=POINTS), report))
-    return replace(found, name=scene.name)
 
 
 def spacing(time: np.ndarray) -> float | None:
