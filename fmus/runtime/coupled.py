@@ -11,16 +11,17 @@ from math import fabs, inf
 
 from .automaton import DryFriction, sign
 from .codes import RULES, STUCK
-from .rounding import NEAR, ULP
+from .rounding import NEAR
 from .vectors import Contact, Contacts, States, contacts, largest, per_contact
 
 LOOKS = 5  # parts of a step in which something may end, each looked at by its end
 CLOSE = 0.25  # of what a guard spans in a step: below, it is looked at more closely
 TOUCHING = 1e-3  # m/s or rad/s: the size of a slip, where it is of no size itself
 ALIKE = 1.0 - 1e-9  # of the greatest load, as a share of what is held: what is let go with it
-MOST_ROUNDS = 60  # of letting go and holding again, and then of changing one contact at a time
+TOGETHER, MOST_ROUNDS = 60, 200  # of letting go and holding again: of all contacts; then of one at a time
 MOST_IMPULSES = 3  # for slips that are not linear in positions
 LEAST = 1e-300  # a force
+MOVING, HELD, RESTING, LEAVING = 0, 1, 2, 3  # contacts with a slip, held again, at rest, with a load at the limit
 UNSETTLED = RULES + 1  # status: no modes fit the forces, as the first rule has it
 
 
@@ -120,16 +121,17 @@ class CoupledFriction(DryFriction):
 
     def after(self, step, ends: Contacts, near) -> tuple[States, Contacts, bool]:
         """State and modes at the end of a step that has been cut there, and whether the modes fit."""
-        t, room = step.t1, 4.0 * ULP * fabs(step.t1)
+        t = step.t1
+        slips = self.slips(t, step.y1)
+        terms = self.slip_terms(t, step.y1)
         rest, first = per_contact(), per_contact()
         for i in contacts:
-            rest[i] = step.modes0[i] == STUCK or ends[i] - t <= room
-            first[i] = STUCK if rest[i] else step.modes0[i]
+            rest[i], first[i] = MOVING, step.modes0[i]
+            if first[i] == STUCK:
+                rest[i] = LEAVING if ends[i] <= t else RESTING
+            elif ends[i] <= t or first[i] * slips[i] <= NEAR * terms[i]:
+                rest[i], first[i] = RESTING, STUCK
         y = self.at_rest(t, step.y1, first)
-        force, _limit, _terms = self.forces(t, y, first)
-        for i in contacts:
-            if step.modes0[i] == STUCK and ends[i] - t <= room:
-                first[i] = sign(force[i])
         modes, fit = self.settled(t, y, first, rest, near)
         return y, modes, fit
 
@@ -140,8 +142,9 @@ class CoupledFriction(DryFriction):
         rest, first = per_contact(), per_contact()
         for i in contacts:
             known = near * (terms[i] + TOUCHING) if modes[i] * slips[i] <= 0.0 else NEAR * terms[i]
-            rest[i] = fabs(slips[i]) <= known
-            first[i] = STUCK if rest[i] else sign(slips[i])
+            rest[i], first[i] = MOVING, sign(slips[i])
+            if fabs(slips[i]) <= known:
+                rest[i], first[i] = RESTING, STUCK
         y = self.at_rest(t, y, first)
         after, fit = self.settled(t, y, first, rest, near)
         return y, after, fit
@@ -168,26 +171,28 @@ class CoupledFriction(DryFriction):
         What would slip against its own force is held; else what bears most of what it holds is let go, and what bears
         as much with it.  If that comes to no end, one contact is changed at a time, the first that has to.
         """
-        after = per_contact()
+        after, state = per_contact(), per_contact()
         for i in contacts:
-            after[i] = modes[i]
-        for turn in range(2 * MOST_ROUNDS):
-            urgency, other = self.urges(t, y, after, rest, near)
+            after[i], state[i] = modes[i], rest[i]
+        for turn in range(MOST_ROUNDS):
+            urgency, other = self.urges(t, y, after, state, near)
             worst = largest(urgency)
             if not worst > 0.0:
                 return after, True
-            least = 0.0 if turn >= MOST_ROUNDS else ALIKE * worst
+            least = ALIKE * worst if turn < TOGETHER else 0.0
             changed = False
             for i in contacts:
                 if urgency[i] > 0.0 and urgency[i] >= least and not (changed and least == 0.0):
                     after[i], changed = other[i], True
+                    if other[i] == STUCK:
+                        state[i] = HELD
         return modes, False
 
     def urges(self, t, y: States, modes: Contacts, rest: Contacts, near) -> tuple[Contacts, Contacts]:
         """How urgently each contact at rest must change, not at all where its mode fits, and to which mode.
 
-        Near a tie the next derivative decides.  A load is known but for the rounding of what it is made of, and, where
-        it moves inward, the share `near` of the limit.
+        A tie is decided by the next derivative, unless the contact has been held again.  A load is known but for the
+        rounding of what it is made of, and, where it moves inward, the share `near` of the limit.
         """
         force, limit, terms = self.forces(t, y, modes)
         force_rate, limit_rate, pull, pull_rate = self.changes(t, y, modes)
@@ -195,17 +200,17 @@ class CoupledFriction(DryFriction):
         for i in contacts:
             urgency[i], other[i] = 0.0, STUCK
             slack = NEAR * (terms[i] + limit[i])
-            if rest[i] and modes[i] == STUCK:
+            if rest[i] != MOVING and modes[i] == STUCK:
                 other[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
                 outward = other[i] * force_rate[i] - limit_rate[i]
-                if outward > 0.0:
+                if rest[i] == LEAVING or (rest[i] == RESTING and outward > 0.0):
                     slack = -slack
                 elif outward < 0.0:
                     slack += near * limit[i]
                 if other[i] != STUCK and fabs(force[i]) > limit[i] + slack:
                     urgency[i] = fabs(force[i]) / (limit[i] + LEAST)
-            elif rest[i]:
+            elif rest[i] != MOVING:
                 ahead = modes[i] * pull[i]
-                if ahead < -slack or (ahead <= slack and modes[i] * pull_rate[i] < 0.0):
+                if ahead < -slack or (ahead <= slack and modes[i] * pull_rate[i] <= 0.0):
                     urgency[i] = inf
         return urgency, other

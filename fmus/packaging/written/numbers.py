@@ -211,10 +211,11 @@ class Numbers(Settled):
                 tests = self.all_terms(one)
                 return Settled.visit_BoolOp(self, ast.BoolOp(ast.And() if name == "every" else ast.Or(), tests))
             case ast.Call(func=ast.Name(id=name), args=[ast.Name() as one]) if name in CHOSEN:
-                text, *others = [ast.unparse(term) for term in self.all_terms(one)] or ["inf"]
-                for n, other in enumerate(others):
-                    text = f"({text})" if n else text
-                    text = f"{text} if {text} {CHOSEN[name]} {other} else {other}"
+                *terms, text = [ast.unparse(term) for term in self.all_terms(one)] or ["inf"]
+                behind = [text]
+                for term in reversed(terms):
+                    text = f"{term} if {' and '.join(f'{term} {CHOSEN[name]} {one}' for one in behind)} else {text}"
+                    behind.insert(0, term)
                 return expression(text)
         contacts = [one.id for one in node.args if isinstance(one, ast.Name) and one.id in self.index]
         if contacts:

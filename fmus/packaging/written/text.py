@@ -290,7 +290,7 @@ def folded(text: str, depth: int = 0) -> str:
     """A line that is too long on several, broken inside its brackets, of which `depth` are open before it."""
     if len(text) <= WIDTH:
         return text
-    blanks = text[: len(text) - len(text.lstrip())]
+    blanks, whole = text[: len(text) - len(text.lstrip())], not depth
     if not depth and text.count(" = ") > 1:  # a row of targets
         *targets, value = text.strip().split(" = ")
         half = len(targets) // 2
@@ -301,11 +301,11 @@ def folded(text: str, depth: int = 0) -> str:
         if letter in "\"'" and quote in ("", letter):
             quote = "" if quote else letter
         depth += 0 if quote else (letter in "([") - (letter in ")]")
-        ends = text[n - 1] == "," or text[n - 2 : n] in (" +", " -") or text[n + 1 : n + 4] == "if "
+        ends = text[n - 1] == "," or text[n - 2 : n] in (" +", " -") or text[n + 1 : n + 4] in ("if ", "and")
         if letter == " " and depth > 0 and not quote and ends and n > len(inner):
             places[depth] = n
     if not places:
-        word = next((word for word in (" = ", "return ", "if ", "while ") if word in text), "")
+        word = next((word for word in (" = ", "return ", "if ", "while ") if whole and word in text), "")
         head, _, value = text.partition(word) if word else (text, "", "")
         value, colon = (value[:-1], ":") if value.endswith(":") else (value, "")
         return folded(f"{head}{word}({value}){colon}") if word and not is_bracketed(value) else text

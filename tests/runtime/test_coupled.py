@@ -1,0 +1,228 @@
+"""Contacts that share bodies: events at one time, in any order of declaration; loads that peak inside a step; what is
+conserved."""
+
+from math import asin
+
+import numpy as np
+import pytest
+from arrays import begun, spelled, start
+from models import DOP853, LARGER, ODE23, ODE45, RODAS, SIGN, THRESHOLD
+
+from fmus.packaging.written import written
+
+FILES = {path.stem: path for path in LARGER}
+HEAD = '''"""A model."""
+from fmus import *
+
+class Mine(Model):
+    """Blocks and springs."""
+
+    k = Parameter(300.0, "N/m", "stiffness of a spring", low=0.0)
+    m = Parameter(1.0, "kg", "mass of one", above=0.0)
+    u = Parameter(0.2, "m/s", "speed of the driver")
+'''
+
+
+@pytest.fixture
+def mine(tmp_path):
+    """mine(body): a model whose class goes on with these lines, written out."""
+
+    def make(*body):
+        path = tmp_path / "mine.py"
+        path.write_text(HEAD + "".join(f"    {line}\n" for line in body))
+        return written(path)()
+
+    return make
+
+
+def body(name, force, mass):
+    """The lines that declare position and speed of a body, and that of its acceleration."""
+    return [
+        f'x{name} = State("m", "position of {name}")',
+        f'v{name} = State("m/s", "speed of {name}", rate_of=x{name})',
+    ], f'a{name} = Output("m/s2", "acceleration of {name}", ({force}) / ({mass} * m), rate_of=v{name})'
+
+
+def contact(name, slip, slide, hold):
+    return [
+        f"mode{name} = Mode()",
+        f'F{name} = Contact("N", "friction {name}", mode=mode{name}, slip={slip}, slide={slide}, hold={hold})',
+    ]
+
+
+DRIVER = 'p = State("m", "driver", rate=u)'
+
+
+def events(model, method, rtol, stop):
+    """Time and modes at the end of each step that an event ends, and all ends of steps with their states and modes."""
+    begun(model, {"solver.method": method, "solver.rtol": rtol, "solver.atol": 1e-3 * rtol}, stop)
+    start(model, model.initial(0.0), stop)
+    step, found, rows = model.solver.step, [], []
+    while step.t1 < stop:
+        assert step.take(model) == 0
+        rows.append((step.t1, spelled(step, model.states), spelled(step, model.contacts)))
+        if step.event:
+            found.append((step.t1, *rows[-1][2]))
+    return found, rows
+
+
+def test_what_happens_twice_at_one_time_is_one_event(mine):
+    """Two equal sleds on two equal springs, pulled alike, have the same bits."""
+    (one, a), (two, b) = body("1", "k * (p - x1) - F1", 12.5), body("2", "k * (p - x2) - F2", 12.5)
+    both = contact("1", "v1", 20.0, 30.0) + contact("2", "v2", 20.0, 30.0)
+    found, rows = events(mine(*one, *two, DRIVER, *both, a, b), DOP853, 1e-10, 8.0)
+    assert len(found) > 5
+    assert all(first == second for _, first, second in found)
+    assert all(x1 == x2 and v1 == v2 for _, (x1, v1, x2, v2), _ in rows)
+
+
+def test_two_riders_on_one_carrier_let_go_and_stop_together(mine):
+    (carrier, a), (one, b) = body("0", "F1 + F2 - 3.0 * k * x0", 3.0), body("1", "k * (p - x1) - F1", 1.3)
+    two, c = body("2", "k * (p - x2) - F2", 1.3)
+    both = contact("1", "v1 - v0", 7.0, 10.0) + contact("2", "v2 - v0", 7.0, 10.0)
+    found, rows = events(mine(*carrier, *one, *two, DRIVER, *both, a, b, c), DOP853, 1e-10, 8.0)
+    assert len(found) > 5
+    assert all(first == second for _, first, second in found)
+    assert max(abs(y[2] - y[4]) for _, y, _ in rows) < 1e-12
+
+
+def test_the_order_of_declaration_does_not_matter(mine):
+    """Three blocks upon each other, driven from both sides: at first all bear the same, and may hold as much."""
+    laws = {"1": "F2 - F1 - k * x1", "2": "F3 - F2", "3": "k * (p - x3) - F3"}
+    contacts = {"1": ("v1", 10.0, 14.0), "2": ("v2 - v1", 10.0, 14.0), "3": ("v3 - v2", 8.0, 14.0)}
+    models = []
+    for order in "123", "312":
+        bodies = [body(name, laws[name], 2.0) for name in order]
+        lines = [line for states, _ in bodies for line in states] + [DRIVER]
+        lines += [line for name in order for line in contact(name, *contacts[name])] + [law for _, law in bodies]
+        models.append((mine(*lines), order))
+    for method in ODE45, DOP853, RODAS:
+        seen = []
+        for model, order in models:
+            found, _ = events(model, method, 1e-9, 6.0)
+            seen.append([(t, *(modes[order.index(name)] for name in "123")) for t, *modes in found])
+        first, other = seen
+        assert len(first) > 10
+        assert [modes for _, *modes in other] == [modes for _, *modes in first]
+        assert np.abs(np.array([t for t, *_ in other]) - [t for t, *_ in first]).max() < 1e-8
+
+
+STEPS = [(DOP853, 1e-3), (DOP853, 1e-6), (DOP853, 1e-9), (ODE45, 1e-4), (ODE23, 1e-3), (RODAS, 1e-4)]
+
+
+@pytest.mark.parametrize(("method", "rtol"), STEPS)
+def test_a_load_that_peaks_inside_a_step_is_found(mine, method, rtol):
+    """A free mass shakes a block that friction holds, by up to 10 N: 10 % to 0.01 % more than it holds, or to what the
+    method knows."""
+    (free, a), (held, b) = body("1", "-k * (x1 - x2)", 1.0), body("2", "k * (x1 - x2) - F2", 5.0)
+    hold = 'most = Parameter(9.0, "N", "what is held", above=0.0)'
+    free[1] = free[1].replace('"speed of 1"', '"speed of 1", start=1.0')
+    model = mine(hold, *free, *held, *contact("2", "v2", "0.9 * most", "most"), a, b)
+    model.k = 100.0
+    inside = 0
+    for i in range(100):
+        model.most = 10.0 * (1.0 - max(10.0 ** -(1.0 + 3.0 * i / 100), 3.0 * rtol))
+        found, rows = events(model, method, rtol, 1.0)
+        assert found, model.most
+        assert abs(found[0][0] - asin(model.most / 10.0) / 10.0) < max(30.0 * rtol, 1e-8) ** 0.5
+        before = [t for t, _, _ in rows if t < found[0][0]]
+        inside += model.solver.step.methods.stages > 0 and (before[-1] if before else 0.0) < found[0][0] - 1e-3
+    assert inside > 50
+
+
+GAUSS = np.polynomial.legendre.leggauss(8)
+
+
+def integrated(model, power, stop):
+    """The integral of what `power` makes of each state and the forces there, over all steps of a run."""
+    begun(model, {"solver.method": DOP853, "solver.rtol": 1e-12, "solver.atol": 1e-15, "solver.h_max": 0.02}, stop)
+    start(model, model.initial(0.0), stop)
+    step, total = model.solver.step, 0.0
+    modes = [mode + ("_" if mode[-1].isdigit() else "") + "0" for mode in model.contacts]
+    while step.t1 < stop:
+        assert step.take(model) == 0
+        h = step.t1 - step.t0
+        for place, weight in zip(*GAUSS, strict=True):
+            t = step.t0 + 0.5 * h * (1.0 + place)
+            y = step.at(model, t)
+            forces = model.forces(t, *y, *(getattr(step, mode) for mode in modes))[: len(modes)]
+            total += 0.5 * h * weight * np.array(power(t, y, forces))
+    return total, spelled(step, model.states)
+
+
+def test_a_clutch_keeps_momentum_and_loses_what_slips():
+    """Over its engagement as well: what the torques bring, and what friction takes."""
+
+    def power(t, y, forces):
+        a, b = y
+        first, second = 20.0 - 0.05 * a, 5.0 + 0.2 * b
+        return first - second, first * a - second * b - forces[0] * (a - b)
+
+    (impulse, work), (a, b) = integrated(written(FILES["clutch"])(), power, 4.0)
+    assert 0.5 * a + 1.5 * b == pytest.approx(25.0 + impulse, abs=1e-10)
+    assert 0.25 * a * a + 0.75 * b * b == pytest.approx(625.0 + work, abs=1e-9)
+
+
+def test_a_block_upon_a_block_gains_what_is_pulled_and_loses_what_slips():
+    def power(t, y, forces):
+        _, v1, x2, v2 = y
+        return 400.0 * (0.2 * t - x2) * v2 - forces[0] * v1 - forces[1] * (v2 - v1)
+
+    work, (x1, v1, _, v2) = integrated(written(FILES["blocks"])(), power, 8.0)
+    assert 2.0 * v1 * v1 + v2 * v2 + 75.0 * x1 * x1 == pytest.approx(work, abs=1e-9)
+
+
+def test_what_is_stuck_stays_where_it_is():
+    """The slip of a stuck contact is zero to the last bit at the end of every step."""
+    for name in ("belt", "clutch", "sleds", "blocks"):
+        model = written(FILES[name])()
+        _, rows = events(model, DOP853, 1e-9, model.stop_time)
+        held = 0
+        for t, y, modes in rows:
+            slips = np.ravel(model.slips(t, *y))
+            assert all(slip == 0.0 for slip, mode in zip(slips, modes, strict=True) if mode == 0)
+            held += 0 in modes
+        assert held > 5
+
+
+# ---- laws without modes
+
+LAWS = {
+    SIGN: ("laws=(HYBRID, SIGN)", lambda slip: np.sign(slip)),
+    THRESHOLD: ("laws=(HYBRID, THRESHOLD), eps=0.01", lambda slip: np.sign(slip) * (abs(slip) >= 0.01)),
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_laws_without_modes_look_at_each_slip(mine, law):
+    """The rates, outputs and Jacobian are those of the modes that the slips tell; held by threshold is no more than
+    the limit."""
+    words, told = LAWS[law]
+    (one, a), (two, b) = body("1", "F2 - F1 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
+    both = [line.replace("hold=", f"{words}, hold=") for line in contact("1", "v1", 9.0, 12.0)]
+    both += [line.replace("hold=", f"{words}, hold=") for line in contact("2", "v2 - v1", 6.0, 8.0)]
+    model, draw, clipped = mine(*one, *two, DRIVER, *both, a, b), np.random.default_rng(2), 0
+    assert model.prepare() == 0
+    for _ in range(200):
+        y = draw.uniform(-0.05, 0.05, 4) * [1.0, draw.choice([0.0, 0.1, 1.0]), 1.0, draw.choice([0.1, 1.0])]
+        model.friction = 1
+        slips = np.array(model.slips(0.0, *y))
+        modes = [int(told(slip)) for slip in slips]
+        forces = np.array(model.forces(0.0, *y, *modes)[:2])
+        if law == SIGN:
+            forces = np.sign(slips) * [9.0, 6.0]
+        limit = np.where(np.array(modes) == 0, [12.0, 8.0], np.inf)
+        clipped += bool(np.any(np.abs(forces) > limit))
+        forces = np.clip(forces, -limit, limit)
+        model.friction = law
+        expected = (forces[1] - forces[0] - 300.0 * y[0]) / 4.0, (-300.0 * y[2] - forces[1]) / 2.0
+        assert model.rates(0.0, *y, 0, 0) == pytest.approx(expected, abs=1e-11)
+        model.observe(0.0, *y, 0, 0)
+        assert (model.mode1, model.mode2) == tuple(modes)
+        assert pytest.approx(forces, abs=1e-11) == (model.F1, model.F2)
+    assert clipped == 0 or law == THRESHOLD
+    begun(model, {"solver.method": ODE23, "solver.rtol": 1e-3, "solver.atol": 1e-5, "u": 1.0}, 0.3)
+    start(model, model.initial(0.0), 0.3)
+    while model.solver.step.t1 < 0.3:
+        assert model.solver.step.take(model) == 0
+        assert not model.solver.step.event
