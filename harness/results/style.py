@@ -7,13 +7,16 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from matplotlib import rc_context
-from matplotlib.artist import Artist
-from matplotlib.axis import Tick
-from matplotlib.figure import Figure
-from matplotlib.text import Text
+from matplotlib import artist, rc_context
 
 from .files import heading
+
+artist.kwdoc = lambda artist: ""  # the lists of properties in all docstrings, a third of what is still to be imported
+
+from matplotlib.axes import Axes as Axes  # noqa: E402
+from matplotlib.axis import Tick  # noqa: E402
+from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.text import Text  # noqa: E402
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -65,9 +68,9 @@ def sheet(
         figure.savefig(path)
 
 
-def texts(artist: Artist) -> Iterator[Text]:
+def texts(within: artist.Artist) -> Iterator[Text]:
     """All texts in a figure but the numbers at its axes, where powers are set as mathematics."""
-    for child in artist.get_children():
+    for child in within.get_children():
         if isinstance(child, Text):
             yield child
         elif not isinstance(child, Tick):

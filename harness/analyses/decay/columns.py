@@ -221,7 +221,7 @@ def numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
     if isinstance(cells, np.ndarray):
         return cells
     try:
-        return np.array(cells, dtype="U").astype(float)
+        return np.array(cells, dtype=float)
     except ValueError:
         pass
     found = np.full(len(cells), np.nan)

@@ -31,7 +31,7 @@ class Model:
 
     def varied(self, p: np.ndarray, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The laws A, zeta, r, b (1 + V, 4) of p and of its V small changes, their places in p (V,) and sizes (V,)."""
-        places = unknowns[np.isin(unknowns, LAW)]
+        places = unknowns[(unknowns == AMPLITUDE) | (unknowns >= ZETA)]
         sizes = dict(
             zip(LAW.tolist(), (1e-6 * p[AMPLITUDE], 1e-7, 1e-7 * p[AMPLITUDE], 1e-6 / p[AMPLITUDE]), strict=True)
         )

@@ -9,6 +9,7 @@ import codecs
 import csv
 import re
 from collections import Counter
+from itertools import chain, pairwise
 
 from ...errors import SceneError
 from .units import COUNTS, known, time_size
@@ -92,12 +93,13 @@ def is_number(cell: str) -> bool:
 
 def first_of_numbers(rows: list[list[str]]) -> int | None:
     """The first of two rows of the file's usual width that are mostly numbers; a last row may be alone."""
-    widths = Counter(len(row) for row in rows if worth(row))
-    if not widths:
-        return None
-    width = widths.most_common(1)[0][0]
-    good = [len(row) == width and worth(row) > 0 for row in rows]
-    return next((i for i in range(len(rows)) if good[i] and all(good[i + 1 : i + 2])), None)
+    for some in (rows[len(rows) // 2 :][:SAMPLE], rows):
+        widths = Counter(len(row) for row in some if worth(row))
+        if widths:
+            width = widths.most_common(1)[0][0]
+            good = (len(row) == width and worth(row) > 0 for row in chain(rows, rows[-1:]))
+            return next((i for i, both in enumerate(pairwise(good)) if all(both)), None)
+    return None
 
 
 def headings(above: list[list[str]], width: int) -> list[str]:

@@ -4,12 +4,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
 from ...analyses.decay.fit import Identified
 from ...analyses.decay.law import Terms
 from ...analyses.decay.loss import Loss
-from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
+from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, label, sheet
 
 MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
 MOST = 4000  # points of a line: more are not seen
@@ -31,11 +30,10 @@ def signal(axes: Axes, found: Identified) -> None:
     """Record, fit, rest position, turning points, and what was left out."""
     record, t = found.record, found.t
     used = np.isin(record.t, t)
-    every = max(1, len(record.t) // (5 * MOST))
-    axes.plot(t[::every], found.x[::every], ".", color=BLUE, markersize=2.5, label="record", rasterized=True)
+    points(axes, t, found.x, color=BLUE, label="record")
     if not used.all():
-        axes.plot(record.t[~used][::every], record.x[~used][::every], ".", color=GREY, markersize=2.5, label="left out")
-    fine = np.linspace(t[0], t[-1], MOST)
+        points(axes, record.t[~used], record.x[~used], color=GREY, label="left out")
+    fine = np.linspace(t[0], t[-1], MOST) if len(t) < MOST else t[extremes(found.x)]
     axes.plot(fine, found.signal(found.best, fine), color=ORANGE, linewidth=0.9, label=f"fit: {found.best.words}")
     axes.plot(
         fine[[0, -1]], found.rest(found.best, fine[[0, -1]]), color=GREY, linestyle="--", linewidth=0.8, label="rest"
@@ -48,11 +46,27 @@ def signal(axes: Axes, found: Identified) -> None:
     axes.legend(loc="upper right", ncols=3)
 
 
+def points(axes: Axes, t: np.ndarray, x: np.ndarray, **style: Any) -> None:
+    """Samples, or of many those that show how far they reach."""
+    some = extremes(x)
+    axes.plot(t[some], x[some], ".", markersize=2.5, **style)
+
+
+def extremes(x: np.ndarray) -> np.ndarray:
+    """All samples of x (n,), or of many the lowest and the highest of each of MOST/2 stretches: what is left out lies
+    between those, whatever its period."""
+    if len(x) <= MOST:
+        return np.arange(len(x))
+    size = -(-2 * len(x) // MOST)
+    places = np.minimum(np.arange(0, len(x), size)[:, None] + np.arange(size), len(x) - 1)
+    low, high = x[places].argmin(axis=1), x[places].argmax(axis=1)
+    return np.unique([places[:, 0] + low, places[:, 0] + high])
+
+
 def residuals(axes: Axes, found: Identified) -> None:
     """Record less fit."""
     left = found.x - found.signal(found.best, found.t)
-    every = max(1, len(left) // (5 * MOST))
-    axes.plot(found.t[::every], left[::every], ".", color=BLUE, markersize=2.5)
+    points(axes, found.t, left, color=BLUE)
     axes.axhline(0, color="black", linewidth=0.6)
     axes.set_title(f"residuals (rms {found.rms:.3g} {found.record.unit})")
     axes.set_ylabel(label("record - fit", found.record.unit))

@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 
-from ...results.style import BLUE, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
+from ...results.style import BLUE, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet
 from ...running.run import Run
 
 BESIDE = ("phase", "steps")  # on the right; what is over time stands on the left, one below the other
