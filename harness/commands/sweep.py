@@ -4,12 +4,12 @@ import os
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..errors import LONGEST, HarnessError
-from .terminal import STOP, progress, results, tell
+from .terminal import anyones, progress, results, tell
 
 if TYPE_CHECKING:
     from ..studies.sweep.file import Swept
@@ -29,10 +29,10 @@ WORKERS = click.IntRange(1, 1024)
 )
 @click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the Latin hypercube.")
 @click.option("--measure", help="What to measure, with commas between (final, and events where the FMU counts them).")
-@STOP
 @click.option("--workers", type=WORKERS, default=lambda: os.cpu_count() or 1, help="Processes on this machine.")
 @click.option("--scheduler", metavar="ADDRESS", help="An existing Dask cluster, as in tcp://host:8786.")
 @click.option("--name", help="Name of the result folder.")
+@anyones
 @results
 def sweep(
     model: str,
@@ -41,13 +41,13 @@ def sweep(
     random: int | None,
     seed: int,
     measure: str | None,
-    stop: float | None,
     workers: int,
     scheduler: str | None,
     name: str | None,
     out: Path,
     quiet: bool,
     as_json: bool,
+    **options: Any,
 ) -> None:
     """Run MODEL (a name, or the path of anyone's FMU) over many parameters, and measure every run.
 
@@ -69,7 +69,7 @@ def sweep(
     except ImportError as error:
         raise HarnessError(f"a sweep needs {error.name}: python -m pip install 'friction-fmus[sweep]'") from None
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
-    asked = sweep_file.Asked(model, vary, values, random, seed, measures, stop, name)
+    asked = sweep_file.Asked(model, vary, values, random, seed, measures, name, options)
     with progress(quiet or as_json, 1) as report:
         swept = sweep_file.carry_out(asked, out, scheduler, workers, partial(report, model))
     if as_json:

@@ -17,6 +17,7 @@ from zipfile import ZipFile
 
 import commands
 import deadly
+import foreign
 import numpy as np
 import pytest
 from builds import ROOT
@@ -96,7 +97,7 @@ def test_an_axis_that_is_none_is_refused(text, random):
 def test_the_instance_that_is_reset_gives_what_a_fresh_one_gives(fmus):
     """Also after a run that failed."""
     measures = ("final", "events", "slips", "period", "peak_speed", "stuck")
-    runs = Runs("stickslip", ("mu_d", "v_driver"), (), None, measures)
+    runs = Runs("stickslip", ("mu_d", "v_driver"), (), measures)
     spots = [[0.6, 0.034], [0.95, 0.034], [0.3, 0.1], [0.6, 0.034]]
     with ready(runs, fmus / "stickslip.fmu") as rerun:
         rows = [rerun.run(spot) for spot in spots]
@@ -111,11 +112,11 @@ def test_the_instance_that_is_reset_gives_what_a_fresh_one_gives(fmus):
 
 
 def test_decay_measures_are_those_of_the_parameters(fmus):
-    with ready(Runs("coulomb", ("f",), (), None, ("rest", "f_over_k")), fmus / "coulomb.fmu") as rerun:
+    with ready(Runs("coulomb", ("f",), (), ("rest", "f_over_k")), fmus / "coulomb.fmu") as rerun:
         rest, ratio = rerun.run([2.0])
     assert ratio == pytest.approx(2 / 157.9, rel=1e-3)
     assert abs(rest) <= 2 / 157.9
-    with ready(Runs("smd", ("c",), (), None, ("zeta",)), fmus / "smd.fmu") as rerun:
+    with ready(Runs("smd", ("c",), (), ("zeta",)), fmus / "smd.fmu") as rerun:
         assert rerun.run([1.0]) == pytest.approx([1 / (2 * sqrt(157.9))], rel=1e-5)
 
 
@@ -155,6 +156,41 @@ def test_failed_runs_leave_their_sentence_on_the_screen_in_the_files_and_in_the_
     assert np.isnan(data["final_x"].to_numpy()[4, 1])
     assert json.loads(data.attrs["parameters"])["k"] == 100.0
     assert pandas.read_csv(tmp_path / "results/sweep/mine/sweep.csv")["final_x [m]"].isna().sum() == 6
+
+
+TOLD = {  # why some have no run to show
+    "Falling": "it ends itself: fmi2DoStep answered Discard",
+    "Breaking": "breaks the FMI standard in 2 places",
+}
+
+
+@pytest.mark.parametrize("name", foreign.VARY)
+def test_an_fmu_of_anyone_is_swept_or_says_why_not(harness, tmp_path, name):
+    """Numbers alone are measured: of arrays each element, of texts nothing."""
+    vary = foreign.VARY[name].replace(":3", ":2")
+    done = harness(
+        "sweep", foreign.built() / f"{name}.fmu", "--vary", vary, "--measure", "final,largest", "--name", "a"
+    )
+    if name in TOLD:
+        assert (done.returncode, TOLD[name] in done.stderr) == (1, True)
+        return
+    assert (done.returncode, done.stderr) == (0, "")
+    data = opened(tmp_path / "results/sweep/a").drop_vars("error")
+    assert len(data.data_vars) >= 2
+    for measured in data.data_vars.values():
+        assert np.isfinite(measured.to_numpy()).all()
+    assert any(len(set(measured.to_numpy().tolist())) == 2 for measured in data.data_vars.values())
+
+
+def test_runs_of_anyone_s_fmu_that_crash_or_fail_are_sentences_among_many(harness, tmp_path):
+    """With kind 0 it does well, with 2 it crashes, with 6 it fails."""
+    trouble = foreign.built() / "Trouble.fmu"
+    done = harness("sweep", trouble, "--vary", "kind=2,6,0", "--name", "a", "--workers", 2)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: 2 of 3 runs failed")
+    assert "its binary has crashed" in done.stderr
+    error = opened(tmp_path / "results/sweep/a")["error"].to_numpy().tolist()
+    assert [bool(sentence) for sentence in error] == [True, True, False]
 
 
 def test_sweeps_of_different_ranges_have_folders_of_their_own(harness, tmp_path):
@@ -352,7 +388,7 @@ def test_what_a_sweep_gets_wrong_is_one_sentence(harness, tmp_path, arguments, s
 
 
 def test_the_fmu_belongs_to_what_tells_a_sweep_from_any_other():
-    runs = Runs("smd", ("m",), (), None, ("final",))
+    runs = Runs("smd", ("m",), (), ("final",))
     one, two = (Sweep(runs, Points((Axis("m", (1.0, 2.0)),)), fmu, 2) for fmu in (b"a", b"b"))
     assert one.key != two.key
     assert one.key == replace(two, fmu=b"a").key
@@ -393,7 +429,8 @@ def test_a_damaged_journal_is_told_and_the_runs_are_done_again(harness, tmp_path
     assert harness(*arguments, "--out", "whole").returncode == 0
     (tmp_path / "results/sweep").mkdir(parents=True)
     points = Points((axis("m=1:2:4", False),))
-    sweep = Sweep(Runs("smd", ("m",), (), None, ()), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
+    usual = ("exchange", False), ("lenient", False), ("patience", 60.0), ("stop", None), ("tolerance", 1e-6)
+    sweep = Sweep(Runs("smd", ("m",), (), (), usual), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
     sweep.journal(tmp_path / "results/sweep").path.write_bytes(b"garbage\n" + line(0, [[1.0]], {}))
     done = harness(*arguments)
     assert (done.returncode, done.stderr) == (0, "")
@@ -412,7 +449,7 @@ def test_a_journal_that_cannot_be_used_is_told(tmp_path):
 def test_a_run_that_kills_its_worker_is_found_and_told_and_the_others_are_done(monkeypatch):
     """Whatever block it is in, and whatever else was under way meanwhile."""
     monkeypatch.setattr(study, "work", deadly.work)
-    sweep = Sweep(Runs("deadly", ("a",), (), None, ()), Points((axis("a=0:39:40", False),)), b"", 1)
+    sweep = Sweep(Runs("deadly", ("a",), (), ()), Points((axis("a=0:39:40", False),)), b"", 1)
     found = {}
     with study.crew(None, 2, 40) as hands:
         for block in study.Shift(sweep, hands, [(0, 40)]).finished():
@@ -428,7 +465,7 @@ def test_what_is_held_in_memory_does_not_grow_with_the_runs(monkeypatch, tmp_pat
     peaks = []
     for many in (20, 200):
         axes = axis(f"a=0:1:{many}", False), axis("b=0:1:100", False)
-        sweep = Sweep(Runs("many", ("a", "b"), (), None, ()), Points(axes), b"", 1)
+        sweep = Sweep(Runs("many", ("a", "b"), (), ()), Points(axes), b"", 1)
         labels = dict.fromkeys(("a", "b"), ("m", ""))
         about = writing.About(labels, (writing.Column("c", "s", "some"),), {}, 1.0, ())
         folder = tmp_path / str(many)

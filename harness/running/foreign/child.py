@@ -31,6 +31,7 @@ class Life:
     def __init__(self, room: Path, patience: float) -> None:
         self.hung, self.share = (room / HUNG).open("w"), (room / SHARE).open("w")
         self.patience, self.next, self.last = patience, 0.0, 0.0
+        self.parent = os.getppid()
 
     def heed(self, share: float | None = None) -> None:
         """So far is the pass, as a share of it."""
@@ -38,6 +39,8 @@ class Life:
         if now < self.next:
             return
         self.next = now + OFTEN
+        if os.getppid() != self.parent:  # it was killed, and nobody waits
+            os._exit(1)
         faulthandler.dump_traceback_later(self.patience, exit=True, file=self.hung)
         self.last = self.last if share is None else share
         self.share.seek(0)

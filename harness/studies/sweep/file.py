@@ -33,7 +33,7 @@ from ...scenes.fmus import check_built, fmu_of
 from .boundaries import Boundary, known
 from .journal import Block, Journal
 from .measures import Column
-from .rerun import Runs, ready
+from .rerun import Runs, ready, specified
 from .space import Points, axis
 from .study import Sweep, perform
 
@@ -45,7 +45,7 @@ NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
 
 @dataclass(frozen=True)
 class Asked:
-    """What the user asks for; `vary` and `values` as texts like m=1:2:11 and k=100."""
+    """What the user asks for; `vary` and `values` as texts like m=1:2:11 and k=100, `options` of a Specification."""
 
     model: str
     vary: tuple[str, ...]
@@ -53,8 +53,8 @@ class Asked:
     random: int | None
     seed: int
     measures: tuple[str, ...]
-    stop: float | None
     name: str | None
+    options: dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,8 @@ def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, repo
     if len(set(names)) < len(names):
         raise SceneError("--vary names a parameter twice")
     points = Points(axes, asked.random, asked.seed)
-    runs = Runs(file.stem, names, tuple(map(assigned, asked.values)), asked.stop, asked.measures)
+    values, options = map(assigned, asked.values), sorted(asked.options.items())
+    runs = Runs(file.stem, names, tuple(values), asked.measures, tuple(options))
     about = describe(runs, points, file)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
     kept = sweep.journal(out / FOLDER)
@@ -129,7 +130,8 @@ def describe(runs: Runs, points: Points, file: Path) -> About:
 
     Some first runs show what is wrong with it before workers are started.
     """
-    variables = {variable.name: variable for variable in description(file).modelVariables}
+    said = description(file, specified(runs, file).lenient)
+    variables = {variable.name: variable for variable in said.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
     for each in points.axes:
         if each.name not in settable:

@@ -26,14 +26,14 @@ from .measures import AT_END, OF_OUTPUTS, ON_PATH, PIECES, USUAL, Column, column
 
 @dataclass(frozen=True)
 class Runs:
-    """What the runs of a sweep share: the `varied` names, `values` and `stop` (None: the FMU's) for all, `measures`
-    (none: the usual ones)."""
+    """What the runs of a sweep share: the `varied` names, the `values` of others, `measures` (none: the usual ones),
+    and what else a Specification holds, by name."""
 
     model: str
     varied: tuple[str, ...]
     values: tuple[tuple[str, float | str], ...]
-    stop: float | None
     measures: tuple[str, ...]
+    options: tuple[tuple[str, Any], ...] = ()
 
 
 class Runner(Protocol):
@@ -173,11 +173,16 @@ def chosen(runs: Runs, variables: dict[str, Any], ours: bool) -> tuple[str, ...]
     return runs.measures or tuple(name for name in USUAL if name in there)
 
 
+def specified(runs: Runs, file: Path) -> Specification:
+    """What all of them run."""
+    return Specification(file, values=dict(runs.values), follow=False, **dict(runs.options))
+
+
 @contextmanager
 def ready(runs: Runs, file: Path) -> Iterator[Runner]:
     """The FMU in a file, ready to run; what it writes to standard error through Python is kept back."""
-    found = description(file)
-    wanted = Specification(file, values=dict(runs.values), stop=runs.stop, follow=False)
+    wanted = specified(runs, file)
+    found = description(file, wanted.lenient)
     with redirect_stderr(io.StringIO()):
         if any_fmu.shows_steps(found):
             with instance(wanted, callbacks()[0]) as (_, fmu):
