@@ -14,7 +14,7 @@ from .edition import FMI2, Edition
 from .reference import INSIDE, Reference, integrated
 from .units import unit_of
 
-GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "pi": "pi"}
+GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
 STYLE = Path(__file__).with_name("page.css")
 WAYS = """\
 <p>Parameters may be changed at every communication point, those marked <i>fixed</i> only before initialisation ends.

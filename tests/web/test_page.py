@@ -5,14 +5,15 @@ import re
 from dataclasses import replace
 from math import pi, sqrt
 
-import builds
 import native_fmus
 import pytest
 import web_page
 from builds import ROOT
 from models import AUTHORED, LARGER, MODELS, declared, parameters
 
+from fmus.packaging.catalogue import find
 from fmus.packaging.web.page import HERE, MODULES
+from fmus.packaging.web.portrait import bodies
 from harness.running.fmu import simulate
 from harness.running.specification import of_scene
 from harness.scenes.scene import load, shipped
@@ -208,7 +209,7 @@ def test_a_body_pulled_while_it_runs_feels_a_force_until_it_is_let_go(page, name
     page.click("#play")
     changes = page.settled("bench.state().changes")
     assert {change["name"] for change in changes} == {body["input"]}
-    assert max(change["value"] for change in changes) > 0
+    assert any(change["value"] for change in changes)
     assert changes[-1]["value"] == 0
     apart = "bench.desk.runs.one.columns[p].at(-1) !== bench.desk.runs.before.columns[p].at(-1)"
     assert page.run(f"(p => {apart})({body['position']!r})")
@@ -256,7 +257,7 @@ def test_what_the_fmu_refuses_is_told_in_its_own_sentence(page):
 
 
 def test_every_published_case_measures_what_the_terminal_does(page):
-    """To the digits that are shown, but where chatter makes the steps hang on rounding; and beside the same figures."""
+    """To a per mille, but where chatter makes the steps hang on rounding; and beside the same figures."""
     page.open()
     names = page.run("[...bench.desk.presets.keys()]")
     scenes = {scene.name: scene for scene in map(load, shipped()) if scene.published}
@@ -280,7 +281,7 @@ def test_every_published_case_measures_what_the_terminal_does(page):
                 size, *unit = measured.replace("\N{MIDDLE DOT}", ".").split()
                 there = quantities[figure]
                 value = there.in_unit(*unit) if unit and unit != [there.unit] else there.value
-                assert float(size) == pytest.approx(value, rel=2e-4), (name, figure)
+                assert float(size) == pytest.approx(value, rel=1e-3), (name, figure)
 
 
 # ---- what is taken away
@@ -313,14 +314,25 @@ def test_paper_is_white_and_everything_is_on_it(page):
 # ---- of anybody
 
 
-def test_models_of_users_run_and_are_drawn_by_what_they_declare(browser, tmp_path):
-    files = [path for path in (*AUTHORED, *LARGER) if path.stem != "sleds"]
-    out = builds.build(ROOT, tmp_path, "--web", *map(str, files), timeout=600)
-    page = web_page.Page(browser, out / "index.html")
-    kinds = {}
-    for path in files:
+def test_what_moves_in_any_model_is_read_from_its_declaration():
+    """Of every model that users might write: what kind each body is, and what acts on it."""
+    drawn = {path.stem: bodies(find(path).anatomy) for path in (*AUTHORED, *LARGER)}
+    kinds = {name: [body["kind"] for body in found] for name, found in drawn.items()}
+    assert kinds["viscous_pendulum"] == ["pendulum"]
+    assert kinds["rotor_brake"] == ["rotor"]
+    assert kinds["blocks"] == kinds["sleds"] == ["block", "block"]
+    assert kinds["clutch"] == ["none"]  # it has no position
+    assert {drawn[name][0]["friction"] for name in ("bumper", "lugre")} == {"F_drag", "F_friction"}  # smooth
+    assert drawn["sleds"][0]["linked"] == ["x2"]
+    assert drawn["viscous_pendulum"][0]["dampers"] == ["d"]
+
+
+def test_models_of_users_run_in_a_page_of_their_own(browser):
+    files = [ROOT / "tests" / "authored" / name for name in ("rotor_brake.py", "larger/blocks.py")]
+    page = web_page.Page(browser, web_page.built("users", *map(str, files)))
+    for path, count in zip(files, (1, 2), strict=True):
         page.open(f".model={path.stem}")
         assert page.run("bench.desk.runs.one.failure") == ""
-        kinds[path.stem] = page.run("bench.desk.portraits.get(bench.state().model).bodies[0].kind")
-        assert page.run("document.querySelectorAll('#mechanism .body').length") == 1
-    assert kinds == {"viscous_pendulum": "pendulum", "rotor_brake": "rotor", "bumper": "block", "lugre": "block"}
+        assert page.run("bench.desk.runs.one.events.length") > 2
+        assert page.run("document.querySelectorAll('#mechanism .body').length") == count
+        assert page.run("document.getElementById('body').parentElement.hidden") == (count == 1)

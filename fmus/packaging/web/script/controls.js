@@ -89,7 +89,9 @@ export class Choice {
   }
 
   fill(pairs, chosen) {
-    this.list.replaceChildren(...pairs.map(([value, text, title]) => make("option", { value, ...(title && { title }) }, text)));
+    const key = JSON.stringify(pairs);
+    if (key !== this.key) this.list.replaceChildren(...pairs.map(([value, text, title]) => make("option", { value, ...(title && { title }) }, text)));
+    this.key = key;
     this.list.value = String(chosen);
     this.element.hidden = pairs.length < 2;
   }

@@ -79,7 +79,7 @@ async function arrange() {
     fields.set(variable.name, { put: (value) => choice.fill(items(variable), value) });
     rows.fields.push(choice.element);
   }
-  const length = { name: "stop", symbol: "T", text: "length of the run", shown: "s", factor: 1, unit: "s", above: 0, start: portrait.stop, allowed: "above 0" };
+  const length = { name: ".stop", symbol: "T", text: "length of the run", shown: "s", factor: 1, unit: "s", above: 0, start: portrait.stop, allowed: "above 0" };
   fields.set(".stop", new Field(length, 0, (value) => { if (value > 0) { state.stop = value; state.t = Math.min(state.t, value); edited(); } }));
   rows.rare.push(fields.get(".stop").element);
   for (const [id, elements] of Object.entries(rows)) $$(id).replaceChildren(...elements);

@@ -15,6 +15,8 @@ const FIGURES = { // name of a figure -> words, unit
   x_n: ["last peak", "m"],
   sample_0: ["first peak, as sampled", "m"],
   sample_n: ["last peak, as sampled", "m"],
+  first_slip: ["first slip", "s"],
+  slip_time: ["duration of a slip", "s"],
   zeta: ["damping ratio", ""],
   f: ["friction force", "N"],
   T_f: ["joint torque", "N·m"],
@@ -85,7 +87,7 @@ function compared(name, figure, value) {
   const plain = typeof number === "number";
   const [size, small] = !plain && own === "s" && Math.abs(value) < 1 ? [1e3 * value, "ms"] : [value / factor, unit];
   const apart = plain && name !== "run_time" ? `${told(100 * (value / factor / number - 1), 2)} %` : name === "run_time" ? "elsewhere" : "";
-  return [words, `${told(size, digits)} ${small.replace(".", "·")}`, plain ? `${told(number, 6)} ${unit.replace(".", "·")}` : number, apart];
+  return [words, `${told(size, digits)} ${small.replace(".", "·")}`, `${number} ${plain ? unit.replace(".", "·") : ""}`.trim(), apart];
 }
 
 // What the turning points say.
@@ -124,6 +126,7 @@ export function events(desk, state) {
   const rows = one.events.slice(0, LISTED).map(({ t, row }, i) => [String(i + 1), String(t), body.mode ? word[one.columns[body.mode][row]] : ""]);
   const more = one.events.length - rows.length;
   const made = table("Events", ["", "t in s", "from then on it"], rows);
+  made.classList.add("long");
   if (more > 0) made.append(make("p", {}, `and ${more} more: the CSV file has them all.`));
   return made;
 }
