@@ -135,13 +135,19 @@ class CoupledFriction(DryFriction):
         modes, fit = self.settled(t, y, first, rest, near)
         return y, modes, fit
 
-    def begun(self, t, y: States, modes: Contacts, near) -> tuple[States, Contacts, bool]:
-        """The same where a motion begins, or values have changed, after these modes: what has a slip slides."""
+    def begun(self, t, y: States, modes: Contacts, near, reach) -> tuple[States, Contacts, bool]:
+        """The same where a motion begins, or values have changed, after these modes: what has a slip slides.
+
+        Of its size the share `near` is none where a contact was stuck, and the share `reach` where it is against the
+        direction of a slide.
+        """
         slips = self.slips(t, y)
         terms = self.slip_terms(t, y)
         rest, first = per_contact(), per_contact()
         for i in contacts:
-            known = near * (terms[i] + TOUCHING) if modes[i] * slips[i] <= 0.0 else NEAR * terms[i]
+            known = NEAR * terms[i]
+            if modes[i] * slips[i] <= 0.0:
+                known = (near if modes[i] == STUCK else reach) * (terms[i] + TOUCHING)
             rest[i], first[i] = MOVING, sign(slips[i])
             if fabs(slips[i]) <= known:
                 rest[i], first[i] = RESTING, STUCK

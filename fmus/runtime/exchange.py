@@ -20,6 +20,7 @@ from .rounding import ULP
 from .step import NEARLY
 from .vectors import Contacts, contacts, every, per_contact, per_state, places, slip, some, speeds
 
+BEHIND = 0.1  # share of a slip and what it is made of, by which an importer may find its end too late
 BEYOND, LEAST = 4.0 * ULP, 1e-300  # of the limit; of a speed and a force
 TOLERANCE = 1e-4  # taken for the importer's, which nobody tells, where solver.rtol is 0
 
@@ -111,7 +112,7 @@ def update(model, march):
     near = NEARLY * (march.rtol if march.rtol > 0.0 else TOLERANCE)
     another = changed = False
     if model.coupled:
-        y, modes, _fits = model.begun(march.t, march.y, march.modes, near)
+        y, modes, _fits = model.begun(march.t, march.y, march.modes, near, BEHIND)
         another, changed = some(y != march.y), some(modes != march.modes)
         march.y, march.modes = y, modes
     else:

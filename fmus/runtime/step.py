@@ -290,7 +290,7 @@ class Step:
         self.modes1, self.touches = STUCK, False
         if self.sticks:
             if model.coupled:
-                self.y1, self.modes1, self.fits = model.begun(self.t1, self.y1, modes, near)
+                self.y1, self.modes1, self.fits = model.begun(self.t1, self.y1, modes, near, near)
             else:
                 for i in contacts:
                     self.modes1[i] = model.settle(self.t1, self.y1, near, i)

@@ -1,0 +1,67 @@
+"""Several contacts in the hands of an importer's solver: the events that the equations have, by the numerics alone."""
+
+import numpy as np
+import pytest
+from arrays import begun, start
+from by_hand import BY_HAND, followed
+from models import DOP853, LARGER
+from scipy.integrate import solve_ivp
+
+from fmus.packaging.written import beside, written
+
+FILES = {path.stem: path for path in LARGER}
+
+
+def integrated(name, stop):
+    """Time and modes of each event, and the last state, by scipy with the indicators for events."""
+    model = written(FILES[name])()
+    exchange = beside(type(model), "runtime.exchange")
+    begun(model, {"solver.method": DOP853, "solver.rtol": 1e-10}, stop)
+    start(model, model.initial(0.0), stop)
+    march = model.solver
+    exchange.begin(march)
+
+    def at(t, y):
+        exchange.move_to(model, march, t)
+        exchange.put(model, march, list(map(float, y)))
+
+    def rates(t, y):
+        at(t, y)
+        return exchange.rates(model, march)
+
+    def indicator(i):
+        def left(t, y):
+            at(t, y)
+            return exchange.indicators(model, march)[i]
+
+        left.terminal, left.direction = True, -1
+        return left
+
+    t, y, events = 0.0, exchange.states(model, march), []
+    indicators = [indicator(i) for i in range(2 * len(model.contacts))]
+    while True:
+        run = solve_ivp(rates, (t, stop), y, "DOP853", events=indicators, rtol=1e-11, atol=1e-14, max_step=0.05)
+        t, y = run.t[-1], run.y[:, -1]
+        if run.status != 1:
+            return events, y
+        assert len(events) < 99
+        beyond = 1e-12 * (1.0 + t)  # where an importer's solver ends a step: the root lies behind it
+        t, y = t + beyond, y + beyond * np.array(rates(t, y))
+        at(t, y)
+        before = [getattr(march, mode) for mode in model.contacts]
+        exchange.update(model, march)
+        assert not exchange.update(model, march)
+        y = exchange.states(model, march)
+        modes = [getattr(march, mode) for mode in model.contacts]
+        if modes != before:
+            events.append((t, *modes))
+
+
+@pytest.mark.parametrize("name", BY_HAND)
+def test_modes_follow_at_the_events_that_an_importer_finds(name):
+    """Nothing changes the second time that it is asked for."""
+    true, end = followed(BY_HAND[name]())
+    events, found = integrated(name, BY_HAND[name].stop)
+    assert [modes for _, *modes in events] == [modes for _, *modes in true]
+    assert np.abs(np.array([t for t, *_ in events]) - [t for t, *_ in true]).max() < 1e-7
+    assert np.abs(np.array(found)[: len(end)] - end).max() < 1e-6
