@@ -29,7 +29,7 @@ def draw(found: Identified, loss: Loss, path: Path) -> None:
 def signal(axes: Axes, found: Identified) -> None:
     """Record, fit, rest position, turning points, and what was left out."""
     record, t = found.record, found.t
-    used = np.isin(record.t, t)
+    used = np.isin(record.t - found.problem.origin, found.problem.t)
     points(axes, t, found.x, color=BLUE, label="record")
     if not used.all():
         points(axes, record.t[~used], record.x[~used], color=GREY, label="left out")
@@ -53,14 +53,14 @@ def points(axes: Axes, t: np.ndarray, x: np.ndarray, **style: Any) -> None:
 
 
 def extremes(x: np.ndarray) -> np.ndarray:
-    """All samples of x (n,), or of many the lowest and the highest of each of MOST/2 stretches: what is left out lies
-    between those, whatever its period."""
+    """All samples of x (n,), or of many the first, the lowest and the highest of each of MOST/2 stretches: what is left
+    out lies between those, whatever its period."""
     if len(x) <= MOST:
         return np.arange(len(x))
     size = -(-2 * len(x) // MOST)
     places = np.minimum(np.arange(0, len(x), size)[:, None] + np.arange(size), len(x) - 1)
     low, high = x[places].argmin(axis=1), x[places].argmax(axis=1)
-    return np.unique([places[:, 0] + low, places[:, 0] + high])
+    return np.unique(places[:, 0] + [np.zeros_like(low), low, high])
 
 
 def residuals(axes: Axes, found: Identified) -> None:
