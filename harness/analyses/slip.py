@@ -48,7 +48,7 @@ def analyse(run: Run) -> Slips:
     driver = run.parameter("v_driver", "the analysis 'slip'")
     v = run.motion("velocity")
     if not driver:
-        raise HarnessError("the analysis 'slip' needs a driver that moves, and v_driver is 0 m/s")
+        raise HarnessError("the analysis 'slip' needs a driver that moves, and v_driver is 0 m/s: set it in [values]")
     ahead = v * np.sign(driver) - abs(driver)  # of the driver
     if run.events is not None and len(run.events.t) > 1:
         starts, durations = slips_of_modes(run.events.t, run.events.mode)

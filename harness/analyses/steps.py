@@ -12,7 +12,7 @@ NEAR = 5  # steps on either side of a reversal that belong to it
 def analyse(run: Run) -> StepSizes:
     """The step sizes of a run that followed its solver."""
     if run.steps is None or not len(run.steps.h):
-        raise HarnessError("the analysis 'steps' needs a run that follows the solver's own steps")
+        raise HarnessError("the analysis 'steps' needs a run that follows the solver's own steps: add follow = true")
     h = run.steps.h
     collapse = None
     if "velocity" in run.wanted.motion:

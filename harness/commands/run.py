@@ -108,4 +108,4 @@ def shown(value: float | str) -> str:
 
 def figures(outcome: Any) -> dict[str, object]:
     """What a scene gave, for JSON."""
-    return {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error}
+    return {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error, "said": outcome.said}

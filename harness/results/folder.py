@@ -46,7 +46,7 @@ def replacing(folder: Path, ours: Collection[str], source: str = "") -> Iterator
         folder.parent.mkdir(parents=True, exist_ok=True)
         tidy(folder, ours)
     except OSError as error:
-        raise HarnessError(f"cannot write below {folder.parent}: {error.strerror}") from None
+        raise HarnessError(f"cannot write below {folder.parent}: {error.strerror}; choose another --out") from None
     fresh, lock = None, -1
     try:
         with later():
@@ -54,7 +54,7 @@ def replacing(folder: Path, ours: Collection[str], source: str = "") -> Iterator
         yield fresh
         swap(fresh, folder)
     except OSError as error:
-        raise HarnessError(f"cannot write {folder}: {error.strerror or error}") from None
+        raise HarnessError(f"cannot write {folder}: {error.strerror or error}; choose another --out") from None
     finally:
         with later():
             if fresh:

@@ -11,6 +11,7 @@ UNITS = {
 }
 
 UNEVEN = 0.1  # of an interval: beyond, its ends are told rather than its half
+MOST = 8  # digits, in which ends that are nearer to each other are alike
 
 
 @dataclass(frozen=True)
@@ -53,8 +54,8 @@ def interval(value: float, low: float, high: float) -> str:
     if value == 0:
         return f"< {high:.2g}"
     margin = max(below, above)
-    digits = min(max(ceil(log10(abs(value) / margin)) + 1, 1), 8) if margin > 0 else 8
-    if abs(above - below) <= UNEVEN * (above + below):
+    digits = min(max(ceil(log10(abs(value) / margin)) + 1, 1), MOST) if margin > 0 else MOST
+    if digits == MOST or abs(above - below) <= UNEVEN * (above + below):
         return f"{value:.{digits}g} ± {margin:.2g}"
     digits = max(digits, 2)
     return f"{value:.{digits}g} ({low:.{digits}g} to {high:.{digits}g})"

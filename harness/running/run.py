@@ -83,7 +83,9 @@ class Run:
         """A parameter's value in the run; HarnessError if the model has none of that name."""
         value = self.parameters.get(name)
         if not isinstance(value, float):
-            raise HarnessError(f"{purpose} needs the parameter '{name}', which {self.wanted.model} does not have")
+            raise HarnessError(
+                f"{purpose} needs the parameter '{name}', which {self.wanted.model} does not have: leave it out"
+            )
         return value
 
     def save(self, folder: Path) -> None:

@@ -61,7 +61,7 @@ def of_scene(scene: Scene) -> Specification:
     short = {name: getattr(scene, key) for key, name in SHORT.items() if getattr(scene, key) is not None}
     for name in short:
         if name in scene.values:
-            raise SceneError(f"{name} is set twice, in [values] and above")
+            raise SceneError(f"{name} is set twice, in [values] and above: leave one out")
     return Specification(
         fmu=scene.file,
         outputs=scene.outputs,

@@ -166,7 +166,7 @@ def again(told: dict[str, Any]) -> Scene:
         table["decay"] = {name: value for name, value in told["decay"].items() if value is not None}
         path, source, file = Path(told["name"]), str(told["source"]), Path(told["file"])
     except (AttributeError, KeyError, TypeError):
-        raise SceneError("its provenance.json holds no scene") from None
+        raise SceneError("its provenance.json holds no scene: run the command that stands there") from None
     return replace(build(path, table, source), file=file, name=path.name)
 
 

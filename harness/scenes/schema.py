@@ -25,6 +25,7 @@ from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn, overri
 
 from ..errors import SceneError, shown, unknown
 
+THERE = "`python -m harness list` shows the scenes that there are"
 LONGEST_TITLE = 200  # letters
 LARGEST = 1_000_000  # bytes of a file that somebody wrote
 Schema = TypeVar("Schema")
@@ -169,17 +170,17 @@ def read(path: Path) -> dict[str, Any]:
     """The table in a TOML file; SceneError in one sentence if there is none."""
     try:
         if path.exists() and not path.is_file():
-            raise SceneError(f"cannot read the scene {path}: not a file")
+            raise SceneError(f"cannot read the scene {path}: not a file; {THERE}")
         if path.stat().st_size > LARGEST:
-            raise SceneError(f"scene {path.stem}: more than {LARGEST} bytes are no scene")
+            raise SceneError(f"scene {path.stem}: more than {LARGEST} bytes are no scene; {THERE}")
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise SceneError(f"cannot read the scene {path}: {error.strerror}") from None
+        raise SceneError(f"cannot read the scene {path}: {error.strerror}; {THERE}") from None
     except UnicodeDecodeError:
-        raise SceneError(f"scene {path.stem}: not a text file in UTF-8") from None
+        raise SceneError(f"scene {path.stem}: not a text file in UTF-8: save it as one") from None
     except RecursionError:
         raise SceneError(f"scene {path.stem}: not valid TOML: brackets too deep in each other") from None
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"scene {path.stem}: not valid TOML: {error}") from None
     except ValueError:
-        raise SceneError(f"scene {path.stem}: an integer of thousands of digits") from None
+        raise SceneError(f"scene {path.stem}: an integer of thousands of digits: write it as in 1e300") from None

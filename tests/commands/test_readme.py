@@ -32,6 +32,7 @@ ELSEWHERE = {  # what takes long, or another machine, and the tests that have it
     "python -m harness importers": "hosts/test_importers.py",
     "python build_fmus.py --fmi 3": "support/fmi3_hosts.py",
     "python build_fmus.py --native": "support/native_fmus.py",
+    "python build_fmus.py --web": "support/web_page.py",
     "python build_fmus.py pacejka --method rodas --platform linux64": "packaging/test_lean.py",
     "python -m build_fmus stickslip": "packaging/test_wheel.py",
     "fmpy simulate fmus/stickslip.fmu": "models/test_conformance.py",

@@ -48,8 +48,8 @@ def fits(said, *headings):
     ("arguments", "headings"),
     [
         (("list",), ("scene", "couple")),
-        (("run", "stickslip"), ("measured", "0.430665996656  0.430665996656 s")),
-        (("run", "coulomb-sign"), ("half of smd's ms",)),
+        (("run", "stickslip"), ("measured", "0.430665996656  s      0.430665996656")),
+        (("run", "coulomb-sign"), ("ms    half of smd's",)),
         (("decay", "coulomb"), ("two peaks",)),
         (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), ("at t [s]",)),
     ],

@@ -11,9 +11,9 @@ from ...results.quantity import interval
 def table(found: Identified) -> Table:
     """Value and half of its 95 % interval, by the whole signal, by its turning points, and by two of them."""
     shown = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), title=found.record.name, title_justify="left")
-    shown.add_column("")
+    shown.add_column("", min_width=14)
     for head in ("whole signal", "turning points", "two peaks"):
-        shown.add_column(head, justify="right", no_wrap=True)
+        shown.add_column(head, justify="right", overflow="fold")
     shown.add_column("", no_wrap=True)
     turns = {each.name: each for each in found.by_turns}
     peaks = {each.name: each for each in found.published}

@@ -78,9 +78,9 @@ def steps(axes: Axes, run: Run, results: Results) -> None:
     axes.semilogy(run.steps.t[:-1], run.steps.h, color=BLUE, linewidth=0.6, marker=".", markersize=3)
     axes.set_title("step size of the solver")
     if "steps" in results:
-        mean = results["steps"].mean
+        mean, told = results["steps"].mean, " ".join(results["steps"].quantities[1].told())
         axes.axhline(mean, color=ORANGE, linestyle="--")
-        axes.set_title(f"step size of the solver (dashed: mean {1e3 * mean:.4g} ms)")
+        axes.set_title(f"step size of the solver (dashed: mean {told})")
     axes.set_xlim(*EDGES @ run.time[[0, -1]])
     axes.set_xlabel("t [s]")
     axes.set_ylabel("h [s]")

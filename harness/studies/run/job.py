@@ -88,7 +88,9 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
 def check_steps(scene: Scene, run: Run) -> None:
     """The FMU shows its solver's steps, where they are asked for."""
     if run.steps is None and "steps" in (*scene.analyses, *scene.plots):
-        raise SceneError(f"'steps' in analyses or plots: {scene.file.name} does not show the steps of its solver")
+        raise SceneError(
+            f"'steps' in analyses or plots: {scene.file.name} does not show the steps of its solver: leave it out"
+        )
 
 
 def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
@@ -104,7 +106,9 @@ def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
                 measured[name].in_unit(value[1])
             except KeyError:
                 unit = measured[name].unit
-                raise SceneError(f"published {name} in '{value[1]}' does not fit the measured '{unit}'") from None
+                raise SceneError(
+                    f"published {name} in '{value[1]}' does not fit the measured '{unit}': give it in that"
+                ) from None
 
 
 def published() -> list[str]:

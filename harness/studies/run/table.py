@@ -18,12 +18,15 @@ ALWAYS = ("steps", "mean_step", "run_time")  # shown in the main job even where 
 
 def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
     """One table for all outcomes; `everything`: also what has no published figure."""
-    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0, caption_justify="left")
+    outcomes = list(outcomes)
+    width = 5 if any(outcome.scene and outcome.scene.published for outcome in outcomes) else 3  # columns
+    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), caption_justify="left")
     table.add_column("", no_wrap=True)
     table.add_column("measured", justify="right", no_wrap=True)
-    table.add_column("published", justify="right", min_width=15)
     table.add_column("", no_wrap=True)
-    table.add_column("difference", justify="right", no_wrap=True)
+    if width == 5:
+        table.add_column("published", justify="right", min_width=15)
+        table.add_column("difference", justify="right", no_wrap=True)
     for outcome in outcomes:
         table.add_section()
         if outcome.scene is None or outcome.run is None:
@@ -31,40 +34,35 @@ def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
             continue
         figures = outcome.scene.published
         title = Text.assemble((outcome.name, "bold"), f"\n  {outcome.run.setting}")
-        table.add_row(title, "", Text("\n" + figures.get("source", ""), style="italic"))
+        table.add_row(title, *("", "", Text("\n" + figures.get("source", ""), style="italic"))[: width - 1])
         for quantity in outcome.quantities:
             if everything or quantity.name in figures or quantity.name in ALWAYS:
-                table.add_row(*map(Text, row(quantity, figures.get(quantity.name))))
-                if quantity.name == "run_time" and quantity.name in figures:
-                    table.caption = ELSEWHERE
+                cells = row(quantity, figures.get(quantity.name))
+                table.add_row(*map(Text, cells[:width]))
+                table.caption = ELSEWHERE if cells[-1] == "elsewhere" else table.caption
     return table
 
 
 def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
-    """Text, measured, published, unit and difference; in the unit of the published figure where it has one."""
+    """Text, measured, unit, published and difference; in the unit of the published figure where it has one."""
     text, value, unit = f"  {quantity.text}", quantity.value, quantity.unit
     if isinstance(figure, tuple):
         figure, unit = figure
         value = quantity.in_unit(unit)
     if not isinstance(figure, int | float):
         measured, unit = quantity.told()
-        return text, measured, str(figure or ""), unit, ""
+        return text, measured, unit, str(figure or ""), ""
     published = repr(figure)
     measured = spelled(value, max(5, len(published.replace(".", "").lstrip("0"))))
     difference = f"{100 * (value / figure - 1):+.2g} %" if figure else ""
-    return (
-        text,
-        measured,
-        published,
-        "" if unit == "1" else unit,
-        "elsewhere" if quantity.name == "run_time" else difference,
-    )
+    difference = "elsewhere" if quantity.name == "run_time" else difference
+    return text, measured, "" if unit == "1" else unit, published, difference
 
 
 def save(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) -> None:
     """Write what the table shows of a scene as CSV, with the source of the published figures in its heading."""
     told = [(text.strip(), *cells) for text, *cells in (row(each, published.get(each.name)) for each in quantities)]
     if not published:
-        write_rows(path, ["", "measured", "unit"], ((text, measured, unit) for text, measured, _, unit, _ in told))
+        write_rows(path, ["", "measured", "unit"], (cells[:3] for cells in told))
         return
-    write_rows(path, ["", "measured", f"published ({published['source']})", "unit", "difference"], told)
+    write_rows(path, ["", "measured", "unit", f"published ({published['source']})", "difference"], told)
