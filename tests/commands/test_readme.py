@@ -46,8 +46,9 @@ SCREEN = ("BROWSER", "DISPLAY", "WAYLAND_DISPLAY")
 BROWSER = "python -c 'import sys, urllib.request as web; web.urlretrieve(sys.argv[1], \"page.html\")' %s &"
 
 
-def scene():
-    return next(block[2] for block in BLOCKS if block[1] == "toml")
+(SCENE,) = (block[2] for block in BLOCKS if block[1] == "toml")
+(MODEL_FILE,) = (block[2] for block in BLOCKS if block[1] == "python" and "(Model)" in block[2])
+SCRIPTS = [block[2] for block in BLOCKS if block[1] == "python" and block[2] != MODEL_FILE]
 
 
 @pytest.fixture
@@ -59,8 +60,8 @@ def here(fmus, tmp_path):
     for name, file in (("a.fmu", "smd.fmu"), ("b.fmu", "coulomb.fmu")):
         shutil.copy(fmus / file, tmp_path / name)
     (tmp_path / "build_fmus.py").symlink_to(ROOT / "build_fmus.py")
-    (tmp_path / "my_scene.toml").write_text(scene())
-    (tmp_path / "cart.py").write_text(next(block[2] for block in BLOCKS if block[1] == "python"))
+    (tmp_path / "my_scene.toml").write_text(SCENE)
+    (tmp_path / "cart.py").write_text(MODEL_FILE)
     return tmp_path
 
 
@@ -150,6 +151,16 @@ def test_the_model_is_built_run_and_certified(here):
     assert validate_fmu(str(here / "cart.fmu")) == []
     assert (here / "cart.csv").is_file()
     assert (here / "results/cart/trajectory.csv").is_file()
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_the_lines_in_python_run_on_what_they_name(here, script):
+    pytest.importorskip("xarray", reason="extra sweep")
+    names = set(re.findall(r"results/sweep/(\w+)/", script))
+    for name in names:
+        typed(f"python -m harness sweep smd --vary c=1,2 --workers 1 --name {name}", here)
+    (here / "lines.py").write_text(script)
+    typed("python lines.py", here, MPLBACKEND="agg")
 
 
 def test_the_scene_is_measured_and_drawn(here):
