@@ -4,8 +4,7 @@
     extra/org.fmi-standard.fmi-ls-ref/<name>_out.csv          time and the states, by their names
 
 The numbers lie beside the file of the model, under its name: `belt.csv`, whose first line tells after a # how they were
-got and how well that agrees, the second what each column is.  Those of our own models stand in harness/references, with
-the script that made them.
+got and how well that agrees, the second what each column is.
 """
 
 import csv
@@ -17,12 +16,9 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ..runtime.declare import Declared
 from . import BuildError
-from .catalogue import FMUS
 from .document import document
 
-OURS = FMUS.parent / "harness" / "references"
 INSIDE = "extra/org.fmi-standard.fmi-ls-ref"
-VARIANTS = {"pacejka": "pacejka-0.01"}  # the file of the default values, where a model has several
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 STANDARD = {
     "name": "org.fmi-standard.fmi-ls-ref",
@@ -50,19 +46,8 @@ def reference(path: Path, declared: list[tuple[str, Declared]]) -> Reference | N
     laws: Any = next((meaning.items for variable, meaning in declared if variable == "friction"), ())
     if laws and "hybrid" not in [label for label, _, _ in laws]:
         return None
-    if path.parent.resolve() == FMUS:
-        return _ours(VARIANTS.get(path.stem, path.stem))
     beside = path.with_suffix(".csv")
     return _checked(beside, len(integrated(declared))) if beside.is_file() else None
-
-
-def _ours(name: str) -> Reference | None:
-    """Of one of our own models."""
-    if not (OURS / f"{name}.csv").is_file():
-        return None
-    _, *rows = _read(OURS / f"{name}.csv")
-    routes, difference = next(rest for known, *rest in _read(OURS / "agreement.csv") if known == name)
-    return Reference(rows, f"{routes}, relative difference {difference}")
 
 
 def _checked(file: Path, states: int) -> Reference:
@@ -83,11 +68,6 @@ def _is_row(row: list[str], states: int) -> bool:
         return len(row) == 1 + states and all(isfinite(float(word)) for word in row)
     except ValueError:
         return False
-
-
-def _read(file: Path) -> list[list[str]]:
-    with file.open(encoding="utf-8", newline="") as text:
-        return list(csv.reader(text))
 
 
 def integrated(declared: list[tuple[str, Declared]]) -> list[tuple[str, Declared]]:

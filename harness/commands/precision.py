@@ -12,12 +12,17 @@ from .terminal import answer, progress, results
 @results
 @click.option("--quick", is_flag=True, help="Three tolerances only, and little patience.")
 def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, quick: bool) -> None:
-    """Show what accuracy costs: error against run time and right-hand sides, for each MODEL (without one: all).
+    """Show what accuracy costs: error against run time and right-hand sides, for each MODEL (without one: all of ours).
+
+    A MODEL is a name, or the path of a file (belt.py, whose FMU lies beside it, or belt.fmu).  What somebody else has
+    not written a second time is held against its certified result (belt.csv, see references), or against two of its
+    own methods, where they agree.
 
     \b
     Examples:
       python -m harness precision
       python -m harness precision pacejka --quick
+      python -m harness precision path/to/belt.py
     """
     from ..studies.precision import table as tables
     from ..studies.precision.study import FULL, QUICK

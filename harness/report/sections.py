@@ -189,12 +189,13 @@ def sizes(folder: Path) -> Item:
 
 def precision(results: Path) -> Section:
     parts, missing, folder = [], [], results / "precision"
-    for model in MODELS:
+    others = sorted({file.stem for file in folder.glob("*.png")} - {*MODELS})
+    for model in (*MODELS, *others):
         if not (folder / f"{model}.png").is_file():
             missing.append((model, f"python -m harness precision {model}"))
             continue
         parts.append(read(folder / model, tradeoff))
-        if not (folder / f"{model}-exchange.csv").is_file():
+        if model in MODELS and not (folder / f"{model}-exchange.csv").is_file():
             again = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
             missing.append((f"{model} in model exchange", again))
     parts += whole(folder / "anchors.csv", "Anchors from the literature")
@@ -225,9 +226,7 @@ def endings(file: Path) -> Item:
     at = {name: i for i, name in enumerate(found.heads)}
     counts = Counter((row[at["model"]], row[at["method"]], row[at["ended"]]) for row in found.rows)
     kinds = sorted({ending for _, _, ending in counts})
-    pairs = sorted(
-        {(model, method) for model, method, _ in counts}, key=lambda pair: (list(MODELS).index(pair[0]), pair)
-    )
+    pairs = sorted({(model, method) for model, method, _ in counts})
     rows = tuple((*pair, *(str(counts[(*pair, kind)]) for kind in kinds)) for pair in pairs)
     picture = drawn(
         file.with_name("region.png"), "Steps of each method over the speed at the peak of the friction curve"

@@ -21,9 +21,10 @@ def write(path: Path, heads: Sequence[str], columns: Sequence[np.ndarray]) -> No
     write_rows(path, heads, zip(*(column.tolist() for column in columns), strict=True))
 
 
-def write_rows(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """The same of rows; None is left empty."""
+def write_rows(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]], first: str = "") -> None:
+    """The same of rows, below a `first` line if there is one; None is left empty."""
     with path.open("w", encoding="utf-8", newline="") as file:
+        file.write(first)
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(heads)
         writer.writerows(rows)

@@ -7,9 +7,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Answer:
-    """Positions and speeds `motion` (n, 2) at the n points asked for (SI units), changes of mode `events` as
-    (time in s, new mode), None where the solver was not asked for them, and the right-hand sides and Jacobians
-    that were evaluated."""
+    """The states `motion` (n, states), position and speed first, at the n points asked for (SI units), changes of mode
+    `events` as (time in s, new mode), None where the solver was not asked for them, and the right-hand sides and
+    Jacobians that were evaluated."""
 
     motion: np.ndarray
     events: list[tuple[float, int]] | None

@@ -61,13 +61,13 @@ class Inside:
         self.model.solver.start(self.model, 0.0, *self.model.initial(0.0), stop, self.model.tolerance)
 
     @property
-    def read(self) -> Callable[[Any], tuple[float, float]]:
-        """What tells position and speed at the present point of the solver."""
-        position, speed, *_ = self.model.states
-        return attrgetter(position, speed)
+    def read(self) -> Callable[[Any], tuple[float, ...]]:
+        """What tells the states at the present point of the solver; of a body, position and speed."""
+        names = list(self.model.states)
+        return attrgetter(*names) if len(names) > 1 else lambda march: (getattr(march, names[0]),)
 
-    def motion(self, times: list[float], patience: float | None = None) -> list[tuple[float, float]]:
-        """Position and speed at the times, from 0 s on; HarnessError if the run fails or outlasts `patience` s."""
+    def motion(self, times: list[float], patience: float | None = None) -> list[tuple[float, ...]]:
+        """The states at the times, from 0 s on; HarnessError if the run fails or outlasts `patience` s."""
         model, march = self.model, self.model.solver
         self.begin(times[-1])
         read = self.read
@@ -85,22 +85,27 @@ class Inside:
         return found
 
     def answer(self, times: list[float], patience: float | None = None) -> Answer:
-        """The same with counts, and with the changes of mode where friction is dry and hybrid."""
+        """The same with counts, and with the changes of mode where the friction of one contact is dry and hybrid."""
         motion = np.array(self.motion(times, patience))
         model = self.model
         model.solver.report(model.events)
         evaluations = model.solver.evaluations
-        return Answer(motion, self.events(times[-1]) if model.dry and model.solver.step.sticks else None, evaluations)
+        sticks = len(model.contacts) == 1 and model.solver.step.sticks
+        return Answer(motion, self.events(times[-1]) if sticks else None, evaluations)
 
     def events(self, stop: float) -> list[tuple[float, int]]:
         """Changes of mode up to the stop, seen by following the solver's own steps."""
-        model, march = self.model, self.model.solver
+        return self.modes(stop)[1:]
+
+    def modes(self, stop: float) -> list[tuple[float, int]]:
+        """The same after the mode at the start."""
+        model, march, (mode,) = self.model, self.model.solver, self.model.contacts
         self.begin(stop)
-        found: list[tuple[float, int]] = []
+        found: list[tuple[float, int]] = [(0.0, getattr(march, mode))]
         while march.t < stop:
             march.look_ahead(model)
             march.advance(model, march.t_next)
             march.report(model.events)
-            if model.events.count > len(found):
-                found.append((march.t, getattr(march, next(iter(model.contacts)))))
+            if model.events.count >= len(found):
+                found.append((march.t, getattr(march, mode)))
         return found

@@ -6,7 +6,9 @@ from ..errors import HarnessError, SceneError, unknown
 
 
 def fmu_of(name: str) -> Path:
-    """Where the FMU of a model is, or will be once it is built."""
+    """Where the FMU of a model is, or will be once it is built; a model is named, or is a file that lies anywhere."""
+    if (path := Path(name)).suffix in (".py", ".fmu"):
+        return path.with_suffix(".fmu")
     folders = (Path("fmus"), Path(__file__).parents[2] / "fmus")
     files = [file for folder in folders for file in folder.glob("*.fmu")]
     sources = [file for folder in folders for file in folder.glob("[!_]*.py")]

@@ -54,6 +54,13 @@ class Equations:
         return (t + (limit - direction * load) / abs(rate), direction) if rate else (inf, 0)
 
 
+class Unwritten(Equations):
+    """A model that nobody has written a second time: there is nothing to ask a peer."""
+
+    def __init__(self, stop: float) -> None:
+        self.stop = stop
+
+
 class Smd(Equations):
     """Spring, mass and viscous damper."""
 

@@ -1,12 +1,13 @@
 """The answer to compare with: the default experiment of each model under each law, certified, with its changes of mode.
 
-The numbers stand in harness/references/*.csv; __main__.py, which makes them, shares no code with the FMUs.
+The numbers lie beside the file of the model, as certified.py makes them: stickslip.csv, whose first line tells how, and
+stickslip-events.csv; those of other laws and values under more of a name, as stickslip-threshold.csv.
 """
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
+from math import nan
 from pathlib import Path
 
 import numpy as np
@@ -14,22 +15,25 @@ import numpy as np
 from ..running.answer import Answer
 from .problem import Coulomb, Equations, Pacejka, Pendulum, Reaction, Smd, Stickslip
 
-FOLDER = Path(__file__).parents[1] / "references"
+FOLDER = Path(__file__).parents[2] / "fmus"
+DOUBT = ", relative difference "  # before it stands how the numbers were got
 POINTS = 401  # common points of every run, start and stop included
 
 
 @dataclass(frozen=True)
 class Case:
-    """A model under one law: `values` to set in its FMU, the name of the `truth` of that law, the `problem` as peers
-    write it, and the name of the truth about `dry` friction if the law only approximates it."""
+    """A model under one law: `values` to set in its FMU, the `truth` of that law or its name, the `problem` as peers
+    write it, the name of the truth about `dry` friction if the law only approximates it, and the `outputs` that are the
+    states; the model is a name, or the path of a file."""
 
     name: str
     model: str
     law: str
-    truth: str
+    truth: "str | Reference"
     problem: Equations
     values: dict[str, float] = field(default_factory=dict)
     dry: str | None = None
+    outputs: tuple[str, ...] = ("x", "v")
 
     @property
     def chatters(self) -> bool:
@@ -37,40 +41,42 @@ class Case:
         return "friction" in self.values
 
     @property
-    def outputs(self) -> tuple[str, str]:
-        """The outputs that are position and speed."""
-        return ("theta", "omega") if self.problem.unit == "rad" else ("x", "v")
+    def reference(self) -> "Reference":
+        """The truth of the law."""
+        return load(self.truth) if isinstance(self.truth, str) else self.truth
 
 
 def magic(x_m: str) -> Case:
     """The sled with the magic formula."""
     problem, name = Pacejka(float(x_m)), f"pacejka-{x_m}"
-    return Case(name, "pacejka", f"magic formula, x_m = {x_m} m/s", name, problem, {"x_m": float(x_m)}, "stickslip")
+    truth = "pacejka" if x_m == "0.01" else name
+    return Case(name, "pacejka", f"magic formula, x_m = {x_m} m/s", truth, problem, {"x_m": float(x_m)}, "stickslip")
 
 
+THRESHOLD, REACTION, SWING = "stickslip-threshold", "pendulum-reaction", ("theta", "omega")
 CASES = (
     Case("smd", "smd", "linear damping", "smd", Smd()),
     Case("coulomb", "coulomb", "hybrid", "coulomb", Coulomb()),
     Case("coulomb-sign", "coulomb", "sign", "coulomb", Coulomb(), {"friction": 2}, "coulomb"),
     Case("stickslip", "stickslip", "hybrid", "stickslip", Stickslip()),
-    Case("stickslip-threshold", "stickslip", "threshold", "threshold", Stickslip(), {"friction": 3}, "stickslip"),
+    Case(THRESHOLD, "stickslip", "threshold", THRESHOLD, Stickslip(), {"friction": 3}, "stickslip"),
     *map(magic, ("0.01", "0.001", "0.0001")),
-    Case("pendulum", "pendulum", "hybrid, pin load weight", "pendulum", Pendulum()),
-    Case("pendulum-reaction", "pendulum", "hybrid, pin load reaction", "reaction", Reaction(), {"pin_load": 2}),
+    Case("pendulum", "pendulum", "hybrid, pin load weight", "pendulum", Pendulum(), outputs=SWING),
+    Case(REACTION, "pendulum", "hybrid, pin load reaction", REACTION, Reaction(), {"pin_load": 2}, outputs=SWING),
 )
 MODELS = tuple(dict.fromkeys(case.model for case in CASES))
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Positions and speeds `motion` (n, 2) at `times` (n,), and the `modes` (time in s, mode that holds from there on)
-    of which the first is the start; none where nothing sticks.  SI units.  `doubt` is the largest difference of the
-    two routes that led here, relative to the largest of each column."""
+    """The states `motion` (n, states), position and speed first, at `times` (n,), and the `modes` (time in s, mode that
+    holds from there on) of which the first is the start; none where nothing sticks.  SI units.  `doubt` is the largest
+    difference of the two routes that led here, relative to the largest of each column; `how` names them."""
 
-    name: str
     times: np.ndarray
     motion: np.ndarray
     modes: list[tuple[float, int]]
+    how: str
     doubt: float
 
     @property
@@ -92,18 +98,16 @@ class Errors:
 
 
 @cache
-def load(name: str) -> Reference:
+def load(name: str, folder: Path = FOLDER) -> Reference:
     """The reference of a name."""
-    table = np.loadtxt(FOLDER / f"{name}.csv", delimiter=",", skiprows=1)
-    modes = [(float(row["t [s]"]), int(row["mode"])) for row in rows(f"{name}-events.csv")]
-    doubt = {row["reference"]: float(row["difference [1]"]) for row in rows("agreement.csv")}[name]
-    return Reference(name, table[:, 0], table[:, 1:], modes, doubt)
-
-
-def rows(file: str) -> list[dict[str, str]]:
-    """The rows of a table by the names in its first line."""
-    with (FOLDER / file).open(encoding="utf-8", newline="") as text:
-        return list(csv.DictReader(text))
+    with (folder / f"{name}.csv").open(encoding="utf-8") as file:
+        how, told, doubt = file.readline().strip("# \n").partition(DOUBT)
+        times, *motion = np.loadtxt(file, delimiter=",", skiprows=1).T
+    events, modes = folder / f"{name}-events.csv", np.empty((0, 2))
+    if events.is_file():
+        modes = np.loadtxt(events, delimiter=",", skiprows=1, ndmin=2)
+    changes = [(t, int(mode)) for t, mode in modes.tolist()]
+    return Reference(times, np.array(motion).T, changes, how, float(doubt) if told else nan)
 
 
 def errors(answer: Answer, truth: Reference) -> Errors:
@@ -119,8 +123,14 @@ def errors(answer: Answer, truth: Reference) -> Errors:
 
 
 def relative(motion: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """The larger error of position and speed at each point (n,), relative to the largest of the true column."""
-    return (np.abs(motion - truth) / np.abs(truth).max(axis=0)).max(axis=1)
+    """The largest error of the states at each point (n,), relative to the largest of the true column."""
+    largest = np.abs(truth).max(axis=0)
+    return (np.abs(motion - truth) / np.where(largest > 0, largest, 1.0)).max(axis=1)
+
+
+def difference(one: Answer, other: Answer) -> float:
+    """The largest error of an answer, the first being the truth."""
+    return float(relative(other.motion, one.motion).max())
 
 
 def late(events: Sequence[tuple[float, int]], truth: Sequence[tuple[float, int]]) -> float:

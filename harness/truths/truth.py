@@ -4,7 +4,7 @@
     pacejka           scipy's Radau at 1e-11, restarted where a value changes: smooth.py
     pendulum          scipy's DOP853 at 1e-13, restarted at every change of mode or value: smooth.py
 
-Nothing is shared with the FMUs.
+Nothing is shared with the FMUs.  Of any other model two of its methods may agree: certified.py.
 """
 
 from collections.abc import Iterable, Iterator

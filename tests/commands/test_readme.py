@@ -150,6 +150,8 @@ def test_the_model_is_built_run_and_certified(here):
         typed(line, here)
     assert validate_fmu(str(here / "cart.fmu")) == []
     assert (here / "cart.csv").is_file()
+    heads, (_, first), *_, (_, last) = (line.split(",") for line in (here / "cart-events.csv").read_text().splitlines())
+    assert (heads, first, last) == (["t [s]", "mode"], "-1", "0")  # it is let go in front, and comes to rest
     assert (here / "results/cart/trajectory.csv").is_file()
 
 

@@ -1,5 +1,6 @@
 """Models of more states or contacts, from files as users write them: right by physics written a second time."""
 
+import commands
 import numpy as np
 import pytest
 from builds import of_file
@@ -32,6 +33,24 @@ def test_three_states_are_those_of_the_equations_written_by_hand(worker):
     (found,) = fmu.run([0.0, STOP], ["x", "v", "z"])[-1:]
     fmu.free()
     assert np.abs(np.array(found) - true).max() < 1e-9
+
+
+def test_a_certified_result_has_all_states_and_precision_takes_it(tmp_path):
+    """LuGre, by its own name for every column."""
+    folder = built("lugre", "").parent
+    for file in ("lugre.py", "lugre.fmu"):
+        (tmp_path / file).write_bytes((folder / file).read_bytes())
+    done = commands.harness(tmp_path, "references", "lugre.py")
+    assert (done.returncode, done.stderr) == (0, "")
+    _, heads, *rows = (tmp_path / "lugre.csv").read_text().splitlines()
+    assert heads == "t [s],x [m],v [m/s],z [m]"
+    table = np.array([row.split(",") for row in rows], float)
+    true = solve_ivp(lugre, (0.0, table[-1, 0]), (0.0, 0.0, 0.0), "Radau", rtol=1e-11, atol=1e-14).y[:, -1]
+    assert np.abs(table[-1, 1:] - true).max() < 1e-9
+    done = commands.harness(tmp_path, "precision", "lugre.py", "--quick")
+    assert (done.returncode, done.stderr) == (0, "")
+    kept = {"lugre.csv", "lugre.json", "lugre.png", "lugre.txt"}
+    assert {file.name for file in (tmp_path / "results/precision").iterdir()} == kept
 
 
 def run(fmu, physics, changes):

@@ -28,7 +28,7 @@ from tests.runtime.test_changes import spans
 
 fmus, worker, _workers = fmi3_hosts.FIXTURES
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
-TRUTHS = {name: load("pacejka-0.01" if name == "pacejka" else name) for name in MODELS}
+TRUTHS = {name: load(name) for name in MODELS}
 PEAK, FASTEST, DRIVER = 2.9546, 0.41736, 0.034  # acceleration, speed, speed of the driver: of the slipping sled, SI
 GROWTH = dict.fromkeys(MODELS, 1.0) | dict.fromkeys(("stickslip", "pacejka"), PEAK / DRIVER * 0.544 / FASTEST)
 EVENTS = ("events.count", "events.t_last")

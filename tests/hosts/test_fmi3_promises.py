@@ -37,7 +37,7 @@ REACH = dict.fromkeys(MODELS, 1e-13) | {"pendulum": 1e-9, "pacejka": 1e-6}  # by
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_default_experiment_in_fmpy_reaches_the_reference(worker, fmus, name):
-    truth = load("pacejka-0.01" if name == "pacejka" else name)
+    truth = load(name)
     interval = model_class(name).stop_time / (POINTS - 1)
     columns = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
     assert columns["time"] == truth.times.tolist()

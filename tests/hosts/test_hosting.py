@@ -37,7 +37,7 @@ def test_the_code_that_runs_is_the_code_in_the_fmu(fresh, fmus):
 
 def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, tmp_path):
     """The sled edited, rebuilt and run beside the one it was made from."""
-    for part in ("fmus", "harness/references", "build_fmus.py", "LICENSE", "pyproject.toml"):
+    for part in ("fmus", "build_fmus.py", "LICENSE", "pyproject.toml"):
         source = ROOT / part
         (shutil.copytree if source.is_dir() else shutil.copy)(source, tmp_path / part)
     file = tmp_path / "fmus" / "stickslip.py"

@@ -187,8 +187,7 @@ def check_signature(library, place):
 def test_builds_are_the_same_from_another_folder_with_another_cache(tmp_path, smd):
     """Not for win64, whose C runtime takes a new cache minutes to compile."""
     source = tmp_path / "another place"
-    for part in ("fmus", "harness/references"):
-        shutil.copytree(ROOT / part, source / part)
+    shutil.copytree(ROOT / "fmus", source / "fmus")
     for part in ("build_fmus.py", "LICENSE"):
         shutil.copy(ROOT / part, source)
     done = run(

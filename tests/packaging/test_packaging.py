@@ -75,8 +75,7 @@ def probe(*fmus, folder):
 def other_checkout(folder):
     """A copy of the project in another place."""
     ignored = shutil.ignore_patterns("*.fmu", "__pycache__")
-    for part in ("fmus", "harness/references"):
-        shutil.copytree(ROOT / part, folder / part, ignore=ignored)
+    shutil.copytree(ROOT / "fmus", folder / "fmus", ignore=ignored)
     for file in ("build_fmus.py", "LICENSE"):
         shutil.copy(ROOT / file, folder)
     return folder

@@ -10,7 +10,7 @@ from evidence import Piece, Trajectory
 from mpmath import mpf
 
 from harness.running.answer import Answer
-from harness.truths.__main__ import CLOSED, closed
+from harness.truths.making import CLOSED, closed
 from harness.truths.problem import Belt, Plain, Smoothed
 from harness.truths.reference import CASES, POINTS, errors, late, load
 
@@ -73,7 +73,7 @@ def held_below(eps, stop):
 
 
 def test_the_threshold_reference_is_the_double_next_to_its_pieces():
-    truth = load("threshold")
+    truth = load("stickslip-threshold")
     pieces = held_below(mpf(1e-7), 16)
     starts = [(t, mode) for t, mode, *_ in pieces]
     events = [after for before, after in pairwise(starts) if before[1] != after[1]]
@@ -88,7 +88,7 @@ def test_the_threshold_reference_is_the_double_next_to_its_pieces():
 
 @pytest.mark.parametrize("reaction", [False, True])
 def test_the_pendulum_references_agree_with_a_third_route(reaction):
-    truth = load("reaction" if reaction else "pendulum")
+    truth = load("pendulum-reaction" if reaction else "pendulum")
     swing = evidence_pendulum.Swing([(0.0, evidence_pendulum.Pendulum(reaction))], evidence_pendulum.THETA0, 0.0, 5.0)
     other = np.array([swing.at(float(t)) for t in truth.times])
     assert errors(Answer(other, swing.events, 0), truth).largest < 1e-11
@@ -114,6 +114,7 @@ def test_every_reference_covers_its_run_and_states_its_doubt(name):
     assert truth.motion.shape == (POINTS, 2)
     assert tuple(truth.motion[0]) == problem.start
     assert bool(truth.modes) == problem.dry
+    assert truth.how
     assert 0.0 < truth.doubt < 2e-11
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ...running.loops import POINTS, direct, shared
 from ...scenes.fmus import fmu_of
-from ...truths.reference import CASES, MODELS, load, relative
+from ...truths.reference import CASES, MODELS, relative
 from .in_c import NotHereError, Timing, built, cvode, runs
 from .measure import Beside, Measure
 
@@ -148,5 +148,5 @@ def through_fmpy(model: str, kind: str, steps: int) -> float:
 
 def off(case: str, found: Timing) -> float:
     """The largest error at the points of the reference, relative to the largest of position and speed."""
-    truth = load(CASE[case].truth)
+    truth = CASE[case].reference
     return float(relative(found.rows[:: POINTS // (len(truth.times) - 1)], truth.motion).max())

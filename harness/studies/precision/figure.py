@@ -70,4 +70,4 @@ def curves(axes: Axes, study: Study, case: Case, cost: str) -> None:
         star = {"markersize": 9, "marker": "*", "fillstyle": FILL.get(tool, "none")}
         shape = {**style, **(star if method == "exact" and tool != CS else {})}
         costs = [np.nan if p.failure else getattr(p, cost) for p in mine]
-        axes.loglog(errors, costs, color=FAMILIES[method], label=text, **shape)
+        axes.loglog(errors, costs, color=FAMILIES.get(method, GREY), label=text, **shape)

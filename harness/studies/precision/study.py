@@ -12,6 +12,7 @@ from functools import partial
 from math import isnan, nan
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from ...running.inside import Inside, embedded, offered
 from ...running.specification import Specification
 from ...scenes.fmus import fmu_of
 from ...truths import peers
+from ...truths.certified import agreed
+from ...truths.problem import Unwritten
 from ...truths.reference import CASES, Case, errors, load
 
 MOST = 20  # timed runs of one point
@@ -111,21 +114,32 @@ class Study:
 
 
 def study(model: str, extent: Extent, report: Callable[[float], None]) -> Study:
-    """Sweep every case of a model; told how far it is as a share."""
-    cases = tuple(case for case in CASES if case.model == model)
+    """Sweep every case of a model, of ours by its name or of anybody by the path of its file; told how far it is as a
+    share."""
     file = fmu_of(model)
     carried = embedded(file)
+    cases = tuple(case for case in CASES if case.model == model) or (default(model, file, carried),)
     work = [(case, job) for case in cases for job in jobs(case, carried, file)]
     points: list[Point] = []
     for done, (case, job) in enumerate(work):
         points += sweep(case, job, extent)
         report((done + 1) / len(work))
-    return Study(model, cases, tuple(points))
+    return Study(file.stem, cases, tuple(points))
 
 
-def jobs(case: Case, carried: type, file: Path) -> Iterator[Job]:
+def default(model: str, file: Path, carried: Any) -> Case:
+    """The default run of a model that nobody has written a second time: its certified result lies beside the file, or
+    two methods agree about it."""
+    beside = file.with_suffix(".csv").is_file()
+    truth = load(file.stem, file.parent) if beside else agreed(carried, file)
+    law, outputs = "default run", tuple(carried.states)
+    return Case(file.stem, model, law, truth, Unwritten(float(truth.times[-1])), outputs=outputs)
+
+
+def jobs(case: Case, carried: Any, file: Path) -> Iterator[Job]:
     """Every solver that is asked about a case."""
-    times = load(case.truth).times
+    truth = case.reference
+    times = truth.times
     for method in offered(carried):
         if not (method == "exact" and case.chatters):
             taken: dict[float, float] = {}  # run time in s by rtol, from the first of the two for the second
@@ -137,8 +151,9 @@ def jobs(case: Case, carried: type, file: Path) -> Iterator[Job]:
         three = fmi3.sibling(file)
         usual = {number: name for name, number in offered(carried).items()}[carried().solver.method]
         for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", three.is_file())):
-            yield Job(tool, method, nan, partial(by_importer, case, three, WAYS[tool], times), swept=swept)
-        absent = peers.missing()
+            marks = tuple(carried.contacts) if tool == ME and len(truth.modes) else ()
+            yield Job(tool, method, nan, partial(by_importer, case, three, WAYS[tool], marks, times), swept=swept)
+        absent = peers.PACKAGES if isinstance(case.problem, Unwritten) else peers.missing()
         for peer, methods in (("scipy", peers.SCIPY), ("cvode", ("BDF",) if case.problem.stiff else ("Adams",))):
             for method in methods:
                 if peer not in absent:
@@ -147,7 +162,7 @@ def jobs(case: Case, carried: type, file: Path) -> Iterator[Job]:
 
 def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
     """One solver over all tolerances, from loose to tight."""
-    truth, dry = load(case.truth), load(case.dry) if case.dry else None
+    truth, dry = case.reference, load(case.dry) if case.dry else None
     given_up = ""
     for rtol in extent.tolerances if job.swept else (nan,):
         point = partial(Point, case.name, job.tool, job.method, rtol, job.absolute * rtol)
@@ -204,7 +219,7 @@ def through_fmpy(
     rtol: float,
     extent: Extent,
 ) -> tuple[Answer, float] | None:
-    """The FMU through fmpy, position and speed recorded; only where it did not fail without fmpy, then it must not."""
+    """The FMU through fmpy, states recorded; only where it did not fail without fmpy, then it must not."""
     if rtol not in taken:
         return None
     tolerance = {"solver.rtol": rtol} if rtol else {}
@@ -223,11 +238,10 @@ def through_fmpy(
 
 
 def by_importer(
-    case: Case, file: Path, way: str, times: np.ndarray, rtol: float, extent: Extent
+    case: Case, file: Path, way: str, marks: tuple[str, ...], times: np.ndarray, rtol: float, extent: Extent
 ) -> tuple[Answer, float]:
-    """The FMI 3.0 FMU through fmpy, position and speed recorded, and in model exchange every change of mode; the run
-    time is that of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
-    marks = ("mode",) if way == fmi3.EXCHANGE and case.problem.dry else ()
+    """The FMI 3.0 FMU through fmpy, states recorded, and in model exchange every change of mode; the run time is that
+    of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
     with fmi3.instance(file, way) as fmu:
         run = partial(fmu.simulate, case.values, case.outputs + marks, float(times[-1]), float(times[1]), rtol or None)
         found = run(extent.patience)

@@ -7,14 +7,13 @@ from math import isnan
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
-from ...errors import SceneError, unknown
 from ...results.files import heading, write_rows
 from ...results.folder import keep, replacing
 from ...results.provenance import record
 from ...running.inside import embedded
-from ...scenes.fmus import fmu_of
+from ...scenes.fmus import check_built, fmu_of
 from ...truths.peers import missing
-from ...truths.reference import CASES, MODELS
+from ...truths.reference import CASES
 from . import anchors, laws
 from .advice import advise
 from .study import QUICK, Extent, Point, Study, study
@@ -29,7 +28,6 @@ UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and r
 }
 EXCHANGED = "model exchange by fmpy's CVode: largest error at rtol [1]"
 ENDS = (".csv", ".json", ".png", ".txt", "-exchange.csv", "-laws.csv")
-FILES = ("anchors.csv", *(f"{model}{end}" for model in MODELS for end in ENDS))
 
 
 @dataclass(frozen=True)
@@ -45,17 +43,18 @@ class Survey:
 
 def survey(models: Sequence[str], extent: Extent, out: Path, report: Callable[[str, float], None]) -> Survey:
     """Study the models and write results to out/precision; what is there on other models stays."""
-    for model in models:
-        if model not in MODELS:
-            raise SceneError(unknown("model", model, MODELS))
+    files = list(map(fmu_of, models))
+    for file in files:
+        check_built(file)
         if extent == QUICK:
-            keep(out / FOLDER, QUICKLY, f"{model}.json")
-    with replacing(out / FOLDER, FILES) as folder:
+            keep(out / FOLDER, QUICKLY, f"{file.stem}.json")
+    kept = [path.name for path in (out / FOLDER).glob("*") if path.name.endswith(ENDS)]
+    with replacing(out / FOLDER, ["anchors.csv", *kept]) as folder:
         if (out / FOLDER).exists():
-            stale = ignore_patterns(*(f"{model}[.-]*" for model in models))
+            stale = ignore_patterns(*(f"{file.stem}[.-]*" for file in files))
             copytree(out / FOLDER, folder, ignore=stale, dirs_exist_ok=True)
         found = gather(models, extent, report)
-        write(found, folder, QUICKLY if extent == QUICK else "")
+        write(found, files, folder, QUICKLY if extent == QUICK else "")
     return found
 
 
@@ -67,7 +66,7 @@ def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float],
     carried = {model: embedded(fmu_of(model)) for model in models}
     told = [laws.analyse(case, carried[case.model]) for case in CASES if case.dry and case.model in models]
     report("anchors", 0.0)
-    rows = tuple(anchors.analyse())
+    rows = tuple(anchors.analyse()) if told or any(case.model in models for case in CASES) else ()
     return Survey(
         tuple(studies),
         tuple(told),
@@ -92,12 +91,12 @@ def reasons(found: Iterable[Study]) -> Iterable[str]:
     return dict.fromkeys(p.failure for study in found for p in study.points if p.failure and isnan(p.rtol))
 
 
-def write(found: Survey, folder: Path, source: str) -> None:
-    """Tables and figures of what was found, and whether they come from a quick run."""
+def write(found: Survey, files: Sequence[Path], folder: Path, source: str) -> None:
+    """Tables and figures of what was found about the FMUs in these files, and whether they come from a quick run."""
     from .figure import draw
 
-    for each, sentence in zip(found.studies, found.advice, strict=True):
-        record(folder, [fmu_of(each.model)], name=f"{each.model}.json", source=source)
+    for each, file, sentence in zip(found.studies, files, found.advice, strict=True):
+        record(folder, [file], name=f"{each.model}.json", source=source)
         (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
         save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
         exchanged = each.exchanged()
@@ -109,7 +108,8 @@ def write(found: Survey, folder: Path, source: str) -> None:
         draw(each, mine, folder / f"{each.model}.png")
         if mine:
             save(folder / f"{each.model}-laws.csv", heads(laws.Shortcut), map(astuple, mine))
-    save(folder / "anchors.csv", heads(anchors.AnchorRun), map(astuple, found.anchors))
+    if found.anchors:
+        save(folder / "anchors.csv", heads(anchors.AnchorRun), map(astuple, found.anchors))
 
 
 def heads(kind: type) -> list[str]:

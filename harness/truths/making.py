@@ -1,4 +1,4 @@
-"""Makes the reference motions, in some minutes: python -m harness.truths
+"""Makes the references of the laws that are written a second time, in some minutes; it shares no code with the FMUs.
 
 piecewise linear laws   closed form in 40 digits; the tests hold a second one against it
 pendulum                Taylor series in 25 digits, and DOP853 restarted at every change of mode
@@ -9,13 +9,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..results.files import heading, write, write_rows
 from ..running.answer import Answer
 from .linear import pieces, threshold
 from .peers import solve
 from .pieces import Piece
-from .problem import Pendulum
-from .reference import CASES, FOLDER, POINTS, Case, late, relative
+from .problem import Equations, Pendulum
+from .reference import POINTS, THRESHOLD, Case, Reference, difference, late
 from .taylor import swings
 from .truth import changes, sampled
 
@@ -26,40 +25,32 @@ CLOSED: dict[str, Callable[[float], Iterator[Piece]]] = {  # up to a stop in s
     "smd": lambda stop: pieces("smd", [(0.0, stop, MASS | {"c": 2.0})]),
     "coulomb": lambda stop: pieces("coulomb", [(0.0, stop, MASS | {"f": 0.5})]),
     "stickslip": lambda stop: pieces("stickslip", [(0.0, stop, SLED)]),
-    "threshold": lambda stop: threshold(SLED, 1e-7, stop),
+    THRESHOLD: lambda stop: threshold(SLED, 1e-7, stop),
 }
 ROUNDING = 2.0**-53  # of a number stored as a double
 NOTHING = 1e-40  # what 120 digits leave of a zero is less
 
 
-def main() -> None:
-    """Write every reference, and how well its routes agree."""
-    rows = []
-    for case in {case.truth: case for case in CASES}.values():
-        times = np.linspace(0.0, case.problem.stop, POINTS)
-        answer, routes, doubt = make(case, times)
-        print(f"{case.truth}: {routes}, difference {doubt:.1e}", flush=True)
-        rows.append((case.truth, routes, f"{doubt:.1e}"))
-        unit, events = case.problem.unit, answer.events or []
-        if case.problem.dry:
-            events.insert(0, (0.0, case.problem.mode_from(0.0, *case.problem.start)))
-        heads = ["t [s]", heading("x", unit), heading("v", f"{unit}/s")]
-        write(FOLDER / f"{case.truth}.csv", heads, [times, *answer.motion.T])
-        columns = [np.array([t for t, _ in events]), np.array([mode for _, mode in events])]
-        write(FOLDER / f"{case.truth}-events.csv", ["t [s]", "mode"], columns)
-    write_rows(FOLDER / "agreement.csv", ["reference", "routes", "difference [1]"], sorted(rows))
+def made(case: Case) -> Reference:
+    """The motion under one of the laws that are written a second time."""
+    problem, name = case.problem, case.truth
+    assert isinstance(name, str)
+    times = np.linspace(0.0, problem.stop, POINTS)
+    answer, how, apart = routes(name, problem, times)
+    start = [(0.0, problem.mode_from(0.0, *problem.start))] if problem.dry else []
+    return Reference(times, answer.motion, start + (answer.events or []), how, apart)
 
 
-def make(case: Case, times: np.ndarray) -> tuple[Answer, str, float]:
+def routes(name: str, problem: Equations, times: np.ndarray) -> tuple[Answer, str, float]:
     """The motion, the routes that led to it, and their largest difference relative to the largest of each column."""
-    if case.truth in CLOSED:
-        return closed(case.truth, times), "closed form in 40 digits", ROUNDING
-    explicit = solve("scipy", "DOP853", case.problem, times, 3e-14, 1e-16)  # as far down as it goes
-    if isinstance(case.problem, Pendulum):
-        answer = swings(case.problem, times.tolist())
+    if name in CLOSED:
+        return closed(name, times), "closed form in 40 digits", ROUNDING
+    explicit = solve("scipy", "DOP853", problem, times, 3e-14, 1e-16)  # as far down as it goes
+    if isinstance(problem, Pendulum):
+        answer = swings(problem, times.tolist())
         apart = max(difference(answer, explicit), late(answer.events or [], explicit.events or []) / times[-1])
         return answer, "Taylor series in 25 digits and DOP853", apart
-    implicit = solve("scipy", "Radau", case.problem, times, 1e-11, 1e-14)
+    implicit = solve("scipy", "Radau", problem, times, 1e-11, 1e-14)
     return explicit, "DOP853 and Radau", difference(explicit, implicit)
 
 
@@ -70,11 +61,3 @@ def closed(name: str, times: np.ndarray) -> Answer:
     motion[np.abs(motion) < NOTHING] = 0.0
     events = [(t, mode) for t, mode in changes(found) if t <= times[-1]]
     return Answer(motion, events, 0)
-
-
-def difference(one: Answer, other: Answer) -> float:
-    return float(relative(other.motion, one.motion).max())
-
-
-if __name__ == "__main__":
-    main()

@@ -1,1 +1,0 @@
-"""The reference motions, made by python -m harness.truths."""
