@@ -50,6 +50,10 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     scalars = SubElement(root, "ModelVariables")
     for reference, (variable, meaning) in enumerate(declared):
         scalars.append(_scalar(variable, meaning, reference))
+    places = {variable: str(place) for place, (variable, _) in enumerate(declared, 1)}
+    for scalar, (_, meaning) in zip(scalars, declared, strict=True):
+        if meaning.rate_of:
+            scalar[0].set("derivative", places[meaning.rate_of])
     _structure(root, declared, at_start(model, declared))
     return closed(root, "guid", code, date)
 

@@ -9,20 +9,24 @@ from .terminal import answer, progress, results
 
 
 @click.command()
+@click.argument("models", metavar="[MODEL]...", nargs=-1)
 @results
-def stability(out: Path, quiet: bool, as_json: bool) -> None:
+def stability(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool) -> None:
     """Run stiff and extreme scenes with every method: each ends right, or is refused with a sentence.
 
+    They are those of each MODEL (without one: all there are).  A MODEL is a name, or the path of a file (belt.py, whose
+    FMU lies beside it, or belt.fmu): then its numbers are varied, and what two of its methods agree about is right.
     Exit status 1 if one ends otherwise.
 
     \b
-    Example:
+    Examples:
       python -m harness stability
+      python -m harness stability stickslip path/to/belt.py
     """
     from ..studies.stability import table as tables
     from ..studies.stability.study import FOLDER, all_cases, survey
 
-    chosen = all_cases()
+    chosen = all_cases(models=models)
     with progress(quiet or as_json, sum(map(len, chosen))) as report:
         rows, regions = survey(out, report, chosen)
     told = [{"scene": row.case.label, "well": row.well, "ended": row.ended} for row in rows]

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from fmpy.fmi1 import FMICallException
 
+from ..errors import HarnessError
 from ..scenes.fmus import fmu_of
 from ..scenes.roles import roles
 from .fmu import WARNING, begin, callbacks, described, instance, put
@@ -62,14 +63,15 @@ class Counts:
 
 @dataclass(frozen=True)
 class Motion:
-    """A run that came to its end: `x`, `v`, `energy` (n,) after each communication step, the start included.
+    """A run that came to its end: `x`, `v`, `energy` (n,) after each communication step, the start included; no energy
+    where the FMU tells none.
 
     `t_last` is the time of the last event in s, the start where there was none.
     """
 
     x: np.ndarray
     v: np.ndarray
-    energy: np.ndarray
+    energy: np.ndarray | None
     t_last: float
     counts: Counts
     seconds: float
@@ -116,7 +118,9 @@ class Probe:
         self.fmu, self.messages, self.spoken = fmu, messages, spoken
         self.variables = {variable.name: variable for variable in description.modelVariables}
         motion = roles(self.variables)
-        self.outputs = (motion["position"], motion["velocity"], "energy")
+        if "velocity" not in motion:
+            raise HarnessError(f"{description.modelName}: no output is the rate of a position, as derivative= says it")
+        self.outputs = (motion["position"], motion["velocity"], *(["energy"] if "energy" in self.variables else []))
 
     def begin(self, setting: Setting) -> None:
         values = ((self.variables[name], value) for name, value in setting.values.items())
@@ -171,10 +175,10 @@ def run(setting: Setting, calls: Calls, changes: Changes) -> Motion | Refusal:
         except FMICallException:
             return it.refusal()
         seconds = perf_counter() - begun
-        x, v, energy = np.array(rows).T
-        (t_last,) = it.read(["events.t_last"])
+        x, v, *energy = np.array(rows).T
+        t_last = it.read(["events.t_last"])[0] if "events.t_last" in it.variables else setting.start
         counts = [it.count(name) for name in ("events.count", "solver.steps", "solver.rejected", "solver.evaluations")]
-        return Motion(x, v, energy, t_last, Counts(*counts), seconds)
+        return Motion(x, v, energy[0] if energy else None, t_last, Counts(*counts), seconds)
 
 
 def poison(setting: Setting) -> Refusals:

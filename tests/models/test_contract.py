@@ -3,11 +3,13 @@
 from math import radians
 
 import pytest
+from fmpy import read_model_description
 from models import MODELS, Choice, Input, Output, Parameter, declared, model_class
 
 from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.declare import Count, Declaring, Fixed, Local
 from fmus.runtime.sentences import of_value
+from harness.scenes.roles import roles
 
 POUND, INCH = 0.45359237, 0.0254
 SLED = {"m": 12.5, "k": 742.5, "mu_s": 0.9, "mu_d": 0.6, "g": 9.81, "v_driver": 0.034}
@@ -135,3 +137,12 @@ def test_a_declaration_says_what_it_allows():
     assert Sample.share.accepts(0.0)
     assert Sample.kind.accepts(2)
     assert not Sample.kind.accepts(3)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_rate_says_whose_it_is_so_that_a_motion_is_found_by_its_roles(fmus, name):
+    variables = {v.name: v for v in read_model_description(fmus / f"{name}.fmu").modelVariables}
+    whose = {v.name: v.derivative.name for v in variables.values() if v.derivative is not None}
+    assert whose == ({"omega": "theta", "alpha": "omega"} if name == "pendulum" else {"v": "x", "a": "v"})
+    named = [*whose.values(), "alpha" if name == "pendulum" else "a"]
+    assert list(roles(variables).values()) == named

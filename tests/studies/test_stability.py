@@ -12,7 +12,8 @@ import evidence
 import evidence_pendulum
 import numpy as np
 import pytest
-from models import MODELS, ROOT, declared
+from builds import of_file
+from models import AUTHORED, LARGER, MODELS, ROOT, declared
 
 from harness.errors import HarnessError
 from harness.running.probe import Counts, Motion, Refusal, Refusals
@@ -26,6 +27,7 @@ from harness.studies.stability.study import (
     all_cases,
     all_refused,
     finished,
+    judged,
     refused,
     regions,
     survey,
@@ -229,3 +231,28 @@ def test_a_long_path_of_temporary_files_is_no_hindrance(tmp_path):
     asked = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(folder)}
     done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, timeout=120)
     assert (done.stdout, done.stderr) == ("5\n", "")
+
+
+@pytest.mark.parametrize("name", ["rotor_brake", "sleds"])
+def test_a_file_of_a_user_meets_the_usual_scenes_by_its_path(tmp_path, name):
+    """Its values, its tolerances and what is no number, by every method; what binds two values may refuse them."""
+    (path,) = (path for path in (*AUTHORED, *LARGER) if path.stem == name)
+    file = of_file(path) / f"{name}.fmu"
+    few = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")
+    chosen = [[case for case in group if case.title.startswith(few)] for group in all_cases(models=[str(file)])]
+    rows, _ = survey(tmp_path, silent, [group for group in chosen if group])
+    assert {row.case.name for row in rows} == {name}
+    assert {row.case.title for row in rows} >= {"as it comes", "rtol = 1e-09"}
+    assert [f"{row.case.label}: {row.text}" for row in rows if not row.well] == []
+    bound = [row for row in rows if row.case.title == "T_d = 3"]
+    assert {row.ended for row in bound} <= {REFUSED}
+    assert all("T_d is 3.0, above T_s = 0.5" in row.text for row in bound)
+
+
+def test_a_motion_of_a_file_that_is_not_what_two_methods_agree_about_is_wrong():
+    file = str(of_file(AUTHORED[0]) / f"{AUTHORED[0].stem}.fmu")
+    group = next(group for group in all_cases(models=[file]) if group[0].title == "as it comes")
+    one = replace(group[0], finish=1e-300)
+    (row,) = judged([one])
+    assert (row.well, row.ended) == (False, WRONG)
+    assert "more than 1e-300" in row.text

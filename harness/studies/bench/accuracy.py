@@ -14,11 +14,11 @@ from ...running.inside import Inside, embedded
 from ...running.probe import Card, Motion, Setting, card, run
 from ...scenes.fmus import fmu_of
 from ...truths.linear import mp
-from ...truths.reference import MODELS
+from ...truths.problem import Equations
+from ...truths.reference import CASES, MODELS
 from ...truths.truth import Grid, truth
 from .measure import Beside, Measure
 
-EXACT = ("smd", "coulomb", "stickslip")
 POINTS = 1600
 CLOSED = Beside("closed form in 120 digits")
 
@@ -26,10 +26,11 @@ CLOSED = Beside("closed form in 120 digits")
 def accuracy() -> list[Callable[[], Measure]]:
     """What to measure, in the order of the design's table."""
     cards = {model: card(model) for model in MODELS}
+    closed = [model for model in MODELS if "exact" in cards[model].methods]
     stuck = (("coulomb", {"x0": 0.003}), ("stickslip", {"v_driver": 0.0}), ("pendulum", {"theta0": 0.005}))
     return [
-        *(partial(exact, model, cards[model]) for model in EXACT),
-        *(partial(late, model, cards[model]) for model in EXACT[1:]),
+        *(partial(exact, model, cards[model]) for model in closed),
+        *(partial(late, model, cards[model]) for model in closed if "friction" in cards[model].choices),
         partial(last, "coulomb", {"f": 1e-7}, 300_000, swings),
         partial(last, "stickslip", {}, 200_000, slips),
         *(partial(default, "pendulum", cards["pendulum"], "pin_load", load, 1e-9) for load in ("weight", "reaction")),
@@ -61,7 +62,7 @@ def exact(model: str, its: Card) -> Measure:
 
 def default(model: str, its: Card, name: str, value: float | str, reach: float) -> Measure:
     """A model with its own method and tolerance."""
-    beside = Beside("scipy DOP853 at 1e-13" if model == "pendulum" else "scipy Radau at 1e-11")
+    beside = Beside("scipy Radau at 1e-11" if problem(model).stiff else "scipy DOP853 at 1e-13")
     return Measure(f"{model}, default, {name} {value}", error(model, its, {name: value}), "1", reach, (beside,))
 
 
@@ -123,5 +124,10 @@ def drift(model: str, its: Card, chosen: dict[str, float]) -> Measure:
     """How far a stuck body gets."""
     setting = Setting(model, {**its.defaults, **chosen}, stop=1e6)
     x = moved(setting, [1e4 * i for i in range(101)]).x
-    unit = "rad" if model == "pendulum" else "m"
-    return Measure(f"{model}, stuck for 1e6 s: displacement", float(np.abs(x - x[0]).max()), unit, 0.0, ())
+    off = float(np.abs(x - x[0]).max())
+    return Measure(f"{model}, stuck for 1e6 s: displacement", off, problem(model).unit, 0.0, ())
+
+
+def problem(model: str) -> Equations:
+    """The equations of a model, as they are written a second time."""
+    return next(case.problem for case in CASES if case.model == model)

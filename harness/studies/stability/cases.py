@@ -13,6 +13,7 @@ from ...truths.truth import Grid
 FILE = Path(__file__).with_name("stability.toml")
 RTOL = 1e-6
 POINTS = 200
+LOOSE = 3e-2  # error at RTOL of any model, which may carry it on from one slip to the next
 OWN = ("start", "stop", "rtol", "calls")  # what `each` may vary besides a value
 
 
@@ -33,11 +34,17 @@ class Trial:
     poison: bool = False
     events: str = "all"  # which methods must find every event: all, exact or none
     region: float | None = None  # where the scene stands on the axis of the region figure
+    either: bool = False  # a sentence will do, whatever it says
     place: int = 0  # in the table
 
     @property
+    def name(self) -> str:
+        """That of the model, which may be a file."""
+        return Path(self.model).stem
+
+    @property
     def label(self) -> str:
-        return f"{self.model}: {self.title}, {self.method}"
+        return f"{self.name}: {self.title}, {self.method}"
 
     @property
     def rtol(self) -> float:
@@ -54,6 +61,23 @@ def scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
     """Every scene with one model and one value, and the largest errors allowed where a scene says nothing."""
     table = tomllib.loads(file.read_text(encoding="utf-8"))
     return [one for scene in table["scene"] for one in spread(scene)], table["finish"]
+
+
+def usual(model: str, card: Card, settled: bool) -> list[dict[str, Any]]:
+    """Scenes for a model of somebody's: every number a tenth of what it is, and ten times; tolerances; few steps; what
+    is no number.  `settled`: whether its events can be told."""
+    of_all = {"model": model, "either": True, "events": "all" if settled else "none"}
+    numbers = {n: x for n, x in card.defaults.items() if x and n not in card.choices and not n.startswith("solver.")}
+    found: list[dict[str, Any]] = [{"title": "as it comes"}, {"title": "one communication step", "points": 1}]
+    found += [{"title": f"rtol = {rtol:g}", "rtol": rtol, "finish": {}} for rtol in (1e-3, 1e-9)]
+    found += [
+        {"title": f"{name} = {share * value:g}", "values": {name: share * value}}
+        for name, value in numbers.items()
+        for share in (0.1, 10.0)
+    ]
+    poison = {"title": "NaN, inf, -inf in every Real, before and in mid-run", "poison": True, "methods": ["default"]}
+    within = {"exact": 1e-6, "other": LOOSE}
+    return [{**of_all, "pattern": one["title"], "finish": within, **one} for one in [*found, poison]]
 
 
 def spread(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -111,6 +135,7 @@ def case(scene: dict[str, Any], card: Card, method: str, finish: float) -> Trial
         poison=scene.get("poison", False),
         events=scene.get("events", "all"),
         region=scene["varied"] if scene.get("region") else None,
+        either=scene.get("either", False),
     )
 
 

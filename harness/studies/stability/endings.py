@@ -30,11 +30,14 @@ class Ending:
         case = self.case
         if case.poison:
             return "refused, each by name"
-        return f"refused: {case.refuse}" if case.refuse else f"finished within {case.finish:g}"
+        finished = f"finished within {case.finish:g}"
+        return f"refused: {case.refuse}" if case.refuse else f"{finished}, or refused" if case.either else finished
 
     @property
     def well(self) -> bool:
         """Whether it ended as it should."""
+        if self.case.either and self.ended != WRONG:
+            return True
         return self.ended == (REFUSED if self.case.poison or self.case.refuse else FINISHED)
 
 

@@ -5,7 +5,7 @@ every run has a process of its own with a time limit (bounded.py).
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import pairwise
@@ -18,11 +18,13 @@ from ...errors import HarnessError
 from ...results.files import write_rows
 from ...results.folder import replacing
 from ...results.provenance import record
+from ...running.inside import embedded
 from ...running.probe import Card, Motion, Refusal, Refusals, card, poison, run
-from ...scenes.fmus import fmu_of
-from ...truths.truth import Truth, check, truth, worst
+from ...scenes.fmus import check_built, fmu_of
+from ...truths.certified import by_two_methods
+from ...truths.truth import PIECES, Truth, check, truth, worst
 from .bounded import bounded
-from .cases import Trial, cases, scenes
+from .cases import Trial, cases, scenes, usual
 from .endings import FINISHED, REFUSED, WRONG, Ending, Region
 
 WORKERS = 2
@@ -60,43 +62,68 @@ def table(report: Callable[[str, float], None], chosen: list[list[Trial]]) -> li
     return sorted(found, key=lambda row: row.case.place)
 
 
-def all_cases(wanted: Callable[[dict[str, Any]], bool] = lambda scene: True) -> list[list[Trial]]:
-    """The cases of all wanted scenes; those that share one true answer stand together."""
+def all_cases(
+    wanted: Callable[[dict[str, Any]], bool] = lambda scene: True, models: Sequence[str] = ()
+) -> list[list[Trial]]:
+    """The cases of all wanted scenes, of some models only if they are named; those that share one true answer stand
+    together.  A model without scenes of its own meets the usual ones."""
     check()
+    for model in models:
+        check_built(fmu_of(model))
     found, finish = scenes()
-    found = [scene for scene in found if wanted(scene)]
+    found = [scene for scene in found if wanted(scene) and (not models or scene["model"] in models)]
     cards: dict[str, Card] = {}
+    for model in dict.fromkeys((*models, *(scene["model"] for scene in found))):
+        cards[model] = bounded(LIMIT, card, model)
+        if model not in [scene["model"] for scene in found]:
+            settled = len(bounded(LIMIT, modes, model)) < 2
+            found += usual(model, cards[model], settled)
     groups: dict[str, list[Trial]] = {}
     for place, scene in enumerate(found):
-        if scene["model"] not in cards:
-            cards[scene["model"]] = bounded(LIMIT, card, scene["model"])
         for case in cases(scene, cards[scene["model"]], finish):
             shared = repr((case.model, case.spans, case.grid))
             groups.setdefault(shared, []).append(replace(case, place=place))
     return list(groups.values())
 
 
+def modes(model: str) -> list[str]:
+    """The names of the modes of a model."""
+    carried: Any = embedded(fmu_of(model))
+    return list(carried.contacts)
+
+
 def judged(group: Iterable[Trial]) -> Iterator[Ending]:
     """The rows of cases that share one true answer."""
     answer: Truth | None = None
+    doubt = ""
     for case in group:
         try:
             if case.poison:
                 yield all_refused(case, bounded(LIMIT, poison, case.setting))
                 continue
-            if case.refuse is None and answer is None:
-                answer = bounded(LIMIT, truth, case.model, case.spans, case.grid)
+            if case.refuse is None and answer is None and not doubt:
+                try:
+                    answer = bounded(LIMIT, answering(case), case.model, case.spans, case.grid)
+                except HarnessError as error:
+                    if not case.either:
+                        raise
+                    doubt = str(error)  # of values that the run may refuse
             times = answer.times.tolist() if answer else case.grid.times(())
             calls = case.calls or [(t, ahead - t) for t, ahead in pairwise(times)]
             ending = bounded(LIMIT, run, case.setting, calls, case.changes)
             if isinstance(ending, Refusal):
                 yield refused(case, ending)
             elif answer is None or case.refuse is not None:
-                yield Ending(case, WRONG, "it was taken", motion=ending)
+                yield Ending(case, WRONG, doubt or "it was taken", motion=ending)
             else:
                 yield finished(case, ending, answer)
         except HarnessError as error:
             yield Ending(case, WRONG, str(error))
+
+
+def answering(case: Trial) -> Callable[..., Truth]:
+    """What tells the true answer to a case."""
+    return truth if case.model in PIECES else by_two_methods
 
 
 def all_refused(case: Trial, ending: Refusals) -> Ending:
@@ -111,7 +138,7 @@ def refused(case: Trial, ending: Refusal) -> Ending:
         return Ending(case, WRONG, "it was refused without a sentence")
     if not ending.silent:
         return Ending(case, WRONG, f"refused, but numbers can still be read: {ending.sentence}")
-    if case.refuse is None or case.refuse not in ending.sentence:
+    if not case.either and (case.refuse is None or case.refuse not in ending.sentence):
         return Ending(case, WRONG, f"refused: {ending.sentence}")
     return Ending(case, REFUSED, ending.sentence)
 
@@ -121,8 +148,8 @@ def finished(case: Trial, motion: Motion, answer: Truth) -> Ending:
     assert case.finish is not None
     error = answer.error(motion.x, motion.v)
     rise = math.nan
-    if case.free:
-        energy = motion.energy
+    free, energy = case.free and motion.energy is not None, motion.energy
+    if free and energy is not None:
         rise = float((energy - np.minimum.accumulate(energy)).max() / (energy.max() or 1.0))
     wrong = []
     if case.events == "all" or case.events == case.method:
@@ -133,7 +160,7 @@ def finished(case: Trial, motion: Motion, answer: Truth) -> Ending:
             error = worst(error, late / (case.grid.stop - case.grid.start))
     if not error <= case.finish:
         wrong.append(f"error {error:.2g}, more than {case.finish:g}")
-    if case.free and not rise <= case.finish:
+    if free and not rise <= case.finish:
         wrong.append(f"energy rises by {rise:.2g}")
     return Ending(case, WRONG if wrong else FINISHED, "; ".join(wrong), error, rise, motion)
 
@@ -155,7 +182,7 @@ def regions(rows: Iterable[Ending]) -> list[Region]:
 def save(rows: list[Ending], path: Path) -> None:
     """Write stability.csv: one line for each row."""
     columns: dict[str, list[Any]] = {
-        "model": [row.case.model for row in rows],
+        "model": [row.case.name for row in rows],
         "scene": [row.case.title for row in rows],
         "method": [row.case.method for row in rows],
         "expected": [row.expected for row in rows],

@@ -7,23 +7,23 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from .endings import FINISHED, Ending, Region
-
-METHODS = ("exact", "ode23", "ode45", "dop853", "rodas")
+from .endings import REFUSED, Ending, Region
 
 
 def endings(rows: Iterable[Ending]) -> Table:
     """Largest error and, below it, internal steps of every run that should end."""
     table = scenes("largest error, as a share of the largest value, and below it internal steps")
-    for method in METHODS:
+    rows = [row for row in rows if row.case.finish is not None]
+    number = {row.case.method: row.case.setting.values["solver.method"] for row in rows}
+    methods = sorted(number, key=lambda method: number[method])
+    for method in methods:
         table.add_column(method, justify="right", no_wrap=True)
-    rows = sorted((row for row in rows if row.case.finish is not None), key=lambda row: row.case.model)
-    for model, of_model in groupby(rows, lambda row: row.case.model):
+    for model, of_model in groupby(sorted(rows, key=lambda row: row.case.name), lambda row: row.case.name):
         table.add_section()
         table.add_row(Text(model, style="bold"))
         for title, group in groupby(of_model, lambda row: row.case.title):
             cells = {row.case.method: cell(row) for row in group}
-            table.add_row(f"  {title}", *(cells.get(method, Text("")) for method in METHODS))
+            table.add_row(f"  {title}", *(cells.get(method, Text("")) for method in methods))
     return table
 
 
@@ -36,7 +36,9 @@ def scenes(title: str) -> Table:
 
 def cell(row: Ending) -> Text:
     """The end of one run."""
-    if not row.well or row.ended != FINISHED or row.motion is None:
+    if row.well and row.ended == REFUSED:
+        return Text("refused")
+    if not row.well or row.motion is None:
         return Text("wrong", style="bold red")
     return Text(f"{f'{row.error:.0e}' if row.error else '0'}\n{row.motion.counts.steps}")
 
@@ -51,7 +53,7 @@ def refusals(rows: Iterable[Ending]) -> Table:
         if row.case.finish is None:
             found.setdefault(row.case.title, []).append(row)
     for title, group in found.items():
-        models = ", ".join(dict.fromkeys(row.case.model for row in group))
+        models = ", ".join(dict.fromkeys(row.case.name for row in group))
         wrong = [row for row in group if not row.well]
         table.add_row(title, models, Text((wrong or group)[0].text, style="red" if wrong else ""))
     return table
