@@ -172,10 +172,20 @@ WRONG = {
         20,
         "S has other laws than R: give all contacts the same",
     ),
-    "two drivers": (
-        RATE + '    p = State("m", "one", rate=u)\n    q = State("m", "another", rate=u)\n',
+    "a driver whose speed moves": (
+        RATE + '    p = State("m", "one", rate=u)\n    q = State("m", "another", rate=v)\n',
         18,
-        "the solver runs one driver so far",
+        "rate of q moves: it must follow from parameters",
+    ),
+    "a driver in another unit": (
+        RATE + '    p = State("m", "one", rate=u)\n    q = State("m", "another", rate=u * u)\n',
+        18,
+        "q is declared in m, and its rate u * u is in m^2/s^2",
+    ),
+    "a name for the rate of a driver": (
+        RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
+        17,
+        "the name q_rate is taken: it is the rate of q; choose another",
     ),
 }
 

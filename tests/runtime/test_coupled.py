@@ -185,6 +185,21 @@ def test_what_is_stuck_stays_where_it_is():
         assert held > 5
 
 
+def test_several_drivers_pull_each_at_its_own_speed(mine):
+    """A mass between two of them; the second starts elsewhere, and its speed is an expression."""
+    another = 'q = State("m", "another", start=0.3, rate=0.5 * u)'
+    (one, a) = body("1", "k * (p - x1) + k * (q - x1)", 1.0)
+    model = mine(*one, DRIVER, another, a)
+    _, rows = events(model, DOP853, 1e-11, 2.0)
+    w = 600.0**0.5
+    for t, (x, v, q), _ in rows:
+        assert q == pytest.approx(0.3 + 0.1 * t, abs=1e-14)
+        assert x == pytest.approx(0.15 * (1.0 + t - np.cos(w * t) - np.sin(w * t) / w), abs=1e-9)
+        assert v == pytest.approx(0.15 * (1.0 + w * np.sin(w * t) - np.cos(w * t)), abs=1e-8)
+    model.observe(0.0, 0.0, 0.0, 0.3)
+    assert model.q_rate == 0.1
+
+
 # ---- laws without modes
 
 LAWS = {

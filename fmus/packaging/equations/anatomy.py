@@ -36,8 +36,9 @@ class Anatomy:
         self.declared: list[Variable] = [e for _, e in own if isinstance(e, Variable)]
         self.parameters = self._all(Parameter, Fixed)
         self.choices, self.inputs = self._all(Choice), self._all(Input)
-        self.states = [s for s in self._all(State) if s.steady is None]
-        self.drives = [s for s in self._all(State) if s.steady is not None]
+        self.drives = [s for s in self._all(State) if isinstance(s.steady, Parameter) and s.begins == 0.0][:1]
+        self.states = [s for s in self._all(State) if s not in self.drives]
+        self._integrate_drivers()
         self.contacts, self.modes = self._all(Contact), self._all(Mode)
         self.outputs = self._all(Output)
         self.rules: tuple[Rule, ...] = (model.rules,) if isinstance(model.rules, Rule) else model.rules
@@ -59,6 +60,18 @@ class Anatomy:
             raise Mistake(f"the name {name} has letters that C does not take: choose another", e.place)
 
     # ---- roles
+
+    def _integrate_drivers(self) -> None:
+        """The position of one driver, of constant speed from zero on, is known in closed form; the others are states,
+        and each gets an output that is its rate."""
+        for s in self.states:
+            if s.steady is not None:
+                unit = s.steady.unit if isinstance(s.steady, Variable) else f"{s.unit}/s"
+                law = Output(unit, f"rate of {s.name}", s.steady, rate_of=s)
+                law.name, law.place = f"{s.name}_rate", s.place
+                if any(e.name == law.name for e in self.declared):
+                    raise Mistake(f"the name {law.name} is taken: it is the rate of {s.name}; choose another", s.place)
+                self.declared.append(law)
 
     def _find_rates(self) -> None:
         """Of every state the variable that is its rate; a state can be that of another."""
@@ -100,11 +113,6 @@ class Anatomy:
             for word, e in ("start", s.begins), ("rate", s.steady), ("finest", s.finest):
                 if depends(e, self.moving):
                     raise Mistake(f"{word} of {s.name} moves: it must follow from parameters", s.place)
-        for d in self.drives:
-            if not isinstance(d.steady, Parameter):
-                raise Mistake(f"rate of {d.name} must be a parameter: then it is known in closed form", d.place)
-            if d.begins != 0.0:
-                raise Mistake(f"{d.name} starts at zero: leave out its start", d.place)
         for rule in self.rules:
             if not (isinstance(rule.broken, Term) and rule.broken.op in COMPARISONS):
                 raise Mistake(f"a Rule begins with a comparison of parameters, not with {rule.broken!r}", place)
@@ -248,8 +256,6 @@ class Anatomy:
 
     def judge_runtime(self) -> None:
         """Refuse what the solver cannot run."""
-        if len(self.drives) > 1:
-            raise Mistake("the solver runs one driver so far", self.drives[1].place)
         for c in self.contacts:
             if c.laws != self.contacts[0].laws:
                 raise Mistake(

@@ -53,8 +53,8 @@ class State(Variable, declare.Output):
     """A continuous state.
 
     `start`: a number or an expression of parameters.  `rate_of`: the state that this one is the rate of, as a speed is
-    of a position.  `rate`: a parameter which is the rate of this one for all time, as of a driver; it is then known in
-    closed form.  `finest`: the size that a tolerance must resolve, where the law has one of its own.
+    of a position.  `rate`: what the rate of this one is for all time, as of a driver, a parameter or an expression of
+    such.  `finest`: the size that a tolerance must resolve, where the law has one of its own.
     """
 
     def __init__(
@@ -68,7 +68,8 @@ class State(Variable, declare.Output):
         **more: Any,
     ) -> None:
         super().__init__(unit, text, **more)
-        self.begins, self.whose, self.steady, self.finest = operand(start), rate_of, rate, finest
+        self.begins, self.whose, self.finest = operand(start), rate_of, finest
+        self.steady: Operand = None if rate is None else operand(rate)
 
 
 class Output(Variable, declare.Output):

@@ -101,7 +101,7 @@ def output(an: Anatomy, e: Variable) -> str:
         return f"Mode({quoted(e.text)})"
     more = f", rate_of={quoted(e.whose.name)}" if isinstance(e, (State, Output)) and e.whose is not None else ""
     if isinstance(e, State):
-        more += f", rate={quoted(e.steady.name)}" if e.steady is not None else ""
+        more += f", rate={quoted(e.steady.name)}" if e in an.drives else ""
         return f"State({described(e)}{more})"
     if isinstance(e, Contact):
         return f"Contact({described(e)})"
