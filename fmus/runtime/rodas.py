@@ -11,7 +11,7 @@ E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.7; G. Stein
 method RODASP, in: Progress in Differential-Algebraic Equations II, Springer 2020, 165-184 (the numbers).
 """
 
-from math import nan  # noqa: F401  of a system that cannot be solved
+from math import fabs, nan  # noqa: F401  of a system that cannot be solved
 
 from .vectors import Contacts, Rates, States, factored, kinematic, solved
 

@@ -22,6 +22,7 @@ place: list[int] = []
 own: list[bool] = []  # for each state whether its rate is calculated, and is no state
 rate: list[int] = []  # the place of that rate, where it is a state
 
+SMALL = 1e-6  # a pivot over what it shall eliminate
 VECTOR = re.compile(r"(y|f|modes)(\d*|_\w+)")
 
 
@@ -109,7 +110,7 @@ def factored(g, h, J):
                     entry = entry + w[i, p]
             w[i, j] = 1.0 - g * h * entry if i == j else -g * h * entry
     for n, k in enumerate(calculated):
-        if w[k, k] != 0.0:
+        if w[k, k] != 0.0 and all(abs(w[k, k]) > SMALL * abs(w[i, k]) for i in calculated[n + 1 :]):
             inverse[k] = g / w[k, k]
         for i in calculated[n + 1 :]:
             w[i, k] = w[i, k] * inverse[k] / g

@@ -1,10 +1,13 @@
 """The linear algebra of a Rosenbrock method, (1 - g h J) k = g r, as lines of text for the states of a model.
 
 A state p whose rate is the state q has k_p = g (r_p + h k_q); what is left is eliminated in order, without exchange.
-A pivot of zero makes NaN, which refuses the step.
+A pivot of zero makes NaN, which refuses the step, and so does one that is small beside what it shall eliminate: it
+would let rounding grow by as much.  A smaller h brings the matrix nearer to 1.
 """
 
 from .spec import Spec
+
+SMALL = 1e-6  # a pivot over what it shall eliminate; vectors.py has the same
 
 
 def factored(w: str, g: str, h: str, spec: Spec) -> list[str]:
@@ -24,7 +27,8 @@ def factored(w: str, g: str, h: str, spec: Spec) -> list[str]:
             entry = f"({slope(i, j)}{behind})" if behind else slope(i, j)
             lines.append(f"{w}_{i}_{j} = {'1.0 - ' if i == j else '-'}{g} * {h} * {entry}")
     for n, k in enumerate(own):
-        lines.append(f"{w}_{k} = {g} / {w}_{k}_{k} if {w}_{k}_{k} != 0.0 else nan")
+        tests = [f"fabs({w}_{k}_{k}) > {SMALL} * fabs({w}_{i}_{k})" for i in own[n + 1 :]]
+        lines.append(f"{w}_{k} = {g} / {w}_{k}_{k} if {' and '.join([*tests, f'{w}_{k}_{k} != 0.0'])} else nan")
         for i in own[n + 1 :]:
             lines.append(f"{w}_{i}_{k} = {w}_{i}_{k} * {w}_{k} / {g}")
             lines += [f"{w}_{i}_{j} = {w}_{i}_{j} - {w}_{i}_{k} * {w}_{k}_{j}" for j in own[n + 1 :]]
