@@ -52,7 +52,9 @@ def test_what_cannot_happen_is_gone():
     for word in ("def set_modes", "def wait", ".sticks", "mode0", "def take_piece"):
         assert word not in smooth
         assert word in dry
-    assert "def breakaway" not in dry  # of a contact that is stuck while something moves
+    assert "class Lost" not in smooth  # of closed forms
+    for word in ("from .coupled", "model.coupled", ".fits"):  # of a contact that is stuck while something moves
+        assert word not in dry
 
 
 @EVERY_MODEL

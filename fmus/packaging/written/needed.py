@@ -1,4 +1,5 @@
-"""What nobody needs is left out: attributes that are set and never read, functions that nobody calls, dead imports.
+"""What nobody needs is left out: attributes that are set and never read, functions that nobody calls, classes of which
+nobody makes one, dead imports.
 
 Who reads is known by name: any file that travels, and whoever finds its way by dotted names, as those of variables.
 """
@@ -88,18 +89,23 @@ def without(path: str, lines: list[Line], wanted: set[str], is_model: bool) -> l
         return lines
     lines_before, lines, tree = lines, list(lines), ast.parse("\n".join(lines))
     methods = {part for one in ast.walk(tree) if isinstance(one, ast.ClassDef) for part in one.body}
-    spare = [
-        one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef) and is_spare(one, wanted, one in methods)
+    classes = [one for one in tree.body if isinstance(one, ast.ClassDef) and not is_model]
+    classes = [one for one in classes if one.name not in wanted and "." + one.name not in wanted]
+    gone = {part for one in classes for part in ast.walk(one)}
+    functions = [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef) and one not in gone]
+    spare: list[ast.ClassDef | ast.FunctionDef] = [
+        *classes,
+        *(one for one in functions if is_spare(one, wanted, one in methods)),
     ]
     inside = {part for one in spare for part in ast.walk(one)} - {*spare}
     assigned = [] if is_model else [one for one in ast.walk(tree) if isinstance(one, ast.Assign) and one not in inside]
-    parts: list[ast.FunctionDef | ast.Assign] = [*spare, *assigned]
+    parts: list[ast.ClassDef | ast.FunctionDef | ast.Assign] = [*spare, *assigned]
     for node in sorted(parts, key=lambda one: one.lineno, reverse=True):
         if isinstance(node, ast.Assign):
             unset(lines, node, wanted)
         else:
             cut(lines, node)
-    for node in [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef) and one not in spare]:
+    for node in [one for one in functions if one not in spare]:
         if all(isinstance(one, ast.Assign) and all(idle(*pair, wanted) for pair in single(one)) for one in node.body):
             place = next(n for n, line in enumerate(lines) if line.source == lines_before[node.lineno - 1].source)
             lines.insert(place + 1, Line.of(" " * (node.col_offset + 4) + "pass", lines[place].source))
@@ -112,8 +118,8 @@ def is_spare(node: ast.FunctionDef, wanted: set[str], is_method: bool) -> bool:
     return not called and not node.name.startswith("__")
 
 
-def cut(lines: list[Line], node: ast.FunctionDef) -> None:
-    """Take out a function, with the blank lines above it."""
+def cut(lines: list[Line], node: ast.ClassDef | ast.FunctionDef) -> None:
+    """Take out a class or a function, with the blank lines above it."""
     first = node.lineno - 1
     while first and not lines[first - 1].strip():
         first -= 1
