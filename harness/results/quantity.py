@@ -10,6 +10,9 @@ UNITS = {
     "lbf.in": ("N.m", 0.45359237 * 9.80665 * 0.0254),
 }
 
+# Those in which angles are drawn and told: by the SI unit, the name and the size of one in it.
+DEGREES = {f"rad{rate}": (f"deg{rate}", pi / 180) for rate in ("", "/s", "/s2")}
+
 UNEVEN = 0.1  # of an interval: beyond, its ends are told rather than its half
 MOST = 8  # digits, in which ends that are nearer to each other are alike
 

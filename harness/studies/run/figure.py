@@ -1,26 +1,77 @@
-"""Figures of a run, one panel for each plot that its scene names; as a scene asks for them."""
+"""Figures of a run, one panel for each plot that its scene names; as a scene asks for them.
 
-from collections.abc import Callable, Iterable
+Where the body is stuck is shaded, changes of mode are marked, published values stand beside ours, and angles are in
+degrees.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...results.style import BLUE, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet
+from ...results.quantity import DEGREES, UNITS, Quantity
+from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet
+from ...running import any_fmu
+from ...running.description import description
+from ...running.fmu import simulate
 from ...running.run import Run
 
 BESIDE = ("phase", "steps")  # on the right; what is over time stands on the left, one below the other
 EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
+SMOOTH = 1000  # points of a curve without corners, no two of them farther apart than twice the mean
+LONG = 20_000  # points of a run that is not run once more for its looks
+MARKED = 100  # events: beyond, one cannot be told from the next
+PEAKS = {"sample_0": 0, "x_0": 0, "sample_n": -1, "x_n": -1}  # published, and which of the turning points each is
+LEVELS = {"velocity": "peak_speed", "acceleration": "peak_acceleration"}
+
+ABOVE: dict[str, Any] = {  # of a legend
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 1.0),
+    "frameon": False,
+    "borderaxespad": 0.2,
+    "columnspacing": 1.2,
+    "handlelength": 1.4,
+}
 
 Results = dict[str, Any]  # by the name of the analysis
 
 
-def draw(title: str, plots: Iterable[str], run: Run, results: Results, path: Path) -> None:
+@dataclass(frozen=True)
+class Drawn:
+    """A run with points enough for smooth curves, the `results` of its analyses, and the `published` figures."""
+
+    run: Run
+    results: Results
+    published: Mapping[str, Any]
+
+    def unit(self, name: str) -> tuple[str, float]:
+        """The unit in which an output is drawn, degrees for an angle, and its size in the output's own."""
+        return DEGREES.get(self.run.units[name], (self.run.units[name], 1.0))
+
+    def values(self, name: str) -> np.ndarray:
+        """An output (n,) as it is drawn."""
+        values, (_, size) = drawable(self.run.columns[name]), self.unit(name)
+        return values if size == 1 else values / size
+
+    def figure(self, name: str) -> float | None:
+        """A published figure in SI units, None where there is no such number."""
+        found = self.published.get(name)
+        value, unit = found if isinstance(found, tuple) else (found, "")
+        return value * UNITS.get(unit, ("", 1.0))[1] if isinstance(value, int | float) else None
+
+
+def draw(
+    title: str, plots: Iterable[str], run: Run, results: Results, path: Path, published: Mapping[str, Any] | None = None
+) -> None:
     """Save the figure of these plots as a PNG file; of an array every element, of a text nothing."""
     chosen = [each for name in plots for each in drawn(name, run)]
     columns = [names for right in (False, True) if (names := [name for name in chosen if (name in BESIDE) == right])]
     if not columns:
         return
+    shown = Drawn(smooth(run), results, published or {})
     height = HEIGHT * max(2, *map(len, columns), 2)
     with sheet(path, WIDTH * len(columns), height) as figure:
         figure.suptitle(f"{title}\n{run.setting}", fontsize=11)
@@ -28,7 +79,7 @@ def draw(title: str, plots: Iterable[str], run: Run, results: Results, path: Pat
         for part, names in zip(parts, columns, strict=True):
             over_time = names[0] not in BESIDE
             for axes, name in zip(part.subplots(len(names), sharex=over_time, squeeze=False)[:, 0], names, strict=True):
-                PANELS[name](axes, run, results) if name in PANELS else history(axes, run, name)
+                PANELS[name](axes, shown) if name in PANELS else history(axes, shown, name)
 
 
 def drawn(name: str, run: Run) -> list[str]:
@@ -39,52 +90,123 @@ def drawn(name: str, run: Run) -> list[str]:
     return [each for each in own if run.columns[each].dtype.kind != "U"]
 
 
-def history(axes: Axes, run: Run, name: str) -> None:
+def smooth(run: Run) -> Run:
+    """The run with what the FMU says between its points, where these are far apart; that it is asked does not move
+    it."""
+    start, stop = run.time[[0, -1]].tolist()
+    fine = len(run.time) > LONG or np.diff(run.time).max() <= 2 * (stop - start) / SMOOTH
+    if fine or run.failed or not any_fmu.shows_steps(description(run.wanted.fmu)):
+        return run
+    wanted = replace(run.wanted, start=start, stop=stop, grid=(stop - start) / SMOOTH, follow=True, repeat=1)
+    return replace(simulate(wanted), steps=run.steps, events=run.events)
+
+
+def history(axes: Axes, shown: Drawn, name: str) -> None:
     """One output over time, or what plays its role."""
-    name = run.wanted.motion.get(name, name)
-    style = "steps-post" if run.columns[name].dtype.kind in "iu" else "default"
-    axes.plot(run.time, drawable(run.columns[name]), color=BLUE, drawstyle=style, label=name)
+    run, role = shown.run, name
+    name = run.wanted.motion.get(role, role)
+    values, (unit, size) = shown.values(name), shown.unit(name)
+    style = "steps-post" if values.dtype.kind in "iu" else "default"
+    axes.plot(run.time, values, color=BLUE, drawstyle=style)
+    modes(axes, run)
+    level = shown.figure(LEVELS.get(role, ""))
+    if level is not None:
+        axes.axhline(level / size, color=GREEN, linestyle=":", label="published peak")
+    legend(axes)
     axes.set_title(run.descriptions[name])
-    axes.set_ylabel(label(name, run.units[name]))
+    axes.set_ylabel(label(name, unit))
     axes.set_xlabel("t [s]")
     axes.set_xlim(*EDGES @ run.time[[0, -1]])
     axes.label_outer()
 
 
-def position(axes: Axes, run: Run, results: Results) -> None:
+def modes(axes: Axes, run: Run) -> None:
+    """Where friction holds, shaded; where a motion turns without a rest, a line."""
+    if run.events is None:
+        return
+    ends = [*run.events.t.tolist(), float(run.time[-1])]
+    turns = []
+    for (begin, end), mode, before in zip(pairwise(ends), run.events.mode, [0, *run.events.mode], strict=False):
+        if mode == 0:
+            axes.axvspan(begin, end, color=GREY, alpha=0.15, linewidth=0, label="stuck")
+        elif before == -mode:
+            turns.append(begin)
+    for begin in turns if len(turns) <= MARKED else ():
+        axes.axvline(begin, color=GREY, linewidth=0.5, linestyle=":", label="reversal")
+
+
+def position(axes: Axes, shown: Drawn) -> None:
     """Position over time, with the driver's if it is recorded, and the turning points if they were measured."""
-    history(axes, run, "position")
+    run, results = shown.run, shown.results
     if "x_driver" in run.columns:
         axes.plot(run.time, run.columns["x_driver"], color=ORANGE, linestyle="--", label="x_driver")
     if "decay" in results:
         decay = results["decay"]
-        axes.plot(decay.times, decay.positions, "o", color=ORANGE, fillstyle="none", label="turning points used")
-    if len(axes.lines) > 1:
-        axes.legend()
+        _, size = shown.unit(run.wanted.motion["position"])
+        axes.plot(decay.times, decay.positions / size, "o", color=ORANGE, fillstyle="none", label="turning points")
+        for name, which in PEAKS.items():
+            peak = shown.figure(name)
+            if peak is not None:
+                signed = np.copysign(peak / size, decay.positions[which])
+                axes.plot(decay.times[which], signed, "+", color=GREEN, markersize=11, label="published")
+        value = shown.figure(decay.result.name)
+        if value is not None:
+            top = envelope(decay, value) / size
+            for side in (top, -top):
+                axes.plot(decay.times, side, color=GREEN, linestyle=":", label="published")
+    first, period = shown.figure("first_slip"), shown.figure("period")
+    if first is not None and period is not None:
+        for at in np.arange(first, run.time[-1], period):
+            axes.axvline(at, color=GREEN, linestyle=":", label="published slip")
+    history(axes, shown, "position")
 
 
-def phase(axes: Axes, run: Run, results: Results) -> None:
+def envelope(decay: Any, value: float) -> np.ndarray:
+    """The sizes of the turning points (n,) from the first on by the `value` that a decay gives: zeta, f or T_f."""
+    share, sizes = np.linspace(0, 1, len(decay.times)), np.abs(decay.positions)
+    if decay.result.name == "zeta":
+        return sizes[0] * np.exp(-2 * np.pi * value / np.sqrt(1 - value * value) * decay.cycles * share)
+    return sizes[0] - (sizes[0] - sizes[-1]) * value / decay.result.value * share
+
+
+def legend(axes: Axes) -> None:
+    """What there is to tell, each once, above the panel, where it hides nothing."""
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    if once:
+        axes.legend(once.values(), once, **ABOVE, ncols=len(once))
+
+
+def phase(axes: Axes, shown: Drawn) -> None:
     """Velocity over position."""
-    x, v = run.wanted.motion["position"], run.wanted.motion["velocity"]
-    axes.plot(drawable(run.columns[x]), drawable(run.columns[v]), color=BLUE)
+    motion = shown.run.wanted.motion
+    x, v = motion["position"], motion["velocity"]
+    axes.plot(shown.values(x), shown.values(v), color=BLUE)
     axes.set_title("phase plane")
-    axes.set_xlabel(label(x, run.units[x]))
-    axes.set_ylabel(label(v, run.units[v]))
+    axes.set_xlabel(label(x, shown.unit(x)[0]))
+    axes.set_ylabel(label(v, shown.unit(v)[0]))
 
 
-def steps(axes: Axes, run: Run, results: Results) -> None:
+def steps(axes: Axes, shown: Drawn) -> None:
     """Size of the solver's own steps over the time where they begin, with the mean if it was measured."""
+    run = shown.run
     assert run.steps is not None  # the scene was checked for it
     axes.semilogy(run.steps.t[:-1], run.steps.h, color=BLUE, linewidth=0.6, marker=".", markersize=3)
+    if "steps" in shown.results:
+        found = {
+            "mean": (shown.results["steps"].mean, ORANGE, "--"),
+            "published": (shown.figure("mean_step"), GREEN, ":"),
+        }
+        for word, (mean, color, style) in found.items():
+            if mean is not None:
+                told = " ".join(Quantity("mean_step", mean, "s", "").told())
+                axes.axhline(mean, color=color, linestyle=style, label=f"{word} {told}")
+    legend(axes)
     axes.set_title("step size of the solver")
-    if "steps" in results:
-        mean, told = results["steps"].mean, " ".join(results["steps"].quantities[1].told())
-        axes.axhline(mean, color=ORANGE, linestyle="--")
-        axes.set_title(f"step size of the solver (dashed: mean {told})")
     axes.set_xlim(*EDGES @ run.time[[0, -1]])
     axes.set_xlabel("t [s]")
     axes.set_ylabel("h [s]")
 
 
-Panel = Callable[[Axes, Run, Results], None]
+Panel = Callable[[Axes, Drawn], None]
 PANELS: dict[str, Panel] = {"position": position, "phase": phase, "steps": steps}

@@ -81,7 +81,7 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     if scene.plots:
         from .figure import draw
 
-        draw(scene.title, scene.plots, run, results, folder / "figure.png")
+        draw(scene.title, scene.plots, run, results, folder / "figure.png", scene.published)
     return Outcome(scene.name, scene, run, quantities, run.failed or None)
 
 

@@ -1,0 +1,127 @@
+"""What the figure of a run shows beside its curves, of every published scene but the one that takes seconds."""
+
+import json
+import os
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+from builds import ROOT
+
+SCENES = {path.stem: tomllib.loads(path.read_text()) for path in sorted((ROOT / "harness/scenes").glob("*.toml"))}
+SCENES.pop("pacejka-0.001")
+MODAL = [name for name, scene in SCENES.items() if scene.get("law") == "hybrid"]
+PROGRAM = """
+import json, sys
+from dataclasses import replace
+from pathlib import Path
+from matplotlib.figure import Figure
+from harness.scenes.scene import load
+from harness.studies.run import job
+
+told, run = {}, job.any_fmu.run
+def kept(wanted, report):
+    runs.append(run(wanted, report))
+    return runs[-1]
+job.any_fmu.run = kept
+for name in sys.argv[1:]:
+    figures, runs = [], []
+    Figure.savefig = lambda figure, path: figures.append(figure)
+    job.perform(replace(load(name), repeat=1), Path("results"), lambda share: None)
+    events = runs[0].events
+    told[name] = {
+        "samples": len(runs[0].time),
+        "sticks": [] if events is None else events.t[events.mode == 0].tolist(),
+        "panels": {
+            axes.get_title(loc="left"): {
+                "axis": axes.get_ylabel(),
+                "lines": [[line.get_label(), *(list(map(float, d)) for d in line.get_data())] for line in axes.lines],
+                "stuck": [patch.get_x() for patch in axes.patches if patch.get_label() == "stuck"],
+            }
+            for axes in figures[0].get_axes()
+        },
+    }
+print(json.dumps(told))
+"""
+
+
+@pytest.fixture(scope="module")
+def drawn(place):
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *SCENES],
+        cwd=place,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def curves(scene):
+    """The panels over time, each with its longest line, the curve."""
+    over_time = {title: panel for title, panel in scene["panels"].items() if title[:4] not in ("phas", "step")}
+    return {title: max(panel["lines"], key=lambda line: len(line[1])) for title, panel in over_time.items()}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_curve_has_no_corners_though_steps_are_large(drawn, name):
+    for _, t, _ in curves(drawn[name]).values():
+        assert np.diff(t).max() < 2.01 * (t[-1] - t[0]) / 1000
+
+
+def test_it_is_the_solver_that_is_shown_and_not_who_looks(drawn):
+    """The steps are those of the run that was measured, the curve has more points than it."""
+    _, t, _ = drawn["smd"]["panels"]["step size of the solver"]["lines"][0]
+    assert len(t) + 1 == drawn["smd"]["samples"] < 300 < len(curves(drawn["smd"])["position of the mass"][1])
+
+
+@pytest.mark.parametrize("name", MODAL)
+def test_every_stick_is_shaded_from_where_it_begins(drawn, name):
+    for title in curves(drawn[name]):
+        stuck = drawn[name]["panels"][title]["stuck"]
+        assert stuck == pytest.approx(drawn[name]["sticks"][: len(stuck)])
+        assert len(drawn[name]["sticks"]) - len(stuck) <= (name == "coulomb")  # whose last begins after the end
+
+
+def test_angles_are_in_degrees(drawn):
+    angle, speed = (drawn["pendulum"]["panels"][title] for title in ("angle, zero hanging down", "angular speed"))
+    assert (angle["axis"], speed["axis"]) == ("theta [deg]", "omega [deg/s]")
+    assert curves(drawn["pendulum"])["angle, zero hanging down"][2][0] == pytest.approx(10.02)
+
+
+@pytest.mark.parametrize(
+    ("name", "title", "figures"),
+    [
+        ("smd", "position of the mass", ["sample_0", "sample_n"]),
+        ("coulomb-sign", "position of the mass", ["sample_0", "sample_n"]),
+        ("pendulum", "angle, zero hanging down", ["x_0", "x_n"]),
+        ("stickslip", "speed of the sled", ["peak_speed"]),
+        ("stickslip", "acceleration of the sled", ["peak_acceleration"]),
+        ("stickslip-threshold", "speed of the sled", ["peak_speed"]),
+    ],
+)
+def test_a_published_figure_stands_beside_ours(drawn, name, title, figures):
+    published = [SCENES[name]["published"][figure] for figure in figures]
+    lines = drawn[name]["panels"][title]["lines"]
+    found = [y[0] for text, _, y in lines if text.startswith("published") and len(set(y)) == 1]
+    assert found == pytest.approx([value[0] if isinstance(value, list) else value for value in published])
+
+
+@pytest.mark.parametrize("name", ["smd", "stickslip-threshold", "pacejka-0.01"])
+def test_the_published_mean_step_stands_beside_ours(drawn, name):
+    value, unit = SCENES[name]["published"]["mean_step"]
+    found = {text: y[0] for text, _, y in drawn[name]["panels"]["step size of the solver"]["lines"]}
+    assert found[f"published {value:.5g} {unit}"] == pytest.approx(1e-3 * value)
+
+
+@pytest.mark.parametrize("name", ["smd", "coulomb", "pendulum"])
+def test_the_envelope_of_the_published_loss_goes_through_the_turning_points(drawn, name):
+    """To what the published value differs from ours."""
+    lines = next(iter(drawn[name]["panels"].values()))["lines"]
+    turning = next(np.abs(y) for text, _, y in lines if text == "turning points")
+    upper = next(np.array(y) for text, _, y in lines if text == "published" and len(y) > 1)
+    assert upper == pytest.approx(turning, abs=0.02 * turning[0])
