@@ -20,7 +20,16 @@ def version(context: click.Context, option: click.Parameter, wanted: bool) -> No
         context.exit()
 
 
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+class Commands(click.Group):
+    """Whose help cuts no sentence short."""
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Each command, and the first sentence of its help."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, each.get_short_help_str(limit=1000)) for name, each in self.commands.items()])
+
+
+@click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @results
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=version, help="Print versions.")
 @click.pass_context

@@ -30,8 +30,9 @@ def run(
     as_json: bool,
     **how: Any,
 ) -> None:
-    """Run one SCENE: a shipped name (see list) or the path of a TOML file.  Or run an FMU of any origin.  Or run again
-    what made a folder of results.
+    """Run a SCENE, an FMU of any origin, or once more what made a folder of results.
+
+    SCENE is a shipped name (see list), the path of a TOML file, or a folder of results.
 
     An FMU that does not show its solver's steps is run with ever shorter communication steps, until halving them
     changes no output by more than the tolerance.

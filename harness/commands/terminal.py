@@ -49,6 +49,12 @@ def results(command: Callable[..., Any]) -> Callable[..., Any]:
 class Number(click.FloatRange):
     """A finite number, in a range or not; click lets NaN through, which is in no range."""
 
+    name = "number"
+
+    def _describe_range(self) -> str:
+        """Of a range without ends click says that it ends at None."""
+        return "" if self.min is self.max is None else super()._describe_range()
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         number = super().convert(value, param, ctx)
         if not isfinite(number):

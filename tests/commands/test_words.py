@@ -14,6 +14,7 @@ from builds import ROOT
 from commands import harness
 from rich.console import Console
 
+from harness.commands import commands
 from harness.scenes.coupled import scene as coupled
 from harness.scenes.scene import load, shipped
 from harness.studies.bench.measure import Beside, Measure
@@ -97,6 +98,16 @@ def test_the_tables_of_long_commands_fit_into_80_columns(name):
         with console.capture() as said:
             console.print(each)
         fits(said.get(), heading)
+
+
+@pytest.mark.parametrize("command", ["", *commands.commands])
+def test_help_cuts_nothing_short(tmp_path, command):
+    done = harness(tmp_path, *command.split(), "--help", **PLAIN)
+    assert (done.returncode, done.stderr) == (0, "")
+    prose = [line for line in done.stdout.splitlines() if "-m harness" not in line]  # a command is one line
+    fits("\n".join(prose), "Example")
+    assert not [line for line in prose if re.search(r"\w\.\.\.$", line)]
+    assert "None" not in done.stdout
 
 
 def test_names_with_brackets_are_shown_as_they_are(tmp_path):
