@@ -1,6 +1,8 @@
 """Runs any FMU: one of ours at its solver's own steps, somebody else's until two results agree."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any
 
 from ..errors import HarnessError
@@ -13,12 +15,13 @@ from .settings import NEEDED
 from .specification import Specification
 
 POINTS = 512  # communication steps of a run from which nothing else is asked
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 def run(wanted: Specification, report: Report) -> Run:
     """The run that is wanted, of every output if none is named; HarnessError if it fails with nothing to show."""
     found = description(wanted.fmu, wanted.lenient)
-    wanted = replace(wanted, outputs=wanted.outputs or outputs(found))
+    wanted = replace(wanted, outputs=wanted.outputs or outputs(found, wanted.values))
     if not wanted.outputs:
         raise HarnessError(f"{wanted.fmu.name} has no variable that changes: there is nothing to record")
     return simulate(wanted, report) if shows_steps(found) else foreign.simulate(wanted, found, report)
@@ -37,14 +40,14 @@ def shows_steps(found: Any) -> bool:
     return found.fmiVersion == "2.0" and found.coSimulation is not None and all(name in names for name in NEEDED)
 
 
-def outputs(found: Any) -> tuple[str, ...]:
-    """The outputs of an FMU; without any, what it computes inside."""
+def outputs(found: Any, values: Mapping[str, Any] = NOTHING) -> tuple[str, ...]:
+    """The outputs of an FMU with such values, arrays by their elements; without any, what it computes inside."""
     for causality in ("output", "local"):
         names = [
             element
             for variable in found.modelVariables
             if variable.causality == causality and variable.variability != "constant" and variable.type in RECORDED
-            for element in elements(variable.name, foreign.shape(variable, {}))
+            for element in elements(variable.name, foreign.shape(variable, values))
         ]
         if names:
             return tuple(names)

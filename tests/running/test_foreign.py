@@ -10,8 +10,11 @@ import commands
 import foreign
 import numpy as np
 import pytest
+from fmpy.model_description import Dimension, ModelVariable
 
+from harness.errors import HarnessError
 from harness.running.foreign.agreement import agreed
+from harness.running.foreign.job import shape
 from harness.running.foreign.passes import Pass
 from harness.running.foreign.request import Request
 from harness.running.foreign.rows import Rows
@@ -298,3 +301,12 @@ def test_two_results_that_never_agree_are_kept_with_what_they_differ_by(exchange
     assert answer.taken == len(passes) - 1
     assert "of its largest value, more than the tolerance of 1e-06; raise --tolerance" in answer.failed
     assert len(passes) < 20
+
+
+def test_an_array_is_as_large_as_its_structural_parameters_say():
+    n = ModelVariable("n", type="UInt64", start="3")
+    y = ModelVariable("y", type="Float64", dimensions=[Dimension(None, 1, n), Dimension(2, None)])
+    assert shape(y, {}) == (3, 2)
+    assert shape(y, {"n": 5}) == (5, 2)
+    with pytest.raises(HarnessError, match="n = -1 is outside its range; allowed: any whole number"):
+        shape(y, {"n": -1})

@@ -4,7 +4,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -37,7 +37,8 @@ def simulate(wanted: Specification, found: Any, report: Callable[[float], None])
     exchange = wanted.exchange or found.coSimulation is None
     if exchange and found.modelExchange is None:
         offered = " and ".join(ways(found)) or "no interface"
-        raise HarnessError(f"{wanted.fmu.name} offers {offered}; model exchange is not among them")
+        lacks = "model exchange is not among them" if wanted.exchange else "neither co-simulation nor model exchange"
+        raise HarnessError(f"{wanted.fmu.name} offers {offered}; {lacks}")
     values = set_values(wanted, variables)
     chosen = recorded(wanted, variables, values)
     start, stop = span(wanted, found)
@@ -103,15 +104,12 @@ def set_values(wanted: Specification, variables: dict[str, Any]) -> dict[str, An
     return values
 
 
-def shape(variable: Any, values: dict[str, Any]) -> tuple[int, ...]:
+def shape(variable: Any, values: Mapping[str, Any]) -> tuple[int, ...]:
     """The shape of an array, () of a scalar; a dimension may be a structural parameter, and that is set."""
     sizes = []
     for dimension in variable.dimensions:
         named = dimension.variable
-        size = int(dimension.start if named is None else values.get(named.name, named.start))
-        if size < 0:
-            raise SceneError(f"{variable.name} would have {size} elements")
-        sizes.append(size)
+        sizes.append(accepted(named, values.get(named.name, float(named.start))) if named else int(dimension.start))
     return tuple(sizes)
 
 
