@@ -24,7 +24,8 @@ def run(wanted: Specification, report: Report) -> Run:
     wanted = replace(wanted, outputs=wanted.outputs or outputs(found, wanted.values))
     if not wanted.outputs:
         raise HarnessError(f"{wanted.fmu.name} has no variable that changes: there is nothing to record")
-    return simulate(wanted, report) if shows_steps(found) else foreign.simulate(wanted, found, report)
+    ours = shows_steps(found) and not wanted.exchange
+    return simulate(wanted, report) if ours else foreign.simulate(wanted, found, report)
 
 
 def stop_of(wanted: Specification) -> float | None:

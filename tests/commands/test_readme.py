@@ -12,6 +12,7 @@ from math import atan2, pi, sqrt
 from pathlib import Path
 
 import fmi3_hosts
+import foreign
 import numpy as np
 import pytest
 from builds import ROOT
@@ -60,6 +61,7 @@ def here(fmus, tmp_path):
     for name, file in (("a.fmu", "smd.fmu"), ("b.fmu", "coulomb.fmu")):
         shutil.copy(fmus / file, tmp_path / name)
     (tmp_path / "build_fmus.py").symlink_to(ROOT / "build_fmus.py")
+    (tmp_path / "theirs.fmu").symlink_to(foreign.built() / "Midpoint.fmu")
     (tmp_path / "my_scene.toml").write_text(SCENE)
     (tmp_path / "cart.py").write_text(MODEL_FILE)
     return tmp_path

@@ -182,10 +182,10 @@ def test_what_shares_no_variable_is_refused():
     ("second", "sentence", "shift"),
     [
         ([[1, 1], [2.5, 0]], "2 changes of mode in both, at most 0.5 s apart", 0.5),
-        ([[1.25, 1]], "1 changes of mode in both, at most 0.25 s apart; only in one: to 0 at t = 2 s", np.nan),
+        ([[1.25, 1]], "1 change of mode in both, at most 0.25 s apart; only in one: to 0 at t = 2 s", np.nan),
         (
             [[1, -1], [2, 0]],
-            "1 changes of mode in both, at most 0 s apart; only in one: to 1 at t = 1 s; only in two: to -1 at t = 1 s",
+            "1 change of mode in both, at most 0 s apart; only in one: to 1 at t = 1 s; only in two: to -1 at t = 1 s",
             np.nan,
         ),
         (
@@ -194,7 +194,7 @@ def test_what_shares_no_variable_is_refused():
             "only in two: to 1 at t = 0.5 s, to 1 at t = 3 s, to 1 at t = 4 s, 2 more",
             np.nan,
         ),
-        ([], "0 changes of mode in both, at most 0 s apart; only in one: to 1 at t = 1 s, to 0 at t = 2 s", np.nan),
+        ([], "0 changes of mode in both; only in one: to 1 at t = 1 s, to 0 at t = 2 s", np.nan),
     ],
 )
 def test_events_are_matched_by_kind_and_time(second, sentence, shift):
@@ -330,6 +330,14 @@ def test_fmus_that_are_not_ours_are_compared(harness, theirs, pair, told):
     done = harness("compare", one, two, "--tolerance", 1e-4, "--rtol", 2e-4, "--lenient")
     assert (done.returncode, done.stderr) == (0, "")
     assert told in done.stdout
+
+
+def test_fmus_that_are_run_are_run_to_the_same_stop(harness, theirs, tmp_path):
+    shorter = {"modelDescription.xml": lambda text: text.replace('stopTime="1.0"', 'stopTime="0.75"')}
+    foreign.edited(theirs / "Breaking.fmu", tmp_path / "Shorter.fmu", shorter)
+    done = harness("compare", "Shorter.fmu", theirs / "Breaking.fmu", "--lenient", "--rtol", 0)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "(common to both)" in done.stdout
 
 
 def test_an_fmu_that_ends_itself_is_compared_as_far_as_it_came(harness, theirs):

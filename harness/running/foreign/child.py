@@ -23,6 +23,7 @@ from .rows import Recorder, Texts, read
 
 OFTEN = 0.2  # s between two signs of life
 LARGEST = 1_000_000  # bytes of what the FMU prints that are kept
+LEFT = 0.8  # of the bar that shows the progress, after each pass
 
 
 class Life:
@@ -30,11 +31,11 @@ class Life:
 
     def __init__(self, room: Path, patience: float) -> None:
         self.hung, self.share = (room / HUNG).open("w"), (room / SHARE).open("w")
-        self.patience, self.next, self.last = patience, 0.0, 0.0
+        self.patience, self.next, self.done, self.passes = patience, 0.0, 0.0, 0
         self.parent = os.getppid()
 
     def heed(self, share: float | None = None) -> None:
-        """So far is the pass, as a share of it."""
+        """So far is the pass, as a share of it; how many there will be nobody knows."""
         now = perf_counter()
         if now < self.next:
             return
@@ -42,9 +43,9 @@ class Life:
         if os.getppid() != self.parent:  # it was killed, and nobody waits
             os._exit(1)
         faulthandler.dump_traceback_later(self.patience, exit=True, file=self.hung)
-        self.last = self.last if share is None else share
+        self.done = self.done if share is None else share
         self.share.seek(0)
-        self.share.write(f"{self.last:.6f}")
+        self.share.write(f"{1 - LEFT ** (self.passes + self.done):.6f}")
         self.share.flush()
         forget()
         if os.fstat(1).st_size > LARGEST:
@@ -59,11 +60,12 @@ class Host:
         self.found = fmpy.read_model_description(asked.folder, validate=False)
         variables = {variable.name: variable for variable in self.found.modelVariables}
         self.chosen = [(variables[name], tuple(shape)) for name, shape in asked.outputs.items()]
-        self.texts, self.passes = Texts(room / TEXTS), 0
+        self.texts = Texts(room / TEXTS)
 
     def run(self, h: float, tolerance: float) -> Pass:
         """One pass with a communication step in s and a tolerance."""
-        path = self.room / f"rows-{self.passes}"
+        number = self.life.passes
+        path = self.room / f"rows-{number}"
         del MESSAGES[:]
         self.life.next = 0.0
         self.life.heed(0.0)
@@ -85,8 +87,8 @@ class Host:
         if sentence:
             at = f" at t = {rows.time[-1]:.9g} s" if len(rows.time) and " at t = " not in sentence else ""
             sentence = ": ".join(filter(None, (sentence + at, words())))
-        self.passes += 1
-        return Pass(self.passes - 1, rows, sentence, ended, refused)
+        self.life.passes += 1
+        return Pass(number, rows, sentence, ended, refused)
 
     def step(self, path: Path, h: float, tolerance: float) -> None:
         """The same; whatever ends it is raised."""

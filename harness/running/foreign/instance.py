@@ -5,7 +5,9 @@ from typing import Any
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
+from ...errors import reason
 from ..fmu import WARNING, callbacks
+from .passes import Failed
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 LONGEST = 50  # messages of the log that are kept
@@ -16,9 +18,14 @@ def instantiated(found: Any, folder: str, exchange: bool) -> Any:
     """A new instance."""
     old = found.fmiVersion == "2.0"
     kind = {(True, True): FMU2Model, (True, False): FMU2Slave, (False, True): FMU3Model, (False, False): FMU3Slave}
-    identifier = (found.modelExchange if exchange else found.coSimulation).modelIdentifier
-    fmu = kind[old, exchange](guid=found.guid or "", unzipDirectory=folder, modelIdentifier=identifier)
-    fmu.instantiate(loggingOn=True, **({"callbacks": callbacks()[0]} if old else {"logMessage": keep}))
+    interface = found.modelExchange if exchange else found.coSimulation
+    try:
+        make = kind[old, exchange]
+        fmu = make(guid=found.guid or "", unzipDirectory=folder, modelIdentifier=interface.modelIdentifier)
+        fmu.instantiate(loggingOn=True, **({"callbacks": callbacks()[0]} if old else {"logMessage": keep}))
+    except Exception as error:  # fmpy raises bare Exceptions
+        tool = "; it needs the tool that made it (needsExecutionTool)" if interface.needsExecutionTool else ""
+        raise Failed(f"{reason(error)}{tool}") from None
     return fmu
 
 

@@ -38,7 +38,8 @@ class Pairs:
 
     def sentence(self, names: tuple[str, str]) -> str:
         """What is to be said of them."""
-        said = [f"{len(self.one)} changes of mode in both, at most {self.apart:.3g} s apart"]
+        count = f"{len(self.one)} change{'s' * (len(self.one) != 1)} of mode in both"
+        said = [f"{count}, at most {self.apart:.3g} s apart" if len(self.one) else count]
         for name, rows in zip(names, self.only, strict=True):
             told = [f"to {mode:g} at t = {t:.6g} s" for t, mode in rows[:MOST]]
             more = [f"{len(rows) - MOST} more"] * (len(rows) > MOST)
