@@ -1,11 +1,11 @@
 """The same bodies in one model, without communication steps: what a coupled run is compared with.
 
-    m_i a_i = F_i + k_i (v_driver_i t - x_i) - c_i v_i - F_friction_i,    F_i = sum of factor * output of another body
+    m_i a_i = F_i + k_i (v_driver_i t - x_i) - c_i v_i - F_friction_i,    F_i = sum of factor * output of a body
 
 Each body sticks, or slides forward or backward; every change is an event at which the integration begins anew.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,10 +56,22 @@ def bodies(scene: Coupled, defaults: dict[str, dict[str, float]]) -> tuple[Bodie
             hold=each("f") + each("mu_s") * weight,
             slide=each("f") + each("mu_d") * weight,
             driver=each("v_driver"),
-            couplings=tuple((places[c.sink], places[c.source], c.output, c.factor) for c in scene.connections),
+            couplings=tuple(couplings(scene, places)),
         ),
         np.concatenate([each("x0"), each("v0")]),
     )
+
+
+def couplings(scene: Coupled, places: dict[str, int]) -> Iterator[tuple[int, int, str, float]]:
+    """What acts on each body from the others: of a spring on its flange a k (x_b - x_a) + c (v_b - v_a)."""
+    for each in scene.passed:
+        yield places[each.sink], places[each.source], each.output, 1.0
+    for spring in scene.springs:
+        for flange, part in spring.acts:
+            for end, source in (("a", spring.a), ("b", spring.b)):
+                sign = -1.0 if end == flange else 1.0
+                for output, factor in (("x", spring.k), ("v", spring.c)) if source else ():
+                    yield places[part], places[source], output, sign * factor
 
 
 def solve(system: Bodies, start: np.ndarray, times: np.ndarray) -> np.ndarray:

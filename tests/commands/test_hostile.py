@@ -214,7 +214,7 @@ def test_scenes_with_letters_changed_at_random_run_or_are_refused(here):
                 text[dice.randrange(len(text))] = dice.choice('"[]{}=.,#\\\n0-e$\0\u00e9 ')
             (here / "mine.toml").write_text("".join(text), encoding="utf-8")
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr("harness.studies.coupled.study.study", refuse)  # what comes after reading takes long
+                patch.setattr("harness.studies.coupled.study.built", refuse)  # what comes after reading takes long
                 check(*ended("couple", "mine.toml", "--quiet"), "".join(text))
     base = "".join(f"{name} = {told}\n" for name, told in SCENE.items()) + "grid = 0.01\n[values]\nm = 1.5\n"
     for _ in range(150):

@@ -6,26 +6,28 @@
     [parts.left]                       one table for each part
     model = "smd"                      smd, coulomb or stickslip
     values = {m = 2.0, x0 = 0.1}       its parameters, SI units
-    [[springs]]                        a linear spring between two parts, without force at equal positions
+    [[springs]]                        a spring and damper between two parts, without force at equal positions
     between = ["left", "right"]
     k = 40.0                           N/m
+    c = 0.1                            N s/m, 0 without
     [[connections]]                    an output that drives the F_ext of another part, times a factor
-    from = "left.x"
+    from = "left.x"                    x or v; or F_spring with the factor 1
     to = "right"
     factor = 40.0
 
-The force k (x_other - x) of a spring is one connection each way with the factor k, and k more stiffness in each part.
+Every spring, and every factor, is an FMU of its own (fmus/more/spring.py), for few tools heed factors in an archive:
+into it come the speeds of its two ends, out of it the forces on them.  A connection is a spring with one end held.
 """
 
 import re
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
 from ...errors import SceneError, shown, unknown
 from ..fmus import fmu_of
-from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Kind, is_names, read, structured
+from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Kind, is_names, is_number, read, structured
 
 FOLDER = Path(__file__).parent
 MODELS = ("smd", "coulomb", "stickslip")
@@ -34,6 +36,7 @@ MOST_STEPS = 1_000_000
 SOURCES = ("x", "v", "F_spring")  # outputs that a connection may come from
 
 
+NOT_NEGATIVE = Kind(lambda value: is_number(value) and value >= 0, "a finite number, at least 0")
 PAIR = Kind(lambda value: is_names(value) and len(value) == 2, "a list of two different names")
 STEPS = Kind(
     lambda value: isinstance(value, list) and bool(value) and all(map(POSITIVE.accepts, value)),
@@ -55,6 +58,7 @@ class SpringKeys:
 
     between: Annotated[tuple[str, str], PAIR]
     k: Annotated[float, POSITIVE]
+    c: Annotated[float, NOT_NEGATIVE] = 0.0
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,7 @@ class CoupledKeys:
 
 @dataclass(frozen=True)
 class Part:
-    """One FMU of the scene, and the values that differ from its own, `k` with the springs already in it."""
+    """One FMU of the scene, and the values that differ from its own."""
 
     name: str
     model: str
@@ -89,13 +93,29 @@ class Part:
 
 
 @dataclass(frozen=True)
+class Spring:
+    """A spring (`k` in N/m) and damper (`c` in N s/m) from the part `a` to the part `b`; `acts` says on which of them,
+    and with which sign.  Without a part at an end that is held at zero."""
+
+    a: str
+    b: str
+    k: float
+    c: float
+    acts: tuple[tuple[str, str], ...]  # a flange, and the part on which its force acts
+
+    @property
+    def name(self) -> str:
+        return "_".join(["spring", *filter(None, (self.a, self.b)), *(part for _, part in self.acts if not self.b)])
+
+
+@dataclass(frozen=True)
 class Connection:
-    """`factor` times the `output` of the part `source` is a share of the outer force on the part `sink`."""
+    """The `output` of the part `source` is the `entry` of the part `sink`."""
 
     source: str
     output: str
     sink: str
-    factor: float
+    entry: str
 
 
 @dataclass(frozen=True)
@@ -107,7 +127,23 @@ class Coupled:
     stop: float
     steps: tuple[float, ...]
     parts: tuple[Part, ...]
-    connections: tuple[Connection, ...]
+    springs: tuple[Spring, ...]
+    passed: tuple[Connection, ...]  # from part to part, as they are
+
+    @property
+    def system(self) -> str:
+        """Its name as an identifier."""
+        return re.sub(r"\W", "_", self.name, flags=re.ASCII)
+
+    @property
+    def connections(self) -> tuple[Connection, ...]:
+        """All of them, those with the springs included."""
+        found = list(self.passed)
+        for each in self.springs:
+            for end, part in (("a", each.a), ("b", each.b)):
+                found += [Connection(part, "v", each.name, f"v_{end}")] if part else []
+            found += [Connection(each.name, f"F_{end}", part, "F_ext") for end, part in each.acts]
+        return tuple(found)
 
 
 def shipped() -> list[Path]:
@@ -115,25 +151,22 @@ def shipped() -> list[Path]:
     return sorted(FOLDER.glob("*.toml"))
 
 
-def load(source: str, stiffness: dict[str, float]) -> Coupled:
-    """The scene of a shipped name or a file; `stiffness` of each model where a scene does not set it.
-
-    SceneError in one sentence if it is not one.
-    """
+def load(source: str) -> Coupled:
+    """The scene of a shipped name or a file; SceneError in one sentence if it is not one."""
     path = Path(source)
     if path.suffix != ".toml":
         names = {file.stem: file for file in shipped()}
         if source not in names:
-            raise SceneError(f"{unknown('coupled scene', source, names)}, or the path of a .toml file")
+            raise SceneError(f"{unknown('coupled scene', source, names)}, or the path of a .toml or .ssp file")
         path = names[source]
     table = read(path)
     try:
-        return build(path, structured(table, CoupledKeys), stiffness)
+        return build(path, structured(table, CoupledKeys))
     except SceneError as error:
         raise SceneError(f"scene {path.stem}: {error}") from None
 
 
-def build(path: Path, keys: CoupledKeys, stiffness: dict[str, float]) -> Coupled:
+def build(path: Path, keys: CoupledKeys) -> Coupled:
     """The scene that the keys of its file say."""
     if not keys.parts:
         raise SceneError("parts is empty; name each part in a table of its own, as in [parts.left]")
@@ -142,37 +175,42 @@ def build(path: Path, keys: CoupledKeys, stiffness: dict[str, float]) -> Coupled
             raise SceneError(f"part {shown(name)}: a name has letters, digits and _, and begins with a letter")
         if part.model not in MODELS:
             raise SceneError(f"part {name}: {unknown('model', part.model, MODELS)}")
-    values = {name: {key: float(value) for key, value in part.values.items()} for name, part in keys.parts.items()}
-    connections = []
+    springs, passed = [], []
     for spring in keys.springs:
         one, two = (known(name, keys.parts) for name in spring.between)
-        connections += [Connection(one, "x", two, float(spring.k)), Connection(two, "x", one, float(spring.k))]
-        for name in (one, two):
-            model = keys.parts[name].model
-            if model == "stickslip":
-                raise SceneError(
-                    f"part {name}: more stiffness of a stickslip sled would pull at its driver; take coulomb"
-                )
-            values[name]["k"] = values[name].get("k", stiffness[model]) + float(spring.k)
+        springs.append(Spring(one, two, float(spring.k), float(spring.c), (("a", one), ("b", two))))
     for each in keys.connections:
         source, _, output = each.from_.partition(".")
         if output not in SOURCES:
             raise SceneError(f"from = {shown(each.from_)}: {unknown('output', output, SOURCES)}")
-        connections.append(
-            Connection(known(source, keys.parts), output, known(each.to, keys.parts), float(each.factor))
-        )
-    driven = [each.sink for each in connections]
+        source, sink, factor = known(source, keys.parts), known(each.to, keys.parts), float(each.factor)
+        if output != "F_spring":
+            size, end = abs(factor), "b" if factor > 0 else "a"
+            k, c = (size, 0.0) if output == "x" else (0.0, size)
+            springs.append(Spring(source, "", k, c, ((end, sink),)))
+        elif factor == 1.0:
+            passed.append(Connection(source, output, sink, "F_ext"))
+        else:
+            raise SceneError(f"from = {shown(each.from_)}: a force is passed on with factor = 1, not {factor!r}")
+    scene = Coupled(path.stem, keys.title, float(keys.stop), stepped(keys), (), tuple(springs), tuple(passed))
+    driven = [each.sink for each in scene.connections]
     twice = [name for name in keys.parts if driven.count(name) > 1]
     if twice:
         raise SceneError(f"part {twice[0]} is driven twice; an input takes one connection")
+    values = {name: {key: float(value) for key, value in part.values.items()} for name, part in keys.parts.items()}
+    parts = tuple(Part(name, part.model, fmu_of(part.model), values[name]) for name, part in keys.parts.items())
+    return replace(scene, parts=parts)
+
+
+def stepped(keys: CoupledKeys) -> tuple[float, ...]:
+    """The communication steps in s, the longest first."""
     steps = tuple(sorted(map(float, keys.steps), reverse=True))
     for step in steps:
         if not 1 <= keys.stop / step <= MOST_STEPS:
             raise SceneError(
                 f"steps: {step!r} s makes {keys.stop / step:.6g} steps to the stop; from 1 to {MOST_STEPS} are allowed"
             )
-    parts = tuple(Part(name, part.model, fmu_of(part.model), values[name]) for name, part in keys.parts.items())
-    return Coupled(path.stem, keys.title, float(keys.stop), steps, parts, tuple(connections))
+    return steps
 
 
 def known(name: str, parts: Collection[str]) -> str:

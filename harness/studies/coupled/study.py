@@ -1,8 +1,11 @@
-"""A coupled scene from its file to its archive, its runs and their error against the communication step."""
+"""A coupled scene from its file to its archive, its runs and their error against the communication step.
 
-import json
+An archive that somebody else wrote is run the same way; the finest run takes the place of the reference.
+"""
+
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from shutil import copy
 
@@ -11,6 +14,7 @@ import numpy as np
 from ...errors import HarnessError
 from ...process.child import ask
 from ...process.room import room
+from ...results.files import heading, write_rows
 from ...results.files import write as write_csv
 from ...results.folder import replacing
 from ...results.provenance import named, record
@@ -19,56 +23,53 @@ from ...scenes.coupled.scene import MODELS, Coupled, load
 from ...scenes.fmus import fmu_of
 from ...truths.monolith import bodies, solve
 from .convergence import Convergence
+from .engine import ENGINES, EXTRA, MAIN, Request, rows
 
 FOLDER = "coupled"
-PATIENCE = 300.0  # s, for one run
-EXTRA = "python -m pip install 'friction-fmus[coupled]'"
+FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.png")
+SPRING = Path(__file__).parents[3] / "fmus" / "more" / "spring.py"
+
+Report = Callable[[float], None]
+Starts = dict[str, dict[str, float]]  # start values of the real parameters of each model
 
 
-def perform(source: str, out: Path, report: Callable[[float], None]) -> tuple[Convergence, Path]:
-    """Write the archive of a coupled scene, run it at each communication step, compare, write out/coupled/<name>."""
+def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple[Convergence, Path]:
+    """Run a coupled scene or an archive at each communication step, compare, and write out/coupled/<name>; `stop` in s
+    is for an archive that names none."""
     try:
-        from . import archive
+        from . import archive, theirs
     except ImportError as error:
         raise HarnessError(f"a coupled scene needs {error.name}: {EXTRA}") from None
     from .figure import draw
 
-    defaults = {model: starts(fmu_of(model)) for model in MODELS}
-    scene = load(source, {model: values["k"] for model, values in defaults.items()})
+    with room("ssp-") as plain:
+        if source.endswith(".ssp"):
+            name, file = Path(source).stem, plain / "theirs.ssp"
+            asked, fmus, scene = theirs.asked(Path(source), file, stop), [Path(source)], None
+        else:
+            defaults = {model: starts(fmu_of(model)) for model in MODELS}
+            scene = load(source)
+            check(scene, defaults)
+            name, file = scene.name, plain / f"{scene.system}.ssp"
+            asked, fmus = blank(scene), [part.fmu for part in scene.parts]
+        folder = out / FOLDER / name
+        with replacing(folder, (file.name, *FILES), named(source)) as fresh:
+            if scene:
+                archive.write(scene, values(scene, defaults), built(scene, plain), file)
+            copy(file, fresh)
+            found = study(asked, file, solver(scene, defaults) if scene else None, report)
+            save(found, fresh)
+            draw(found, fresh / "figure.png")
+            record(fresh, fmus, scene=scene, source=named(source))
+    return found, folder
+
+
+def check(scene: Coupled, defaults: Starts) -> None:
+    """What is set is there to be set."""
     for part in scene.parts:
         unknown = sorted(set(part.values) - set(defaults[part.model]))
         if unknown:
             raise HarnessError(f"scene {scene.name}: part {part.name} ({part.model}) has no parameter {unknown[0]}")
-    files = (f"{scene.name}.ssp", "trajectory.csv", "error.csv", "figure.png")
-    folder = out / FOLDER / scene.name
-    with replacing(folder, files, named(source)) as fresh, room("ssp-") as plain:
-        archive.write(scene, plain / files[0])
-        copy(plain / files[0], fresh)
-        found = study(scene, plain / files[0], defaults, report)
-        names = [f"{part.name}.x" for part in scene.parts]
-        heads = [f"{name} [m]" for name in (*names, *(f"{name} reference" for name in names))]
-        write_csv(fresh / "trajectory.csv", ["t [s]", *heads], [found.time, *found.x.T, *found.truth.T])
-        columns = [np.array(found.steps), np.array(found.errors)]
-        write_csv(fresh / "error.csv", ["communication step [s]", "largest error [m]"], columns)
-        draw(found, fresh / "figure.png")
-        record(fresh, {part.fmu for part in scene.parts}, scene=scene, source=named(source))
-    return found, folder
-
-
-def study(
-    scene: Coupled, archive: Path, defaults: dict[str, dict[str, float]], report: Callable[[float], None]
-) -> Convergence:
-    """Run the archive at each communication step, beside the reference."""
-    system, start = bodies(scene, defaults)
-    errors = []
-    for i, step in enumerate(scene.steps):
-        count = round(scene.stop / step)
-        time = np.arange(count + 1) * step
-        x = np.array(ecos(archive, step, count, [f"{part.name}::x" for part in scene.parts]))
-        truth = solve(system, start, time)
-        errors.append(float(np.abs(x - truth).max()))
-        report((i + 1) / len(scene.steps))
-    return Convergence(scene, time, x, truth, scene.steps, tuple(errors))
 
 
 def starts(fmu: Path) -> dict[str, float]:
@@ -80,13 +81,89 @@ def starts(fmu: Path) -> dict[str, float]:
     }
 
 
-def ecos(archive: Path, step: float, count: int, read: list[str]) -> list[list[float]]:
-    """The rows that Ecos gives; HarnessError with its last words if it gives none."""
-    request = json.dumps({"archive": str(archive), "step": step, "count": count, "read": read})
-    command = [sys.executable, "-m", f"{__package__}.ecos"]
-    done = ask(command, request, patience=PATIENCE)
-    if done.returncode or not done.stdout:
-        last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-        hint = f"; {EXTRA}" if "ModuleNotFoundError" in last else ""
-        raise HarnessError(f"Ecos could not run {archive.name}: {last}{hint}")
-    return json.loads(done.stdout)
+def values(scene: Coupled, defaults: Starts) -> Starts:
+    """What is set in each element of the archive: a spring begins where the parts do."""
+    models = {part.name: defaults[part.model] | part.values for part in scene.parts}
+    found = {part.name: part.values for part in scene.parts if part.values}
+    for each in scene.springs:
+        ends = {f"x0_{end}": models[part]["x0"] for end, part in (("a", each.a), ("b", each.b)) if part}
+        found[each.name] = {"k": each.k, "c": each.c} | ends
+    return found
+
+
+def built(scene: Coupled, folder: Path) -> dict[str, Path]:
+    """The FMU of each element; that of the springs is built for the occasion."""
+    fmus = {part.name: part.fmu for part in scene.parts}
+    if scene.springs:
+        done = ask([sys.executable, "-m", "build_fmus", str(SPRING), "--out", str(folder)])
+        if done.returncode:
+            raise HarnessError(f"the spring could not be built: {done.stderr.strip()}")
+    return fmus | {each.name: folder / "spring.fmu" for each in scene.springs}
+
+
+def blank(scene: Coupled) -> Convergence:
+    """What is to be run: the positions of the parts."""
+    read = tuple((part.name, "x", reference(part.fmu, "x")) for part in scene.parts)
+    labels = tuple(f"{part.name} ({part.model})" for part in scene.parts)
+    return Convergence(scene.title, read, labels, ("m",) * len(read), scene.steps, scene.stop, "monolithic reference")
+
+
+def reference(fmu: Path, name: str) -> int:
+    """The value reference of a variable."""
+    return next(int(each.valueReference) for each in description(fmu).modelVariables if each.name == name)
+
+
+def solver(scene: Coupled, defaults: Starts) -> Callable[[np.ndarray], np.ndarray]:
+    """What gives the positions (m, n) at times (m,) in s."""
+    system, start = bodies(scene, defaults)
+    return lambda times: solve(system, start, times)
+
+
+def study(
+    asked: Convergence, archive: Path, truth: Callable[[np.ndarray], np.ndarray] | None, report: Report
+) -> Convergence:
+    """Run the archive at each communication step, beside the reference; with the finest one in the other engines,
+    too."""
+    runs = []
+    for i, step in enumerate(asked.steps):
+        runs.append(np.array(rows(MAIN, request(asked, archive, step))))
+        report((i + 1) / (len(asked.steps) + len(ENGINES)))
+    finest = runs[-1]
+    errors, truths = [], []
+    for step, x in zip(asked.steps, runs, strict=True):
+        time = np.arange(len(x)) * step
+        if truth:
+            truths.append(truth(time))
+        else:
+            at = np.arange(len(finest)) * asked.steps[-1]
+            truths.append(np.column_stack([np.interp(time, at, column) for column in finest.T]))
+        errors.append(float(np.abs(x - truths[-1]).max()))
+    if not truth:  # the finest is its own
+        errors = errors[:-1]
+    others = {}
+    for engine in ENGINES:
+        try:
+            x = finest if engine == MAIN else np.array(rows(engine, request(asked, archive, asked.steps[-1])))
+            late = len(truths[-1]) - len(x)
+            others[engine] = tuple(x[-1].tolist()), float(np.abs(x - truths[-1][late:]).max()), ""
+        except HarnessError as error:
+            others[engine] = (), float("nan"), str(error)
+    return replace(asked, time=time, x=finest, truth=truths[-1], errors=tuple(errors), engines=others)
+
+
+def request(asked: Convergence, archive: Path, step: float) -> Request:
+    return Request(str(archive), step, round(asked.stop / step), list(asked.read), asked.values)
+
+
+def save(found: Convergence, folder: Path) -> None:
+    """Write the three tables."""
+    names = [f"{element}.{variable}" for element, variable, _ in found.read]
+    heads = [heading(name, size) for name, size in zip(names, found.units, strict=True)]
+    truths = [heading(f"{name} reference", size) for name, size in zip(names, found.units, strict=True)]
+    write_csv(folder / "trajectory.csv", ["t [s]", *heads, *truths], [found.time, *found.x.T, *found.truth.T])
+    columns = [np.array(found.steps[: len(found.errors)]), np.array(found.errors)]
+    write_csv(folder / "error.csv", ["communication step [s]", heading("largest error", found.unit)], columns)
+    table = [[engine, *(end or [None] * len(names)), off, why] for engine, (end, off, why) in found.engines.items()]
+    table.append([found.reference, *found.truth[-1].tolist(), 0.0, ""])
+    ends = [heading(f"{name} at the stop", size) for name, size in zip(names, found.units, strict=True)]
+    write_rows(folder / "engines.csv", ["engine", *ends, heading("largest error", found.unit), "why not"], table)

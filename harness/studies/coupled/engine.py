@@ -1,0 +1,54 @@
+"""Engines that run an SSP archive, each in a process of its own: what they are asked and how they answer, in JSON."""
+
+import json
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from ...errors import HarnessError
+from ...process.child import ask
+
+PATIENCE = 300.0  # s, for one run
+EXTRA = "python -m pip install 'friction-fmus[coupled]'"
+MAIN = "Ecos"
+ENGINES = {  # module of each
+    "Ecos": f"{__package__}.ecos",
+    "libcosim": f"{__package__}.libcosim",
+    "fmpy": "harness.running.ssp",
+}
+
+
+@dataclass(frozen=True)
+class Request:
+    """Run an archive in so many (`count`) equal communication steps of `step` s, with a set of `values` in it, and read
+    after each some variables: element, variable, value reference."""
+
+    archive: str
+    step: float
+    count: int
+    read: list[tuple[str, str, int]]
+    values: str = "initialValues"
+
+
+def serve(run: Callable[[Request], list[list[float]]]) -> None:
+    """Answer the request on standard input; what an engine or an FMU prints is no answer."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    json.dump(run(Request(**json.load(sys.stdin))), answers)
+    answers.close()
+
+
+def rows(engine: str, asked: Request) -> list[list[float]]:
+    """A row for each communication point, without the start where an engine does not show it; HarnessError with the
+    last words of the engine if it gives none."""
+    path = os.pathsep.join(filter(None, (str(Path(__file__).parents[3]), os.environ.get("PYTHONPATH", ""))))
+    environment = os.environ | {"PYTHONPATH": path}
+    done = ask([sys.executable, "-m", ENGINES[engine]], json.dumps(asdict(asked)), environment, PATIENCE)
+    if done.returncode or not done.stdout:
+        last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+        hint = f"; {EXTRA}" if "ModuleNotFoundError" in last else ""
+        raise HarnessError(f"{engine} could not run {Path(asked.archive).name}: {last}{hint}")
+    found: list[list[float]] = json.loads(done.stdout)
+    return found
