@@ -27,8 +27,11 @@ def report(out: Path, quiet: bool, as_json: bool) -> None:
       python -m harness && python -m harness decay coulomb && python -m harness report
     """
     from ..report.page import write
+    from ..report.sections import Published
+    from ..scenes.scene import load, shipped
 
-    found = write(out)
+    scenes = [scene for scene in map(load, shipped()) if scene.published]
+    found = write(out, [Published(scene.name, scene.file.stem, scene.about) for scene in scenes])
     if as_json:
         tell({"page": str(found.path), "missing": [name for name, _ in found.missing]})
     elif not quiet:

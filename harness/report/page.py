@@ -1,19 +1,19 @@
 """The page itself; the only home of HTML in the harness."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..errors import HarnessError
-from .sections import Section, sections
+from .sections import Published, Section, sections
 
 FILE = "report.html"
 ADVICE = (
     "Dry friction that must hold: the law hybrid. Stick and slip are modes, what is stuck does not creep, and every "
     "change of mode is an event at its own time.",
-    "Where the model is linear between events (smd, coulomb, stickslip): the method exact. It costs least, and is "
-    "right to rounding.",
+    "Where the model is linear between events: the method exact. It costs least, and is right to rounding.",
     "The laws sign and threshold are there to show what the usual shortcuts cost: they chatter.",
     "The magic formula where a smooth curve is wanted: the method rodas, since it is stiff.",
 )
@@ -27,9 +27,9 @@ class Page:
     missing: tuple[tuple[str, str], ...]
 
 
-def write(results: Path) -> Page:
+def write(results: Path, scenes: Sequence[Published]) -> Page:
     """Write the page of all results below a folder into it; HarnessError if there are none."""
-    found = sections(results)
+    found = sections(results, scenes)
     if not any(part.grid or part.pictures or part.lost for section in found for part in section.parts):
         raise HarnessError(
             f"there are no results in {results}: make some with `python -m harness`, or name another --out"

@@ -4,7 +4,7 @@ import csv
 import json
 from base64 import b64encode
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import nan
@@ -18,25 +18,17 @@ from ..results import provenance
 from ..results.quantity import interval as spelled_interval
 from ..results.steps import sizes as step_sizes
 
-MODELS = {
-    "smd": "Spring, mass and viscous damper. Every swing loses the same share: the envelope is an exponential.",
-    "coulomb": "Spring and mass with dry friction. Every swing loses the same amount: the envelope is a straight line, "
-    "and the mass comes to rest for good where the spring no longer overcomes friction.",
-    "stickslip": "A sled pulled through a spring by a driver of constant speed. It sticks while the spring winds up, "
-    "breaks away, slips, and sticks again.",
-    "pacejka": "The same sled with the smooth friction curve of the magic formula. It never sticks: it creeps, and is "
-    "the stiffer the steeper the curve.",
-    "pendulum": "A compound pendulum with friction in its pin. Its envelope is nearly a straight line.",
-}
-CASES = {  # what the published scenes are about
-    "smd": ("smd",),
-    "coulomb": ("coulomb", "coulomb-sign"),
-    "stickslip": ("stickslip", "stickslip-threshold"),
-    "pacejka": ("pacejka-0.01", "pacejka-0.001"),
-    "pendulum": ("pendulum",),
-}
 PNG, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 SHORTEST = 12  # decimals cut from long numbers in cells
+
+
+@dataclass(frozen=True)
+class Published:
+    """A scene with figures that others published: its name, that of its model, and what this does, where it says so."""
+
+    name: str
+    model: str
+    about: str
 
 
 @dataclass(frozen=True)
@@ -79,9 +71,12 @@ class Section:
     missing: tuple[tuple[str, str], ...]
 
 
-def sections(results: Path) -> list[Section]:
-    """Every section, from the results below a folder."""
-    made = [oscillators, runs, decays, steps, precision, stability, importers, sweeps, comparisons, coupled, bench]
+def sections(results: Path, scenes: Sequence[Published]) -> list[Section]:
+    """Every section, from the results below a folder; those of the published scenes stand first."""
+    made: list[Callable[[Path], Section]] = [
+        *(partial(oscillators, scenes), partial(runs, scenes), decays, partial(steps, scenes)),
+        *(partial(precision, scenes), stability, importers, sweeps, comparisons, coupled, bench),
+    ]
     return [section for make in made if (section := make(results)).parts or section.missing]
 
 
@@ -102,27 +97,27 @@ def origin(place: Path) -> tuple[str, ...]:
     return provenance.sentences(own if own.is_file() else (place if place.is_dir() else place.parent) / provenance.FILE)
 
 
-def oscillators(results: Path) -> Section:
+def oscillators(scenes: Sequence[Published], results: Path) -> Section:
     parts, missing = [], []
-    for model, text in MODELS.items():
-        present = [case for case in CASES[model] if (results / case / "figures.csv").is_file()]
-        missing += [(case, f"python -m harness run {case}") for case in CASES[model] if case not in present]
-        if not present:
-            parts.append(Item(model, (text,)))
-        for i, case in enumerate(present):
-            parts.append(read(results / case, partial(oscillator, "" if i else text)))
-    intro = "What each of the five does, with figures measured here beside those that were published."
-    return Section("oscillators", "The five oscillators", intro, tuple(parts), tuple(missing))
+    for scene in scenes:
+        said = (scene.about,) if scene.about else ()
+        if (results / scene.name / "figures.csv").is_file():
+            parts.append(read(results / scene.name, partial(oscillator, said)))
+        else:
+            missing.append((scene.name, f"python -m harness run {scene.name}"))
+            parts += [Item(scene.name, said)] if said else []
+    intro = "What each of them does, with figures measured here beside those that were published."
+    return Section("oscillators", "The oscillators", intro, tuple(parts), tuple(missing))
 
 
-def oscillator(text: str, folder: Path) -> Item:
+def oscillator(said: tuple[str, ...], folder: Path) -> Item:
     picture = drawn(folder / "figure.png", f"{folder.name}: position, velocity and phase plane of the run")
-    return Item(folder.name, (text,) if text else (), table(folder / "figures.csv", cut=False), picture)
+    return Item(folder.name, said, table(folder / "figures.csv", cut=False), picture)
 
 
-def runs(results: Path) -> Section:
+def runs(scenes: Sequence[Published], results: Path) -> Section:
     """What was run besides: scenes and FMUs of whoever reads the page."""
-    cases = [case for cases in CASES.values() for case in cases]
+    cases = [scene.name for scene in scenes]
     found = folders(results, "trajectory.csv")
     others = [folder for folder in found if folder.name not in cases or not (folder / "figures.csv").is_file()]
     intro = "Scenes and FMUs of one's own, from their first value to their last."
@@ -165,9 +160,9 @@ def decay(folder: Path) -> Item:
     return Item(found["record"], sentences, grid, drawn(folder / "figure.png", alternative))
 
 
-def steps(results: Path) -> Section:
-    cases = [case for cases in CASES.values() for case in cases if (results / case / "steps.csv").is_file()]
-    made = [read(results / case, sizes) for case in cases]
+def steps(scenes: Sequence[Published], results: Path) -> Section:
+    cases = [results / scene.name for scene in scenes if (results / scene.name / "steps.csv").is_file()]
+    made = [read(case, sizes) for case in cases]
     rows = [row for part in made if part.grid for row in part.grid.rows]
     heads = next((part.grid.heads for part in made if part.grid), ())
     parts = [Item("The solver's own steps", (), TableCells(heads, tuple(rows)))] if rows else []
@@ -187,15 +182,15 @@ def sizes(folder: Path) -> Item:
     return Item(folder.name, grid=TableCells(("case", *(each.text for each in told)), (row,)))
 
 
-def precision(results: Path) -> Section:
+def precision(scenes: Sequence[Published], results: Path) -> Section:
     parts, missing, folder = [], [], results / "precision"
-    others = sorted({file.stem for file in folder.glob("*.png")} - {*MODELS})
-    for model in (*MODELS, *others):
+    models = {scene.model for scene in scenes}
+    for model in sorted(models | {file.stem for file in folder.glob("*.png")}):
         if not (folder / f"{model}.png").is_file():
             missing.append((model, f"python -m harness precision {model}"))
             continue
         parts.append(read(folder / model, tradeoff))
-        if model in MODELS and not (folder / f"{model}-exchange.csv").is_file():
+        if model in models and not (folder / f"{model}-exchange.csv").is_file():
             again = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
             missing.append((f"{model} in model exchange", again))
     parts += whole(folder / "anchors.csv", "Anchors from the literature")

@@ -1,6 +1,7 @@
 """A scene: what to run, what to record, what to measure, what to draw.  Read from a TOML file:
 
     title = "..."             one line for people
+    about = "..."             what its model does, for the report
     model = "smd"             fmus/smd.fmu below the present folder or the project; or fmu = "path/from/this/file.fmu"
     start, stop               s; left out: the FMU's own
     method, law               solver.method and friction by name; left out: the FMU's own
@@ -110,6 +111,7 @@ class SceneKeys:
     exchange: Annotated[bool, FLAG] = False
     lenient: Annotated[bool, FLAG] = False
     patience: Annotated[float, POSITIVE] = 60.0
+    about: Annotated[str, TITLE] = ""
     analyses: Annotated[tuple[str, ...], NAMES] = ()
     plots: Annotated[tuple[str, ...] | None, NAMES] = None
     values: Annotated[dict[str, Any], TABLE] = field(default_factory=dict)

@@ -55,7 +55,7 @@ def test_a_scene_that_names_no_plots_has_those_of_its_outputs(tmp_path, outputs,
 @pytest.mark.parametrize(
     ("keys", "sentence"),
     [
-        ({"mehtod": '"ode23"'}, "unknown key 'mehtod' (nearest: 'method'); allowed: analyses, "),
+        ({"mehtod": '"ode23"'}, "unknown key 'mehtod' (nearest: 'method'); allowed: about, analyses, "),
         ({"model": '"stikslip"'}, "unknown model 'stikslip' (nearest: 'stickslip'); allowed: coulomb, "),
         ({"analyses": '["decy"]'}, "unknown name in analyses 'decy' (nearest: 'decay'); allowed: decay, slip, steps"),
         ({"plots": '["phse"]'}, "unknown name in plots 'phse' (nearest: 'phase')"),
