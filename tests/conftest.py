@@ -6,6 +6,7 @@ from tempfile import TemporaryDirectory
 import builds
 import native_fmus
 import pytest
+from browser import CHROMIUM, Browser
 from driver import Worker, processes
 
 
@@ -46,6 +47,16 @@ def place(fmus, tmp_path_factory):
 
 
 _workers, worker, fresh = processes(Worker, "session")
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """A browser, of the size of a screen."""
+    if CHROMIUM is None:
+        pytest.skip("there is no chromium here")
+    browser = Browser()
+    yield browser
+    browser.close()
 
 
 @pytest.fixture
