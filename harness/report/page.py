@@ -1,15 +1,23 @@
 """The page itself; the only home of HTML in the harness."""
 
+import os
+import platform
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
+from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..errors import HarnessError
+from ..results.provenance import HARNESS, installed
+from .gallery import Sketch, gallery
 from .sections import Published, Section, sections
 
 FILE = "report.html"
+LIVE = Path("fmus/web/index.html")  # the page that runs, where it has been built
 ADVICE = (
     "Dry friction that must hold: the law hybrid. Stick and slip are modes, what is stuck does not creep, and every "
     "change of mode is an event at its own time.",
@@ -37,18 +45,35 @@ def write(results: Path, scenes: Sequence[Published]) -> Page:
     path = results / FILE
     fresh = path.with_suffix(".new")
     try:
-        fresh.write_text(page(found), encoding="utf-8", errors="replace")
+        fresh.write_text(page(found, gallery(scenes, results), results), encoding="utf-8", errors="replace")
         fresh.replace(path)
     except OSError as error:
         raise HarnessError(f"cannot write {path}: {error.strerror}") from None
     return Page(path, tuple(gap for section in found for gap in section.missing))
 
 
-def page(found: list[Section]) -> str:
-    """The HTML text."""
+def page(found: list[Section], sketches: tuple[Sketch, ...], results: Path) -> str:
+    """The HTML text of a page that lies in the folder of the results."""
     environment = Environment(
         loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
+    environment.filters["beside"] = lambda file: quote(Path(os.path.relpath(file, results)).as_posix())
     measured = [part.sentences for section in found if section.name == "precision" for part in section.parts]
-    advice = [*ADVICE, *(sentence for sentences in measured for sentence in sentences)]
-    return environment.get_template("page.html").render(sections=found, advice=advice)
+    return environment.get_template("page.html").render(
+        sections=found,
+        sketches=sketches,
+        advice=ADVICE,
+        measured=[clauses(sentence) for sentences in measured for sentence in sentences],
+        live=LIVE if LIVE.is_file() else None,
+        made=f"{date.today()}, {HARNESS} {installed(HARNESS)}, {platform.platform()}",
+    )
+
+
+def clauses(sentence: str) -> tuple[str, list[str]]:
+    """A long piece of advice: the model that it is about, and its clauses, each of which may hold brackets.
+
+    >>> clauses("smd: use exact (1e-15; ode45 2 times); no more.")
+    ('smd', ['use exact (1e-15; ode45 2 times)', 'no more'])
+    """
+    model, _, rest = sentence.rstrip(".").partition(": ")
+    return (model, re.split(r"; (?![^()]*\))", rest)) if rest else ("", [sentence])

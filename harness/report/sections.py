@@ -19,6 +19,7 @@ from ..results.quantity import interval as spelled_interval
 from ..results.steps import sizes as step_sizes
 
 PNG, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
+SHOWN = "trajectory.csv"
 SHORTEST = 12  # decimals cut from long numbers in cells
 
 
@@ -49,8 +50,8 @@ class TableCells:
 
 @dataclass(frozen=True)
 class Item:
-    """A piece of a section: heading, sentences, table and pictures, as far as there are any, and sentences on
-    their origin; `lost` if its results could not be read, which a sentence says."""
+    """A piece of a section: heading, sentences, table and pictures, as far as there are any, sentences on
+    their origin, and files of its numbers; `lost` if its results could not be read, which a sentence says."""
 
     title: str
     sentences: tuple[str, ...] = ()
@@ -58,6 +59,7 @@ class Item:
     pictures: tuple[Picture, ...] = ()
     lost: bool = False
     origin: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def read(place: Path, make: Callable[[Path], Item]) -> Item:
     """What is made of a file or folder of results; a sentence in its place if that holds something else."""
     try:
         part = make(place)
-        return replace(part, origin=origin(place)) if part.grid or part.pictures else part
+        return replace(part, origin=origin(place), files=numbers(place)) if part.grid or part.pictures else part
     except Exception as error:  # it may hold anything: half of a file, another version's, somebody else's
         return Item(
             place.name, (f"{place} cannot be shown ({type(error).__name__}: {reason(error)[:100]}).",), lost=True
@@ -95,6 +97,11 @@ def origin(place: Path) -> tuple[str, ...]:
     """Where the results at a place came from: told in their folder, or in a file of their own beside them."""
     own = place.with_suffix(".json")
     return provenance.sentences(own if own.is_file() else (place if place.is_dir() else place.parent) / provenance.FILE)
+
+
+def numbers(place: Path) -> tuple[Path, ...]:
+    """The CSV files of the results at a place: those in its folder, or those whose names begin with its own."""
+    return tuple(sorted(place.glob("*.csv") if place.is_dir() else place.parent.glob(f"{place.stem}*.csv")))
 
 
 def oscillators(scenes: Sequence[Published], results: Path) -> Section:
@@ -118,14 +125,14 @@ def oscillator(said: tuple[str, ...], folder: Path) -> Item:
 def runs(scenes: Sequence[Published], results: Path) -> Section:
     """What was run besides: scenes and FMUs of whoever reads the page."""
     cases = [scene.name for scene in scenes]
-    found = folders(results, "trajectory.csv")
+    found = folders(results, SHOWN)
     others = [folder for folder in found if folder.name not in cases or not (folder / "figures.csv").is_file()]
     intro = "Scenes and FMUs of one's own, from their first value to their last."
     return Section("runs", "Other runs", intro, tuple(read(folder, own) for folder in others), ())
 
 
 def own(folder: Path) -> Item:
-    figures, recorded = folder / "figures.csv", table(folder / "trajectory.csv")
+    figures, recorded = folder / "figures.csv", table(folder / SHOWN)
     rows = tuple(zip(recorded.heads, recorded.rows[0], recorded.rows[-1], strict=True))
     grid = table(figures, cut=False) if figures.is_file() else TableCells(("", "first", "last"), rows)
     return Item(folder.name, (), grid, drawn(folder / "figure.png", f"{folder.name}: the plots that its scene names"))

@@ -2,20 +2,12 @@
 
 import re
 import shutil
-import subprocess
 from html.parser import HTMLParser
+from itertools import groupby
 
 import pytest
 from commands import harness
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-background-networking",
-    "--disable-dev-shm-usage",
-)
 EMPTY = {"meta", "link", "img", "br"}
 
 
@@ -78,15 +70,19 @@ def test_every_picture_has_its_text_and_nothing_comes_from_elsewhere(page):
     for picture in pictures:
         assert len(picture["alt"]) > 20
         assert picture["src"].startswith("data:image/png;base64,")
-    assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
+    assert not re.findall(r'src="(?!data:)', page)
     assert "url(" not in page
     assert tags.of("script") == []
 
 
-def test_every_link_of_the_page_has_its_place(page):
+def test_every_link_leads_to_a_place_of_the_page_or_to_a_file_beside_it(made, page):
     tags = Tags(page)
     places = {attributes.get("id") for _, attributes in tags.found}
-    assert {link["href"][1:] for link in tags.of("a")} <= places
+    links = {link["href"] for link in tags.of("a")}
+    files = {link for link in links if not link.startswith("#")}
+    assert {link[1:] for link in links - files} <= places
+    assert {"coulomb/trajectory.csv", "coulomb/events.csv", "coulomb-sign/steps.csv"} <= files
+    assert all((made[0] / "results" / file).is_file() for file in files)
 
 
 def test_text_from_results_is_text(made):
@@ -107,23 +103,35 @@ def test_without_results_there_is_no_report(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
-@pytest.mark.parametrize("width", [360, 1200])
-def test_a_browser_shows_it_without_complaint_and_without_scrolling_sideways(made, tmp_path, width):
-    """A frame of that width reports how wide the page is, and how many pictures could be drawn."""
-    shutil.copy(made[0] / "results/report.html", tmp_path)
-    (tmp_path / "frame.html").write_text(
-        f'<iframe id="f" width="{width}" height="3000" style="border:0" src="report.html"></iframe>'
-        "<script>f.onload = () => { const d = f.contentDocument; document.title = `wide ${"
-        "d.documentElement.scrollWidth} drawn ${[...d.images].filter(i => i.naturalWidth).length}` }</script>"
-    )
-    options = (
-        "--hide-scrollbars",
-        f"--user-data-dir={tmp_path / 'profile'}",
-        "--allow-file-access-from-files",
-        "--enable-logging=stderr",
-    )
-    command = [CHROMIUM, *FLAGS, *options, "--virtual-time-budget=5000", "--dump-dom", f"file://{tmp_path}/frame.html"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert f"wide {width} drawn 4" in done.stdout
-    assert "CONSOLE" not in done.stderr
+@pytest.mark.parametrize("dark", [False, True])
+def test_a_browser_shows_it_without_complaint_and_without_scrolling_sideways(made, browser, dark):
+    browser.dark(dark)
+    browser.open((made[0] / "results/report.html").as_uri())
+    for width in (360, 1200):
+        browser.size(width)
+        assert browser.run("document.documentElement.scrollWidth") <= width
+        assert browser.run("[...document.images].filter(i => i.naturalWidth && i.width <= innerWidth).length") == 4
+    assert browser.said == []
+    assert browser.pdf().startswith(b"%PDF")
+
+
+def test_it_begins_with_a_picture_of_the_motion_that_was_computed(made, page):
+    """The first drawing of the page is the position over time: it has as many turning points."""
+    first = re.search(r'<svg viewBox="0 0 (\d+) (\d+)".*?<polyline points="([^"]+)"', page, re.S)
+    points = [tuple(map(float, pair.split(","))) for pair in first[3].split()]
+    assert page.index("<svg") < page.index("What to use when</h2>")
+    assert (points[0][0], points[-1][0]) == (6.0, float(first[1]) - 6.0)
+    drawn = [y for y, _ in groupby(y for _, y in points)]
+    turns = sum((b - a) * (c - b) < 0 for a, b, c in zip(drawn, drawn[1:], drawn[2:], strict=False))
+    assert turns == 15  # of the 16 half swings
+
+
+def test_where_the_page_that_runs_has_been_built_every_picture_leads_to_it(tmp_path, made):
+    shutil.copytree(made[0] / "results", tmp_path / "results")
+    (tmp_path / "fmus/web").mkdir(parents=True)
+    (tmp_path / "fmus/web/index.html").touch()
+    assert harness(tmp_path, "report", "--quiet").returncode == 0
+    text = (tmp_path / "results/report.html").read_text(encoding="utf-8")
+    assert 'href="../fmus/web/index.html"' in text
+    assert 'href="../fmus/web/index.html#.preset=coulomb"' in text
+    assert "index.html" not in (made[0] / "results/report.html").read_text(encoding="utf-8")
