@@ -6,6 +6,7 @@ import pytest
 from builds import of_file
 from by_hand import BY_HAND, followed
 from compare import identical
+from driver import Refused
 from fmpy import read_model_description
 from models import LARGER
 from scipy.integrate import solve_ivp
@@ -107,3 +108,14 @@ def test_python_and_native_have_the_same_bits(worker, name):
         rows.append(fmu.run([STOP * i / 80 for i in range(81)], wanted))
         fmu.free()
     identical(*rows, wanted)
+
+
+@pytest.mark.parametrize("kind", ["", "native"])
+def test_a_sled_that_slides_with_more_than_it_holds_is_told_in_one_sentence(worker, kind):
+    fmu = worker.instantiate(built("sleds", kind)).begin({"slide1": 200.0}, stop=STOP)
+    with pytest.raises(Refused):
+        fmu.step(0.0, STOP)
+    ((_, _, sentence),) = [message for message in fmu.messages() if message[0] != 0]
+    assert sentence.startswith("the contacts can neither hold nor slip: one of them slides with a larger force than")
+    assert np.isnan(fmu.get("x1"))
+    fmu.free()
