@@ -30,8 +30,9 @@ class Ending:
         case = self.case
         if case.poison:
             return "refused, each by name"
-        finished = f"finished within {case.finish:g}"
-        return f"refused: {case.refuse}" if case.refuse else f"{finished}, or refused" if case.either else finished
+        if case.refuse:
+            return f"refused: {case.refuse}"
+        return f"finished within {case.finish:g}{', or refused' * case.either}"
 
     @property
     def well(self) -> bool:
