@@ -10,9 +10,6 @@ UNITS = {
     "lbf.in": ("N.m", 0.45359237 * 9.80665 * 0.0254),
 }
 
-# Those in which angles are drawn and told: by the SI unit, the name and the size of one in it.
-DEGREES = {f"rad{rate}": (f"deg{rate}", pi / 180) for rate in ("", "/s", "/s2")}
-
 UNEVEN = 0.1  # of an interval: beyond, its ends are told rather than its half
 MOST = 8  # digits, in which ends that are nearer to each other are alike
 
@@ -41,6 +38,11 @@ class Quantity:
         if base != self.unit:
             raise KeyError(unit)
         return self.value / size
+
+
+def in_degrees(unit: str) -> tuple[str, float]:
+    """The unit in which people look at what is in a `unit`, degrees for angles and their rates, and its size in it."""
+    return (unit.replace("rad", "deg"), pi / 180) if unit in ("rad", "rad/s", "rad/s2") else (unit, 1.0)
 
 
 def spelled(value: float, digits: int = 5) -> str:

@@ -49,7 +49,7 @@ def test_a_pause_in_which_no_turning_point_is_lost_costs_no_other_sample(share):
 def test_too_few_swings_before_a_pause_are_left_out_and_said():
     found = identify(paused(0.55, 1.3), Known())
     assert found.t[0] > 0.55
-    assert "Before the gap that ends at t = 0.876 s are too few swings" in " ".join(found.remarks)
+    assert "Before the gap that ends at t = 0.8760 s are too few swings" in " ".join(found.remarks)
 
 
 def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):

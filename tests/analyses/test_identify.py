@@ -6,12 +6,14 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from builds import ROOT
 from decays import OMEGA, T, random_record, swung
 from intervals import FAR
+from matplotlib.figure import Figure
 from scipy.integrate import solve_ivp
 from scipy.stats import norm
 from scipy.stats import t as student_t
@@ -22,9 +24,11 @@ from harness.analyses.decay.figures import Known
 from harness.analyses.decay.fit import identify
 from harness.analyses.decay.intervals import student
 from harness.analyses.decay.law import LAWS, TERMS, unknowns_of
+from harness.analyses.decay.loss import losses_seen
 from harness.analyses.decay.model import Model
 from harness.analyses.decay.record import Record
 from harness.errors import HarnessError
+from harness.studies.decay.figure import MOST, draw, extremes
 from harness.studies.decay.job import numbers
 from harness.studies.decay.table import sentences, table
 
@@ -436,6 +440,36 @@ def test_whatever_a_fit_tries_a_record_ends_in_a_fit_or_in_one_sentence(seed):
 def test_no_loss_is_called_a_loss():
     found = identify(swung(noise=1e-3), Known())
     assert "No loss stands out" in found.sentence or all(each.value < 3 * each.error for each in found.estimates[1:4])
+
+
+# ---- the figure
+
+
+def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(tmp_path, monkeypatch):
+    """Of a record whose clock counts from 1970."""
+    figures = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path: figures.append(figure))
+    t = np.linspace(0.0, 9.0, 3001)
+    record = swung(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
+    found = identify(replace(record, t=record.t + 1.7e9), Known(pendulum=True))
+    draw(found, losses_seen(found), tmp_path / "figure.png")
+    signal, residuals, shares = figures[0].get_axes()
+    assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
+    assert shares.get_xlabel() == "amplitude [deg]"
+    drawn = {line.get_label(): line.get_data() for line in signal.lines}
+    assert np.degrees(1.0) == pytest.approx(np.max(drawn["record"][1]), rel=5e-3)
+    assert len(drawn.get("left out", [[]])[0]) == len(record.t) - len(found.t)
+    assert found.record.at(1.7e9 + 0.0125) == "1700000000.0125"
+
+
+@pytest.mark.parametrize("count", [3000, 120_000])
+def test_of_many_samples_those_are_drawn_that_show_how_far_they_reach(count):
+    x = np.sin(np.arange(count)) + np.random.default_rng(1).standard_normal(count)
+    some, wide = extremes(x), -(-2 * count // MOST)
+    assert len(some) <= min(count, 3 * MOST // 2)
+    for begin in range(0, count, 100 * wide):
+        those = x[some[(some >= begin) & (some < begin + 10 * wide)]]
+        assert (those.min(), those.max()) == (x[begin : begin + 10 * wide].min(), x[begin : begin + 10 * wide].max())
 
 
 # ---- the command line

@@ -29,6 +29,10 @@ class Record:
     def quantity(self) -> str:
         return QUANTITIES[self.order]
 
+    def at(self, t: float) -> str:
+        """A time in s as a sentence has it: to a hundred thousandth of the record, however late its clock."""
+        return f"{t:.{max(5 - int(np.ceil(np.log10(np.ptp(self.t)))), 0)}f}"
+
     def between(self, begin: float, end: float) -> Self:
         """The samples from `begin` to `end` in s."""
         inside = (self.t >= begin) & (self.t <= end)

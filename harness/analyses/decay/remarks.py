@@ -34,7 +34,7 @@ def refuse(record: Record, problem: Problem, full: Law, spread: Spread, pendulum
             advice = "say --pendulum if it is one, or " + advice
         raise Unfit(
             f"is not a free decay of one oscillator: the best fit leaves {100 * min(share, 1.0):.0f} % of the "
-            f"motion, most of it about t = {worst(problem, full.p, e):.6g} s",
+            f"motion, most of it about t = {record.at(worst(problem, full.p, e))} s",
             advice,
         )
     if gains(problem, full) < -GAINS:
@@ -70,8 +70,8 @@ def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, 
         said.append(
             f"The fit is off by {rms:.3g} {unit} (rms), {100 * spread.rms / motion:.1f} % of the motion, where the "
             f"samples scatter by {noise:.3g}: something else acts as well, or the noise is not independent from sample "
-            f"to sample, most of it about t = {worst(problem, full.p, e):.4g} s; the intervals are widened, but where "
-            "the law does not hold its values mean little."
+            f"to sample, most of it about t = {record.at(worst(problem, full.p, e))} s; the intervals are widened, but "
+            "where the law does not hold its values mean little."
         )
     elif rough and spread.alike:
         said.append(

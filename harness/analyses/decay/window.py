@@ -43,7 +43,9 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
         seed[place] = 0.0
     swing, notes = turns.half, []
     if turns.start > record.t[0]:
-        notes.append(f"Before the gap that ends at t = {turns.start:.6g} s are too few swings; they are left out.")
+        notes.append(
+            f"Before the gap that ends at t = {record.at(turns.start)} s are too few swings; they are left out."
+        )
     begin = max(turns.start - problem.origin, seed[T0])
     later = problem.only(problem.t >= begin)
     sure = later.only(later.t <= turns.t[-1] - problem.origin + 0.6 * swing)
@@ -55,15 +57,17 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
     if pushed is not None:
         used, p, squares = pushed
         used, p, squares = until_stop(used, p, terms, turns, used, squares)
-        notes.append(f"The motion is free from t = {used.t[0] + used.origin:.6g} s on; what is before is left out.")
+        notes.append(
+            f"The motion is free from t = {record.at(used.t[0] + used.origin)} s on; what is before is left out."
+        )
 
     if used.rough(squares) and squares > len(used.t) * (2 * used.noise) ** 2:
         broken = until_disturbed(record, turns, used, squares, terms)
         if broken is not None:
             used, p, squares, strayed = without_strays(*broken, terms, swing)
-            at = used.t[-1] + used.origin
+            at = record.at(used.t[-1] + used.origin)
             notes.append(
-                f"The record follows the law until t = {at:.6g} s, and then departs from it; it is used until there."
+                f"The record follows the law until t = {at} s, and then departs from it; it is used until there."
             )
     if len(strayed):
         notes.append(f"Left out as stray: {len(strayed)} of {len(problem.t)} samples.")

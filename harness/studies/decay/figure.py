@@ -8,6 +8,7 @@ import numpy as np
 from ...analyses.decay.fit import Identified
 from ...analyses.decay.law import Terms
 from ...analyses.decay.loss import Loss
+from ...results.quantity import in_degrees
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, label, sheet
 
 MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
@@ -29,20 +30,22 @@ def draw(found: Identified, loss: Loss, path: Path) -> None:
 def signal(axes: Axes, found: Identified) -> None:
     """Record, fit, rest position, turning points, and what was left out."""
     record, t = found.record, found.t
+    unit, size = in_degrees(record.unit)
     used = np.isin(record.t - found.problem.origin, found.problem.t)
-    points(axes, t, found.x, color=BLUE, label="record")
+    points(axes, t, found.x / size, color=BLUE, label="record")
     if not used.all():
-        points(axes, record.t[~used], record.x[~used], color=GREY, label="left out")
+        points(axes, record.t[~used], record.x[~used] / size, color=GREY, label="left out")
     fine = np.linspace(t[0], t[-1], MOST) if len(t) < MOST else t[extremes(found.x)]
-    axes.plot(fine, found.signal(found.best, fine), color=ORANGE, linewidth=0.9, label=f"fit: {found.best.words}")
     axes.plot(
-        fine[[0, -1]], found.rest(found.best, fine[[0, -1]]), color=GREY, linestyle="--", linewidth=0.8, label="rest"
+        fine, found.signal(found.best, fine) / size, color=ORANGE, linewidth=0.9, label=f"fit: {found.best.words}"
     )
+    rest = found.rest(found.best, fine[[0, -1]]) / size
+    axes.plot(fine[[0, -1]], rest, color=GREY, linestyle="--", linewidth=0.8, label="rest")
     if not record.order:
         style: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
-        axes.plot(found.turns.t, found.turns.x, "o", label="turning points", **style)
+        axes.plot(found.turns.t, found.turns.x / size, "o", label="turning points", **style)
     axes.set_title(f"{record.name}: {found.best.words}")
-    axes.set_ylabel(label(("x", "v", "a")[record.order], record.unit))
+    axes.set_ylabel(label(("x", "v", "a")[record.order], unit))
     axes.legend(loc="upper right", ncols=3)
 
 
@@ -65,25 +68,32 @@ def extremes(x: np.ndarray) -> np.ndarray:
 
 def residuals(axes: Axes, found: Identified) -> None:
     """Record less fit."""
-    left = found.x - found.signal(found.best, found.t)
+    unit, size = in_degrees(found.record.unit)
+    left = (found.x - found.signal(found.best, found.t)) / size
     points(axes, found.t, left, color=BLUE)
     axes.axhline(0, color="black", linewidth=0.6)
-    axes.set_title(f"residuals (rms {found.rms:.3g} {found.record.unit})")
-    axes.set_ylabel(label("record - fit", found.record.unit))
+    axes.set_title(f"residuals (rms {found.rms / size:.3g} {unit})")
+    axes.set_ylabel(label("record - fit", unit))
     axes.set_xlabel("t [s]")
 
 
 def shares(axes: Axes, found: Identified, loss: Loss) -> None:
     """The share of its energy that each half swing loses, with the curves of all laws."""
     best, others = found.best, found.laws[1:]
+    unit, size = in_degrees(found.record.base)
+
+    def curve(loss: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes, and shares in percent."""
+        return loss[0] / size, 100 * loss[1]
+
     for law in (law for law in others if law.terms in COLOURS):
-        axes.plot(*percent(loss.curves[law.terms]), color=COLOURS[law.terms], linestyle="--", label=law.words)
+        axes.plot(*curve(loss.curves[law.terms]), color=COLOURS[law.terms], linestyle="--", label=law.words)
     for i, law in enumerate(law for law in others if law.terms not in COLOURS):
         label_once = "" if i else "other mixed laws"
-        axes.plot(*percent(loss.curves[law.terms]), color=GREY, linestyle=":", label=label_once)
-    axes.plot(*percent(loss.curves[best.terms]), color=ORANGE, linewidth=2, label=f"fit: {best.words}")
+        axes.plot(*curve(loss.curves[law.terms]), color=GREY, linestyle=":", label=label_once)
+    axes.plot(*curve(loss.curves[best.terms]), color=ORANGE, linewidth=2, label=f"fit: {best.words}")
     if len(loss.amplitude):
-        axes.plot(*percent((loss.amplitude, loss.share)), "o", color="black", fillstyle="none", label="turning points")
+        axes.plot(*curve((loss.amplitude, loss.share)), "o", color="black", fillstyle="none", label="turning points")
     drawn = np.concatenate([loss.share, loss.curves[best.terms][1]])
     if len(drawn):
         low, high = np.percentile(100 * drawn, [5, 95])
@@ -91,10 +101,5 @@ def shares(axes: Axes, found: Identified, loss: Loss) -> None:
         axes.set_ylim(min(low - margin, 0.0), high + margin)
     axes.set_title("energy lost in a half swing, against its amplitude")
     axes.set_ylabel("share of the energy [%]")
-    axes.set_xlabel(label("amplitude", found.record.base))
+    axes.set_xlabel(label("amplitude", unit))
     axes.legend(loc="best", ncols=2)
-
-
-def percent(curve: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """A curve of shares in percent."""
-    return curve[0], 100 * curve[1]

@@ -39,7 +39,7 @@ def sentences(found: Identified) -> list[str]:
     left = len(record.t) - len(used)
     if left:
         said.append(
-            f"Fitted to {record.quantity} from t = {used[0]:.6g} to {used[-1]:.6g} s; {left} of {len(record.t)} "
-            "samples are left out (before the release, after the last sure swing, or stray)."
+            f"Fitted to {record.quantity} from t = {record.at(used[0])} to {record.at(used[-1])} s; {left} of "
+            f"{len(record.t)} samples are left out (before the release, after the last sure swing, or stray)."
         )
     return [*said, *found.remarks]

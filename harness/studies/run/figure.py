@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...results.quantity import DEGREES, UNITS, Quantity
+from ...results.quantity import UNITS, Quantity, in_degrees
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet
 from ...running import any_fmu
 from ...running.description import description
@@ -48,8 +48,8 @@ class Drawn:
     published: Mapping[str, Any]
 
     def unit(self, name: str) -> tuple[str, float]:
-        """The unit in which an output is drawn, degrees for an angle, and its size in the output's own."""
-        return DEGREES.get(self.run.units[name], (self.run.units[name], 1.0))
+        """The unit in which an output is drawn, and its size in the output's own."""
+        return in_degrees(self.run.units[name])
 
     def values(self, name: str) -> np.ndarray:
         """An output (n,) as it is drawn."""
