@@ -9,6 +9,7 @@ import fmpy
 from fmpy.model_description import ValidationError
 
 from ..errors import HarnessError, SceneError, reason
+from ..scenes.fmus import check_built
 
 MOST = 50  # faults that are told
 
@@ -16,8 +17,7 @@ MOST = 50  # faults that are told
 def description(path: Path, lenient: bool = False) -> Any:
     """What an FMU says of itself; HarnessError if it cannot be read, is of a version that nobody here runs, or, unless
     one is lenient, breaks the standard."""
-    if not path.is_file():
-        raise SceneError(f"there is no {path}")
+    check_built(path, SceneError)
     try:
         old = version(path)
         found = None if old.startswith("1.") else fmpy.read_model_description(path, validate=not lenient)

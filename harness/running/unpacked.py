@@ -15,6 +15,7 @@ import fmpy
 
 from ..errors import HarnessError, reason
 from ..process.room import plain, room
+from ..scenes.fmus import check_built
 
 LAYER = "slavemodule.txt"  # the file that names an FMU's script; the libraries of both packages hold its name
 
@@ -22,6 +23,7 @@ LAYER = "slavemodule.txt"  # the file that names an FMU's script; the libraries 
 @contextmanager
 def unpacked(fmu: Path) -> Iterator[Path]:
     """The folder of an FMU's files; HarnessError if it cannot be unpacked, or if its library would crash."""
+    check_built(fmu)
     with room() as folder:
         try:
             with ZipFile(fmu) as archive:

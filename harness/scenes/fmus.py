@@ -20,7 +20,7 @@ def fmu_of(name: str) -> Path:
     return next((file for file in files if file.stem == name), Path("fmus") / f"{name}.fmu")
 
 
-def check_built(fmu: Path) -> None:
+def check_built(fmu: Path, error: type[HarnessError] = HarnessError) -> None:
     """The FMU is there."""
     if not fmu.is_file():
-        raise HarnessError(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another file")
+        raise error(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another file")

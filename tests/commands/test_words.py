@@ -15,6 +15,7 @@ from commands import harness
 from rich.console import Console
 
 from harness.commands import commands
+from harness.errors import HarnessError
 from harness.scenes.coupled import scene as coupled
 from harness.scenes.scene import load, shipped
 from harness.studies.bench.measure import Beside, Measure
@@ -116,6 +117,23 @@ def test_names_with_brackets_are_shown_as_they_are(tmp_path):
     said = harness(tmp_path, "compare", "one.csv", "two.csv", **PLAIN).stdout
     assert "\nx[1] " in said
     assert "\n[bold] " in said
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *("", "run stickslip", "decay coulomb", "compare smd coulomb", "sweep smd --vary c=1,2", "couple two-masses"),
+        *("precision smd", "bench", "importers"),
+    ],
+)
+def test_a_command_without_its_fmus_says_how_to_build_them(tmp_path, monkeypatch, arguments):
+    (tmp_path / "fmus").mkdir()
+    for name in MODELS:
+        (tmp_path / f"fmus/{name}.py").write_text("")
+    monkeypatch.setattr("harness.scenes.fmus.__file__", str(tmp_path / "elsewhere/harness/scenes/fmus.py"))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(HarnessError, match=r"there is no fmus/.*: build the FMUs with `python build_fmus\.py`"):
+        commands.main(arguments.split(), standalone_mode=False)
 
 
 def test_the_versions_are_told(tmp_path):
