@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 from math import nan
 
+import commands
 import evidence
 import evidence_pendulum
 import numpy as np
@@ -247,6 +248,32 @@ def test_a_file_of_a_user_meets_the_usual_scenes_by_its_path(tmp_path, name):
     bound = [row for row in rows if row.case.title == "T_d = 3"]
     assert {row.ended for row in bound} <= {REFUSED}
     assert all("T_d is 3.0, above T_s = 0.5" in row.text for row in bound)
+
+
+RELAX = '''
+from fmus import Model, Output, Parameter, State
+
+class Relax(Model):
+    """What turns into something else."""
+
+    k = Parameter(1.0, "1/s", "rate", above=0.0)
+    x = State("1", "what there is", start=1.0)
+    y = State("1", "what it becomes")
+    p = Output("1/s", "what goes", -k * x, rate_of=x)
+    q = Output("1/s", "what comes", k * x, rate_of=y)
+'''
+
+
+def test_what_has_no_position_and_speed_is_refused_by_stability_and_studied_by_precision(tmp_path):
+    (tmp_path / "relax.py").write_text(RELAX)
+    assert commands.build("relax.py", folder=tmp_path).returncode == 0
+    done = commands.harness(tmp_path, "stability", "relax.py")
+    assert (done.returncode, done.stdout) == (1, "")
+    said = "no state is the rate of another, and the scenes are about positions and speeds"
+    assert done.stderr == f"Error: relax.py: {said}\n"
+    done = commands.harness(tmp_path, "precision", "relax.py", "--quick")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "results/precision/relax.csv").is_file()
 
 
 def test_a_motion_of_a_file_that_is_not_what_two_methods_agree_about_is_wrong():

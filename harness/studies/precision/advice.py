@@ -30,7 +30,7 @@ def ranking(study: Study, case: Case, target: float) -> list[Point]:
 def advise(study: Study, laws: Iterable[Shortcut], clear: float = 0.0) -> str:
     """One sentence on what to use for a model; of what takes less than `clear` times as long as another, none."""
     best = [(case, ranking(study, case, TARGET)) for case in study.cases if not case.chatters]
-    nothing = UNTOLD.format(study.model) if clear else NOBODY
+    nothing = UNTOLD.format(study.cases[0].model) if clear else NOBODY
     parts = []
     for method, cases in groupby(best, key=lambda pair: choice(pair[1], clear)):
         parts.append(f"use {method}: " + series([price(*each) for each in cases]) if method else nothing)

@@ -87,8 +87,10 @@ def all_cases(
 
 
 def modes(model: str) -> list[str]:
-    """The names of the modes of a model."""
+    """The names of the modes of a model; HarnessError where nothing moves as a body does."""
     carried: Any = embedded(fmu_of(model))
+    if not {*carried.states} & {*carried.states.values()}:
+        raise HarnessError(f"{model}: no state is the rate of another, and the scenes are about positions and speeds")
     return list(carried.contacts)
 
 
