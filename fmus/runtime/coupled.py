@@ -31,7 +31,7 @@ class CoupledFriction(DryFriction):
     It says, in the order of its contacts,
         slips(t, states)               their slips
         slip_terms(t, states)          the sums of the sizes of what these are made of
-        forces(t, states, modes)       their forces, the limits of these, and the sums of the sizes of what they are
+        forces(t, states, modes)       their forces, their limits, and the sums of the sizes that the forces consist of
         changes(t, states, modes)      the rates of forces and limits; what each force lacks to hold its contact, and
                                        the rate of that
         struck(t, states, modes)       the states after impulses in the stuck contacts, which end their slips

@@ -112,9 +112,12 @@ def update(model, march):
     near = NEARLY * (march.rtol if march.rtol > 0.0 else TOLERANCE)
     another = changed = False
     if model.coupled:
-        y, modes, _fits = model.begun(march.t, march.y, march.modes, near, BEHIND)
+        y, modes, fits = model.begun(march.t, march.y, march.modes, near, BEHIND)
         another, changed = some(y != march.y), some(modes != march.modes)
         march.y, march.modes = y, modes
+        if not fits:
+            for i in places:
+                march.y[i] = nan  # no motion obeys the equations
     else:
         for i in contacts:
             mode = march.modes[i]

@@ -65,3 +65,19 @@ def test_modes_follow_at_the_events_that_an_importer_finds(name):
     assert [modes for _, *modes in events] == [modes for _, *modes in true]
     assert np.abs(np.array([t for t, *_ in events]) - [t for t, *_ in true]).max() < 1e-7
     assert np.abs(np.array(found)[: len(end)] - end).max() < 1e-6
+
+
+def test_where_no_modes_fit_no_state_is_a_number():
+    """A sled whose sliding friction is above the static one, when the driver has pulled far enough."""
+    model = written(FILES["sleds"])()
+    exchange = beside(type(model), "runtime.exchange")
+    begun(model, {"slide1": 200.0}, 8.0)
+    start(model, model.initial(0.0), 8.0)
+    exchange.begin(model.solver)
+    exchange.move_to(model, model.solver, 4.0)
+    model.x_base = 0.034 * 4.0
+    assert not exchange.update(model, model.solver)
+    exchange.move_to(model, model.solver, 5.0)
+    model.x_base = 0.034 * 5.0
+    exchange.update(model, model.solver)
+    assert np.isnan(exchange.states(model, model.solver)[:4]).all()

@@ -9,7 +9,7 @@
     names.py         those that a written-out model takes for itself
     scribe.py        expressions as text, line by line
     frame.py         what its methods share
-    values.py, motion.py, friction.py, outputs.py    its methods
+    values.py, motion.py, friction.py, coupled.py, outputs.py    its methods
     written.py       its text
 
 Nothing is regrouped: what an author wrote as (F_ext + F_spring - F_friction) / m is calculated in that order.
