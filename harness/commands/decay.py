@@ -69,8 +69,8 @@ def decay(
       a column of a pipe:     zcat swing.gz | python -m harness decay - --unit mm --from 2.5
       a scene:                python -m harness decay coulomb
     """
-    from ..analyses.decay.columns import Columns
     from ..analyses.decay.figures import Known
+    from ..records.columns import Columns
     from ..studies.decay import job as decays
     from ..studies.decay.table import sentences, table
 

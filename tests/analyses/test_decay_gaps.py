@@ -13,9 +13,9 @@ from builds import ROOT
 from harness.analyses.decay.figures import Known
 from harness.analyses.decay.fit import identify
 from harness.analyses.decay.problem import prepare
-from harness.analyses.decay.record import Record
 from harness.analyses.decay.turning import find
 from harness.errors import HarnessError
+from harness.records.record import Record
 
 HALF, RATE = 0.25, 0.3  # s, of a half cycle; 1/s, of the decay
 OMEGA = sqrt((pi / HALF) ** 2 + RATE**2)

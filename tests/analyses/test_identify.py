@@ -26,8 +26,8 @@ from harness.analyses.decay.intervals import student
 from harness.analyses.decay.law import LAWS, TERMS, unknowns_of
 from harness.analyses.decay.loss import losses_seen
 from harness.analyses.decay.model import Model
-from harness.analyses.decay.record import Record
 from harness.errors import HarnessError
+from harness.records.record import Record
 from harness.studies.decay.figure import MOST, draw, extremes
 from harness.studies.decay.job import numbers
 from harness.studies.decay.table import sentences, table

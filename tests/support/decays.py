@@ -4,7 +4,7 @@ import numpy as np
 
 from harness.analyses.decay.law import LAWS, TERMS, unknowns_of
 from harness.analyses.decay.model import Model
-from harness.analyses.decay.record import Record
+from harness.records.record import Record
 
 T = np.linspace(0.0, 4.0, 1000)
 OMEGA = 12.566

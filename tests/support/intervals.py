@@ -20,8 +20,8 @@ from decays import random_record
 from harness.analyses.decay.figures import Known
 from harness.analyses.decay.fit import identify
 from harness.analyses.decay.law import LAWS
-from harness.analyses.decay.record import QUANTITIES
 from harness.errors import HarnessError
+from harness.records.record import QUANTITIES
 
 NAMES = ("omega", "zeta", "r", "b", "rest")
 SAMPLES = 600

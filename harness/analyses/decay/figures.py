@@ -9,11 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...records.record import Record
 from .choice import Law
 from .intervals import SIDE, Spread, interval
 from .law import DRIFT, OMEGA, REST, UNKNOWNS, ZETA, B, R
 from .problem import Problem
-from .record import Record
 
 
 @dataclass(frozen=True)

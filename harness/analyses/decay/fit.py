@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import HarnessError
+from ...records.record import Record
 from .choice import Law, all_laws, plausible
 from .figures import Estimate, Known, estimates
 from .intervals import Spread, spread
 from .law import DRIFT, REST, TERMS, Terms
 from .peaks import by_turning_points, by_two_peaks
 from .problem import Problem
-from .record import Record
 from .remarks import ROUGH, halves_apart, refuse, remarks
 from .squares import Unfit
 from .turning import Turns, find

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .record import FEWEST
+from ...records.record import FEWEST
 
 
 def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...records.record import Record
 from .chain import chain
 from .choice import Law
 from .decrement import damping_ratio, friction
@@ -18,7 +19,6 @@ from .intervals import correlated, interval
 from .law import AMPLITUDE, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
 from .model import Model
 from .problem import Problem
-from .record import Record
 from .squares import least_squares, scales
 from .turning import Turns
 

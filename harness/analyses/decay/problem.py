@@ -9,11 +9,11 @@ from typing import Self
 
 import numpy as np
 
+from ...records.record import FEWEST, Record
 from .chain import MOST, chain
 from .energy import losses
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, Terms, unknowns_of
 from .model import LAW, Model
-from .record import FEWEST, Record
 from .squares import Unfit, least_squares
 from .turning import Turns
 

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...records.record import Record
 from .choice import Law
 from .figures import Estimate, sizes
 from .intervals import Spread, spread
 from .law import AMPLITUDE, DRIFT, OMEGA, UNKNOWNS, ZETA
 from .problem import Problem
-from .record import Record
 from .squares import Unfit
 
 ROUGH = 1.5  # times the noise: residuals beyond are no noise of single samples

@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import HarnessError
+from ...records.record import Record
 from .noise import reversals, scatter, smooth
-from .record import Record
 
 SURE = 8.0  # times the noise: what a reversal of the record must measure to be one
 SMOOTHED = 18.0  # the same of a smoothed record, over the root of the samples in a window

@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...records.record import FEWEST, Record
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
 from .noise import scatter
 from .problem import LEAST_NOISE, Problem, prepare
-from .record import FEWEST, Record
 from .turning import Turns
 
 SWINGS = 2.0  # steps of a quantiser that a swing spans at least

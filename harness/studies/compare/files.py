@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.columns import numeric, split
-from ...analyses.decay.files import content
-from ...analyses.decay.units import TIMES
 from ...errors import SceneError, reason, shown
+from ...records.columns import numeric, split
+from ...records.files import content
+from ...records.units import TIMES
 from ...running.foreign.rows import elements
 from ...running.trajectory import Trajectory
 

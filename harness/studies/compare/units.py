@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 
-from ...analyses.decay.units import known
+from ...records.units import known
 
 SAME = (("²", "2"), ("³", "3"), ("⁻", "-"), ("¹", "1"), ("**", ""), ("^", ""), ("·", "."), ("*", "."), ("µ", "u"))
 FACTOR = re.compile(r"([^\W\d_]+|°|%)(-?\d+)?|1")

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.columns import Columns, read
 from ...analyses.decay.figures import Known
 from ...analyses.decay.fit import Identified, identify
 from ...analyses.decay.law import AMPLITUDE, T0
 from ...analyses.decay.loss import Loss, losses_seen
-from ...analyses.decay.record import Record, check
 from ...errors import HarnessError, SceneError
+from ...records.columns import Columns, read
+from ...records.record import Record, check
 from ...results import provenance
 from ...results.files import as_text, heading, write
 from ...results.folder import replacing

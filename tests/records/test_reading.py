@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from decays import swung
 
-from harness.analyses.decay.columns import Columns, read
 from harness.analyses.decay.figures import Known
 from harness.analyses.decay.fit import identify
-from harness.analyses.decay.units import known
 from harness.errors import HarnessError, SceneError
+from harness.records.columns import Columns, read
+from harness.records.units import known
 
 T = np.arange(600) / 100
 TRUTH = {"omega": 12.566, "zeta": 0.01, "r": 0.002}

@@ -11,7 +11,7 @@ import re
 from collections import Counter
 from itertools import chain, pairwise
 
-from ...errors import SceneError
+from ..errors import SceneError
 from .units import COUNTS, known, time_size
 
 MARKS = ("\t", ";", ",", "|", " ")

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import HarnessError, SceneError, reason
+from ..errors import HarnessError, SceneError, reason
 from . import text
 
 EXTRA = "python -m pip install 'friction-fmus[records]'"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import SceneError, unknown
+from ..errors import SceneError, unknown
 from .clock import seconds, spread_evenly
 from .files import Cells, Table, load
 from .record import QUANTITIES, Record, check

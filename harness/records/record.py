@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from ...errors import SceneError
+from ..errors import SceneError
 
 QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative that was recorded
 FEWEST = 12  # samples

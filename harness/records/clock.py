@@ -5,7 +5,7 @@ from datetime import datetime
 
 import numpy as np
 
-from ...errors import SceneError
+from ..errors import SceneError
 
 DAY = 86400.0
 ROUNDED = 0.51  # of the unit in the last place: how far a rounded time is off
