@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 LONGEST = 100  # letters of a value in a sentence
+MOST = 100  # names in one
 
 
 class HarnessError(Exception):
@@ -37,4 +38,5 @@ def unknown(kind: str, word: object, allowed: Iterable[str]) -> str:
     names, text = sorted(allowed), shown(word)
     close = get_close_matches(text.strip("'"), names, n=1)
     hint = f" (nearest: '{close[0]}')" if close else ""
-    return f"unknown {kind} {text}{hint}; allowed: {', '.join(names) or 'none'}"
+    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
+    return f"unknown {kind} {text}{hint}; allowed: {', '.join(names[:MOST]) or 'none'}{more}"

@@ -37,7 +37,7 @@ class Trajectory:
 def of_run(run: Run) -> Trajectory:
     """The trajectory of a run."""
     events = None if run.events is None else np.column_stack([run.events.t, run.events.mode])
-    note = run.note or f"solver: {run.setting}"
+    note = run.note or (f"solver: {run.setting}" if run.setting else "")
     units = {name: run.units[name] for name in run.columns}
     fmu, told = run.wanted.fmu, run.in_force
     return Trajectory(run.wanted.model, run.time, run.columns, units, events, note, fmu, told, run.failed)

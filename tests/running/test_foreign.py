@@ -14,10 +14,10 @@ from fmpy.model_description import Dimension, ModelVariable
 
 from harness.errors import HarnessError
 from harness.running.foreign.agreement import agreed
-from harness.running.foreign.job import shape
+from harness.running.foreign.job import recording, shape
 from harness.running.foreign.passes import Pass
 from harness.running.foreign.request import Request
-from harness.running.foreign.rows import Rows
+from harness.running.foreign.rows import Recorder, Rows
 
 
 @pytest.fixture(scope="module")
@@ -184,6 +184,21 @@ def test_what_hangs_crashes_raises_or_is_lost_is_one_sentence_and_keeps_what_it_
     assert done.stderr.count("\n") == 1
     assert rows["t [s]"][-1] == 0.5
     assert (rows["x"] == rows["t [s]"]).all()
+
+
+def test_of_passes_that_broke_off_the_one_that_came_farthest_is_kept(tmp_path):
+    x = ModelVariable("x", type="Float64", valueReference=0)
+    for number, times in enumerate(([0.0, 0.5, 1.0], [0.0, 0.25, 0.5, 0.75], [])):
+        recorder = Recorder(
+            SimpleNamespace(getFloat64=lambda *_: [1.5]), "3.0", [(x, ())], tmp_path / f"rows-{number}", None
+        )
+        for t in times:
+            recorder.sample(t)
+        recorder.file.close()
+    with (tmp_path / "rows-0").open("ab") as file:
+        file.write(b"cut off")
+    assert recording(tmp_path, None, [(x, ())]).time.tolist() == [0.0, 0.5, 1.0]
+    assert recording(tmp_path, 1, [(x, ())]).columns["x"].tolist() == [1.5] * 4
 
 
 def test_what_an_fmu_prints_is_told_and_spoils_nothing(run):

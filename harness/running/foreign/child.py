@@ -18,7 +18,7 @@ from .cosimulation import cosimulate
 from .exchange import exchange
 from .instance import MESSAGES, STATUS, begin, forget, instantiated, words
 from .passes import Ended, Pass, Refused, Span
-from .request import ANSWER, HUNG, SAID, SHARE, TEXTS, Answer, Request
+from .request import ANSWER, HUNG, ROWS, SAID, SHARE, TEXTS, Answer, Request
 from .rows import Recorder, Texts, read
 
 OFTEN = 0.2  # s between two signs of life
@@ -65,7 +65,7 @@ class Host:
     def run(self, h: float, tolerance: float) -> Pass:
         """One pass with a communication step in s and a tolerance."""
         number = self.life.passes
-        path = self.room / f"rows-{number}"
+        path = self.room / f"{ROWS}{number}"
         del MESSAGES[:]
         self.life.next = 0.0
         self.life.heed(0.0)
@@ -84,6 +84,9 @@ class Host:
             sentence = reason(error)
         path.touch()
         rows = read(path, self.chosen)
+        for older in self.room.glob(f"{ROWS}*") if not sentence else ():
+            if older != path:
+                older.unlink()  # nobody needs it beside one that is whole
         if sentence:
             at = f" at t = {rows.time[-1]:.9g} s" if len(rows.time) and " at t = " not in sentence else ""
             sentence = ": ".join(filter(None, (sentence + at, words())))

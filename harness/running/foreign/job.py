@@ -21,7 +21,7 @@ from ..run import Run
 from ..specification import Specification
 from ..unpacked import unpacked
 from ..values import accepted, labels, unit
-from .request import ANSWER, COARSEST, HUNG, SAID, SHARE, TEXTS, Answer, Request
+from .request import ANSWER, COARSEST, HUNG, ROWS, SAID, SHARE, TEXTS, Answer, Request
 from .rows import RECORDED, Rows, Shaped, elements, read
 
 HARNESS = Path(__file__).parents[3]
@@ -58,8 +58,7 @@ def simulate(wanted: Specification, found: Any, report: Callable[[float], None])
             outputs={variable.name: list(shape) for variable, shape in chosen},
         )
         answer = asked(request, place, report)
-        path = place / f"rows-{answer.taken}"
-        rows = read(path, chosen) if answer.taken is not None else Rows(np.zeros(0), {})
+        rows = recording(place, answer.taken, chosen)
         texts = [json.loads(line) for line in lines(place / TEXTS)]
         said = lines(place / SAID)
     failed = f"{wanted.fmu.name}: {answer.failed}" if answer.failed else ""
@@ -137,7 +136,7 @@ def check_library(fmu: Path, found: Any, exchange: bool, folder: Path) -> None:
 
 
 def asked(request: Request, place: Path, report: Callable[[float], None]) -> Answer:
-    """What a process of its own answers, or, if it does not, why, with the pass that came farthest."""
+    """What a process of its own answers, or why it does not."""
 
     def meanwhile() -> None:
         check()
@@ -155,9 +154,14 @@ def asked(request: Request, place: Path, report: Callable[[float], None]) -> Ans
         sentence = f"its binary has crashed ({signal.strsignal(-done.returncode)})"
     else:
         sentence = f"its binary has ended the process, with status {done.returncode}"
-    passes = sorted(place.glob("rows-*"), key=lambda file: (file.stat().st_size, file.name))
-    taken = int(passes[-1].name.removeprefix("rows-")) if passes else None
-    return Answer(taken, "", sentence)
+    return Answer(None, "", sentence)
+
+
+def recording(place: Path, taken: int | None, chosen: list[Shaped]) -> Rows:
+    """The rows of the pass that is taken, or, None, of the one that came farthest; empty if there are none."""
+    files = [place / f"{ROWS}{taken}"] if taken is not None else place.glob(f"{ROWS}*")
+    passes = [rows for file in files if len((rows := read(file, chosen)).time)]
+    return max(passes, key=lambda rows: float(rows.time[-1]), default=Rows(np.zeros(0), {}))
 
 
 def lines(path: Path) -> list[str]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 ANSWER, SHARE, SAID, HUNG, TEXTS = "answer.json", "share", "said", "hung", "texts"  # files in the room
+ROWS = "rows-"  # and the number of a pass
 COARSEST = 64  # communication steps
 
 
