@@ -31,6 +31,7 @@ ELSEWHERE = {  # what takes long, or another machine, and the tests that have it
     "python -m harness stability": "studies/test_stability.py",
     "python -m harness bench": "studies/test_bench.py",
     "python -m harness importers": "hosts/test_importers.py",
+    "python -m harness couple two-masses": "studies/test_coupled.py",
     "python build_fmus.py --fmi 3": "support/fmi3_hosts.py",
     "python build_fmus.py --native": "support/native_fmus.py",
     "python build_fmus.py --web": "support/web_page.py",

@@ -10,7 +10,7 @@ from models import MODELS
 
 from harness.errors import HarnessError
 from harness.studies.importers import table
-from harness.studies.importers.checks import CHECKS, IMPORTERS
+from harness.studies.importers.checks import CHECKS, ELSEWHERE, IMPORTERS
 
 
 @pytest.fixture(scope="module", params=["python", "native"])
@@ -31,8 +31,9 @@ def test_the_importer_passes(rows, importer, check):
     assert len(row.cells) == len(MODELS)
 
 
-def test_the_table_lists_every_model():
-    assert sorted(table.MODELS) == MODELS
+def test_the_table_lists_every_model_and_names_the_tools_that_are_not_there(rows):
+    assert list(table.models(rows)) == MODELS
+    assert {row.importer for row in rows if row.reason} >= set(ELSEWHERE)
 
 
 def test_a_tool_that_is_not_asked_is_named_with_the_reason():

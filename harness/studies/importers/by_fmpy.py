@@ -15,15 +15,16 @@ from ...running.unpacked import unpacked
 from .request import Reply, Request, serve
 
 
-def play(request: Request) -> Reply:
+def play(request: Request, logged: tuple[str, ...] = ("",)) -> Reply:
+    """The answer; of the log what begins so."""
     with unpacked(Path(request.fmu)) as folder:
-        return played(request, str(folder))
+        return played(request, str(folder), logged)
 
 
-def played(request: Request, folder: str) -> Reply:
-    """The answer, from the FMU's files in a folder."""
+def played(request: Request, folder: str, logged: tuple[str, ...]) -> Reply:
+    """The same from the FMU's files in a folder."""
     description = fmpy.read_model_description(request.fmu)
-    callbacks = logging()
+    callbacks = logging(logged)
     instances = []
     for name in request.instances:
         identifier = description.coSimulation.modelIdentifier
@@ -81,11 +82,12 @@ def run(
     return rows, accepted
 
 
-def logging() -> fmi2.fmi2CallbackFunctions:
-    """Callbacks that print the log."""
+def logging(logged: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:
+    """Callbacks that print what begins so of the log."""
 
     def hear(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
-        print(f"log: {text.decode()}", file=sys.stderr, flush=True)
+        if text.decode().startswith(logged):
+            print(f"log: {text.decode()}", file=sys.stderr, flush=True)
 
     callbacks = fmi2.fmi2CallbackFunctions()
     callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(hear)

@@ -13,6 +13,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite, isnan, nan
 from pathlib import Path
+from zipfile import ZipFile
 
 from ...errors import HarnessError
 from ...process.child import Hangs, ask
@@ -24,13 +25,15 @@ PATIENCE = 300  # s, for one request
 LIVES = 100
 POINTS = 200  # communication steps of a run
 DIVERGED = "the motion leaves the range of numbers"
+EXCHANGE = "fmi2EnterEventMode"
 FACTOR = 1.1  # a tunable is changed by this factor
 
 
 @dataclass(frozen=True)
 class Importer:
-    """A tool: its player, the packages it needs; whether it shows the log, heeds the status of a step, and ends its own
-    process, with the FMU's sentence, when initialisation answers an error."""
+    """A tool: its player, the packages it needs; whether it shows the log, heeds the status of a step, ends its own
+    process, with the FMU's sentence, when initialisation answers an error, and asks for the functions of model exchange
+    whatever it runs."""
 
     name: str
     player: str
@@ -38,14 +41,24 @@ class Importer:
     logs: bool
     heeds: bool
     ends: bool = False
+    exchange: bool = False
 
 
 IMPORTERS = (
     Importer("fmpy", "by_fmpy", ("fmpy",), True, True),
     Importer("C, cc", "by_c", (), True, True),
+    Importer("fmuloader", "by_fmuloader", ("fmuloader",), True, True, exchange=True),
+    Importer("FMUContainer", "by_fmucontainer", ("fmu-manipulation-toolbox",), True, True),
     Importer("Ecos", "by_ecos", ("ecospy", "tbb"), False, False),
     Importer("libcosim", "by_libcosim", ("libcosimpy",), True, True, ends=True),
 )
+
+
+ELSEWHERE = {  # why some are not driven
+    "OMSimulator": "its pip package fetches its programs from elsewhere when it is installed",
+    "PyFMI": "conda has it; what pip has of it is of 2018, and wants libraries that pip has not",
+    "fmusim, FMU Compliance Checker, libfmi4c": "neither pip nor Debian has them",
+}
 
 
 @dataclass(frozen=True)
@@ -60,8 +73,8 @@ class Wrong(Exception):
     """A check that failed, in a few words."""
 
 
-def absent(importer: Importer) -> str:
-    """Why an importer cannot be asked here, or nothing."""
+def absent(importer: Importer, fmu: Path | None = None) -> str:
+    """Why an importer cannot be asked here, of an FMU if one is named, or nothing."""
     for package in importer.packages:
         try:
             version(package)
@@ -74,7 +87,16 @@ def absent(importer: Importer) -> str:
             return "there is no C compiler here"
         if not EMBEDDED.is_file():
             return "this Python has no shared library that a C program could load"
+    if importer.exchange and fmu and not exports(fmu, EXCHANGE):
+        return f"it opens only FMUs whose library has all functions of FMI, and {fmu.name} has none of model exchange"
     return ""
+
+
+def exports(fmu: Path, function: str) -> bool:
+    """Whether the library of an FMU for this machine names a function."""
+    with ZipFile(fmu) as archive:
+        names = [name for name in archive.namelist() if name.startswith("binaries/linux64/") and name.endswith(".so")]
+        return any(function.encode() in archive.read(name) for name in names)
 
 
 def play(importer: Importer, request: Request) -> Played:
@@ -116,8 +138,10 @@ def subject(fmu: Path) -> Subject:
         raise HarnessError(f"{fmu} is of FMI {found.fmiVersion}; the importers are asked with FMUs of FMI 2.0")
     reals = {v.name: v for v in found.modelVariables if v.type == "Real"}
     outputs = [name for name, v in reals.items() if v.causality == "output"]
-    entry = next(name for name, v in reals.items() if v.causality == "input")
-    source = next(name for name in outputs if reals[name].unit == reals[entry].unit)
+    entry = next((name for name, v in reals.items() if v.causality == "input"), "")
+    source = next((name for name in outputs if entry and reals[name].unit == reals[entry].unit), "")
+    if not source or "m" not in reals:
+        raise HarnessError(f"{fmu}: the checks want a mass m, an input, and an output of its unit; move it elsewhere")
     change = {name: FACTOR * float(v.start) for name, v in reals.items() if name in ("k", "r")}
     basis = Request(
         fmu=str(fmu.resolve()),
@@ -222,7 +246,8 @@ def failure(importer: Importer, request: Request, sentence: str) -> str:
         raise
     kind = request.instances[0]
     lines = [line for line in played.said.splitlines() if sentence in line]
-    own = [line for line in lines if f"({kind}): " in line or f"{Path(request.fmu).name}): " in line]
+    names = f"({kind}): ", f"{Path(request.fmu).name}): ", f"({kind}.0.fmu): "  # the last one in a container
+    own = [line for line in lines if any(name in line for name in names)]
     if len(own) != 1:
         raise Wrong(f"{len(own)} lines on standard error instead of one")
     if importer.logs and len(lines) != 2:

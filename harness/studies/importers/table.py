@@ -8,11 +8,11 @@ from pathlib import Path
 
 from rich.table import Table
 
+from ...errors import HarnessError
 from ...results.files import write_rows
 from ...results.folder import replacing
 from ...results.provenance import record
-from ...truths.reference import MODELS
-from .checks import CHECKS, IMPORTERS, Importer, Subject, Wrong, absent, play, subject
+from .checks import CHECKS, ELSEWHERE, IMPORTERS, Importer, Subject, Wrong, absent, play, subject
 
 WORKERS = 2
 FOLDER, FILES = "importers", ("importers.csv",)
@@ -27,23 +27,33 @@ class Checked:
     cells: tuple[str, ...] = ()
     failed: tuple[str, ...] = ()
     reason: str = ""
+    fmus: tuple[str, ...] = ()
 
 
 def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
     """Ask every importer everything about the FMUs in a folder; `report` is told the importer and the share done."""
-    subjects = [subject(folder / f"{name}.fmu") for name in MODELS]
+    subjects = [subject(fmu) for fmu in fmus(folder)]
     found: list[Checked] = []
     with ThreadPoolExecutor(WORKERS) as workers:
         for importer in IMPORTERS:
-            if reason := absent(importer):
+            if reason := absent(importer, subjects[0].fmu):
                 found.append(Checked(importer.name, "", reason=reason))
                 continue
             name = f"{importer.name} {play(importer, subjects[0].basis).answer.version}"
+            names = tuple(each.fmu.stem for each in subjects)
             for done, check in enumerate(CHECKS):
                 report(name, done / len(CHECKS))
                 cells = tuple(workers.map(partial(ask, importer, check), subjects))
-                failed = tuple(f"{m}: {cell}" for m, cell in zip(MODELS, cells, strict=True) if "FAILED" in cell)
-                found.append(Checked(name, check, cells, failed))
+                failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
+                found.append(Checked(name, check, cells, failed, fmus=names))
+    return found + [Checked(name, "", reason=reason) for name, reason in ELSEWHERE.items()]
+
+
+def fmus(folder: Path) -> list[Path]:
+    """The FMUs of a folder, by name."""
+    found = sorted(folder.glob("*.fmu"))
+    if not found:
+        raise HarnessError(f"there is no FMU in {folder}: build them with `python build_fmus.py`, or name another one")
     return found
 
 
@@ -60,7 +70,7 @@ def table(found: list[Checked]) -> Table:
     notes = [f"{row.importer} was not asked: {row.reason}" for row in found if row.reason]
     words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers, or the tool ends"
     caption = "\n".join([words, *notes])
-    shown = Table("importer", "check", *MODELS, box=None, caption=caption, caption_justify="left")
+    shown = Table("importer", "check", *models(found), box=None, caption=caption, caption_justify="left")
     last = ""
     for row in found:
         if row.check:
@@ -69,10 +79,16 @@ def table(found: list[Checked]) -> Table:
     return shown
 
 
+def models(found: list[Checked]) -> tuple[str, ...]:
+    """The names of the FMUs."""
+    return next((row.fmus for row in found if row.fmus), ())
+
+
 def save(found: list[Checked], fmus: Path, out: Path) -> None:
     """Write the rows on the FMUs in a folder to out/importers/importers.csv."""
-    nothing = ("",) * len(MODELS)
+    names = models(found)
+    nothing = ("",) * len(names)
     rows = ((row.importer, row.check or f"not asked: {row.reason}", *(row.cells or nothing)) for row in found)
     with replacing(out / FOLDER, FILES) as folder:
-        write_rows(folder / FILES[0], ["importer", "check", *MODELS], rows)
-        record(folder, [fmus / f"{model}.fmu" for model in MODELS])
+        write_rows(folder / FILES[0], ["importer", "check", *names], rows)
+        record(folder, [fmus / f"{name}.fmu" for name in names])
