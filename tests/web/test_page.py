@@ -9,6 +9,7 @@ import native_fmus
 import pytest
 import web_page
 from builds import ROOT
+from commands import build
 from models import AUTHORED, LARGER, MODELS, declared, parameters
 
 from fmus.packaging.catalogue import find
@@ -48,6 +49,19 @@ def test_five_models_take_less_than_600_kb_and_may_load_nothing(page):
     assert page.browser.said.pop()  # the policy says so
     assert len(page.browser.said) <= 1
     page.browser.said.clear()
+
+
+def test_what_cannot_be_made_into_a_page_is_told_in_a_sentence(tmp_path):
+    for words, sentence in (
+        (("--web", "--native"), "--web makes a page and no FMU: leave out --native, --platform and --fmi 3."),
+        (("--web", "nobody"), "There is no model 'nobody'"),
+        (("--web", "smd", "--law", "sign"), "smd has no friction law 'sign'"),
+    ):
+        done = build(*words, "--out", str(tmp_path))
+        assert done.returncode
+        assert sentence in done.stderr
+        assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_every_module_imports_what_is_there_and_only_from_those_before_it():
@@ -114,6 +128,19 @@ def test_a_slider_changes_the_run_and_what_it_says_is_what_is_run(page):
     omega = sqrt(d["k"] / d["m"])
     peak = d["v_driver"] + sqrt(((d["mu_s"] - mu) * d["m"] * d["g"] / d["k"] * omega) ** 2 + d["v_driver"] ** 2)
     assert page.run("Math.max(...bench.desk.runs.one.columns.v)") == pytest.approx(peak, rel=1e-3)
+
+
+def test_the_very_next_frame_shows_a_changed_parameter(page):
+    page.open(".model=coulomb")
+    shown = page.run(
+        "new Promise(done => { const before = bench.plots.get('x').plot.paints;"
+        "const e = document.querySelector('#field-x0').closest('.field').querySelector('input[type=range]');"
+        "e.value = 390; e.dispatchEvent(new Event('input'));"
+        "requestAnimationFrame(() => { const { plot, panel } = bench.plots.get('x');"
+        "done([plot.paints - before, panel.content.curves.at(-1).y[0], bench.state().values.x0]) }) })"
+    )
+    assert shown[0] == 1
+    assert shown[1] == shown[2] > 0.1
 
 
 def test_a_law_beside_another_shows_the_difference_and_the_counts(page):

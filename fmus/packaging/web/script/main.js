@@ -64,6 +64,7 @@ async function arrange() {
   $$("title").textContent = portrait.title;
   $$("equations").innerHTML = portrait.text; // made by the builder
   mechanism.build(portrait);
+  $$("kick").hidden = !portrait.bodies.some((body) => body.input);
   const usual = usualSizes(portrait);
   fields.clear();
   const rows = { fields: [], rare: [] };
