@@ -332,9 +332,19 @@ def test_the_csv_file_holds_the_run_and_the_picture_is_a_png(page):
 
 
 def test_paper_is_white_and_everything_is_on_it(page):
+    """But the cursor: its canvas would cover the curves beneath it in a PDF file."""
     page.browser.dark()
     page.open(".model=stickslip")
+    page.run(
+        "addEventListener('beforeprint', () => { globalThis.seen = [...document.querySelectorAll('.plot')].map(plot =>"
+        "getComputedStyle(plot).getPropertyValue('--a').trim()) })"
+    )
     assert page.browser.pdf().startswith(b"%PDF")
+    assert set(page.run("seen")) == {"#0064a8"}
+    page.browser.call("Emulation.setEmulatedMedia", media="print")
+    shown = "[...document.querySelectorAll('canvas')].map(canvas => getComputedStyle(canvas).display)"
+    assert page.run(shown) == ["block" if i % 2 == 0 else "none" for i in range(page.run(f"{shown}.length"))]
+    page.browser.call("Emulation.setEmulatedMedia", media="")
     page.browser.dark(False)
 
 

@@ -275,7 +275,7 @@ function drawAlert() {
   const { one, other } = desk.runs;
   $$("alert").textContent = one.failure || other?.failure || "";
   $$("alert").hidden = !$$("alert").textContent;
-  $$("panels").classList.toggle("gone", !one.time.length);
+  for (const id of ["panels", "mechanism"]) $$(id).classList.toggle("gone", !one.time.length);
 }
 
 function drawCurves() {
