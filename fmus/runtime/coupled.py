@@ -12,7 +12,7 @@ from math import fabs, inf
 from .automaton import DryFriction, sign
 from .codes import RULES, STUCK
 from .rounding import NEAR
-from .vectors import Contact, Contacts, States, contacts, largest, per_contact
+from .vectors import Contact, Contacts, States, contacts, largest, per_contact, some
 
 LOOKS = 5  # parts of a step in which something may end, each looked at by its end
 CLOSE = 0.25  # of what a guard spans in a step: below, it is looked at more closely
@@ -53,13 +53,14 @@ class CoupledFriction(DryFriction):
         """Positive while the modes last: what the load of a stuck contact lacks to the limit, where one that stays
         there, but for rounding, is held; or the slip, in the direction of the mode."""
         slips = self.slips(t, y)
-        force, limit, terms = self.forces(t, y, modes)
         left = per_contact()
         for i in contacts:
-            if modes[i] == STUCK:
-                left[i] = limit[i] + NEAR * (terms[i] + limit[i]) - fabs(force[i])
-            else:
-                left[i] = modes[i] * slips[i]
+            left[i] = modes[i] * slips[i]
+        if some(modes == STUCK):
+            force, limit, terms = self.forces(t, y, modes)
+            for i in contacts:
+                if modes[i] == STUCK:
+                    left[i] = limit[i] + NEAR * (terms[i] + limit[i]) - fabs(force[i])
         return left
 
     def guard(self, step, t, i: Contact):
