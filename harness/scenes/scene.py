@@ -164,7 +164,7 @@ def load(scene: str | Path) -> Scene:
 def again(told: dict[str, Any]) -> Scene:
     """The scene that a result says was run; SceneError if it does not."""
     try:
-        table = {each.name: told[each.name] for each in fields(SceneKeys) if told[each.name] is not None}
+        table = {each.name: told[each.name] for each in fields(SceneKeys) if told[each.name] not in (None, "")}
         table["decay"] = {name: value for name, value in told["decay"].items() if value is not None}
         path, source, file = Path(told["name"]), str(told["source"]), Path(told["file"])
     except (AttributeError, KeyError, TypeError):

@@ -142,6 +142,7 @@ def test_a_scene_may_be_of_any_fmu(theirs, tmp_path, name, outputs, more, column
         assert rows["place[2]"][-1] == pytest.approx(2 * cos(3))
     assert (tmp_path / "results/mine/figure.png").is_file()
     assert "error unknown" in done.stdout or "changes no output by more than" in done.stdout
+    assert "the same, bit for bit" in commands.harness(tmp_path, "run", "results/mine", COLUMNS="120").stdout
 
 
 @pytest.mark.parametrize(
