@@ -504,6 +504,22 @@ def test_a_netcdf_file_written_piece_by_piece_is_read_as_it_was_meant(tmp_path):
         assert (data["text"].to_numpy() == texts).all()
 
 
+@pytest.mark.parametrize(
+    ("values", "spread", "kind"),
+    [
+        ((0.001, 0.01, 0.1), "linear", "log"),
+        ((1.0, 2.0, 4.0), "log", "log"),
+        ((1.0, 50.0, 99.0), "linear", "linear"),
+        ((0.0, 1.0, 1000.0), "linear", "linear"),
+        ((np.nan, 1.0, 1000.0), "linear", "log"),
+        ((np.nan, np.nan), "linear", "linear"),
+    ],
+)
+def test_an_axis_is_logarithmic_where_its_values_lie_over_decades(values, spread, kind):
+    data = xarray.Dataset({"a": ("n", np.array(values), {"scale": spread})})
+    assert figure.scale(data, "a") == kind
+
+
 @pytest.mark.parametrize("name", MODELS)
 def test_known_boundaries_travel_in_the_fmu_and_depend_on_its_parameters(fmus, name):
     """At its own values each quantity is a number; what it depends on is declared."""
