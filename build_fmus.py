@@ -8,7 +8,6 @@ import click
 from fmus.packaging import BuildError, __version__
 from fmus.packaging.archive import build
 from fmus.packaging.catalogue import find, names
-from fmus.packaging.edition import FMI2, FMI3
 from fmus.packaging.equations.authored import Authored
 from fmus.packaging.weigh import import_time
 from fmus.packaging.written import LAWS, METHODS
@@ -20,7 +19,7 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  #
 
 @click.command()
 @click.argument("models", metavar="[NAME | FILE.py]...", nargs=-1)
-@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="Version; 3 has model exchange as well.")
+@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="Version; 3 is --native.")
 @click.option("--native", "compiled", is_flag=True, help="Compiled to machine code: no Python in the FMU.")
 @click.option("--web", is_flag=True, help="No FMUs but one page, web/index.html, that runs them in a browser.")
 @click.option("--method", "methods", multiple=True, type=click.Choice(list(METHODS)), help="Offer this; repeatable.")
@@ -42,11 +41,9 @@ def main(
 
     Prints the size, the time that Python takes to import it, and the sha256 digest.
     """
-    if compiled and fmi == "3":
-        raise Mistake("There are no native FMUs of FMI 3.0: leave out --native, or --fmi 3.")
     if web and (compiled or platforms or fmi == "3"):
         raise Mistake("--web makes a page and no FMU: leave out --native, --platform and --fmi 3.")
-    edition, kind = (FMI3, "fmi3") if fmi == "3" else (FMI2, "native" if compiled else "")
+    compiled, kind = compiled or fmi == "3", "native/fmi3" if fmi == "3" else "native" if compiled else ""
     try:
         wanted = {model: find(model) for model in models or names()}
     except BuildError as error:
@@ -60,10 +57,10 @@ def main(
         folder = out or (FMUS if model in names() else source.path.parent) / kind
         try:
             if compiled:
-                path = native(source.path, folder, methods, laws, platforms)
+                path = native(source.path, folder, methods, laws, platforms, fmi)
                 weight = ""
             else:
-                path = build(source.path, folder, methods, laws, platforms, edition)
+                path = build(source.path, folder, methods, laws, platforms)
                 weight = f"  {1000 * import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
@@ -77,12 +74,12 @@ def tell(path: Path, weight: str = "") -> None:
 
 
 def native(
-    model: Path, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...]
+    model: Path, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...], fmi: str
 ) -> Path:
     """The native FMU; what builds it needs more than the others do."""
     from fmus.packaging.native import build
 
-    return build(model, folder, methods, laws, platforms)
+    return build(model, folder, methods, laws, platforms, fmi)
 
 
 def page(models: list[Authored], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...]) -> Path:

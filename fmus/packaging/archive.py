@@ -1,12 +1,12 @@
 """The zip: binaries, sources and description under the names that FMI gives them, the same bytes for the same content.
 
     modelDescription.xml
-    binaries/<platform>/<name>.{so,dll}     the native layer of pythonfmu, or of pythonfmu3
+    binaries/<platform>/<name>.{so,dll}     the native layer of pythonfmu
     resources/slavemodule.txt               names the entry script
     resources/<entry>.py                    imports the class; guard.py says what else it does, and why
     resources/<package>/                    the model and what it needs (modules.py)
     documentation/                          the page (page.py), licences, what the host must have
-    model.png                               the icon; FMI 3.0: terminalsAndIcons/icon.png
+    model.png                               the icon
     extra/org.fmi-standard.fmi-ls-ref/      the certified result (reference.py)
 
 Python finds modules by bare name in the process of the host.  So package and entry carry a digest of their
@@ -24,8 +24,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 from . import BuildError
 from .catalogue import find
 from .companions import companions
-from .description import declared_by
-from .edition import FMI2, Edition
+from .description import declared_by, describe
 from .modules import digest, installed, travelling
 from .written import files_of, offer, written
 
@@ -34,6 +33,12 @@ CPython 3.9 or newer, 64 bit, with its standard library and nothing else.
 
 Linux     libpython3 in the process: a host that is Python has it, any other is started with it in LD_PRELOAD.
 Windows   the folder of python3.dll in PATH.
+"""
+LAYER = "pythonfmu"
+ENTRY = """\
+from {package} import {model}, lend
+
+lend(globals())
 """
 EARLIEST, LATEST = datetime(1980, 1, 1, tzinfo=UTC), datetime(2107, 12, 31, tzinfo=UTC)  # that a zip can tell
 
@@ -44,7 +49,6 @@ def build(
     methods: Sequence[str] = (),
     laws: Sequence[str] = (),
     platforms: Sequence[str] = (),
-    edition: Edition = FMI2,
 ) -> Path:
     """Write the FMU of a model, given by its name or by the path of its file, into `folder`.
 
@@ -54,18 +58,18 @@ def build(
     source, date = find(model), build_date()
     name, offered = source.name, offer(source.model, source.name, methods, laws)
     cls, texts = written(source, offered), files_of(source, offered)
-    sources = travelling(source, edit=lambda path, text: texts.get(path, text), edition=edition)
-    code = digest(sources, edition.entry)
+    sources = travelling(source, edit=lambda path, text: texts.get(path, text))
+    code = digest(sources, ENTRY)
     package = f"{name}_{code[:12]}"
-    entries = companions(cls, source.path, declared_by(cls), edition)
+    entries = companions(cls, source.path, declared_by(cls))
     entries |= {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
     entries |= {
         "documentation/externalDependencies.txt": NEEDED.encode(),
-        "modelDescription.xml": edition.describe(cls, name, code, date),
+        "modelDescription.xml": describe(cls, name, code, date),
         "resources/slavemodule.txt": f"{package}_fmu".encode(),
-        f"resources/{package}_fmu.py": edition.entry.format(package=package, model=cls.__name__).encode(),
+        f"resources/{package}_fmu.py": ENTRY.format(package=package, model=cls.__name__).encode(),
     }
-    entries |= _binaries(name, platforms, edition) | licenses(edition)
+    entries |= _binaries(name, platforms) | licenses()
     return write(folder / f"{name}.fmu", zipped(entries, date))
 
 
@@ -78,28 +82,26 @@ def build_date() -> datetime:
     return max(EARLIEST, datetime.fromtimestamp(int(epoch), UTC))
 
 
-def _binaries(name: str, platforms: Sequence[str], edition: Edition) -> dict[str, bytes]:
+def _binaries(name: str, platforms: Sequence[str]) -> dict[str, bytes]:
     """The native layer for the platforms, or for every one that it comes for."""
-    layer = edition.layer
-    files = (installed(layer) / "resources" / "binaries").glob("*/*")
-    found = [(path.parent.name, path) for path in files if path.suffix in (".so", ".dll", ".dylib")]
-    if not found:
-        raise BuildError(f"The installed {layer} has no binaries: try 'pip install --force-reinstall {layer}'.")
-    there = {edition.platforms.get(folder, folder): (folder, path) for folder, path in sorted(found)}
+    files = (installed(LAYER) / "resources" / "binaries").glob("*/*")
+    there = {path.parent.name: path for path in sorted(files) if path.suffix in (".so", ".dll", ".dylib")}
+    if not there:
+        raise BuildError(f"The installed {LAYER} has no binaries: try 'pip install --force-reinstall {LAYER}'.")
     for platform in platforms:
         if platform not in there:
             known = ", ".join(there)
-            raise BuildError(f"{layer} has no binary for {platform}, only for {known}: {edition.otherwise}.")
+            raise BuildError(f"{LAYER} has no binary for {platform}, only for {known}: add --native.")
     chosen = [there[platform] for platform in platforms or there]
-    return {f"binaries/{folder}/{name}{path.suffix}": path.read_bytes() for folder, path in chosen}
+    return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in chosen}
 
 
-def licenses(edition: Edition = FMI2) -> dict[str, bytes]:
+def licenses() -> dict[str, bytes]:
     """The licence of the FMU, and that of the native layer inside it."""
-    layer, ours, kept = edition.layer, Path(__file__).resolve().parents[2], "{}-*.dist-info/**/LICENSE"
+    ours, kept = Path(__file__).resolve().parents[2], "{}-*.dist-info/**/LICENSE"
     return {
         "documentation/licenses/license.txt": _license(ours, kept.format("friction_fmus"), "LICENSE"),  # or of a clone
-        f"documentation/licenses/{layer}.txt": _license(installed(layer).parent, kept.format(layer)),
+        f"documentation/licenses/{LAYER}.txt": _license(installed(LAYER).parent, kept.format(LAYER)),
     }
 
 

@@ -3,23 +3,23 @@
 from pathlib import Path
 
 from ..runtime.declare import Declared, Declaring
-from .edition import FMI2, Edition
 from .page import page
 from .reference import files, reference
 
 
 def companions(
-    model: type[Declaring], path: Path, declared: list[tuple[str, Declared]], edition: Edition = FMI2
+    model: type[Declaring], path: Path, declared: list[tuple[str, Declared]], icon: str = "model.png", use: str = ""
 ) -> dict[str, bytes]:
     """Their content, by their paths in the FMU; a model has an icon, known boundaries (harness/studies/sweep)
-    and a certified result if they lie beside its file at `path`, under the same name."""
-    name, icon, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
+    and a certified result if they lie beside its file at `path`, under the same name.  The icon goes to `icon`;
+    the page says `use` of the ways to run it."""
+    name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
     found = reference(path, declared)
-    entries = {"documentation/index.html": page(model, name, declared, found, edition)}
+    entries = {"documentation/index.html": page(model, name, declared, found, icon, use)}
     if found is not None:
         entries |= files(name, found, declared)
-    if icon.is_file():
-        entries[edition.icon] = icon.read_bytes()
+    if picture.is_file():
+        entries[icon] = picture.read_bytes()
     if boundaries.is_file():
         entries["documentation/boundaries.toml"] = boundaries.read_bytes()
     return entries

@@ -1,11 +1,13 @@
-"""The model description: `modelDescription.xml` from the declared variables (FMI 2.0.4, sections 2.2 and 4.3).
+"""The model description: `modelDescription.xml` from the declared variables (FMI 2.0.4, sections 2.2, 3.3 and 4.3).
 
-What does not depend on the version of FMI is shared with description3.py.
+A Python FMU is for co-simulation; a native one for model exchange as well, with further variables (further.py).  What
+does not depend on the version of FMI is shared with description3.py.
 """
 
+from collections.abc import Iterable
 from datetime import datetime
 from math import isfinite
-from typing import cast
+from typing import Any, cast
 from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
@@ -14,6 +16,7 @@ from ..runtime.values import SETTABLE
 from . import BuildError, __version__
 from .dependencies import at_start
 from .document import document
+from .further import DERIVATIVE, Variables, all_variables, exchanged, indicators_of, rates_of
 from .units import in_order, unit_of
 
 CAPABILITIES = {
@@ -24,6 +27,12 @@ CAPABILITIES = {
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
 }
+SLOPES = {"providesDirectionalDerivative": "true"}
+EXCHANGE = {  # what is said of model exchange: the same, but for the steps
+    **{key: able for key, able in CAPABILITIES.items() if "Communication" not in key},
+    "completedIntegratorStepNotNeeded": "true",
+    **SLOPES,
+}
 EXPERIMENT = {"stopTime": "stop_time", "tolerance": "tolerance", "stepSize": "step_size"}
 LOG_CATEGORIES = {
     "logStatusWarning": "Messages with status {fmi}Warning.",
@@ -32,18 +41,21 @@ LOG_CATEGORIES = {
     "logStatusFatal": "Messages with status {fmi}Fatal.",
     "logAll": "All messages.",
 }
-Variables = list[tuple[str, Declared]]
 
 
-def describe(model: type[Declaring], name: str, code: str, date: datetime) -> bytes:
-    """The model description of the FMU `name` as XML.
+def describe(model: type[Declaring], name: str, code: str, date: datetime, exchanging: bool = False) -> bytes:
+    """The model description of the FMU `name`, also for model exchange if wanted, as XML.
 
     `code` is the digest of the source that travels inside.  The guid follows from it and from all of the
     description but the date: equal guids mean equal content.
     """
     root = opened(model, name, "2.0", "guid")
-    SubElement(root, "CoSimulation", CAPABILITIES, modelIdentifier=name)
-    declared = declared_by(model)
+    thing: Any = exchanged(model) if exchanging else model()
+    declared = all_variables(thing) if exchanging else variables(thing)
+    if exchanging:
+        root.set("numberOfEventIndicators", str(len(indicators_of(declared))))
+        SubElement(root, "ModelExchange", EXCHANGE, modelIdentifier=name)
+    SubElement(root, "CoSimulation", CAPABILITIES | (SLOPES if exchanging else {}), modelIdentifier=name)
     define_units(root, declared)
     _define_types(root, declared)
     log_and_experiment(root, model, "fmi2")
@@ -54,7 +66,9 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     for scalar, (_, meaning) in zip(scalars, declared, strict=True):
         if meaning.rate_of:
             scalar[0].set("derivative", places[meaning.rate_of])
-    _structure(root, declared, at_start(model, declared))
+    rates = rates_of(declared) if exchanging else {}
+    tell_states([scalar[0] for scalar in scalars], thing, rates, first=1)
+    _structure(root, declared, at_start(model, variables(thing)), rates)
     return closed(root, "guid", code, date)
 
 
@@ -172,17 +186,61 @@ def part_of_type(name: str, meaning: Declared) -> dict[str, str]:
     return attributes
 
 
-def _structure(root: Element, declared: Variables, followed: dict[str, list[str]]) -> None:
-    """ModelStructure: which outputs follow an input at once, and what each follows from at the start.
+def tell_states(elements: list[Element], thing: Any, rates: dict[int, int], first: int) -> None:
+    """Derivatives name their states, the first of all variables being that number; a state has a nominal value, and a
+    speed may be put to zero at an event."""
+    if not rates:
+        return
+    for (rate, state), size in zip(rates.items(), thing.exchange.nominals, strict=True):
+        elements[rate].set("derivative", str(state + first))
+        elements[state].set("nominal", repr(size))
+    slips = [slip for slip in thing.contacts.values() if slip]
+    if len(slips) < len(thing.contacts):  # one that is an expression: any speed may be
+        slips = [name for name in thing.states if name in thing.states.values()] or list(thing.states)
+    for slip in slips:
+        elements[list(rates.values())[list(thing.states).index(slip)]].set("reinit", "true")
+
+
+def followed_at_start(declared: Variables, followed: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Name of every output and derivative, and of what it follows from at the start."""
+    return followed | {DERIVATIVE.format(name): [meaning.rate] for name, meaning in declared if meaning.rate}
+
+
+def depends(declared: Variables, rates: dict[int, int], place: int) -> list[int]:
+    """The places of what a variable follows from between events: an output or a derivative.
+
+    A state follows from itself, and a driver's rate from nothing that moves.
+    """
+    name, meaning = declared[place]
+    states = list(rates.values())
+    inputs = [other for other, (_, known) in enumerate(declared) if known.causality == "input"]
+    if place in states:
+        return [place]
+    if name.startswith(DERIVATIVE[:4]):
+        return []
+    return states + inputs * cast(Output, meaning).direct
+
+
+def _structure(root: Element, declared: Variables, followed: dict[str, list[str]], rates: dict[int, int]) -> None:
+    """ModelStructure: what follows an input or a state at once, and from what each follows at the start.
 
     Without the latter an importer must assume that it is everything, and sees loops where there are none.
     """
-    places = {name: str(place) for place, (name, _) in enumerate(declared, 1)}
-    inputs = " ".join(places[name] for name, meaning in declared if meaning.causality == "input")
     structure = SubElement(root, "ModelStructure")
-    outputs, unknowns = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
-    for name, meaning in declared:
-        if meaning.causality == "output":
-            at_once, first = inputs if cast(Output, meaning).direct else "", (places[known] for known in followed[name])
-            SubElement(outputs, "Unknown", index=places[name], dependencies=at_once)
-            SubElement(unknowns, "Unknown", index=places[name], dependencies=" ".join(first))
+    outputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "output"]
+    unknown: list[tuple[str, Iterable[int]]] = [("Outputs", outputs), ("Derivatives", rates)]
+    for kind, known in unknown if rates else unknown[:1]:
+        element = SubElement(structure, kind)
+        for place in known:
+            SubElement(element, "Unknown", index=str(place + 1), dependencies=numbers(depends(declared, rates, place)))
+    places = {name: place for place, (name, _) in enumerate(declared)}
+    known_at_start = followed_at_start(declared, followed)
+    element = SubElement(structure, "InitialUnknowns")
+    for place in sorted({*outputs, *rates}):
+        at_first = [places[known] for known in known_at_start[declared[place][0]]]
+        SubElement(element, "Unknown", index=str(place + 1), dependencies=numbers(at_first))
+
+
+def numbers(places: Iterable[int]) -> str:
+    """Variables by their numbers, the first being 1."""
+    return " ".join(str(place + 1) for place in places)

@@ -1,7 +1,6 @@
 """What keeps the native layer of pythonfmu from freeing twice, and from leaving its mark; travels inside every FMU.
 
-Seen with pythonfmu 0.7.0, the first in reference counts, the second with valgrind; the layer for FMI 3.0 runs the
-entry script once only and shares the last two:
+Seen with pythonfmu 0.7.0, the first in reference counts, the second with valgrind:
 
 1. Every instance releases one reference to the names of the entry script, which was only lent.  A script without
    functions of its own loses its names under the second instance.  So each run of the script keeps one more.
@@ -32,15 +31,10 @@ def lend(names: dict[str, str]) -> None:
     script = names["__name__"] + ".py"
     for folder in list(sys.path):
         if isinstance(folder, str) and os.path.isfile(os.path.join(folder, script)):
-            leave_path(folder)
+            with suppress(ValueError):  # by value: another thread may have moved the places meanwhile
+                sys.path.remove(folder)
+            watch(folder)
             return
-
-
-def leave_path(resources: str) -> None:
-    """Called when an instance is made: its folder of resources is read, and needs to be found no more."""
-    with suppress(ValueError):  # by value: another thread may have moved the places meanwhile
-        sys.path.remove(resources)
-    watch(resources)
 
 
 def watch(resources: str) -> None:

@@ -13,12 +13,20 @@ from pathlib import Path, PurePosixPath
 
 from . import BuildError
 from .catalogue import FMUS
-from .edition import FMI2, Edition
 from .equations.authored import Authored
 
 ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # what stands in the originals of these does not travel
 Edit = Callable[[str, str], str]  # of the text of the file at a path
-GUARD = "guard.py"  # travels beside the model
+GUARD, SLAVE = "guard.py", "runtime/slave.py"  # travel with the model
+INIT = '''\
+"""{name} as an FMI 2.0 co-simulation slave."""
+
+from .{name} import {model} as Model
+from .guard import lend
+from .runtime.slave import slave_for
+
+{model} = slave_for(Model)
+'''
 
 
 def unchanged(path: str, text: str) -> str:
@@ -34,11 +42,11 @@ def installed(layer: str) -> Path:
     return Path(spec.origin).parent
 
 
-def travelling(source: Authored, root: Path = FMUS, edit: Edit = unchanged, edition: Edition = FMI2) -> dict[str, str]:
+def travelling(source: Authored, root: Path = FMUS, edit: Edit = unchanged) -> dict[str, str]:
     """Path inside the package and text, after `edit`, of the written-out model and of every file in `root` it needs."""
-    files = {ROOT: edition.init.format(name=source.name, model=source.title)}
+    files = {ROOT: INIT.format(name=source.name, model=source.title)}
     model = f"{source.name}.py"
-    waiting = [model, GUARD, edition.slave]
+    waiting = [model, GUARD, SLAVE]
     for path in waiting:  # which grows on the way
         if path == VENDORED:
             files[path] = ""

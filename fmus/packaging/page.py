@@ -9,8 +9,7 @@ from ..runtime.declare import Declared, Declaring
 from ..runtime.values import SETTABLE
 from . import __version__
 from .chart import chart
-from .description import Variables
-from .edition import FMI2, Edition
+from .further import Variables
 from .reference import INSIDE, Reference, integrated
 from .units import unit_of
 
@@ -26,13 +25,11 @@ it, and every internal step and every event shows.</p>
 FREE = Declared("", "").allowed  # in words, where every finite number is
 
 
-def page(
-    model: type[Declaring], name: str, declared: Variables, found: Reference | None, edition: Edition = FMI2
-) -> bytes:
-    """The page of the FMU `name`, as HTML that needs nothing but the icon beside it."""
+def page(model: type[Declaring], name: str, declared: Variables, found: Reference | None, icon: str, use: str) -> bytes:
+    """The page of the FMU `name`, as HTML that needs nothing but the icon beside it; `use` says how it can be run."""
     first, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
     title = f"<h1>{escape(name)}</h1><p>{escape(first)}</p>"
-    parts = [f"<header><img src='../{edition.icon}' alt=''><div>{title}</div></header>", "<h2>Equations</h2>"]
+    parts = [f"<header><img src='../{icon}' alt=''><div>{title}</div></header>", "<h2>Equations</h2>"]
     parts += map(block, blocks)
     if found is not None:
         parts += _figure(found, declared)
@@ -47,7 +44,7 @@ def page(
         ("Solver and events", [pair for pair in plain if "." in pair[0]]),
     ):
         parts += [f"<h2>{title}</h2>", _table(chosen)]
-    parts += ["<h2>Use</h2>", WAYS + edition.use, _footer(model, found)]
+    parts += ["<h2>Use</h2>", WAYS + use, _footer(model, found)]
     head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(name)}</title>"
     style = STYLE.read_text(encoding="utf-8")
     begin = f"<!doctype html>\n<html lang='en'><head>{head}<style>\n{style}</style></head><body>"

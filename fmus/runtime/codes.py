@@ -5,13 +5,15 @@ HYBRID, SIGN, THRESHOLD = 1, 2, 3  # friction laws, as friction
 BACKWARD, STUCK, FORWARD = -1, 0, 1  # modes
 
 INSTANTIATED, INITIALISING, RUNNING, TERMINATED = 0, 1, 2, 3  # phases of an instance
-UNDECIDED, CO_SIMULATION, MODEL_EXCHANGE = 0, 1, 2  # what an importer has it for
+EVENT, CONTINUOUS, INTERMEDIATE = 4, 5, 6  # further ones, where the importer handles events
+CO_SIMULATION, MODEL_EXCHANGE = 1, 2  # what an importer has it for
 
 # Statuses: of the motion; of a run that failed before; of what an importer asks for
 OK, DIVERGED, STALLED, ENDLESS = 0, 1, 2, 3
 FAILED = 4
-BAD_STEP, BAD_START, BAD_STOP, BAD_VALUE, INTEGRATED = 5, 6, 7, 8, 9
+BAD_STEP, BAD_START, BAD_STOP, BAD_VALUE = 5, 6, 7, 8
 CALCULATED, FIXED, OUT_OF_RANGE = 10, 11, 12  # why a value is bad
 NO_VARIABLE, FOREIGN_STATE, INTERRUPTED = 13, 14, 15
-OUT_OF_ORDER, NO_ADDRESS, NO_MEMORY, NOT_OFFERED, TOO_SHORT, WRONG_TOKEN, CO_SIMULATES = 16, 17, 18, 19, 20, 21, 22
+OUT_OF_ORDER, NO_ADDRESS, NO_MEMORY, NOT_OFFERED, TOO_SHORT, WRONG_TOKEN, WRONG_LENGTH = 16, 17, 18, 19, 20, 21, 22
+NO_DERIVATIVE = 23
 RULES = 100  # and the number of the rule of the model that the values break

@@ -1,9 +1,9 @@
 """Model exchange: what an importer's solver asks of an oscillator, and what happens at an event.
 
-Continuous states are those of the model and, where there is one, the position of the driver: nobody tells when the
-importer's run begins, so nothing may depend on the time as such.  The modes of friction are discrete states.  They
-change in `update` only, so that the motion is smooth between events, and stands exactly still where friction holds it.
-An importer finds an event where an indicator of a contact falls to zero:
+Continuous states are those of the model and, where there is one, the position of the driver: so nothing depends on the
+time as such.  The modes of friction are discrete states.  They change in `update` only, so that the motion is smooth
+between events, and stands exactly still where friction holds it.  An importer finds an event where an indicator of a
+contact falls to zero, or at the time that it was told:
 
     to_rest          mode v while sliding, 1 while stuck
     to_break_away    limit - |load| while stuck, 1 while sliding
@@ -12,93 +12,211 @@ At an event that has been handled neither is zero, for solvers take a root there
 just beyond the event.
 """
 
-from math import fabs, nan
+from math import fabs, inf, nan
 
-from .codes import STUCK
+from . import rules
+from .codes import DIVERGED, MODEL_EXCHANGE, OK, RUNNING, STUCK
 from .march import NOMINAL
 from .rounding import ULP
-from .step import NEARLY
-from .vectors import Contacts, contacts, every, per_contact, per_state, places, slip, some, speeds
+from .step import HUGE, NEARLY
+from .vectors import (
+    Contacts,
+    contacts,
+    every,
+    first,
+    magnitude,
+    per_contact,
+    per_state,
+    places,
+    slip,
+    some,
+    speeds,
+    total,
+)
 
 BEHIND = 0.1  # share of a slip and what it is made of, by which an importer may find its end too late
 BEYOND, LEAST = 4.0 * ULP, 1e-300  # of the limit; of a speed and a force
-TOLERANCE = 1e-4  # taken for the importer's, which nobody tells, where solver.rtol is 0
+TOLERANCE = 1e-4  # taken for the importer's, where it tells none
 
 
-def begin(march):
+class Exchange:
+    """What is read of it, as last asked for: rows over the continuous states and over the event indicators, all to rest
+    before all to break away; the indicators one by one, and the rate of the driver; what an event has changed."""
+
+    to_rest: Contacts
+    to_break_away: Contacts
+
+    def __init__(self, model):
+        y, modes = per_state(), per_contact()
+        for i in places:
+            y[i] = 0.0
+        for i in contacts:
+            modes[i] = 1.0
+        self.states = [*y, 0.0] if model.driven else [*y]
+        self.rates = [*y, 0.0] if model.driven else [*y]
+        self.nominals = [*y, 0.0] if model.driven else [*y]
+        self.indicators = [*modes, *modes, 1.0]  # the last is nobody's: C has no empty rows
+        self.to_rest = self.to_break_away = 1.0
+        self.driver = self.finest = 0.0
+        self.jumped = self.rescaled = False
+        self.due = inf  # when a contact will break away, as far as can be known
+        # a communication step in leaps: where it ends, whether a leap ended at an event, and what they may cost
+        self.end = 0.0
+        self.struck = False
+        self.leaps = self.most = 0
+
+
+class Exchanging:
+    """A base before that of a model, which then owns an Exchange."""
+
+    def __init__(self):
+        super().__init__()
+        self.exchange = Exchange(self)
+
+
+def take_over(run):
+    """The instance is for model exchange."""
+    run.interface, run.tolerance = MODEL_EXCHANGE, TOLERANCE
+
+
+def begin(model):
     """From here on the importer's solver steps: no internal step is in force, and none has been counted."""
-    step, before = march.step, march.step.before
+    march = model.solver
+    step = march.step
+    before = step.before
     before.taken = before.refused = before.called = 0
     step.t0, step.t1 = march.t, nan
+    nominals(model)
 
 
-def move_to(model, march, t):
+def ready(run, model):
+    """Whether the values can be used.  Status."""
+    if run.phase >= RUNNING or run.failed:
+        return rules.ready(run, model)
+    if run.observed:
+        return OK
+    return rules.observe(run, model)
+
+
+def move_to(run, model, t):
     """The present time is t, the states stay."""
+    run.observed = False
+    march = model.solver
     march.t = march.step.t0 = t
     if model.driven:
         model.t_base = t
 
 
-def states(model, march):
-    """The continuous states."""
-    return [*march.y, model.x_base] if model.driven else [*march.y]
-
-
-def put(model, march, values):
-    """Take over the continuous states."""
+def put(run, model):
+    """Take over the continuous states, which stand in their row; the driver's is at the present time, as it stays."""
+    run.observed = False
+    exchange = model.exchange
+    march = model.solver
     for i in places:
-        march.y[i] = values[i]
+        march.y[i] = exchange.states[i]
     if model.driven:
-        model.x_base = values[len(march.y)]  # at the present time, which move_to keeps
+        model.x_base = exchange.states[len(march.y)]
+
+
+def states(model):
+    """The continuous states."""
+    exchange = model.exchange
+    march = model.solver
+    for i in places:
+        exchange.states[i] = march.y[i]
+    if model.driven:
+        exchange.states[len(march.y)] = model.x_base
 
 
 def nominals(model):
     """The sizes of the states below which a tolerance is absolute: those of our own solver where nobody sets them."""
-    size = per_state()
+    exchange = model.exchange
+    march = model.solver
+    exchange.finest = model.finest()
     for i in places:
-        size[i] = NOMINAL
-    finest = model.finest()
+        exchange.nominals[i] = NOMINAL
     for i in speeds:
-        size[i] = finest if finest < NOMINAL else NOMINAL
-    return [*size, NOMINAL] if model.driven else [*size]
+        exchange.nominals[i] = exchange.finest if exchange.finest < NOMINAL else NOMINAL
+    if model.driven:
+        exchange.nominals[len(march.y)] = NOMINAL
 
 
-def rates(model, march):
+def rates(model):
     """The derivatives of the continuous states."""
-    if model.waits and march.step.sticks and every(march.modes == STUCK):
-        still = per_state()
-        for i in places:
-            still[i] = 0.0
-        return [*still, model.drive()] if model.driven else [*still]
+    exchange = model.exchange
+    march = model.solver
     y = march.y
-    f = model.rates(march.t, y, march.modes)
-    return [*f, model.drive()] if model.driven else [*f]
+    if model.waits and march.step.sticks and every(march.modes == STUCK):
+        for i in places:
+            exchange.rates[i] = 0.0
+    else:
+        f = model.rates(march.t, y, march.modes)
+        for i in places:
+            exchange.rates[i] = f[i]
+    if model.driven:
+        exchange.rates[len(y)] = model.drive()
 
 
-def indicators(model, march):
-    """The event indicators of a model with dry friction, all to rest before all to break away; where its law knows no
-    modes, they are 1."""
+def indicators(model):
+    """The event indicators; where the law of friction knows no modes, they are 1."""
+    exchange = model.exchange
+    march = model.solver
     to_rest, to_break_away = per_contact(), per_contact()
     for i in contacts:
         to_rest[i] = to_break_away[i] = 1.0
-    if not (model.dry and march.step.sticks):
-        return [*to_rest, *to_break_away]
-    if model.coupled:
-        slips = model.slips(march.t, march.y)
-        force, most, _terms = model.forces(march.t, march.y, march.modes)
+    if model.dry and march.step.sticks:
+        if model.coupled:
+            slips = model.slips(march.t, march.y)
+            force, most, _terms = model.forces(march.t, march.y, march.modes)
+            for i in contacts:
+                if march.modes[i] != STUCK:
+                    to_rest[i] = march.modes[i] * slips[i] + LEAST
+                else:
+                    to_break_away[i] = most[i] + BEYOND * most[i] + LEAST - fabs(force[i])
+        else:
+            for i in contacts:
+                if march.modes[i] != STUCK:
+                    to_rest[i] = march.modes[i] * march.y[slip[i]] + LEAST
+                else:
+                    load, _, limit = model.hold(march.t, march.y, i)
+                    to_break_away[i] = limit + BEYOND * limit + LEAST - fabs(load)
+    for i in contacts:
+        exchange.indicators[i] = to_rest[i]
+        exchange.indicators[len(march.modes) + i] = to_break_away[i]
+
+
+def show(model):
+    """Set what is read like a variable."""
+    exchange = model.exchange
+    march = model.solver
+    if model.dry:
+        indicators(model)
         for i in contacts:
-            if march.modes[i] != STUCK:
-                to_rest[i] = march.modes[i] * slips[i] + LEAST
-            else:
-                to_break_away[i] = most[i] + BEYOND * most[i] + LEAST - fabs(force[i])
-    else:
-        for i in contacts:
-            if march.modes[i] != STUCK:
-                to_rest[i] = march.modes[i] * march.y[slip[i]] + LEAST
-            else:
-                load, _, limit = model.hold(march.t, march.y, i)
-                to_break_away[i] = limit + BEYOND * limit + LEAST - fabs(load)
-    return [*to_rest, *to_break_away]
+            exchange.to_rest[i], exchange.to_break_away[i] = (
+                exchange.indicators[i],
+                exchange.indicators[len(march.modes) + i],
+            )
+    if model.driven:
+        exchange.driver = model.drive()
+
+
+def handle(run, model):
+    """An event is handled: `jumped` and `rescaled` tell the importer what is new, `due` when the next is.  Status."""
+    exchange = model.exchange
+    march = model.solver
+    exchange.jumped = exchange.rescaled = run.observed = False
+    status = rules.ready(run, model)
+    if status != OK or run.interface != MODEL_EXCHANGE:  # co-simulation goes on with what was set
+        return status
+    if not total(magnitude(march.y)) < HUGE:
+        return DIVERGED
+    finest = exchange.finest
+    nominals(model)
+    exchange.rescaled = exchange.finest != finest
+    if model.dry and march.step.sticks:
+        exchange.jumped = update(model, march)
+        exchange.due = release(model, march)
+    return OK
 
 
 def update(model, march):
@@ -107,9 +225,7 @@ def update(model, march):
     The speed is set to zero where a slide has ended.  Without a reason for an event nothing changes, nor does it the
     second time.
     """
-    if not (model.dry and march.step.sticks):
-        return False
-    near = NEARLY * (march.rtol if march.rtol > 0.0 else TOLERANCE)
+    near = NEARLY * march.step.tolerance
     another = changed = False
     if model.coupled:
         y, modes, fits = model.begun(march.t, march.y, march.modes, near, BEHIND)
@@ -127,6 +243,10 @@ def update(model, march):
                     another = True
                 if not model.touches(march.t, march.y, march.modes, 0.0, i):
                     march.modes[i] = model.settle(march.t, march.y, near, i)
+                if march.modes[i] == STUCK and march.t >= model.exchange.due:
+                    load, rate, limit = model.hold(march.t, march.y, i)  # the time is right, the load but for rounding
+                    if load * rate > 0.0 and limit - fabs(load) <= near * limit:
+                        march.modes[i] = 1 if rate > 0.0 else -1
                 if march.modes[i] != mode:
                     changed = True
     if changed:
@@ -135,28 +255,11 @@ def update(model, march):
     return another or changed
 
 
-class Exchange:
-    """What is read of it like a variable, as last shown."""
-
-    to_rest: Contacts
-    to_break_away: Contacts
-
-    def __init__(self):
-        self.to_rest = self.to_break_away = 1.0
-        self.driver = 0.0
-
-    def show(self, model, march):
-        if model.dry:
-            found = indicators(model, march)
-            for i in contacts:
-                self.to_rest[i], self.to_break_away[i] = found[i], found[len(march.modes) + i]
-        if model.driven:
-            self.driver = model.drive()
-
-
-class Exchanging:
-    """A base before that of a model, which then owns an Exchange."""
-
-    def __init__(self):
-        super().__init__()
-        self.exchange = Exchange()
+def release(model, march):
+    """When a contact breaks away if nothing but the driver moves; inf if it never does."""
+    if not (model.waits and every(march.modes == STUCK)):
+        return inf
+    ends, ways = per_contact(), per_contact()
+    for i in contacts:
+        ends[i], ways[i] = model.release(march.t, march.y, i)
+    return first(ends)

@@ -11,7 +11,7 @@ from .codes import DIVERGED, ENDLESS, HYBRID, OK, STUCK
 from .declare import Choice, Count, Declaring, Fixed, Local
 from .methods import ITEMS
 from .step import HUGE, Step
-from .vectors import Contacts, States, contacts, magnitude, slip, some, speeds, total
+from .vectors import Contacts, States, contacts, every, magnitude, slip, some, speeds, total
 
 NOMINAL = 1e-3  # size of a position or a speed, in SI units, where nobody sets one
 # Within one communication step, so that a sentence comes after half a minute at most, on a slow machine too:
@@ -81,6 +81,7 @@ class March(Declaring):
             step.before.length = step.t1 - step.t0
             if model.dry and step.event and self.t >= step.t1:
                 step.note_event()
+                self.modes = step.modes1  # if the event still waited to be handled, it has been now
         else:
             step.go_back()
         step.event = False
@@ -179,7 +180,7 @@ class March(Declaring):
         """The declared counts, up to the present point."""
         step = self.step
         before = step.before
-        here = step.event and self.t >= step.t1
+        here = step.event and self.t >= step.t1 and every(self.modes == step.modes1)  # and does not wait to be handled
         events.count = before.happened + 1 if here else before.happened
         events.t_last = step.t1 if here else before.t_event
         if self.t > step.t0:

@@ -12,19 +12,16 @@ from .codes import (
     BAD_VALUE,
     CALCULATED,
     CO_SIMULATION,
+    CONTINUOUS,
     DIVERGED,
     FAILED,
     FIXED,
-    INITIALISING,
     INSTANTIATED,
-    INTEGRATED,
     MODEL_EXCHANGE,
     OK,
     OUT_OF_RANGE,
     RULES,
     RUNNING,
-    TERMINATED,
-    UNDECIDED,
 )
 from .vectors import contacts
 
@@ -42,13 +39,15 @@ class Run:
 
 
 def is_sound(run, model, exchanges):
-    """Whether an instance, of an FMU for model exchange or not, can be in this state; the motion of one that cannot
-    may have no end."""
-    if not (INSTANTIATED <= run.phase <= TERMINATED and UNDECIDED <= run.interface <= MODEL_EXCHANGE):
+    """Whether an instance, for model exchange or not, can be in this state; the motion of one that cannot may have no
+    end."""
+    if not (INSTANTIATED <= run.phase <= CONTINUOUS and 0.0 < run.tolerance < 1.0):
         return False
-    if not 0.0 < run.tolerance < 1.0 or (run.interface != CO_SIMULATION and not exchanges):
+    if run.interface != (MODEL_EXCHANGE if exchanges else CO_SIMULATION):
         return False
-    if run.phase < RUNNING or run.failed or run.interface == MODEL_EXCHANGE:
+    if run.phase == (RUNNING if exchanges else CONTINUOUS):
+        return False
+    if run.phase < RUNNING or run.failed or exchanges:
         return True
     march = model.solver
     step = march.step
@@ -128,22 +127,6 @@ def begin(run, model):
     if run.failed:
         return FAILED
     return renew(run, model, beginning)
-
-
-def begin_steps(run, model, t):
-    """A step is asked for, of an instance that may have been made for anything (FMI 3.0).  Status.
-
-    The run begins where the first step does.
-    """
-    if run.interface == MODEL_EXCHANGE:
-        return INTEGRATED
-    run.interface = CO_SIMULATION
-    if run.phase < RUNNING or run.failed:
-        return OK
-    if t == model.solver.t:
-        return objection(run, model)
-    run.start_time, run.phase = t, INITIALISING
-    return OK
 
 
 def ready(run, model):

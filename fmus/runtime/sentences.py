@@ -14,16 +14,18 @@ from .codes import (
     BAD_STEP,
     BAD_STOP,
     CALCULATED,
-    CO_SIMULATES,
+    CONTINUOUS,
     DIVERGED,
     ENDLESS,
+    EVENT,
     FIXED,
     FOREIGN_STATE,
     INITIALISING,
     INSTANTIATED,
-    INTEGRATED,
+    INTERMEDIATE,
     INTERRUPTED,
     NO_ADDRESS,
+    NO_DERIVATIVE,
     NO_MEMORY,
     NO_VARIABLE,
     NOT_OFFERED,
@@ -34,6 +36,7 @@ from .codes import (
     STALLED,
     TERMINATED,
     TOO_SHORT,
+    WRONG_LENGTH,
     WRONG_TOKEN,
 )
 from .declare import Declared
@@ -50,8 +53,6 @@ RUN = {
     "present point, t = {now!r} s, and end by the stop time, t = {t_end!r} s",
     BAD_START: "start time = {start!r} s is refused: it must be a finite number",
     BAD_STOP: "stop time = {stop!r} s is refused: it must be above the start time, {start!r} s",
-    INTEGRATED: "a communication step from t = {t!r} s is refused: the importer integrates this instance (model "
-    "exchange); instantiate the FMU once more for co-simulation",
     INTERRUPTED: "the run was interrupted after t = {now!r} s; reset the FMU to run again",
 }
 VALUES = {
@@ -70,14 +71,19 @@ CALLS = {
     NO_MEMORY: "{function} failed: no memory is left",
     NOT_OFFERED: "{function} is refused: this FMU does not offer it, see its description",
     TOO_SHORT: "{function} is refused: a state does not fit into so few bytes",
-    WRONG_TOKEN: "{function} is refused: the GUID must be {word}, that of modelDescription.xml",
-    CO_SIMULATES: "{function} is refused: this FMU is for co-simulation only",
+    WRONG_TOKEN: "{function} is refused: the GUID or token must be {word}, that of modelDescription.xml",
+    NO_DERIVATIVE: "{function} is refused: value reference {reference} is not that of a state or an input, or of what "
+    "follows from them",
+    WRONG_LENGTH: "{function} is refused: {word} is another number than there are",
 }
 PHASES = {
     INSTANTIATED: "instantiated",
     INITIALISING: "in initialisation mode",
     RUNNING: "running",
     TERMINATED: "terminated",
+    EVENT: "in event mode",
+    CONTINUOUS: "in continuous-time mode",
+    INTERMEDIATE: "in intermediate update mode",
 }
 
 

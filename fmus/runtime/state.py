@@ -96,7 +96,6 @@ class Saved(Values):
     shape: Shape
     living: WeakSet[Any]
     bare: Any
-    exchanges = False  # made for model exchange as well
 
     @guarded
     def _get_fmu_state(self) -> dict[str, Any]:
@@ -154,7 +153,7 @@ class Saved(Values):
         """Whether run, settings and sentences are such as can come about."""
         names = {NOWHERE, *(name for name, _ in self.variables)}
         return (
-            rules.is_sound(self.run, self.model, self.exchanges)
+            rules.is_sound(self.run, self.model, False)
             and self.run.refused == len(self.refused)
             and names.issuperset(self.refused)
             and all(type(text) is str and text == printable(text) for text in self.refused.values())

@@ -114,7 +114,7 @@ def heed(time: float, recorder: Any) -> bool:
 
 def sibling(fmu: Path) -> Path:
     """The FMI 3.0 FMU of the same model, beside that of FMI 2.0."""
-    return fmu.parent / "fmi3" / fmu.name
+    return fmu.parent / "native" / "fmi3" / fmu.name
 
 
 @contextmanager

@@ -15,7 +15,11 @@ from scipy.integrate import solve_ivp
 from fmus.packaging.catalogue import find
 
 EVERY_FILE = pytest.mark.parametrize("path", AUTHORED, ids=lambda path: path.stem)
-KINDS = {"": [], "fmi3": ["--fmi", "3"], "native": ["--native", "--platform", "linux64"]}
+KINDS = {
+    "": [],
+    "native/fmi3": ["--fmi", "3", "--platform", "linux64"],
+    "native": ["--native", "--platform", "linux64"],
+}
 
 
 def command(*arguments, cwd):
@@ -34,8 +38,9 @@ def test_it_is_built_beside_its_file_in_every_kind_and_is_valid(path, kind):
     fmu = built(path, kind)
     assert validate_fmu(str(fmu)) == []
     assert read_model_description(fmu).modelName == path.stem
-    left = {file.name for file in (fmu.parents[1] if kind else fmu.parent).iterdir()}
-    assert left == {path.name, kind or f"{path.stem}.fmu"}
+    folder, *_ = [*kind.split("/"), ""]
+    left = {file.name for file in fmu.parents[len(kind.split("/")) if kind else 0].iterdir()}
+    assert left == {path.name, folder or f"{path.stem}.fmu"}
     with ZipFile(fmu) as archive:
         names = archive.namelist()
         assert "documentation/index.html" in names

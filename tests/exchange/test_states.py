@@ -187,6 +187,7 @@ def test_reset_brings_every_start_value_back(launch, name):
     settable = {v: d.start for v, d in declared(name).items() if d.causality in ("parameter", "input")}
     fmu = launch(name, {push(name)[0]: 1.0, "m": 3.0})
     fmu.update()
+    fmu.go_on()
     fmu.place(0.1, [0.2] * fmu.sizes()[0])
     fmu.reset()
     assert dict(zip(settable, fmu.get(*settable), strict=True)) == settable

@@ -1,20 +1,14 @@
 """Many lives of FMI 3.0 FMUs, for co-simulation and for model exchange, in turn, at once, in threads and processes,
 beside those of FMI 2.0; every host is a process of its own (fmi3_lives.py), which must end well and say nothing."""
 
-import json
-import subprocess
-import sys
-import zipfile
 from functools import partial
 
 import driver
 import fmi3_hosts
 import pytest
-from builds import ROOT, SUPPORT
-from compare import close, identical
-from models import CASES, MODELS, counts, declared, label, model_class, outputs
-
-from tests.hosts.test_hosting import PYTHONS, interpreter, request
+from builds import ROOT
+from compare import identical
+from models import CASES, MODELS, counts, declared, label, outputs
 
 host = partial(driver.host, "fmi3_lives.py")
 
@@ -115,54 +109,3 @@ def test_co_simulation_is_that_of_fmi_2_to_the_last_bit(process, fmus, case):
         rows.append(fmu.through(times, names, changes))
         fmu.free()
     identical(*rows, names)
-
-
-def test_the_code_that_runs_is_the_code_in_the_fmu(fresh):
-    """Not the sources, and nothing of pythonfmu or pythonfmu3."""
-    before = set(fresh.modules())
-    for name in MODELS:
-        path = fmi3_hosts.built() / f"{name}.fmu"
-        for make in (fresh.instantiate, fresh.exchange):
-            instance = make(path).begin()
-            instance.get(outputs(name)[0])
-            instance.free()
-        own, new = fresh.directory(path), set(fresh.modules()) - before
-        assert len([file for file in new if file.startswith(own)]) >= 4
-        strangers = [file for file in new if not file.startswith(own)]
-        assert [file for file in strangers if "pythonfmu" in file or str(ROOT / "fmus") in file] == []
-        before |= new
-
-
-# ---- other Pythons
-
-
-@pytest.fixture(scope="module")
-def requests(tmp_path_factory):
-    """What fmi3_embedded.py is asked to run: the default experiment of every model."""
-    resources = tmp_path_factory.mktemp("resources")
-    for name in MODELS:
-        with zipfile.ZipFile(fmi3_hosts.built() / f"{name}.fmu") as archive:
-            archive.extractall(resources / name)
-    return [request(resources, name, {}, model_class(name).stop_time) for name in MODELS]
-
-
-def embedded(python, requests):
-    command = [python, "-I", SUPPORT / "fmi3_embedded.py"]
-    done = subprocess.run(command, input=json.dumps(requests), capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
-
-
-@pytest.mark.parametrize("version", PYTHONS)
-def test_the_embedded_code_runs_alike_on_every_python(process, requests, version):
-    """As in the process of fmpy, for co-simulation; and both kinds as in this Python."""
-    python = interpreter(version)
-    if python is None:
-        pytest.skip(f"there is no Python {version} here")
-    told, here = embedded(python, requests), embedded(sys.executable, requests)
-    for name, asked, rows, expected in zip(MODELS, requests, told, here, strict=True):
-        names = [v for v in outputs(name) if declared(name)[v].type == "Real"]
-        close(rows, expected, names, 1e-14)
-        fmu = process.instantiate(fmi3_hosts.built() / f"{name}.fmu").begin()
-        close(rows[: len(asked["times"])], fmu.run(asked["times"], names), names, 1e-14)
-        fmu.free()

@@ -1,13 +1,9 @@
-"""What the FMI 2.0 FMUs promise for co-simulation, the FMI 3.0 FMUs keep: the same claims, put to them word for word.
-
-Left out is what needs the stop time or the tolerance of the importer, which never arrive.
-"""
+"""What the FMI 2.0 FMUs promise for co-simulation, the FMI 3.0 FMUs keep: the same claims, word for word."""
 
 import fmi3_hosts
 import numpy as np
 import pytest
-from compare import identical
-from models import MODELS, model_class, outputs, tunable
+from models import MODELS, model_class, outputs
 
 from harness.truths.reference import POINTS, load, relative
 from tests.runtime.test_changes import (  # noqa: F401
@@ -45,17 +41,6 @@ def test_the_default_experiment_in_fmpy_reaches_the_reference(worker, fmus, name
     assert relative(motion, truth.motion).max() < REACH[name]
     if "mode" in columns:
         assert columns["mode"][-1] == truth.modes[-1][1]
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_a_value_set_after_initialisation_counts_from_the_first_step_on(launch, name):
-    """The start time, that of the first step, is not known before: nothing has moved until then."""
-    names, times = outputs(name), [7.3 + 0.1 * i for i in range(20)]
-    values = {v: 0.9 * d.start for v, d in tunable(name).items()}
-    expected = launch(name, values, start=7.3).run(times, names)[1:]
-    fmu = launch(name, start=7.3)
-    fmu.set(values)
-    identical(fmu.run(times, names)[1:], expected, names)
 
 
 @pytest.mark.parametrize("name", MODELS)

@@ -5,7 +5,6 @@ import subprocess
 import sys
 import zipfile
 
-import fmi3_hosts
 import pytest
 from builds import SUPPORT
 from interrupted import HANDLERS
@@ -13,9 +12,9 @@ from interrupted import HANDLERS
 from tests.hosts.test_hosting import PYTHONS, interpreter
 
 
-@pytest.fixture(params=[2, 3], ids=["FMI 2.0", "FMI 3.0"])
-def fmu(request, fmus):
-    return (fmi3_hosts.built() if request.param == 3 else fmus) / "smd.fmu"
+@pytest.fixture
+def fmu(fmus):
+    return fmus / "smd.fmu"
 
 
 def host(function, *arguments):

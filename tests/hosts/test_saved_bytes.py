@@ -9,7 +9,6 @@ import random
 from math import nan
 from zlib import crc32
 
-import fmi3_hosts
 import pytest
 from compare import identical
 from driver import Refused, Worker
@@ -17,7 +16,6 @@ from models import MODELS, declared, model_class, outputs, runtime
 
 from fmus.packaging.written import beside
 
-BOTH = pytest.mark.parametrize("kind", ["slave", "slave3"], ids=["FMI 2.0", "FMI 3.0"])
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 REFUSAL = (
     "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
@@ -25,9 +23,9 @@ REFUSAL = (
 )
 
 
-def running(kind, name):
+def running(name):
     """The class of slaves of a model, and one of them in mid-run."""
-    made = runtime(name, kind).slave_for(model_class(name))
+    made = runtime(name, "slave").slave_for(model_class(name))
     one = made(instance_name="saved")
     one.exit_initialization_mode()
     assert one.do_step(0.0, 0.3)
@@ -83,10 +81,9 @@ def at(state, path):
     return state, path[-1]
 
 
-@BOTH
 @EVERY_MODEL
-def test_own_bytes_are_taken_and_the_same_again(kind, name):
-    made, one = running(kind, name)
+def test_own_bytes_are_taken_and_the_same_again(name):
+    made, one = running(name)
     heir = made(instance_name="heir")
     for spoil in ([], ["set"], ["set", "step"]):  # healthy, with a value that cannot be used, failed
         if spoil == ["set"]:
@@ -98,11 +95,10 @@ def test_own_bytes_are_taken_and_the_same_again(kind, name):
         assert own(made, heir) == own(made, one)
 
 
-@BOTH
 @EVERY_MODEL
-def test_bytes_that_were_flipped_cut_or_extended_are_refused(kind, name, capsys):
+def test_bytes_that_were_flipped_cut_or_extended_are_refused(name, capsys):
     """Ten thousand times."""
-    made, one = running(kind, name)
+    made, one = running(name)
     content, draw = own(made, one), random.Random(name)
     for i in range(10_000):
         place, bit = draw.randrange(len(content)), 1 << draw.randrange(8)
@@ -114,10 +110,9 @@ def test_bytes_that_were_flipped_cut_or_extended_are_refused(kind, name, capsys)
     assert len(said) == 10_000
 
 
-@BOTH
 @EVERY_MODEL
-def test_every_member_must_be_there_under_its_name_with_its_type_and_length(kind, name, capsys):
-    made, one = running(kind, name)
+def test_every_member_must_be_there_under_its_name_with_its_type_and_length(name, capsys):
+    made, one = running(name)
     content = own(made, one)
     assert taken(made, forged(content, lambda state: None))
     state = json.loads(content[8:])
@@ -148,10 +143,9 @@ def test_every_member_must_be_there_under_its_name_with_its_type_and_length(kind
             assert not taken(made, forged(content, change)), (path, change)
 
 
-@BOTH
 @EVERY_MODEL
-def test_every_setting_must_lie_in_its_range(kind, name, capsys):
-    made, one = running(kind, name)
+def test_every_setting_must_lie_in_its_range(name, capsys):
+    made, one = running(name)
     content = own(made, one)
     settable = {v: d for v, d in declared(name).items() if d.causality in ("parameter", "input")}
     for variable, declaration in settable.items():
@@ -214,11 +208,11 @@ FORGERIES = {
 }
 
 
-@pytest.fixture(params=[2, 3], ids=["FMI 2.0", "FMI 3.0"])
-def fmu(request, fmus):
+@pytest.fixture
+def fmu(fmus):
     """A process of its own, which must end well, and the path of an FMU for it."""
-    worker = fmi3_hosts.Worker() if request.param == 3 else Worker()
-    yield worker, (fmi3_hosts.built() if request.param == 3 else fmus) / "stickslip.fmu"
+    worker = Worker()
+    yield worker, fmus / "stickslip.fmu"
     assert worker.close() == 0
 
 

@@ -13,7 +13,7 @@ from fmus.runtime.declare import variables
 
 FMI_SIDE = [
     *("__init__", "boundary", "declare", "failure", "hosted"),
-    *("sentences", "slave", "slave3", "state", "values", "variables3", "vectors"),
+    *("sentences", "slave", "state", "values", "vectors"),
 ]
 NUMERICS = {
     path.stem: path.read_text() for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.stem not in FMI_SIDE

@@ -191,7 +191,7 @@ def test_the_command_writes_every_point_and_says_what_to_use_and_results_on_othe
         rows = list(csv.DictReader(file))
     tools = {FMU, FMPY, *WAYS, "scipy", "cvode"} - peers.missing().keys()
     assert {row["tool"] for row in rows} == tools
-    unbuilt = "not built: fmus/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
+    unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
     assert [row["failure"] for row in rows if row["tool"] in WAYS] == [unbuilt, unbuilt]
     assert done.stdout.count(unbuilt) == 1
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))

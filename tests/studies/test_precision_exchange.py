@@ -29,7 +29,8 @@ def both(fmus, tmp_path_factory):
     (folder / "fmus").mkdir()
     for file in fmus.glob("*.fmu"):
         (folder / "fmus" / file.name).symlink_to(file)
-    (folder / "fmus" / "fmi3").symlink_to(built())
+    (folder / "fmus" / "native").mkdir()
+    (folder / "fmus" / "native" / "fmi3").symlink_to(built())
     return folder
 
 
@@ -82,7 +83,7 @@ def test_where_cvode_may_take_no_more_steps_there_is_a_gap_with_fmpys_reason(bot
 
 
 def test_each_run_of_an_instance_begins_anew(both):
-    with fmi3.instance(both / "fmus/fmi3/stickslip.fmu", fmi3.EXCHANGE) as fmu:
+    with fmi3.instance(both / "fmus/native/fmi3/stickslip.fmu", fmi3.EXCHANGE) as fmu:
         first, again = (fmu.simulate({"mu_s": 0.8}, ("x", "v", "mode"), 16.0, 0.5, 1e-6) for _ in range(2))
         other = fmu.simulate({}, ("x", "v", "mode"), 16.0, 0.5, 1e-6)
     assert np.array_equal(first.rows, again.rows)
@@ -97,7 +98,7 @@ def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
             fmu.simulate(values or {}, ("x",), 16.0, 0.01, 1e-6, patience)
         return str(error.value)
 
-    sled, missing, broken = both / "fmus/fmi3/stickslip.fmu", tmp_path / "missing.fmu", tmp_path / "broken.fmu"
+    sled, missing, broken = both / "fmus/native/fmi3/stickslip.fmu", tmp_path / "missing.fmu", tmp_path / "broken.fmu"
     broken.write_bytes(b"no archive")
     assert "m = -1.0 kg is refused" in refused(sled, {"m": -1.0})
     unknown = "stickslip.fmu: The start values for the following variables could not be set: mess"

@@ -114,6 +114,21 @@ static Instance *life(int number_of_life)
 
 enum { LIVES = 9 };
 
+/* For model exchange: fresh, initialised, in continuous time, elsewhere, at an event. */
+static Instance *exchanging(int far)
+{
+    Instance *it = fmi2Instantiate("exchange", fmi2ModelExchange, MODEL_GUID, "", &callbacks, fmi2False, fmi2True);
+    fmi2EventInfo event;
+    double states[STATES];
+    HOLDS(it);
+    if (far > 0) initialise(it, fmi2OK);
+    if (far > 1) HOLDS(fmi2NewDiscreteStates(it, &event) == fmi2OK && fmi2EnterContinuousTimeMode(it) == fmi2OK);
+    for (int i = 0; i < STATES; i++) states[i] = number();
+    if (far > 2) HOLDS(fmi2SetTime(it, number()) == fmi2OK && fmi2SetContinuousStates(it, states, STATES) == fmi2OK);
+    if (far > 3) HOLDS(fmi2EnterEventMode(it) == fmi2OK);
+    return it;
+}
+
 static void bytes_of(Instance *it, char bytes[BYTES])
 {
     fmi2FMUstate state = NULL;
@@ -221,9 +236,10 @@ static void forged(void)
         State good = it->state;
         good.run.observed = false; /* as it is saved */
         refuses_forged(it, &good, true);
-        FORGED(state.run.phase = 4);
+        FORGED(state.run.phase = CONTINUOUS);
+        FORGED(state.run.phase = INTERMEDIATE);
         FORGED(state.run.phase = -1);
-        FORGED(state.run.interface = UNDECIDED);
+        FORGED(state.run.interface = 0);
         FORGED(state.run.interface = MODEL_EXCHANGE);
         FORGED(state.run.refused++);
         FORGED(state.run.refused = -1);
@@ -331,7 +347,11 @@ static void calls(uint64_t seed, int turns)
         size_t count = draw(FEW), size;
         fmi2Status status = fmi2OK;
         settings(references, reals, integers, count);
-        switch (draw(26)) {
+        double *places = draw(20) ? reals : NULL, slopes[FEW];
+        size_t rows = draw(9) ? STATES : draw(FEW), limits = draw(9) ? INDICATORS : draw(FEW);
+        fmi2EventInfo event;
+        fmi2Boolean flag;
+        switch (draw(38)) {
         case 0:
             fmi2FreeInstance(it);
             crowd[i] = NULL;
@@ -339,7 +359,7 @@ static void calls(uint64_t seed, int turns)
         case 1:
         case 2:
         case 3:
-            if (!it) crowd[i] = life((int)draw(LIVES));
+            if (!it) crowd[i] = draw(2) ? life((int)draw(LIVES)) : exchanging((int)draw(5));
             break;
         case 4: status = fmi2SetDebugLogging(it, draw(2) > 0, draw(4), draw(5) ? categories : NULL); break;
         case 5: status = fmi2SetupExperiment(it, draw(2) > 0, number(), number(), draw(2) > 0, number()); break;
@@ -364,6 +384,22 @@ static void calls(uint64_t seed, int turns)
         case 22: status = fmi2FreeFMUstate(it, draw(50) ? &states[k] : NULL); break;
         case 23: status = fmi2SerializedFMUstateSize(it, states[k], draw(50) ? &size : NULL); break;
         case 24: status = serialised(it, states[k], bytes[i], draw(9) ? BYTES : draw(BYTES)); break;
+        case 25: status = fmi2EnterEventMode(it); break;
+        case 26: status = fmi2NewDiscreteStates(it, draw(9) ? &event : NULL); break;
+        case 27: status = fmi2EnterContinuousTimeMode(it); break;
+        case 28: status = fmi2SetTime(it, number()); break;
+        case 29:
+        case 30: status = fmi2SetContinuousStates(it, places, rows); break;
+        case 31: status = fmi2GetContinuousStates(it, places, rows); break;
+        case 32: status = fmi2GetDerivatives(it, places, rows); break;
+        case 33: status = fmi2GetEventIndicators(it, places, limits); break;
+        case 34: status = fmi2GetNominalsOfContinuousStates(it, places, rows); break;
+        case 35: status = fmi2CompletedIntegratorStep(it, fmi2True, draw(9) ? &flag : NULL, &flag); break;
+        case 36:
+            status = fmi2GetDirectionalDerivative(it, draw(9) ? references : NULL, count, references, draw(FEW), reals,
+                                                  slopes);
+            if (status == fmi2Discard) status = fmi2OK;
+            break;
         default: status = fmi2DeSerializeFMUstate(it, bytes[i], draw(9) ? BYTES : draw(BYTES), &states[k]); break;
         }
         HOLDS(status == fmi2OK || status == fmi2Error);
@@ -372,7 +408,7 @@ static void calls(uint64_t seed, int turns)
         Instance *it = crowd[i] ? crowd[i] : instance("heir");
         HOLDS(fmi2Reset(it) == fmi2OK);
         initialise(it, fmi2OK);
-        HOLDS(fmi2DoStep(it, 0.0, 0.3, fmi2True) == fmi2OK);
+        if (!exchanges(&it->state)) HOLDS(fmi2DoStep(it, 0.0, 0.3, fmi2True) == fmi2OK);
         HOLDS(isfinite(get(it, reference_of("energy"))));
         if (states[i]) HOLDS(fmi2FreeFMUstate(it, &states[i]) == fmi2OK);
         fmi2FreeInstance(it);

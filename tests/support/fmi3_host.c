@@ -162,8 +162,9 @@ static void refuse(const Task *task)
     fmi3Instance c = born(0, task);
     double bad = -1.0, values[OUTPUTS];
     ok(fmi.SetFloat64(c, &task->bad, 1, &bad, 1), "set");
-    begin(c, 0, task);
-    if (step(c, 0.0, 1.0) != fmi3Error) die("a bad parameter was not refused");
+    ok(fmi.EnterInitializationMode(c, fmi3False, 0.0, 0.0, fmi3False, 0.0), "enter");
+    if (fmi.ExitInitializationMode(c) != fmi3Error) die("a bad parameter was not refused");
+    if (step(c, 0.0, 1.0) != fmi3Error) die("a run goes on that never began");
     ok(fmi.GetFloat64(c, task->outputs, OUTPUTS, values, OUTPUTS), "values after a failure");
     if (!isnan(values[0]) || !isnan(values[1])) die("a failed run gives numbers");
     ok(fmi.Reset(c), "reset after a failure");

@@ -8,6 +8,7 @@ from functools import cache
 import builds
 import driver
 import pytest
+from native_fmus import needed
 
 
 class Worker(driver.Worker):
@@ -38,7 +39,8 @@ class Failed(Exception):
 @cache
 def built():
     """The folder of the FMI 3.0 FMUs."""
-    return builds.once("fmi3", "--fmi", "3")
+    needed()
+    return builds.once("fmi3", "--fmi", "3", "--platform", "linux64", timeout=600)
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ python fmi3_look.py FUNCTION '[ARGUMENTS]'
 """
 
 import json
-import os
 import random
 import sys
 from contextlib import contextmanager
@@ -15,7 +14,6 @@ from shutil import rmtree
 from fmpy import extract, read_model_description
 from fmpy.fmi3 import FMU3Model
 
-NATIVE_LAYER = "pythonfmu3"
 NUDGE = 1e-3
 
 
@@ -42,9 +40,8 @@ def write(fmu, variable, value):
 
 
 def variables(path):
-    """Every variable as it reads before and after it is set, the files that were loaded, and the modules there are."""
-    sys.modules[NATIVE_LAYER] = None
-    with instance(path) as (fmu, description, folder):
+    """Every variable as it reads before and after it is set."""
+    with instance(path) as (fmu, description, _):
         starts, after = {}, {}
         for variable in description.modelVariables:
             starts[variable.name] = repr(read(fmu, variable))
@@ -53,9 +50,7 @@ def variables(path):
                 value = read(fmu, variable)
                 write(fmu, variable, value if variable.type == "Enumeration" else 0.5 * value + 0.0625)
                 after[variable.name] = repr(read(fmu, variable))
-        files = [getattr(module, "__file__", None) or "" for module in sys.modules.values()]
-        inside = [os.path.relpath(file, folder).replace(os.sep, "/") for file in files if file.startswith(folder)]
-    return {"starts": starts, "after": after, "inside": inside, "modules": list(sys.modules)}
+    return {"starts": starts, "after": after}
 
 
 def factors(path, parameters):
@@ -82,11 +77,13 @@ def factors(path, parameters):
                 write(fmu, there[name], value)
             fmu.enterInitializationMode()
             fmu.exitInitializationMode()
+            settle(fmu)
             for i in range(12):
                 point = [chance.uniform(-0.3, 0.3), [0.0, 1e-8, 0.2, -0.2][i % 4], chance.uniform(-0.3, 0.3)]
                 force = chance.uniform(-0.1, 0.1)
                 put(fmu, push, [*point[: len(states)], force])
-                fmu.updateDiscreteStates()  # the mode settles here, and the nudges do not change it
+                fmu.enterEventMode()
+                settle(fmu)  # the mode does, and the nudges do not change it
                 point = (c_double * len(states))()
                 fmu.getContinuousStates(point, len(states))
                 point = [*point, force]
@@ -116,6 +113,12 @@ def nominals(path, variable, value):
             fmu.getNominalsOfContinuousStates(sizes, len(sizes))
             told.append((renewed, list(sizes)))
     return told
+
+
+def settle(fmu):
+    """Handle an event."""
+    fmu.updateDiscreteStates()
+    fmu.enterContinuousTimeMode()
 
 
 def put(fmu, push, point):

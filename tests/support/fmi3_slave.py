@@ -11,6 +11,10 @@ class Names:
     def setupExperiment(self, **experiment):
         self.experiment = experiment
 
+    def reset(self):
+        self.experiment = {}
+        super().reset()
+
     def enterInitializationMode(self):
         super().enterInitializationMode(**self.experiment)
 

@@ -19,7 +19,7 @@ sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not loo
 import worker
 from fmi3_slave import Model, Slave
 
-FLAGS = ("again", "terminate", "nominals", "states", "timed")  # of fmi3UpdateDiscreteStates, in its order
+FLAGS = ("again", "terminate", "nominals", "states")  # of fmi3UpdateDiscreteStates, in its order
 
 
 class CoSimulation(worker.Instance):
@@ -85,7 +85,13 @@ class ModelExchange(CoSimulation):
 
     def update(self):
         """The flags that are raised."""
-        return [name for name, flag in zip(FLAGS, self.slave.updateDiscreteStates(), strict=False) if flag]
+        *flags, timed, due = self.slave.updateDiscreteStates()
+        self.ahead = due if timed else None
+        return [name for name, flag in zip(FLAGS, flags, strict=True) if flag]
+
+    def due(self):
+        """When the next event will be, as the last update told; None where it did not."""
+        return self.ahead
 
     def go_on(self):
         self.slave.enterContinuousTimeMode()

@@ -110,7 +110,7 @@ static void run(Player *player, fmi2Component c, char **words, int count)
 static void refused_instances(Player *player)
 {
     fmi2Component c[] = {
-        fmi.Instantiate("x", fmi2ModelExchange, player->guid, "", &player->callbacks, fmi2False, fmi2True),
+        fmi.Instantiate("x", fmi2ModelExchange, "", "", &player->callbacks, fmi2False, fmi2True),
         fmi.Instantiate("x", fmi2CoSimulation, "{of another}", "", &player->callbacks, fmi2False, fmi2True),
         fmi.Instantiate("x", fmi2CoSimulation, NULL, "", NULL, fmi2False, fmi2True),
     };

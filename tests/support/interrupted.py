@@ -10,7 +10,7 @@ from math import isnan
 
 sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
 
-import fmi3_worker
+import worker
 
 
 class Stop(BaseException):
@@ -32,8 +32,8 @@ HANDLERS = {
 
 
 def begun(path):
-    worker = fmi3_worker.Worker(tempfile.mkdtemp())
-    fmu = worker.instances[worker.instantiate(path, "interrupted")]
+    process = worker.Worker(tempfile.mkdtemp())
+    fmu = process.instances[process.instantiate(path, "interrupted")]
     begin(fmu)
     return fmu
 

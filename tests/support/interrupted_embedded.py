@@ -32,12 +32,10 @@ def interrupted(slave, name, arguments):
         return [type(error).__name__, error.args, sys.stderr.getvalue().splitlines()[-1]]
 
 
-FMI2 = {"get_real": [[0]], "set_real": [[0], [1.0]], "get_integer": [[0]], "setup_experiment": [0.0]}
-FMI3 = {
-    **{"get_float64": [[0]], "set_float64": [[0], [1.0]], "set_time": [1.0], "get_continuous_states": []},
-    **{"get_event_indicators": [], "update_discrete_states": []},
+ENTRIES = {
+    **{"get_real": [[0]], "set_real": [[0], [1.0]], "get_integer": [[0]], "setup_experiment": [0.0]},
+    **{"do_step": [0.0, 0.1], "exit_initialization_mode": [], "_get_fmu_state": []},
 }
-BOTH = {"do_step": [0.0, 0.1], "exit_initialization_mode": [], "_get_fmu_state": []}
 
 
 def main(resources):
@@ -51,8 +49,7 @@ def main(resources):
         slave.exit_initialization_mode()
         return slave
 
-    entries = {**BOTH, **(FMI2 if hasattr(entry.Stickslip, "get_real") else FMI3)}
-    return {name: interrupted(born(), name, arguments) for name, arguments in entries.items()}
+    return {name: interrupted(born(), name, arguments) for name, arguments in ENTRIES.items()}
 
 
 if __name__ == "__main__":

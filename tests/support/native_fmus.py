@@ -13,8 +13,13 @@ def room():
     return tempfile.TemporaryDirectory()
 
 
+def needed():
+    """Skip what needs a compiler, where there is none."""
+    pytest.importorskip("ziglang", reason="native FMUs are compiled by the package ziglang: pip install -e '.[native]'")
+
+
 @cache
 def built(platform="linux64"):
     """The folder of the native FMUs for a platform."""
-    pytest.importorskip("ziglang", reason="native FMUs are compiled by the package ziglang: pip install -e '.[native]'")
+    needed()
     return builds.once(platform, "--native", "--platform", platform, timeout=600)

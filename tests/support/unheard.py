@@ -12,7 +12,7 @@ from math import isnan
 
 sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
 
-import fmi3_worker
+import worker
 from fmpy.fmi1 import FMICallException
 
 
@@ -56,12 +56,12 @@ WAYS = {
 
 
 def refused(path, ways):
-    worker = fmi3_worker.Worker(tempfile.mkdtemp())
-    return [refused_in(way, worker, path) for way in ways]
+    process = worker.Worker(tempfile.mkdtemp())
+    return [refused_in(way, process, path) for way in ways]
 
 
-def refused_in(way, worker, path):
-    fmu = worker.instances[worker.instantiate(path, "Prüfstand")]
+def refused_in(way, process, path):
+    fmu = process.instances[process.instantiate(path, "Prüfstand")]
     WAYS[way]()
 
     def begin():

@@ -4,9 +4,10 @@
     kinds.py         what a name may stand for, and how C spells it
     expressions.py, statements.py    one function of the numerics, specialised to the kinds of its arguments
     program.py       all functions that the FMI layer reaches, each once
+    tangent.py       a model differentiated along a direction
     interface.py     the declared variables and the sentences, as C tables
     numerics.h, text.h               written by hand: Python's arithmetic, Python's numbers as text
-    instance.h, fmi2.c               what an instance is; FMI 2.0
+    instance.h, fmi2.c, fmi3.c       what an instance is; FMI 2.0 and 3.0
     sources.py       the folder sources/ of an FMU, which any tool can compile
     compiler.py, universal.py        the binaries
     fmu.py           the file

@@ -11,7 +11,6 @@ from tempfile import TemporaryDirectory
 
 from .. import BuildError
 from .expressions import PARTIAL, TOTAL
-from .sources import COMPILED
 from .universal import universal
 
 # One rounding for each operation, and every function of libm from the machine that runs the FMU: the compiler would
@@ -20,47 +19,60 @@ BUILT_IN = {math.fabs, math.copysign, math.sqrt}  # instructions of the processo
 LIBM = [function.__name__ for function in (*TOTAL, *PARTIAL) if function not in BUILT_IN]
 SAME_BITS = ("-O2", "-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM))
 LEFT_OUT = ("-Wno-unused-parameter", "-Wno-unused-but-set-variable")  # by a branch of the numerics that is not needed
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *LEFT_OUT)
+THEIRS = ("-Wno-strict-prototypes",)  # in the headers of FMI 3.0
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *LEFT_OUT, *THEIRS)
 LIBRARY = ("-shared", "-fPIC", "-fvisibility=hidden")
 
 
 @dataclass(frozen=True)
 class Platform:
-    """A folder of binaries/: the suffix there, and the compiler's names for the processors that it serves."""
+    """The suffix of its libraries; for each processor that it serves the folder of FMI 3.0 (of FMI 2.0 there is one for
+    all, under our name), and the compiler's name."""
 
     suffix: str
-    targets: tuple[str, ...]
+    targets: dict[str, str]
     options: tuple[str, ...] = ()
 
 
 PLATFORMS = {
-    "linux64": Platform(".so", ("x86_64-linux-gnu.2.17",)),
-    "win64": Platform(".dll", ("x86_64-windows-gnu",)),
+    "linux64": Platform(".so", {"x86_64-linux": "x86_64-linux-gnu.2.17"}),
+    "win64": Platform(".dll", {"x86_64-windows": "x86_64-windows-gnu"}),
     "darwin64": Platform(
-        ".dylib", ("x86_64-macos.11.0", "aarch64-macos.11.0"), ("-Wl,-install_name,@rpath/{name}.dylib",)
+        ".dylib",
+        {"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"},
+        ("-Wl,-install_name,@rpath/{name}.dylib",),
     ),
-    "aarch64-linux": Platform(".so", ("aarch64-linux-gnu.2.17",)),
+    "aarch64-linux": Platform(".so", {"aarch64-linux": "aarch64-linux-gnu.2.17"}),
 }
 USUAL = ("linux64", "win64", "darwin64")
 
 
-def compiled(name: str, files: Mapping[str, str], platform: str) -> bytes:
-    """The binary of the FMU `name` from its sources, which depends on nothing else."""
+def binaries(name: str, files: Mapping[str, str], main: str, platform: str, fmi: str) -> dict[str, bytes]:
+    """Path and content of what is in binaries/ of the FMU `name` for a platform, in a version of FMI."""
+    suffix, slices = PLATFORMS[platform].suffix, compiled(name, files, main, platform)
+    if fmi == "2":
+        whole = universal(list(slices.values())) if len(slices) > 1 else next(iter(slices.values()))
+        slices = {platform: whole}
+    return {f"binaries/{folder}/{name}{suffix}": content for folder, content in slices.items()}
+
+
+def compiled(name: str, files: Mapping[str, str], main: str, platform: str) -> dict[str, bytes]:
+    """The libraries from the source `main`, which depend on nothing else, by the folders of FMI 3.0."""
     chosen = PLATFORMS[platform]
-    options = (*LIBRARY, *(option.format(name=name) for option in chosen.options))
-    slices = [linked(files, target, f"{name}{chosen.suffix}", options) for target in chosen.targets]
-    return slices[0] if len(slices) == 1 else universal(slices)
+    options, out = [option.format(name=name) for option in chosen.options], f"{name}{chosen.suffix}"
+    return {place: linked(files, main, target, out, (*LIBRARY, *options)) for place, target in chosen.targets.items()}
 
 
-def linked(files: Mapping[str, str], target: str, out: str, options: Iterable[str]) -> bytes:
-    """What the compiler makes of the sources for a target; `out` is a name without a folder, so that none gets in."""
+def linked(files: Mapping[str, str], main: str, target: str, out: str, options: Iterable[str]) -> bytes:
+    """What the compiler makes of the source `main` for a target; `out` is a name without a folder, so that none gets
+    in."""
     if find_spec("ziglang") is None:
         raise BuildError("Native FMUs need the compiler in the package ziglang: try pip install -e '.[native]'.")
     with TemporaryDirectory() as folder:
         for file, text in files.items():
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
         command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
-        command += [COMPILED, "-o", out, "-lm"]
+        command += [main, "-o", out, "-lm"]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         if done.returncode:
             raise BuildError(f"{out} does not compile for {target}:\n{done.stderr.strip()}")

@@ -1,4 +1,4 @@
-/* FMI 2.0 co-simulation of the model in model.h: instance.h says what a call does. */
+/* FMI 2.0, co-simulation and model exchange, of the model in model.h: instance.h says what a call does. */
 #define _POSIX_C_SOURCE 200809L /* beside C99: signal masks */
 
 #include "fmi2Functions.h"
@@ -35,8 +35,9 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     static const fmi2CallbackFunctions silent = {0};
     (void)fmuResourceLocation, (void)visible;
     if (!functions) functions = &silent;
-    Instance *it = instantiate(instanceName ? instanceName : "", functions, loggingOn, __func__);
-    if (it && fmuType != fmi2CoSimulation) return dismissed(it, CO_SIMULATES, __func__, "");
+    const char *name = instanceName ? instanceName : "";
+    int running = fmuType == fmi2ModelExchange ? EXCHANGING : STEPPING;
+    Instance *it = instantiate(name, functions, running, loggingOn, __func__);
     if (it && (!fmuGUID || strcmp(fmuGUID, MODEL_GUID))) return dismissed(it, WRONG_TOKEN, __func__, MODEL_GUID);
     return it;
 }
@@ -71,12 +72,12 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component component)
 fmi2Status fmi2ExitInitializationMode(fmi2Component component)
 {
     ENTER(component, 1 << INITIALISING);
-    return begin(it);
+    return begin(it, exchanges(&it->state));
 }
 
 fmi2Status fmi2Terminate(fmi2Component component)
 {
-    ENTER(component, 1 << RUNNING);
+    ENTER(component, BEGUN);
     it->state.run.phase = TERMINATED;
     return fmi2OK;
 }
@@ -84,7 +85,7 @@ fmi2Status fmi2Terminate(fmi2Component component)
 fmi2Status fmi2Reset(fmi2Component component)
 {
     ENTER(component, ANY);
-    memcpy(&it->state, &initial, sizeof initial);
+    fresh(it);
     return fmi2OK;
 }
 
@@ -111,41 +112,41 @@ fmi2Status fmi2GetInteger(fmi2Component component, const fmi2ValueReference vr[]
 
 fmi2Status fmi2SetReal(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
 {
-    ENTER(component, ALIVE);
+    ENTER(component, LIVING);
     WRITE(it, &REAL, vr, nvr, value);
 }
 
 fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer value[])
 {
-    ENTER(component, ALIVE);
+    ENTER(component, LIVING);
     WRITE(it, &INTEGER, vr, nvr, value);
 }
 
 /* No variable is a Boolean or a String. */
-#define NO_VARIABLES_OF(TYPE, READ_IN, WRITTEN_IN)                                                                    \
+#define NO_VARIABLES_OF(TYPE)                                                                                         \
     fmi2Status fmi2Get##TYPE(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2##TYPE value[])  \
     {                                                                                                                 \
-        ENTER(component, READ_IN);                                                                                    \
+        ENTER(component, ANY);                                                                                        \
         (void)value;                                                                                                  \
         REFUSE_ALL(it, vr, nvr, #TYPE);                                                                               \
     }                                                                                                                 \
     fmi2Status fmi2Set##TYPE(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,                      \
                              const fmi2##TYPE value[])                                                                \
     {                                                                                                                 \
-        ENTER(component, WRITTEN_IN);                                                                                 \
+        ENTER(component, LIVING);                                                                                     \
         (void)value;                                                                                                  \
         REFUSE_ALL(it, vr, nvr, #TYPE);                                                                               \
     }
 
-NO_VARIABLES_OF(Boolean, ANY, ALIVE)
-NO_VARIABLES_OF(String, ANY, ALIVE)
+NO_VARIABLES_OF(Boolean)
+NO_VARIABLES_OF(String)
 
 /* ---- steps */
 
 fmi2Status fmi2DoStep(fmi2Component component, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
-    ENTER(component, 1 << RUNNING);
+    ENTER(component, STEPPING);
     (void)noSetFMUStatePriorToCurrentPoint;
     return step_by(it, currentCommunicationPoint, communicationStepSize);
 }
@@ -167,6 +168,81 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s,
     if (s != fmi2Terminated) return fmi2Discard;
     *value = fmi2False;
     return fmi2OK;
+}
+
+/* ---- model exchange */
+
+fmi2Status fmi2EnterEventMode(fmi2Component component)
+{
+    ENTER(component, EXCHANGING);
+    it->state.run.phase = EVENT;
+    return fmi2OK;
+}
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventInfo)
+{
+    ENTER(component, 1 << EVENT);
+    NEED(eventInfo);
+    fmi2Status status = handle(it);
+    const struct Exchange *exchange = &it->state.model.exchange;
+    *eventInfo = (fmi2EventInfo){.terminateSimulation = status != fmi2OK,
+                                 .nominalsOfContinuousStatesChanged = exchange->rescaled,
+                                 .valuesOfContinuousStatesChanged = exchange->jumped,
+                                 .nextEventTimeDefined = exchange->due < INFINITY,
+                                 .nextEventTime = exchange->due};
+    return status;
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component component)
+{
+    ENTER(component, 1 << EVENT);
+    it->state.run.phase = CONTINUOUS;
+    return fmi2OK;
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
+{
+    ENTER(component, 1 << CONTINUOUS);
+    NEED(enterEventMode);
+    NEED(terminateSimulation);
+    (void)noSetFMUStatePriorToCurrentPoint;
+    *enterEventMode = *terminateSimulation = fmi2False;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time)
+{
+    ENTER(component, EXCHANGING);
+    return move_to(it, time);
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real x[], size_t nx)
+{
+    ENTER(component, 1 << CONTINUOUS);
+    return put(it, x, nx, __func__);
+}
+
+#define TELLING(NAME, FIND, COUNT)                                                      \
+    fmi2Status fmi2Get##NAME(fmi2Component component, fmi2Real value[], size_t n)       \
+    {                                                                                   \
+        ENTER(component, ANY);                                                          \
+        return tell(it, exchange_##FIND, it->state.model.exchange.FIND, COUNT, value, n, __func__); \
+    }
+
+TELLING(Derivatives, rates, STATES)
+TELLING(EventIndicators, indicators, INDICATORS)
+TELLING(ContinuousStates, states, STATES)
+TELLING(NominalsOfContinuousStates, nominals, STATES)
+
+/* ---- directional derivatives */
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2ValueReference vUnknown_ref[],
+                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown,
+                                        const fmi2Real dvKnown[], fmi2Real dvUnknown[])
+{
+    ENTER(component, ANY);
+    return directional(it, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown, __func__);
 }
 
 /* ---- state */
@@ -215,15 +291,6 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte seria
 }
 
 /* ---- what this FMU does not offer, as its description says */
-
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2ValueReference vUnknown_ref[],
-                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[], size_t nKnown,
-                                        const fmi2Real dvKnown[], fmi2Real dvUnknown[])
-{
-    ENTER(component, ANY);
-    (void)vUnknown_ref, (void)nUnknown, (void)vKnown_ref, (void)nKnown, (void)dvKnown, (void)dvUnknown;
-    return refuse(it, NOT_OFFERED, __func__, "");
-}
 
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[])

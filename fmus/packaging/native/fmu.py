@@ -3,7 +3,8 @@
 modelDescription.xml
 binaries/<platform>/<name>.{so,dll,dylib}
 sources/                                  what they were made from, for any other platform
-documentation/, model.png, extra/         page and licence, icon, certified result
+documentation/, extra/                    page and licence, certified result
+model.png                                 the icon; FMI 3.0: terminalsAndIcons/, with the flange
 """
 
 from collections.abc import Sequence
@@ -18,13 +19,22 @@ from ..archive import build_date, licenses, write, zipped
 from ..catalogue import find
 from ..companions import companions
 from ..description import declared_by, describe
+from ..description3 import describe as describe3
 from ..document import document
 from ..modules import digest
+from ..terminals import terminals
 from ..written import offer, written
-from .compiler import PLATFORMS, USUAL, compiled
+from .compiler import PLATFORMS, USUAL, binaries
 from .sources import COMPILED, build_description, guid_header, sources
 
 LICENSE = "documentation/licenses/license.txt"
+ICONS = {"2": "model.png", "3": "terminalsAndIcons/icon.png"}
+USE = """\
+<p>In model exchange the importer's solver takes the place of ours, and <code>solver.*</code> says nothing; where
+friction is dry, the mode changes at events, which the importer finds by <code>events.to_rest</code> and
+<code>events.to_break_away</code>. In FMI 3.0 co-simulation, too, it may handle events itself: a step returns early at
+stick and slip.</p>
+"""
 
 
 def build(
@@ -33,8 +43,10 @@ def build(
     methods: Sequence[str] = (),
     laws: Sequence[str] = (),
     platforms: Sequence[str] = (),
+    fmi: str = "2",
 ) -> Path:
-    """Write the FMU of a model, by name or path, for the platforms (none: the usual ones) into `folder`.
+    """Write the FMU of a model, by name or path, for the platforms (none: the usual ones) and a version of FMI, into
+    `folder`.
 
     An older one is replaced whole or not at all.  Methods and friction laws may be chosen, as for the Python FMU.
     """
@@ -45,24 +57,29 @@ def build(
     date = build_date()
     source = find(model)
     name, cls = source.name, written(source, offer(source.model, source.name, methods, laws))
-    files, description = frozen(cls, name, date)
-    entries = companions(cls, source.path, declared_by(cls))
+    files, description = frozen(cls, name, date, fmi)
+    declared = declared_by(cls)
+    entries = companions(cls, source.path, declared, ICONS[fmi], USE)
+    if fmi == "3":
+        entries |= terminals(declared)
     entries |= {"modelDescription.xml": description, LICENSE: licenses()[LICENSE]}
     entries |= {f"sources/{file}": text.encode() for file, text in files.items()}
-    entries["sources/buildDescription.xml"] = build_description(name)
+    entries["sources/buildDescription.xml"] = build_description(name, fmi)
     with ThreadPoolExecutor() as pool:
-        binaries = pool.map(lambda platform: compiled(name, files, platform), platforms)
-    for platform, content in zip(platforms, binaries, strict=True):
-        entries[f"binaries/{platform}/{name}{PLATFORMS[platform].suffix}"] = content
+        for content in pool.map(lambda platform: binaries(name, files, COMPILED[fmi], platform, fmi), platforms):
+            entries |= content
     return write(folder / f"{name}.fmu", zipped(entries, date))
 
 
-def frozen(model: type[Declaring], name: str, date: datetime) -> tuple[dict[str, str], bytes]:
+def frozen(model: type[Declaring], name: str, date: datetime, fmi: str) -> tuple[dict[str, str], bytes]:
     """The C sources of a model, and the description that goes with them."""
-    files = sources(model)
-    root = fromstring(describe(model, name, digest(files), date))
-    interface = root.find("CoSimulation")
-    assert interface is not None
-    SubElement(SubElement(interface, "SourceFiles"), "File", name=COMPILED)
+    files = sources(model, fmi)
+    if fmi == "3":
+        root = fromstring(describe3(model, name, digest(files), date))
+        files["guid.h"] = guid_header(root.attrib["instantiationToken"])
+        return files, document(root)
+    root = fromstring(describe(model, name, digest(files), date, exchanging=True))
+    for interface in root.findall("ModelExchange") + root.findall("CoSimulation"):
+        SubElement(SubElement(interface, "SourceFiles"), "File", name=COMPILED[fmi])
     files["guid.h"] = guid_header(root.attrib["guid"])
     return files, document(root)

@@ -17,6 +17,7 @@
 
 typedef struct {
     State state;
+    int possible; /* phases in which it can be, for what it was made */
     bool logging;
     Host host;
     char name[];
@@ -34,8 +35,9 @@ typedef struct {
 } Type;
 
 /* Phases as bits. */
-enum { NEW = 1 << INSTANTIATED, SETTING_UP = NEW | 1 << INITIALISING, ALIVE = SETTING_UP | 1 << RUNNING };
-enum { ANY = ALIVE | 1 << TERMINATED };
+enum { NEW = 1 << INSTANTIATED, STEPPING = 1 << RUNNING, EXCHANGING = 1 << EVENT | 1 << CONTINUOUS };
+enum { BEGUN = STEPPING | EXCHANGING, LIVING = NEW | 1 << INITIALISING | BEGUN, ANY = LIVING | 1 << TERMINATED };
+enum { READABLE = ANY | 1 << INTERMEDIATE, AROUND = ANY & ~BEGUN }; /* what comes before and after all runs */
 
 /* ---- saying what is wrong */
 
@@ -67,6 +69,7 @@ static Status refuse_order(const Instance *it, int allowed, const char *function
 {
     Text words = {0};
     if (!it) return REFUSED;
+    if (allowed & it->possible) allowed &= it->possible;
     for (int i = 0; i < PHASES; i++) {
         if (!(allowed & 1 << i)) continue;
         if (words.length) add(&words, " or ");
@@ -94,9 +97,11 @@ static Status refuse_reference(const Instance *it, uint32_t reference, const cha
 static void silence(Model *model)
 {
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
-        if (variable->is_real && variable->is_calculated) *(double *)place(model, variable) = NAN;
+        if (variable->is_real && variable->is_answer) *(double *)place(model, variable) = NAN;
     }
 }
+
+static bool exchanges(const State *state) { return state->run.interface == MODEL_EXCHANGE; }
 
 /* The refused value that came first. */
 static const Refusal *refused(const State *state)
@@ -156,12 +161,13 @@ static Status ready(Instance *it, const Type *type, const uint32_t vr[], size_t 
                     const char *function)
 {
     State *state = &it->state;
-    bool reported = false, ahead = false, fault = false;
+    bool reported = false, ahead = false, shown = false, fault = false;
     if (!vr || !value) return check(it, type, vr, n, value, function);
     for (size_t i = 0; i < n; i++) {
         if (!is_one(vr[i], type)) return check(it, type, vr, n, value, function);
         reported |= variables[vr[i]].is_reported;
         ahead |= vr[i] == T_NEXT;
+        shown |= vr[i] >= DECLARED;
     }
     if (!state->run.observed && !state->run.failed) {
         int64_t status = rules_observe(&state->run, &state->model, &fault);
@@ -169,7 +175,12 @@ static Status ready(Instance *it, const Type *type, const uint32_t vr[], size_t 
         else if (status != OK) silence(&state->model);
     }
     if (reported && state->run.observed && !fault) rules_report(&state->model, ahead, &fault);
+    if (shown && state->run.observed && !fault) exchange_show(&state->model, &fault);
     if (!fault) return DONE;
+    if (exchanges(state)) { /* a state that the importer's solver only tries may be anything */
+        silence(&state->model);
+        return DONE;
+    }
     give_up(it, DIVERGED, NAN, NAN);
     return DISCARDED;
 }
@@ -231,8 +242,15 @@ static int64_t integer_at(const Instance *it, uint32_t reference)
 
 /* ---- from instantiation to the end */
 
-/* A new instance; NULL with a sentence if there is no memory. */
-static Instance *instantiate(const char *name, const Host *host, bool logging, const char *function)
+static void fresh(Instance *it)
+{
+    bool fault = false;
+    memcpy(&it->state, &initial, sizeof initial);
+    if (it->possible & 1 << CONTINUOUS) exchange_take_over(&it->state.run, &fault);
+}
+
+/* A new instance, whose runs are in some phases; NULL with a sentence if there is no memory. */
+static Instance *instantiate(const char *name, const Host *host, int running, bool logging, const char *function)
 {
     Text why = {0};
     Instance *it = calloc(1, sizeof *it + 4 * strlen(name) + 1);
@@ -244,7 +262,8 @@ static Instance *instantiate(const char *name, const Host *host, bool logging, c
     copy_name(it->name, name);
     it->host = *host;
     it->logging = logging;
-    memcpy(&it->state, &initial, sizeof initial);
+    it->possible = AROUND | running;
+    fresh(it);
     return it;
 }
 
@@ -267,11 +286,14 @@ static Status choose_log(Instance *it, bool logging, size_t n, const char *const
     return DONE;
 }
 
-/* The run begins. */
-static Status begin(Instance *it)
+/* The run begins, with an event if the importer handles them. */
+static Status begin(Instance *it, bool handles)
 {
+    State *state = &it->state;
     bool fault = false;
-    int64_t status = rules_begin(&it->state.run, &it->state.model, &fault);
+    int64_t status = rules_begin(&state->run, &state->model, &fault);
+    if (status == OK && !fault && exchanges(state)) exchange_begin(&state->model, &fault);
+    if (handles) state->run.phase = EVENT;
     return judged_by(it, status, fault, NAN, NAN);
 }
 
@@ -282,9 +304,108 @@ static Status step_by(Instance *it, double t, double h)
     return judged_by(it, status, fault, t, h);
 }
 
+/* ---- model exchange */
+
+typedef void Find(Model *model, bool *fault);
+
+static Status move_to(Instance *it, double t)
+{
+    bool fault = false;
+    exchange_move_to(&it->state.run, &it->state.model, t, &fault);
+    return DONE;
+}
+
+static Status put(Instance *it, const double states[], size_t n, const char *function)
+{
+    bool fault = false;
+    if (n != STATES) return refuse(it, WRONG_LENGTH, function, "the number of states");
+    if (!states) return refuse(it, NO_ADDRESS, function, "states");
+    memcpy(it->state.model.exchange.states, states, STATES * sizeof *states);
+    exchange_put(&it->state.run, &it->state.model, &fault);
+    return DONE;
+}
+
+/* What is found of the present point, in a row of the model; NaN where there is nothing to calculate with, for a state
+ * that the importer's solver only tries may be anything. */
+static Status tell(Instance *it, Find *find, const double *row, size_t count, double value[], size_t n,
+                   const char *function)
+{
+    State *state = &it->state;
+    bool fault = false;
+    if (n != count) return refuse(it, WRONG_LENGTH, function, "the number of values");
+    if (n && !value) return refuse(it, NO_ADDRESS, function, "the address of the values");
+    int64_t status = exchange_ready(&state->run, &state->model, &fault);
+    if (status == OK && !fault) find(&state->model, &fault);
+    bool found = status == OK && !fault;
+    for (size_t i = 0; i < n; i++) value[i] = found ? row[i] : NAN;
+    return status == OK || state->run.phase < RUNNING ? DONE : give_up(it, status, NAN, NAN);
+}
+
+/* An event is handled; what is new stands in the exchange. */
+static Status handle(Instance *it)
+{
+    State *state = &it->state;
+    bool fault = false;
+    int64_t status = exchange_handle(&state->run, &state->model, &fault);
+    return judged_by(it, status, fault, NAN, NAN);
+}
+
+/* ---- directional derivatives */
+
+static double *slope_of(struct Tangent *to, uint32_t reference)
+{
+    return (double *)((char *)to + variables[reference].slope);
+}
+
+/* Refuse a call unless all knowns are states or inputs, and all unknowns what follows from them. */
+static Status check_slopes(const Instance *it, const uint32_t unknowns[], size_t n, const uint32_t knowns[], size_t m,
+                           const double *seed, const double *sensitivity, const char *function)
+{
+    if ((n && !unknowns) || (m && !knowns) || !seed || !sensitivity) {
+        return refuse(it, NO_ADDRESS, function, "one of unknowns, knowns, seed and sensitivity");
+    }
+    for (size_t i = 0; i < n + m; i++) {
+        uint32_t reference = i < n ? unknowns[i] : knowns[i - n];
+        const Variable *variable = reference < VARIABLES ? &variables[reference] : NULL;
+        if (!variable || variable->slope == NO_SLOPE || !(i < n ? variable->is_calculated : variable->moves)) {
+            return refuse_call(it, NO_DERIVATIVE, &(Call){.function = function, .reference = reference});
+        }
+    }
+    return DONE;
+}
+
+/* What follows along a direction, at the present point; DISCARDED where there is nothing to calculate with. */
+static Status follow(Instance *it, struct Tangent *to)
+{
+    State *state = &it->state;
+    bool fault = false;
+    int64_t status = exchange_ready(&state->run, &state->model, &fault);
+    if (status != OK && state->run.phase >= RUNNING) return give_up(it, status, NAN, NAN);
+    if (status == OK && !fault) along(&state->model, to, &fault);
+    return status == OK && !fault ? DONE : DISCARDED;
+}
+
+static Status directional(Instance *it, const uint32_t unknowns[], size_t n, const uint32_t knowns[], size_t m,
+                          const double seed[], double sensitivity[], const char *function)
+{
+    struct Tangent to = {0};
+    if (check_slopes(it, unknowns, n, knowns, m, seed, sensitivity, function)) return REFUSED;
+    for (size_t j = 0; j < m; j++) *slope_of(&to, knowns[j]) += seed[j];
+    Status status = follow(it, &to);
+    for (size_t i = 0; i < n; i++) sensitivity[i] = status ? NAN : *slope_of(&to, unknowns[i]);
+    return status;
+}
+
 /* ---- state */
 
 static Status refuse_state(const Instance *it) { return refuse(it, FOREIGN_STATE, "", ""); }
+
+/* The state under a seal; NULL if it is broken, or that of an instance for something else. */
+static const State *own(const Instance *it, Sealed *sealed)
+{
+    const State *state = unsealed(sealed);
+    return state && exchanges(state) == exchanges(&it->state) ? state : NULL;
+}
 
 /* Keep a state in memory, in place of an older one if there is one. */
 static Status keep(const Instance *it, const State *state, void **kept, const char *function)
@@ -303,7 +424,7 @@ static Status save(Instance *it, void **kept, const char *function)
 
 static Status restore(Instance *it, void *kept)
 {
-    const State *state = unsealed(kept);
+    const State *state = own(it, kept);
     if (!state) return refuse_state(it);
     memcpy(&it->state, state, sizeof *state);
     return DONE;
@@ -327,7 +448,7 @@ static Status measure(const Instance *it, void *kept, size_t *size)
 
 static Status serialize(const Instance *it, void *kept, void *bytes, size_t size, const char *function)
 {
-    if (!unsealed(kept)) return refuse_state(it);
+    if (!own(it, kept)) return refuse_state(it);
     if (size < sizeof(Sealed)) return refuse(it, TOO_SHORT, function, "");
     memset(bytes, 0, size);
     memcpy(bytes, kept, sizeof(Sealed));
@@ -340,7 +461,7 @@ static Status deserialize(const Instance *it, const void *bytes, size_t size, vo
     Sealed *sealed = malloc(sizeof *sealed); /* for bytes may lie where a state cannot */
     if (!sealed) return refuse(it, NO_MEMORY, function, "");
     memcpy(sealed, bytes, size);
-    const State *state = unsealed(sealed);
+    const State *state = own(it, sealed);
     Status status = state ? keep(it, state, kept, function) : refuse_state(it);
     free(sealed);
     return status;

@@ -3,18 +3,19 @@
 import inspect
 from collections.abc import Mapping
 from string import Formatter
-from typing import Any
 
 from ...runtime import codes
-from ...runtime.codes import INTEGRATED, INTERRUPTED, RULES
+from ...runtime.codes import INTERRUPTED, RULES
 from ...runtime.declare import Declared, Declaring
 from ...runtime.failure import ANSWERS
 from ...runtime.sentences import CALLS, PHASES, RUN, VALUES
-from ..description import declared_by
+from ...runtime.values import SETTABLE
+from ..further import TIME, all_variables, exchanged, indicators_of, place, rates_of
 from ..written import beside
 from .entries import entries
-from .kinds import BOOL, FLOAT, INT, literal
+from .kinds import BOOL, FLOAT, INT, Object, literal
 from .program import Program
+from .tangent import Tangent, slots, tangent
 
 HEADER = """\
 /* {sentence}
@@ -39,7 +40,7 @@ enum {{
 typedef struct {name} Model;
 
 {items}
-enum {{ VARIABLES = {count}, T_NEXT = {ahead} }};
+enum {{ VARIABLES = {count}, DECLARED = {declared}, T_NEXT = {ahead}, STATES = {states}, INDICATORS = {indicators} }};
 
 static const Variable variables[VARIABLES] = {{
 {table}}};
@@ -98,28 +99,30 @@ PLACES = {  # field of a sentence -> what adds it to the text
     **{name: f"add(text, call->{name})" for name in ("function", "word", "phase")},
     "reference": "add_integer(text, call->reference)",
 }
-ELSEWHERE = (INTEGRATED, INTERRUPTED)  # statuses of other kinds
+ELSEWHERE = (INTERRUPTED,)  # statuses of other kinds
 
 
-def header(model: type[Declaring]) -> str:
-    """The text of model.h."""
-    thing: Any = model()
-    rules = beside(model, "runtime.rules")
+def header(model: type[Declaring], fmi: str) -> str:
+    """The text of model.h, for a version of FMI."""
+    thing = exchanged(model)
+    rules, exchange, leaps = (beside(model, f"runtime.{part}") for part in ("rules", "exchange", "leaps"))
     run = rules.Run(thing.tolerance)
-    program = Program(thing, run)
-    for function, kinds in entries(rules, program.layout.model).items():
+    declared = all_variables(thing)
+    to, along = tangent(model, thing, declared)
+    program = Program(thing, run, to)
+    program.entry("along", along, Object(Tangent))
+    for function, kinds in entries(rules, exchange, leaps, program.layout.model, fmi).items():
         program.exported(function, kinds)
     layout = program.layout
-    declared = declared_by(model)
     names = [name for name, _ in declared]
-    numbers = [("run", rules.Run), ("model", model)]
+    numbers = [("run", rules.Run), ("model", type(thing))]
     members = [(path, kind) for prefix, cls in numbers for path, kind in layout.scalars(cls, f"{prefix}.")]
     members = [(path, kind) for path, kind in members if kind in (INT, BOOL)]
     statuses = {status: sentence for status, sentence in RUN.items() if status not in ELSEWHERE}
     broken = dict(enumerate(thing.rules, RULES + 1))
     own = {
         name: f"{'add_real' if kind is FLOAT else 'add_integer'}(text, model->{name})"
-        for name, kind in layout.fields[model].items()
+        for name, kind in layout.fields[type(thing)].items()
     }
     return HEADER.format(
         sentence=(inspect.getdoc(model) or "").splitlines()[0],
@@ -131,10 +134,13 @@ def header(model: type[Declaring]) -> str:
         image=layout.image(thing, "        "),
         items="".join(_items(name, meaning) for name, meaning in declared if meaning.items),
         count=len(names),
+        declared=names.index(TIME),
         ahead=names.index("solver.t_next"),
+        states=len(rates_of(declared)),
+        indicators=len(indicators_of(declared)),
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {literal(kind is BOOL)}}},\n" for path, kind in members),
-        table="".join(_line(name, meaning) for name, meaning in declared),
+        table="".join(_line(name, meaning, slots(declared)) for name, meaning in declared),
         statuses=_cases(statuses, PLACES) + _cases(broken, own),
         values=_cases(VALUES, PLACES),
         calls=_cases(CALLS, PLACES),
@@ -157,15 +163,23 @@ def _of(name: str) -> str:
     return f"items_of_{name.replace('.', '_')}"
 
 
-def _line(name: str, meaning: Declared) -> str:
+def _line(name: str, meaning: Declared, slots: dict[str, str]) -> str:
     """One variable in the table."""
     words = (name, meaning.text, meaning.suffix, meaning.allowed)
-    flags = (meaning.type == "Real", meaning.causality in ANSWERS, meaning.variability == "fixed", "." in name)
+    flags = (
+        meaning.type == "Real",
+        meaning.causality not in SETTABLE,
+        meaning.variability == "fixed",
+        meaning.causality in ANSWERS,
+        "." in name,
+        meaning.role == "state" or meaning.causality == "input",
+    )
     bounds = (meaning.low, meaning.high, meaning.above, meaning.below)
     items = f"{_of(name)}, {_of(name)} + {len(meaning.items)}" if meaning.items else "NULL, NULL"
     parts = [
         *map(_text, words),
-        f"offsetof(Model, {name})",
+        f"offsetof(Model, {place(name)})",
+        f"offsetof(struct Tangent, {slots[name]})" if name in slots else "NO_SLOPE",
         *map(literal, flags),
         *(literal(float(bound)) for bound in bounds),
         items,

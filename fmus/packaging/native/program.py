@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import count
 from types import FunctionType
 
-from .kinds import Group, Kind, Scalar
+from .kinds import Group, Kind
 from .layout import Layout
 from .statements import Body
 
@@ -29,8 +29,8 @@ class Program:
         self._groups: dict[str, Group] = {}
         self._names: set[str] = set()
 
-    def entry(self, name: str, function: FunctionType, *kinds: Scalar) -> Compiled:
-        """A function of the model and of numbers, to be called from outside by `name`."""
+    def entry(self, name: str, function: FunctionType, *kinds: Kind) -> Compiled:
+        """A function of the model and of more, to be called from outside by `name`."""
         return self.exported(function, [self.layout.model, *kinds], name)
 
     def exported(self, function: FunctionType, kinds: list[Kind], name: str = "") -> Compiled:

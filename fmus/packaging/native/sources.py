@@ -9,17 +9,20 @@ from .. import BuildError
 from ..document import document
 from .interface import header
 
-COMPILED = "fmi2.c"  # includes all the others
-WRITTEN = (COMPILED, "instance.h", "numerics.h", "say.h", "state.h", "text.h", "variable.h")
-FMI_HEADERS = ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h")  # 2-clause BSD
+COMPILED = {"2": "fmi2.c", "3": "fmi3.c"}  # by the version of FMI: includes all the others
+WRITTEN = ("instance.h", "numerics.h", "say.h", "state.h", "text.h", "variable.h")
+FMI_HEADERS = {  # 2-clause BSD, as they say
+    "2": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
+    "3": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
+}
 
 
-def sources(model: type[Declaring]) -> dict[str, str]:
+def sources(model: type[Declaring], fmi: str) -> dict[str, str]:
     """Name and text of every file but guid.h, which follows from these."""
     here = Path(__file__).parent
-    written = {name: (here / name).read_text(encoding="utf-8") for name in WRITTEN}
-    headers = {name: (_fmi_folder() / name).read_text(encoding="utf-8") for name in FMI_HEADERS}
-    return written | headers | {"model.h": header(model)}
+    written = {name: (here / name).read_text(encoding="utf-8") for name in (COMPILED[fmi], *WRITTEN)}
+    headers = {name: (_fmi_folder() / name).read_text(encoding="utf-8") for name in FMI_HEADERS[fmi]}
+    return written | headers | {"model.h": header(model, fmi)}
 
 
 def guid_header(guid: str) -> str:
@@ -27,18 +30,18 @@ def guid_header(guid: str) -> str:
     return f'#define MODEL_GUID "{guid}"\n'
 
 
-def build_description(name: str) -> bytes:
+def build_description(name: str, fmi: str) -> bytes:
     """buildDescription.xml: how to compile the sources (FMI 3.0, section 2.5.2; FMI 2.0 has no such file)."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=name)
     files = SubElement(configuration, "SourceFileSet", language="C99")
-    SubElement(files, "SourceFile", name=COMPILED)
+    SubElement(files, "SourceFile", name=COMPILED[fmi])
     SubElement(configuration, "Library", name="m", external="true", description="the C library of mathematics")
     return document(root)
 
 
 def _fmi_folder() -> Path:
-    """Where fmpy keeps the headers of FMI 2.0; it is found without being imported."""
+    """Where fmpy keeps the headers of FMI; it is found without being imported."""
     spec = find_spec("fmpy")
     if spec is None or spec.origin is None:
         raise BuildError("fmpy is not installed, and a native FMU carries its FMI headers: try 'pip install fmpy'.")

@@ -120,7 +120,7 @@ static bool is_sound(State *state)
 {
     bool fault = false;
     return are_members_sound(state) && !state->run.observed && are_values_sound(&state->model) && are_refusals_sound(state) &&
-           rules_is_sound(&state->run, &state->model, false, &fault) && !fault;
+           rules_is_sound(&state->run, &state->model, state->run.interface == MODEL_EXCHANGE, &fault) && !fault;
 }
 
 /* The state under the seal; NULL if it is broken in any way. */

@@ -8,13 +8,18 @@
 
 #include "text.h"
 
+#define NO_SLOPE SIZE_MAX
+
 typedef struct {
     const char *name, *text;
     const char *unit, *allowed; /* the unit behind a number, and the range, in words */
     size_t offset; /* in the model */
+    size_t slope;  /* in a direction; NO_SLOPE if it has none */
     bool is_real;  /* a double; otherwise an int64_t */
     bool is_calculated, is_fixed;
+    bool is_answer;   /* reads NaN once the run has failed */
     bool is_reported; /* tells of the solver, and is brought up to date when it is read */
+    bool moves;       /* a state or an input: one along which there are derivatives */
     double low, high, above, below;     /* low <= value <= high, above < value < below */
     const int64_t *items, *end_of_items; /* of an enumeration */
 } Variable;

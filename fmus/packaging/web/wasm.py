@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from gzip import compress
 
 from ..native.compiler import linked
+from ..native.sources import COMPILED
 
 TARGET = "wasm32-wasi"
 CALLED = (  # by script/fmu.js
@@ -17,4 +18,4 @@ OPTIONS = ("-mexec-model=reactor", "-fvisibility=hidden", *(f"-Wl,--export={name
 
 def packed(name: str, files: Mapping[str, str]) -> str:
     """The WebAssembly of the FMU `name` from its sources, compressed, in letters."""
-    return b64encode(compress(linked(files, TARGET, f"{name}.wasm", OPTIONS), mtime=0)).decode()
+    return b64encode(compress(linked(files, COMPILED["2"], TARGET, f"{name}.wasm", OPTIONS), mtime=0)).decode()

@@ -12,7 +12,19 @@ from dataclasses import dataclass
 from .text import Line
 
 DOTTED = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
-HOSTS = ("boundary", "declare", "failure", "hosted", "rules", "sentences", "slave", "slave3", "state", "values")
+HOSTS = (
+    "boundary",
+    "declare",
+    "exchange",
+    "failure",
+    "hosted",
+    "leaps",
+    "rules",
+    "sentences",
+    "slave",
+    "state",
+    "values",
+)
 CALLED_BY_NAME = {f"runtime/{name}.py" for name in HOSTS}  # by a layer of FMI
 Files = dict[str, list[Line]]
 

@@ -1,0 +1,85 @@
+"""The variables that no model declares: the time, event indicators, the rate of a driver; and what becomes of states.
+
+They stand behind the declared variables, whose value references stay.
+"""
+
+from typing import Any
+
+from ..runtime.declare import Declared, Declaring, Local, variables
+from .written import beside
+
+TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
+DERIVATIVE = "der({})"  # of a state that a driver is
+Variables = list[tuple[str, Declared]]
+
+
+class Time(Declared):
+    """The independent variable."""
+
+    causality, variability = "independent", "continuous"
+
+
+class Smooth(Local):
+    """Calculated; continuous between events."""
+
+    variability = "continuous"
+
+
+def exchanged(model: type[Declaring]) -> Any:
+    """An object of a model, as written out, that an importer's solver may lead."""
+    exchange = beside(model, "runtime.exchange")
+    thing = type(model.__name__, (exchange.Exchanging, model), {})()
+    exchange.nominals(thing)
+    return thing
+
+
+def place(name: str) -> str:
+    """Where a variable is in such an object."""
+    if name == TIME:
+        return "solver.t"
+    if name.startswith((TO_REST, TO_BREAK_AWAY)):
+        return name.replace("events", "exchange", 1)
+    return "exchange.driver" if name.startswith(DERIVATIVE[:4]) else name
+
+
+def all_variables(thing: Any) -> Variables:
+    """Name and declaration of every variable of such an object: those declared, then the others."""
+    declared = variables(thing)
+    meanings = dict(declared)
+    found: Variables = [(TIME, Time("s", "the independent variable"))]
+    forces = [meaning.unit for _, meaning in declared if meaning.role == "contact"]
+    states = [meaning for _, meaning in declared if meaning.role == "state" and not meaning.rate]
+    speed = next((meaning.unit for meaning in states if meaning.rate_of), states[0].unit)
+    for (mode, slip), force in zip(thing.contacts.items(), forces, strict=True):
+        tail, where = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
+        rest = f"event indicator{where}: speed in the direction of the slide; 1 while stuck"
+        away = f"event indicator{where}: holding limit less load on the body at rest; 1 while sliding"
+        found += [
+            (TO_REST + tail, Smooth(meanings[slip].unit if slip else speed, rest)),
+            (TO_BREAK_AWAY + tail, Smooth(force, away)),
+        ]
+    for name, meaning in declared:
+        if meaning.rate:
+            words = "rate of the " + meaning.text.split(",")[0]
+            found.append((DERIVATIVE.format(name), Smooth(meanings[meaning.rate].unit, words)))
+    return declared + found
+
+
+def rates_of(declared: Variables) -> dict[int, int]:
+    """The places of the derivatives, each with that of its state: states as declared, then drivers."""
+    names = {name: place for place, (name, _) in enumerate(declared)}
+    rates = {names[name]: names[meaning.rate_of] for name, meaning in declared if meaning.rate_of}
+    of_state = {state: rate for rate, state in rates.items() if declared[state][1].role == "state"}
+    states = [names[name] for name, meaning in declared if meaning.role == "state" and not meaning.rate]
+    drivers = {names[DERIVATIVE.format(name)]: names[name] for name, meaning in declared if meaning.rate}
+    return {of_state[state]: state for state in states} | drivers
+
+
+def indicators_of(declared: Variables) -> list[int]:
+    """The places of the event indicators: all to rest before all to break away."""
+    return [
+        place
+        for start in (TO_REST, TO_BREAK_AWAY)
+        for place, (name, _) in enumerate(declared)
+        if name.startswith(start)
+    ]

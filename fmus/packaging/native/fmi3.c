@@ -1,0 +1,496 @@
+/* FMI 3.0, co-simulation and model exchange, of the model in model.h: instance.h says what a call does. */
+#define _POSIX_C_SOURCE 200809L /* beside C99: signal masks */
+
+#include "fmi3Functions.h"
+
+typedef struct {
+    fmi3InstanceEnvironment environment;
+    fmi3LogMessageCallback log;
+    fmi3IntermediateUpdateCallback look; /* called in every step, if it is there */
+    bool handles;                        /* events of a communication step */
+    bool returns;                        /* early */
+} Host;
+typedef fmi3Status Status;
+
+#include "instance.h"
+
+static const Type FLOAT64 = {"Float64", true}, INT64 = {"Int64", false};
+
+static void log_to(const Host *host, const char *name, const char *sentence)
+{
+    (void)name;
+    if (host->log) host->log(host->environment, fmi3Error, "logStatusError", sentence);
+}
+
+/* ---- from instantiation to the end */
+
+const char *fmi3GetVersion(void) { return fmi3Version; }
+
+static Instance *instance_for(const char *name, const char *token, Host host, int running, bool logging,
+                              const char *function)
+{
+    Instance *it = instantiate(name ? name : "", &host, running, logging, function);
+    if (it && (!token || strcmp(token, MODEL_GUID))) return dismissed(it, WRONG_TOKEN, function, MODEL_GUID);
+    return it;
+}
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
+                                          fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                          fmi3InstanceEnvironment instanceEnvironment,
+                                          fmi3LogMessageCallback logMessage)
+{
+    Host host = {.environment = instanceEnvironment, .log = logMessage, .handles = true};
+    (void)resourcePath, (void)visible;
+    return instance_for(instanceName, instantiationToken, host, EXCHANGING, loggingOn, __func__);
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
+                                         fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                         fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
+                                         const fmi3ValueReference requiredIntermediateVariables[],
+                                         size_t nRequiredIntermediateVariables,
+                                         fmi3InstanceEnvironment instanceEnvironment,
+                                         fmi3LogMessageCallback logMessage,
+                                         fmi3IntermediateUpdateCallback intermediateUpdate)
+{
+    Host host = {instanceEnvironment, logMessage, intermediateUpdate, eventModeUsed, earlyReturnAllowed};
+    (void)resourcePath, (void)visible;
+    (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables; /* all can be read then */
+    int running = STEPPING | (intermediateUpdate ? 1 << INTERMEDIATE : 0) | (eventModeUsed ? 1 << EVENT : 0);
+    return instance_for(instanceName, instantiationToken, host, running, loggingOn, __func__);
+}
+
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
+                                               fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                               fmi3InstanceEnvironment instanceEnvironment,
+                                               fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
+                                               fmi3LockPreemptionCallback lockPreemption,
+                                               fmi3UnlockPreemptionCallback unlockPreemption)
+{
+    Host host = {.environment = instanceEnvironment, .log = logMessage};
+    (void)resourcePath, (void)visible, (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
+    Instance *it = instance_for(instanceName, instantiationToken, host, STEPPING, loggingOn, __func__);
+    return it ? dismissed(it, NOT_OFFERED, __func__, "") : NULL;
+}
+
+void fmi3FreeInstance(fmi3Instance instance) { free(instance); }
+
+fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
+                               const fmi3String categories[])
+{
+    ENTER(instance, ANY);
+    if (nCategories) NEED(categories);
+    return choose_log(it, loggingOn, nCategories, categories);
+}
+
+fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+                                       fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
+{
+    ENTER(instance, NEW);
+    bool fault = false;
+    rules_setup(&it->state.run, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0,
+                &fault);
+    it->state.run.phase = INITIALISING;
+    return fmi3OK;
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
+{
+    ENTER(instance, 1 << INITIALISING);
+    return begin(it, it->host.handles);
+}
+
+fmi3Status fmi3Terminate(fmi3Instance instance)
+{
+    ENTER(instance, BEGUN);
+    it->state.run.phase = TERMINATED;
+    return fmi3OK;
+}
+
+fmi3Status fmi3Reset(fmi3Instance instance)
+{
+    ENTER(instance, ANY);
+    fresh(it);
+    return fmi3OK;
+}
+
+/* ---- values */
+
+/* Every variable is one number. */
+#define ONE_EACH \
+    if (nValues != nValueReferences) return refuse(it, WRONG_LENGTH, __func__, "the number of values")
+
+fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                          fmi3Float64 values[], size_t nValues)
+{
+    ENTER(instance, READABLE);
+    ONE_EACH;
+    READ(it, &FLOAT64, valueReferences, nValueReferences, values, real_at, NAN);
+}
+
+fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        fmi3Int64 values[], size_t nValues)
+{
+    ENTER(instance, READABLE);
+    ONE_EACH;
+    READ(it, &INT64, valueReferences, nValueReferences, values, integer_at, 0);
+}
+
+fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                          const fmi3Float64 values[], size_t nValues)
+{
+    ENTER(instance, LIVING);
+    ONE_EACH;
+    WRITE(it, &FLOAT64, valueReferences, nValueReferences, values);
+}
+
+fmi3Status fmi3SetInt64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        const fmi3Int64 values[], size_t nValues)
+{
+    ENTER(instance, LIVING);
+    ONE_EACH;
+    WRITE(it, &INT64, valueReferences, nValueReferences, values);
+}
+
+#define NO_VARIABLES_OF(TYPE)                                                                                     \
+    fmi3Status fmi3Get##TYPE(fmi3Instance instance, const fmi3ValueReference valueReferences[],                   \
+                             size_t nValueReferences, fmi3##TYPE values[], size_t nValues)                        \
+    {                                                                                                             \
+        ENTER(instance, READABLE);                                                                                \
+        (void)values, (void)nValues;                                                                              \
+        REFUSE_ALL(it, valueReferences, nValueReferences, #TYPE);                                                 \
+    }                                                                                                             \
+    fmi3Status fmi3Set##TYPE(fmi3Instance instance, const fmi3ValueReference valueReferences[],                   \
+                             size_t nValueReferences, const fmi3##TYPE values[], size_t nValues)                  \
+    {                                                                                                             \
+        ENTER(instance, LIVING);                                                                                  \
+        (void)values, (void)nValues;                                                                              \
+        REFUSE_ALL(it, valueReferences, nValueReferences, #TYPE);                                                 \
+    }
+
+NO_VARIABLES_OF(Float32)
+NO_VARIABLES_OF(Int8)
+NO_VARIABLES_OF(UInt8)
+NO_VARIABLES_OF(Int16)
+NO_VARIABLES_OF(UInt16)
+NO_VARIABLES_OF(Int32)
+NO_VARIABLES_OF(UInt32)
+NO_VARIABLES_OF(UInt64)
+NO_VARIABLES_OF(Boolean)
+NO_VARIABLES_OF(String)
+
+fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                         size_t valueSizes[], fmi3Binary values[], size_t nValues)
+{
+    ENTER(instance, READABLE);
+    (void)valueSizes, (void)values, (void)nValues;
+    REFUSE_ALL(it, valueReferences, nValueReferences, "Binary");
+}
+
+fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                         const size_t valueSizes[], const fmi3Binary values[], size_t nValues)
+{
+    ENTER(instance, LIVING);
+    (void)valueSizes, (void)values, (void)nValues;
+    REFUSE_ALL(it, valueReferences, nValueReferences, "Binary");
+}
+
+fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        fmi3Clock values[])
+{
+    ENTER(instance, READABLE);
+    (void)values;
+    REFUSE_ALL(it, valueReferences, nValueReferences, "Clock");
+}
+
+fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        const fmi3Clock values[])
+{
+    ENTER(instance, LIVING);
+    (void)values;
+    REFUSE_ALL(it, valueReferences, nValueReferences, "Clock");
+}
+
+/* ---- events */
+
+fmi3Status fmi3EnterEventMode(fmi3Instance instance)
+{
+    ENTER(instance, BEGUN);
+    bool fault = false;
+    if (!it->host.handles) return refuse(it, NOT_OFFERED, __func__, "");
+    if (!exchanges(&it->state)) leaps_handle(&it->state.run, &it->state.model, &fault);
+    it->state.run.phase = EVENT;
+    return fmi3OK;
+}
+
+/* They are evaluated when they are updated, and when an output is read. */
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
+{
+    ENTER(instance, 1 << INITIALISING | 1 << EVENT);
+    return fmi3OK;
+}
+
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
+                                    fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
+                                    fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined,
+                                    fmi3Float64 *nextEventTime)
+{
+    ENTER(instance, 1 << EVENT);
+    NEED(discreteStatesNeedUpdate);
+    NEED(terminateSimulation);
+    NEED(nominalsOfContinuousStatesChanged);
+    NEED(valuesOfContinuousStatesChanged);
+    NEED(nextEventTimeDefined);
+    NEED(nextEventTime);
+    fmi3Status status = handle(it);
+    const struct Exchange *exchange = &it->state.model.exchange;
+    *discreteStatesNeedUpdate = false;
+    *terminateSimulation = status != fmi3OK;
+    *nominalsOfContinuousStatesChanged = exchange->rescaled;
+    *valuesOfContinuousStatesChanged = exchange->jumped;
+    *nextEventTimeDefined = exchange->due < INFINITY;
+    *nextEventTime = exchange->due;
+    return status;
+}
+
+/* ---- co-simulation */
+
+fmi3Status fmi3EnterStepMode(fmi3Instance instance)
+{
+    ENTER(instance, 1 << EVENT);
+    if (exchanges(&it->state)) return refuse(it, NOT_OFFERED, __func__, "");
+    it->state.run.phase = RUNNING;
+    return fmi3OK;
+}
+
+/* Let the importer look at the present point, where a leap ends or the first begins, and say where it wants to stop. */
+static void show(Instance *it, bool finished)
+{
+    struct Exchange *exchange = &it->state.model.exchange;
+    double now = it->state.model.solver.t, wanted = now;
+    bool wants = false;
+    if (!it->host.look) return;
+    it->state.run.phase = INTERMEDIATE;
+    it->host.look(it->host.environment, now, false, true, finished, it->host.returns, &wants, &wanted);
+    it->state.run.phase = RUNNING;
+    if (!it->host.returns || !wants || !(wanted < exchange->end)) return;
+    if (wanted > now) exchange->end = wanted;
+    else if (finished) exchange->end = now;
+}
+
+fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
+                      fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded,
+                      fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
+{
+    ENTER(instance, STEPPING);
+    NEED(eventHandlingNeeded);
+    NEED(terminateSimulation);
+    NEED(earlyReturn);
+    NEED(lastSuccessfulTime);
+    State *state = &it->state;
+    const double *now = &state->model.solver.t;
+    double t = currentCommunicationPoint, h = communicationStepSize;
+    bool fault = false;
+    (void)noSetFMUStatePriorToCurrentPoint;
+    *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
+    if (!it->host.handles && !it->host.returns && !it->host.look) {
+        fmi3Status status = step_by(it, t, h);
+        *lastSuccessfulTime = *now;
+        return status;
+    }
+    struct Exchange *exchange = &state->model.exchange;
+    int64_t status = leaps_aim(&state->run, &state->model, t, h, &fault);
+    double end = exchange->end;
+    if (status == OK && !fault) show(it, false);
+    while (status == OK && !fault && *now < exchange->end) {
+        status = leaps_leap(&state->run, &state->model, it->host.handles, &fault);
+        if (status != OK || fault) break;
+        show(it, true);
+        if (exchange->struck && it->host.returns) break;
+    }
+    *lastSuccessfulTime = *now;
+    if (status == OK && !fault) {
+        *eventHandlingNeeded = it->host.handles && exchange->struck;
+        *earlyReturn = *now < end;
+    }
+    return judged_by(it, status, fault, t, h);
+}
+
+/* ---- model exchange */
+
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
+{
+    ENTER(instance, 1 << EVENT);
+    if (!exchanges(&it->state)) return refuse(it, NOT_OFFERED, __func__, "");
+    it->state.run.phase = CONTINUOUS;
+    return fmi3OK;
+}
+
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
+{
+    ENTER(instance, 1 << CONTINUOUS);
+    NEED(enterEventMode);
+    NEED(terminateSimulation);
+    (void)noSetFMUStatePriorToCurrentPoint;
+    *enterEventMode = *terminateSimulation = false;
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
+{
+    ENTER(instance, EXCHANGING);
+    return move_to(it, time);
+}
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
+                                   size_t nContinuousStates)
+{
+    ENTER(instance, 1 << CONTINUOUS);
+    return put(it, continuousStates, nContinuousStates, __func__);
+}
+
+#define TELLING(NAME, FIND, COUNT)                                                                        \
+    fmi3Status fmi3Get##NAME(fmi3Instance instance, fmi3Float64 values[], size_t n)                       \
+    {                                                                                                     \
+        ENTER(instance, ANY);                                                                             \
+        return tell(it, exchange_##FIND, it->state.model.exchange.FIND, COUNT, values, n, __func__);      \
+    }
+
+TELLING(ContinuousStates, states, STATES)
+TELLING(ContinuousStateDerivatives, rates, STATES)
+TELLING(NominalsOfContinuousStates, nominals, STATES)
+TELLING(EventIndicators, indicators, INDICATORS)
+
+#define COUNTING(NAME, COUNT)                                                    \
+    fmi3Status fmi3GetNumberOf##NAME(fmi3Instance instance, size_t *number)      \
+    {                                                                            \
+        ENTER(instance, ANY);                                                    \
+        NEED(number);                                                            \
+        *number = COUNT;                                                         \
+        return fmi3OK;                                                           \
+    }
+
+COUNTING(ContinuousStates, STATES)
+COUNTING(EventIndicators, INDICATORS)
+
+/* ---- derivatives */
+
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+                                        const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+                                        size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+{
+    ENTER(instance, ANY);
+    if (nSeed != nKnowns) return refuse(it, WRONG_LENGTH, __func__, "the length of seed");
+    if (nSensitivity != nUnknowns) return refuse(it, WRONG_LENGTH, __func__, "the length of sensitivity");
+    return directional(it, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__);
+}
+
+/* One direction for each known. */
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+                                    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+                                    size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+{
+    ENTER(instance, ANY);
+    if (nSeed != nUnknowns) return refuse(it, WRONG_LENGTH, __func__, "the length of seed");
+    if (nSensitivity != nKnowns) return refuse(it, WRONG_LENGTH, __func__, "the length of sensitivity");
+    if (check_slopes(it, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__)) return fmi3Error;
+    for (size_t j = 0; j < nKnowns; j++) {
+        struct Tangent to = {0};
+        *slope_of(&to, knowns[j]) = 1.0;
+        fmi3Status status = follow(it, &to);
+        sensitivity[j] = status ? NAN : 0.0;
+        for (size_t i = 0; i < nUnknowns; i++) sensitivity[j] += seed[i] * *slope_of(&to, unknowns[i]);
+        if (status) return status;
+    }
+    return fmi3OK;
+}
+
+/* ---- state */
+
+fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    ENTER(instance, ANY);
+    NEED(FMUState);
+    return save(it, FMUState, __func__);
+}
+
+fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
+{
+    ENTER(instance, ANY);
+    return restore(it, FMUState);
+}
+
+fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    ENTER(instance, ANY);
+    return forget(it, FMUState);
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
+{
+    ENTER(instance, ANY);
+    NEED(size);
+    return measure(it, FMUState, size);
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
+{
+    ENTER(instance, ANY);
+    NEED(serializedState);
+    return serialize(it, FMUState, serializedState, size, __func__);
+}
+
+fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
+                                   fmi3FMUState *FMUState)
+{
+    ENTER(instance, ANY);
+    NEED(serializedState);
+    NEED(FMUState);
+    return deserialize(it, serializedState, size, FMUState, __func__);
+}
+
+/* ---- what this FMU does not offer, as its description says */
+
+#define NOT_OFFERED_HERE(NAME, ...)                              \
+    fmi3Status NAME(fmi3Instance instance, __VA_ARGS__)          \
+    {                                                            \
+        ENTER(instance, ANY);                                    \
+        return refuse(it, NOT_OFFERED, __func__, "");            \
+    }
+
+typedef const fmi3ValueReference References[];
+
+fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
+{
+    ENTER(instance, ANY);
+    return refuse(it, NOT_OFFERED, __func__, "");
+}
+
+fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
+{
+    ENTER(instance, ANY);
+    return refuse(it, NOT_OFFERED, __func__, "");
+}
+
+NOT_OFFERED_HERE(fmi3GetNumberOfVariableDependencies, fmi3ValueReference valueReference, size_t *nDependencies)
+NOT_OFFERED_HERE(fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t elementIndicesOfDependent[],
+                 fmi3ValueReference independents[], size_t elementIndicesOfIndependents[],
+                 fmi3DependencyKind dependencyKinds[], size_t nDependencies)
+NOT_OFFERED_HERE(fmi3GetOutputDerivatives, References valueReferences, size_t nValueReferences,
+                 const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
+NOT_OFFERED_HERE(fmi3GetIntervalDecimal, References valueReferences, size_t nValueReferences, fmi3Float64 intervals[],
+                 fmi3IntervalQualifier qualifiers[])
+NOT_OFFERED_HERE(fmi3GetIntervalFraction, References valueReferences, size_t nValueReferences, fmi3UInt64 counters[],
+                 fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
+NOT_OFFERED_HERE(fmi3GetShiftDecimal, References valueReferences, size_t nValueReferences, fmi3Float64 shifts[])
+NOT_OFFERED_HERE(fmi3GetShiftFraction, References valueReferences, size_t nValueReferences, fmi3UInt64 counters[],
+                 fmi3UInt64 resolutions[])
+NOT_OFFERED_HERE(fmi3SetIntervalDecimal, References valueReferences, size_t nValueReferences,
+                 const fmi3Float64 intervals[])
+NOT_OFFERED_HERE(fmi3SetIntervalFraction, References valueReferences, size_t nValueReferences,
+                 const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+NOT_OFFERED_HERE(fmi3SetShiftDecimal, References valueReferences, size_t nValueReferences, const fmi3Float64 shifts[])
+NOT_OFFERED_HERE(fmi3SetShiftFraction, References valueReferences, size_t nValueReferences, const fmi3UInt64 counters[],
+                 const fmi3UInt64 resolutions[])
+NOT_OFFERED_HERE(fmi3ActivateModelPartition, fmi3ValueReference clockReference, fmi3Float64 activationTime)

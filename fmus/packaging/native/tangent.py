@@ -1,0 +1,173 @@
+"""The derivative of a model along a direction: its `observe`, differentiated statement by statement (forward mode).
+
+Every calculated number z gets a second one, d_z, which is its change if states, driver and inputs change as told.  The
+branches are those that `observe` takes; where friction sticks, its force is the load, and so are their changes.
+
+A. Griewank, A. Walther, Evaluating Derivatives, chapter 3.
+"""
+
+import ast
+import math
+import sys
+from copy import deepcopy
+from math import fabs
+from types import FunctionType
+from typing import Any
+
+from ...runtime.declare import Declaring
+from ..further import Variables
+from ..written import definition
+from ..written.live import TREE
+
+D, TO = "d_", "to"  # what the second number is called; the object that holds the direction and what follows
+SLOPES = {  # function of a -> the factor of d_a
+    "sin": "cos({a})",
+    "cos": "-sin({a})",
+    "tan": "1.0 + tan({a}) * tan({a})",
+    "asin": "1.0 / sqrt(1.0 - ({a}) * ({a}))",
+    "acos": "-1.0 / sqrt(1.0 - ({a}) * ({a}))",
+    "atan": "1.0 / (1.0 + ({a}) * ({a}))",
+    "sinh": "cosh({a})",
+    "cosh": "sinh({a})",
+    "tanh": "1.0 - tanh({a}) * tanh({a})",
+    "exp": "exp({a})",
+    "log": "1.0 / ({a})",
+    "sqrt": "0.5 / sqrt({a})",
+    "fabs": "copysign(1.0, {a})",
+    "copysign": "copysign(1.0, {a}) * copysign(1.0, {b})",
+}
+
+
+class Tangent:
+    """A direction, and what follows along it: one float for each variable that has one."""
+
+
+def slots(declared: Variables) -> dict[str, str]:
+    """Of every variable that can change or follow: the name of its float."""
+    found = {name: name for name, meaning in declared if "." not in name and is_smooth(meaning)}
+    return found | {name: f"rate_{number}" for number, (name, _) in enumerate(declared) if name.startswith("der(")}
+
+
+def is_smooth(meaning: Any) -> bool:
+    return meaning.type == "Real" and meaning.causality in ("input", "output")
+
+
+def tangent(model: type[Declaring], thing: Any, declared: Variables) -> tuple[Tangent, FunctionType]:
+    """An empty direction, and the function that follows it: along(self, to), where self is `thing`, a model that an
+    importer's solver may lead."""
+    to = Tangent()
+    for slot in slots(declared).values():
+        setattr(to, slot, 0.0)
+    observe: Any = model.__dict__["observe"]
+    tree = definition(observe)
+    writer = Writer(thing, declared)
+    begin = [f"{name} = self.solver.{name}" for name in ("t", *thing.states, *thing.contacts)]
+    begin += [f"{D}{name} = {TO}.{name}" for name in thing.states]
+    body = [ast.parse(line).body[0] for line in begin] + writer.block(tree.body)
+    text = ast.unparse(ast.fix_missing_locations(ast.Module([head(body)], [])))
+    module = sys.modules[model.__module__]
+    names = vars(math) | vars(module) | {threshold_slope.__name__: threshold_slope, TREE: ast.parse(text)}
+    exec(compile(text, module.__file__ or "?", "exec"), names)
+    return to, names["along"]
+
+
+def head(body: list[ast.stmt]) -> ast.FunctionDef:
+    """The function around the statements."""
+    found = ast.parse(f'def along(self, {TO}):\n    """What follows, along a direction."""').body[0]
+    assert isinstance(found, ast.FunctionDef)
+    found.body += body
+    return found
+
+
+class Writer:
+    """The statements of `observe`, each after that of its change."""
+
+    def __init__(self, thing: Any, declared: Variables) -> None:
+        inputs = [name for name, meaning in declared if meaning.causality == "input"]
+        drivers = [name for name, meaning in declared if meaning.rate]
+        self.seeds = dict(zip([*inputs, *(["x_base"] * len(drivers))], [*inputs, *drivers], strict=True))
+        self.outputs = {name for name, meaning in declared if is_smooth(meaning)}
+        self.floats = set(thing.states)  # local names that have a change
+        self.counts = set(thing.contacts)  # and those that have none
+
+    def block(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        found: list[ast.stmt] = []
+        for node in statements:
+            match node:
+                case ast.Assign(targets=[ast.Name(id=name)], value=value) if name not in self.counts:
+                    found += [self.let(f"{D}{name}", self.change(value)), node]
+                    self.floats.add(name)
+                case ast.Assign(targets=[ast.Name()]):
+                    found.append(node)
+                case ast.Assign(targets=[ast.Attribute(attr=name)], value=value) if name in self.outputs:
+                    found.append(self.let(f"{TO}.{name}", self.change(value)))
+                case ast.If():
+                    found.append(ast.If(node.test, self.block(node.body), self.block(node.orelse)))
+        return found
+
+    @staticmethod
+    def let(target: str, change: ast.expr | None) -> ast.stmt:
+        return ast.parse(f"{target} = {told(change)}").body[0]
+
+    def change(self, e: ast.expr) -> ast.expr | None:
+        """How an expression changes; None where it does not."""
+        match e:
+            case ast.Name(id=name) if name in self.floats:
+                return ast.Name(D + name)
+            case ast.Attribute(attr=name) if name in self.seeds:
+                return ast.parse(f"{TO}.{self.seeds[name]}", mode="eval").body
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                return negative(self.change(inner))
+            case ast.BinOp(left=a, op=op, right=b):
+                return self.of_two(e, a, op, b)
+            case ast.IfExp(test=test, body=yes, orelse=no):
+                ways = self.change(yes), self.change(no)
+                return None if ways == (None, None) else read(f"{told(ways[0])} if {told(test)} else {told(ways[1])}")
+            case ast.Call(func=ast.Name(id="threshold"), args=[v, eps, load, slide, hold]):
+                changes = [told(self.change(one)) for one in (load, slide, hold)]
+                return read(f"threshold_slope({', '.join(map(told, (v, eps, load, hold)))}, {', '.join(changes)})")
+            case ast.Call(func=ast.Name(id=name), args=[a, *more]) if name in SLOPES:
+                return times(read(SLOPES[name].format(a=told(a), b="".join(map(told, more)))), self.change(a))
+        return None
+
+    def of_two(self, e: ast.expr, a: ast.expr, op: ast.operator, b: ast.expr) -> ast.expr | None:
+        da, db = self.change(a), self.change(b)
+        match op:
+            case ast.Add():
+                return plus(da, db)
+            case ast.Sub():
+                return plus(da, negative(db))
+            case ast.Mult():
+                return plus(times(a, db), times(b, da))
+            case ast.Div():
+                first = None if da is None else read(f"({told(da)}) / ({told(b)})")
+                return plus(first, None if db is None else read(f"-({told(e)}) * ({told(db)}) / ({told(b)})"))
+        assert isinstance(op, ast.Pow), ast.unparse(e)
+        return times(read(f"({told(b)}) * ({told(a)}) ** ({told(b)} - 1.0)"), da)
+
+
+def threshold_slope(v, eps, load, hold, d_load, d_slide, d_hold):  # type: ignore[no-untyped-def] # it is translated
+    """The change of friction by the threshold law."""
+    if fabs(v) >= eps:
+        return d_slide if v > 0.0 else -d_slide
+    return d_hold if load > hold else -d_hold if load < -hold else d_load
+
+
+def read(text: str) -> ast.expr:
+    return ast.parse(text, mode="eval").body
+
+
+def told(e: ast.expr | None) -> str:
+    return "0.0" if e is None else ast.unparse(ast.fix_missing_locations(deepcopy(e)))
+
+
+def plus(a: ast.expr | None, b: ast.expr | None) -> ast.expr | None:
+    return b if a is None else a if b is None else ast.BinOp(a, ast.Add(), b)
+
+
+def times(a: ast.expr, b: ast.expr | None) -> ast.expr | None:
+    return None if b is None else ast.BinOp(a, ast.Mult(), b)
+
+
+def negative(e: ast.expr | None) -> ast.expr | None:
+    return None if e is None else ast.UnaryOp(ast.USub(), e)

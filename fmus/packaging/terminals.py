@@ -1,0 +1,37 @@
+"""Where another body can be joined to that of a model: terminalsAndIcons.xml (FMI 3.0.2, section 2.4.9)."""
+
+from xml.etree.ElementTree import Element, SubElement
+
+from .document import document
+from .further import Variables
+
+PATH = "terminalsAndIcons/terminalsAndIcons.xml"
+CORNERS = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+FLANGES = {  # unit of the input -> units of position and speed, and what each is called
+    "N": (("m", "m/s"), ("position", "speed", "force")),
+    "N.m": (("rad", "rad/s"), ("angle", "angular_speed", "torque")),
+}
+
+
+def terminals(declared: Variables) -> dict[str, bytes]:
+    """The file by its path, for a model of one body and one input that is a force or a torque on it: the flange."""
+    names = {meaning.name: name for name, meaning in declared}
+    inputs = [(name, meaning) for name, meaning in declared if meaning.causality == "input"]
+    moving = [(name, meaning) for name, meaning in declared if meaning.role == "state" and meaning.rate_of]
+    if len(inputs) != 1 or len(moving) != 1 or inputs[0][1].unit not in FLANGES:
+        return {}
+    ((force, load),), ((speed, meaning),) = inputs, moving
+    position = names[meaning.rate_of]
+    units, members = FLANGES[load.unit]
+    if (dict(declared)[position].unit, meaning.unit) != units:
+        return {}
+    root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    drawn = SubElement(root, "GraphicalRepresentation")
+    SubElement(drawn, "CoordinateSystem", CORNERS, suggestedScalingFactorTo_mm="0.1")
+    SubElement(drawn, "Icon", CORNERS)
+    words = {"name": "flange", "matchingRule": "plug", "description": "the body: where it is, and what acts on it"}
+    terminal = SubElement(SubElement(root, "Terminals"), "Terminal", words)
+    for member, variable in zip(members, (position, speed, force), strict=True):
+        kind = "inflow" if variable == force else "signal"
+        SubElement(terminal, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind=kind)
+    return {PATH: document(root)}
