@@ -87,12 +87,12 @@ class Browser:
         return found
 
     def open(self, address):
-        """Load an address, until it has loaded."""
-        self.call("Page.navigate", url="about:blank")
-        self.loaded, self.said, self.asked = False, [], []
-        self.call("Page.navigate", url=address)
-        while not self.loaded:
-            self.receive()
+        """Load an address, until it has loaded; the page before is left first, so that it is loaded whatever it was."""
+        for each in ("about:blank", address):
+            self.loaded, self.said, self.asked = False, [], []
+            self.call("Page.navigate", url=each)
+            while not self.loaded:
+                self.receive()
 
     def run(self, script):
         """The value of an expression in the page; a promise is awaited."""

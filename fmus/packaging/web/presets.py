@@ -15,7 +15,7 @@ def presets(scenes: Iterable[Path], models: Collection[str]) -> list[dict[str, A
     found = []
     for path in sorted(scenes):
         scene = loads(path.read_text(encoding="utf-8"))
-        if "published" in scene and scene["model"] in models:
+        if "published" in scene and scene.get("model") in models:
             labels = {name: scene[key] for key, name in ENUMERATED.items() if key in scene}
             numbers = {name: scene[key] for key, name in NUMBERS.items() if key in scene}
             kept = {key: scene[key] for key in KEPT if key in scene}

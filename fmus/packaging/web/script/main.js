@@ -57,6 +57,15 @@ async function enter(next, lost = []) {
   restart();
 }
 
+// Go where a link leads: to a state, or to a published case by its name alone; the first model without.
+async function follow(hash) {
+  const found = read(hash, desk.portraits);
+  const preset = new URLSearchParams(hash.slice(1)).get(".preset");
+  if (found) await enter(found.state, found.lost);
+  else if (desk.presets.has(preset)) await takePreset(preset);
+  else await enter(fresh(desk.portraits.values().next().value));
+}
+
 // Controls and mechanism of another model.
 async function arrange() {
   document.querySelector(`input[name=model][value="${state.model}"]`).checked = true;
@@ -445,10 +454,7 @@ $$("link").addEventListener("click", async () => {
     $$("status").textContent = "The link is in the address bar: it carries all that is set.";
   }
 });
-addEventListener("hashchange", () => {
-  const found = read(location.hash, desk.portraits);
-  if (found && location.hash !== written(state)) enter(found.state, found.lost);
-});
+addEventListener("hashchange", () => { if (location.hash !== written(state)) follow(location.hash); });
 addEventListener("keydown", (event) => {
   if (event.key !== " " || event.target.closest("button, input, select, summary, a")) return;
   event.preventDefault();
@@ -471,5 +477,4 @@ for (const name of desk.portraits.keys()) {
 }
 $$("choices").append(...Object.values(lists).map(({ element }) => element));
 globalThis.bench = { desk, plots, seek, state: () => state }; // for the console
-const linked = read(location.hash, desk.portraits);
-await enter(linked?.state ?? fresh(desk.portraits.values().next().value), linked?.lost);
+await follow(location.hash);
