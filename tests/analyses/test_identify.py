@@ -375,6 +375,13 @@ def test_noise_that_is_not_independent_is_told_and_widens_the_intervals():
     assert zeta[1].error > zeta[0].error
 
 
+@pytest.mark.parametrize(("r", "alike"), [(2e-3, True), (1.999e-3, True), (2.13e-3, False), (1.8e-3, False)])
+def test_a_loss_that_keeps_time_with_the_steps_of_the_sensor_is_told(r, alike):
+    """Of 1 mm, at which a half swing takes 2 r."""
+    found = identify(swung(r=r, rest=0.0203, turn=0.0, step=1e-3, noise=1e-5), Known())
+    assert ("rounds all turning points alike" in said(found)) == alike
+
+
 def test_a_second_motion_is_told():
     x = swung(0.02).x + 0.004 * np.sin(50 * T)
     assert "something else acts" in said(identify(Record("two", T, x), Known()))

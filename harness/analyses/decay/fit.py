@@ -144,7 +144,7 @@ def identified(record: Record, known: Known, drag: bool, drift: bool, report: Ca
     refuse(record, problem, full, found, known.pendulum)
     values = plausible(laws, full, problem)
     told = estimates(record, problem, values, full, found, known)
-    said = [*record.notes, *window.notes, *remarks(record, problem, laws, full, found)]
+    said = [*record.notes, *window.notes, *remarks(record, problem, laws, full, found, turns.step)]
     if found.alike and found.rms > ROUGH * problem.noise:
         told, more = halves_apart(record, problem, full, told)
         said += more

@@ -8,7 +8,7 @@ from ...records.record import Record
 from .choice import Law
 from .figures import Estimate, sizes
 from .intervals import Spread, spread
-from .law import AMPLITUDE, DRIFT, OMEGA, UNKNOWNS, ZETA
+from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
 from .problem import Problem
 from .squares import Unfit
 
@@ -20,6 +20,8 @@ APART = 3.0  # errors by which the halves of a record disagree
 HINTED = 4.0  # of n ln(squares): what one more term takes away by chance once in twenty times
 DRIFTS = 5.0  # errors of a drift that is told
 GAINS = 5.0  # errors by which the losses are negative
+LEAST_TURNS = 6  # for their places to be more than chance
+KEEPS_TIME = 12.0  # of n R^2, R the mean of n places on a circle: once in a hundred thousand records by chance
 FEWEST = 100  # samples of a half that is fitted apart
 
 
@@ -57,7 +59,9 @@ def gains(problem: Problem, full: Law) -> float:
     return float(found.free[-1] / found.errors[-1]) if found.errors[-1] > 0 else 0.0
 
 
-def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, spread: Spread) -> tuple[str, ...]:
+def remarks(
+    record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, spread: Spread, step: float
+) -> tuple[str, ...]:
     """The sentences."""
     said = []
     noise, rms, unit = problem.noise * problem.unit, spread.rms * problem.unit, record.unit
@@ -89,7 +93,26 @@ def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, 
             "sample to sample; the intervals are widened."
         )
     drift = drifting(record, problem, full) if spread.alike and not problem.drift else ""
-    return (*said, *([drift] if drift else []), *undecided(problem, laws))
+    alike = rounded_alike(problem, full, step, unit)
+    return (*said, *([drift] if drift else []), *alike, *undecided(problem, laws))
+
+
+def rounded_alike(problem: Problem, full: Law, step: float, unit: str) -> tuple[str, ...]:
+    """A sentence where the steps of a sensor and the loss of a half swing keep time, so that its rounding is no noise:
+    Rayleigh's test of where the turning points lie between two steps."""
+    amplitudes, begins = problem.half_swings(full.p)
+    amplitudes = amplitudes[(begins >= 0) & (begins <= problem.t[-1])]
+    if not step or problem.model.order or len(amplitudes) < LEAST_TURNS:
+        return ()
+    places = full.p[REST] + amplitudes * (-1.0) ** np.arange(len(amplitudes))
+    alike = abs(np.mean(np.exp(2j * np.pi * places * problem.unit / step)))
+    if len(amplitudes) * alike**2 < KEEPS_TIME:
+        return ()
+    near = 2 / np.pi * np.arccos(1 - min(step / (problem.unit * amplitudes.mean()), 1.0))  # share of the time there
+    return (
+        f"The sensor rounds all turning points alike, for what a half swing loses keeps time with its steps of "
+        f"{step:.3g} {unit}: the rest position may be off by some {step / 2 * near:.1g} {unit}, amplitudes as much.",
+    )
 
 
 def drifting(record: Record, problem: Problem, full: Law) -> str:
