@@ -121,8 +121,9 @@ def test_a_command_does_what_the_readme_says(here, line):
     for name in shlex.split(line):
         if name in RECORDS:
             RECORDS[name](here / name)
-        elif name.startswith("fmus/fmi3/"):
-            (here / "fmus" / "fmi3").symlink_to(fmi3_hosts.built())
+        elif name.startswith("fmus/native/fmi3/"):
+            (here / "fmus" / "native").mkdir()
+            (here / "fmus" / "native" / "fmi3").symlink_to(fmi3_hosts.built())
     if line.endswith(("report", "results/stickslip")):
         typed("python -m harness run stickslip", here)
     said = typed(line, here)

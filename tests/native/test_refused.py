@@ -404,4 +404,4 @@ def test_an_object_that_is_no_data_is_refused_by_the_name_of_its_attribute(thing
 
 @pytest.mark.parametrize("name", MODELS)
 def test_every_model_is_in_the_subset(name):
-    assert "static" in sources(model_class(name))["model.h"]
+    assert "static" in sources(model_class(name), "2")["model.h"]
