@@ -378,7 +378,8 @@ def test_noise_that_is_not_independent_is_told_and_widens_the_intervals():
 @pytest.mark.parametrize(("r", "alike"), [(2e-3, True), (1.999e-3, True), (2.13e-3, False), (1.8e-3, False)])
 def test_a_loss_that_keeps_time_with_the_steps_of_the_sensor_is_told(r, alike):
     """Of 1 mm, at which a half swing takes 2 r."""
-    found = identify(swung(r=r, rest=0.0203, turn=0.0, step=1e-3, noise=1e-5), Known())
+    side = 1.0 if r > 1.9995e-3 else -1.0
+    found = identify(swung(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), Known())
     assert ("rounds all turning points alike" in said(found)) == alike
 
 

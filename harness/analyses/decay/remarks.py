@@ -101,10 +101,11 @@ def rounded_alike(problem: Problem, full: Law, step: float, unit: str) -> tuple[
     """A sentence where the steps of a sensor and the loss of a half swing keep time, so that its rounding is no noise:
     Rayleigh's test of where the turning points lie between two steps."""
     amplitudes, begins = problem.half_swings(full.p)
-    amplitudes = amplitudes[(begins >= 0) & (begins <= problem.t[-1])]
+    places = full.p[REST] + problem.model.side * amplitudes * (-1.0) ** np.arange(len(amplitudes))
+    seen = (begins >= 0) & (begins <= problem.t[-1])
+    amplitudes, places = amplitudes[seen], places[seen]
     if not step or problem.model.order or len(amplitudes) < LEAST_TURNS:
         return ()
-    places = full.p[REST] + amplitudes * (-1.0) ** np.arange(len(amplitudes))
     alike = abs(np.mean(np.exp(2j * np.pi * places * problem.unit / step)))
     if len(amplitudes) * alike**2 < KEEPS_TIME:
         return ()
