@@ -7,6 +7,7 @@ from by_hand import BY_HAND, followed
 from models import DOP853, LARGER
 from scipy.integrate import solve_ivp
 
+from fmus.packaging.further import exchanged
 from fmus.packaging.written import beside, written
 
 FILES = {path.stem: path for path in LARGER}
@@ -14,35 +15,42 @@ FILES = {path.stem: path for path in LARGER}
 
 def integrated(name, stop):
     """Time and modes of each event, and the last state, by scipy with the indicators for events."""
-    model = written(FILES[name])()
-    exchange = beside(type(model), "runtime.exchange")
+    cls = written(FILES[name])
+    model, exchange, run = exchanged(cls), beside(cls, "runtime.exchange"), beside(cls, "runtime.rules").Run(1e-10)
     begun(model, {"solver.method": DOP853, "solver.rtol": 1e-10}, stop)
     start(model, model.initial(0.0), stop)
     march = model.solver
-    exchange.begin(march)
+    exchange.begin(model)
 
     def at(t, y):
-        exchange.move_to(model, march, t)
-        exchange.put(model, march, list(map(float, y)))
+        exchange.move_to(run, model, t)
+        model.exchange.states[:] = map(float, y)
+        exchange.put(run, model)
 
     def rates(t, y):
         at(t, y)
-        return exchange.rates(model, march)
+        exchange.rates(model)
+        return list(model.exchange.rates)
+
+    def states():
+        exchange.states(model)
+        return list(model.exchange.states)
 
     def indicator(i):
         def left(t, y):
             at(t, y)
-            return exchange.indicators(model, march)[i]
+            exchange.indicators(model)
+            return model.exchange.indicators[i]
 
         left.terminal, left.direction = True, -1
         return left
 
-    t, y, events = 0.0, exchange.states(model, march), []
+    t, y, events = 0.0, states(), []
     indicators = [indicator(i) for i in range(2 * len(model.contacts))]
     while True:
-        run = solve_ivp(rates, (t, stop), y, "DOP853", events=indicators, rtol=1e-11, atol=1e-14, max_step=0.05)
-        t, y = run.t[-1], run.y[:, -1]
-        if run.status != 1:
+        found = solve_ivp(rates, (t, stop), y, "DOP853", events=indicators, rtol=1e-11, atol=1e-14, max_step=0.05)
+        t, y = found.t[-1], found.y[:, -1]
+        if found.status != 1:
             return events, y
         assert len(events) < 99
         beyond = 1e-12 * (1.0 + t)  # where an importer's solver ends a step: the root lies behind it
@@ -51,7 +59,7 @@ def integrated(name, stop):
         before = [getattr(march, mode) for mode in model.contacts]
         exchange.update(model, march)
         assert not exchange.update(model, march)
-        y = exchange.states(model, march)
+        y = states()
         modes = [getattr(march, mode) for mode in model.contacts]
         if modes != before:
             events.append((t, *modes))
@@ -69,15 +77,16 @@ def test_modes_follow_at_the_events_that_an_importer_finds(name):
 
 def test_where_no_modes_fit_no_state_is_a_number():
     """A sled whose sliding friction is above the static one, when the driver has pulled far enough."""
-    model = written(FILES["sleds"])()
-    exchange = beside(type(model), "runtime.exchange")
+    cls = written(FILES["sleds"])
+    model, exchange, run = exchanged(cls), beside(cls, "runtime.exchange"), beside(cls, "runtime.rules").Run(1e-10)
     begun(model, {"slide1": 200.0}, 8.0)
     start(model, model.initial(0.0), 8.0)
-    exchange.begin(model.solver)
-    exchange.move_to(model, model.solver, 4.0)
+    exchange.begin(model)
+    exchange.move_to(run, model, 4.0)
     model.x_base = 0.034 * 4.0
     assert not exchange.update(model, model.solver)
-    exchange.move_to(model, model.solver, 5.0)
+    exchange.move_to(run, model, 5.0)
     model.x_base = 0.034 * 5.0
     exchange.update(model, model.solver)
-    assert np.isnan(exchange.states(model, model.solver)[:4]).all()
+    exchange.states(model)
+    assert np.isnan(model.exchange.states[:4]).all()
