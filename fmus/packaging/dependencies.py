@@ -54,11 +54,17 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
 def at_rest(thing: Any, chance: Random) -> tuple[float, float]:
     """The load on a contact at the start, if all are stuck, and its limit."""
     if not thing.coupled:
-        load, _, limit = thing.hold(0.0, *thing.initial(0.0))
+        load, _, limit = thing.hold(0.0, *first_states(thing))
         return load, limit
     many = len(thing.contacts)
-    found = thing.forces(0.0, *thing.initial(0.0), *(0 for _ in range(many)))
+    found = thing.forces(0.0, *first_states(thing), *(0 for _ in range(many)))
     return one(list(zip(found[:many], found[many : 2 * many], strict=True)), chance)
+
+
+def first_states(thing: Any) -> tuple[float, ...]:
+    """The states at time zero; a model of one state says it as a number."""
+    found = thing.initial(0.0)
+    return found if isinstance(found, tuple) else (found,)
 
 
 def another(meaning: Declared, sizes: dict[str, list[float]], chance: Random) -> float:
@@ -93,7 +99,7 @@ def begun(thing: Any, outputs: list[str]) -> list[float]:
         if thing.prepare():
             return []
         march = thing.solver
-        march.start(thing, 0.0, *thing.initial(0.0), thing.stop_time, thing.tolerance)
+        march.start(thing, 0.0, *first_states(thing), thing.stop_time, thing.tolerance)
         thing.observe(march.t, *(getattr(march, name) for name in (*thing.states, *thing.contacts)))
     except (ArithmeticError, ValueError):
         return []

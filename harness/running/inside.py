@@ -58,7 +58,9 @@ class Inside:
         return cls(new)
 
     def begin(self, stop: float) -> None:
-        self.model.solver.start(self.model, 0.0, *self.model.initial(0.0), stop, self.model.tolerance)
+        first = self.model.initial(0.0)  # a number, of a model of one state
+        first = first if isinstance(first, tuple) else (first,)
+        self.model.solver.start(self.model, 0.0, *first, stop, self.model.tolerance)
 
     @property
     def read(self) -> Callable[[Any], tuple[float, ...]]:

@@ -246,3 +246,31 @@ def test_a_run_of_it_by_the_harness_shows_its_events_by_whatever_name_its_mode_h
     header, *rows = (tmp_path / "results" / "brake" / "events.csv").read_text().splitlines()
     assert header == "t [s],mode"
     assert [int(row.split(",")[1]) for row in rows[:4]] == [0, 1, 0, 1]
+
+
+PUCK = '''
+from fmus import Contact, Mode, Model, Output, Parameter, State
+
+
+class Puck(Model):
+    """Puck on ice, of which nobody asks where it is: m a = -F."""
+
+    m = Parameter(2.0, "kg", "mass", above=0.0)
+    f = Parameter(3.0, "N", "force of dry friction", low=0.0)
+    v = State("m/s", "speed", start=1.0)
+    mode = Mode()
+    F = Contact("N", "friction, against the motion", mode=mode, slip=v, slide=f)
+    a = Output("m/s2", "acceleration", -F / m, rate_of=v)
+'''
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_model_may_have_one_state(tmp_path, kind):
+    """It slows by f / m, and comes to rest after m / f."""
+    file = tmp_path / "puck.py"
+    file.write_text(PUCK)
+    run = simulate_fmu(
+        str(built(file, kind)), stop_time=1.0, output_interval=0.25, output=["v", "mode", "events.t_last"]
+    )
+    assert np.abs(run["v"] - np.maximum(0.0, 1.0 - 1.5 * run["time"])).max() < 1e-12
+    assert (run["mode"][-1], run["events.t_last"][-1]) == (0, pytest.approx(2.0 / 3.0, abs=1e-12))

@@ -17,6 +17,7 @@ from typing import Any
 
 from ...runtime.declare import Declaring
 from .. import BuildError
+from ..dependencies import first_states
 from .anatomy import Anatomy
 from .declared import Model
 from .dimensions import judge_units
@@ -80,7 +81,7 @@ class Authored:
         """Refuse start values that go nowhere: nobody could run the model as it is."""
         try:
             rule = thing.prepare()
-            thing.observe(0.0, *thing.initial(0.0), *(0 for _ in self.anatomy.contacts))
+            thing.observe(0.0, *first_states(thing), *(0 for _ in self.anatomy.contacts))
         except (ArithmeticError, ValueError) as error:
             mistake = Mistake(f"the start values lead out of the range of numbers: {error}", self.anatomy.model.place)
             raise self._told(mistake) from error
