@@ -216,7 +216,7 @@ def handle(run, model):
     if model.dry and march.step.sticks:
         exchange.jumped = update(model, march)
         exchange.due = release(model, march)
-    return OK
+    return OK if total(magnitude(march.y)) < HUGE else DIVERGED
 
 
 def update(model, march):
