@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from builds import ROOT, of_file
 from compare import identical
+from driver import Refused
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from models import AUTHORED, model_class
@@ -274,3 +275,22 @@ def test_a_model_may_have_one_state(tmp_path, kind):
     )
     assert np.abs(run["v"] - np.maximum(0.0, 1.0 - 1.5 * run["time"])).max() < 1e-12
     assert (run["mode"][-1], run["events.t_last"][-1]) == (0, pytest.approx(2.0 / 3.0, abs=1e-12))
+
+
+@pytest.mark.parametrize("kind", ["", "native"])
+def test_what_slides_with_more_than_it_holds_is_refused_before_it_runs(tmp_path, worker, kind):
+    """It could neither stay nor go: as built, and when a value is set."""
+    grip = '    grip = Parameter(4.0, "N", "what holds")'
+    held = PUCK.replace("slide=f", "slide=f, hold=grip").replace("    v =", f"{grip}\n    v =")
+    sentence = "F slides with more than it holds (f = {}, grip = {}): lower what slides, or raise what holds"
+    (tmp_path / "puck.py").write_text(held.replace("(4.0", "(2.0"))
+    done = command("puck.py", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert sentence.format(3.0, 2.0) in done.stderr
+    file = tmp_path / "gripped.py"
+    file.write_text(held.replace("Puck", "Gripped"))
+    fmu = worker.instantiate(built(file, kind))
+    with pytest.raises(Refused):
+        fmu.begin({"f": 5.0}, stop=1.0).step(0.0, 1.0)
+    assert sentence.format(5.0, 4.0) in str(fmu.messages())
+    fmu.free()

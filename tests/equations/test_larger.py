@@ -8,7 +8,7 @@ from by_hand import BY_HAND, followed
 from compare import identical
 from driver import Refused
 from fmpy import read_model_description
-from models import LARGER
+from models import LARGER, growing
 from scipy.integrate import solve_ivp
 
 STOP, DOP853 = 8.0, 4
@@ -111,8 +111,11 @@ def test_python_and_native_have_the_same_bits(worker, name):
 
 
 @pytest.mark.parametrize("kind", ["", "native"])
-def test_a_sled_that_slides_with_more_than_it_holds_is_told_in_one_sentence(worker, kind):
-    fmu = worker.instantiate(built("sleds", kind)).begin({"slide1": 200.0}, stop=STOP)
+def test_a_sled_that_slides_with_more_than_it_holds_is_told_in_one_sentence(tmp_path, worker, kind):
+    words = ["--native", "--platform", "linux64"] if kind else []
+    fmu = worker.instantiate(of_file(growing(tmp_path), *words) / kind / "growing.fmu").begin(
+        {"slide1": 200.0}, stop=STOP
+    )
     with pytest.raises(Refused):
         fmu.step(0.0, STOP)
     ((_, _, sentence),) = [message for message in fmu.messages() if message[0] != 0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from arrays import begun, start
 from by_hand import BY_HAND, followed
-from models import DOP853, LARGER
+from models import DOP853, LARGER, growing
 from scipy.integrate import solve_ivp
 
 from fmus.packaging.further import exchanged
@@ -75,9 +75,9 @@ def test_modes_follow_at_the_events_that_an_importer_finds(name):
     assert np.abs(np.array(found)[: len(end)] - end).max() < 1e-6
 
 
-def test_where_no_modes_fit_no_state_is_a_number():
+def test_where_no_modes_fit_no_state_is_a_number(tmp_path):
     """A sled whose sliding friction is above the static one, when the driver has pulled far enough."""
-    cls = written(FILES["sleds"])
+    cls = written(growing(tmp_path))
     model, exchange, run = exchanged(cls), beside(cls, "runtime.exchange"), beside(cls, "runtime.rules").Run(1e-10)
     begun(model, {"slide1": 200.0}, 8.0)
     start(model, model.initial(0.0), 8.0)

@@ -91,3 +91,15 @@ def counts(name):
 def push(name):
     """The input of a model, and a size that overcomes its friction."""
     return ("T_ext", 0.02) if name == "pendulum" else ("F_ext", 200.0)
+
+
+def growing(folder):
+    """A file of the two sleds, in which the first one's sliding friction is not known beforehand: it grows with its
+    way."""
+    (sleds,) = (path for path in LARGER if path.stem == "sleds")
+    text = sleds.read_text().replace("import Contact", "import fabs, Contact")
+    text = text.replace("    x1 =", '    wear = Parameter(1.0, "N/m", "how friction grows")\n    x1 =')
+    (folder / "growing.py").write_text(
+        text.replace("slide=slide1", "slide=slide1 + wear * fabs(x1)").replace("class Sleds", "class Growing")
+    )
+    return folder / "growing.py"

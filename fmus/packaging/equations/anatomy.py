@@ -47,8 +47,22 @@ class Anatomy:
         self.flow = {s: self.rate[s] for s in self.states} | {d: d.steady for d in self.drives} | {TIME: 1.0}
         self._judge_parts()
         self._find_forces()
+        self.rules += self._holding()
         for name, e in own if self.contacts and not self.waits else ():
             self._judge_name(name, e, RESERVED_WHERE_COUPLED)
+
+    def _holding(self) -> tuple[Rule, ...]:
+        """What slides with more than it holds could neither stay nor go: the rule that refuses it, where both follow
+        from parameters and no rule of the author binds these."""
+        found = []
+        for c in (c for c in self.contacts if c.hold is not None):
+            sliding, holding = (set(leaves(e)) & {*self.parameters} for e in (c.slide, c.hold))
+            told = any(sliding & set(leaves(rule.broken)) and holding & set(leaves(rule.broken)) for rule in self.rules)
+            if not told and not depends(c.slide - c.hold, (*self.moving, *self.inputs)):
+                values = ", ".join(f"{e.name} = {{{e.name}!r}}" for e in self.parameters if e in sliding | holding)
+                sentence = f"{c.name} slides with more than it holds ({values}): lower what slides, or raise what holds"
+                found.append(Rule(c.slide > (1.0 + 1e-9) * c.hold, sentence))
+        return tuple(found)
 
     def _all(self, *kinds: type) -> list[Any]:
         return [e for e in self.declared if isinstance(e, kinds)]
