@@ -16,7 +16,7 @@ from ..runtime.values import SETTABLE
 from . import BuildError, __version__
 from .dependencies import at_start
 from .document import document
-from .further import DERIVATIVE, Variables, all_variables, exchanged, indicators_of, rates_of
+from .further import DERIVATIVE, TIME, Variables, all_variables, exchanged, indicators_of, rates_of
 from .units import in_order, unit_of
 
 CAPABILITIES = {
@@ -51,7 +51,9 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime, excha
     """
     root = opened(model, name, "2.0", "guid")
     thing: Any = exchanged(model) if exchanging else model()
-    declared = all_variables(thing) if exchanging else variables(thing)
+    declared = variables(thing)
+    if exchanging:  # FMI 2.0 needs no variable for the time, and FMILibrary takes one for a mistake
+        declared = [one for one in all_variables(thing) if one[0] != TIME]
     if exchanging:
         root.set("numberOfEventIndicators", str(len(indicators_of(declared))))
         SubElement(root, "ModelExchange", EXCHANGE, modelIdentifier=name)

@@ -43,10 +43,10 @@ def place(name: str) -> str:
 
 
 def all_variables(thing: Any) -> Variables:
-    """Name and declaration of every variable of such an object: those declared, then the others."""
+    """Name and declaration of every variable of such an object: those declared, then the others, the time last."""
     declared = variables(thing)
     meanings = dict(declared)
-    found: Variables = [(TIME, Time("s", "the independent variable"))]
+    found: Variables = []
     forces = [meaning.unit for _, meaning in declared if meaning.role == "contact"]
     states = [meaning for _, meaning in declared if meaning.role == "state" and not meaning.rate]
     speed = next((meaning.unit for meaning in states if meaning.rate_of), states[0].unit)
@@ -62,7 +62,7 @@ def all_variables(thing: Any) -> Variables:
         if meaning.rate:
             words = "rate of the " + meaning.text.split(",")[0]
             found.append((DERIVATIVE.format(name), Smooth(meanings[meaning.rate].unit, words)))
-    return declared + found
+    return [*declared, *found, (TIME, Time("s", "the independent variable"))]
 
 
 def rates_of(declared: Variables) -> dict[int, int]:

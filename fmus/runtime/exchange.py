@@ -244,7 +244,7 @@ def update(model, march):
                 if not model.touches(march.t, march.y, march.modes, 0.0, i):
                     march.modes[i] = model.settle(march.t, march.y, near, i)
                 if march.modes[i] == STUCK and march.t >= model.exchange.due:
-                    load, rate, limit = model.hold(march.t, march.y, i)  # the time is right, the load but for rounding
+                    load, rate, limit = model.hold(march.t, march.y, i)  # due, but for rounding
                     if load * rate > 0.0 and limit - fabs(load) <= near * limit:
                         march.modes[i] = 1 if rate > 0.0 else -1
                 if march.modes[i] != mode:

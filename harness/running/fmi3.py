@@ -5,10 +5,9 @@ tolerance being the relative one times the FMU's nominals).  fmpy lets it take 5
 and where friction at rest is no more than sliding friction it does not see a turn that only touches v = 0.
 """
 
-import io
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -124,20 +123,23 @@ def instance(file: Path, way: str) -> Iterator[Instance]:
     if not file.is_file():
         raise HarnessError(f"not built: {file} (python build_fmus.py --fmi 3)")
     os.environ |= dict.fromkeys(QUIET, os.devnull)
-    spoken = io.StringIO()
+    said: list[str] = []
+
+    def hear(environment: Any, status: int, category: bytes, message: bytes) -> None:
+        said.append(message.decode(errors="replace"))
+
     try:
-        with redirect_stderr(spoken), unpacked(file) as folder:
+        with unpacked(file) as folder:
             found = description(file)
             fmu = (Counted if way == EXCHANGE else FMU3Slave)(
                 guid=found.guid, unzipDirectory=str(folder), modelIdentifier=file.stem, instanceName=file.stem
             )
-            fmu.instantiate(logMessage=lambda *message: None)  # the FMU says it on standard error as well
+            fmu.instantiate(loggingOn=True, logMessage=hear)
             try:
                 yield Instance(way, fmu, found, str(folder))
             finally:
                 fmu.freeInstance()
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
-        said = spoken.getvalue().strip().splitlines()
         if isinstance(error, HarnessError) and not said:
             raise
         raise HarnessError(said[-1] if said else f"{file.name}: {reason(error)}") from None

@@ -85,7 +85,11 @@ TABLES = {  # whose commands take long, filled with long words
         "to reach",
     ),
     "importers": (
-        [importers.table([importers.Checked("libcosim 0.0.6", check, ("1.23e-16",) * 5) for check in CHECKS])],
+        [
+            importers.table(
+                [importers.Checked("libcosim 0.0.6", check, ("1.23e-16",) * 5, fmus=tuple(MODELS)) for check in CHECKS]
+            )
+        ],
         "pendulum",
     ),
 }
@@ -132,7 +136,7 @@ def test_a_command_without_its_fmus_says_how_to_build_them(tmp_path, monkeypatch
         (tmp_path / f"fmus/{name}.py").write_text("")
     monkeypatch.setattr("harness.scenes.fmus.__file__", str(tmp_path / "elsewhere/harness/scenes/fmus.py"))
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(HarnessError, match=r"there is no fmus/.*: build the FMUs with `python build_fmus\.py`"):
+    with pytest.raises(HarnessError, match=r"there is no .*fmus.*: build .* with `python build_fmus\.py`"):
         commands.main(arguments.split(), standalone_mode=False)
 
 

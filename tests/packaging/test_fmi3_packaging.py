@@ -46,7 +46,7 @@ look = partial(driver.host, "fmi3_look.py", timeout=120)  # where the FMU is all
 def beside(name):
     """The names of what follows the declared variables."""
     indicators = ["events.to_rest", "events.to_break_away"] if name in DRY else []
-    return ["time", *indicators, *(["der(x_driver)"] if name in DRIVEN else [])]
+    return [*indicators, *(["der(x_driver)"] if name in DRIVEN else []), "time"]
 
 
 def structure(root, kind):

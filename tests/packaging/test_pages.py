@@ -13,6 +13,7 @@ from models import MODELS, declared, model_class, outputs
 
 from fmus.packaging.chart import ticks
 from fmus.packaging.description import declared_by
+from fmus.packaging.native.fmu import USE
 from fmus.packaging.page import page, typeset
 from tests.packaging.test_packaging import entries
 
@@ -29,10 +30,11 @@ def content(fmus):
 
 
 @EVERY_MODEL
-def test_a_native_fmu_tells_the_same(content, name):
+def test_a_native_fmu_tells_the_same_and_the_ways_to_run_it(content, name):
     told = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
     native = entries(native_fmus.built() / f"{name}.fmu")
     assert len(told) == 4
+    native[PAGE] = native[PAGE].replace(USE.encode(), b"", 1)
     assert told == {path: native.get(path) for path in told}
 
 
@@ -131,7 +133,7 @@ def test_the_fmu_reproduces_the_result_that_it_carries(content, launch, name):
 
 def test_a_model_without_a_certified_result_has_a_page_all_the_same():
     model = model_class("smd")
-    reader = Reader(page(model, "sixth", declared_by(model), None).decode())
+    reader = Reader(page(model, "sixth", declared_by(model), None, "model.png", "").decode())
     assert "Default run" not in reader.headings
     assert "sixth" in reader.text
 

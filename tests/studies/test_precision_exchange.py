@@ -106,7 +106,9 @@ def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
     assert refused(sled, patience=1e-3).endswith(" s after 0.001 s of run time")
     assert refused(missing) == f"not built: {missing} (python build_fmus.py --fmi 3)"
     assert refused(broken) == "broken.fmu cannot be unpacked: File is not a zip file"
-    assert capfd.readouterr() == ("", "")
+    out, err = capfd.readouterr()  # where the FMU itself says its sentence
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("Stickslip (stickslip): m = -1.0 kg is refused")
 
 
 def harness(folder, *arguments):

@@ -6,11 +6,11 @@ from string import Formatter
 
 from ...runtime import codes
 from ...runtime.codes import INTERRUPTED, RULES
-from ...runtime.declare import Declared, Declaring
+from ...runtime.declare import Declared, Declaring, variables
 from ...runtime.failure import ANSWERS
 from ...runtime.sentences import CALLS, PHASES, RUN, VALUES
 from ...runtime.values import SETTABLE
-from ..further import TIME, all_variables, exchanged, indicators_of, place, rates_of
+from ..further import all_variables, exchanged, indicators_of, place, rates_of
 from ..written import beside
 from .entries import entries
 from .kinds import BOOL, FLOAT, INT, Object, literal
@@ -134,7 +134,7 @@ def header(model: type[Declaring], fmi: str) -> str:
         image=layout.image(thing, "        "),
         items="".join(_items(name, meaning) for name, meaning in declared if meaning.items),
         count=len(names),
-        declared=names.index(TIME),
+        declared=len(variables(thing)),
         ahead=names.index("solver.t_next"),
         states=len(rates_of(declared)),
         indicators=len(indicators_of(declared)),
