@@ -6,11 +6,15 @@ before they travel (packaging/written), so this file stays at home.  One model a
 
 import re
 from functools import wraps
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-States = Rates = Contacts = Contact = Any  # what an annotation says that a name runs over, or counts
+# What an annotation says that a name runs over, or counts.
+States = npt.NDArray[np.float64]
+Rates = npt.NDArray[np.float64]
+Contacts = npt.NDArray[np.int64]
+Contact = int
 
 # Of the model at hand: every state, every state that is the rate of another, every contact; for each contact the place
 # of its slip among the states, and that of the state whose rate the slip is.
