@@ -1,10 +1,11 @@
 """The sources of the native FMUs under the address and undefined-behaviour sanitizers, in the hands of an importer that
-does whatever it must not; tests/support/abuse.c says what it does."""
+does whatever it must not; tests/support/abuse.c and, for FMI 3.0, walk.c say what it does."""
 
 import os
 import subprocess
 import sys
 
+import fmi3_hosts
 import pytest
 from models import MODELS, declared
 from native_fmus import built
@@ -20,14 +21,11 @@ SENTENCE = (
 )
 
 
-@pytest.fixture(scope="module", params=MODELS)
-def abuse(request):
-    """The program for a model: it must end well, and tells what went to its outputs."""
-    out = folder("abuse") / request.param
-    sources = unpacked(built() / f"{request.param}.fmu") / "sources"
-    dry = ["-DDRY"] if "mode" in declared(request.param) else []
-    command = [compiler(), *STRICT, "-O1", "-g", *sanitized(SANITIZERS), f"-I{sources}", *dry]
-    subprocess.run([*command, str(SOURCE.with_name("abuse.c")), "-o", str(out), "-lm"], check=True)
+def program(source, fmu, sanitizers, *options):
+    """What runs a program over the sources in an FMU: it must end well, and tells what went to its outputs."""
+    sources, out = unpacked(fmu) / "sources", folder(f"{source} {sanitizers} {fmu.stem}") / "program"
+    command = [compiler(), *STRICT, "-g", *sanitized(sanitizers), f"-I{sources}", *options]
+    subprocess.run([*command, str(SOURCE.with_name(source)), "-o", str(out), "-lm", "-lpthread"], check=True)
 
     def run(*words, **options):
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
@@ -36,6 +34,17 @@ def abuse(request):
         return done.stdout, done.stderr
 
     return run
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def abuse(request):
+    dry = ["-DDRY"] if "mode" in declared(request.param) else []
+    return program("abuse.c", built() / f"{request.param}.fmu", SANITIZERS, *dry)
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def walk(request):
+    return program("walk.c", fmi3_hosts.built() / f"{request.param}.fmu", SANITIZERS, "-O0")
 
 
 def test_a_state_with_any_bit_flipped_cut_extended_or_exchanged_is_refused_and_nobody_changes(abuse):
@@ -50,6 +59,20 @@ def test_a_state_that_cannot_be_is_refused_though_its_checksum_is_right(abuse):
 
 def test_calls_in_any_order_with_anything_in_them_end_in_a_status_and_leave_other_instances_alone(abuse):
     abuse("calls", 1, 50_000)
+
+
+def test_every_function_of_fmi_3_is_answered_in_every_state_as_the_standard_has_it_and_no_life_leaves_memory(walk):
+    """With null pointers and wrong lengths, in every kind of instance; the address sanitizer looks for what is left."""
+    told, _ = walk("states", 4)
+    assert int(told) > 10_000
+
+
+def test_calls_of_fmi_3_in_any_order_end_in_a_status_and_leave_other_instances_alone(walk):
+    walk("calls", 1, 50_000)
+
+
+def test_instances_of_fmi_3_share_nothing_between_threads():
+    program("walk.c", fmi3_hosts.built() / "stickslip.fmu", "thread", "-O0")("states", 4)
 
 
 NAMES = [

@@ -6,6 +6,8 @@
  */
 #include "fmi2.c"
 
+#include "abuse.h"
+
 enum { FEW = 12, BYTES = sizeof(Sealed) };
 
 static int heard;
@@ -19,34 +21,6 @@ static void hear(fmi2ComponentEnvironment environment, fmi2String instance, fmi2
 }
 
 static const fmi2CallbackFunctions callbacks = {hear, calloc, free, NULL, NULL};
-
-#define HOLDS(condition) \
-    if (!(condition)) die(#condition, __LINE__)
-
-static void die(const char *what, int line)
-{
-    printf("line %d: not so: %s\n", line, what);
-    fflush(stdout);
-    abort();
-}
-
-/* ---- chance (S. Vigna, xorshift64*) */
-
-static uint64_t chance = 1;
-
-static uint64_t draw(uint64_t below)
-{
-    chance ^= chance >> 12, chance ^= chance << 25, chance ^= chance >> 27;
-    return (chance * UINT64_C(2685821657736338717) >> 20) % below;
-}
-
-/* A number of the kind that goes wrong. */
-static double number(void)
-{
-    static const double numbers[] = {0.0, -0.0, 1.0, -1.0, 0.5, 0.01, 2.0, -5.0, 1e-3, 1e9, 1e300, -1e300, -5e-324,
-                                     NAN, INFINITY, -INFINITY, 9.81, 100.0};
-    return numbers[draw(sizeof numbers / sizeof *numbers)];
-}
 
 /* ---- lives */
 
@@ -62,15 +36,6 @@ static void initialise(Instance *it, fmi2Status expected)
     HOLDS(fmi2SetupExperiment(it, fmi2False, 0.0, 0.0, fmi2True, 4.0) == fmi2OK);
     HOLDS(fmi2EnterInitializationMode(it) == fmi2OK);
     HOLDS(fmi2ExitInitializationMode(it) == expected);
-}
-
-static fmi2ValueReference reference_of(const char *name)
-{
-    for (fmi2ValueReference i = 0; i < VARIABLES; i++) {
-        if (!strcmp(variables[i].name, name)) return i;
-    }
-    die(name, __LINE__);
-    return 0;
 }
 
 static void set(Instance *it, const char *name, double value)

@@ -48,7 +48,7 @@ def sanitized(kind):
 @cache
 def unpacked(fmu):
     """The folder of an extracted FMU."""
-    out = folder("unpacked") / fmu.stem
+    out = folder("unpacked") / fmu.parent.name / fmu.stem
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(out)
     return out
