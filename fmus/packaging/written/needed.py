@@ -8,6 +8,7 @@ import ast
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 from .text import Line
 
@@ -41,6 +42,19 @@ def pruned(files: Files, model: str, names: Iterable[str]) -> Files:
         files, found = left, found | {path: readers(path, left[path]) for path in changed}
 
 
+@lru_cache(200)
+def nodes(text: str) -> list[ast.AST]:
+    """Every node of a text, its tree first; nobody changes them, for most files are looked at again and again."""
+    return [*ast.walk(ast.parse(text))]
+
+
+def parsed(lines: list[Line]) -> tuple[ast.Module, list[ast.AST]]:
+    """The tree of a file, and every node of it."""
+    found = nodes("\n".join(lines))
+    assert isinstance(found[0], ast.Module)
+    return found[0], found
+
+
 @dataclass
 class Reader:
     """What a function reads: .attribute, name; and by which names it is called, or none if it always may be."""
@@ -51,7 +65,7 @@ class Reader:
 
 def readers(path: str, lines: list[Line]) -> list[Reader]:
     """The functions of a file, each with what it reads; what stands outside of them is always read."""
-    tree = ast.parse("\n".join(lines))
+    tree, _ = parsed(lines)
     outside = Reader(set(), set())
     found = [outside]
     for part in tree.body:
@@ -99,18 +113,18 @@ def without(path: str, lines: list[Line], wanted: set[str], is_model: bool) -> l
     """One file without what is not wanted."""
     if path in CALLED_BY_NAME:
         return lines
-    lines_before, lines, tree = lines, list(lines), ast.parse("\n".join(lines))
-    methods = {part for one in ast.walk(tree) if isinstance(one, ast.ClassDef) for part in one.body}
+    lines_before, lines, (tree, every) = lines, list(lines), parsed(lines)
+    methods = {part for one in every if isinstance(one, ast.ClassDef) for part in one.body}
     classes = [one for one in tree.body if isinstance(one, ast.ClassDef) and not is_model]
     classes = [one for one in classes if one.name not in wanted and "." + one.name not in wanted]
     gone = {part for one in classes for part in ast.walk(one)}
-    functions = [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef) and one not in gone]
+    functions = [one for one in every if isinstance(one, ast.FunctionDef) and one not in gone]
     spare: list[ast.ClassDef | ast.FunctionDef] = [
         *classes,
         *(one for one in functions if is_spare(one, wanted, one in methods)),
     ]
     inside = {part for one in spare for part in ast.walk(one)} - {*spare}
-    assigned = [] if is_model else [one for one in ast.walk(tree) if isinstance(one, ast.Assign) and one not in inside]
+    assigned = [] if is_model else [one for one in every if isinstance(one, ast.Assign) and one not in inside]
     parts: list[ast.ClassDef | ast.FunctionDef | ast.Assign] = [*spare, *assigned]
     for node in sorted(parts, key=lambda one: one.lineno, reverse=True):
         if isinstance(node, ast.Assign):
@@ -186,8 +200,8 @@ def idle(target: ast.expr, value: ast.expr, wanted: set[str]) -> bool:
 
 
 def without_dead_imports(lines: list[Line]) -> list[Line]:
-    tree = ast.parse("\n".join(lines))
-    used = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    tree, every = parsed(lines)
+    used = {node.id for node in every if isinstance(node, ast.Name)}
     for node in reversed([node for node in tree.body if isinstance(node, ast.ImportFrom)]):
         kept = [alias.name for alias in node.names if alias.name in used]
         if len(kept) < len(node.names) and not any(alias.asname for alias in node.names):
