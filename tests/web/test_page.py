@@ -143,6 +143,33 @@ def test_the_very_next_frame_shows_a_changed_parameter(page):
     assert shown[1] == shown[2] > 0.1
 
 
+def test_of_a_slow_method_the_next_frame_shows_the_motion_by_the_quick_one_and_then_its_own(page):
+    """However long a run takes: a slider that is pulled is answered by the last value, to the end of the run."""
+    page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001")
+    seen = page.run(
+        "new Promise(done => { const e = document.querySelector('.field:has(#field-k) [type=range]');"
+        "for (const at of [100, 200, 300]) { e.value = at; e.dispatchEvent(new Event('input')) }"
+        "requestAnimationFrame(() => { const { one, quick } = bench.desk.runs;"
+        "const [ghost, own] = bench.plots.get('x').panel.content.curves.slice(-2);"
+        "done([one.done, one.setting.values.k, quick.setting.values, ghost.x.at(-1), own.x.at(-1)]) }) })"
+    )
+    done, k, quick, reached, own = seen
+    assert (done, quick) == (False, {"x_m": 0.001, "k": k})
+    assert own < reached <= 16
+    assert page.settled("bench.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [16, 16]
+    assert page.run("bench.desk.runs.one.setting.values.k") == k
+
+
+def test_until_the_first_picture_one_model_is_compiled(page):
+    count = "const { instantiate } = WebAssembly; globalThis.compiled = 0;"
+    count += "WebAssembly.instantiate = (...all) => (compiled++, instantiate(...all))"
+    script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=count)
+    page.open()
+    page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
+    assert page.run("compiled") == 1
+    assert page.run("bench.plots.get('x').plot.paints") > 0
+
+
 def test_a_law_beside_another_shows_the_difference_and_the_counts(page):
     page.open(".model=coulomb")
     page.choose("other", "coulomb")
@@ -280,6 +307,17 @@ def test_what_the_fmu_refuses_is_told_in_its_own_sentence(page):
     assert page.run(f"{alert}.hidden")
     page.put("m", "-1")
     assert "m cannot be -1" in page.run(f"{alert}.textContent") or "m" in page.run(f"{alert}.textContent")
+
+
+def test_what_is_no_number_is_told_and_changes_nothing(page):
+    page.open(".model=stickslip&m=20")
+    field, alert = "document.getElementById('field-m').value", "document.getElementById('alert')"
+    for name, text, sentence in (("m", "", "m takes a number: it stays 20 kg."), (".stop", "-1", "stays 16 s long")):
+        page.put(name, text)
+        assert sentence in page.run(f"{alert}.textContent")
+        assert page.run(f"[{field}, bench.state().values, bench.state().stop]") == ["20", {"m": 20}, 16]
+    page.put("m", "21")
+    assert page.run(f"{alert}.hidden")
 
 
 # ---- what was published

@@ -21,8 +21,8 @@ from .wasm import packed
 FILE = "index.html"
 HERE = Path(__file__).parent
 MODULES = (
-    *("wasm", "fmu", "run", "state", "measure", "desk"),
-    *("plot", "mechanism", "controls", "panels", "tables", "take", "main"),
+    *("wasm", "fmu", "run", "state", "edit", "measure", "desk", "plot", "mechanism", "hand", "controls"),
+    *("panels", "diagrams", "form", "tables", "take", "main"),
 )
 
 

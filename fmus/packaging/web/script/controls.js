@@ -1,6 +1,7 @@
 // Sliders, number fields and choices, made from the declared variables.
 
 import { told } from "./plot.js";
+import { named } from "./state.js";
 
 const STEPS = 400; // of a slider
 const DIGITS = 7; // that a number field shows
@@ -42,9 +43,24 @@ function valueAtPlace(place, { low, high, log }, factor) {
   return Number(((low + share * (high - low)) * factor).toFixed(Math.min(digits, 12))) / factor;
 }
 
-// One row: name, words, number, unit, slider.  `onChange(value)` is told the value in SI.
+// Gives the size that a variable usually has, where its start is zero: from the default run `one`, by its unit.
+export function sizes(one) {
+  const { portrait } = one.fmu;
+  const [{ position, speed }] = portrait.bodies;
+  const first = (unit) => portrait.variables.find((each) => each.unit === unit && each.start > 0)?.start ?? 1;
+  const length = named(portrait, position).unit === "m" ? one.largest(position) : first("m");
+  const bases = [first("kg"), length, one.largest(position) / one.largest(speed), 1];
+  return ({ unit, powers }) => {
+    const alike = one.reals.filter((name) => named(portrait, name).unit === unit).map((name) => one.largest(name));
+    const size = Math.max(0, ...alike) || powers.reduce((product, power, i) => product * bases[i] ** power, 1);
+    return Number.isFinite(size) && size > 0 ? Number(size.toPrecision(1)) : 1;
+  };
+}
+
+// One row: name, words, number, unit, slider.  `onChange(value)` is told the value in SI, `refuse(sentence)` what was
+// typed that is no number.
 export class Field {
-  constructor(variable, usual, onChange) {
+  constructor(variable, usual, onChange, refuse) {
     const { name, text, shown, factor, symbol, allowed } = variable;
     Object.assign(this, { variable, span: span(variable, usual) });
     const id = `field-${name}`;
@@ -55,8 +71,10 @@ export class Field {
     this.element = make("div", { class: "field" }, label, make("span", { class: "entry" }, this.number, make("span", { class: "unit" }, shown)), this.slider);
     this.slider.addEventListener("input", () => this.take(valueAtPlace(Number(this.slider.value), this.span, factor), onChange));
     this.number.addEventListener("change", () => {
-      const value = Number(this.number.value);
-      this.take(this.number.value === this.begun ? variable.start : value / factor, onChange);
+      const { value } = this.number; // "" if it is no number
+      if (value) return this.take(value === this.begun ? variable.start : Number(value) / factor, onChange);
+      this.number.value = this.shown;
+      refuse(`${name} takes a number: it stays ${`${this.shown} ${shown}`.trim()}.`);
     });
     this.begun = this.spelled(variable.start);
   }
@@ -73,8 +91,8 @@ export class Field {
   // Show a value in SI, which changes nothing.
   put(value) {
     const { shown, factor } = this.variable;
-    const text = this.spelled(value);
-    if (this.number.value !== text) this.number.value = text;
+    this.shown = this.spelled(value);
+    if (this.number.value !== this.shown) this.number.value = this.shown;
     this.slider.value = placeOf(value, this.span);
     this.slider.setAttribute("aria-valuetext", `${told(value * factor)} ${shown}`);
   }

@@ -1,9 +1,10 @@
-// The runs behind the page, for one state of it: the run itself, the one beside it, the closed form to compare with,
-// the motion as it would be without changes, and the published case as it was published.
+// The runs behind the page, for one state of it: the run itself, the one beside it, the motion as it would be without
+// changes, the published case as it was published, and by the model's own law, method and tolerance the quick one:
+// what is seen at once where another takes its time, and the closed form where there is one.
 
 import { Fmu } from "./fmu.js";
 import { Run } from "./run.js";
-import { beside, inForce } from "./state.js";
+import { beside, named } from "./state.js";
 import { load } from "./wasm.js";
 
 export const POINTS = 1600; // of the grid
@@ -31,49 +32,44 @@ export class Desk {
 
   // Begin all runs anew; the models must be ready.
   restart(state) {
+    const { values, changes, stop } = state;
     const portrait = this.portraits.get(state.model);
-    const { stop, changes } = state;
-    const setting = { values: state.values, changes, stop, points: POINTS };
-    const runs = { one: new Run(this.fmu(state.model, "one"), setting) };
-    if (state.other) {
-      const theirs = { ...setting, ...beside(this.portraits, state) };
-      runs.other = new Run(this.fmu(state.other.model, "other"), theirs);
-    }
-    const exact = closedForm(portrait);
-    if (exact && this.isTrue(state)) runs.truth = runs.one;
-    else if (exact) runs.truth = new Run(this.fmu(state.model, "truth"), { ...setting, values: { ...state.values, ...exact } });
-    if (changes.length) runs.before = new Run(this.fmu(state.model, "before"), { ...setting, changes: [] });
+    const run = (role, setting = {}, model = state.model) =>
+      new Run(this.fmu(model, role), { values, changes, stop, points: POINTS, ...setting });
+    const own = Object.entries(values).filter(([name]) => name !== "friction" && !name.startsWith("solver."));
+    const runs = {};
+    if (own.length < Object.keys(values).length) runs.quick = run("quick", { values: Object.fromEntries(own) });
+    runs.one = run("one");
+    if (isExact(portrait)) runs.truth = runs.quick ?? runs.one;
+    if (state.other) runs.other = run("other", beside(this.portraits, state), state.other.model);
+    if (changes.length) runs.before = run("before", { changes: [] });
     const preset = this.presets.get(state.preset);
-    if (preset) {
-      const points = preset.grid ? Math.round(stop / preset.grid) : 0;
-      runs.published = new Run(this.fmu(state.model, "published"), { values: state.values, changes: [], stop, points });
-    }
-    this.runs = runs;
+    if (preset) runs.published = run("published", { points: preset.grid ? Math.round(stop / preset.grid) : 0 });
+    [this.runs, this.seen] = [runs, 0];
   }
 
-  // Whether the run itself is the closed form.
-  isTrue(state) {
-    const portrait = this.portraits.get(state.model);
-    const values = inForce(portrait, state.values);
-    return Object.entries(closedForm(portrait) ?? { none: 1 }).every(([name, value]) => values[name] === value);
+  get done() {
+    return Object.values(this.runs).every((run) => run.done);
   }
 
-  // Advance what is not done, the first first, until the deadline in ms; whether there was anything to do.
-  work(deadline) {
-    const waiting = Object.values(this.runs).filter((run) => !run.done);
+  // Advance what is not done for so many ms, half of them at most the quick one; whether there is more to see: a run
+  // has ended, or has twice the points.
+  work(slice) {
+    const begun = performance.now();
+    const waiting = new Set(Object.values(this.runs).filter((run) => !run.done));
     for (const run of waiting) {
-      if (!run.advance(deadline)) break;
+      const quick = run === this.runs.quick;
+      if (!run.advance(begun + (quick ? slice / 2 : slice)) && !quick) break;
     }
-    return waiting.length > 0;
+    const points = Object.values(this.runs).reduce((sum, run) => sum + run.time.length, 0);
+    const more = points >= 2 * this.seen || [...waiting].some((run) => run.done);
+    if (more) this.seen = points;
+    return more;
   }
 }
 
-// The choices of the closed form; null for a model without.
-function closedForm(portrait) {
-  const item = (name, label) => portrait.variables.find((each) => each.name === name)?.items.find((each) => each.label === label);
-  const exact = item("solver.method", "exact");
-  if (!exact) return null;
-  const hybrid = item("friction", "hybrid");
-  return { "solver.method": exact.value, ...(hybrid && { friction: hybrid.value }) };
+// Whether a model by itself has its motion in closed form.
+function isExact(portrait) {
+  const { items, start } = named(portrait, "solver.method");
+  return items.some(({ label, value }) => label === "exact" && value === start);
 }
-

@@ -1,6 +1,7 @@
 // The mechanism that moves: what is drawn follows from what the model declares of its bodies.
 
 import { told, ticks } from "./plot.js";
+import { named } from "./state.js";
 
 const WIDE = 800;
 const FLOOR = 132; // of a lane with a block
@@ -20,11 +21,9 @@ function element(name, attributes, parent) {
 }
 
 export class Mechanism {
-  // `onDrag(body, position, phase)` is told where a body is dragged to: phase "grab", "move" or "drop".
-  constructor(host, onDrag) {
-    this.host = host;
-    this.onDrag = onDrag;
-    this.parts = [];
+  // `hand` is told what is dragged: grab(body), move(position), drop().
+  constructor(host, hand) {
+    Object.assign(this, { host, hand, parts: [] });
   }
 
   // Draw the bodies of a model anew.
@@ -101,23 +100,22 @@ export class Mechanism {
   // How far the bodies of a run go, so that all of it fits.
   fit(run) {
     for (const part of this.parts.filter(({ body }) => body.kind === "block")) {
-      const columns = [part.body.position, part.body.driver].filter(Boolean).map((name) => run.columns[name]);
-      const largest = columns.reduce((most, column) => column.reduce((m, x) => Math.max(m, Math.abs(x)), most), 0);
+      const names = [part.body.position, part.body.driver].filter(Boolean);
+      const largest = Math.max(...names.map((name) => run.largest(name)));
       const step = ticks(0, largest || 1, 4).at(1);
       part.reach = step * Math.ceil((largest || 1) / step - 1e-9);
-      const forward = part.body.driver && Math.min(...columns[0]) >= -0.05 * part.reach;
+      const forward = part.body.driver && run.columns[part.body.position].every((x) => x >= -0.05 * part.reach);
       part.origin = forward ? 110 : part.body.spring || part.body.dampers ? WALL + REST + BLOCK.width + 120 : WIDE / 2;
       const room = forward ? WIDE - part.origin - BLOCK.width - REST - 30 : Math.min(part.origin - WALL - BLOCK.width - 60, WIDE - part.origin - 60);
       part.pixels = room / part.reach;
       this.rule(part, forward ? 0 : -part.reach, step);
     }
-    const forces = this.parts.map(({ body }) => (run.columns[body.friction] ?? []).reduce((m, F) => Math.max(m, Math.abs(F)), 0));
-    this.strongest = Math.max(...forces, 0);
+    this.strongest = Math.max(0, ...this.parts.map(({ body }) => run.largest(body.friction)));
   }
 
   // The rule under the floor, in the unit of the position.
   rule(part, low, step) {
-    const { shown, factor } = this.portrait.variables.find(({ name }) => name === part.body.position);
+    const { shown, factor } = named(this.portrait, part.body.position);
     const y = part.y + FLOOR;
     part.scale.replaceChildren();
     for (const value of ticks(low, part.reach, Math.round((part.reach - low) / step))) {
@@ -172,7 +170,7 @@ export class Mechanism {
 
   words(value) {
     const each = this.parts.map(({ body }) => {
-      const { shown, factor } = this.portrait.variables.find(({ name }) => name === body.position);
+      const { shown, factor } = named(this.portrait, body.position);
       const mode = body.mode ? (value(body.mode) === 0 ? ", stuck" : ", sliding") : "";
       return `${body.position} = ${told(value(body.position) * factor, 3)} ${shown}${mode}`;
     });
@@ -190,13 +188,13 @@ export class Mechanism {
     grip.addEventListener("pointerdown", (event) => {
       grip.setPointerCapture(event.pointerId);
       offset = place(event) - part.at;
-      this.onDrag(part.body, part.at, "grab");
+      this.hand.grab(part.body);
       event.preventDefault();
     });
-    grip.addEventListener("pointermove", (event) => offset !== null && this.onDrag(part.body, place(event) - offset, "move"));
+    grip.addEventListener("pointermove", (event) => offset !== null && this.hand.move(place(event) - offset));
     for (const end of ["pointerup", "pointercancel"]) {
       grip.addEventListener(end, () => {
-        if (offset !== null) this.onDrag(part.body, part.at, "drop");
+        if (offset !== null) this.hand.drop();
         offset = null;
       });
     }

@@ -50,7 +50,7 @@ function sparse(run) {
 
 // One variable of every run over time.
 function overTime(desk, state, tools, name, key, log = false) {
-  const { one, other, before } = desk.runs;
+  const { one, other, before, quick } = desk.runs;
   const variable = one.fmu.variables.get(name);
   const { factor, shown, text } = variable;
   const curve = (run, colour, dash) => ({ x: times(run, name), y: series(run, variable), colour, dash });
@@ -58,6 +58,7 @@ function overTime(desk, state, tools, name, key, log = false) {
   const body = one.fmu.portrait.bodies[state.body];
   if (name === body.position) curves.push(...companions(one, body, tools, factor));
   if (before) curves.push({ ...curve(before, "ghost", [4, 4]), width: 1 });
+  if (quick && !one.done) curves.push({ ...curve(quick, "ghost"), width: 1 });
   if (other?.columns[name]) curves.push(curve(other, "b"));
   curves.push(curve(one, "a"));
   const y = { ...bounds(curves.map((each) => each.y), log), log };

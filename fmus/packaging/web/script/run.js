@@ -117,6 +117,11 @@ export class Run {
     this.counts = Object.fromEntries(has.map((name, i) => [name, counts[i]]));
   }
 
+  // The largest size of an output; zero of one that it has not.
+  largest(name) {
+    return (this.columns[name] ?? []).reduce((most, value) => Math.max(most, Math.abs(value)), 0);
+  }
+
   // The last row at or before a time in s.
   row(t) {
     let [low, high] = [0, this.time.length - 1];

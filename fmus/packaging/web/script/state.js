@@ -5,6 +5,11 @@ export function fresh(portrait) {
   return { model: portrait.name, values: {}, changes: [], stop: portrait.stop, t: 0, body: 0, other: null, preset: "" };
 }
 
+// A variable by its name.
+export function named(portrait, name) {
+  return portrait.variables.find((variable) => variable.name === name);
+}
+
 export function settable(portrait) {
   return portrait.variables.filter(({ causality }) => causality === "parameter" || causality === "input");
 }

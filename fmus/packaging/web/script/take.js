@@ -23,7 +23,7 @@ export function csv(one, other) {
   return `${lines.join("\n")}\n`;
 }
 
-// All diagrams in one picture, two in a row, each under its title.
+// All diagrams [{plot, heading}] in one picture, two in a row, each under its title.
 export function picture(titled, title) {
   const canvas = document.createElement("canvas");
   const rows = Math.ceil(titled.length / 2);
@@ -41,9 +41,9 @@ export function picture(titled, title) {
   context.fillStyle = style.getPropertyValue("--paper");
   context.fillRect(0, 0, 2 * WIDTH, canvas.height);
   text(title, 10, 18, "bold 14px system-ui, sans-serif");
-  titled.forEach(({ plot, words }, i) => {
+  titled.forEach(({ plot, heading }, i) => {
     const [x, y] = [(i % 2) * WIDTH, TITLE + Math.floor(i / 2) * (HEIGHT + TITLE)];
-    text(words, x + 10, y + 18, "12px system-ui, sans-serif");
+    text(heading.textContent, x + 10, y + 18, "12px system-ui, sans-serif");
     context.save();
     context.translate(x, y + TITLE);
     plot.drawn(context, WIDTH, HEIGHT);
