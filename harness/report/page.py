@@ -65,6 +65,7 @@ def page(found: list[Section], sketches: tuple[Sketch, ...], results: Path) -> s
         advice=ADVICE,
         measured=[clauses(sentence) for sentences in measured for sentence in sentences],
         live=LIVE if LIVE.is_file() else None,
+        bench=LIVE.read_text(encoding="utf-8", errors="replace") if LIVE.is_file() else "",
         made=f"{date.today()}, {HARNESS} {installed(HARNESS)}, {platform.platform()}",
     )
 

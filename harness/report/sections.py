@@ -18,7 +18,6 @@ from ..results import provenance
 from ..results.quantity import interval as spelled_interval
 from ..results.steps import sizes as step_sizes
 
-PNG, PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
 SHOWN = "trajectory.csv"
 SHORTEST = 12  # decimals cut from long numbers in cells
 
@@ -34,8 +33,9 @@ class Published:
 
 @dataclass(frozen=True)
 class Picture:
-    """A PNG file as a data address, with its text alternative."""
+    """An SVG file, the same as a data address, and its text alternative."""
 
+    file: Path
     data: str
     text: str
 
@@ -118,7 +118,7 @@ def oscillators(scenes: Sequence[Published], results: Path) -> Section:
 
 
 def oscillator(said: tuple[str, ...], folder: Path) -> Item:
-    picture = drawn(folder / "figure.png", f"{folder.name}: position, velocity and phase plane of the run")
+    picture = drawn(folder / "figure.svg", f"{folder.name}: position, velocity and phase plane of the run")
     return Item(folder.name, said, table(folder / "figures.csv", cut=False), picture)
 
 
@@ -135,7 +135,7 @@ def own(folder: Path) -> Item:
     figures, recorded = folder / "figures.csv", table(folder / SHOWN)
     rows = tuple(zip(recorded.heads, recorded.rows[0], recorded.rows[-1], strict=True))
     grid = table(figures, cut=False) if figures.is_file() else TableCells(("", "first", "last"), rows)
-    return Item(folder.name, (), grid, drawn(folder / "figure.png", f"{folder.name}: the plots that its scene names"))
+    return Item(folder.name, (), grid, drawn(folder / "figure.svg", f"{folder.name}: the plots that its scene names"))
 
 
 def decays(results: Path) -> Section:
@@ -164,7 +164,7 @@ def decay(folder: Path) -> Item:
         f"Decay of {found['record']}: signal, turning points, envelope and fit, and residuals. {found['sentence']}"
     )
     sentences = (found["sentence"], *found["remarks"])
-    return Item(found["record"], sentences, grid, drawn(folder / "figure.png", alternative))
+    return Item(found["record"], sentences, grid, drawn(folder / "figure.svg", alternative))
 
 
 def steps(scenes: Sequence[Published], results: Path) -> Section:
@@ -192,8 +192,8 @@ def sizes(folder: Path) -> Item:
 def precision(scenes: Sequence[Published], results: Path) -> Section:
     parts, missing, folder = [], [], results / "precision"
     models = {scene.model for scene in scenes}
-    for model in sorted(models | {file.stem for file in folder.glob("*.png")}):
-        if not (folder / f"{model}.png").is_file():
+    for model in sorted(models | {file.stem for file in folder.glob("*.svg")}):
+        if not (folder / f"{model}.svg").is_file():
             missing.append((model, f"python -m harness precision {model}"))
             continue
         parts.append(read(folder / model, tradeoff))
@@ -208,7 +208,7 @@ def precision(scenes: Sequence[Published], results: Path) -> Section:
 def tradeoff(place: Path) -> Item:
     """One model's, whose files begin with its name."""
     picture = drawn(
-        place.with_suffix(".png"), f"{place.name}: run time and right-hand sides over the largest error, by method"
+        place.with_suffix(".svg"), f"{place.name}: run time and right-hand sides over the largest error, by method"
     )
     text, exchanged = place.with_suffix(".txt"), place.with_name(f"{place.name}-exchange.csv")
     said = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
@@ -231,7 +231,7 @@ def endings(file: Path) -> Item:
     pairs = sorted({(model, method) for model, method, _ in counts})
     rows = tuple((*pair, *(str(counts[(*pair, kind)]) for kind in kinds)) for pair in pairs)
     picture = drawn(
-        file.with_name("region.png"), "Steps of each method over the speed at the peak of the friction curve"
+        file.with_name("region.svg"), "Steps of each method over the speed at the peak of the friction curve"
     )
     text = f"{len(found.rows)} stiff and extreme cases; how each ended:"
     return Item("Endings", (text,), TableCells(("model", "method", *kinds), rows), picture)
@@ -258,7 +258,7 @@ def swept(folder: Path) -> Item:
         failed = Counter(bool(row[place]) for row in rows)
     measured = ", ".join(heads[:place])
     text = f"{failed.total()} runs, {failed[True]} failed. Columns: {measured}."
-    return Item(folder.name, (text,), None, drawn(folder / "figure.png", f"Sweep {folder.name}. {text}"))
+    return Item(folder.name, (text,), None, drawn(folder / "figure.svg", f"Sweep {folder.name}. {text}"))
 
 
 def comparisons(results: Path) -> Section:
@@ -281,7 +281,7 @@ def comparison(folder: Path) -> Item:
     grid = TableCells(("variable", "largest", "rms", "relative", "unit"), rows)
     title = f"{found['one']['name']} and {found['two']['name']}"
     said = tuple(filter(None, (found["one"]["note"], found["two"]["note"], found["events"])))
-    return Item(title, said, grid, drawn(folder / "figure.png", f"{title}, and their difference"))
+    return Item(title, said, grid, drawn(folder / "figure.svg", f"{title}, and their difference"))
 
 
 def coupled(results: Path) -> Section:
@@ -293,7 +293,7 @@ def coupled(results: Path) -> Section:
 
 def pair(folder: Path) -> Item:
     alternative = f"Coupled scene {folder.name}: positions beside the monolithic reference, and error over the step"
-    return Item(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.png", alternative))
+    return Item(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.svg", alternative))
 
 
 def bench(results: Path) -> Section:
@@ -319,9 +319,9 @@ def drawn(file: Path, text: str) -> tuple[Picture, ...]:
     if not file.is_file():
         return ()
     data = file.read_bytes()
-    if not (data.startswith(PNG) and PNG_END in data[-len(PNG_END) :]):
-        raise ValueError(f"{file.name} is not a whole PNG picture")
-    return (Picture(f"data:image/png;base64,{b64encode(data).decode()}", text),)
+    if not (b"<svg" in data and data.rstrip().endswith(b"</svg>")):
+        raise ValueError(f"{file.name} is not a whole SVG drawing")
+    return (Picture(file, f"data:image/svg+xml;base64,{b64encode(data).decode()}", text),)
 
 
 def table(file: Path, cut: bool = True) -> TableCells:

@@ -40,7 +40,8 @@ def replacing(folder: Path, ours: Collection[str], source: str = "") -> Iterator
     unless that is what the user wants, a result of another `source`.
     """
     try:
-        ours = {*ours, FILE}
+        drawn = {name.replace(".svg", ".png") for name in ours}  # as earlier versions drew them
+        ours = {*ours, *drawn, FILE}
         refuse(folder, ours)
         keep(folder, source)
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -1,8 +1,10 @@
 """The look of every figure: colours, sizes, headings of axes."""
 
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +17,9 @@ artist.kwdoc = lambda artist: ""  # the lists of properties in all docstrings, a
 
 from matplotlib.axes import Axes as Axes  # noqa: E402
 from matplotlib.axis import Tick  # noqa: E402
+from matplotlib.collections import QuadMesh  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
+from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.text import Text  # noqa: E402
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
@@ -42,9 +46,29 @@ STYLE: dict[Any, Any] = {
     "lines.linewidth": 1.2,
     "legend.framealpha": 0.9,
     "legend.fontsize": 8,
+    "svg.fonttype": "none",  # letters stay letters
+    "svg.hashsalt": "friction",  # the same drawing is the same file
 }
+DARK = {  # what stands for a colour where the reader's screen is dark
+    "#ffffff": "#1d2125",
+    "#000000": "#e6e8ea",
+    "#dddddd": "#343a40",
+    "#cccccc": "#454c54",
+    GREY: "#9aa4ae",
+    BLUE.lower(): "#4aa8e0",
+    ORANGE.lower(): "#f08a4b",
+    GREEN.lower(): "#2cc295",
+}
+SWITCHED = "".join(
+    f'[style*="{part}: {light}"] {{ {part}: {dark} !important }}\n'
+    for light, dark in DARK.items()
+    for part in ("fill", "stroke")
+)
+FOLLOWING = f"@media screen and (prefers-color-scheme: dark) {{\ntext {{ fill: {DARK['#000000']} }}\n{SWITCHED}}}\n"
+CROWDED = 1000  # points with a mark each: more are one image in the drawing
 LARGEST = 1e150  # that is drawn
 LONGEST = 500  # letters of a text that are drawn
+UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML: a path may be no text
 WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
 
 
@@ -52,8 +76,8 @@ WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
 def sheet(
     path: Path, width: float, height: float, layout: Literal["constrained"] | None = "constrained"
 ) -> Iterator[Figure]:
-    """A figure in this look, of a size in inches; saved as PNG when all has been drawn.  Without a `layout`, which
-    draws all of it once more to find the margins, these are given.
+    """A figure in this look, of a size in inches; saved as SVG, light or dark as the reader's screen is, when all has
+    been drawn.  Without a `layout`, which draws all of it once more to find the margins, these are given.
 
     Names and titles are drawn letter by letter, whatever is in them.  What nobody can draw, such as letters that the
     font lacks and numbers near the end of their range, is left out of the picture without a word.
@@ -64,8 +88,20 @@ def sheet(
         yield figure
         for text in texts(figure):
             text.set_parse_math(False)
-            text.set_text(text.get_text()[:LONGEST].encode("utf-8", "replace").decode())  # a path may be no text
-        figure.savefig(path)
+            text.set_text(UNWRITABLE.sub("\N{REPLACEMENT CHARACTER}", text.get_text()[:LONGEST]))
+        for crowd in figure.findobj(crowded):
+            crowd.set_rasterized(True)
+        drawn = StringIO()
+        figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
+    short = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d\d)\d+", r"\1", line[0]), drawn.getvalue())
+    path.write_text(short.replace("</style>", f"{FOLLOWING}</style>", 1), encoding="utf-8")
+
+
+def crowded(within: artist.Artist) -> bool:
+    """Whether something is drawn in so many pieces that nobody wants each of them in a file."""
+    if isinstance(within, Line2D):
+        return within.get_marker() not in ("None", None) and np.size(within.get_xdata()) > CROWDED
+    return isinstance(within, QuadMesh)
 
 
 def texts(within: artist.Artist) -> Iterator[Text]:

@@ -460,7 +460,7 @@ def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(
     t = np.linspace(0.0, 9.0, 3001)
     record = swung(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
     found = identify(replace(record, t=record.t + 1.7e9), Known(pendulum=True))
-    draw(found, losses_seen(found), tmp_path / "figure.png")
+    draw(found, losses_seen(found), tmp_path / "figure.svg")
     signal, residuals, shares = figures[0].get_axes()
     assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
     assert shares.get_xlabel() == "amplitude [deg]"
@@ -512,7 +512,7 @@ def test_a_scene_leaves_numbers_turning_points_fit_and_figure(fmus, tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     assert "Best described by dry friction" in done.stdout
     folder = tmp_path / "results/decay/coulomb"
-    files = {"decay.json", "turning-points.csv", "fit.csv", "figure.png", "provenance.json"}
+    files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json"}
     assert {file.name for file in folder.iterdir()} == files
     found = {each["name"]: each for each in json.loads((folder / "decay.json").read_text())["fit"]}
     assert found["f"]["value"] == pytest.approx(0.5, rel=1e-9)

@@ -151,7 +151,7 @@ def test_a_title_is_drawn_letter_by_letter(here, title):
     lines = "".join(f"{name} = {told}\n" for name, told in (SCENE | changed).items())
     (here / "mine.toml").write_text(lines, encoding="utf-8")
     assert ended("run", "mine.toml", "--quiet") == (0, "")
-    assert (here / "results/mine/figure.png").stat().st_size > 1000
+    assert (here / "results/mine/figure.svg").stat().st_size > 1000
 
 
 def test_numbers_near_the_end_of_their_range_are_drawn_or_refused(here):
@@ -241,7 +241,7 @@ RESULTS = {
     "coupled/mine/error.csv": ["", '"'],
     "bench/bench.csv": ["", "x"],
     "precision/anchors.csv": [""],
-    "precision/smd.png": ["", "no picture"],
+    "precision/smd.svg": ["", "no picture"],
 }
 
 

@@ -181,4 +181,4 @@ def test_the_scene_is_measured_and_drawn(here):
     assert found["peak_speed"] == pytest.approx(driver + omega * amplitude, rel=1e-5)
     table = np.loadtxt(here / "results/my_scene/trajectory.csv", delimiter=",", skiprows=1)
     assert np.diff(table[:, 0]).max() < 0.02 * found["slip_time"]
-    assert (here / "results/my_scene/figure.png").stat().st_size > 10_000
+    assert (here / "results/my_scene/figure.svg").stat().st_size > 10_000

@@ -62,7 +62,7 @@ def test_the_main_job_runs_every_published_case(main_job):
     assert {path.name for path in results.iterdir()} == cases
     for case in cases:
         assert case in done.stdout
-        assert {"trajectory.csv", "steps.csv", "figure.png"} <= {path.name for path in (results / case).iterdir()}
+        assert {"trajectory.csv", "steps.csv", "figure.svg"} <= {path.name for path in (results / case).iterdir()}
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_steps_add_up_to_the_run(main_job):
 def test_a_scene_leaves_only_what_it_names(scene):
     done, results = scene(BASE + "grid = 0.25\nstop = 2")
     assert (done.returncode, done.stderr) == (0, "")
-    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "figure.png", "provenance.json"}
+    assert {path.name for path in results.iterdir()} == {"trajectory.csv", "figure.svg", "provenance.json"}
     head, columns = table(results / "trajectory.csv")
     assert head == ["t [s]", "x [m]", "v [m/s]"]
     assert list(columns[0]) == [0.25 * i for i in range(9)]

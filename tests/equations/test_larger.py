@@ -50,7 +50,7 @@ def test_a_certified_result_has_all_states_and_precision_takes_it(tmp_path):
     assert np.abs(table[-1, 1:] - true).max() < 1e-9
     done = commands.harness(tmp_path, "precision", "lugre.py", "--quick")
     assert (done.returncode, done.stderr) == (0, "")
-    kept = {"lugre.csv", "lugre.json", "lugre.png", "lugre.txt"}
+    kept = {"lugre.csv", "lugre.json", "lugre.svg", "lugre.txt"}
     assert {file.name for file in (tmp_path / "results/precision").iterdir()} == kept
 
 

@@ -69,7 +69,7 @@ def test_every_picture_has_its_text_and_nothing_comes_from_elsewhere(page):
     assert len(pictures) == 4
     for picture in pictures:
         assert len(picture["alt"]) > 20
-        assert picture["src"].startswith("data:image/png;base64,")
+        assert picture["src"].startswith("data:image/svg+xml;base64,")
     assert not re.findall(r'src="(?!data:)', page)
     assert "url(" not in page
     assert tags.of("script") == []
@@ -81,7 +81,7 @@ def test_every_link_leads_to_a_place_of_the_page_or_to_a_file_beside_it(made, pa
     links = {link["href"] for link in tags.of("a")}
     files = {link for link in links if not link.startswith("#")}
     assert {link[1:] for link in links - files} <= places
-    assert {"coulomb/trajectory.csv", "coulomb/events.csv", "coulomb-sign/steps.csv"} <= files
+    assert {"coulomb/trajectory.csv", "coulomb/events.csv", "coulomb-sign/steps.csv", "coulomb/figure.svg"} <= files
     assert all((made[0] / "results" / file).is_file() for file in files)
 
 
@@ -126,12 +126,28 @@ def test_it_begins_with_a_picture_of_the_motion_that_was_computed(made, page):
     assert turns == 15  # of the 16 half swings
 
 
-def test_where_the_page_that_runs_has_been_built_every_picture_leads_to_it(tmp_path, made):
+def test_a_figure_is_as_light_or_dark_as_the_screen_and_its_letters_are_letters(made, browser):
+    """The ground, an axis and a text of the file itself, on a light screen and on a dark one."""
+    look = "[...document.querySelectorAll('#patch_1 path, text')].slice(0, 2).map(e => getComputedStyle(e).fill)"
+    seen = []
+    for dark in (False, True):
+        browser.dark(dark)
+        browser.open((made[0] / "results/coulomb/figure.svg").as_uri())
+        seen.append(browser.run(look))
+    browser.dark(False)
+    assert seen == [["rgb(255, 255, 255)", "rgb(0, 0, 0)"], ["rgb(29, 33, 37)", "rgb(230, 232, 234)"]]
+    assert "position of the mass" in (made[0] / "results/coulomb/figure.svg").read_text(encoding="utf-8")
+
+
+def test_where_the_page_that_runs_has_been_built_the_report_carries_it_and_every_picture_leads_to_it(tmp_path, made):
     shutil.copytree(made[0] / "results", tmp_path / "results")
     (tmp_path / "fmus/web").mkdir(parents=True)
-    (tmp_path / "fmus/web/index.html").touch()
+    bench = '<!doctype html><title>it\'s "here" &amp; <b></title><script>"x"</script>'
+    (tmp_path / "fmus/web/index.html").write_text(bench)
     assert harness(tmp_path, "report", "--quiet").returncode == 0
-    text = (tmp_path / "results/report.html").read_text(encoding="utf-8")
-    assert 'href="../fmus/web/index.html"' in text
-    assert 'href="../fmus/web/index.html#.preset=coulomb"' in text
+    report = tmp_path / "results/report.html"
+    tags = Tags(report.read_text(encoding="utf-8"))
+    assert [frame["srcdoc"] for frame in tags.of("iframe")] == [bench]
+    links = [link["href"] for link in tags.of("a")]
+    assert {"../fmus/web/index.html", "../fmus/web/index.html#.preset=coulomb"} <= set(links)
     assert "index.html" not in (made[0] / "results/report.html").read_text(encoding="utf-8")

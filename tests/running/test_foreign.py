@@ -86,7 +86,7 @@ def test_an_fmu_whose_own_step_is_fixed_is_told_as_such(run):
 def test_booleans_integers_and_texts_are_recorded_drawn_and_set(run, tmp_path):
     done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007")
     fine(done)
-    assert (tmp_path / "results/Switching/figure.png").is_file()
+    assert (tmp_path / "results/Switching/figure.svg").is_file()
     assert {*rows["on"]} == {0, 1}
     assert rows["switched"][-1] == 3
     assert {*rows["says"]} == {"cold", "007 cold", "007 warm"}
@@ -140,7 +140,7 @@ def test_a_scene_may_be_of_any_fmu(theirs, tmp_path, name, outputs, more, column
     if name == "Arrays":
         assert len(rows["t [s]"]) == 101
         assert rows["place[2]"][-1] == pytest.approx(2 * cos(3))
-    assert (tmp_path / "results/mine/figure.png").is_file()
+    assert (tmp_path / "results/mine/figure.svg").is_file()
     assert "error unknown" in done.stdout or "changes no output by more than" in done.stdout
     assert "the same, bit for bit" in commands.harness(tmp_path, "run", "results/mine", COLUMNS="120").stdout
 

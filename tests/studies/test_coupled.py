@@ -73,7 +73,7 @@ def test_two_equal_masses_swing_against_each_other_as_their_closed_form_says(cou
     assert json.loads(done.stdout)["order"] == pytest.approx(1.0, abs=0.1)
     folder = tmp_path / "results/coupled/mine"
     assert {file.name for file in folder.iterdir()} == {
-        *("mine.ssp", "trajectory.csv", "error.csv", "engines.csv", "figure.png", "provenance.json")
+        *("mine.ssp", "trajectory.csv", "error.csv", "engines.csv", "figure.svg", "provenance.json")
     }
     table = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1)
     expected = [0.1 * cos(sqrt(157.9 + 80.0) * t) for t in table[:, 0]]

@@ -184,7 +184,7 @@ def test_the_command_writes_every_point_and_says_what_to_use_and_results_on_othe
     done = command(place, "smd", "--quick", "--out", tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert "smd: use exact: " in done.stdout
-    made = {"smd.csv", "smd.json", "smd.png", "smd.txt", "anchors.csv"}
+    made = {"smd.csv", "smd.json", "smd.svg", "smd.txt", "anchors.csv"}
     assert {path.name for path in folder.iterdir()} == made | {"pendulum.csv"}
     assert (folder / "pendulum.csv").read_text() == "older"
     with (folder / "smd.csv").open(newline="") as file:

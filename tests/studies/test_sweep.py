@@ -128,7 +128,7 @@ def test_a_map_is_labelled_for_xarray_and_pandas_the_same_for_any_number_of_work
     one, eight = (folder_of(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 8))
     for file in ("sweep.nc", "sweep.csv"):
         assert (one / file).read_bytes() == (eight / file).read_bytes()
-    assert {file.name for file in one.iterdir()} == {"sweep.nc", "sweep.csv", "figure.png", "provenance.json"}
+    assert {file.name for file in one.iterdir()} == {"sweep.nc", "sweep.csv", "figure.svg", "provenance.json"}
     assert [file.name for file in one.parent.iterdir()] == [one.name]
     data = opened(one)
     assert data["slips"].dims == ("mu_d", "v_driver")

@@ -11,7 +11,7 @@ MOST = 8  # variables drawn, those that differ most
 
 
 def draw(found: Comparison, path: Path) -> None:
-    """Save the figure as PNG, if there is anything but texts to draw."""
+    """Save the figure, if there is anything but texts to draw."""
     numbers = [each for each in found.differences if not textual(found.one, each.name)]
     chosen = sorted(numbers, key=lambda each: -each.relative)[:MOST]
     if not chosen:

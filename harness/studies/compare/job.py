@@ -24,9 +24,9 @@ def perform_compare(sources: tuple[str, str], how: Specification, out: Path, rep
     one, two = trajectory.both(sources, how, report)
     found = compare(one, two)
     folder = out / "compare" / f"{one.name}-{two.name}"
-    with replacing(folder, ("compare.json", "figure.png"), named(*sources)) as fresh:
+    with replacing(folder, ("compare.json", "figure.svg"), named(*sources)) as fresh:
         (fresh / "compare.json").write_text(as_text(numbers(found)) + "\n", encoding="utf-8")
-        draw(found, fresh / "figure.png")
+        draw(found, fresh / "figure.svg")
         sides = (("one", one), ("two", two))
         values = {f"{side}: {name}": told for side, each in sides for name, told in each.parameters.items()}
         record(fresh, [each.file for each in (one, two) if each.file], values, source=named(*sources))

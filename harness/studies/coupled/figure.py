@@ -9,7 +9,7 @@ from .convergence import Convergence
 
 
 def draw(found: Convergence, path: Path) -> None:
-    """Save the figure as PNG."""
+    """Save the figure."""
     with sheet(path, 2 * WIDTH, 1.6 * HEIGHT) as figure:
         figure.suptitle(found.title, fontsize=11)
         motion, error = figure.subplots(1, 2, width_ratios=(3, 2))

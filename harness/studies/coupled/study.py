@@ -26,7 +26,7 @@ from .convergence import Convergence
 from .engine import ENGINES, EXTRA, MAIN, Request, rows
 
 FOLDER = "coupled"
-FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.png")
+FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.svg")
 SPRING = Path(__file__).parents[3] / "fmus" / "more" / "spring.py"
 
 Report = Callable[[float], None]
@@ -59,7 +59,7 @@ def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple
             copy(file, fresh)
             found = study(asked, file, solver(scene, defaults) if scene else None, report)
             save(found, fresh)
-            draw(found, fresh / "figure.png")
+            draw(found, fresh / "figure.svg")
             record(fresh, fmus, scene=scene, source=named(source))
     return found, folder
 

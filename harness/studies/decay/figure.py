@@ -17,7 +17,7 @@ COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"} 
 
 
 def draw(found: Identified, loss: Loss, path: Path) -> None:
-    """Save the figure as PNG."""
+    """Save the figure."""
     with sheet(path, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None) as figure:
         grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
         above = figure.add_subplot(grid[0])

@@ -23,7 +23,7 @@ from ...results.files import as_text, heading, write
 from ...results.folder import replacing
 
 FOLDER = "decay"
-FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.png")
+FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
 
 
 Loaded = tuple[Record, Known, Callable[..., None]]  # and what writes into a folder where they come from
@@ -112,7 +112,7 @@ def save(found: Identified, folder: Path) -> None:
     name = ("x", "v", "a")[found.record.order]
     heads = ["t [s]", heading(name, unit), heading("fit", unit), heading("residual", unit)]
     write(folder / "fit.csv", heads, [found.t, found.x, fitted, found.x - fitted])
-    draw(found, loss, folder / "figure.png")
+    draw(found, loss, folder / "figure.svg")
 
 
 def numbers(found: Identified, loss: Loss | None = None) -> dict[str, Any]:

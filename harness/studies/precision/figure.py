@@ -31,7 +31,7 @@ FLOOR = 2.0**-53  # errors below what a double can tell are drawn there
 
 
 def draw(study: Study, laws: Sequence[Shortcut], path: Path) -> None:
-    """Save the figure of a study as PNG: run time and right-hand sides over the error, a row for each law.
+    """Save the figure of a study: run time and right-hand sides over the error, a row for each law.
 
     Laws that chatter are drawn in the row of true stick and slip, by their error beside that.
     """

@@ -27,7 +27,7 @@ UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and r
     "creep": "m/s",
 }
 EXCHANGED = "model exchange by fmpy's CVode: largest error at rtol [1]"
-ENDS = (".csv", ".json", ".png", ".txt", "-exchange.csv", "-laws.csv")
+ENDS = (".csv", ".json", ".svg", ".png", ".txt", "-exchange.csv", "-laws.csv")  # earlier versions drew .png
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def write(found: Survey, files: Sequence[Path], folder: Path, source: str) -> No
             rows = [[rtol, *errors.values()] for rtol, errors in exchanged.items()]
             save(folder / f"{each.model}-exchange.csv", [EXCHANGED, *(f"{case} [1]" for case in cases)], rows)
         mine = [law for law in found.laws if law.model == each.model]
-        draw(each, mine, folder / f"{each.model}.png")
+        draw(each, mine, folder / f"{each.model}.svg")
         if mine:
             save(folder / f"{each.model}-laws.csv", heads(laws.Shortcut), map(astuple, mine))
     if found.anchors:

@@ -21,7 +21,7 @@ def perform_run(wanted: Specification, out: Path, report: Report) -> tuple[Traje
         done = run(wanted, report)
         found = of_run(done)
         found.save(fresh / FILES[0])
-        draw(wanted.fmu.name, usual(tuple(found.columns)), done, {}, fresh / "figure.png")
+        draw(wanted.fmu.name, usual(tuple(found.columns)), done, {}, fresh / "figure.svg")
         record(fresh, [wanted.fmu], found.parameters, wanted, source=source)
         said = since(folder, fresh, FILES[0])
     return found, folder, said

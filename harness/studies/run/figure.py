@@ -66,7 +66,7 @@ class Drawn:
 def draw(
     title: str, plots: Iterable[str], run: Run, results: Results, path: Path, published: Mapping[str, Any] | None = None
 ) -> None:
-    """Save the figure of these plots as a PNG file; of an array every element, of a text nothing."""
+    """Save the figure of these plots; of an array every element, of a text nothing."""
     chosen = [each for name in plots for each in drawn(name, run)]
     columns = [names for right in (False, True) if (names := [name for name in chosen if (name in BESIDE) == right])]
     if not columns:

@@ -21,7 +21,7 @@ from ...scenes.fmus import check_built
 from ...scenes.scene import Scene, load, shipped
 from .outcome import Outcome
 
-FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.png")  # all that a result folder may hold
+FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.svg")  # all that a result folder may hold
 
 
 def decay(run: Run, scene: Scene) -> Any:
@@ -81,7 +81,7 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     if scene.plots:
         from .figure import draw
 
-        draw(scene.title, scene.plots, run, results, folder / "figure.png", scene.published)
+        draw(scene.title, scene.plots, run, results, folder / "figure.svg", scene.published)
     return Outcome(scene.name, scene, run, quantities, run.failed or None)
 
 

@@ -8,7 +8,7 @@ from .endings import Region
 
 
 def draw(regions: Iterable[Region], path: Path) -> None:
-    """Save the steps of each method as PNG; a line of slope -1 is bounded by stability."""
+    """Save the steps of each method; a line of slope -1 is bounded by stability."""
     with sheet(path, 1.3 * WIDTH, 2 * HEIGHT) as figure:
         axes = figure.subplots()
         for each in regions:

@@ -29,7 +29,7 @@ from .endings import FINISHED, REFUSED, WRONG, Ending, Region
 
 WORKERS = 2
 LIMIT = 120.0  # s, for one run and for one answer to compare with
-FOLDER, FILES = "stability", ("stability.csv", "region.png")
+FOLDER, FILES = "stability", ("stability.csv", "region.svg")
 
 
 def survey(
@@ -42,7 +42,7 @@ def survey(
         rows = table(report, chosen)
         found = regions(rows)
         save(rows, folder / "stability.csv")
-        draw(found, folder / "region.png")
+        draw(found, folder / "region.svg")
         record(folder, [fmu_of(model) for model in dict.fromkeys(row.case.model for row in rows)])
     return rows, found
 

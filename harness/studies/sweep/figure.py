@@ -27,7 +27,7 @@ FINE = 401  # points along an axis where a boundary is looked for
 
 
 def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) -> None:
-    """Save the figure of a sweep's netCDF file as PNG: a panel for each measure, in points for each measure and
+    """Save the figure of a sweep's netCDF file: a panel for each measure, in points for each measure and
     parameter."""
     with xarray.open_dataset(file, engine="scipy", drop_variables="error") as whole:
         many = len(whole.dims)

@@ -38,7 +38,7 @@ from .space import Points, axis
 from .study import Sweep, perform
 
 FOLDER = "sweep"
-FILES = ("sweep.nc", "sweep.csv", "figure.png")
+FILES = ("sweep.nc", "sweep.csv", "figure.svg")
 NOT_NUMBERS = ("String", "Binary", "Clock")
 NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
 
@@ -201,7 +201,7 @@ def save(sweep: Sweep, kept: Journal, about: About, folder: Path) -> tuple[Failu
                 data.put(column.name, block.first, values)
             data.put("error", block.first, np.array([sentence.encode() for sentence in sentences(block)]))
             table.writerows(rows(spots, block))
-    draw(folder / "sweep.nc", folder / "figure.png", about.boundaries, sum(each.runs for each in failures))
+    draw(folder / "sweep.nc", folder / "figure.svg", about.boundaries, sum(each.runs for each in failures))
     return failures
 
 

@@ -1,0 +1,29 @@
+"""Figures: drawings in a file that anybody can read, however much is drawn."""
+
+from xml.etree.ElementTree import fromstring
+
+import numpy as np
+
+from harness.results.style import sheet
+
+
+def drawn(path, **style):
+    """The text of a figure of 200 000 points, in a path under a name that no XML may hold."""
+    t = np.linspace(0.0, 1.0, 200_000)
+    with sheet(path, 5.0, 3.0) as figure:
+        axes = figure.subplots()
+        axes.plot(t, np.sin(900 * t) * np.exp(-t), **style)
+        axes.set_title("a<b & \x00\x1b\udcff\ufffe $x_")
+    return path.read_text(encoding="utf-8")
+
+
+def test_whatever_a_name_holds_the_file_is_xml_and_says_what_can_be_said(tmp_path):
+    root = fromstring(drawn(tmp_path / "a.svg"))
+    assert "a<b & \ufffd\ufffd\ufffd\ufffd $x_" in [each.text for each in root.iter("{http://www.w3.org/2000/svg}text")]
+
+
+def test_very_many_points_make_a_file_of_hundreds_of_kilobytes_at_most(tmp_path):
+    """As a line and as marks; the same drawing is the same file."""
+    line, marks = drawn(tmp_path / "a.svg"), drawn(tmp_path / "b.svg", marker=".", linestyle="")
+    assert max(len(line), len(marks)) < 400_000
+    assert drawn(tmp_path / "c.svg") == line
