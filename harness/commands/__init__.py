@@ -56,7 +56,7 @@ def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> N
         with progress(quiet or as_json, len(names)) as report:
             outcomes = list(job.main_job(names, out, report))
         table = comparison(outcomes, everything=False)
-        answer(quiet, as_json, [figures(outcome) for outcome in outcomes], table, f"Results in {out}")
+        answer(quiet, as_json, [figures(outcome, out) for outcome in outcomes], table, folder=out)
         failed = [outcome.error for outcome in outcomes if outcome.error]
         if failed:
             raise HarnessError("\n".join(failed))

@@ -22,4 +22,4 @@ def bench(out: Path, quiet: bool, as_json: bool) -> None:
     chosen = work.measures()
     with progress(quiet or as_json, len(chosen)) as report:
         found = work.bench(chosen, out, report)
-    answer(quiet, as_json, found, numbers(found), f"Results in {out / work.FOLDER}")
+    answer(quiet, as_json, found, numbers(found), folder=out / work.FOLDER)

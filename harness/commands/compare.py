@@ -47,8 +47,7 @@ def compare(
     with progress(quiet or as_json, 1) as report:
         asked = Specification(Path(), **how)
         found, folder = job.perform_compare((one, two), asked, out, partial(report, "compare"))
-    shown = (job.table(found), "", *job.sentences(found), f"Results in {folder}")
-    answer(quiet, as_json, job.numbers(found), *shown)
+    answer(quiet, as_json, job.numbers(found), job.table(found), "", *job.sentences(found), folder=folder)
     failed = [each.failed for each in (found.one, found.two) if each.failed]
     if rtol is not None or atol is not None:
         failed += found.beyond(rtol or 0.0, atol or 0.0)

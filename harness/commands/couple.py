@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from .terminal import STOP, progress, results, tell
+from .terminal import STOP, answer, progress, results
 
 
 @click.command()
@@ -30,15 +30,12 @@ def couple(scene: str, stop: float | None, out: Path, quiet: bool, as_json: bool
 
     with progress(quiet or as_json, 1) as report:
         found, folder = perform(scene, out, stop, partial(report, scene))
-    if as_json:
-        engines = {name: {"largest error": off, "why not": why} for name, (_, off, why) in found.engines.items()}
-        told = {"steps": found.steps, "errors": found.errors, "order": found.order, "engines": engines}
-        tell(told | {"folder": str(folder)})
-    elif not quiet:
-        click.echo(f"communication step [s]   largest error{f' [{found.unit}]' if found.unit else ''}")
-        for step, error in zip(found.steps, found.errors, strict=False):
-            click.echo(f"{step:<24g} {error:.3e}")
-        click.echo(f"The error falls with the power {found.order:.2f} of the step.")
-        for name, (_, off, why) in found.engines.items():
-            click.echo(f"{name:<24} {why or f'{off:.3e} with the finest step'}")
-        click.echo(f"Results in {folder}")
+    engines = {name: {"largest error": off, "why not": why} for name, (_, off, why) in found.engines.items()}
+    told = {"steps": found.steps, "errors": found.errors, "order": found.order, "engines": engines, "folder": folder}
+    shown = [
+        f"communication step [s]   largest error{f' [{found.unit}]' if found.unit else ''}",
+        *(f"{step:<24g} {error:.3e}" for step, error in zip(found.steps, found.errors, strict=False)),
+        f"The error falls with the power {found.order:.2f} of the step.",
+        *(f"{name:<24} {why or f'{off:.3e} with the finest step'}" for name, (_, off, why) in found.engines.items()),
+    ]
+    answer(quiet, as_json, told, *shown, folder=folder)

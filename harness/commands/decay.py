@@ -84,4 +84,4 @@ def decay(
     with decays.uncollected(), progress(quiet or as_json, 1) as report:
         progressed = partial(report, "standard input" if source == "-" else source)
         found, folder = decays.perform(source, columns, Known(k, m, pendulum), drag, drift, out, progressed)
-    answer(quiet, as_json, decays.numbers(found), table(found), "", *sentences(found), f"Results in {folder}")
+    answer(quiet, as_json, decays.numbers(found), table(found), "", *sentences(found), folder=folder)

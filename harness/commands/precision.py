@@ -36,4 +36,4 @@ def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, qu
     }
     errors = (tables.exchange(found.studies), tables.laws(found.laws), tables.anchors(found.anchors))
     shown = [each for table in (*map(tables.work, found.studies), *errors) if table.rows for each in (table, "")]
-    answer(quiet, as_json, told, *shown, *found.advice, *found.missing, f"Results in {out / FOLDER}")
+    answer(quiet, as_json, told, *shown, *found.advice, *found.missing, folder=out / FOLDER)

@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from ..errors import HarnessError
-from .terminal import answer, anyones, progress, results, tell
+from .terminal import answer, anyones, progress, results
 
 
 @click.command()
@@ -67,8 +67,8 @@ def run(
     with progress(quiet or as_json, 1) as report:
         outcome = job.perform(chosen, out, partial(report, chosen.name))
     table = comparison([outcome], everything=True)
-    folder, said = out / chosen.name, (outcome.run.note if outcome.run else "", *outcome.said)
-    answer(quiet, as_json, figures(outcome), table, *filter(None, said), f"Results in {folder}")
+    folder, said = out / chosen.name, [outcome.run.note] if outcome.run and outcome.run.note else []
+    answer(quiet, as_json, figures(outcome, out), table, *said, folder=folder)
     if outcome.error:
         raise HarnessError(f"{outcome.error}; what it computed until then is in {folder}")
 
@@ -89,15 +89,15 @@ def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], out: Path,
 
     with progress(quiet or as_json, 1) as report:
         wanted = Specification(path, values=dict(map(assigned, values)), even=EVEN, **how)
-        found, folder, said = perform_run(wanted, out, partial(report, path.stem))
-    ends = {name: column[-1].item() for name, column in found.columns.items()}
-    if as_json:
-        tell({"fmu": found.name, "note": found.note, "failed": found.failed, "final": ends, "folder": str(folder)})
-    elif not quiet:
-        for name, value in ends.items():
-            first = found.columns[name][0].item()
-            click.echo(f"{heading(name, found.units[name])}: from {shown(first)} to {shown(value)}")
-        click.echo("\n".join(filter(None, [found.note, *said, f"Results in {folder}"])))
+        found, folder = perform_run(wanted, out, partial(report, path.stem))
+    ends = {name: column[[0, -1]].tolist() for name, column in found.columns.items()}
+    final = {name: last for name, (_, last) in ends.items()}
+    told = {"fmu": found.name, "note": found.note, "failed": found.failed, "final": final, "folder": folder}
+    said = [
+        f"{heading(name, found.units[name])}: from {shown(first)} to {shown(last)}"
+        for name, (first, last) in ends.items()
+    ]
+    answer(quiet, as_json, told, *said, *filter(None, [found.note]), folder=folder)
     if found.failed:
         raise HarnessError(f"{found.failed}; what it computed until then is in {folder}")
 
@@ -107,6 +107,9 @@ def shown(value: float | str) -> str:
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def figures(outcome: Any) -> dict[str, object]:
+def figures(outcome: Any, out: Path) -> dict[str, object]:
     """What a scene gave, for JSON."""
-    return {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error, "said": outcome.said}
+    from ..results.provenance import replaced
+
+    told = {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error}
+    return told | {"replaced": replaced(out / outcome.name)}

@@ -23,15 +23,16 @@ def stability(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool) ->
       python -m harness stability
       python -m harness stability stickslip path/to/belt.py
     """
+    from ..results.provenance import named
     from ..studies.stability import table as tables
     from ..studies.stability.study import FOLDER, all_cases, survey
 
     chosen = all_cases(models=models)
     with progress(quiet or as_json, sum(map(len, chosen))) as report:
-        rows, regions = survey(out, report, chosen)
+        rows, regions = survey(out, report, chosen, named(*models))
     told = [{"scene": row.case.label, "well": row.well, "ended": row.ended} for row in rows]
     shown = (tables.endings(rows), "", tables.refusals(rows), "", tables.summary(rows, regions))
-    answer(quiet, as_json, told, *shown, f"Results in {out / FOLDER}")
+    answer(quiet, as_json, told, *shown, folder=out / FOLDER)
     wrong = [f"{row.case.label}: {row.text}" for row in rows if not row.well]
     if wrong:
         raise HarnessError("\n".join(wrong))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import LONGEST, HarnessError
-from .terminal import anyones, progress, results, tell
+from .terminal import answer, anyones, progress, results
 
 if TYPE_CHECKING:
     from ..studies.sweep.file import Swept
@@ -72,16 +72,13 @@ def sweep(
     asked = sweep_file.Asked(model, vary, values, random, seed, measures, name, options)
     with progress(quiet or as_json, 1) as report:
         swept = sweep_file.carry_out(asked, out, scheduler, workers, partial(report, model))
-    if as_json:
-        tell(swept)
-    elif not quiet:
-        fresh = swept.runs - swept.before
-        click.echo(f"{swept.runs} runs, {swept.before} of them done before, {swept.failed} failed")
-        if swept.damaged:
-            click.echo(f"{swept.damaged} damaged lines of the earlier sweep's journal were left out, and run again")
-        if fresh:
-            click.echo(f"{fresh} runs in {swept.seconds:.3g} s: {fresh / swept.seconds:.4g} runs/s")
-        click.echo(f"Results in {swept.folder}")
+    fresh = swept.runs - swept.before
+    shown = [f"{swept.runs} runs, {swept.before} of them done before, {swept.failed} failed"]
+    if swept.damaged:
+        shown.append(f"{swept.damaged} damaged lines of the earlier sweep's journal were left out, and run again")
+    if fresh:
+        shown.append(f"{fresh} runs in {swept.seconds:.3g} s: {fresh / swept.seconds:.4g} runs/s")
+    answer(quiet, as_json, swept, *shown, folder=swept.folder)
     if swept.failed:
         raise HarnessError("\n".join(told(swept)))
 

@@ -123,8 +123,9 @@ def tell(result: Any) -> None:
     click.echo(as_text(result))
 
 
-def answer(quiet: bool, as_json: bool, result: Any, *shown: Any) -> None:
-    """Print a result as JSON, or, unless all is to be quiet, the tables and sentences that people are shown."""
+def answer(quiet: bool, as_json: bool, result: Any, *shown: Any, folder: Path | None = None) -> None:
+    """Print a result as JSON, or, unless all is to be quiet, the tables and sentences that people are shown; last what
+    is said of the older result in its folder, and where that is."""
     from rich.console import Console
 
     if as_json:
@@ -133,3 +134,7 @@ def answer(quiet: bool, as_json: bool, result: Any, *shown: Any) -> None:
         console = Console(markup=False, highlight=False)  # units and names have brackets, too
         for each in shown:
             console.print(each)
+        if folder:
+            from ..results.provenance import replaced
+
+            console.print("\n".join(filter(None, (replaced(folder), f"Results in {folder}"))))

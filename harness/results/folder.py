@@ -13,7 +13,7 @@ import ctypes
 import os
 import re
 import sys
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
@@ -22,7 +22,7 @@ from tempfile import mkdtemp
 
 from ..errors import HarnessError
 from ..process.interrupt import later
-from .provenance import FILE, load
+from .provenance import FILE, load, succeed
 
 if sys.platform != "win32":
     import fcntl
@@ -33,8 +33,9 @@ AT_FDCWD, RENAME_EXCHANGE, RENAME_SWAP = -100, 2, 2  # of Linux and macOS
 
 
 @contextmanager
-def replacing(folder: Path, ours: Collection[str], source: str = "") -> Iterator[Path]:
+def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[Path]:
     """A new folder beside `folder` to write into; it takes its place if nothing is raised, and is removed otherwise.
+    Its account tells what was there before, by the first of the files that are `ours`.
 
     Refused with HarnessError if the old folder is a link, holds a file not named in `ours`, which would be lost, or,
     unless that is what the user wants, a result of another `source`.
@@ -53,6 +54,7 @@ def replacing(folder: Path, ours: Collection[str], source: str = "") -> Iterator
         with later():
             fresh, lock = begun(folder)
         yield fresh
+        succeed(folder, fresh, ours[0])
         swap(fresh, folder)
     except OSError as error:
         raise HarnessError(f"cannot write {folder}: {error.strerror or error}; choose another --out") from None

@@ -16,6 +16,7 @@ from .files import as_text
 
 FILE = "provenance.json"
 HARNESS = "friction-fmus"
+REPLACED = "replaced"
 IMPLIED = {"values", "name", "file", "source"}  # of a scene: in its parameters, or in what it was made from
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 
@@ -43,6 +44,11 @@ def record(
         "scene": scene,
     }
     (folder / name).write_text(as_text(told) + "\n", encoding="utf-8")
+
+
+def of_each(parts: Mapping[str, Parameters]) -> Parameters:
+    """The parameters of several parts, each by the name of its own before it."""
+    return {f"{part}: {name}": told for part, each in parts.items() for name, told in each.items()}
 
 
 def named(*sources: str) -> str:
@@ -82,23 +88,36 @@ def whole(told: dict[str, Any]) -> bool:
     return texts and tables and all(isinstance(each, dict) and len(each) == 2 for each in told["parameters"].values())
 
 
-def since(older: Path, fresh: Path, file: str) -> tuple[str, ...]:
-    """What a fresh result says of the older one whose place it takes: what that was made with, if it was not the same,
-    and whether a file of both is the same."""
+def succeed(older: Path, fresh: Path, file: str) -> None:
+    """Let the account of a fresh result tell of the older one whose place it takes: what that was made with, if it was
+    not the same; otherwise, of a scene, whether the file of both is the same."""
     before, after = load(older), load(fresh)
-    if not before:
-        return ()
+    if not before or not after:
+        return
     had = [worded(name, **each) for name, each in before["parameters"].items() if each != after["parameters"].get(name)]
-    scene = before["scene"] or {}
-    kept = [name for name in scene if name in IMPLIED or scene[name] == after["scene"].get(name)]
-    had += [f"{name} = {value}" if value else f"no {name}" for name, value in scene.items() if name not in kept]
+    scene, now = before["scene"] or {}, after["scene"] or {}
+    kept = [name for name in scene if name in IMPLIED or scene[name] == now.get(name)]
+    had += [option(name, value) for name, value in scene.items() if name not in kept]
     had += [f"another {name}" for name, told in before["files"].items() if told != after["files"].get(name)]
     if had:
-        return (f"It takes the place of the result of {before['date']}, which had {', '.join(sorted(had))}.",)
-    same = (older / file).is_file() and digest(older / file) == digest(fresh / file)
-    return (
-        f"The result of {before['date']} was {'the same, bit for bit' if same else 'not the same to the last bit'}.",
-    )
+        sentence = f"It takes the place of the result of {before['date']}, which had {', '.join(sorted(had))}."
+    elif scene:
+        same = (older / file).is_file() and digest(older / file) == digest(fresh / file)
+        told = "the same, bit for bit" if same else "not the same to the last bit"
+        sentence = f"The result of {before['date']} was {told}."
+    else:
+        return
+    (fresh / FILE).write_text(as_text(after | {REPLACED: sentence}) + "\n", encoding="utf-8")
+
+
+def option(name: str, value: object) -> str:
+    """What was asked, in words."""
+    return name if value is True else f"{name} = {value}" if value else f"no {name}"
+
+
+def replaced(folder: Path) -> str:
+    """What a result says of the one whose place it took; empty where there was none."""
+    return str(load(folder).get(REPLACED, ""))
 
 
 def trusted(folder: Path) -> dict[str, Any]:

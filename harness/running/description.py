@@ -10,6 +10,7 @@ from fmpy.model_description import ValidationError
 
 from ..errors import HarnessError, SceneError, reason
 from ..scenes.fmus import check_built
+from .values import in_force, unit
 
 MOST = 50  # faults that are told
 
@@ -34,6 +35,12 @@ def description(path: Path, lenient: bool = False) -> Any:
     if found is None:
         raise HarnessError(f"{path.name} is an FMU of FMI {old}; FMI 2.0 and 3.0 are run here: export it anew as one")
     return found
+
+
+def parameters(fmu: Path) -> dict[str, tuple[object, str]]:
+    """The start value of every parameter of an FMU, and its unit."""
+    found = [each for each in description(fmu, lenient=True).modelVariables if each.causality == "parameter"]
+    return {each.name: (in_force(each, each.start), unit(each)) for each in found}
 
 
 def version(path: Path) -> str:

@@ -1,5 +1,6 @@
 """What a variable of an FMU takes: numbers, truths, enumerations by label, texts, and arrays of them; and its unit."""
 
+from contextlib import suppress
 from math import prod
 from typing import Any
 
@@ -73,6 +74,15 @@ def bound(variable: Any, which: str) -> float | None:
     """A bound from the XML, if there is one, of the variable or of its type."""
     text = getattr(variable, which) or getattr(variable.declaredType, which, None)
     return None if text is None else float(text)
+
+
+def in_force(variable: Any, value: Any) -> Any:
+    """A parameter's value as a result tells it: a number, a label or a text."""
+    if variable.type == "Enumeration":
+        return labels(variable).get(int(value), value) if value is not None else value
+    with suppress(TypeError, ValueError):
+        return float(value) if isinstance(value, str) and variable.type != "String" else value
+    return value
 
 
 def labels(variable: Any) -> dict[int, str]:

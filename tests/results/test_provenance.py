@@ -62,7 +62,7 @@ def test_every_parameter_in_force_is_told_with_its_unit(here, model):
 
 def test_a_comparison_tells_the_parameters_of_both_sides(here):
     assert harness(here, "compare", "fmus/smd.fmu", "smd").returncode == 0
-    found = told(here / "results/compare/smd-smd")["parameters"]
+    found = told(here / "results/compare/fmus-smd-scene-smd")["parameters"]
     assert found["one: c"] == found["two: c"] == {"value": 2.0, "unit": "N.s/m"}
 
 
@@ -164,6 +164,9 @@ def test_a_result_whose_fmu_has_changed_or_gone_is_not_made_again_as_if_it_were_
     assert files(here / "results/mine") == before
 
 
+ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
+
+
 @pytest.mark.parametrize(
     ("first", "second", "folder"),
     [
@@ -172,11 +175,12 @@ def test_a_result_whose_fmu_has_changed_or_gone_is_not_made_again_as_if_it_were_
         (("run", "a/mine.toml"), ("run", "b/mine.toml"), "mine"),
         (("run", "--fmu", "fmus/smd.fmu"), ("run", "--fmu", "a/smd.fmu"), "smd"),
         (("decay", "coulomb"), ("decay", "a/coulomb.csv"), "decay/coulomb"),
-        (("compare", "fmus/smd.fmu", "fmus/smd.fmu"), ("compare", "fmus/smd.fmu", "a/smd.fmu"), "compare/smd-smd"),
+        (("compare", "smd", "a/smd.fmu"), ("compare", "smd", "b/a/smd.fmu"), "compare/scene-smd-a-smd"),
+        (("sweep", "a/smd.fmu", *ONCE), ("sweep", "b/smd.fmu", *ONCE), "sweep/c"),
     ],
 )
 def test_a_result_of_something_else_is_replaced_only_by_the_word_for_it(here, fmus, first, second, folder):
-    for place in ("a", "b"):
+    for place in ("a", "b", "b/a"):
         (here / place).mkdir()
         (here / place / "mine.toml").write_text(MINE)
         shutil.copy(fmus / "smd.fmu", here / place)
@@ -201,8 +205,22 @@ def test_a_result_of_other_values_is_not_replaced_in_silence(here):
     (here / "mine.toml").write_text(MINE.replace("3.0", "4.0").replace("1.0", "2.0"))
     said = harness(here, "run", "mine.toml", COLUMNS="200").stdout
     assert re.search(r"It takes the place of the result of [-\dT:+]+, which had c = 3.0 N.s/m, .*stop = 1.0", said)
-    assert harness(here, "run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.25").returncode == 0
-    assert "which had f = 0.25 N" in harness(here, "run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.5").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "older", "newer", "had"),
+    [
+        (("run", "--fmu", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),
+        (("decay", "coulomb"), (), ("--no-drag", "--until", "3"), "drag, no end"),
+        (("compare", "fmus/coulomb.fmu", "smd"), ("--stop", "2"), (), "stop = 2.0"),
+        (("sweep", "smd", *ONCE), ("--set", "m=2"), (), "m = 2.0 kg"),
+    ],
+)
+def test_a_result_of_other_options_is_not_replaced_in_silence(here, arguments, older, newer, had):
+    assert harness(here, *arguments, *older).returncode == 0
+    done = harness(here, *arguments, *newer, COLUMNS="200")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.search(rf"It takes the place of the result of [-\dT:+]+, which had {had}\b", done.stdout)
 
 
 @pytest.mark.parametrize("content", ["", "[]", "{}", '{"command": 1}', None])

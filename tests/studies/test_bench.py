@@ -9,6 +9,7 @@ import pytest
 from native_fmus import built as native_built
 
 from harness.errors import HarnessError
+from harness.results.provenance import load
 from harness.running.clock import best
 from harness.studies.bench import in_c, native
 from harness.studies.bench import speed as bench_speed
@@ -99,8 +100,10 @@ def test_a_peer_is_told_as_a_multiple_and_a_missing_one_by_name():
     assert numbers([FAST]).row_count == 1
 
 
-def test_the_csv_holds_every_number(tmp_path):
+def test_the_csv_holds_every_number_and_the_account_every_parameter(tmp_path, place, monkeypatch):
+    monkeypatch.chdir(place)
     bench([lambda: FAST], tmp_path, lambda name, share: None)
+    assert load(tmp_path / FOLDER)["parameters"]["smd: c"] == {"value": 2.0, "unit": "N.s/m"}
     with (tmp_path / FOLDER / FILE).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [(row["measured"], row["its value"]) for row in rows] == [("2e-06", "5e-06"), ("2e-06", "")]

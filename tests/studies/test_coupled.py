@@ -75,6 +75,10 @@ def test_two_equal_masses_swing_against_each_other_as_their_closed_form_says(cou
     assert {file.name for file in folder.iterdir()} == {
         *("mine.ssp", "trajectory.csv", "error.csv", "engines.csv", "figure.svg", "provenance.json")
     }
+    values = json.loads((folder / "provenance.json").read_text())["parameters"]
+    told = {name: values[name]["value"] for name in ("a.c", "a.x0", "b.x0", "spring_a_b.k")}
+    assert told == {"a.c": 0.0, "a.x0": 0.1, "b.x0": -0.1, "spring_a_b.k": 40.0}
+    assert values["a.k"] == {"value": 157.9, "unit": "N/m"}
     table = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1)
     expected = [0.1 * cos(sqrt(157.9 + 80.0) * t) for t in table[:, 0]]
     assert table[:, 3] == pytest.approx(expected, abs=1e-9)

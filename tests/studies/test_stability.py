@@ -17,6 +17,7 @@ from builds import of_file
 from models import AUTHORED, LARGER, MODELS, ROOT, declared
 
 from harness.errors import HarnessError
+from harness.results.provenance import load
 from harness.running.probe import Counts, Motion, Refusal, Refusals
 from harness.studies.stability.bounded import bounded
 from harness.studies.stability.cases import Trial, scenes, spans, spread
@@ -217,6 +218,9 @@ def test_a_part_of_the_table_ends_as_it_should(place, tmp_path, monkeypatch):
     assert {row.case.model for row in rows} == set(MODELS)
     with (tmp_path / "stability" / "stability.csv").open(encoding="utf-8", newline="") as file:
         assert len(list(csv.DictReader(file))) == len(rows) > 100
+    told = load(tmp_path / "stability")["parameters"]
+    assert told["pendulum: theta0"]["unit"] == "rad"
+    assert {name.partition(":")[0] for name in told} == set(MODELS)
     assert region.method == "rodas"
     assert region.stiff.tolist() == [0.1, 0.03]
     assert endings(rows).row_count > 20

@@ -20,7 +20,7 @@ from ...process.room import room
 from ..run import Run
 from ..specification import Specification
 from ..unpacked import unpacked
-from ..values import accepted, labels, unit
+from ..values import accepted, in_force, unit
 from .request import ANSWER, COARSEST, HUNG, ROWS, SAID, SHARE, TEXTS, Answer, Request
 from .rows import RECORDED, Rows, Shaped, elements, read
 
@@ -202,12 +202,3 @@ def result(
         note="; ".join(filter(None, (note, prints))),
         failed=failed,
     )
-
-
-def in_force(variable: Any, value: Any) -> Any:
-    """A parameter's value as a result tells it: a number, a label or a text."""
-    if variable.type == "Enumeration":
-        return labels(variable).get(int(value), value) if value is not None else value
-    with suppress(TypeError, ValueError):
-        return float(value) if isinstance(value, str) and variable.type != "String" else value
-    return value

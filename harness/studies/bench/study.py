@@ -5,7 +5,8 @@ from pathlib import Path
 
 from ...results.files import write_rows
 from ...results.folder import replacing
-from ...results.provenance import record
+from ...results.provenance import of_each, record
+from ...running.description import parameters
 from ...scenes.fmus import fmu_of
 from ...truths.reference import MODELS
 from ...truths.truth import check
@@ -32,7 +33,8 @@ def bench(chosen: list[Callable[[], Measure]], out: Path, report: Callable[[str,
             found.append(measure())
             report(found[-1].what, 1.0)
         save(found, folder / FILE)
-        record(folder, map(fmu_of, MODELS))
+        fmus = [fmu for fmu in map(fmu_of, MODELS) if fmu.is_file()]
+        record(folder, fmus, of_each({fmu.stem: parameters(fmu) for fmu in fmus}))
     return found
 
 

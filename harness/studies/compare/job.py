@@ -1,5 +1,6 @@
 """Runs and comparisons of anyone's FMUs and results, in folders of results."""
 
+from dataclasses import replace
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from rich.table import Table
 
 from ...results.files import as_text
 from ...results.folder import replacing
-from ...results.provenance import named, record
+from ...results.provenance import named, of_each, record
 from ...running.fmu import Report
 from ...running.specification import Specification
 from . import trajectory
@@ -21,15 +22,17 @@ def perform_compare(sources: tuple[str, str], how: Specification, out: Path, rep
     `how` says how FMUs are run."""
     from .figure import draw
 
-    one, two = trajectory.both(sources, how, report)
-    found = compare(one, two)
-    folder = out / "compare" / f"{one.name}-{two.name}"
+    names = trajectory.names(sources)
+    folder = out / "compare" / "-".join(names).replace("/", "-")
     with replacing(folder, ("compare.json", "figure.svg"), named(*sources)) as fresh:
+        one, two = (
+            replace(each, name=name) for each, name in zip(trajectory.both(sources, how, report), names, strict=True)
+        )
+        found = compare(one, two)
         (fresh / "compare.json").write_text(as_text(numbers(found)) + "\n", encoding="utf-8")
         draw(found, fresh / "figure.svg")
-        sides = (("one", one), ("two", two))
-        values = {f"{side}: {name}": told for side, each in sides for name, told in each.parameters.items()}
-        record(fresh, [each.file for each in (one, two) if each.file], values, source=named(*sources))
+        values = of_each({"one": one.parameters, "two": two.parameters})
+        record(fresh, [each.file for each in (one, two) if each.file], values, how, source=named(*sources))
     return found, folder
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from os.path import abspath
 from pathlib import Path
 
 import numpy as np
@@ -29,13 +30,22 @@ def both(sources: tuple[str, str], how: Specification, report: Report) -> tuple[
     stops = {stop_of(each) for each in runs if each} | {float(each.time[-1]) for each in found if each}
     stop = how.stop if None in stops or len(stops) == 1 else min(filter(None, stops))
     sides = []
-    for each, asked, source in zip(found, runs, sources, strict=True):
+    for each, asked in zip(found, runs, strict=True):
         if asked:
             asked = replace(asked, grid=grid or asked.grid, even=POINTS, stop=stop if how.stop is None else how.stop)
-            each = replace(of_run(run(asked, report)), name=Path(source).stem if source.endswith(SUFFIXES) else source)
+            each = of_run(run(asked, report))
         assert each
         sides.append(each)
     return sides[0], sides[1]
+
+
+def names(sources: tuple[str, str]) -> list[str]:
+    """What two sources are called; where they are called alike, with the folders or endings in which they differ."""
+    paths = [Path(abspath(each)) if Path(each).exists() else Path("scene", each) for each in sources]
+    plain = [each if each.is_dir() or each.parts[0] == "scene" else each.with_suffix("") for each in paths]
+    one, two = (each.parts for each in (plain if plain[0] != plain[1] else paths))
+    apart = next((k for k, ends in enumerate(zip(one[::-1], two[::-1], strict=False), 1) if ends[0] != ends[1]), 1)
+    return ["/".join(parts[-apart:]) for parts in (one, two)]
 
 
 def wanted(source: str, how: Specification) -> Specification:

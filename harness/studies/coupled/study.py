@@ -60,7 +60,8 @@ def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple
             found = study(asked, file, solver(scene, defaults) if scene else None, report)
             save(found, fresh)
             draw(found, fresh / "figure.svg")
-            record(fresh, fmus, scene=scene, source=named(source))
+            told = {"stop": found.stop} | (vars(scene) if scene else {})
+            record(fresh, fmus, theirs.in_force(file), told, source=named(source))
     return found, folder
 
 

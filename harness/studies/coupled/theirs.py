@@ -1,6 +1,7 @@
 """An SSP archive that somebody else wrote: what can be read of it, and in which steps it is run."""
 
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 from shutil import copy
 from typing import Any
@@ -11,8 +12,8 @@ from pyssp_standard.ssp import SSP
 from pyssp_standard.ssv import SSV
 
 from ...errors import HarnessError, SceneError, reason
-from ...running.description import description
-from ...running.values import REALS, unit
+from ...running.description import description, parameters
+from ...running.values import REALS, element, unit
 from .convergence import Convergence
 
 COARSEST, HALVINGS = 100, 4  # communication steps of the first run
@@ -27,9 +28,12 @@ def asked(source: Path, file: Path, stop: float | None) -> Convergence:
     try:
         with SSP(file, mode="r") as archive, archive.system_structure as structure:
             system, experiment = structure.system, structure.default_experiment
-            parts = [each for each in system.elements if isinstance(each, Component)]
-            found = [(each.name, variable) for each in parts for variable in outputs(each, archive.unpacked_path)]
-            values = bound(system, archive.unpacked_path)
+            found = [
+                (each.name, variable)
+                for each in components(system)
+                for variable in outputs(each, archive.unpacked_path)
+            ]
+            sets = [name for part in (system, *components(system)) for name, _ in bound(part, archive.unpacked_path)]
     except (OSError, KeyError, ValueError, AttributeError, zipfile.BadZipFile, etree.LxmlError) as error:
         raise HarnessError(f"{source.name} cannot be read: {reason(error)}") from None
     end = stop if stop is not None else experiment and experiment.stop_time
@@ -45,7 +49,7 @@ def asked(source: Path, file: Path, stop: float | None) -> Convergence:
         steps=tuple(float(end) / COARSEST / 2**i for i in range(HALVINGS + 1)),
         stop=float(end),
         reference="finest run",
-        values=values,
+        values=sets[0] if sets else "",
     )
 
 
@@ -56,12 +60,32 @@ def outputs(part: Component, folder: Path) -> list[Any]:
     return [each for each in variables if each.name in named and each.type in REALS]
 
 
-def bound(system: Any, folder: Path) -> str:
-    """The name of the first set of parameters that an archive binds; empty if there is none."""
-    for element in (system, *system.elements):
-        for binding in getattr(element, "parameter_bindings", None) or ():
-            if binding.ssv is not None:
-                return str(binding.ssv.name)
-            with SSV(folder / binding.source, mode="r") as table:
-                return str(table.ssv_elem.name)
-    return ""
+def components(system: Any) -> list[Component]:
+    return [each for each in system.elements if isinstance(each, Component)]
+
+
+def bound(part: Any, folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The name of each set of parameters that a part of an archive binds, and the values in it."""
+    for binding in part.parameter_bindings or ():
+        if binding.ssv is not None:
+            table = binding.ssv
+        else:
+            with SSV(folder / binding.source, mode="r") as file:
+                table = file.ssv_elem
+        values = {each["name"]: each["type_value"].parameter.get("value", "") for each in table.parameters}
+        yield str(table.name), {f"{binding.prefix or ''}{name}": value for name, value in values.items()}
+
+
+def in_force(file: Path) -> dict[str, tuple[object, str]]:
+    """Every parameter of the components of an archive, as its sets say, those of the whole last, and its unit."""
+    with SSP(file, mode="r") as archive, archive.system_structure as structure:
+        folder, parts = archive.unpacked_path, components(structure.system)
+        found = {
+            f"{each.name}.{name}": told for each in parts for name, told in parameters(folder / each.source).items()
+        }
+        for part, own in [*((each, f"{each.name}.") for each in parts), (structure.system, "")]:
+            for _, values in bound(part, folder):
+                for name, value in values.items():
+                    if own + name in found:
+                        found[own + name] = element(value), found[own + name][1]
+    return found

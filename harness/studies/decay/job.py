@@ -4,7 +4,6 @@ import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
-from functools import partial
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -26,7 +25,7 @@ FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
 
 
-Loaded = tuple[Record, Known, Callable[..., None]]  # and what writes into a folder where they come from
+Loaded = tuple[Record, Known, dict[str, Any]]  # and what their account tells: files, parameters, scene
 
 
 def perform(
@@ -39,13 +38,14 @@ def perform(
     report: Callable[[float], None],
 ) -> tuple[Identified, Path]:
     """Identify the decay of a record's file or of a scene; results go to out/decay/<name>."""
-    record, known, told = load_record(source, columns, known, report)
-    found = identify(record, known, drag, drift, report)
+    record, force, told = load_record(source, columns, known, report)
+    scene = told.pop("scene", {}) | vars(columns) | vars(known) | {"drag": drag, "drift": drift}
+    found = identify(record, force, drag, drift, report)
     folder = out / FOLDER / record.name
     named = provenance.named(source)
     with replacing(folder, FILES, named) as fresh:
         save(found, fresh)
-        told(fresh, source=named)
+        provenance.record(fresh, **told, scene=scene, source=named)
     return found, folder
 
 
@@ -65,10 +65,10 @@ def load_record(source: str, columns: Columns, known: Known, report: Callable[[f
     """The record of a file, or of a run of a scene together with the stiffness that its model has."""
     path = Path(source)
     if source == "-":
-        return read(source, columns, "stdin"), known, partial(provenance.record, files=())
+        return read(source, columns, "stdin"), known, {"files": ()}
     if path.suffix.lower() != ".toml" and (path.is_file() or path.suffix):
         name = path.stem.encode("utf-8", "replace").decode()
-        return read(source, columns, name), known, partial(provenance.record, files=(path,))
+        return read(source, columns, name), known, {"files": (path,)}
     if path.is_dir():
         raise SceneError(f"{source} is a folder; name a file in it")
     return recorded(source, columns, known, report)
@@ -89,7 +89,7 @@ def recorded(source: str, columns: Columns, known: Known, report: Callable[[floa
     unit = run.units[scene.motion["position"]]
     record = Record(scene.name, run.time, run.motion("position"), unit, 0, unit).between(columns.begin, columns.end)
     check(record)
-    told = partial(provenance.record, files=(scene.file,), parameters=run.in_force, scene=scene)
+    told = {"files": (scene.file,), "parameters": run.in_force, "scene": vars(scene)}
     if known.k is None and known.m is None:
         names = ("m", "g", "a") if unit == "rad" else ("k",)
         try:

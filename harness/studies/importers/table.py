@@ -11,7 +11,8 @@ from rich.table import Table
 from ...errors import HarnessError
 from ...results.files import write_rows
 from ...results.folder import replacing
-from ...results.provenance import record
+from ...results.provenance import named, of_each, record
+from ...running.description import parameters
 from .checks import CHECKS, ELSEWHERE, IMPORTERS, Importer, Subject, Wrong, absent, play, subject
 
 WORKERS = 2
@@ -28,6 +29,16 @@ class Checked:
     failed: tuple[str, ...] = ()
     reason: str = ""
     fmus: tuple[str, ...] = ()
+
+
+def perform(fmus: Path, out: Path, report: Callable[[str, float], None]) -> list[Checked]:
+    """Ask about the FMUs in a folder, and write the rows to out/importers/importers.csv."""
+    with replacing(out / FOLDER, FILES, named(str(fmus))) as folder:
+        found = rows(fmus, report)
+        save(found, folder / FILES[0])
+        files = [fmus / f"{name}.fmu" for name in models(found)]
+        record(folder, files, of_each({file.stem: parameters(file) for file in files}), source=named(str(fmus)))
+    return found
 
 
 def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
@@ -84,11 +95,9 @@ def models(found: list[Checked]) -> tuple[str, ...]:
     return next((row.fmus for row in found if row.fmus), ())
 
 
-def save(found: list[Checked], fmus: Path, out: Path) -> None:
-    """Write the rows on the FMUs in a folder to out/importers/importers.csv."""
+def save(found: list[Checked], path: Path) -> None:
+    """Write the rows as CSV."""
     names = models(found)
     nothing = ("",) * len(names)
     rows = ((row.importer, row.check or f"not asked: {row.reason}", *(row.cells or nothing)) for row in found)
-    with replacing(out / FOLDER, FILES) as folder:
-        write_rows(folder / FILES[0], ["importer", "check", *names], rows)
-        record(folder, [fmus / f"{name}.fmu" for name in names])
+    write_rows(path, ["importer", "check", *names], rows)

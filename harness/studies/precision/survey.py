@@ -10,6 +10,7 @@ from shutil import copytree, ignore_patterns
 from ...results.files import heading, write_rows
 from ...results.folder import keep, replacing
 from ...results.provenance import record
+from ...running.description import parameters
 from ...running.inside import embedded
 from ...scenes.fmus import check_built, fmu_of
 from ...truths.peers import missing
@@ -96,7 +97,8 @@ def write(found: Survey, files: Sequence[Path], folder: Path, source: str) -> No
     from .figure import draw
 
     for each, file, sentence in zip(found.studies, files, found.advice, strict=True):
-        record(folder, [file], name=f"{each.model}.json", source=source)
+        values = {case.name: case.values for case in each.cases}
+        record(folder, [file], parameters(file), values, f"{each.model}.json", source)
         (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
         save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
         exchanged = each.exchanged()

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...results.folder import replacing
-from ...results.provenance import named, record, since
+from ...results.provenance import named, record
 from ...running.any_fmu import run
 from ...running.fmu import Report
 from ...running.specification import Specification
@@ -12,8 +12,8 @@ from ...scenes.scene import usual
 from .job import FILES
 
 
-def perform_run(wanted: Specification, out: Path, report: Report) -> tuple[Trajectory, Path, tuple[str, ...]]:
-    """Run an FMU, and write its outputs to out/<name of the file>; last, what is said of the older result there."""
+def perform_run(wanted: Specification, out: Path, report: Report) -> tuple[Trajectory, Path]:
+    """Run an FMU, and write its outputs to out/<name of the file>."""
     from .figure import draw
 
     folder, source = out / wanted.model, named(str(wanted.fmu))
@@ -23,5 +23,4 @@ def perform_run(wanted: Specification, out: Path, report: Report) -> tuple[Traje
         found.save(fresh / FILES[0])
         draw(wanted.fmu.name, usual(tuple(found.columns)), done, {}, fresh / "figure.svg")
         record(fresh, [wanted.fmu], found.parameters, wanted, source=source)
-        said = since(folder, fresh, FILES[0])
-    return found, folder, said
+    return found, folder

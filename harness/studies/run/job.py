@@ -12,7 +12,7 @@ from typing import Any
 from ...errors import HarnessError, SceneError, unknown
 from ...process.interrupt import check
 from ...results.folder import replacing
-from ...results.provenance import record, since
+from ...results.provenance import record
 from ...results.quantity import Quantity
 from ...running import any_fmu
 from ...running.run import Run
@@ -49,8 +49,7 @@ def perform(scene: Scene, out: Path, report: Callable[[float], None]) -> Outcome
     """Run, analyse and write results to out/<scene>; HarnessError leaves older results as they are."""
     try:
         with replacing(out / scene.name, FILES, scene.source) as folder:
-            outcome = fill(scene, folder, report)
-            return replace(outcome, said=since(out / scene.name, folder, FILES[0]))
+            return fill(scene, folder, report)
     except HarnessError as error:
         raise type(error)(f"scene {scene.name}: {error}") from None
 

@@ -9,12 +9,10 @@ from ...scenes.scene import Scene
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a scene: its measured quantities, or the sentence that says why there are none; and what is said
-    of the older result whose place it took."""
+    """What became of a scene: its measured quantities, or the sentence that says why there are none."""
 
     name: str
     scene: Scene | None
     run: Run | None
     quantities: tuple[Quantity, ...]
     error: str | None
-    said: tuple[str, ...] = ()

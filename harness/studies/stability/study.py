@@ -17,7 +17,8 @@ import numpy as np
 from ...errors import HarnessError
 from ...results.files import write_rows
 from ...results.folder import replacing
-from ...results.provenance import record
+from ...results.provenance import of_each, record
+from ...running.description import parameters
 from ...running.inside import embedded
 from ...running.probe import Card, Motion, Refusal, Refusals, card, poison, run
 from ...scenes.fmus import check_built, fmu_of
@@ -33,17 +34,19 @@ FOLDER, FILES = "stability", ("stability.csv", "region.svg")
 
 
 def survey(
-    out: Path, report: Callable[[str, float], None], chosen: list[list[Trial]]
+    out: Path, report: Callable[[str, float], None], chosen: list[list[Trial]], source: str = ""
 ) -> tuple[list[Ending], list[Region]]:
-    """Run the chosen groups of cases and write results to out/stability."""
+    """Run the chosen groups of cases and write results to out/stability; `source`: of whom, if not of all."""
     from .figure import draw
 
-    with replacing(out / FOLDER, FILES) as folder:
+    with replacing(out / FOLDER, FILES, source) as folder:
         rows = table(report, chosen)
         found = regions(rows)
         save(rows, folder / "stability.csv")
         draw(found, folder / "region.svg")
-        record(folder, [fmu_of(model) for model in dict.fromkeys(row.case.model for row in rows)])
+        fmus = {row.case.name: fmu_of(row.case.model) for row in rows}
+        values = of_each({name: parameters(fmu) for name, fmu in fmus.items()})
+        record(folder, fmus.values(), values, source=source)
     return rows, found
 
 

@@ -25,7 +25,7 @@ from ...errors import HarnessError, SceneError, unknown
 from ...results.files import heading
 from ...results.folder import replacing
 from ...results.netcdf import NetCDF, Variable
-from ...results.provenance import record
+from ...results.provenance import named, record
 from ...running.description import description
 from ...running.values import REALS, unit
 from ...scenes.assigned import assigned
@@ -110,10 +110,11 @@ def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, repo
     kept = sweep.journal(out / FOLDER)
     before = kept.done
     folder = out / FOLDER / (asked.name or "-".join((runs.model, *names, sweep.key[:8])))
-    with replacing(folder, FILES) as fresh:  # from before the runs on: a place that cannot be written is told at once
+    source = named(str(file))
+    with replacing(folder, FILES, source) as fresh:  # from before the runs on: what is in the way is told at once
         seconds = perform(sweep, kept, scheduler, workers, report)
         failures = save(sweep, kept, about, fresh)
-        record(fresh, [file], about.constants, asked)
+        record(fresh, [file], about.constants, asked, source=source)
     kept.forget()
     return Swept(len(points), folder, before, kept.damaged, failures, seconds)
 
