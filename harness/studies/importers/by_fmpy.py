@@ -17,21 +17,22 @@ from .request import Reply, Request, serve
 
 def play(request: Request, logged: tuple[str, ...] = ("",)) -> Reply:
     """The answer; of the log what begins so."""
-    with unpacked(Path(request.fmu)) as folder:
-        return played(request, str(folder), logged)
-
-
-def played(request: Request, folder: str, logged: tuple[str, ...]) -> Reply:
-    """The same from the FMU's files in a folder."""
     description = fmpy.read_model_description(request.fmu)
     callbacks = logging(logged)
-    instances = []
-    for name in request.instances:
-        identifier = description.coSimulation.modelIdentifier
-        instances.append(
-            fmi2.FMU2Slave(guid=description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=name)
-        )
-        instances[-1].instantiate(callbacks=callbacks, loggingOn=True)
+    with unpacked(Path(request.fmu)) as folder:
+        about = {
+            "guid": description.guid,
+            "modelIdentifier": description.coSimulation.modelIdentifier,
+            "unzipDirectory": str(folder),
+        }
+        instances = [fmi2.FMU2Slave(instanceName=name, **about) for name in request.instances]
+        for instance in instances:
+            instance.instantiate(callbacks=callbacks, loggingOn=True)
+        return played(request, instances, fmpy.__version__)
+
+
+def played(request: Request, instances: list[Any], version: str) -> Reply:
+    """The answer of instances, which are freed; `version` of the tool."""
     rows, accepted = run(request, instances, request.values, request.change)
     again: list[list[float]] = []
     if request.again:
@@ -40,7 +41,7 @@ def played(request: Request, folder: str, logged: tuple[str, ...]) -> Reply:
         again, _ = run(request, instances, {}, {})
     for instance in instances:
         instance.freeInstance()
-    return Reply(fmpy.__version__, rows, again, accepted)
+    return Reply(version, rows, again, accepted)
 
 
 def run(

@@ -10,7 +10,7 @@ from fmuloader.fmi2 import Fmi2Error, Fmi2Slave, Fmi2Status, Fmi2Type
 from ...running.description import description
 from ...running.fmu import FMICallException
 from ...running.unpacked import unpacked
-from .by_fmpy import run
+from .by_fmpy import played
 from .request import Reply, Request, serve
 
 
@@ -55,6 +55,9 @@ class Instance:
     def reset(self) -> None:
         self.call("reset")
 
+    def freeInstance(self) -> None:
+        self.slave.free_instance()
+
 
 def hear(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
     """Print the log."""
@@ -64,16 +67,7 @@ def hear(environment: Any, name: bytes, status: int, category: bytes, text: byte
 def play(request: Request) -> Reply:
     found = description(Path(request.fmu))
     with unpacked(Path(request.fmu)) as folder:
-        instances = [Instance(folder, found, name) for name in request.instances]
-        rows, accepted = run(request, instances, request.values, request.change)
-        again: list[list[float]] = []
-        if request.again:
-            for instance in instances:
-                instance.reset()
-            again, _ = run(request, instances, {}, {})
-        for instance in instances:
-            instance.slave.free_instance()
-    return Reply(version("fmuloader"), rows, again, accepted)
+        return played(request, [Instance(folder, found, name) for name in request.instances], version("fmuloader"))
 
 
 if __name__ == "__main__":
