@@ -1,5 +1,6 @@
 """Times in s from what loggers write: numbers, times of day, time stamps; also rounded ones."""
 
+import re
 from collections.abc import Sequence
 from datetime import datetime
 
@@ -8,6 +9,9 @@ import numpy as np
 from ..errors import SceneError
 
 DAY = 86400.0
+OTHERS = re.compile(r"^\d{1,4}[./]\d{1,2}[./]\d{1,4}[T ]\s*")  # days as 21.11.2026; midnight tells the next one
+HALF = re.compile(r"\s*([AP])M$", re.I)  # of a day
+THOUSANDTHS = re.compile(r"(:\d\d:\d\d):")  # of a second after a third colon
 ROUNDED = 0.51  # of the unit in the last place: how far a rounded time is off
 EVEN = 0.02  # of a step: uneven by less, times are what they are
 
@@ -27,14 +31,16 @@ def second(cell: str, name: str) -> float:
     if not cell:
         return np.nan
     try:
+        cell = OTHERS.sub("", cell)
+        half, cell = HALF.search(cell), HALF.sub("", cell)
         if "-" in cell[:8] or len(cell) > 16:
             stamp = datetime.fromisoformat(cell.replace(",", "."))
             naive = stamp.replace(tzinfo=None) - (stamp.utcoffset() or datetime.min - datetime.min)
             return (naive - datetime(2000, 1, 1)).total_seconds()
         total = 0.0
-        for part in cell.replace(",", ".").split(":"):
+        for part in THOUSANDTHS.sub(r"\1.", cell).replace(",", ".").split(":"):
             total = 60 * total + float(part)
-        return total
+        return total if half is None else total % (DAY / 2) + DAY / 2 * (half[1] in "Pp")
     except (ValueError, OverflowError):
         raise SceneError(
             f"{name}: '{cell}' is no time stamp; ISO 8601 is read, as in 2026-11-21T15:18:03.125"

@@ -15,14 +15,18 @@ from ..errors import SceneError, unknown
 from .clock import seconds, spread_evenly
 from .files import Cells, Table, load
 from .record import QUANTITIES, Record, check
-from .text import MISSING, STAMP
+from .text import GROUPED, MISSING, STAMP
 from .units import COUNTS, TIMES, known, per_count, time_size
 
 HEADING = re.compile(r"^\s*(.*?)\s*(?:[\[(]([^\[\]()]*(?:\([^()]*\))?)[\])])?\s*$")
 SLASHED = re.compile(r"^\s*(.*?)\s+(?:/|in)\s+(\S+)\s*$")
+INSIDE = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]+)[\])]\s*(.*)$")  # of which run follows, as in `x (mm) Run #1`
 CLOCK = re.compile(
-    r"^(t|time|times|zeit|temps|tiempo|tid|timestamp|datetime|date|elapsed|seconds)\b|time$|time[ _]s$|^t_", re.I
+    r"^(t|times?|zeit|temps|tiempo|tid|timestamp|datetime|date|elapsed|seconds|epoch)(?![^\W_])|(time|zeit|stamp)$",
+    re.I,
 )
+DATE = re.compile(r"^(date|datum)\b", re.I)
+LATE = 1e11  # s: the year 5138
 BY_NAME = (
     re.compile(
         r"^(x|y|z|s|theta|phi|pos|position|displacement|disp|angle|weg|winkel|laser|encoder|height|distance)\b", re.I
@@ -30,6 +34,7 @@ BY_NAME = (
     re.compile(r"^(v|vel|velocity|speed|omega|gyro|gyroscope|rate)\b|velocity|gyroscope|speed", re.I),
     re.compile(r"^(a|acc|accel|accelerometer|alpha|a[xyz])\b|acceleration|accelerometer|accel|^a_|^acc", re.I),
 )
+EXPONENT = re.compile("[dD](?=[-+0-9])")  # of Fortran
 LENGTH_ONLY = re.compile(r"\b(abs|absolute|magnitude|norm)\b", re.I)  # of a vector: it has no sign
 MOST_MISSING = 0.2  # share of the samples
 
@@ -54,16 +59,18 @@ def read(source: str, columns: Columns, name: str) -> Record:
     """The record in a file, from `columns.begin` to `columns.end` in s; SceneError in one sentence if it is not one."""
     table = load(source, columns.names)
     if len(table.heads) < 2:
-        raise SceneError(f"{table.name} has one column; time and position are needed")
+        raise SceneError(f"{table.name} has one column that is not empty; time and position are needed")
     if not any(table.heads):
         raise SceneError(f"{table.name} has no heading; name its columns, as in --columns 't [s],x [mm]'")
     parts = [split(head) for head in table.heads]
     i_t = time_column(table, parts, columns)
     i_x, notes = signal_column(table, parts, columns, i_t)
-    t = times(table, parts[i_t], i_t, columns)
     label, unit = parts[i_x][0] or table.heads[i_x], columns.unit or parts[i_x][1]
     x = numbers(table, i_x)
     order, base, size, guessed = measured(label, unit, columns, table.name)
+    t = times(table, parts[i_t], i_t, columns)
+    if columns.time is None and not (CLOCK.search(parts[i_t][0]) or parts[i_t][1]):
+        notes.append(f"{table.heads[i_t]} is taken for the time; --time takes another.")
     keep = np.isfinite(t) & np.isfinite(x)
     missing = int(len(t) - keep.sum())
     if missing > MOST_MISSING * len(t):
@@ -89,12 +96,20 @@ def numeric(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
 
 
 def split(head: str) -> tuple[str, str | None]:
-    """Name and unit of a heading."""
+    """Name and unit of a heading: x [mm], x / mm, x_mm, millis."""
     found = HEADING.match(head)
     name, unit = (found[1], found[2]) if found else (head, None)
-    slashed = SLASHED.match(name) if unit is None else None
-    if slashed and (known(slashed[2]) or time_size(slashed[2])):
-        return slashed[1], slashed[2]
+    if unit is None:
+        for found in (SLASHED.match(name), INSIDE.match(name)):
+            if found and (known(found[2]) or time_size(found[2])):
+                return " ".join(filter(None, (found[1], *found.groups()[2:]))), found[2]
+        words = re.split(r"[ _]+", name)
+        for i in range(1, len(words)):
+            first, last = " ".join(words[:i]), "/".join(words[i:])
+            if time_size(last) if CLOCK.search(first) else len(last) > 1 and last != "in" and known(last):
+                return first, last
+        if len(name) > 1 and name != "min" and time_size(name):
+            return name, name
     return name, unit or None
 
 
@@ -113,6 +128,7 @@ def time_column(table: Table, parts: Sequence[tuple[str, str | None]], columns: 
     if columns.time is not None:
         return place(columns.time, table, parts)
     named = [i for i, (name, _) in enumerate(parts) if CLOCK.search(name)]
+    named = [i for i in named if not DATE.search(parts[i][0])] or named
     measured = [i for i, (_, unit) in enumerate(parts) if unit and time_size(unit) and known(unit) is None]
     both = [i for i in named if i in measured]
     return (both or named or measured or [i for i, head in enumerate(table.heads) if head])[0]
@@ -126,6 +142,8 @@ def signal_column(
         return place(columns.position, table, parts), []
     others = [i for i in range(len(parts)) if i != i_t]
     others = [i for i in others if table.heads[i] and not CLOCK.search(parts[i][0])] or others
+    next_t = next((i for i in range(i_t + 1, len(parts)) if CLOCK.search(parts[i][0])), len(parts))
+    others = [i for i in others if i_t < i < next_t] or others  # of several runs beside each other that of this time
     kinds = {i: kind(*parts[i]) for i in others}
     if columns.quantity is not None:
         wanted: int | None = QUANTITIES.index(columns.quantity)
@@ -208,11 +226,18 @@ def times(table: Table, part: tuple[str, str | None], i: int, columns: Columns) 
     first = next((cell for cell in cells if isinstance(cell, str) and cell), None)
     if first is not None and ":" in first and STAMP.match(first):
         return seconds(cells, table.name)  # type: ignore[arg-type]
-    unit = columns.time_unit or part[1] or "s"  # s: every simulation program and nearly every instrument
-    size = time_size(unit)
-    if size is None:
+    unit = columns.time_unit or part[1]
+    size = time_size(unit or "s")  # s: every simulation program and nearly every instrument
+    if unit and not size:
         raise SceneError(unknown(f"unit of {part[0]}", unit, TIMES))
-    return numbers(table, i) * size
+    t = numbers(table, i)
+    some = t[np.isfinite(t)]
+    if unit is None and len(some) and ((some == np.round(some)).all() or some.max() > LATE):
+        raise SceneError(
+            f"{table.name}: {part[0]} has whole or huge numbers and no unit: say what one is, as in --time-unit ms, "
+            "s, or 0.01s of samples that are counted"
+        )
+    return t * size
 
 
 def numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
@@ -225,11 +250,17 @@ def numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
     except ValueError:
         pass
     found = np.full(len(cells), np.nan)
+    there = [cell for cell in cells if cell.lower() not in MISSING]
+    commas = [cell for cell in there if "," in cell]
+    thousands = len(commas) < len(there) and all(GROUPED.match(cell) and cell.strip("+-")[0] != "0" for cell in commas)
     for at, cell in enumerate(cells):
         if cell.lower() in MISSING:
             continue
+        grouped = GROUPED.match(cell)
+        if grouped and (grouped[2] or grouped[3] or grouped[1] == "'" or (grouped[1] == "," and thousands)):
+            cell = cell.replace(grouped[1], "")
         try:
-            found[at] = float(cell.replace(",", ".") if "," in cell and "." not in cell else cell)
+            found[at] = float(EXPONENT.sub("e", cell.replace(",", ".")))
         except ValueError:
             if strict:
                 row = f"row {table.line + 1 + at}, column {table.heads[i]}"

@@ -50,7 +50,9 @@ def load(source: str, names: str | None = None) -> Table:
         return table
     heads = tuple(part.strip() for part in names.split(","))
     if len(heads) != len(table.columns):
-        raise SceneError(f"--columns names {len(heads)} columns, and {name} has {len(table.columns)}")
+        raise SceneError(
+            f"--columns names {len(heads)} columns, and {name} has {len(table.columns)} that are not empty"
+        )
     return Table(name, heads, table.columns, table.line)
 
 
@@ -82,32 +84,33 @@ def parse(data: bytes, name: str) -> Table:
 
 
 def from_rows(heads: list[str], rows: list[list[Any]], line: int, name: str) -> Table:
-    """A table from its rows; what a short row lacks is missing."""
+    """A table from its rows; what a short row lacks is missing, and what only stands beside the first rows is left."""
     width = max(len(heads), len(rows[0]))
     for number, row in enumerate(rows, line + 1):
         if len(row) > width and any(str(cell).strip() for cell in row[width:]):
             raise SceneError(f"{name}: row {number} has {len(row)} cells where the heading has {width}")
     columns = zip(*(row if len(row) == width else [*row, *[""] * width][:width] for row in rows), strict=True)
     heads = [*heads, *[""] * (width - len(heads))]
-    return Table(name, tuple(heads), tuple(map(list, columns)), line)
+    middle = slice(len(rows) // 2, len(rows) // 2 + text.SAMPLE)
+    kept = [(h, list(c)) for h, c in zip(heads, columns, strict=True) if any(c if h else c[middle])]
+    return Table(name, tuple(head for head, _ in kept), tuple(cells for _, cells in kept), line)
 
 
 def sheet(data: bytes, name: str) -> Table:
-    """The first sheet with a table in a workbook."""
+    """The longest table in the sheets of a workbook, the first of equal ones."""
     from python_calamine import CalamineWorkbook
 
     book = CalamineWorkbook.from_filelike(io.BytesIO(data))
+    found = []
     for each in book.sheet_names:
-        rows = [[as_cell(cell) for cell in row] for row in book.get_sheet_by_name(each).to_python()]
+        rows = [[str(cell).strip() for cell in row] for row in book.get_sheet_by_name(each).to_python()]
         first = text.first_of_numbers(rows)
         if first is not None:
-            return from_rows(text.headings(rows[:first], len(rows[first])), rows[first:], first, name)
-    raise SceneError(f"{name} has no sheet with a heading and rows of numbers")
-
-
-def as_cell(cell: Any) -> str:
-    """A cell of a workbook as a text file would hold it."""
-    return cell.isoformat(" ") if hasattr(cell, "isoformat") else str(cell).strip()
+            found.append((rows, first))
+    if not found:
+        raise SceneError(f"{name} has no sheet with a heading and rows of numbers")
+    rows, first = max(found, key=lambda each: len(each[0]) - each[1])
+    return from_rows(text.headings(rows[:first], len(rows[first])), rows[first:], first, name)
 
 
 def npz(data: bytes) -> dict[str, Any]:

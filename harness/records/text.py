@@ -15,10 +15,13 @@ from ..errors import SceneError
 from .units import COUNTS, known, time_size
 
 MARKS = ("\t", ";", ",", "|", " ")
-MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf"}
+MISSING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "inf", "-inf", "+inf", "\u221e", "-\u221e"}
 NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eEdD][-+]?\d+)?$")
-STAMP = re.compile(r"(\d{4}-?\d\d-?\d\d[T ]?)?(\d{1,2}:)?\d{1,2}:\d{1,2}([.,]\d+)?\s*(Z|[-+]\d\d:?\d\d)?$")
+GROUPED = re.compile(r"[-+]?\d{1,3}([,.'])\d{3}(\1\d{3})*((?!\1)[.,]\d+)?$")  # 1,234.5 or 1.234,5
+DAY = r"(\d{4}-?\d\d-?\d\d[T ]?|\d{1,4}[./]\d{1,2}[./]\d{1,4}[T ]\s*)"
+STAMP = re.compile(DAY + r"?(\d{1,2}:)?\d{1,2}:\d{1,2}([.,:]\d+)?\s*([AP]M|Z|[-+]\d\d:?\d\d)?$", re.I)
 SAMPLE = 200  # lines that tell how the file is written
+BEFORE_UNIT = re.compile(r"(?<=[^\s\])])\s+(?=[\[(])")  # the blank in `t [s]`
 WIDEST = 10_000  # characters of a line: beyond, it is no table
 
 
@@ -34,6 +37,7 @@ def decoded(data: bytes, name: str) -> str:
         text = data.decode(encoding)
     except UnicodeDecodeError:
         text = data.decode("cp1252", errors="replace")
+    text = text.replace("\u2212", "-")  # the minus of typesetters, and of spreadsheets in the north
     if "\0" in text:
         raise SceneError(f"{name} is no text, and none of the tables known here (.xlsx, .ods, .mat, .npz)")
     return text
@@ -67,7 +71,7 @@ def is_comment(line: str) -> bool:
 def split(lines: list[str], mark: str, name: str) -> list[list[str]]:
     """The cells of each line."""
     if mark == " ":
-        return [line.split() for line in lines]
+        return [BEFORE_UNIT.sub("", line).split() for line in lines]
     try:
         return [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
     except csv.Error as error:
@@ -82,22 +86,24 @@ def delimiter(lines: list[str]) -> str:
 
 def worth(row: list[str]) -> int:
     """How many cells are numbers, nothing for a row of one cell or of mostly words."""
-    count = sum(map(is_number, row))
-    return count if len(row) > 1 and 2 * count > len(row) - 1 else 0
+    filled = [cell for cell in row if cell]
+    count = sum(map(is_number, filled))
+    return count if len(row) > 1 and 2 * count > len(filled) - 1 else 0
 
 
 def is_number(cell: str) -> bool:
     """Whether a cell holds a number or a time."""
-    return bool(NUMBER.match(cell) or (":" in cell and STAMP.match(cell)))
+    return bool(NUMBER.match(cell) or (":" in cell and STAMP.match(cell)) or GROUPED.match(cell))
 
 
 def first_of_numbers(rows: list[list[str]]) -> int | None:
-    """The first of two rows of the file's usual width that are mostly numbers; a last row may be alone."""
+    """The first of two rows of the file's usual width that are mostly numbers, from the first column on that usually
+    is one; a last row may be alone."""
     for some in (rows[len(rows) // 2 :][:SAMPLE], rows):
-        widths = Counter(len(row) for row in some if worth(row))
-        if widths:
-            width = widths.most_common(1)[0][0]
-            good = (len(row) == width and worth(row) > 0 for row in chain(rows, rows[-1:]))
+        usual = Counter((len(row), [*map(is_number, row)].index(True)) for row in some if worth(row))
+        if usual:
+            width, column = usual.most_common(1)[0][0]
+            good = (len(row) == width and worth(row) > 0 and is_number(row[column]) for row in chain(rows, rows[-1:]))
             return next((i for i, both in enumerate(pairwise(good)) if all(both)), None)
     return None
 

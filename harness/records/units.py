@@ -16,7 +16,8 @@ SPELLED = {
     "hours": "h", "metres": "m", "meters": "m", "metre": "m", "meter": "m", "millimetres": "mm", "millimeters": "mm",
     "centimetres": "cm", "centimeters": "cm", "inches": "in", "inch": "in", "feet": "ft", "radians": "rad",
     "radian": "rad", "degrees": "deg", "degree": "deg", "grad": "deg", "turns": "rev", "turn": "rev",
-    "revolutions": "rev",
+    "revolutions": "rev", "millis": "ms", "msec": "ms", "micros": "us", "usec": "us", "secs": "s", "sekunden": "s",
+    "minuten": "min",
 }  # fmt: skip
 
 
@@ -58,9 +59,13 @@ def known(text: str) -> Unit | None:
 
 
 def time_size(text: str) -> float | None:
-    """The size of a unit of time in s, or None where it is none."""
-    name = plain(text).lower()
-    return TIMES.get(SPELLED.get(name, name))
+    """The size of a unit of time in s, of so many of them as in 0.01s, or None where it is none."""
+    number, name = re.fullmatch(r"([0-9.]*(?:e-?[0-9]+)?)(.*)", plain(text).lower(), re.S).groups()  # type: ignore[union-attr]
+    size = TIMES.get(SPELLED.get(name, name))
+    try:
+        return size and size * float(number or 1)
+    except ValueError:
+        return None
 
 
 def per_count(text: str) -> tuple[float, str]:

@@ -163,12 +163,14 @@ def mat73(**arrays):
     return b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + file.getvalue()[512:]
 
 
-def xlsx(rows):
+def xlsx(*sheets):
     openpyxl = pytest.importorskip("openpyxl", reason="only tests write spreadsheets")
     pytest.importorskip("python_calamine", reason="extra records")
     book = openpyxl.Workbook()
-    for row in rows:
-        book.active.append(row)
+    for rows in sheets:
+        for row in rows:
+            book.worksheets[-1].append(row)
+        book.create_sheet()
     file = io.BytesIO()
     book.save(file)
     return file.getvalue()
@@ -187,6 +189,96 @@ def test_a_file_as_people_have_it_gives_its_answer(tmp_path, name):
     assert SAID.get(name, "") in " ".join(found.remarks)
 
 
+MM = 1e3 * X + 500  # off rest, so that no number begins with 0
+CLOCKS = [np.datetime64("2026-11-21T23:59:58.500") + np.timedelta64(round(1000 * t), "ms") for t in T]
+
+DAY = CLOCKS[0].item().date()
+
+
+def each(line, mark="\n"):
+    """The lines of a file, from a time in s, a position in mm, and a stamp."""
+    return mark.join(line(t, x, stamp.item()) for t, x, stamp in zip(T, MM, CLOCKS, strict=True))
+
+
+def scope(i, t, x):
+    """What a Tektronix TDS writes: the settings stand beside the first rows."""
+    beside = ["Record Length,6.0e+02", "Sample Interval,1.0e-02", "", "Source,CH1"]
+    return f"{beside[i] if i < 4 and beside[i] else ','},,{t:016.12f},{x:10.5f},"
+
+
+WRITTEN = {  # and what is asked of it; in each stands the same motion
+    "names with units": (lambda: "time_ms,x_mm\n" + each(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f}"), {}),
+    "a clock named after its unit": (lambda: "millis x(mm)\n" + each(lambda t, x, s: f"{1e3 * t:.0f} {x:.6f}"), {}),
+    "units of Pasco": (
+        lambda: (
+            "Time (ms) Run #1,Position (mm) Run #1,Time (s) Run #2,Position (mm) Run #2\n"
+            + each(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f},{2 * t},{3 * x}")
+        ),
+        {},
+    ),
+    "blanks before units": (lambda: "Time (s)   x [mm]\n" + each(lambda t, x, s: f"{t:9.3f} {x:11.6f}"), {}),
+    "samples": (lambda: "Sample,x [mm]\n" + each(lambda t, x, s: f"{100 * t:.0f},{x:.6f}"), {"time_unit": "0.01s"}),
+    "day, month and year": (
+        lambda: "Zeit;Weg [mm]\n" + each(lambda t, x, s: f"{s:%d.%m.%Y %H:%M:%S,%f};{x:.6f}".replace(".6", ",6")),
+        {},
+    ),
+    "half days": (lambda: "Time,x [mm]\n" + each(lambda t, x, s: f"{s:%m/%d/%Y %I:%M:%S.%f %p},{x:.6f}"), {}),
+    "three colons": (lambda: "Time\tx [mm]\n" + each(lambda t, x, s: f"{s:%H:%M:%S:%f}\t{x:.6f}"), {}),
+    "date and time": (lambda: "Date,Time,x [mm]\n" + each(lambda t, x, s: f"{s:%Y-%m-%d,%H:%M:%S.%f},{x:.6f}"), {}),
+    "empty cells": (lambda: "t [s];x [mm];;;;\n" + each(lambda t, x, s: f"{t};{x:.6f};;;;"), {}),
+    "settings beside": (
+        lambda: "\n".join(scope(i, t, x) for i, (t, x) in enumerate(zip(T, MM, strict=True))),
+        {"names": "t [s],x [mm]"},
+    ),
+    "settings above": (
+        lambda: (
+            "Writer_Version\t2\nReader_Version\t2\n\nSamples\t600\t\nX0\t0,0E+0\t\nX_Value\tx [mm]\tComment\n"
+            + each(lambda t, x, s: f"{t}\t{x:.6f}".replace(".", ","))
+        ),
+        {},
+    ),
+    "the numbers of Fortran": (
+        lambda: "# t [s] x [mm]\n" + each(lambda t, x, s: f"  {t:.9E}  {x:.9E}".replace("E", "D")),
+        {},
+    ),
+    "a typesetter's minus": (
+        lambda: "t [s];x [mm]\n" + each(lambda t, x, s: f"{t};{x - 1000:.6f}".replace("-", "\u2212")),
+        {},
+    ),
+    "thousands": (lambda: "t [s],x [um]\n" + each(lambda t, x, s: f'{t},"{1e3 * x:,.3f}"'), {}),
+    "whole thousands": (lambda: "t [s],x [nm]\n" + each(lambda t, x, s: f'{t},"{1e6 * x:,.0f}"'), {}),
+    "thousands in Germany": (
+        lambda: "t [s];x [um]\n" + each(lambda t, x, s: f"{t};{1e3 * x:_.3f}".replace(".", ",").replace("_", ".")),
+        {},
+    ),
+    "three decimals and a gap": (
+        lambda: "t [s];x [mm]\n9;NaN\n" + each(lambda t, x, s: f"{t + 10};{x:.3f}".replace(".", ",")),
+        {},
+    ),
+    "times of a spreadsheet": (
+        lambda: xlsx([["t", "x [mm]"], *([s.item().time(), x] for s, x in zip(CLOCKS, MM, strict=True))]),
+        {},
+    ),
+    "the longest sheet": (
+        lambda: xlsx(
+            [["k", "m"], [1, 2], [3, 4]],
+            [["date", "t [s]", "x [mm]"], *([DAY, t, x] for t, x in zip(T, MM, strict=True))],
+        ),
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_numbers_and_times_are_read_however_they_are_written(tmp_path, name):
+    path, (content, asked) = tmp_path / "record", WRITTEN[name]
+    written = content()
+    path.write_bytes(written.encode() if isinstance(written, str) else written)
+    record = read(str(path), Columns(**asked), "record")
+    assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
+    assert record.x - record.x[0] == pytest.approx(X - X[0], abs=1e-6)
+
+
 ROWS = "\n".join(f"{i},{i}" for i in range(20))
 
 
@@ -195,6 +287,8 @@ ROWS = "\n".join(f"{i},{i}" for i in range(20))
     [
         (f"t,x\n{ROWS}", Columns(), "x has no unit"),
         (f"t,a\n{ROWS}", Columns(), "as in --unit m/s2 or g"),
+        (f"millivolts,x [m]\n{ROWS}", Columns(), "millivolts has whole or huge numbers and no unit"),
+        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", Columns(), "as in --time-unit ms, s, or 0.01s"),
         (f"t [s],x [m]\n{ROWS}", Columns(position="y"), "unknown column 'y'"),
         (f"t [h/m],x [m]\n{ROWS}", Columns(), "unknown unit of t 'h/m'"),
         (f"t [s],x [m]\n{ROWS}\n20,abc", Columns(), "'abc' in row 22, column x [m], is not a number"),
