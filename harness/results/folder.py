@@ -41,8 +41,8 @@ def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[P
     unless that is what the user wants, a result of another `source`.
     """
     try:
-        drawn = {name.replace(".svg", ".png") for name in ours}  # as earlier versions drew them
-        ours = {*ours, *drawn, FILE}
+        drawn = (name.replace(".svg", ".png") for name in ours)  # as earlier versions drew them
+        ours = (*ours, *drawn, FILE)
         refuse(folder, ours)
         keep(folder, source)
         folder.parent.mkdir(parents=True, exist_ok=True)
