@@ -6,6 +6,7 @@ hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer al
 """
 
 import atexit
+import gc
 import json
 import os
 import runpy
@@ -14,6 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
@@ -85,12 +87,13 @@ def serve():
             with suppress(ImportError):  # an extra that is not installed
                 if not module.name.endswith("__main__"):
                     import_module(module.name)
+    gc.freeze()  # else whoever is forked copies all that there is, to count who refers to it
     for line in sys.stdin:
         child = os.fork()
         if not child:
             module, asked = json.loads(line)
             become(**asked)
-            runpy.run_module(module, run_name="__main__", alter_sys=True)
+            run(module)
             return
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 
@@ -106,6 +109,22 @@ def become(words, folder, environment, files):
         os.dup2(opened, number)
         os.close(opened)
     sys.stdin = open(0, closefd=False)  # noqa: SIM115 - what was read ahead is not the command's
+
+
+def run(module):
+    """As Python does, to the end; but what was loaded is not taken down, which takes longer than most commands."""
+    status = 0
+    try:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        if not isinstance(end.code, int | None):
+            raise
+        status = end.code or 0
+    threading._shutdown()
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
 
 
 if __name__ == "__main__":
