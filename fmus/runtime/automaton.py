@@ -8,15 +8,17 @@ based on the synchronous data flow principle, CACSD 1999).
 
 from math import fabs, inf
 
-from .codes import BACKWARD, EXACT, FORWARD, HYBRID, SIGN, STUCK, THRESHOLD
+from .codes import BACKWARD, EXACT, FORWARD, HYBRID, RULES, SIGN, STUCK, THRESHOLD
 from .oscillator import Oscillator
 from .rounding import NEAR
-from .vectors import Contact, Contacts, States, place, slip
+from .vectors import Contact, Contacts, States, per_contact, place, slip
 
 HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes, every change of mode is located as an event")
 SIGN_LAW = ("sign", SIGN, "sliding force times sign(v) as it stands: no event, no stick; chatters")
 THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but below a small speed friction balances the spring; chatters")
 
+UNSETTLED = RULES + 2  # status: no modes fit the forces, as the second rule has it
+BACKWARDS = 1e-9  # of the force of friction: less than that is the last bits
 MOST_HALVINGS = 200
 MOST_THIRDS = 25
 
@@ -47,6 +49,8 @@ class DryFriction(Oscillator):
     rules: tuple[str, ...] = (
         "friction = {friction} with solver.method = 1 (exact): the closed form holds for the hybrid law only; "
         "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
+        "the contacts can neither hold nor slip: one of them slides with a larger force than it holds; let no sliding "
+        "force be above the holding force",
     )
     own_solver = 1
 
@@ -93,8 +97,20 @@ class DryFriction(Oscillator):
 
     def departure(self, t, y: States, modes: Contacts, i: Contact):
         """The rate of a slip at a break-away, where the load is just the limit."""
+        return self.slip_rate(t, y, modes, i)
+
+    def slip_rate(self, t, y: States, modes: Contacts, i: Contact):
+        """The rate of a slip."""
         f = self.rates(t, y, modes)
         return f[slip[i]]
+
+    def goes_its_way(self, t, y: States, modes: Contacts, i: Contact):
+        """Whether a body at rest that has been let go starts in the direction of its mode, but for the last bits: one
+        that slides with more than it holds does not."""
+        back = per_contact()
+        back[i] = -modes[i]
+        forward, backward = self.slip_rate(t, y, modes, i), self.slip_rate(t, y, back, i)
+        return modes[i] * forward >= -BACKWARDS * fabs(forward - backward)
 
     def release(self, t, y: States, i: Contact):
         """When a contact breaks away if nothing moves, and in which direction; inf if it never does."""

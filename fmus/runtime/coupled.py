@@ -10,7 +10,7 @@ all are held; whatever bears more than it holds is let go, and what would slip a
 from math import fabs, inf
 
 from .automaton import DryFriction, sign
-from .codes import RULES, STUCK
+from .codes import STUCK
 from .rounding import NEAR
 from .vectors import Contact, Contacts, States, contacts, largest, per_contact, some
 
@@ -22,7 +22,6 @@ TOGETHER, MOST_ROUNDS = 60, 200  # of letting go and holding again: of all conta
 MOST_IMPULSES = 3  # for slips that are not linear in positions
 LEAST = 1e-300  # a force
 MOVING, HELD, RESTING, LEAVING = 0, 1, 2, 3  # contacts with a slip, held again, at rest, with a load at the limit
-UNSETTLED = RULES + 1  # status: no modes fit the forces, as the first rule has it
 
 
 class CoupledFriction(DryFriction):
@@ -38,14 +37,6 @@ class CoupledFriction(DryFriction):
     """
 
     coupled, waits = True, False
-    rules = (
-        "the contacts can neither hold nor slip: one of them slides with a larger force than it holds; let no sliding "
-        "force be above the holding force",
-    )
-    own_solver = 0
-
-    def prepare(self):
-        return 0
 
     # ---- where modes end
 

@@ -17,7 +17,7 @@ from math import fabs, inf, nan
 from . import rules
 from .codes import DIVERGED, MODEL_EXCHANGE, OK, RUNNING, STUCK
 from .march import NOMINAL
-from .rounding import ULP
+from .rounding import NEAR, ULP
 from .step import HUGE, NEARLY
 from .vectors import (
     Contacts,
@@ -167,19 +167,21 @@ def indicators(model):
     if model.dry and march.step.sticks:
         if model.coupled:
             slips = model.slips(march.t, march.y)
-            force, most, _terms = model.forces(march.t, march.y, march.modes)
+            force, most, terms = model.forces(march.t, march.y, march.modes)
             for i in contacts:
                 if march.modes[i] != STUCK:
                     to_rest[i] = march.modes[i] * slips[i] + LEAST
                 else:
-                    to_break_away[i] = most[i] + BEYOND * most[i] + LEAST - fabs(force[i])
+                    slack = NEAR * (terms[i] + most[i])
+                    to_break_away[i] = most[i] + slack + BEYOND * most[i] + LEAST - fabs(force[i])
         else:
             for i in contacts:
                 if march.modes[i] != STUCK:
                     to_rest[i] = march.modes[i] * march.y[slip[i]] + LEAST
                 else:
                     load, _, limit = model.hold(march.t, march.y, i)
-                    to_break_away[i] = limit + BEYOND * limit + LEAST - fabs(load)
+                    slack = NEAR * (model.terms(march.t, march.y, i) + limit)  # what is held, as settle has it
+                    to_break_away[i] = limit + slack + BEYOND * limit + LEAST - fabs(load)
     for i in contacts:
         exchange.indicators[i] = to_rest[i]
         exchange.indicators[len(march.modes) + i] = to_break_away[i]
@@ -227,13 +229,11 @@ def update(model, march):
     """
     near = NEARLY * march.step.tolerance
     another = changed = False
+    fits = True
     if model.coupled:
         y, modes, fits = model.begun(march.t, march.y, march.modes, near, BEHIND)
         another, changed = some(y != march.y), some(modes != march.modes)
         march.y, march.modes = y, modes
-        if not fits:
-            for i in places:
-                march.y[i] = nan  # no motion obeys the equations
     else:
         for i in contacts:
             mode = march.modes[i]
@@ -249,6 +249,11 @@ def update(model, march):
                         march.modes[i] = 1 if rate > 0.0 else -1
                 if march.modes[i] != mode:
                     changed = True
+                    if march.modes[i] != STUCK:
+                        fits = fits and model.goes_its_way(march.t, march.y, march.modes, i)
+    if not fits:
+        for i in places:
+            march.y[i] = nan  # no motion obeys the equations
     if changed:
         march.step.before.happened += 1
         march.step.before.t_event = march.t

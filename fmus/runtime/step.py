@@ -7,8 +7,8 @@ ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci
 
 from math import inf
 
+from .automaton import UNSETTLED
 from .codes import DIVERGED, EXACT, OK, STALLED, STUCK
-from .coupled import UNSETTLED
 from .interpolant import Interpolant
 from .methods import Methods
 from .rounding import NEAR, ULP
@@ -130,7 +130,7 @@ class Step:
 
     def take(self, model):
         """The internal step from t1 on; OK or the reason why not."""
-        if model.coupled and not self.fits:
+        if model.dry and not self.fits:
             return UNSETTLED
         if model.dry and self.event:
             self.note_event()
@@ -287,7 +287,7 @@ class Step:
 
     def set_modes(self, model, modes: Contacts, near):
         """The modes that hold from t1 on, after these."""
-        self.modes1, self.touches = STUCK, False
+        self.modes1, self.touches, self.fits = STUCK, False, True
         if self.sticks:
             if model.coupled:
                 self.y1, self.modes1, self.fits = model.begun(self.t1, self.y1, modes, near, near)
@@ -308,6 +308,7 @@ class Step:
             if model.dry and not model.coupled:
                 for i in contacts:
                     if self.sticks and self.y1[slip[i]] == 0.0 and self.modes1[i] * self.f1[slip[i]] < 0.0:
+                        self.fits = self.touches or model.goes_its_way(self.t1, self.y1, self.modes1, i)
                         self.f1[slip[i]] = 0.0  # the last bit at a break-away: no body starts against its mode
 
     def begin_anew(self, model):

@@ -90,7 +90,25 @@ class Blocks:
             y[3] = y[1] = 0.0 if modes[0] == 0 else (4.0 * y[1] + 2.0 * y[3]) / 6.0
 
 
-BY_HAND = {"belt": Belt, "clutch": Clutch, "sleds": Sleds, "blocks": Blocks}
+class Lift:
+    """A sled that its driver lifts as he pulls."""
+
+    stop, states, modes, first, start = 16.0, ("x", "v"), ("mode",), [0], [0.0, 0.0]
+    changes = ()
+
+    def __call__(self, t, y, modes):
+        x, v = y
+        stretch = 0.034 * t - x
+        normal, pull = 12.5 * 9.81 - 300.0 * stretch, 742.5 * stretch
+        force = modes[0] * 0.6 * normal if modes[0] else pull
+        return [v, (pull - force) / 12.5 if modes[0] else 0.0], [v], [force], [0.9 * normal]
+
+    def rest(self, y, modes):
+        if modes[0] == 0:
+            y[1] = 0.0
+
+
+BY_HAND = {"belt": Belt, "clutch": Clutch, "sleds": Sleds, "blocks": Blocks, "lift": Lift}
 
 
 def followed(physics, changes=()):

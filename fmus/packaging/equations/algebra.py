@@ -31,6 +31,12 @@ def depends(e: Operand, leaves: Collection[Expression], memo: dict[int, bool] | 
     return memo[id(e)]
 
 
+def jumps(e: Operand, leaves: Collection[Expression]) -> bool:
+    """Whether a condition in an expression has one of the leaves in it: derivatives do not tell."""
+    compares = isinstance(e, Term) and e.op in COMPARISONS
+    return depends(e, leaves) and (compares or any(jumps(one, leaves) for one in inside(e)))
+
+
 def leaves(e: Operand, found: dict[int, Expression] | None = None) -> list[Expression]:
     """The declared variables in an expression, each once."""
     found = {} if found is None else found

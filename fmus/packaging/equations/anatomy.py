@@ -11,7 +11,7 @@ from typing import Any
 
 from ...runtime.methods import EXACT_ITEM, ITEMS
 from ..words import OF_C
-from .algebra import degree, depends, derivative, is_sum, leaves, made, negative, occurrences, put, same, undone
+from .algebra import degree, depends, derivative, is_sum, jumps, leaves, made, negative, occurrences, put, same, undone
 from .declared import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 from .expressions import COMPARISONS, Expression, Mistake, Operand, Term
 from .names import RESERVED, RESERVED_WHERE_COUPLED
@@ -200,7 +200,7 @@ class Anatomy:
             if c in self.lonely:
                 e = self.slip_rate[c]
                 load = undone(e, c) if occurrences(e, c) == 1 else made("/", put(e, {c: 0.0}), self.A[c, c])
-                self.load[c] = put(load, at_rest) if isinstance(c.slip, State) else load
+                self.load[c] = put(load, {c.mode: 0.0} | (at_rest if isinstance(c.slip, State) else {}))
 
     def held(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
         """The derivative of an expression while every contact holds."""
@@ -231,7 +231,7 @@ class Anatomy:
         mass, force = (rate.args[1], rate.args[0]) if isinstance(rate, Term) and rate.op == "/" else (1.0, rate)
         damping, stiffness = (negative(derivative(force, {s: 1.0})) for s in (v, x))
         drift, speed = derivative(force, self.by_time), 0.0
-        if any(depends(e, self.moving) for e in (mass, damping, stiffness, drift)):
+        if any(depends(e, self.moving) for e in (mass, damping, stiffness, drift)) or jumps(force, self.moving):
             return None
         if not same(drift, 0.0):
             if len(self.drives) != 1 or not same(damping, 0.0):
@@ -244,10 +244,13 @@ class Anatomy:
 
     @cached_property
     def waits(self) -> bool:
-        """Whether nothing moves while the only contact is stuck, whose load is then linear in time."""
+        """Whether nothing moves while the only contact is stuck, whose load is then linear in time, and whose limit
+        stays."""
         if len(self.contacts) != 1 or len(self.positions) != 1 or self.own != [self.contacts[0].slip]:
             return False
-        return not depends(derivative(self.load[self.contacts[0]], self.by_time), (TIME, *self.drives))
+        (c,), by_time = self.contacts, (TIME, *self.drives)
+        changes = (derivative(self.load[c], self.by_time), self.hold[c])
+        return not any(depends(e, by_time) for e in changes) and not jumps(self.load[c], by_time)
 
     @property
     def pins(self) -> list[tuple[Contact, State, Operand]]:

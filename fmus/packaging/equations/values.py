@@ -1,5 +1,6 @@
 """The methods of a written-out model about its values: at its birth, at the start, when they have changed."""
 
+from ...runtime.automaton import DryFriction
 from .algebra import parts
 from .expressions import Term
 from .frame import Frame, method
@@ -42,7 +43,7 @@ def prepare(f: Frame) -> str:
                 s.let(f"self.{e.name}", e)
                 done.append(e)
 
-    for number, rule in enumerate(f.an.rules, 2 if dry else 1):  # friction has a rule of its own
+    for number, rule in enumerate(f.an.rules, len(DryFriction.rules) + 1 if dry else 1):
         calculate(parts(rule.broken))
         with s.block(f"if {s.text(rule.broken)}:"):
             s.say(f"return {number}")

@@ -1,0 +1,114 @@
+"""What a contact holds, or slides with, may move: it is let go in time, and what can neither hold nor slip is told."""
+
+import numpy as np
+import pytest
+from arrays import begun, spelled, start
+from models import DOP853, LARGER, MODELS, ODE45, RODAS, declared
+
+from fmus.packaging.further import exchanged
+from fmus.packaging.written import beside, written
+from fmus.runtime.automaton import UNSETTLED
+
+FILES = {path.stem: path for path in LARGER}
+ULP = 2.0**-52
+SLIDER = '''"""A model."""
+from fmus import Contact, Input, Mode, Model, Output, Parameter, State
+
+
+class Slider(Model):
+    """A body that is pressed on its way: what it slides with is not known beforehand."""
+
+    m = Parameter(2.0, "kg", "mass", above=0.0)
+    grip = Parameter(4.0, "N", "what holds", low=0.0)
+    press = Input(3.0, "N", "what slides", low=0.0)
+    F_ext = Input(0.0, "N", "outer force")
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F = Contact("N", "friction", mode=mode, slip=v, slide=press, hold=grip)
+    a = Output("m/s2", "acceleration", (F_ext - F) / m, rate_of=v)
+'''
+
+
+@pytest.mark.parametrize("method", [ODE45, DOP853, RODAS])
+def test_a_steady_load_breaks_away_when_the_limit_has_come_down_to_it(method):
+    """A sled under a force, lifted by its driver: when mu_s (m g - lift u t) is the force."""
+    model = begun(written(FILES["lift"])(), {"solver.method": method, "k": 0.0, "F_ext": 60.0}, 16.0)
+    start(model, model.initial(0.0), 16.0)
+    step = model.solver.step
+    while not step.event:
+        assert step.take(model) == 0
+        assert step.t1 < 16.0
+    assert step.t1 == pytest.approx((12.5 * 9.81 - 60.0 / 0.9) / (300.0 * 0.034), rel=1e-9)
+    assert spelled(step, model.contacts) == [1]
+
+
+def led(source, values):
+    """A model that an importer's solver leads, its exchange, and its run."""
+    cls = written(source)
+    model, exchange, run = exchanged(cls), beside(cls, "runtime.exchange"), beside(cls, "runtime.rules").Run(1e-6)
+    begun(model, {"solver.method": DOP853, "solver.rtol": 1e-6} | values, 1.0)
+    start(model, model.initial(0.0), 1.0)
+    exchange.begin(model)
+    return model, exchange, run
+
+
+STUCK = [one for one in (*MODELS, *FILES.values()) if any(d.role == "contact" for d in declared(one).values())]
+STUCK = [one for one in STUCK if one not in (FILES["belt"], FILES["clutch"])]  # which slide at the start
+
+
+@pytest.mark.parametrize("source", STUCK, ids=lambda source: getattr(source, "stem", source))
+def test_no_contact_is_held_whose_indicator_says_that_it_breaks_away(source):
+    """Whatever an input brings, to the last bit: an importer would never hear of it again."""
+    rest = {name: 0.0 for name, d in declared(source).items() if name in ("x0", "theta0")}
+    model, exchange, _ = led(source, rest)
+    entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
+    many, tried = len(model.contacts), 0
+    march = model.solver
+    start_states, start_modes = ([getattr(march, n) for n in names] for names in (model.states, model.contacts))
+
+    def push(force):
+        """The indicators before and after the event, with modes as at the start."""
+        for names, numbers in (model.states, start_states), (model.contacts, start_modes):
+            for name, number in zip(names, numbers, strict=True):
+                setattr(march, name, number)
+        setattr(model, entry, force)
+        exchange.indicators(model)
+        before = min(model.exchange.indicators[many : 2 * many])
+        exchange.update(model, march)
+        exchange.indicators(model)
+        return before, min(model.exchange.indicators[many : 2 * many])
+
+    low, high = getattr(model, entry), 1e4
+    assert push(low)[0] > 0.0 >= push(high)[0]
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (low, middle) if push(middle)[0] <= 0.0 else (middle, high)
+    for places in range(300):
+        before, after = push(high * (1.0 + places * ULP))
+        tried += before <= 0.0
+        assert after > 0.0, places
+    assert tried == 300
+
+
+@pytest.fixture
+def slider(tmp_path):
+    path = tmp_path / "slider.py"
+    path.write_text(SLIDER)
+    return path
+
+
+def test_what_comes_to_slide_with_more_than_it_holds_is_told_and_leads_nowhere(slider):
+    """In co-simulation by any method, in model exchange by states that are no numbers."""
+    methods = [value for _, value, _ in declared(slider)["solver.method"].items]
+    for method in methods:
+        model = begun(written(slider)(), {"solver.method": method, "press": 5.0, "F_ext": 4.5}, 1.0)
+        start(model, model.initial(0.0), 1.0)
+        assert model.solver.step.take(model) == UNSETTLED
+    model, exchange, _ = led(slider, {"press": 5.0})
+    model.F_ext = 4.5
+    exchange.update(model, model.solver)
+    assert np.isnan([model.solver.x, model.solver.v]).all()
+    model, exchange, _ = led(slider, {"press": 3.9})
+    model.F_ext = 4.5
+    exchange.update(model, model.solver)
+    assert (model.solver.x, model.solver.v, model.solver.mode) == (0.0, 0.0, 1)
