@@ -7,10 +7,13 @@ tried: zeros, both signs, all sizes, every choice, and loads about as large as f
 from collections.abc import Sequence
 from math import isfinite
 from random import Random
+from types import SimpleNamespace
 from typing import Any
 
 from ..runtime.declare import Declared, Declaring
 from ..runtime.values import SETTABLE
+from .equations.authored import first_states
+from .written import beside
 
 SITUATIONS = 2000
 SIZES = 2.0  # powers of ten above and below a start value
@@ -61,12 +64,6 @@ def at_rest(thing: Any, chance: Random) -> tuple[float, float]:
     return one(list(zip(found[:many], found[many : 2 * many], strict=True)), chance)
 
 
-def first_states(thing: Any) -> tuple[float, ...]:
-    """The states at time zero; a model of one state says it as a number."""
-    found = thing.initial(0.0)
-    return found if isinstance(found, tuple) else (found,)
-
-
 def another(meaning: Declared, sizes: dict[str, list[float]], chance: Random) -> float:
     """A value that is allowed; the start value where the range is narrow."""
     if meaning.items:
@@ -98,9 +95,8 @@ def begun(thing: Any, outputs: list[str]) -> list[float]:
     try:
         if thing.prepare():
             return []
-        march = thing.solver
-        march.start(thing, 0.0, *first_states(thing), thing.stop_time, thing.tolerance)
-        thing.observe(march.t, *(getattr(march, name) for name in (*thing.states, *thing.contacts)))
+        thing.solver.start(thing, 0.0, *first_states(thing), thing.stop_time, thing.tolerance)
+        beside(type(thing), "runtime.rules").show(SimpleNamespace(), thing)
     except (ArithmeticError, ValueError):
         return []
     values = [getattr(thing, output) for output in outputs]

@@ -65,8 +65,12 @@ class Inside:
     @property
     def read(self) -> Callable[[Any], tuple[float, ...]]:
         """What tells the states at the present point of the solver; of a body, position and speed."""
-        names = list(self.model.states)
+        names = [self.number(name) for name in self.model.states]
         return attrgetter(*names) if len(names) > 1 else lambda march: (getattr(march, names[0]),)
+
+    def number(self, name: str) -> str:
+        """What the solver calls a state or a mode: its_h_ where h means something else to it."""
+        return f"its_{name}_" if hasattr(self.model.solver, f"its_{name}_") else name
 
     def motion(self, times: list[float], patience: float | None = None) -> list[tuple[float, ...]]:
         """The states at the times, from 0 s on; HarnessError if the run fails or outlasts `patience` s."""
@@ -101,7 +105,7 @@ class Inside:
 
     def modes(self, stop: float) -> list[tuple[float, int]]:
         """The same after the mode at the start."""
-        model, march, (mode,) = self.model, self.model.solver, self.model.contacts
+        model, march, (mode,) = self.model, self.model.solver, map(self.number, self.model.contacts)
         self.begin(stop)
         found: list[tuple[float, int]] = [(0.0, getattr(march, mode))]
         while march.t < stop:

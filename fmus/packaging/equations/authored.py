@@ -17,7 +17,6 @@ from typing import Any
 
 from ...runtime.declare import Declaring
 from .. import BuildError
-from ..dependencies import first_states
 from .anatomy import Anatomy
 from .declared import Model
 from .dimensions import judge_units
@@ -123,6 +122,12 @@ class Authored:
         file, line = mistake.place
         where = f"{self.path}, line {line}" if file == str(self.path) else str(self.path)
         return BuildError(f"{where}: {mistake}.")
+
+
+def first_states(thing: Any) -> tuple[float, ...]:
+    """The states at time zero; a model of one state says it as a number."""
+    found = thing.initial(0.0)
+    return found if isinstance(found, tuple) else (found,)
 
 
 _known: dict[Path, Authored] = {}

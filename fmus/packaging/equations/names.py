@@ -16,7 +16,7 @@ IMPORTS = {  # module -> what may be needed of it
     "methods": ("EXACT_ITEM", "ITEMS"),
     "oscillator": ("Oscillator",),
 }
-ATTRIBUTES = ("friction", "solver", "events", "exact", "exchange", "x_base", "t_base")
+ATTRIBUTES = ("friction", "solver", "events", "exact", "exchange", "x_base", "t_base", "time", "method")
 METHODS = (
     "initial",
     "rates",
@@ -28,11 +28,10 @@ METHODS = (
     "observe",
 )  # beside those that are inherited
 COUPLED_METHODS = ("slips", "slip_terms", "forces", "changes", "struck")
-FACTS = ("stop_time", "step_size", "tolerance", "rules")  # which an author sets as such
 CLASSES = ("Solver", "Model", "Fmi3Slave")
 RESERVED = {
     *("self", "t", *MATH, *ATTRIBUTES, *METHODS, *CLASSES),
     *(name for names in IMPORTS.values() for name in names),
     *(name for name in dir(DryFriction) if not name.startswith("__")),
-} - {*FACTS}
-RESERVED_WHERE_COUPLED = {*dir(CoupledFriction), *COUPLED_METHODS} - {*FACTS}
+}
+RESERVED_WHERE_COUPLED = {*dir(CoupledFriction), *COUPLED_METHODS}

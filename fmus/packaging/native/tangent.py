@@ -1,6 +1,6 @@
 """The derivative of a model along a direction: its `observe`, differentiated statement by statement (forward mode).
 
-Every calculated number z gets a second one, d_z, which is its change if states, driver and inputs change as told.  The
+Every calculated number z gets a second one, _d_z, which is its change if states, driver and inputs change as told.  The
 branches are those that `observe` takes; where friction sticks, its force is the load, and so are their changes.
 
 A. Griewank, A. Walther, Evaluating Derivatives, chapter 3.
@@ -17,9 +17,10 @@ from typing import Any
 from ...runtime.declare import Declaring
 from ..further import Variables
 from ..written import definition
-from ..written.live import TREE
+from ..written.live import TREE, number_of
 
-D, TO = "d_", "to"  # what the second number is called; the object that holds the direction and what follows
+# what the second number is called; the object that holds the direction and what follows: no name of an author's
+D, TO = "_d_", "_to"
 SLOPES = {  # function of a -> the factor of d_a
     "sin": "cos({a})",
     "cos": "-sin({a})",
@@ -45,7 +46,7 @@ class Tangent:
 def slots(declared: Variables) -> dict[str, str]:
     """Of every variable that can change or follow: the name of its float."""
     found = {name: name for name, meaning in declared if "." not in name and is_smooth(meaning)}
-    return found | {name: f"rate_{number}" for number, (name, _) in enumerate(declared) if name.startswith("der(")}
+    return found | {name: f"_rate_{number}" for number, (name, _) in enumerate(declared) if name.startswith("der(")}
 
 
 def is_smooth(meaning: Any) -> bool:
@@ -53,7 +54,7 @@ def is_smooth(meaning: Any) -> bool:
 
 
 def tangent(model: type[Declaring], thing: Any, declared: Variables) -> tuple[Tangent, FunctionType]:
-    """An empty direction, and the function that follows it: along(self, to), where self is `thing`, a model that an
+    """An empty direction, and the function that follows it: along(self, _to), where self is `thing`, a model that an
     importer's solver may lead."""
     to = Tangent()
     for slot in slots(declared).values():
@@ -61,7 +62,8 @@ def tangent(model: type[Declaring], thing: Any, declared: Variables) -> tuple[Ta
     observe: Any = model.__dict__["observe"]
     tree = definition(observe)
     writer = Writer(thing, declared)
-    begin = [f"{name} = self.solver.{name}" for name in ("t", *thing.states, *thing.contacts)]
+    known = {"t": "t"} | {name: number_of(thing, name) for name in (*thing.states, *thing.contacts)}
+    begin = [f"{name} = self.solver.{number}" for name, number in known.items()]
     begin += [f"{D}{name} = {TO}.{name}" for name in thing.states]
     body = [ast.parse(line).body[0] for line in begin] + writer.block(tree.body)
     text = ast.unparse(ast.fix_missing_locations(ast.Module([head(body)], [])))

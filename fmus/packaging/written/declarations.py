@@ -2,9 +2,9 @@
 
 import ast
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, TypeGuard
 
-from .spec import CONTACTS, STATES, STEM
+from .spec import CONTACTS, STATES, STEM, Spec
 
 KINDS = {"States": STATES, "Rates": STATES, "Contacts": CONTACTS}
 
@@ -17,6 +17,8 @@ class Declarations(ast.NodeVisitor):
         self.stored: set[str] = set()
         self.constants: dict[str, Any] = {}
         self.each: set[str] = set()
+        self.words: set[str] = set()  # what files call their own: constants, functions, classes
+        self.classes: list[set[str]] = []  # the attributes of each class
         self.results: dict[str, list[str | None]] = {
             "initial": [STATES],
             "rates": [STATES],
@@ -42,8 +44,26 @@ class Declarations(ast.NodeVisitor):
         if isinstance(node.ctx, ast.Store):
             self.stored.add(node.attr)
 
+    def visit_ClassDef(self, node: ast.ClassDef) -> None:
+        self.generic_visit(node)
+        names = {getattr(one.targets[0], "id", "") for one in node.body if isinstance(one, ast.Assign)}
+        self.classes.append(names | {one.attr for one in ast.walk(node) if is_own(one)})
+
+    def clash(self, spec: Spec) -> str:
+        """A name of the model that means something else in the numerics, if there is one."""
+        found = self.words & {*spec.states, *spec.states.values(), *spec.contacts}
+        for names in self.classes:
+            vectors = filter(STEM.fullmatch, names)
+            kinds = [(vector, self.attribute(vector) or STATES) for vector in vectors]
+            found |= names & {spec.number(v, kind, i) for v, kind in kinds for i in range(len(spec.parts(kind)))}
+        return min(found, default="")
+
     def visit_Module(self, node: ast.Module) -> None:
         for statement in node.body:
+            if isinstance(statement, (ast.FunctionDef, ast.ClassDef)):
+                self.words.add(statement.name)
+            if isinstance(statement, ast.ImportFrom):
+                self.words.update(alias.name for alias in statement.names)
             if isinstance(statement, ast.Assign):
                 target, value = statement.targets[0], statement.value
                 pairs = [(target, value)]
@@ -51,6 +71,7 @@ class Declarations(ast.NodeVisitor):
                     pairs = list(zip(target.elts, value.elts, strict=True))
                 for one, what in pairs:
                     if isinstance(one, ast.Name):
+                        self.words.add(one.id)
                         self.constants[one.id] = label(what) or getattr(what, "value", None)
         self.generic_visit(node)
 
@@ -65,6 +86,13 @@ class Declarations(ast.NodeVisitor):
         """What an attribute runs over; None for a number."""
         stem = STEM.fullmatch(name)
         return self.attributes.get(name) or ((CONTACTS if stem[1] == "modes" else STATES) if stem else None)
+
+
+def is_own(node: ast.AST) -> TypeGuard[ast.Attribute]:
+    """Whether this sets an attribute of self."""
+    return (
+        isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and getattr(node.value, "id", "") == "self"
+    )
 
 
 def annotated(node: ast.arg | ast.AnnAssign) -> str | None:

@@ -19,7 +19,7 @@ from ...runtime.declare import Declaring
 from ..catalogue import FMUS, find
 from ..equations.authored import Authored
 from .offer import Offer
-from .sources import Files, written_out
+from .sources import APART, PLAIN, Files, written_out
 
 TREE = "written_out"  # in a module of a written-out package: its tree, with the lines of the source
 
@@ -86,6 +86,11 @@ class Finder(MetaPathFinder, Loader):
 def beside(model: type[Declaring], path: str) -> Any:
     """A module of the package of a written-out model, as `runtime.rules`."""
     return import_module(f"{model.__module__.split('.', 1)[0]}.{path}")
+
+
+def number_of(thing: Any, name: str) -> str:
+    """What the numerics of a written-out model call one of its states or modes."""
+    return next(one for one in (APART.format(name), PLAIN.format(name)) if hasattr(thing.solver, one))
 
 
 def definition(function: FunctionType) -> ast.FunctionDef:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...runtime.declare import Declaring, variables
-from .. import __version__
+from .. import BuildError, __version__
 from .declarations import Declarations
 from .needed import pruned
 from .offer import Offer, choices, gone, stepping
@@ -15,6 +15,7 @@ from .text import Line, Writer
 
 FMUS = Path(__file__).resolve().parents[2]
 AT_HOME = ("vectors.py", "found.py")  # never travel
+PLAIN, APART = "{}", "its_{}_"  # what the numerics call a state: so where its name means something else to them
 Files = dict[str, list[Line]]
 
 
@@ -25,19 +26,36 @@ def runtime() -> dict[str, str]:
     return {f"runtime/{path.name}": path.read_text(encoding="utf-8") for path in paths}
 
 
-def spec_of(model: type[Declaring], offered: Offer | None) -> Spec:
-    """What a model and an offer fix."""
+def spec_of(model: type[Declaring], offered: Offer | None, called: str = PLAIN) -> Spec:
+    """What a model and an offer fix; `called`: as its states, rates and modes are."""
     thing: Any = model()
     dry = bool(thing.contacts)
     closed = thing.linear and (offered is None or offered.closed)
     flags = {"dry": dry, "waits": thing.waits, "coupled": thing.coupled, "driven": thing.driven, "linear": closed}
-    return Spec(thing.states, thing.contacts, flags, choices(model, offered), gone(offered), stepping(offered))
+    states, contacts = (
+        {called.format(name): other and called.format(other) for name, other in pairs.items()}
+        for pairs in (thing.states, thing.contacts)
+    )
+    return Spec(states, contacts, flags, choices(model, offered), gone(offered), stepping(offered))
 
 
 def written_out(model: type[Declaring], file: str, text: str, offered: Offer | None = None) -> Files:
-    """The lines of every file of the runtime and of the file of a model."""
-    spec, texts = spec_of(model, offered), runtime() | {file: text}
+    """The lines of every file of the runtime and of the file of a model.
+
+    The numbers go by the names of the model, if these mean nothing else in the numerics.
+    """
+    try:
+        return expanded(spec_of(model, offered), model, file, text)
+    except BuildError:
+        return expanded(spec_of(model, offered, APART), model, file, text)
+
+
+def expanded(spec: Spec, model: type[Declaring], file: str, text: str) -> Files:
+    """The lines with the names of `spec`."""
+    texts = runtime() | {file: text}
     declared = Declarations([ast.parse(text, path) for path, text in texts.items() if path != file])
+    if name := declared.clash(spec):
+        raise BuildError(f"The name {name} means something else in the numerics; take another.")
     files = {path: Writer(spec, declared, path, text, path != file).lines for path, text in texts.items()}
     names = {"." + part for variable, _ in variables(model()) for part in variable.split(".")}
     files = pruned(files, file, names)

@@ -1,0 +1,63 @@
+"""Whatever an author calls the variables of a model, its numbers are the same."""
+
+import pytest
+from arrays import begun, start
+from models import DOP853, RODAS
+
+from fmus.packaging.native.interface import header
+from fmus.packaging.written import beside, written
+
+BELT = '''"""A model."""
+from fmus import Contact, Mode, Model, Output, Parameter, State
+
+
+class Mine(Model):
+    """Sled on a belt."""
+
+    m = Parameter(1.3, "kg", "mass", above=0.0)
+    k = Parameter(100.0, "N/m", "stiffness")
+    f = Parameter(1.0, "N", "friction", low=0.0)
+    u = Parameter(0.3, "m/s", "speed of a driver")
+    POSITION = State("m", "position", start=0.1)
+    SPEED = State("m/s", "speed", rate_of=POSITION)
+    driver = State("m", "driver", rate=u)
+    MODE = Mode()
+    F = Contact("N", "friction", mode=MODE, slip=SPEED - 0.5 * u, slide=f, hold=1.3 * f)
+    RATE = Output("m/s2", "acceleration", (k * (driver - POSITION) - F) / m, rate_of=SPEED)
+'''
+SLED = BELT.replace(" - 0.5 * u", "")
+# Of position, speed, rate and mode: local names, attributes, constants, stages of each other, what the C has.
+NAMES = {
+    SLED: [("y", "v", "e", "modes"), ("x", "x1", "x0", "x_1")],
+    BELT: [("h", "size", "end", "i"), ("HUGE", "d_x", "to", "near")],
+}
+
+
+def numbers(path, model, names):
+    """Ends of steps, and what these names are there, by two methods."""
+    found, rules = [], beside(written(path), "runtime.rules")
+    for method in DOP853, RODAS:
+        begun(model, {"solver.method": method, "solver.rtol": 1e-6}, 2.0)
+        start(model, model.initial(0.0), 2.0)
+        march = model.solver
+        while march.t < 1.5:
+            march.look_ahead(model)
+            assert march.advance(model, march.t_next) == 0
+            rules.show(rules.Run(1e-6), model)
+            found.append((march.t, *(getattr(model, name) for name in names)))
+    return found
+
+
+@pytest.mark.parametrize("text", NAMES, ids=["sled", "belt"])
+def test_a_name_that_the_numerics_have_for_something_else_changes_nothing(tmp_path, text):
+    plain, path = ("POSITION", "SPEED", "RATE", "MODE"), tmp_path / "mine.py"
+    path.write_text(text)
+    expected = numbers(path, written(path)(), plain)
+    assert len(expected) > 20
+    for names in NAMES[text]:
+        changed = text
+        for old, new in zip(plain, names, strict=True):
+            changed = changed.replace(old, new)
+        path.write_text(changed)
+        assert numbers(path, written(path)(), names) == expected, names
+    assert text == SLED or "typedef struct Mine Model;" in header(written(path), "3")  # with a slope of d_x
