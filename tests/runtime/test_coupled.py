@@ -241,3 +241,26 @@ def test_laws_without_modes_look_at_each_slip(mine, law):
     while model.solver.step.t1 < 0.3:
         assert model.solver.step.take(model) == 0
         assert not model.solver.step.event
+
+
+@pytest.mark.parametrize("bodies", [1, 2])
+def test_the_jacobian_under_the_threshold_law_is_that_of_the_load_as_it_is_limited(mine, bodies):
+    """As differences of the rates have it, on the limit and below: rodas takes few steps by that."""
+    (one, a), (two, b) = body("1", "k * (p - x1) - F1" + " + F2" * (bodies - 1), 1.0), body("2", "-F2 - k * x2", 1.0)
+    both = contact("1", "v1", "f + w * x1", "1.5 * f + 2.0 * w * x1") + contact("2", "v2 - v1", "f", "2.0 * f")
+    declared = ['f = Parameter(6.0, "N", "friction")', 'w = Parameter(40.0, "N/m", "how it grows")', DRIVER, *one]
+    lines = [line.replace("hold=", f"{LAWS[THRESHOLD][0]}, hold=") for line in both]
+    lines = [*declared, *two, *lines, a, b] if bodies == 2 else [*declared, *lines[:2], a]
+    model, draw, many = mine(*lines), np.random.default_rng(3), 2 * bodies
+    assert model.prepare() == 0
+    model.friction, limited = THRESHOLD, 0
+    for _ in range(200):
+        y = draw.uniform(-0.1, 0.1, many) * np.tile([1.0, 0.05], bodies)
+        slopes = []
+        for moved in 1e-7 * np.eye(many):
+            ahead, behind = (np.ravel(model.rates(0.1, *(y + way), *[0] * bodies)) for way in (moved, -moved))
+            slopes.append((ahead - behind) / 2e-7)
+        found = np.reshape(model.jacobian(0.1, *y, *[0] * bodies), (bodies, many + 1))
+        assert np.abs(found[:, 1:].T - slopes).max() < 1e-5
+        limited += bool(abs(slopes[0][0]) < 300.0)
+    assert 20 < limited < 180

@@ -61,7 +61,10 @@ def slope(f: Frame, name: str, by: dict[Expression, Operand]) -> Unknown:
     held = {
         c: derivative(an.load[c], by) if c in an.lonely else derivative(an.slip_rate[c], fixed) for c in an.contacts
     }
-    none = {c for c in an.contacts if same(slides[c], 0.0) and same(held[c], 0.0)}
+    zero = {
+        c: [slides[c], held[c], *([derivative(an.hold[c], by)] if THRESHOLD in c.laws else [])] for c in an.contacts
+    }
+    none = {c for c in an.contacts if all(same(e, 0.0) for e in zero[c])}
     none = none if none.issuperset(an.shared) else none & {*an.lonely}
     return Unknown({c: 0.0 if c in none else leaf(f"{name}_{c.name}") for c in an.contacts}, slides, held)
 

@@ -1,6 +1,6 @@
 """The methods of a written-out model that solvers ask: rates, Jacobian, constant push."""
 
-from .algebra import derivative, put
+from .algebra import depends, derivative, made, put
 from .coupled import follow_law, force, slope, solve
 from .declared import THRESHOLD, Contact
 from .expressions import Expression, Operand, Term
@@ -53,6 +53,9 @@ def jacobian(f: Frame) -> str:
             with inner.block(f"if fabs({inner.text(an.load[c])}) <= {inner.text(an.hold[c])}:"):
                 inner.say("return " + ", ".join(inner.text(an.held(law, by)) for law in f.laws for by in ways))
             s.lines += inner.lines
+            if depends(c.slide, an.moving) or depends(an.hold[c], an.moving):
+                limits = [by | {c: limited(f, c, by)} for by in ways]
+                s.lines += f.returning(f.scribe(s.depth), [derivative(law, by) for law in f.laws for by in limits])
     f.follow_sign(s, c, targets)
     return method("jacobian", f.point, f.returning(s, targets))
 
@@ -66,7 +69,20 @@ def slopes(f: Frame, s: Scribe, ways: list[dict[Expression, Operand]]) -> list[s
     s.count(*terms, *targets)
     follow_law(f, s)
     solve(f, s, forces, law=True)
+    for c in f.an.contacts:
+        known = [(u.stands[c], by) for u, by in zip(forces, ways, strict=True) if isinstance(u.stands[c], Expression)]
+        if THRESHOLD in c.laws and known:
+            clips = f"fabs({c.name}) >= {s.text(f.an.hold[c])}"
+            with s.block(f"if {c.mode.name} == 0 and self.friction != HYBRID and {clips}:"):
+                for e, by in known:
+                    s.say(f"{s.text(e)} = {s.text(limited(f, c, by))}")
     return returned(s, targets)
+
+
+def limited(f: Frame, c: Contact, by: dict[Expression, Operand]) -> Operand:
+    """The derivative of a force that the threshold law limits."""
+    force = c if f.alone is None else f.an.load[c]
+    return made("*", Term("copysign", 1.0, force), derivative(f.an.hold[c], by))
 
 
 def push(f: Frame) -> list[str]:
