@@ -10,8 +10,9 @@ from native_fmus import built as native_built
 
 from harness.errors import HarnessError
 from harness.results.provenance import load
+from harness.running import in_c
 from harness.running.clock import best
-from harness.studies.bench import in_c, native
+from harness.studies.bench import native
 from harness.studies.bench import speed as bench_speed
 from harness.studies.bench.accuracy import default, drift, exact, last, late
 from harness.studies.bench.measure import Beside, Measure
@@ -139,7 +140,7 @@ def test_what_a_machine_lacks_is_told_in_its_row_and_fails_nothing(both_kinds, m
     monkeypatch.setattr(in_c, "COMPILER", None)
     (both_kinds / "native").unlink()
     in_c.host.cache_clear()
-    in_c.cvode.cache_clear()
+    native.cvode.cache_clear()
     found = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.against_cvode("smd")]
     assert [measure.reached for measure in found] == [False, False, False]
     assert [measure.beside[0].name.split(":")[0] for measure in found] == ["not built"] * 3
@@ -155,4 +156,4 @@ def test_what_a_machine_lacks_is_told_in_its_row_and_fails_nothing(both_kinds, m
 def test_a_run_that_an_fmu_refuses_in_c_gives_its_sentence(both_kinds):
     library = in_c.built(both_kinds / "native" / "stickslip.fmu")
     with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
-        in_c.runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
+        native.runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)

@@ -9,7 +9,7 @@ from .. import BuildError
 from .declarations import Declarations, annotated
 from .elimination import factored, solved
 from .settled import Settled
-from .spec import CONTACTS, STATES, STEM, Spec
+from .spec import STATES, STEM, Spec
 
 EACH = {"magnitude": "{0} if {0} > 0.0 else -{0}", "greater": "{0} if {0} > {1} else {1}"}  # number by number
 CHOSEN = {"largest": ">", "first": "<"}  # one of the numbers
@@ -391,6 +391,3 @@ def without_zero(left: ast.expr, op: ast.operator, right: ast.expr) -> ast.expr:
     if isinstance(op, ast.Mult) and any(zero):
         return ast.Constant(0.0)
     return left if isinstance(op, (ast.Add, ast.Sub)) and zero[1] else ast.BinOp(left, op, right)
-
-
-assert CONTACTS

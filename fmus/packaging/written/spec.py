@@ -1,7 +1,6 @@
 """What a model and an offer fix, and the names of the numbers of a vector."""
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from .. import BuildError
@@ -83,7 +82,3 @@ class Spec:
     def slope(self, rate: int, state: int) -> str:
         """The name of an entry of the Jacobian."""
         return f"{list(self.states.values())[rate]}_{list(self.states)[state]}"
-
-
-def joined(names: Iterable[str]) -> str:
-    return ", ".join(names)

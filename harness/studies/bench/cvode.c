@@ -1,4 +1,4 @@
-/* The five oscillators by SUNDIALS CVODE: an FMI 2.0 co-simulation FMU of those functions that host.c calls.
+/* The five oscillators by SUNDIALS CVODE: an FMI 2.0 co-simulation FMU of those functions that the host in C calls.
  *
  *     y = (x, v),    y' = (v, acceleration),    mode = -1 sliding backward, 0 stuck, 1 sliding forward
  *

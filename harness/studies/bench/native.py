@@ -1,14 +1,21 @@
-"""The native FMUs beside those in Python, through fmpy and in a host in C, and beside one that uses CVODE."""
+"""The native FMUs beside those in Python, through fmpy and in a host in C, and beside one that integrates with SUNDIALS
+CVODE (cvode.c)."""
 
+import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache, partial
 from math import nan
 from pathlib import Path
 
+import numpy as np
+
+from ...errors import HarnessError
+from ...process.child import ask
+from ...running.in_c import Library, NotHereError, built, compiled, compiler
 from ...running.loops import POINTS, direct, shared
 from ...scenes.fmus import fmu_of
 from ...truths.reference import CASES, MODELS, relative
-from .in_c import NotHereError, Timing, built, cvode, runs
 from .measure import Beside, Measure
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
@@ -120,7 +127,40 @@ def fmu(model: str, kind: str) -> Path:
     return path
 
 
+@dataclass(frozen=True)
+class Timing:
+    """Run time in s of the fastest, and what was read at every point of the last (points, read)."""
+
+    seconds: float
+    rows: np.ndarray
+
+
+def runs(
+    library: Library, values: dict[str, float], read: tuple[str, ...], stop: float, steps: int, repeat: int
+) -> Timing:
+    """Runs from 0 to the stop in equal steps, one after the other on one instance."""
+    words = [f"{library.references[name]}={value!r}" for name, value in values.items()]
+    words += [str(library.references[name]) for name in read]
+    calls = f"0 new bench quiet\n0 time {repeat} {stop!r} {steps} {' '.join(words)}\n0 free\n"
+    done = ask(library.command, calls, library.environment)
+    if done.returncode:
+        raise HarnessError((done.stderr.splitlines() or [f"{library.file.name} ends the host in C"])[0])
+    (_, seconds), *rows = (line.split() for line in done.stdout.splitlines())
+    return Timing(float(seconds), np.array([row[1:] for row in rows], dtype=float))
+
+
 # Measured once, for all rows that show it.
+
+
+@cache
+def cvode(model: str) -> Library:
+    """The CVODE FMU, compiled for a model."""
+    looking = [compiler(), "-E", "-x", "c", "-", "-o", os.devnull]
+    if ask(looking, "#include <cvode/cvode.h>\n").returncode:
+        raise NotHereError("not installed: SUNDIALS for C (on Debian libsundials-dev)")
+    source, options = Path(__file__).with_name("cvode.c"), (f"-DMODEL={model.upper()}", "-shared", "-fPIC")
+    file = compiled(source, f"{model}-cvode.so", options, ("-lsundials_cvode", "-lsundials_nvecserial", "-lm"))
+    return Library(file, {name: place for place, name in enumerate(("x", "v", "rtol", "atol", "x_m"))})
 
 
 @cache

@@ -1,14 +1,10 @@
-"""A request carried out by a C program (host.c), for which Python is a library at most."""
+"""A request carried out by a C program (running/host.c), for which Python is a library at most."""
 
-import os
 import re
 import subprocess
 from pathlib import Path
-from xml.etree import ElementTree
 
-from ...process.room import room
-from ...running.compiler import COMPILER, EMBEDDED, HEADERS
-from ...running.unpacked import in_python, unpacked
+from ...running.in_c import built, compiler
 from .request import Reply, Request, serve
 
 
@@ -16,7 +12,7 @@ def play(request: Request) -> Reply:
     count = len(request.instances)
     if request.lives:
         rows, _ = told(host(request.fmu, life(request) * request.lives + ["0 unload"]), 1)
-        return Reply(compiler(), rows, [], 0)
+        return Reply(version(), rows, [], 0)
     calls = [f"{i} new {name}" for i, name in enumerate(request.instances)]
     calls += run(request, request.values, request.change)
     if request.again:
@@ -24,7 +20,7 @@ def play(request: Request) -> Reply:
     calls += [f"{i} free" for i in range(count)] + ["0 unload"]
     rows, statuses = told(host(request.fmu, calls), count)
     size = request.steps + 1
-    return Reply(compiler(), rows[:size], rows[size:], sum(statuses[: request.steps]))
+    return Reply(version(), rows[:size], rows[size:], sum(statuses[: request.steps]))
 
 
 def run(request: Request, values: dict[str, float], change: dict[str, float]) -> list[str]:
@@ -65,25 +61,16 @@ def told(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
 
 def host(fmu: str, calls: list[str]) -> list[str]:
     """What the C program prints when it plays the calls on the FMU; its log goes to standard error."""
-    with room("host-") as folder, unpacked(Path(fmu)) as files:
-        program = folder / "host"
-        source = Path(__file__).with_name("host.c")
-        options = ["-std=c99", "-Wall", "-Werror", "-I", str(HEADERS)]
-        subprocess.run([COMPILER or "cc", *options, str(source), "-o", str(program), "-ldl"], check=True)
-        root = ElementTree.parse(files / "modelDescription.xml").getroot()
-        (library,) = (files / "binaries" / "linux64").glob("*.so")
-        environment = dict(os.environ)
-        if in_python(files):
-            environment["LD_PRELOAD"] = str(EMBEDDED)
-        command = [str(program), str(library), root.attrib["guid"], (files / "resources").as_uri()]
-        text = "".join(f"{call}\n" for call in calls)
-        done = subprocess.run(command, input=text, stdout=subprocess.PIPE, text=True, env=environment, check=True)
-        return done.stdout.splitlines()
+    library, text = built(Path(fmu)), "".join(f"{call}\n" for call in calls)
+    done = subprocess.run(
+        library.command, input=text, stdout=subprocess.PIPE, text=True, env=library.environment, check=True
+    )
+    return done.stdout.splitlines()
 
 
-def compiler() -> str:
+def version() -> str:
     """The version that the compiler tells of itself."""
-    told = subprocess.run([COMPILER or "cc", "--version"], capture_output=True, text=True, check=True)
+    told = subprocess.run([compiler(), "--version"], capture_output=True, text=True, check=True)
     return (re.findall(r"\d+(?:\.\d+)+", told.stdout.splitlines()[0]) or ["of unknown version"])[-1]
 
 

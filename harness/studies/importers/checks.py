@@ -81,7 +81,7 @@ def absent(importer: Importer, fmu: Path | None = None) -> str:
         except PackageNotFoundError:
             return f"{package} is not installed: pip install -e '.[importers]'"
     if importer.player == "by_c":
-        from ...running.compiler import COMPILER, EMBEDDED
+        from ...running.in_c import COMPILER, EMBEDDED
 
         if COMPILER is None:
             return "there is no C compiler here"

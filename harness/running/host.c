@@ -1,0 +1,189 @@
+/* A host that is not Python: plays FMI calls, one a line from standard input, on the library of an FMU.
+ *
+ *     host LIBRARY GUID RESOURCES
+ *
+ *     I new NAME [quiet]     I begin                 I step T H              I setr REFERENCE VALUE
+ *     I getr REFERENCE...    I pass REFERENCE J TO   I save                  I restore             I reset
+ *     I free                 0 unload                I time REPEAT STOP STEPS WORD...
+ *
+ * I and J are numbers of instances.  step answers its status, getr the values; whatever else fails ends the host.
+ *
+ * time runs from t = 0 to STOP in so many equal communication steps, several times.  The word R=VALUE sets the Real of
+ * value reference R before each run; the word R has that Real read at every point.  It answers the seconds of the
+ * fastest run, initialisation and reading included, and the values at every point of the last one.
+ */
+#define _POSIX_C_SOURCE 199309L
+#include <dlfcn.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "fmi2FunctionTypes.h"
+
+enum { INSTANCES = 4, WORDS = 64, LINE = 4096 };
+
+#define FUNCTIONS(f)                                                                                               \
+    f(Instantiate) f(FreeInstance) f(SetupExperiment) f(EnterInitializationMode) f(ExitInitializationMode) f(Reset) \
+    f(SetReal) f(GetReal) f(DoStep) f(GetFMUstate) f(SetFMUstate) f(FreeFMUstate)
+
+static struct {
+#define DECLARE(name) fmi2##name##TYPE *name;
+    FUNCTIONS(DECLARE)
+} fmi;
+
+typedef struct {
+    fmi2ValueReference references[WORDS];
+    fmi2Real values[WORDS];
+    size_t count;
+} Reals;
+
+static void die(const char *what, const char *why)
+{
+    fprintf(stderr, "host: %s: %s\n", what, why);
+    exit(1);
+}
+
+#define DO(call) \
+    if (fmi.call > fmi2Warning) die("fmi2" #call, "does not return OK")
+
+static void hear(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
+                 fmi2String message, ...)
+{
+    (void)environment, (void)instance, (void)status, (void)category;
+    va_list values;
+    va_start(values, message);
+    fprintf(stderr, "log: ");
+    vfprintf(stderr, message, values);
+    fprintf(stderr, "\n");
+    va_end(values);
+}
+
+static const fmi2CallbackFunctions callbacks = {hear, calloc, free, NULL, NULL};
+
+/* A word R or R=VALUE. */
+static void add(Reals *reals, const char *word)
+{
+    const char *value = strchr(word, '=');
+    if (value) reals->values[reals->count] = strtod(value + 1, NULL);
+    reals->references[reals->count++] = (fmi2ValueReference)strtoul(word, NULL, 10);
+}
+
+static void tell(const fmi2Real *values, size_t count)
+{
+    printf("values");
+    for (size_t n = 0; n < count; n++) printf(" %.17g", values[n]);
+    printf("\n");
+}
+
+static double now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+/* The seconds of one run; what is read at each point goes to `out`, row by row. */
+static double run(fmi2Component c, const Reals *set, const Reals *read, double stop, int steps, double *out)
+{
+    double begun = now(), t = 0.0;
+    if (set->count) DO(SetReal(c, set->references, set->count, set->values));
+    DO(SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2True, stop));
+    DO(EnterInitializationMode(c));
+    DO(ExitInitializationMode(c));
+    DO(GetReal(c, read->references, read->count, out));
+    for (int i = 1; i <= steps; i++) {
+        double next = i < steps ? stop * i / steps : stop;
+        DO(DoStep(c, t, next - t, fmi2True));
+        t = next;
+        DO(GetReal(c, read->references, read->count, out += read->count));
+    }
+    return now() - begun;
+}
+
+static void take_time(fmi2Component c, char **words, int count)
+{
+    Reals set = {.count = 0}, read = {.count = 0};
+    int repeat = atoi(words[0]), steps = atoi(words[2]);
+    double stop = strtod(words[1], NULL), fastest = 0.0;
+    for (int n = 3; n < count; n++) add(strchr(words[n], '=') ? &set : &read, words[n]);
+    double *out = malloc(((size_t)steps + 1) * read.count * sizeof *out);
+    if (!out) die("time", "no memory");
+    for (int i = 0; i <= repeat; i++) { /* one more, to warm up */
+        double seconds = run(c, &set, &read, stop, steps, out);
+        if (i == 1 || (i && seconds < fastest)) fastest = seconds;
+        DO(Reset(c));
+    }
+    printf("seconds %.9g\n", fastest);
+    for (int i = 0; i <= steps; i++) tell(out + (size_t)i * read.count, read.count);
+    free(out);
+}
+
+static void play(const char *command, int i, char **words, int count, char **host)
+{
+    static fmi2Component instances[INSTANCES];
+    static fmi2FMUstate states[INSTANCES];
+    Reals read = {.count = 0};
+    fmi2Component c = instances[i];
+    fmi2Status status = fmi2OK;
+#define IS(name) (!strcmp(command, name))
+    if (IS("new")) {
+        instances[i] = fmi.Instantiate(words[0], fmi2CoSimulation, host[2], host[3], &callbacks, fmi2False, count < 2);
+        if (!instances[i]) die("new", "no instance");
+    } else if (IS("begin")) {
+        status = fmi.SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0);
+        if (status == fmi2OK) status = fmi.EnterInitializationMode(c);
+        if (status == fmi2OK) fmi.ExitInitializationMode(c); /* what it refuses, the steps refuse too */
+    } else if (IS("step")) {
+        printf("status %d\n", fmi.DoStep(c, strtod(words[0], NULL), strtod(words[1], NULL), fmi2True));
+    } else if (IS("setr")) {
+        add(&read, words[0]);
+        read.values[0] = strtod(words[1], NULL);
+        status = fmi.SetReal(c, read.references, 1, read.values);
+    } else if (IS("getr")) {
+        for (int n = 0; n < count; n++) add(&read, words[n]);
+        status = fmi.GetReal(c, read.references, read.count, read.values);
+        tell(read.values, read.count);
+    } else if (IS("pass")) {
+        add(&read, words[0]);
+        add(&read, words[2]);
+        status = fmi.GetReal(c, read.references, 1, read.values);
+        if (status == fmi2OK) status = fmi.SetReal(instances[atoi(words[1])], read.references + 1, 1, read.values);
+    } else if (IS("time")) {
+        take_time(c, words, count);
+    } else if (IS("reset")) {
+        status = fmi.Reset(c);
+    } else if (IS("free")) {
+        fmi.FreeInstance(c);
+    } else if (IS("save")) {
+        status = fmi.GetFMUstate(c, &states[i]);
+    } else if (IS("restore")) {
+        status = fmi.SetFMUstate(c, states[i]);
+        if (status == fmi2OK) status = fmi.FreeFMUstate(c, &states[i]);
+    } else {
+        die(command, "unknown");
+    }
+    if (status != fmi2OK) die(command, "does not return OK");
+}
+
+int main(int argc, char **argv)
+{
+    char line[LINE], *words[WORDS];
+    if (argc != 4) die("usage", "host LIBRARY GUID RESOURCES < calls");
+    void *library = dlopen(argv[1], RTLD_NOW | RTLD_LOCAL);
+    if (!library) die("dlopen", dlerror());
+#define FIND(name) *(void **)&fmi.name = dlsym(library, "fmi2" #name); /* the CVODE FMU has no states to save */
+    FUNCTIONS(FIND)
+    while (fgets(line, sizeof line, stdin)) {
+        int count = 0;
+        for (char *word = strtok(line, " \n"); word && count < WORDS; word = strtok(NULL, " \n")) words[count++] = word;
+        if (count < 2) die("line", "an instance and a command are needed");
+        if (!strcmp(words[1], "unload")) {
+            if (dlclose(library)) die("dlclose", dlerror());
+        } else {
+            play(words[1], atoi(words[0]), words + 2, count - 2, argv);
+        }
+    }
+    return fflush(stdout) ? 1 : 0;
+}

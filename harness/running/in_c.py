@@ -1,0 +1,96 @@
+"""FMUs in a host in C (host.c), which the system's compiler makes on the spot."""
+
+import atexit
+import os
+import shutil
+import sysconfig
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import fmpy
+
+from ..errors import HarnessError
+from ..process.child import ask
+from ..process.room import room
+from .unpacked import in_python, unpacked
+
+COMPILER = shutil.which("cc") or shutil.which("gcc")
+EMBEDDED = Path(sysconfig.get_config_var("LIBDIR") or "", sysconfig.get_config_var("INSTSONAME") or "none")
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+HELD = ExitStack()  # folders that last as long as the process
+atexit.register(HELD.close)
+
+
+class NotHereError(HarnessError):
+    """What this machine lacks."""
+
+
+@dataclass(frozen=True)
+class Library:
+    """The library of an FMU, its value references by name, and what the host passes and loads with it."""
+
+    file: Path
+    references: dict[str, int]
+    guid: str = ""
+    resources: str = ""
+    loaded: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def command(self) -> list[str]:
+        """The host with this library."""
+        return [str(host()), str(self.file), self.guid, self.resources]
+
+    @property
+    def environment(self) -> Mapping[str, str]:
+        return os.environ | self.loaded
+
+
+@cache
+def built(fmu: Path) -> Library:
+    """That of a built FMU for Linux; with one in Python its interpreter is loaded too."""
+    folder = HELD.enter_context(unpacked(fmu))
+    libraries = list((folder / "binaries" / "linux64").glob("*.so"))
+    if len(libraries) != 1:
+        raise NotHereError(f"not built: {fmu.name} for linux64")
+    loaded = {}
+    if in_python(folder):
+        if not EMBEDDED.is_file():
+            raise NotHereError("not installed: Python as a shared library")
+        loaded["LD_PRELOAD"] = str(EMBEDDED)
+    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    references = {each.attrib["name"]: int(each.attrib["valueReference"]) for each in root.iter("ScalarVariable")}
+    return Library(libraries[0], references, root.attrib["guid"], (folder / "resources").as_uri(), loaded)
+
+
+@cache
+def host() -> Path:
+    """The host, as a program."""
+    return compiled(Path(__file__).with_name("host.c"), "host", (), ("-ldl",))
+
+
+def compiled(source: Path, name: str, options: tuple[str, ...], libraries: tuple[str, ...]) -> Path:
+    """A program or a library from one source."""
+    file = programs() / name
+    command = [compiler(), "-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", *options, "-I", str(HEADERS)]
+    done = ask([*command, str(source), "-o", str(file), *libraries])
+    if done.returncode:
+        lines = [line for line in done.stderr.splitlines() if "error" in line] or [f"{command[0]} gives no reason"]
+        raise NotHereError(f"{source.name} does not compile here: {lines[0]}")
+    return file
+
+
+def compiler() -> str:
+    """The system's compiler."""
+    if COMPILER is None:
+        raise NotHereError("not installed: a C compiler (try apt-get install gcc)")
+    return COMPILER
+
+
+@cache
+def programs() -> Path:
+    """The folder of what was compiled."""
+    return HELD.enter_context(room("host-"))
