@@ -27,7 +27,7 @@ def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, qu
     from ..studies.precision import table as tables
     from ..studies.precision.study import FULL, QUICK
     from ..studies.precision.survey import FOLDER, survey
-    from ..truths.reference import MODELS
+    from ..truths.models import MODELS
 
     with progress(quiet or as_json, len(models or MODELS) + 1) as report:
         found = survey(models or MODELS, QUICK if quick else FULL, out, report)

@@ -14,8 +14,9 @@ from ..errors import HarnessError
 from ..results.files import heading, write_rows
 from ..running.inside import Inside, embedded, offered
 from ..scenes.fmus import fmu_of
+from .models import CASES
 from .pieces import Span, Values
-from .reference import CASES, DOUBT, FOLDER, POINTS, Reference, difference
+from .reference import DOUBT, FOLDER, POINTS, Reference, difference
 from .truth import Grid, Truth, check
 
 METHODS = {"dop853": 1e-13, "rodas": 1e-12}  # an explicit one and one for stiff laws, with their relative tolerances

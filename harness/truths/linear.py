@@ -12,7 +12,7 @@ from typing import Any
 
 from mpmath import MPContext
 
-from .pieces import Course, Piece, Span, Values
+from .pieces import Course, Friction, Piece, Span, Values, gliding, later
 
 mp = MPContext()  # a context of its own: the precision of others stays theirs
 mp.dps = 120
@@ -43,24 +43,20 @@ class System:
         return 0 if abs(load) <= self.hold else 1 if load > 0 else -1
 
 
-def system(model: str, values: Values) -> System:
+def system(values: Values, friction: Friction | None) -> System:
     """The system that a model's values make."""
     value = {name: mpf(number) for name, number in values.items()}
-    slide = hold = mpf(0)
-    if model == "coulomb":
-        slide = hold = value["f"]
-    elif model == "stickslip":
-        weight = value["m"] * value["g"]
-        slide, hold = value["mu_d"] * weight, value["mu_s"] * weight
+    slide, hold = friction(value) if friction else (mpf(0), mpf(0))
     c, u = value.get("c", mpf(0)), value.get("v_driver", mpf(0))
-    return System(value["m"], value["k"], c, slide, hold, u, value["F_ext"], model != "smd")
+    return System(value["m"], value["k"], c, slide, hold, u, value["F_ext"], friction is not None)
 
 
-def pieces(model: str, spans: list[Span]) -> Iterator[Piece]:
-    """The pieces of the motion, each from an event or a change of values on."""
+def pieces(spans: list[Span], friction: Friction | None = None) -> Iterator[Piece]:
+    """The pieces of the motion, each from an event or a change of values on; `friction` tells what slides and what
+    holds."""
     x, v, drive = mpf(spans[0][2]["x0"]), mpf(spans[0][2]["v0"]), mpf(0)
     for begin, end, values in spans:
-        s = system(model, values)
+        s = system(values, friction)
         t, load = mpf(begin), s.load(x, drive)
         mode = 1 if not s.dry else (1 if v > 0 else -1) if v != 0 else s.direction(load)
         while True:
@@ -81,14 +77,14 @@ def pieces(model: str, spans: list[Span]) -> Iterator[Piece]:
                 mode = s.direction(load)
 
 
-def threshold(values: Values, eps: float, stop: float) -> Iterator[Piece]:
+def threshold(s: System, eps: float, stop: float) -> Iterator[Piece]:
     """The sled, from rest, under the threshold law with `eps` (m/s) in the limit of exact integration.
 
     It is held below the speed eps only as far as friction can: it starts with the friction that holds until it is as
     fast as eps, slides, and, once it has slowed down to eps, glides on at that speed until the pull exceeds what
     friction holds.
     """
-    s, level = system("stickslip", values), mpf(eps)
+    level = mpf(eps)
     t, x, v = mpf(0), mpf(0), mpf(0)
     while t < stop:
         yield Piece(t, 0, later(gliding(x, v), t))
@@ -104,15 +100,6 @@ def threshold(values: Values, eps: float, stop: float) -> Iterator[Piece]:
         yield Piece(t, 1, later(slip, t))
         wait = standstill(replace(s, u=s.u - level), 1, mpf(0), net)  # seen by who moves at the level
         t, x, v = t + wait, slip(wait)[0], level
-
-
-def later(at: Course, origin: Any) -> Course:
-    """A motion with its time counted from elsewhere."""
-    return lambda t: at(mpf(t) - origin)
-
-
-def gliding(x: Any, v: Any) -> Course:
-    return lambda s: (x + v * s, v)
 
 
 def sliding(s: System, x: Any, v: Any, net: Any) -> Course:

@@ -10,22 +10,17 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..running.answer import Answer
-from .linear import pieces, threshold
+from .models import FOUND
+from .models.pendulum import Pendulum
 from .peers import solve
 from .pieces import Piece
-from .problem import Equations, Pendulum
-from .reference import POINTS, THRESHOLD, Case, Reference, difference, late
+from .problem import Equations
+from .reference import POINTS, Case, Reference, difference, late
 from .taylor import swings
 from .truth import changes, sampled
 
-REST = {"v0": 0.0, "F_ext": 0.0}
-SLED = {"m": 12.5, "k": 742.5, "g": 9.81, "mu_s": 0.9, "mu_d": 0.6, "v_driver": 0.034, "x0": 0.0} | REST
-MASS = {"m": 1.0, "k": 157.9, "x0": 0.1} | REST
 CLOSED: dict[str, Callable[[float], Iterator[Piece]]] = {  # up to a stop in s
-    "smd": lambda stop: pieces("smd", [(0.0, stop, MASS | {"c": 2.0})]),
-    "coulomb": lambda stop: pieces("coulomb", [(0.0, stop, MASS | {"f": 0.5})]),
-    "stickslip": lambda stop: pieces("stickslip", [(0.0, stop, SLED)]),
-    THRESHOLD: lambda stop: threshold(SLED, 1e-7, stop),
+    name: form for each in FOUND.values() for name, form in getattr(each, "CLOSED", {}).items()
 }
 ROUNDING = 2.0**-53  # of a number stored as a double
 NOTHING = 1e-40  # what 120 digits leave of a zero is less

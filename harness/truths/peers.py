@@ -33,31 +33,38 @@ def unwatched(rates: Rates) -> Rates:
 def at_most(limit: int) -> Watch:
     """Right-hand sides that end the run after so many of them, all together."""
     calls = count(1)
-
-    def watched(rates: Rates) -> Rates:
-        def counting(t: float, y: State) -> tuple[float, float]:
-            if next(calls) > limit:
-                raise HarnessError(f"at t = {t:.3g} s after {limit} right-hand sides")
-            return rates(t, y)
-
-        return counting
-
-    return watched
+    return ending(lambda: next(calls) > limit, f"{limit} right-hand sides")
 
 
 def within(seconds: float) -> Watch:
     """Right-hand sides that end the run after so many seconds from now."""
     end = perf_counter() + seconds
+    return ending(lambda: perf_counter() > end, f"{seconds:g} s of run time")
+
+
+def ending(over: Callable[[], bool], after: str) -> Watch:
+    """Right-hand sides that end the run when it is `over`."""
 
     def watched(rates: Rates) -> Rates:
-        def timing(t: float, y: State) -> tuple[float, float]:
-            if perf_counter() > end:
-                raise HarnessError(f"at t = {t:.3g} s after {seconds:g} s of run time")
+        def asked(t: float, y: State) -> tuple[float, float]:
+            if over():
+                raise HarnessError(f"at t = {t:.3g} s after {after}")
             return rates(t, y)
 
-        return timing
+        return asked
 
     return watched
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a peer is to solve, and how."""
+
+    method: str
+    problem: Equations
+    watched: Watch
+    rtol: float
+    atol: float
 
 
 @dataclass(frozen=True)
@@ -80,8 +87,7 @@ def solve(
     peer: str, method: str, problem: Equations, times: np.ndarray, rtol: float, atol: float, watched: Watch = unwatched
 ) -> Answer:
     """The motion at `times` (n,), which begin at 0 and end at the stop; HarnessError says why there is none."""
-    stretch: Callable[..., Stretch] = {"scipy": by_scipy, "cvode": by_cvode}[peer]
-    ask = partial(stretch, method, problem, watched=watched, rtol=rtol, atol=atol)
+    ask = partial({"scipy": by_scipy, "cvode": by_cvode}[peer], Task(method, problem, watched, rtol, atol))
     t, state = 0.0, problem.start
     mode = problem.mode_from(t, *state)
     motion = np.empty((len(times), 2))
@@ -109,37 +115,28 @@ def solve(
     return Answer(motion, events if problem.dry else None, evaluations)
 
 
-def by_scipy(
-    method: str,
-    problem: Equations,
-    mode: int,
-    t: float,
-    state: tuple[float, float],
-    times: np.ndarray,
-    *,
-    watched: Watch,
-    rtol: float,
-    atol: float,
-) -> Stretch:
+def by_scipy(task: Task, mode: int, t: float, state: tuple[float, float], times: np.ndarray) -> Stretch:
     """One mode through solve_ivp."""
     from scipy.integrate import solve_ivp
+
+    problem = task.problem
 
     def standstill(t: float, y: np.ndarray) -> float:
         return y[1]
 
     standstill.terminal, standstill.direction = True, -mode  # type: ignore[attr-defined]
-    options = {"jac": problem.jacobian(mode)} if method in IMPLICIT else {}
+    options = {"jac": problem.jacobian(mode)} if task.method in IMPLICIT else {}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a failure is told by its status
         run = solve_ivp(
-            watched(problem.rates(mode)),
+            task.watched(problem.rates(mode)),
             (t, problem.stop),
             state,
-            method,
+            task.method,
             t_eval=times,
             events=standstill if problem.dry else None,
-            rtol=rtol,
-            atol=atol,
+            rtol=task.rtol,
+            atol=task.atol,
             **options,
         )
     if run.status < 0:
@@ -152,22 +149,12 @@ def by_scipy(
     return Stretch(samples, problem.stop, tuple(run.y[:, -1].tolist()), False, evaluations)
 
 
-def by_cvode(
-    method: str,
-    problem: Equations,
-    mode: int,
-    t: float,
-    state: tuple[float, float],
-    times: np.ndarray,
-    *,
-    watched: Watch,
-    rtol: float,
-    atol: float,
-) -> Stretch:
+def by_cvode(task: Task, mode: int, t: float, state: tuple[float, float], times: np.ndarray) -> Stretch:
     """One mode through CVODE."""
     from sksundae.cvode import CVODE as Solver
 
-    rates = watched(problem.rates(mode))
+    problem, method = task.problem, task.method
+    rates = task.watched(problem.rates(mode))
     jacobian = problem.jacobian(mode) if method in IMPLICIT else None
 
     def fill(t: float, y: np.ndarray, slope: np.ndarray) -> None:
@@ -184,7 +171,7 @@ def by_cvode(
     options = {"eventsfn": standstill, "num_events": 1} if problem.dry else {}
     if jacobian is not None:
         options["jacfn"] = fill_matrix
-    solver = Solver(fill, method=method, rtol=rtol, atol=atol, max_num_steps=1_000_000, **options)
+    solver = Solver(fill, method=method, rtol=task.rtol, atol=task.atol, max_num_steps=1_000_000, **options)
     run = solver.solve(np.append(t, times), np.array(state))
     if not run.success:
         raise HarnessError(str(run.message).splitlines()[0])

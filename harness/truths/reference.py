@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..running.answer import Answer
-from .problem import Coulomb, Equations, Pacejka, Pendulum, Reaction, Smd, Stickslip
+from .problem import Equations
 
 FOLDER = Path(__file__).parents[2] / "fmus"
 DOUBT = ", relative difference "  # before it stands how the numbers were got
@@ -44,27 +44,6 @@ class Case:
     def reference(self) -> "Reference":
         """The truth of the law."""
         return load(self.truth) if isinstance(self.truth, str) else self.truth
-
-
-def magic(x_m: str) -> Case:
-    """The sled with the magic formula."""
-    problem, name = Pacejka(float(x_m)), f"pacejka-{x_m}"
-    truth = "pacejka" if x_m == "0.01" else name
-    return Case(name, "pacejka", f"magic formula, x_m = {x_m} m/s", truth, problem, {"x_m": float(x_m)}, "stickslip")
-
-
-THRESHOLD, REACTION, SWING = "stickslip-threshold", "pendulum-reaction", ("theta", "omega")
-CASES = (
-    Case("smd", "smd", "linear damping", "smd", Smd()),
-    Case("coulomb", "coulomb", "hybrid", "coulomb", Coulomb()),
-    Case("coulomb-sign", "coulomb", "sign", "coulomb", Coulomb(), {"friction": 2}, "coulomb"),
-    Case("stickslip", "stickslip", "hybrid", "stickslip", Stickslip()),
-    Case(THRESHOLD, "stickslip", "threshold", THRESHOLD, Stickslip(), {"friction": 3}, "stickslip"),
-    *map(magic, ("0.01", "0.001", "0.0001")),
-    Case("pendulum", "pendulum", "hybrid, pin load weight", "pendulum", Pendulum(), outputs=SWING),
-    Case(REACTION, "pendulum", "hybrid, pin load reaction", REACTION, Reaction(), {"pin_load": 2}, outputs=SWING),
-)
-MODELS = tuple(dict.fromkeys(case.model for case in CASES))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
 from ..running.answer import Answer
-from .problem import Pendulum, Reaction
+from .models.pendulum import Pendulum, Reaction
 
 DIGITS = 25
 WITHIN = (0.25, 0.45)  # s: half a period and then some, which holds one turning point

@@ -1,13 +1,10 @@
 """The answer by a second route, for any values: what the stability table compares with.
 
-    linear models     closed forms in 120 digits: linear.py
-    pacejka           scipy's Radau at 1e-11, restarted where a value changes: smooth.py
-    pendulum          scipy's DOP853 at 1e-13, restarted at every change of mode or value: smooth.py
-
-Nothing is shared with the FMUs.  Of any other model two of its methods may agree: certified.py.
+Closed forms in 120 digits, or scipy's methods at 1e-11 and less, restarted at every change of mode or value: as the
+file of the model in models/ has it.  Nothing is shared with the FMUs.  Of others two methods may agree: certified.py.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from importlib.util import find_spec
 from itertools import pairwise
@@ -15,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..errors import HarnessError
+from .models import FOUND
 from .pieces import Piece, Span
 
 
@@ -65,7 +63,7 @@ class Grid:
 
 def truth(model: str, spans: list[Span], grid: Grid) -> Truth:
     """The motion over the spans, at the points of the grid."""
-    pieces = list(PIECES[model](model, spans))
+    pieces = list(FOUND[model].pieces(spans))
     events = changes(pieces)
     times = grid.times(t for t, _ in events)
     x, v = sampled(pieces, times).T
@@ -86,24 +84,6 @@ def sampled(pieces: list[Piece], times: list[float]) -> np.ndarray:
         x, v = pieces[i].at(t)
         rows.append((float(x), float(v)))
     return np.array(rows)
-
-
-def in_closed_form(model: str, spans: list[Span]) -> Iterator[Piece]:
-    from .linear import pieces
-
-    return pieces(model, spans)
-
-
-def by_scipy(model: str, spans: list[Span]) -> Iterator[Piece]:
-    from . import smooth
-
-    return {"pacejka": smooth.pacejka, "pendulum": smooth.pendulum}[model](spans)
-
-
-PIECES = {
-    **dict.fromkeys(("smd", "coulomb", "stickslip"), in_closed_form),
-    **dict.fromkeys(("pacejka", "pendulum"), by_scipy),
-}
 
 
 def check() -> None:

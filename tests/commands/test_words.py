@@ -25,7 +25,7 @@ from harness.studies.importers.checks import CHECKS
 from harness.studies.precision import laws, table
 from harness.studies.precision.anchors import AnchorRun
 from harness.studies.precision.study import FMU, ME, Point, Study
-from harness.truths.reference import CASES, MODELS
+from harness.truths.models import CASES, MODELS
 
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}

@@ -23,7 +23,8 @@ from models import MODELS, SIGN, declared, model_class, outputs
 
 from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.sentences import of_value
-from harness.truths.reference import CASES, POINTS, late, load, relative
+from harness.truths.models import CASES
+from harness.truths.reference import POINTS, late, load, relative
 from tests.runtime.test_changes import spans
 
 fmus, worker, _workers = fmi3_hosts.FIXTURES

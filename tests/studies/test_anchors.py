@@ -9,7 +9,7 @@ from models import model_class
 from harness.running.inside import Inside, offered
 from harness.studies.precision import anchors
 from harness.truths import peers
-from harness.truths.problem import Belt, Classic, Plain, Smoothed
+from harness.truths.anchors import Belt, Classic, Plain, Smoothed
 
 BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as published
 

@@ -19,7 +19,8 @@ from harness.studies.precision import advice, laws
 from harness.studies.precision.study import FMPY, FMU, FULL, QUICK, WAYS, Extent, Job, Point, Study, jobs, study, sweep
 from harness.studies.precision.survey import survey
 from harness.truths import peers
-from harness.truths.reference import CASES, errors, load
+from harness.truths.models import CASES
+from harness.truths.reference import errors, load
 
 CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.chatters]

@@ -15,7 +15,8 @@ from harness.running import fmi3
 from harness.running.inside import embedded
 from harness.studies.precision import advice
 from harness.studies.precision.study import CS, ME, Extent, jobs, sweep
-from harness.truths.reference import CASES, load
+from harness.truths.models import CASES
+from harness.truths.reference import load
 
 CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.chatters]

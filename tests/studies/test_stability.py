@@ -35,7 +35,7 @@ from harness.studies.stability.study import (
     survey,
 )
 from harness.studies.stability.table import endings, refusals, summary
-from harness.truths.smooth import Curve
+from harness.truths.models.pacejka import Curve
 from harness.truths.truth import Grid, Truth, truth
 
 QUICK = (

@@ -10,9 +10,10 @@ from evidence import Piece, Trajectory
 from mpmath import mpf
 
 from harness.running.answer import Answer
+from harness.truths.anchors import Belt, Plain, Smoothed
 from harness.truths.making import CLOSED, closed
-from harness.truths.problem import Belt, Plain, Smoothed
-from harness.truths.reference import CASES, POINTS, errors, late, load
+from harness.truths.models import CASES
+from harness.truths.reference import POINTS, errors, late, load
 
 ULP = 2.0**-52
 TRUTHS = {case.truth: case for case in CASES}

@@ -14,8 +14,8 @@ from ...running.inside import Inside, embedded
 from ...running.probe import Card, Motion, Setting, card, run
 from ...scenes.fmus import fmu_of
 from ...truths.linear import mp
+from ...truths.models import CASES, MODELS
 from ...truths.problem import Equations
-from ...truths.reference import CASES, MODELS
 from ...truths.truth import Grid, truth
 from .measure import Beside, Measure
 

@@ -15,7 +15,8 @@ from ...process.child import ask
 from ...running.in_c import Library, NotHereError, built, compiled, compiler
 from ...running.loops import POINTS, direct, shared
 from ...scenes.fmus import fmu_of
-from ...truths.reference import CASES, MODELS, relative
+from ...truths.models import CASES, MODELS
+from ...truths.reference import relative
 from .measure import Beside, Measure
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside

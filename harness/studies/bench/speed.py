@@ -15,8 +15,11 @@ from ...running.inside import Inside, embedded
 from ...running.loops import POINTS
 from ...scenes.fmus import fmu_of
 from ...truths import peers
-from ...truths.problem import Equations, Pacejka, Smd, Stickslip
-from ...truths.reference import MODELS
+from ...truths.models import MODELS
+from ...truths.models.pacejka import Pacejka
+from ...truths.models.smd import Smd
+from ...truths.models.stickslip import Stickslip
+from ...truths.problem import Equations
 from . import empty as bench_empty
 from .measure import Beside, Measure
 

@@ -8,7 +8,7 @@ from ...results.folder import replacing
 from ...results.provenance import of_each, record
 from ...running.description import parameters
 from ...scenes.fmus import fmu_of
-from ...truths.reference import MODELS
+from ...truths.models import MODELS
 from ...truths.truth import check
 from .measure import Measure
 

@@ -23,7 +23,8 @@ from ...running.answer import Answer
 from ...running.inside import Inside, embedded, offered
 from ...scenes.fmus import fmu_of
 from ...truths import peers
-from ...truths.problem import Belt, Classic, Equations, Plain, Smoothed
+from ...truths.anchors import Belt, Classic, Plain, Smoothed
+from ...truths.problem import Equations
 
 LIMIT = 20_000  # right-hand sides after which a run counts as without end
 RUNTIME, EVENTS = "this runtime", "events"

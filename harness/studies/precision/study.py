@@ -26,8 +26,9 @@ from ...running.specification import Specification
 from ...scenes.fmus import fmu_of
 from ...truths import peers
 from ...truths.certified import agreed
+from ...truths.models import CASES
 from ...truths.problem import Unwritten
-from ...truths.reference import CASES, Case, errors, load
+from ...truths.reference import Case, errors, load
 
 MOST = 20  # timed runs of one point
 

@@ -13,8 +13,8 @@ from ...results.provenance import record
 from ...running.description import parameters
 from ...running.inside import embedded
 from ...scenes.fmus import check_built, fmu_of
+from ...truths.models import CASES
 from ...truths.peers import missing
-from ...truths.reference import CASES
 from . import anchors, laws
 from .advice import advise
 from .study import QUICK, Extent, Point, Study, study

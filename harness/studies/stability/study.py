@@ -23,7 +23,8 @@ from ...running.inside import embedded
 from ...running.probe import Card, Motion, Refusal, Refusals, card, poison, run
 from ...scenes.fmus import check_built, fmu_of
 from ...truths.certified import by_two_methods
-from ...truths.truth import PIECES, Truth, check, truth, worst
+from ...truths.models import MODELS
+from ...truths.truth import Truth, check, truth, worst
 from .bounded import bounded
 from .cases import Trial, cases, scenes, usual
 from .endings import FINISHED, REFUSED, WRONG, Ending, Region
@@ -128,7 +129,7 @@ def judged(group: Iterable[Trial]) -> Iterator[Ending]:
 
 def answering(case: Trial) -> Callable[..., Truth]:
     """What tells the true answer to a case."""
-    return truth if case.model in PIECES else by_two_methods
+    return truth if case.model in MODELS else by_two_methods
 
 
 def all_refused(case: Trial, ending: Refusals) -> Ending:

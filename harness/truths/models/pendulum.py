@@ -1,68 +1,63 @@
-"""The models without a closed form, by scipy.
-
-pacejka     Radau, with the slope of the friction curve, restarted where a value changes
-pendulum    DOP853, restarted at every change of mode or value
-"""
+"""Compound pendulum with friction in its pin, by scipy's DOP853, restarted at every change of mode or value."""
 
 from collections.abc import Iterator
-from math import asin, atan, copysign, cos, hypot, pi, sin, sqrt, tan
+from math import copysign, cos, hypot, pi, radians, sin, sqrt
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
-from .pieces import Course, Piece, Span, Values
+from ..pieces import Course, Piece, Span, Values, gliding, later
+from ..problem import Equations, Jacobian, Rates, State
+from ..reference import Case
 
+POUND, INCH = 0.45359237, 0.0254
 REACTION = 2  # the number of pin_load = reaction
 BEYOND_PI = 1.2246467991473532e-16  # of pi, after what a float holds
 
 
-def pacejka(spans: list[Span]) -> Iterator[Piece]:
-    """m a = F_ext + k (x_driver - x) - mu(v) m g, in one piece from each change of values on."""
-    y, drive = [spans[0][2]["x0"], spans[0][2]["v0"]], 0.0
-    for begin, end, p in spans:
-        curve = Curve(p)
+class Pendulum(Equations):
+    """Compound pendulum with friction in its pin, loaded by the weight."""
 
-        def rates(
-            s: float, y: np.ndarray, p: Values = p, curve: Curve = curve, drive: float = drive
-        ) -> tuple[float, float]:
-            pull = p["F_ext"] + p["k"] * (drive + p["v_driver"] * s - y[0])
-            return y[1], pull / p["m"] - curve.mu(y[1]) * p["g"]
+    start, stop, unit, dry = (radians(10.02), 0.0), 5.0, "rad", True
+    m, a, g, r, mu = 0.46 * POUND, 3.7 * INCH, 386 * INCH, 0.25 * INCH, 0.1
+    inertia = 1.5 * POUND * INCH**2 + m * a * a
 
-        def slopes(s: float, y: np.ndarray, p: Values = p, curve: Curve = curve) -> list[list[float]]:
-            return [[0.0, 1.0], [-p["k"] / p["m"], -curve.slope(y[1]) * p["g"]]]
+    def rates(self, mode: int) -> Rates:
+        swing = self.m * self.g * self.a / self.inertia
+        drag = mode * self.mu * self.r * self.m * self.g / self.inertia
+        return lambda t, y: (y[1], -swing * sin(y[0]) - drag)
 
-        # in the time from the beginning of the span, which has finer digits than that of the clock
-        run = solve_ivp(rates, (0.0, end - begin), y, "Radau", jac=slopes, rtol=1e-11, atol=1e-15, dense_output=True)
-        yield Piece(begin, 1, later(run.sol, begin))
-        y, drive = run.y[:, -1], drive + p["v_driver"] * (end - begin)
+    def jacobian(self, mode: int) -> Jacobian | None:
+        swing = self.m * self.g * self.a / self.inertia
+        return lambda t, y: [[0.0, 1.0], [-swing * cos(y[0]), 0.0]]
 
-
-def later(at: Course, origin: float) -> Course:
-    """A motion with its time counted from elsewhere."""
-    return lambda t: at(t - origin)
+    def hold(self, t: float, x: float) -> tuple[float, float, float]:
+        return -self.m * self.g * self.a * sin(x), 0.0, self.mu * self.r * self.m * self.g
 
 
-class Curve:
-    """The magic formula: mu and its slope at a speed."""
+class Reaction(Pendulum):
+    """The pendulum whose pin is loaded by its reaction N, which friction itself changes:
 
-    def __init__(self, p: Values):
-        self.D, self.C = p["mu_s"], 1 + (1 - 2 * asin(p["mu_d"] / p["mu_s"]) / pi)
-        self.B = (p["mu_s"] / (p["x_m"] / 2)) / (self.C * self.D)
-        top = self.B * p["x_m"]
-        self.E = (top - tan(pi / (2 * self.C))) / (top - atan(top))
+    N^2 = R^2 + (b - mode s N)^2,    R = m g cos(x) + m a v^2,    b = m g sin(x) (1 - m a^2/J),    s = mu r m a/J
+    """
 
-    def mu(self, v: float) -> float:
-        bv = self.B * v
-        return self.D * sin(self.C * atan(bv - self.E * (bv - atan(bv))))
+    def rates(self, mode: int) -> Rates:
+        weight, moment, arm = self.m * self.g, self.m * self.a, self.mu * self.r
+        share = 1 - moment * self.a / self.inertia
+        s = mode * arm * moment / self.inertia
+        rest = 1 - s * s
 
-    def slope(self, v: float) -> float:
-        bv = self.B * v
-        inner = bv - self.E * (bv - atan(bv))
-        rise = self.B * (1 - self.E * bv * bv / (1 + bv * bv))
-        return self.D * self.C * cos(self.C * atan(inner)) * rise / (1 + inner * inner)
+        def rates(t: float, y: State) -> tuple[float, float]:
+            x, v = y
+            radial, b = weight * cos(x) + moment * v * v, weight * sin(x) * share
+            normal = (sqrt(b * b + rest * radial * radial) - s * b) / rest
+            return v, -(weight * self.a * sin(x) + mode * arm * normal) / self.inertia
+
+        return rates
+
+    jacobian = Equations.jacobian
 
 
-def pendulum(spans: list[Span]) -> Iterator[Piece]:
+def pieces(spans: list[Span]) -> Iterator[Piece]:
     """Swings from one standstill to the next, and rests.
 
     The angle is counted from the nearest of the hanging and the inverted position, so that it keeps its digits there.
@@ -75,7 +70,7 @@ def pendulum(spans: list[Span]) -> Iterator[Piece]:
         while t < end:
             mode = int(copysign(1, omega)) if omega else pin.direction(angle)
             if mode == 0:
-                yield Piece(t, 0, turned(resting(angle), half_turns * pi))
+                yield Piece(t, 0, turned(gliding(angle, 0.0), half_turns * pi))
                 break
             ahead, angle, omega, at = swing(pin, mode, end - t, angle, omega)
             yield Piece(t, mode, turned(later(at, t), half_turns * pi))
@@ -85,10 +80,6 @@ def pendulum(spans: list[Span]) -> Iterator[Piece]:
 def turned(at: Course, angle: float) -> Course:
     """A motion with its angle counted from elsewhere."""
     return lambda t: (angle + at(t)[0], at(t)[1])
-
-
-def resting(angle: float) -> Course:
-    return lambda t: (angle, 0.0)
 
 
 class Pin:
@@ -122,6 +113,8 @@ class Pin:
 def swing(pin: Pin, mode: int, longest: float, angle: float, omega: float) -> tuple[float, float, float, Course]:
     """To the next standstill, or as long as may be: how long, angle, angular speed and the motion until then."""
 
+    from scipy.integrate import solve_ivp
+
     def rates(_: float, y: np.ndarray) -> tuple[float, float]:
         return y[1], pin.acceleration(y[0], y[1], mode)
 
@@ -133,3 +126,10 @@ def swing(pin: Pin, mode: int, longest: float, angle: float, omega: float) -> tu
     options = {"rtol": 1e-13, "atol": 1e-18, "max_step": step, "dense_output": True}
     run = solve_ivp(rates, (0.0, longest), (angle, omega), "DOP853", events=still, **options)
     return float(run.t[-1]), float(run.y[0, -1]), 0.0 if run.status == 1 else float(run.y[1, -1]), run.sol
+
+
+NAME, SWING = "pendulum-reaction", ("theta", "omega")
+CASES = (
+    Case("pendulum", "pendulum", "hybrid, pin load weight", "pendulum", Pendulum(), outputs=SWING),
+    Case(NAME, "pendulum", "hybrid, pin load reaction", NAME, Reaction(), {"pin_load": REACTION}, outputs=SWING),
+)

@@ -1,0 +1,88 @@
+"""The sled with the magic formula, by scipy's Radau, with the slope of the curve, restarted where a value changes."""
+
+from collections.abc import Iterator
+from math import asin, atan, cos, pi, sin, tan
+
+import numpy as np
+
+from ..pieces import Piece, Span, Values, later
+from ..problem import Equations, Jacobian, Rates, State
+from ..reference import Case
+from .stickslip import Stickslip
+
+
+class Curve:
+    """The magic formula: mu and its slope at a speed."""
+
+    def __init__(self, p: Values):
+        self.D, self.C = p["mu_s"], 1 + (1 - 2 * asin(p["mu_d"] / p["mu_s"]) / pi)
+        self.B = (p["mu_s"] / (p["x_m"] / 2)) / (self.C * self.D)
+        top = self.B * p["x_m"]
+        self.E = (top - tan(pi / (2 * self.C))) / (top - atan(top))
+
+    def mu(self, v: float) -> float:
+        bv = self.B * v
+        return self.D * sin(self.C * atan(bv - self.E * (bv - atan(bv))))
+
+    def slope(self, v: float) -> float:
+        bv = self.B * v
+        inner = bv - self.E * (bv - atan(bv))
+        rise = self.B * (1 - self.E * bv * bv / (1 + bv * bv))
+        return self.D * self.C * cos(self.C * atan(inner)) * rise / (1 + inner * inner)
+
+
+class Pacejka(Stickslip):
+    """The sled with the magic formula: one smooth equation, no modes."""
+
+    dry, stiff = False, True
+
+    def __init__(self, x_m: float = 0.01) -> None:
+        self.absolute = min(x_m, Equations.absolute)  # the curve is as fine as that
+        self.curve = Curve({"mu_s": self.mu_s, "mu_d": self.mu_d, "x_m": x_m})
+
+    def rates(self, mode: int) -> Rates:
+        square, speed, weight = self.k / self.m, self.v_driver, self.curve.D * self.g
+        B, C, E = self.curve.B, self.curve.C, self.curve.E  # written out, as who wants it fast would
+
+        def rates(t: float, y: State) -> tuple[float, float]:
+            x, v = y
+            z = B * v
+            return v, square * (speed * t - x) - weight * sin(C * atan(z - E * (z - atan(z))))
+
+        return rates
+
+    def jacobian(self, mode: int) -> Jacobian:
+        square = self.k / self.m
+        return lambda t, y: [[0.0, 1.0], [-square, -self.curve.slope(y[1]) * self.g]]
+
+
+def pieces(spans: list[Span]) -> Iterator[Piece]:
+    """m a = F_ext + k (x_driver - x) - mu(v) m g, in one piece from each change of values on."""
+    from scipy.integrate import solve_ivp
+
+    y, drive = [spans[0][2]["x0"], spans[0][2]["v0"]], 0.0
+    for begin, end, p in spans:
+        curve = Curve(p)
+
+        def rates(
+            s: float, y: np.ndarray, p: Values = p, curve: Curve = curve, drive: float = drive
+        ) -> tuple[float, float]:
+            pull = p["F_ext"] + p["k"] * (drive + p["v_driver"] * s - y[0])
+            return y[1], pull / p["m"] - curve.mu(y[1]) * p["g"]
+
+        def slopes(s: float, y: np.ndarray, p: Values = p, curve: Curve = curve) -> list[list[float]]:
+            return [[0.0, 1.0], [-p["k"] / p["m"], -curve.slope(y[1]) * p["g"]]]
+
+        # in the time from the beginning of the span, which has finer digits than that of the clock
+        run = solve_ivp(rates, (0.0, end - begin), y, "Radau", jac=slopes, rtol=1e-11, atol=1e-15, dense_output=True)
+        yield Piece(begin, 1, later(run.sol, begin))
+        y, drive = run.y[:, -1], drive + p["v_driver"] * (end - begin)
+
+
+def case(x_m: str, truth: str) -> Case:
+    """One of its curves."""
+    law, problem = f"magic formula, x_m = {x_m} m/s", Pacejka(float(x_m))
+    return Case(f"pacejka-{x_m}", "pacejka", law, truth, problem, {"x_m": float(x_m)}, "stickslip")
+
+
+CASES = (case("0.01", "pacejka"), case("0.001", "pacejka-0.001"), case("0.0001", "pacejka-0.0001"))

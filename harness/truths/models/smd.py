@@ -1,0 +1,26 @@
+"""Spring, mass and viscous damper."""
+
+from functools import partial
+
+from ..problem import Equations, Jacobian, Rates, closed
+from ..reference import Case
+
+
+class Smd(Equations):
+    """m v' = -k x - c v."""
+
+    start, stop = (0.1, 0.0), 4.0
+    m, k, c = 1.0, 157.9, 2.0
+
+    def rates(self, mode: int) -> Rates:
+        square, damping = self.k / self.m, self.c / self.m
+        return lambda t, y: (y[1], -square * y[0] - damping * y[1])
+
+    def jacobian(self, mode: int) -> Jacobian:
+        matrix = [[0.0, 1.0], [-self.k / self.m, -self.c / self.m]]
+        return lambda t, y: matrix
+
+
+pieces = partial(closed, None)
+CASES = (Case("smd", "smd", "linear damping", "smd", Smd()),)
+CLOSED = {"smd": lambda stop: pieces([(0.0, stop, Smd().values("m", "k", "c"))])}
