@@ -17,7 +17,7 @@ from ...truths.linear import mp
 from ...truths.models import CASES, MODELS
 from ...truths.problem import Equations
 from ...truths.truth import Grid, truth
-from .measure import Beside, Measure
+from .measure import NUMBERS, Beside, Measure
 
 POINTS = 1600
 CLOSED = Beside("closed form in 120 digits")
@@ -27,7 +27,6 @@ def accuracy() -> list[Callable[[], Measure]]:
     """What to measure, in the order of the design's table."""
     cards = {model: card(model) for model in MODELS}
     closed = [model for model in MODELS if "exact" in cards[model].methods]
-    stuck = (("coulomb", {"x0": 0.003}), ("stickslip", {"v_driver": 0.0}), ("pendulum", {"theta0": 0.005}))
     return [
         *(partial(exact, model, cards[model]) for model in closed),
         *(partial(late, model, cards[model]) for model in closed if "friction" in cards[model].choices),
@@ -36,7 +35,7 @@ def accuracy() -> list[Callable[[], Measure]]:
         *(partial(default, "pendulum", cards["pendulum"], "pin_load", load, 1e-9) for load in ("weight", "reaction")),
         *(partial(default, "pacejka", cards["pacejka"], "x_m", 10.0**-n, 1e-6) for n in range(2, 7)),
         *(partial(between_grids, model, cards[model]) for model in MODELS),
-        *(partial(drift, model, cards[model], values) for model, values in stuck),
+        *(partial(drift, model, cards[model], values) for model, values in NUMBERS["stuck"].items()),
     ]
 
 

@@ -1,6 +1,11 @@
 """One number of the benchmark: what was measured, what is to be reached, and what stands beside it."""
 
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+NUMBERS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("reach.toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)

@@ -17,21 +17,13 @@ from ...running.loops import POINTS, direct, shared
 from ...scenes.fmus import fmu_of
 from ...truths.models import CASES, MODELS
 from ...truths.reference import relative
-from .measure import Beside, Measure
+from .measure import NUMBERS, Beside, Measure
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
 
 CASE = {case.name: case for case in CASES}
 
-# Run times in C to reach, in s: of the sled and of the stiffest as asked for, of the others as seen feasible.
-REACH = {
-    "smd": 0.2e-3,
-    "coulomb": 0.15e-3,
-    "stickslip": 0.05e-3,
-    "pacejka-0.01": 1.5e-3,
-    "pacejka-0.001": 1.5e-3,
-    "pendulum": 0.3e-3,
-}
+REACH: dict[str, float] = NUMBERS["in_c"]
 TOLERANCES = (1e-4, 1e-6, 1e-8)  # of CVODE, relative
 REPEAT, REPEAT_PYTHON = 100, 5
 
