@@ -1,103 +1,49 @@
-"""What every output follows from at the start, found by trying: one value is changed, and who follows is seen.
+"""What every output follows from at the start: the parameters and inputs in its equation, with the start values put in,
+so that terms which are zero are gone.
 
-A dependency may show in few situations only, as that on what holds a body that is about to break away.  So many are
-tried: zeros, both signs, all sizes, every choice, and loads about as large as friction can hold, or just so large.
+The mode of a contact follows from its slip and, where it may stick, from its load and from what it holds, and from the
+rates of both, which decide ties; of contacts that share bodies from those of all.
 """
-
-from collections.abc import Sequence
-from math import isfinite
-from random import Random
-from types import SimpleNamespace
-from typing import Any
 
 from ..runtime.declare import Declared, Declaring
 from ..runtime.values import SETTABLE
-from .equations.authored import first_states
-from .written import beside
-
-SITUATIONS = 2000
-SIZES = 2.0  # powers of ten above and below a start value
-LOADS = (-1.5, -1.0, -0.5, 0.5, 1.0, 1.5)  # of a body at rest, in holding limits
-TRIES = 100  # to meet a range
+from .equations.algebra import derivative, leaves, put
+from .equations.anatomy import TIME, Anatomy
+from .equations.declared import HYBRID, SIGN, THRESHOLD, Contact
+from .equations.expressions import Expression, Operand
 
 
 def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> dict[str, list[str]]:
-    """For every output the parameters and inputs that it follows from while the model is initialised.
-
-    The settings of the solver are chosen like all others but not tried: at the start it has not stepped yet.
-    """
-    thing: Any = model()
+    """For every output the parameters and inputs that it follows from while the model is initialised."""
     outputs = [name for name, meaning in declared if meaning.causality == "output"]
-    known = {name: meaning for name, meaning in declared if meaning.causality in SETTABLE}
     if not outputs:
         return {}
-    entry = next((name for name, meaning in known.items() if meaning.causality == "input"), "")
-    sizes: dict[str, list[float]] = {}  # values of a unit meet at the size of one of them
-    for meaning in known.values():
-        sizes.setdefault(meaning.unit, []).append(abs(meaning.start) or 1.0)
-    found: dict[str, set[str]] = {name: set() for name in outputs}
-    chance = Random(0)
-    for _ in range(SITUATIONS):
-        values = {name: another(meaning, sizes, chance) for name, meaning in known.items()}
-        put(thing, values)
-        if thing.dry and entry and begun(thing, outputs):
-            load, limit = at_rest(thing, chance)
-            values[entry] += one(LOADS, chance) * limit - load
-            put(thing, values)
-        before = begun(thing, outputs)
-        for name in (name for name in known if "." not in name and before):
-            put(thing, {name: another(known[name], sizes, chance)})
-            for output, old, new in zip(outputs, before, begun(thing, outputs), strict=False):
-                if new != old:
-                    found[output].add(name)
-            put(thing, {name: values[name]})
-    return {output: [name for name in known if name in found[output]] for output in outputs}
+    an: Anatomy = model.anatomy  # type: ignore[attr-defined]
+    laws = [label for name, meaning in declared if name == "friction" for label, _, _ in meaning.items] or [HYBRID]
+    start: dict[Expression, Operand] = {TIME: 0.0, **dict.fromkeys(an.drives, 0.0), **{s: s.begins for s in an.states}}
 
+    def among(*terms: Operand) -> set[Expression]:
+        return {leaf for e in terms for leaf in leaves(put(e, start))}
 
-def at_rest(thing: Any, chance: Random) -> tuple[float, float]:
-    """The load on a contact at the start, if all are stuck, and its limit."""
-    if not thing.coupled:
-        load, _, limit = thing.hold(0.0, *first_states(thing))
-        return load, limit
-    many = len(thing.contacts)
-    found = thing.forces(0.0, *first_states(thing), *(0 for _ in range(many)))
-    return one(list(zip(found[:many], found[many : 2 * many], strict=True)), chance)
+    def loads(c: Contact) -> list[Operand]:
+        return [an.load[c]] if c in an.lonely else [an.slip_rate[d] for d in an.contacts]
 
+    def of_mode(c: Contact) -> set[Expression]:
+        near = [c] if c in an.lonely else an.contacts
+        held = [*loads(c), *(an.hold[d] for d in near)] if HYBRID in laws else []
+        rates = [derivative(e, an.by_time | {x: an.rate[x] for x in an.positions}) for e in held]
+        others = [e for d in near if d is not c for e in (d.slip, d.slide)]
+        return among(c.slip, *held, *rates, *others, *([c.eps] if THRESHOLD in laws else []))
 
-def another(meaning: Declared, sizes: dict[str, list[float]], chance: Random) -> float:
-    """A value that is allowed; the start value where the range is narrow."""
-    if meaning.items:
-        return one(meaning.items, chance)[1]
-    for _ in range(TRIES):
-        size = one(sizes[meaning.unit], chance) * 10.0 ** (SIZES * (2.0 * chance.random() - 1.0))
-        value = one((0.0, size, -size), chance)
-        if meaning.accepts(value):
-            return value
-    return meaning.start
+    def of_force(c: Contact) -> set[Expression]:
+        return of_mode(c) | among(c.slide, *([] if laws == [SIGN] else [*loads(c), an.hold[c]]))
 
+    def follows(e: Expression) -> set[str]:
+        found = among(e)
+        touched = [of_force(c) if c in found else of_mode(c) for c in an.contacts if {c, c.mode} & found]
+        names = {one.name for part in (found, *touched) for one in part}
+        return names | {"friction"} if touched and laws[1:] else names
 
-def one(things: Sequence[Any], chance: Random) -> Any:
-    """One of several; what Random itself chooses may be another in another Python."""
-    return things[int(chance.random() * len(things))]
-
-
-def put(thing: Any, values: dict[str, float]) -> None:
-    """Set variables by their dotted names."""
-    for name, value in values.items():
-        owner, *path = thing, *name.split(".")
-        for part in path[:-1]:
-            owner = getattr(owner, part)
-        setattr(owner, path[-1], value)
-
-
-def begun(thing: Any, outputs: list[str]) -> list[float]:
-    """The outputs at the start; none where the values do not go together, or lead out of the range of numbers."""
-    try:
-        if thing.prepare():
-            return []
-        thing.solver.start(thing, 0.0, *first_states(thing), thing.stop_time, thing.tolerance)
-        beside(type(thing), "runtime.rules").show(SimpleNamespace(), thing)
-    except (ArithmeticError, ValueError):
-        return []
-    values = [getattr(thing, output) for output in outputs]
-    return values if all(map(isfinite, values)) else []
+    equations = {e.name: follows(e) for e in an.declared if e.name in outputs}
+    known = [name for name, meaning in declared if meaning.causality in SETTABLE]
+    return {output: [name for name in known if name in equations[output]] for output in outputs}

@@ -1,6 +1,6 @@
 """What the model descriptions say of the start: which outputs follow from which parameters and inputs.
 
-The build finds it by trying on the model's class; here built FMUs are tried, in other situations.
+The build reads it in the equations; here built FMUs are tried.
 """
 
 import random
@@ -10,7 +10,11 @@ from zipfile import ZipFile
 
 import fmi3_hosts
 import pytest
-from models import MODELS, declared, model_class, outputs, push
+from models import MODELS, ROOT, declared, model_class, outputs, push
+
+from fmus.packaging.dependencies import at_start
+from fmus.packaging.written import written
+from fmus.runtime.declare import variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 SITUATIONS = 800
@@ -103,3 +107,14 @@ def test_fmi_3_says_the_same_and_of_the_driver_that_it_follows_its_speed(at_the_
     beside = {place: known for place, known in told.items() if place not in expected}
     assert told == expected | beside
     assert list(beside.values()) == [{"v_driver"}] * model_class(name).driven
+
+
+def test_what_shows_in_few_situations_only_is_told_too(tmp_path):
+    """A stop beyond the start; a logarithm behind a condition that does not hold there."""
+    text = (ROOT / "tests" / "authored" / "bumper.py").read_text(encoding="utf-8")
+    more = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
+    (tmp_path / "bumper.py").write_text(text + more, encoding="utf-8")
+    model = written(tmp_path / "bumper.py")
+    told = at_start(model, variables(model()))
+    assert {"gap", "s"} <= set(told["a"])
+    assert told["depth"] == ["gap"]

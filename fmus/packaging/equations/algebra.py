@@ -5,6 +5,7 @@ A term is made shorter only where that leaves its bits alone: by zeros, ones and
 
 import math
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 
 from .declared import Output, Parameter
 from .expressions import COMPARISONS, FUNCTIONS, Expression, Mistake, Operand, Term
@@ -97,7 +98,8 @@ def made(op: str, *args: Operand) -> Operand:
     if op == "choose":
         return args[1] if same(args[1], args[2]) else Term(op, *args)
     if op in FUNCTIONS and not isinstance(args[0], Expression):
-        return getattr(math, op)(args[0])
+        with suppress(ArithmeticError, ValueError):  # as of a logarithm behind a condition that does not hold
+            return getattr(math, op)(args[0])
     if op not in ARITHMETIC:
         return Term(op, *args)
     a, b = args

@@ -55,7 +55,9 @@ def brought_in(source: Authored, offered: Offer | None = None) -> type[Declaring
         sys.modules[parent].__path__ = []
     sys.modules[f"{package}.runtime.declare"] = declare  # what is declared is what it is to everybody else
     sys.meta_path.insert(0, Finder(package, files, {f"{name}.py": sys.modules[model.__module__].__file__ or "?"}))
-    return vars(import_module(f"{package}.{name}"))[model.__name__]
+    found = vars(import_module(f"{package}.{name}"))[model.__name__]
+    found.anatomy = source.anatomy  # for whoever describes it
+    return found
 
 
 class Finder(MetaPathFinder, Loader):
