@@ -14,8 +14,8 @@ FUNCTIONS: dict[str, Callable[[Operand, Operand], Operand]] = {
     "sin": lambda u, value: Term("cos", u),
     "cos": lambda u, value: -Term("sin", u),
     "tan": lambda u, value: 1.0 + value * value,
-    "asin": lambda u, value: 1.0 / Term("sqrt", 1.0 - u * u),
-    "acos": lambda u, value: -1.0 / Term("sqrt", 1.0 - u * u),
+    "asin": lambda u, value: Term("/", 1.0, Term("sqrt", 1.0 - u * u)),
+    "acos": lambda u, value: Term("/", -1.0, Term("sqrt", 1.0 - u * u)),
     "atan": lambda u, value: 1.0 / (1.0 + u * u),
     "sinh": lambda u, value: Term("cosh", u),
     "cosh": lambda u, value: Term("sinh", u),
@@ -44,6 +44,11 @@ def written_at() -> tuple[str, int]:
     return frame.f_code.co_filename, frame.f_lineno
 
 
+def _both_ways(op: str) -> tuple[Any, Any]:
+    """The methods that make a term of an operation, self op other and other op self."""
+    return (lambda self, other: Term(op, self, other)), (lambda self, other: Term(op, other, self))
+
+
 class Expression:
     """What a number is calculated from: a declared variable, or a term of such."""
 
@@ -55,29 +60,14 @@ class Expression:
         made.place = written_at()
         return made
 
-    def __add__(self, other: Operand) -> "Term":
-        return Term("+", self, other)
-
-    def __radd__(self, other: Operand) -> "Term":
-        return Term("+", other, self)
-
-    def __sub__(self, other: Operand) -> "Term":
-        return Term("-", self, other)
-
-    def __rsub__(self, other: Operand) -> "Term":
-        return Term("-", other, self)
-
-    def __mul__(self, other: Operand) -> "Term":
-        return Term("*", self, other)
-
-    def __rmul__(self, other: Operand) -> "Term":
-        return Term("*", other, self)
-
-    def __truediv__(self, other: Operand) -> "Term":
-        return Term("/", self, other)
-
-    def __rtruediv__(self, other: Operand) -> "Term":
-        return Term("/", other, self)
+    __add__, __radd__ = _both_ways("+")
+    __sub__, __rsub__ = _both_ways("-")
+    __mul__, __rmul__ = _both_ways("*")
+    __truediv__, __rtruediv__ = _both_ways("/")
+    __lt__ = _both_ways("<")[0]  # Python turns a < b round to b > a by itself
+    __le__ = _both_ways("<=")[0]
+    __gt__ = _both_ways(">")[0]
+    __ge__ = _both_ways(">=")[0]
 
     def __neg__(self) -> "Term":
         return Term("neg", self)
@@ -87,18 +77,6 @@ class Expression:
 
     def __abs__(self) -> "Term":
         return Term("fabs", self)
-
-    def __lt__(self, other: Operand) -> "Term":
-        return Term("<", self, other)
-
-    def __le__(self, other: Operand) -> "Term":
-        return Term("<=", self, other)
-
-    def __gt__(self, other: Operand) -> "Term":
-        return Term(">", self, other)
-
-    def __ge__(self, other: Operand) -> "Term":
-        return Term(">=", self, other)
 
     def __pow__(self, other: Operand) -> Never:
         raise Mistake("** rounds in ways of its own: write a product, x * x, or exp and log")
