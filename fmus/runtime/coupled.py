@@ -15,7 +15,8 @@ from .rounding import NEAR
 from .vectors import Contact, Contacts, States, contacts, largest, per_contact, some
 
 LOOKS = 5  # parts of a step in which something may end, each looked at by its end
-CLOSE = 0.25  # of what a guard spans in a step: below, it is looked at more closely
+CLOSE = 0.25  # of what a guard changes in a step: below, it is looked at more closely
+INSIDE = 3.0  # times the second difference over the middle: by up to 2 the ends differ where a parabola turns inside
 TOUCHING = 1e-3  # m/s or rad/s: the size of a slip, where it is of no size itself
 ALIKE = 1.0 - 1e-9  # of the greatest load, as a share of what is held: what is let go with it
 TOGETHER, MOST_ROUNDS = 60, 200  # of letting go and holding again: of all contacts; then of one at a time
@@ -55,31 +56,30 @@ class CoupledFriction(DryFriction):
         return left
 
     def guard(self, step, t, i: Contact):
-        """That of one contact, within a step."""
+        """That of one contact, within a step; while it slides nobody asks for loads."""
         y = step.at(self, t)
+        if step.modes0[i] != STUCK:
+            slips = self.slips(t, y)
+            return step.modes0[i] * slips[i]
         left = self.guards(t, y, step.modes0)
         return left[i]
 
-    def comes_close(self, step):
-        """Whether a guard comes near zero within the step, as far as the cubic with the values and slopes of its ends
-        tells: no interpolant is worked out for that."""
+    def may_dip(self, step, first: Contacts, last: Contacts):
+        """Whether a guard may come to zero between the ends of the step, where it has these values, as far as the
+        parabola through its middle tells: no interpolant is worked out for that, the middle is that of the cubic with
+        the values and slopes of both ends."""
         h = step.t1 - step.t0
-        c1 = step.y1 - step.y0
-        c2 = h * step.f0 - c1
-        c3 = 2.0 * c1 - h * (step.f0 + step.f1)
-        s, r = 1.0 / 3.0, 2.0 / 3.0
-        y2 = step.y0 + s * (c1 + r * (c2 + s * c3))
-        y3 = step.y0 + r * (c1 + s * (c2 + r * c3))
-        first = self.guards(step.t0, step.y0, step.modes0)
-        second = self.guards(step.t0 + s * h, y2, step.modes0)
-        third = self.guards(step.t0 + r * h, y3, step.modes0)
-        last = self.guards(step.t1, step.y1, step.modes0)
-        close = False
+        y2 = 0.5 * (step.y0 + step.y1) + 0.125 * h * (step.f0 - step.f1)
+        middle = self.guards(step.t0 + 0.5 * h, y2, step.modes0)
+        found = False
         for i in contacts:
-            low = min(first[i], second[i], third[i], last[i])
-            high = max(first[i], second[i], third[i], last[i])
-            close = close or last[i] <= 0.0 or low <= CLOSE * (high - low)
-        return close
+            end = first[i] if first[i] < last[i] else last[i]
+            low = end if end < middle[i] else middle[i]
+            bend = first[i] + last[i] - 2.0 * middle[i]
+            rise = fabs(last[i] - first[i])
+            close = low <= CLOSE * (rise if rise > bend else bend)
+            found = found or last[i] <= 0.0 or middle[i] <= 0.0 or (close and rise <= INSIDE * bend)
+        return found
 
     def ends(self, step) -> Contacts:
         """When each mode ends within the step, to the last bit; inf where it does not.
@@ -89,16 +89,17 @@ class CoupledFriction(DryFriction):
         found, before = per_contact(), per_contact()
         for i in contacts:
             found[i], before[i] = inf, -inf
-        if self.comes_close(step):
+        here = self.guards(step.t0, step.y0, step.modes0)
+        last = self.guards(step.t1, step.y1, step.modes0)
+        if self.may_dip(step, here, last):
             step.looked += LOOKS
-            here = self.guards(step.t0, step.y0, step.modes0)
             t_before = t_here = step.t0
             for part in range(1, LOOKS + 1):
-                t, y = step.t1, step.y1
+                t, ahead = step.t1, last
                 if part < LOOKS:
                     t = step.t0 + (step.t1 - step.t0) * part / LOOKS
                     y = step.at(self, t)
-                ahead = self.guards(t, y, step.modes0)
+                    ahead = self.guards(t, y, step.modes0)
                 for i in contacts:
                     if found[i] == inf and ahead[i] <= 0.0:
                         found[i] = self.located(step, t_here, t, here[i], ahead[i], i)
