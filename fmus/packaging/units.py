@@ -49,7 +49,7 @@ SYMBOLS = {  # exponents of kg, m, s and rad
     **{"1": (0, 0, 0, 0), "kg": (1, 0, 0, 0), "m": (0, 1, 0, 0), "s": (0, 0, 1, 0), "rad": (0, 0, 0, 1)},
     **{"N": (1, 1, -2, 0), "J": (1, 2, -2, 0), "W": (1, 2, -3, 0), "Pa": (1, -1, -2, 0), "Hz": (0, 0, -1, 0)},
 }
-FACTOR = re.compile(r"([./])(1|[A-Za-z]+)(-?\d+)?")
+FACTOR = re.compile(r"([./])(1|[A-Za-z]+)(-?\d{1,2})?")
 
 
 def derived(symbol: str) -> Unit | None:

@@ -239,6 +239,36 @@ def test_an_author_may_derive_variables_of_a_kind(tmp_path):
     assert find(path).text == find("smd").text.replace("smd.py", "mine.py")
 
 
+@pytest.mark.parametrize("moved", ["x", "driver"])
+def test_what_jumps_has_no_closed_form_though_its_slopes_have(tmp_path, moved):
+    """Neither a motion nor a load at rest is known from its slopes, where a condition moves."""
+    text = f'''"""A model."""
+from fmus import Contact, Mode, Model, Output, Parameter, State, choose
+
+
+class Jump(Model):
+    """A sled on a spring that is longer from some place on."""
+
+    k = Parameter(100.0, "N/m", "stiffness")
+    f = Parameter(1.0, "N", "friction")
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    u = Parameter(0.1, "m/s", "speed")
+    edge = Parameter(0.02, "m", "place")
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+    driver = State("m", "driver", rate=u)
+    mode = Mode()
+    F = Contact("N", "friction", mode=mode, slip=v, slide=f)
+    a = Output("m/s2", "acceleration", (k * (driver - x) + choose({moved} > edge, f, -f) - F) / m, rate_of=v)
+'''
+    (tmp_path / "jump.py").write_text(text)
+    anatomy = find(tmp_path / "jump.py").anatomy
+    assert anatomy.closed_form is None
+    assert anatomy.waits == (moved == "x")
+    (tmp_path / "jump.py").write_text(text.replace(f"choose({moved} > edge, f, -f)", "f"))
+    assert find(tmp_path / "jump.py").anatomy.closed_form is not None
+
+
 def test_choices_and_contacts_are_walked():
     """The models of these tests have what they are to try."""
     kinds = {type(e) for source in SOURCES for e in find(source).anatomy.declared}

@@ -182,6 +182,44 @@ WRONG = {
         18,
         "q is declared in m, and its rate u * u is in m^2/s^2",
     ),
+    "a rate of a text": (
+        RATE.replace("rate_of=v", 'rate_of="v"'),
+        16,
+        "a says that it is the rate of 'v', which is no",
+    ),
+    "a number out of range": (
+        RATE + '    q = Parameter(10**400, "kg", "q")\n',
+        17,
+        "q: start value and bounds are numbers",
+    ),
+    "no rules": (RATE + "    rules = None\n", 4, "rules are one Rule, or several in brackets"),
+    "a rule without words": (RATE + "    rules = Rule(k > k + k, 3)\n", 17, "the sentence of a Rule: 3 is no text"),
+    "words that no page can show": (
+        RATE + '    q = Parameter(1.0, "kg", "mass\\x00")\n',
+        17,
+        "q: 'mass\\x00' is no text of letters that can be printed in one line",
+    ),
+    "a choice of nothing": (RATE + '    q = Choice("kind")\n', 17, "a Choice has items, each with what it is"),
+    "an exit": (RATE + "    raise SystemExit(3)\n", 17, "SystemExit: 3"),
+    "an error of two lines": (RATE + '    raise ValueError("no\\nway")\n', 17, "ValueError: no way"),
+    "an equality": (RATE + "    q = 1.0 if k == 0.0 else 2.0\n", 17, "== and != say nothing of values that are not"),
+    "an equality of two": (
+        RATE + "    q = 1.0 if x != v else 2.0\n",
+        17,
+        "== and != say nothing of values that are not",
+    ),
+    "friction that drives": (
+        DRY.replace("slide=f", "slide=-f") + STUCK,
+        17,
+        "R slides or holds with a negative force at the start values",
+    ),
+    "a huge unit": (RATE + '    q = Parameter(1.0, "m999", "q")\n', 17, "q has the unit 'm999'; known units are"),
+    "a setting as a variable": (
+        RATE + '    stop_time = Parameter(4.0, "s", "stop")\n',
+        17,
+        "the name stop_time is taken",
+    ),
+    "the time of FMI": (RATE + '    time = Parameter(4.0, "s", "ours")\n', 17, "the name time is taken"),
     "a name for the rate of a driver": (
         RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
         17,
@@ -198,6 +236,15 @@ def test_a_mistake_is_told_in_one_sentence_with_its_line(wrong, tmp_path):
     with pytest.raises(BuildError, match=re.escape(f"{path}, line {line}: {sentence}")) as told:
         find(path).model  # noqa: B018
     assert "\n" not in str(told.value)
+
+
+def test_any_words_travel_as_they_are(tmp_path):
+    """What LaTeX, quotes and places for text look like in a docstring; a byte order mark before it all."""
+    words = r"""A \nu \x \N{k} {imports} spring of "three" \"\"\" quotes"""
+    path = tmp_path / "mine.py"
+    text = (HEAD + RATE).replace('    """A mass on a spring.', f"    r'''{words}")
+    path.write_text("\ufeff" + text.replace('- c v\n    """', "- c v\n    '''"), encoding="utf-8")
+    assert find(path).model.__doc__.startswith(words)
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from collections.abc import Collection
 from functools import cached_property
 from keyword import iskeyword
 from math import inf
+from sys import float_info
 from typing import Any
 
 from ...runtime.methods import EXACT_ITEM, ITEMS
@@ -16,6 +17,7 @@ from .declared import Choice, Contact, Fixed, Input, Mode, Model, Output, Parame
 from .expressions import COMPARISONS, Expression, Mistake, Operand, Term
 from .names import RESERVED, RESERVED_WHERE_COUPLED
 
+MOST = float_info.max
 METHODS = [label for label, _, _ in (EXACT_ITEM, *ITEMS)]
 TIME = Expression()
 TIME.name = "t"
@@ -36,12 +38,14 @@ class Anatomy:
         self.declared: list[Variable] = [e for _, e in own if isinstance(e, Variable)]
         self.parameters = self._all(Parameter, Fixed)
         self.choices, self.inputs = self._all(Choice), self._all(Input)
-        self.drives = [s for s in self._all(State) if isinstance(s.steady, Parameter) and s.begins == 0.0][:1]
+        self.drives = [s for s in self._all(State) if isinstance(s.steady, Parameter) and same(s.begins, 0.0)][:1]
         self.states = [s for s in self._all(State) if s not in self.drives]
         self._integrate_drivers()
         self.contacts, self.modes = self._all(Contact), self._all(Mode)
         self.outputs = self._all(Output)
         self.rules: tuple[Rule, ...] = (model.rules,) if isinstance(model.rules, Rule) else model.rules
+        if not isinstance(self.rules, (tuple, list)) or not all(isinstance(rule, Rule) for rule in self.rules):
+            raise Mistake("rules are one Rule, or several in brackets", model.place)
         self._find_rates()
         self.moving = (TIME, *self.states, *self.drives, *self.contacts, *self.modes)
         self.flow = {s: self.rate[s] for s in self.states} | {d: d.steady for d in self.drives} | {TIME: 1.0}
@@ -92,11 +96,12 @@ class Anatomy:
         self.rate: dict[State, State | Output] = {}
         for e in self.declared:
             if isinstance(e, (State, Output)) and e.whose is not None:
+                if e.whose not in self.states:
+                    whose = getattr(e.whose, "name", repr(e.whose))
+                    raise Mistake(f"{e.name} says that it is the rate of {whose}, which is no state", e.place)
                 if e.whose in self.rate:
                     both = f"{e.name} and {self.rate[e.whose].name}"
                     raise Mistake(f"{both} both say that they are the rate of {e.whose.name}", e.place)
-                if e.whose not in self.states:
-                    raise Mistake(f"{e.name} says that it is the rate of {e.whose.name}, which is no state", e.place)
                 self.rate[e.whose] = e
         for s in self.states:
             if s not in self.rate:
@@ -132,6 +137,7 @@ class Anatomy:
                 raise Mistake(f"a Rule begins with a comparison of parameters, not with {rule.broken!r}", place)
             if depends(rule.broken, (*self.moving, *self.inputs)):
                 raise Mistake("a Rule is about parameters, and this one moves", rule.broken.place)
+            self._judge_words("the sentence of a Rule", rule.broken.place, rule.sentence)
             try:
                 rule.sentence.format_map({e.name: 1.0 for e in (*self.parameters, *self.choices)})
             except (LookupError, ValueError) as error:
@@ -142,23 +148,33 @@ class Anatomy:
             raise Mistake(f"method = {self.model.method!r} is not known; there are {', '.join(METHODS)}", place)
         for word, most in ("stop_time", inf), ("step_size", inf), ("tolerance", 1.0):
             value = getattr(self.model, word)
+            value = getattr(value, "name", value)
             if not isinstance(value, (int, float)) or not 0.0 < value < most:
                 raise Mistake(f"{word} = {value!r} is refused: it must be above zero, and below {most:g}", place)
         if not (self.model.__doc__ or "").strip():
             raise Mistake(
                 f"{self.name} has no docstring: its first line describes the FMU, the rest is its page", place
             )
+        self._judge_words(self.name, place, (self.model.__doc__ or "").replace("\n", " "))
 
     @staticmethod
     def _judge_declared(e: Variable) -> None:
         """That words are words, numbers are numbers, and a start value is allowed."""
         if not all(isinstance(one, str) for one in (e.unit, e.text, e.display)) or not e.text:
             raise Mistake(f"{e.name}: the unit and what it is are texts", e.place)
-        numbers = (e.start, e.low, e.high, e.above, e.below)
-        if not all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in numbers):
-            raise Mistake(f"{e.name}: start value and bounds are numbers", e.place)
+        Anatomy._judge_words(e.name, e.place, e.text, *(sentence for _, _, sentence in e.items))
+        for one in (e.start, e.low, e.high, e.above, e.below):
+            if not isinstance(one, (int, float)) or isinstance(one, bool) or MOST < abs(one) < inf:
+                raise Mistake(f"{e.name}: start value and bounds are numbers", e.place)
         if isinstance(e, (Parameter, Fixed, Input)) and not e.accepts(e.start):
             raise Mistake(f"{e.name} starts at {e.start!r}, and must be {e.allowed}", e.place)
+
+    @staticmethod
+    def _judge_words(name: str, place: tuple[str, int], *words: str) -> None:
+        """That texts can be printed: they go into XML, pages and C."""
+        for text in words:
+            if not isinstance(text, str) or not text.isprintable():
+                raise Mistake(f"{name}: {text!r} is no text of letters that can be printed in one line", place)
 
     @staticmethod
     def parts(e: Variable) -> list[Operand]:
@@ -289,6 +305,10 @@ class Anatomy:
         start: dict[Expression, Operand] = dict.fromkeys((*self.moving, TIME), 0.0)
         start |= {e: float(e.start) for e in (*self.parameters, *self.choices, *self.inputs)}
         start |= {s: put(s.begins, start) for s in self.states}
+        for c in self.contacts:
+            least = min(one for one in (put(c.slide, start), put(self.hold[c], start), 0.0) if isinstance(one, float))
+            if least < 0.0:
+                raise Mistake(f"{c.name} slides or holds with a negative force at the start values", c.place)
         A = {key: put(e, start) for key, e in self.A.items()}
         if any(isinstance(e, Expression) for e in A.values()):
             return  # which hangs on a choice

@@ -104,9 +104,10 @@ class Authored:
             raise
         except SyntaxError as error:
             raise Mistake(f"this is no Python: {error.msg}", (str(self.path), error.lineno or 1)) from error
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             lines = [frame.lineno or 1 for frame in extract_tb(error.__traceback__) if frame.filename == str(self.path)]
-            raise Mistake(f"{type(error).__name__}: {error}", (str(self.path), lines[-1] if lines else 1)) from error
+            told = " ".join(f"{type(error).__name__}: {error}".split())
+            raise Mistake(told, (str(self.path), lines[-1] if lines else 1)) from error
         models = [
             one
             for one in vars(module).values()
@@ -136,7 +137,7 @@ _known: dict[Path, Authored] = {}
 def authored(path: Path) -> Authored:
     """The model in a file; read anew when the file has changed, and otherwise made once."""
     try:
-        source = path.read_text(encoding="utf-8")
+        source = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise BuildError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}.") from error
     known = _known.get(path.resolve())

@@ -36,6 +36,8 @@ class Choice(Variable, declare.Choice):
     """An enumeration, label=sentence for each item: numbered from 1, and the first is the default."""
 
     def __init__(self, text: str, **items: str) -> None:
+        if not items:
+            raise Mistake("a Choice has items, each with what it is: label=sentence")
         super().__init__(1, text, tuple((label, n, sentence) for n, (label, sentence) in enumerate(items.items(), 1)))
         self.numbers = {label: n for n, label in enumerate(items, 1)}
 

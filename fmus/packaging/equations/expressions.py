@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Never
 
 HERE = str(Path(__file__).parent)
+HOUSE = str(Path(__file__).parents[2] / "packaging")
 Operand = Any  # an expression or a number
 
 # The derivative of each function, by its argument and its value.
@@ -77,6 +78,14 @@ class Expression:
 
     def __abs__(self) -> "Term":
         return Term("fabs", self)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether this is the very same: for those who calculate with expressions; an author would get no answer."""
+        if self is not other and not sys._getframe(1).f_code.co_filename.startswith(HOUSE):
+            raise Mistake("== and != say nothing of values that are not there yet: write choose(a < b, this, that)")
+        return self is other
+
+    __hash__ = object.__hash__
 
     def __pow__(self, other: Operand) -> Never:
         raise Mistake("** rounds in ways of its own: write a product, x * x, or exp and log")

@@ -39,6 +39,7 @@ class {name}({base}):
 
 {methods}
 '''
+HERE = "\0"  # where imports go; no text of an author's has it
 WIDTH = 105
 RUN = ("stop_time", "step_size", "tolerance")
 
@@ -46,12 +47,12 @@ RUN = ("stop_time", "step_size", "tolerance")
 def written(an: Anatomy, file: str) -> str:
     """The text of the module."""
     f = Frame(an)
-    first, _, rest = cleandoc(an.model.__doc__ or "").partition("\n")
+    first, _, rest = escaped(cleandoc(an.model.__doc__ or "")).partition("\n")
     about = indent(f"{first}\n{rest}" + ("\n" if rest else ""), INDENT).strip(" ")
     text = HEAD.format(
         first=first,
         file=file,
-        imports="{imports}",
+        imports=HERE,
         method="EXACT" if an.method == EXACT_ITEM[0] else f"{an.method}.NUMBER",
         items="(EXACT_ITEM, *ITEMS)" if an.closed_form else "ITEMS",
         name=an.name,
@@ -61,7 +62,7 @@ def written(an: Anatomy, file: str) -> str:
         facts=indent("\n".join(facts(an)), INDENT),
         methods="\n\n".join([*values(f), *motion(f), *friction(f), *coupled(f), observe(f)]),
     )
-    return text.replace("{imports}", imports(text), 1)
+    return text.replace(HERE, imports(text.replace(HERE, "")))
 
 
 def base(an: Anatomy) -> str:
@@ -71,7 +72,7 @@ def base(an: Anatomy) -> str:
 
 def imports(text: str) -> str:
     """What the text needs."""
-    used = {node.id for node in ast.walk(ast.parse(text.replace("{imports}", ""))) if isinstance(node, ast.Name)}
+    used = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
     lines = [f"from math import {', '.join(names)}\n"] if (names := sorted(used & set(MATH))) else []
     for module, offered in IMPORTS.items():
         if names := [name for name in offered if name in used]:
@@ -138,6 +139,12 @@ def lines_of(text: str) -> str:
     """A string literal over several lines, if it is long."""
     lines = wrap(text, WIDTH, drop_whitespace=False)
     return quoted(text) if len(lines) == 1 else f"\n{INDENT}".join(map(quoted, lines))
+
+
+def escaped(text: str) -> str:
+    """A text as it stands between three quotes."""
+    text = text.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
+    return f'{text[:-1]}\\"' if text.endswith('"') else text
 
 
 def quoted(text: str) -> str:
