@@ -339,6 +339,20 @@ def test_stray_samples_are_left_out_and_counted():
     assert "Left out as stray: 2 of 1000 samples." in said(found)
 
 
+@pytest.mark.parametrize("lost", [(-9999.0, 1), (0.5, 1), (0.0, 5)], ids=["marks", "spikes", "dropouts"])
+def test_many_samples_that_were_not_measured_are_left_out_and_counted(lost):
+    """What a rangefinder gives without an echo, alone and in runs: turning points that are none."""
+    record = swung(0.02, 0.003, rest=0.2, noise=1e-4)
+    value, run = lost
+    at = np.random.default_rng(3).choice(np.arange(10, 900, 9), 20 // run, replace=False)
+    record.x[(at[:, None] + np.arange(run)).ravel()] = value
+    found = identify(record, Known())
+    each = values(found.estimates)
+    assert (each["r"], each["zeta"]) == (pytest.approx(0.003, rel=2e-2), pytest.approx(0.02, rel=2e-2))
+    assert 20 <= 1000 - len(found.record.t) <= 30  # a run may take its neighbours with it
+    assert f"Left out as stray: {1000 - len(found.record.t)} of 1000 samples." in said(found)
+
+
 @pytest.mark.parametrize("gap", [(2.0, 2.4), (2.2, 3.7)])
 def test_both_sides_of_a_gap_are_used(gap):
     t = np.linspace(0, 6, 3000)

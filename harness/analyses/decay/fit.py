@@ -22,6 +22,7 @@ from .choice import Law, all_laws, plausible
 from .figures import Estimate, Known, estimates
 from .intervals import Spread, spread
 from .law import DRIFT, REST, TERMS, Terms
+from .noise import without_spikes
 from .peaks import by_turning_points, by_two_peaks
 from .problem import Problem
 from .remarks import ROUGH, halves_apart, refuse, remarks
@@ -97,8 +98,14 @@ def identify(
     HarnessError where there is no decay, or no fit, with what would mend it where that is known."""
     try:
         return identified(record, known, drag, drift, report)
-    except Unfit as unfit:
-        raise HarnessError(f"{record.name} {unfit}; {mended(record, known, drag, drift) or unfit.advice}") from None
+    except HarnessError as error:
+        calm = without_spikes(record)
+        if calm is not record:
+            with suppress(HarnessError):
+                return identified(calm, known, drag, drift, report)
+        if not isinstance(error, Unfit):
+            raise
+        raise HarnessError(f"{record.name} {error}; {mended(record, known, drag, drift) or error.advice}") from None
 
 
 def mended(record: Record, known: Known, drag: bool, drift: bool) -> str:

@@ -1,8 +1,15 @@
 """The noise of a record, and what is left when it is smoothed away."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from ...records.record import FEWEST
+from ...records.record import FEWEST, Record
+
+FAR = 8.0  # times the noise of a stray sample
+SPIKE = 0.02  # of the range: no smaller one hides a turning point
+LONGEST = 40  # rounds: a run of so many samples, too, is taken away from its ends
+MOST = 0.05  # share of the samples
 
 
 def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
@@ -16,6 +23,17 @@ def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     if len(changes) and changes[-1] - changes[0] > 2 * FEWEST:
         moving = slice(changes[0], changes[-1] + 2)
         t, x = t[moving], x[moving]
+    noise = typical(beside(t, x))
+    rungs = np.diff(np.unique(x))
+    rungs = rungs[rungs > 1e-9 * np.ptp(x)]  # the same value, computed twice
+    step = float(rungs.min()) if len(rungs) else 0.0
+    coarse = step > 1.5 * noise or noise < step / 3
+    return max(noise, step / np.sqrt(12)), step if coarse else 0.0
+
+
+def beside(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """How far each inner sample of x (n,) lies beside the cubic through its four neighbours (n - 4,), scaled so that
+    white noise keeps its size."""
     n = len(t) - 4
     near = np.array([t[i : i + n] for i in (0, 1, 3, 4)])
     weights = np.ones((4, n))
@@ -24,12 +42,29 @@ def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
             if i != j:
                 weights[i] *= (t[2:-2] - near[j]) / (near[i] - near[j])
     left = x[2:-2] - sum(weight * x[i : i + n] for weight, i in zip(weights, (0, 1, 3, 4), strict=True))
-    noise = float(1.4826 * np.median(np.abs(left) / np.sqrt(1 + (weights**2).sum(axis=0))))
-    rungs = np.diff(np.unique(x))
-    rungs = rungs[rungs > 1e-9 * np.ptp(x)]  # the same value, computed twice
-    step = float(rungs.min()) if len(rungs) else 0.0
-    coarse = step > 1.5 * noise or noise < step / 3
-    return max(noise, step / np.sqrt(12)), step if coarse else 0.0
+    return np.asarray(np.abs(left) / np.sqrt(1 + (weights**2).sum(axis=0)))
+
+
+def typical(e: np.ndarray) -> float:
+    """The standard deviation of residuals (n,) as their median tells it."""
+    return 1.4826 * float(np.median(np.abs(e)))
+
+
+def without_spikes(record: Record) -> Record:
+    """The record without the samples that lie far beside their neighbours; whole where such samples are many."""
+    t, x = record.t, record.x
+    for _ in range(LONGEST):
+        e = beside(t, x)
+        beyond = np.pad(np.where(e > max(FAR * typical(e), SPIKE * np.ptp(x)), e, 0.0), 2)
+        alone = beyond[2:-2] >= np.max([beyond[i : len(x) - 4 + i] for i in range(5)], axis=0)
+        spikes = 2 + np.flatnonzero(alone & (beyond[2:-2] > 0))
+        t, x = np.delete(t, spikes), np.delete(x, spikes)
+        if not len(spikes) or len(x) < (1 - MOST) * len(record.x):
+            break
+    lost = len(record.x) - len(x)
+    if not 0 < lost <= MOST * len(record.x):
+        return record
+    return replace(record, t=t, x=x, notes=(*record.notes, f"Left out as stray: {lost} of {len(record.x)} samples."))
 
 
 def smooth(x: np.ndarray, width: int, degree: int) -> np.ndarray:

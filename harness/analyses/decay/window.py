@@ -10,13 +10,12 @@ import numpy as np
 
 from ...records.record import FEWEST, Record
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
-from .noise import scatter
+from .noise import FAR, scatter, typical
 from .problem import LEAST_NOISE, Problem, prepare
 from .turning import Turns
 
 SWINGS = 2.0  # steps of a quantiser that a swing spans at least
 PUSHED = 2.0  # times the noise: what the first half swing may be off
-FAR = 8.0  # times the noise of a stray sample
 STRAY = 0.001  # share of the samples, beside two, that may stray
 PARTS = (0.6, 0.35)  # shares of the turning points that may be free of what disturbs the rest
 LOST = 4.0  # times the noise: where a half swing leaves the law
@@ -122,11 +121,6 @@ def without_strays(
         if far.sum() <= most:
             return rest, q, less, problem.t[far]
     return problem, p, squares, problem.t[:0]
-
-
-def typical(e: np.ndarray) -> float:
-    """The standard deviation of residuals (n,) as their median tells it."""
-    return 1.4826 * float(np.median(np.abs(e)))
 
 
 def after_push(
