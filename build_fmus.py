@@ -48,6 +48,10 @@ def main(
         wanted = {model: find(model) for model in models or names()}
     except BuildError as error:
         raise Mistake(str(error)) from error
+    for source in wanted.values():
+        alike = sorted({str(other.path.resolve()) for other in wanted.values() if other.name == source.name})
+        if (out or web) and len(alike) > 1:
+            raise Mistake(f"{' and '.join(alike)} have one name: build them into folders of their own.")
     if web:
         ours = any(model in names() for model in wanted)
         place = out or (FMUS if ours else next(iter(wanted.values())).path.parent) / "web"

@@ -80,13 +80,13 @@ def anyones(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def prepare() -> None:
-    """Let standard output take every letter, a closed stream take everything, temporary files lie where every library
+    """Let standard output take every letter, a closed stream be an empty one, temporary files lie where every library
     finds them, and numpy's products be summed by one thread: several sum in another order, and mostly wait."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    for name in ("stdout", "stderr"):
+    for name in ("stdin", "stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - as long as the process
+            setattr(sys, name, open(os.devnull, "r+", encoding="utf-8"))  # noqa: SIM115 - as long as the process
         elif isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
     tempfile.tempdir = os.environ["TMPDIR"] = str(temporary())

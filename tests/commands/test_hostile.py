@@ -5,6 +5,7 @@ import os
 import random
 import subprocess
 import sys
+import threading
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -286,6 +287,20 @@ def test_a_standard_output_that_takes_nothing_is_no_crash(place, tmp_path, comma
     out = ("--out", tmp_path) if command[0] == "run" else ()
     done = python(place, *command, *out, shell=shell)
     assert (done.returncode, done.stderr) == (status, said)
+
+
+def test_a_standard_input_that_is_closed_is_an_empty_one(place, tmp_path):
+    done = python(place, "decay", "-", "--out", tmp_path, shell="<&-")
+    assert (done.returncode, done.stderr) == (2, "Error: standard input is empty\n")
+
+
+def test_a_record_comes_out_of_a_pipe_that_has_a_name(tmp_path):
+    """As a shell makes of `decay <(zcat swing.gz)`."""
+    os.mkfifo(tmp_path / "63")
+    writer = threading.Thread(target=(tmp_path / "63").write_text, args=("t [s],x [m]\n0.5,1\n1.5,2\n",))
+    writer.start()
+    assert ended("decay", tmp_path / "63") == (2, "63 has 2 samples in this stretch; 12 or more are needed")
+    writer.join()
 
 
 @pytest.mark.parametrize(

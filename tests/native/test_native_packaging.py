@@ -21,8 +21,8 @@ from models import MODELS, ROOT, model_class
 from native_fmus import built
 from native_host import compiler, unpacked
 
-from fmus.packaging import native
-from fmus.packaging.native.compiler import PLATFORMS, USUAL
+from fmus.packaging import BuildError, native
+from fmus.packaging.native.compiler import PLATFORMS, USUAL, linked
 from fmus.packaging.native.sources import COMPILED, FMI_HEADERS, WRITTEN
 from tests.packaging.test_packaging import entries
 
@@ -286,3 +286,17 @@ def test_without_a_compiler_it_says_what_to_install(tmp_path):
 
 def test_the_files_of_c_travel_with_the_package():
     assert all((Path(native.__file__).parent / file).is_file() for file in (*WRITTEN, *COMPILED.values()))
+
+
+def test_the_compiler_has_a_home_where_a_service_has_none(monkeypatch):
+    told = {}
+
+    def run(command, **options):
+        told.update(options["env"])
+        return subprocess.CompletedProcess(command, 1, "", "")
+
+    monkeypatch.delenv("HOME", raising=False)
+    monkeypatch.setattr("fmus.packaging.native.compiler.subprocess.run", run)
+    with pytest.raises(BuildError, match=r"a.so does not compile"):
+        linked({}, "a.c", "x86_64-linux-gnu.2.17", "a.so", ())
+    assert Path(told["HOME"]).is_dir()

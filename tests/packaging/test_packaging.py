@@ -293,6 +293,17 @@ def test_an_unknown_name_is_refused_with_the_known_ones_before_anything_is_built
     assert list(tmp_path.iterdir()) == []
 
 
+def test_two_models_of_one_name_are_refused_before_one_takes_the_place_of_the_other(tmp_path):
+    for folder in ("one", "two"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "smd.py").write_bytes((ROOT / "fmus/smd.py").read_bytes())
+    files = [tmp_path / folder / "smd.py" for folder in ("one", "two")]
+    run = command(*files, "--out", tmp_path / "out")
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr == f"Error: {files[0]} and {files[1]} have one name: build them into folders of their own.\n"
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_folder_that_cannot_be_written_is_named_in_one_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     run = command("smd", "--out", tmp_path / "file")

@@ -1,13 +1,14 @@
 """The binaries of a native FMU, for every platform on any machine, by the compiler in the package ziglang."""
 
 import math
+import os
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, gettempdir
 
 from .. import BuildError
 from .expressions import PARTIAL, TOTAL
@@ -73,7 +74,8 @@ def linked(files: Mapping[str, str], main: str, target: str, out: str, options: 
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
         command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
         command += [main, "-o", out, "-lm"]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+        home = {"HOME": gettempdir()} | os.environ  # the compiler keeps a store there, and services have none
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=home)
         if done.returncode:
             raise BuildError(f"{out} does not compile for {target}:\n{done.stderr.strip()}")
         return (Path(folder) / out).read_bytes()

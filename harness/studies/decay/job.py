@@ -66,7 +66,7 @@ def load_record(source: str, columns: Columns, known: Known, report: Callable[[f
     path = Path(source)
     if source == "-":
         return read(source, columns, "stdin"), known, {"files": ()}
-    if path.suffix.lower() != ".toml" and (path.is_file() or path.suffix):
+    if path.suffix.lower() != ".toml" and (path.is_file() or path.is_fifo() or path.suffix):
         name = path.stem.encode("utf-8", "replace").decode()
         return read(source, columns, name), known, {"files": (path,)}
     if path.is_dir():
