@@ -301,14 +301,15 @@ def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, theirs, tmp_path):
     refused(done, 1, "huge.fmu", "more than the temporary folder has room for")
 
 
+@pytest.mark.parametrize("values", [(1.0, 2.0), (1e308, -1e308)])
 @pytest.mark.parametrize("exchange", [False, True])
-def test_two_results_that_never_agree_are_kept_with_what_they_differ_by(exchange):
-    """A made-up FMU whose output is the number of the pass."""
+def test_two_results_that_never_agree_are_kept_with_what_they_differ_by(exchange, values):
+    """A made-up FMU whose output is another in every second pass."""
     passes = []
 
     def run(h, tolerance):
         time = np.linspace(0.0, 1.0, 65)
-        passes.append(Pass(len(passes), Rows(time, {"x": np.full(65, 1.0 + len(passes) % 2)})))
+        passes.append(Pass(len(passes), Rows(time, {"x": np.full(65, values[len(passes) % 2])})))
         return passes[-1]
 
     asked = Request("", "", exchange, 0.0, 1.0, tolerance=1e-6, patience=1.0)

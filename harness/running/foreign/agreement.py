@@ -142,6 +142,7 @@ def by_tolerance(asked: Request, h: float, run: Run) -> Answer:
     return apart_still("a tenth of the tolerance of fmpy's CVode", now, off, asked)
 
 
+@np.errstate(over="ignore")  # what numpy says of that would be told as printed by the FMU
 def apart(one: Rows, two: Rows, asked: Request) -> float:
     """The largest difference of two passes, as a share of each variable's largest value, at the coarsest times."""
     end = min(each.time[-1] if len(each.time) else asked.start for each in (one, two))
