@@ -66,6 +66,14 @@ SWITCHED = "".join(
 )
 FOLLOWING = f"@media screen and (prefers-color-scheme: dark) {{\ntext {{ fill: {DARK['#000000']} }}\n{SWITCHED}}}\n"
 CROWDED = 1000  # points with a mark each: more are one image in the drawing
+ABOVE: dict[str, Any] = {  # of a legend above its panel, where it hides nothing
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 1.0),
+    "frameon": False,
+    "borderaxespad": 0.2,
+    "columnspacing": 1.2,
+    "handlelength": 1.4,
+}
 LARGEST = 1e150  # that is drawn
 LONGEST = 500  # letters of a text that are drawn
 UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML: a path may be no text
@@ -120,4 +128,9 @@ def drawable(y: np.ndarray) -> np.ndarray:
 
 def label(name: str, unit: str) -> str:
     """The heading of an axis."""
-    return heading(name, unit.replace("2", "²").replace(".", "·"))
+    return heading(name, spelled(unit))
+
+
+def spelled(unit: str) -> str:
+    """A unit as figures show it."""
+    return unit.replace("2", "²").replace(".", "·")

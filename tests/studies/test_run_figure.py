@@ -18,6 +18,7 @@ import json, sys
 from dataclasses import replace
 from pathlib import Path
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from harness.scenes.scene import load
 from harness.studies.run import job
 
@@ -26,10 +27,15 @@ def kept(wanted, report):
     runs.append(run(wanted, report))
     return runs[-1]
 job.any_fmu.run = kept
+def covered(axes):
+    (title,) = (each for each in axes.findobj(Text) if each.get_text() == axes.get_title(loc="left"))
+    legend = axes.get_legend()
+    return bool(legend and legend.get_window_extent().overlaps(title.get_window_extent()))
 for name in sys.argv[1:]:
     figures, runs = [], []
-    Figure.savefig = lambda figure, path: figures.append(figure)
+    Figure.savefig = lambda figure, file, **how: figures.append(figure)
     job.perform(replace(load(name), repeat=1), Path("results"), lambda share: None)
+    figures[0].draw_without_rendering()
     events = runs[0].events
     told[name] = {
         "samples": len(runs[0].time),
@@ -37,6 +43,7 @@ for name in sys.argv[1:]:
         "panels": {
             axes.get_title(loc="left"): {
                 "axis": axes.get_ylabel(),
+                "covered": covered(axes),
                 "lines": [[line.get_label(), *(list(map(float, d)) for d in line.get_data())] for line in axes.lines],
                 "stuck": [patch.get_x() for patch in axes.patches if patch.get_label() == "stuck"],
             }
@@ -85,6 +92,11 @@ def test_every_stick_is_shaded_from_where_it_begins(drawn, name):
         stuck = drawn[name]["panels"][title]["stuck"]
         assert stuck == pytest.approx(drawn[name]["sticks"][: len(stuck)])
         assert len(drawn[name]["sticks"]) - len(stuck) <= (name == "coulomb")  # whose last begins after the end
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_no_legend_covers_a_title(drawn, name):
+    assert [title for title, panel in drawn[name]["panels"].items() if panel["covered"]] == []
 
 
 def test_angles_are_in_degrees(drawn):

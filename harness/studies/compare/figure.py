@@ -4,7 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, drawable, label, sheet
+from ...results.quantity import in_degrees
+from ...results.style import ABOVE, BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, drawable, label, sheet, spelled
+from . import units
 from .difference import Comparison, textual
 
 MOST = 8  # variables drawn, those that differ most
@@ -20,20 +22,17 @@ def draw(found: Comparison, path: Path) -> None:
         figure.suptitle(f"{found.one.name} and {found.two.name}", fontsize=11)
         panels = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)
         for (both, off), each in zip(panels, chosen, strict=True):
-            both.plot(found.one.time, drawable(found.one.columns[each.name]), color=BLUE, label=found.one.name)
-            both.plot(
-                found.two.time,
-                drawable(found.two.columns[each.name]),
-                color=ORANGE,
-                linestyle="--",
-                label=f"{found.two.name} ",
-            )
-            both.set_ylabel(label(each.name, each.unit))
-            off.plot(found.time, drawable(each.left) - drawable(each.right), color=GREEN, linewidth=0.8)
-            off.set_title(f"difference: largest {each.largest:.3g}, rms {each.rms:.3g} {each.unit}")
+            unit, size = in_degrees(each.unit)
+            for side, style in ((found.one, {"color": BLUE}), (found.two, {"color": ORANGE, "linestyle": "--"})):
+                values = drawable(side.columns[each.name]) * (units.size(side.units[each.name], each.unit) or 1.0)
+                both.plot(side.time, values / size, label=f"{side.name} ", **style)
+            both.set_ylabel(label(each.name, unit))
+            off.plot(found.time, (drawable(each.left) - drawable(each.right)) / size, color=GREEN, linewidth=0.8)
+            largest, rms = each.largest / size, each.rms / size
+            off.set_title(f"difference: largest {largest:.3g}, rms {rms:.3g} {spelled(unit)}")
             off.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
             off.axvline(each.at, color=GREY, linestyle=":", linewidth=0.8)
-        panels[0, 0].legend()
+        panels[0, 0].legend(**ABOVE, ncols=2)
         for axes in panels[-1]:
             axes.set_xlabel("t [s]")
             axes.set_xlim(np.min(found.time), np.max(found.time))

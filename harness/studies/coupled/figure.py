@@ -1,5 +1,6 @@
 """The figure of a coupled scene: its motion beside the reference, and the error over the communication step."""
 
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -7,27 +8,34 @@ import numpy as np
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
 from .convergence import Convergence
 
+MOST = 8  # names of variables that are drawn, a panel each
+OTHERS = ("#CC79A7", "#56B4E9", "#E69F00")  # colours
+
 
 def draw(found: Convergence, path: Path) -> None:
     """Save the figure."""
-    with sheet(path, 2 * WIDTH, 1.6 * HEIGHT) as figure:
+    kinds = [*dict.fromkeys(zip([name for _, name, _ in found.read], found.units, strict=True))][:MOST]
+    with sheet(path, 2.2 * WIDTH, max(1.6, len(kinds)) * HEIGHT) as figure:
         figure.suptitle(found.title, fontsize=11)
-        motion, error = figure.subplots(1, 2, width_ratios=(3, 2))
-        colours = 9 * (BLUE, GREEN, "#CC79A7")
-        for text, x, truth, colour in zip(found.labels, found.x.T, found.truth.T, colours, strict=False):
-            motion.plot(found.time, x, color=colour, label=text)
-            motion.plot(found.time, truth, color="black", linestyle=":", linewidth=0.9)
-        motion.plot([], [], color="black", linestyle=":", label=found.reference)
-        motion.set_title(f"coupled, communication step {1e3 * found.steps[-1]:g} ms")
-        motion.set_xlabel("t [s]")
-        motion.set_ylabel(label(found.read[0][1] if found.unit else "", found.unit))
-        motion.legend()
+        left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 2))[0]
+        panels = left.subplots(len(kinds), sharex=True, squeeze=False)[:, 0]
+        for motion, (name, unit) in zip(panels, kinds, strict=True):
+            columns = [i for i, each in enumerate(found.read) if (each[1], found.units[i]) == (name, unit)]
+            for i, colour in zip(columns, cycle((BLUE, ORANGE, GREEN, *OTHERS)), strict=False):
+                motion.plot(found.time, found.x[:, i], color=colour, label=found.labels[i])
+                motion.plot(found.time, found.truth[:, i], color="black", linestyle=":", linewidth=0.9)
+            motion.plot([], [], color="black", linestyle=":", label=found.reference)
+            motion.set_ylabel(label(name, unit))
+            motion.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        panels[0].set_title(f"coupled, communication step {1e3 * found.steps[-1]:g} ms")
+        panels[-1].set_xlabel("t [s]")
+        error = right.subplots()
         h, errors = np.array(found.steps[: len(found.errors)]), np.array(found.errors)
         if errors.any():
             error.loglog(h, errors, "o-", color=ORANGE, label="largest error")
             error.loglog(h, errors[0] * h / h[0], color=GREY, linestyle="--", label="in proportion to the step")
             error.set_xticks(h, [f"{1e3 * step:g}" for step in h])
-            error.minorticks_off()
+            error.xaxis.minorticks_off()
             error.legend()
         error.set_title(f"error against the {found.reference} (order {found.order:.2f})")
         error.set_xlabel("communication step [ms]")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...results.quantity import UNITS, Quantity, in_degrees
-from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet
+from ...results.style import ABOVE, BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet
 from ...running import any_fmu
 from ...running.description import description
 from ...running.fmu import simulate
@@ -22,19 +22,12 @@ from ...running.run import Run
 BESIDE = ("phase", "steps")  # on the right; what is over time stands on the left, one below the other
 EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
 SMOOTH = 1000  # points of a curve without corners, no two of them farther apart than twice the mean
-LONG = 20_000  # points of a run that is not run once more for its looks
 MARKED = 100  # events: beyond, one cannot be told from the next
 PEAKS = {"sample_0": 0, "x_0": 0, "sample_n": -1, "x_n": -1}  # published, and which of the turning points each is
 LEVELS = {"velocity": "peak_speed", "acceleration": "peak_acceleration"}
 
-ABOVE: dict[str, Any] = {  # of a legend
-    "loc": "lower right",
-    "bbox_to_anchor": (1.0, 1.0),
-    "frameon": False,
-    "borderaxespad": 0.2,
-    "columnspacing": 1.2,
-    "handlelength": 1.4,
-}
+HANDLE, LINE = 5, 75  # letters that a line beside its label takes, and that stand beside each other above a panel
+LIFTED = 20  # points, of a title above the legend
 
 Results = dict[str, Any]  # by the name of the analysis
 
@@ -94,11 +87,15 @@ def smooth(run: Run) -> Run:
     """The run with what the FMU says between its points, where these are far apart; that it is asked does not move
     it."""
     start, stop = run.time[[0, -1]].tolist()
-    fine = len(run.time) > LONG or np.diff(run.time).max() <= 2 * (stop - start) / SMOOTH
+    fine = np.diff(run.time).max() <= 2 * (stop - start) / SMOOTH
     if fine or run.failed or not any_fmu.shows_steps(description(run.wanted.fmu)):
         return run
-    wanted = replace(run.wanted, start=start, stop=stop, grid=(stop - start) / SMOOTH, follow=True, repeat=1)
-    return replace(simulate(wanted), steps=run.steps, events=run.events)
+    between = simulate(
+        replace(run.wanted, start=start, stop=stop, grid=(stop - start) / SMOOTH, follow=False, repeat=1)
+    )
+    time, places = np.unique(np.append(run.time, between.time), return_index=True)
+    columns = {name: np.append(column, between.columns[name])[places] for name, column in run.columns.items()}
+    return replace(run, time=time, columns=columns)
 
 
 def history(axes: Axes, shown: Drawn, name: str) -> None:
@@ -112,8 +109,8 @@ def history(axes: Axes, shown: Drawn, name: str) -> None:
     level = shown.figure(LEVELS.get(role, ""))
     if level is not None:
         axes.axhline(level / size, color=GREEN, linestyle=":", label="published peak")
-    legend(axes)
     axes.set_title(run.descriptions[name])
+    legend(axes)
     axes.set_ylabel(label(name, unit))
     axes.set_xlabel("t [s]")
     axes.set_xlim(*EDGES @ run.time[[0, -1]])
@@ -175,6 +172,9 @@ def legend(axes: Axes) -> None:
     once = dict(zip(labels, handles, strict=True))
     if once:
         axes.legend(once.values(), once, **ABOVE, ncols=len(once))
+        title = axes.get_title(loc="left")
+        if len(title) + sum(len(each) + HANDLE for each in once) > LINE:
+            axes.set_title(title, pad=LIFTED)
 
 
 def phase(axes: Axes, shown: Drawn) -> None:
@@ -201,8 +201,8 @@ def steps(axes: Axes, shown: Drawn) -> None:
             if mean is not None:
                 told = " ".join(Quantity("mean_step", mean, "s", "").told())
                 axes.axhline(mean, color=color, linestyle=style, label=f"{word} {told}")
-    legend(axes)
     axes.set_title("step size of the solver")
+    legend(axes)
     axes.set_xlim(*EDGES @ run.time[[0, -1]])
     axes.set_xlabel("t [s]")
     axes.set_ylabel("h [s]")

@@ -44,7 +44,8 @@ def survey(
         rows = table(report, chosen)
         found = regions(rows)
         save(rows, folder / "stability.csv")
-        draw(found, folder / "region.svg")
+        if found:
+            draw(found, folder / "region.svg")
         fmus = {row.case.name: fmu_of(row.case.model) for row in rows}
         values = of_each({name: parameters(fmu) for name, fmu in fmus.items()})
         record(folder, fmus.values(), values, source=source)
