@@ -22,7 +22,7 @@ from harness.running.foreign.rows import Recorder, Rows
 
 @pytest.fixture(scope="module")
 def theirs():
-    """The folder of nine FMUs that are not ours."""
+    """The folder of FMUs that are not ours."""
     return foreign.built()
 
 
@@ -73,6 +73,21 @@ def test_an_fmu_that_hides_its_steps_is_run_until_two_results_agree(run, name, t
     time, position, *_ = rows.values()
     assert time[-1] == 1.0
     assert np.abs(position - np.cos(sqrt(50) * time)).max() < 2 * tolerance
+
+
+def test_a_state_that_jumps_at_events_is_exchanged_as_its_closed_form_says(run):
+    """FMI 2.0: after bounce n the ball rises with e^n of the speed of its first fall."""
+    e, g = 0.8, 9.81
+    done, rows = run("Bouncing", "--set", f"e={e}")
+    fine(done)
+    fall = sqrt(2 / g)
+    bounces = fall + 2 * fall * np.cumsum([0, *(e**n for n in (1, 2))])
+    since = rows["t [s]"][-1] - bounces[-1]
+    assert rows["bounces"][-1] == len(bounces)
+    assert rows["h [m]"][-1] == pytest.approx(g * fall * e**3 * since - g / 2 * since**2, abs=1e-5)
+    jumps = np.flatnonzero(np.diff(rows["bounces"]))
+    assert rows["t [s]"][jumps] == pytest.approx(bounces, abs=1e-6)
+    assert rows["v [m/s]"][jumps + 1] == pytest.approx(-e * rows["v [m/s]"][jumps], abs=1e-9)
 
 
 def test_an_fmu_whose_own_step_is_fixed_is_told_as_such(run):

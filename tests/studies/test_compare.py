@@ -323,6 +323,7 @@ def test_rtol_and_atol_say_what_may_differ(tmp_path, bounds, status):
         (("FixedStep", "FixedStep"), "its own step is fixed"),
         (("Switching", "Switching"), "says"),
         (("Arrays", "Arrays"), "turn[1,2]"),
+        (("Bouncing", "Bouncing"), "bounces"),
     ],
 )
 def test_fmus_that_are_not_ours_are_compared(harness, theirs, pair, told):

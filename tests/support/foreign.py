@@ -1,10 +1,11 @@
-"""Nine FMUs that are not ours, of plain pythonfmu (FMI 2.0) and pythonfmu3 (FMI 3.0); their sources are tests/foreign.
+"""Ten FMUs that are not ours, of plain pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C; sources in tests/foreign.
 
 built() / "Midpoint.fmu"       built once a run
 VARY["Midpoint"]               what a sweep may vary in it, as --vary takes it
 edited(fmu, copy, {name: new}) a copy with files changed, added, or (None) left out; a function gets the old text
 """
 
+import os
 import subprocess
 import sys
 from fcntl import LOCK_EX, flock
@@ -25,17 +26,19 @@ VARY = {
     "Third": "k=30:50:3",  # FMI 3.0, with units; ends itself at `limit`
     "Arrays": "omega=1:3:3",  # FMI 3.0: arrays, an enumeration, a text
     "Exchange": "k=30:50:3",  # FMI 3.0, model exchange alone
+    "Bouncing": "e=0.7:0.9:3",  # FMI 2.0, model exchange alone, in C: events that change states; with units
 }
 
 
 def built():
-    """The folder of all nine."""
+    """The folder of all ten."""
     folder = builds.room / "foreign"
     with (builds.room / "foreign.lock").open("w") as lock:
         flock(lock, LOCK_EX)
         if not folder.exists():
             fresh = mkdtemp(dir=builds.room)
-            subprocess.run([sys.executable, __file__, fresh], check=True, capture_output=True, timeout=120)
+            path = os.environ | {"PYTHONPATH": str(builds.ROOT)}
+            subprocess.run([sys.executable, __file__, fresh], check=True, capture_output=True, timeout=120, env=path)
             Path(fresh).rename(folder)
     return folder
 
@@ -57,10 +60,18 @@ def main(out):
     import pythonfmu
     import pythonfmu3
 
-    for name in VARY:
-        source = SOURCES / f"{name}.py"
+    from fmus.packaging.native.compiler import binaries
+    from harness.running.compiler import HEADERS
+
+    for source in sorted(SOURCES.glob("*.py")):
         package = pythonfmu3 if "pythonfmu3" in source.read_text() else pythonfmu
         package.FmuBuilder.build_FMU(source, out)
+    for source in SOURCES.glob("*/*.c"):
+        files = {file.name: file.read_text() for file in (source, *HEADERS.glob("fmi2*.h"))}
+        with ZipFile(Path(out) / f"{source.stem}.fmu", "w", ZIP_DEFLATED) as archive:
+            archive.write(source.with_name("modelDescription.xml"), "modelDescription.xml")
+            for path, content in binaries(source.stem, files, source.name, "linux64", "2").items():
+                archive.writestr(path, content)
 
 
 if __name__ == "__main__":

@@ -43,7 +43,8 @@ def names(sources: tuple[str, str]) -> list[str]:
     """What two sources are called; where they are called alike, with the folders or endings in which they differ."""
     paths = [Path(abspath(each)) if Path(each).exists() else Path("scene", each) for each in sources]
     plain = [each if each.is_dir() or each.parts[0] == "scene" else each.with_suffix("") for each in paths]
-    one, two = (each.parts for each in (plain if plain[0] != plain[1] else paths))
+    alike = plain[0] == plain[1] and paths[0] != paths[1]
+    one, two = (each.parts for each in (paths if alike else plain))
     apart = next((k for k, ends in enumerate(zip(one[::-1], two[::-1], strict=False), 1) if ends[0] != ends[1]), 1)
     return ["/".join(parts[-apart:]) for parts in (one, two)]
 
