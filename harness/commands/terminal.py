@@ -98,12 +98,15 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    console = Console(file=sys.stderr)  # this very stream: runs redirect sys.stderr
+    console = Console(file=sys.stderr)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     if quiet or not console.is_terminal:  # a bar that is told to be silent writes an empty line, until rich 14.2
         yield lambda name, share: check()
         return
-    with Progress(*columns, console=console, transient=True, redirect_stderr=False) as bar:
+    with (
+        os.fdopen(os.dup(sys.stderr.fileno()), "w", errors="replace") as console.file,  # runs redirect standard error
+        Progress(*columns, console=console, transient=True, redirect_stderr=False) as bar,
+    ):
         task = bar.add_task("", total=total)
         done: list[str] = []
 

@@ -5,9 +5,10 @@ ends, so following it shows every step and event through the standard interface 
 """
 
 import io
+import os
 from array import array
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, redirect_stderr
+from contextlib import ExitStack, contextmanager, redirect_stderr, suppress
 from ctypes import byref, c_double, c_int, c_uint, c_void_p
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -60,13 +61,27 @@ def simulate(wanted: Specification, report: Report = lambda share: None) -> Run:
     """The run that is wanted; HarnessError with the FMU's sentence if it fails, SceneError if it has not got that."""
     functions, messages = callbacks()
     messages.clear()
-    spoken = io.StringIO()
-    with redirect_stderr(spoken), instance(wanted, functions) as (found, fmu):
+    with overheard() as spoken, instance(wanted, functions) as (found, fmu):
         try:
             return passes(planned(wanted, found), fmu, report)
         except FMICallException as error:
             lines = [text for status, text in messages if status > WARNING] or spoken.getvalue().strip().splitlines()
             raise HarnessError(lines[-1] if lines else f"{wanted.fmu.name}: {error}") from None
+
+
+@contextmanager
+def overheard() -> Iterator[io.StringIO]:
+    """What an FMU says on standard error is heard here alone, for the sentence stands in its log, too; one that is not
+    in Python writes past Python, and to nobody."""
+    spoken = io.StringIO()
+    with ExitStack() as back, redirect_stderr(spoken):
+        with suppress(OSError):  # there is none
+            own = os.dup(2)
+            back.callback(os.close, own)
+            back.callback(os.dup2, own, 2)
+            with open(os.devnull, "w") as nobody:
+                os.dup2(nobody.fileno(), 2)
+        yield spoken
 
 
 def described(wanted: Specification) -> Any:

@@ -5,7 +5,7 @@ Values go to the FMU as they are, unchecked: what it makes of NaN is the questio
 
 import io
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf, isnan, nan
@@ -18,7 +18,7 @@ from fmpy.fmi1 import FMICallException
 from ..errors import HarnessError
 from ..scenes.fmus import fmu_of
 from ..scenes.roles import roles
-from .fmu import WARNING, begin, callbacks, described, instance, put
+from .fmu import WARNING, begin, callbacks, described, instance, overheard, put
 from .specification import Specification
 from .values import labels
 
@@ -156,8 +156,8 @@ class Probe:
 def probe(model: str) -> Iterator[Probe]:
     """A fresh instance of a model's FMU, whose words are kept from the terminal."""
     functions, messages = callbacks()
-    wanted, spoken = Specification(fmu_of(model)), io.StringIO()
-    with redirect_stderr(spoken), instance(wanted, functions) as (description, fmu):
+    wanted = Specification(fmu_of(model))
+    with overheard() as spoken, instance(wanted, functions) as (description, fmu):
         yield Probe(description, fmu, messages, spoken)
 
 

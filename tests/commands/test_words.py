@@ -140,6 +140,14 @@ def test_a_command_without_its_fmus_says_how_to_build_them(tmp_path, monkeypatch
         commands.main(arguments.split(), standalone_mode=False)
 
 
+@pytest.mark.parametrize("arguments", [("run", "--fmu"), ("sweep", "--vary", "k=1,2", "--workers", "1")])
+def test_why_an_fmu_of_either_kind_fails_is_said_once(kind, tmp_path, arguments):
+    """A native one tells it to the process's standard error, too, past Python."""
+    done = harness(tmp_path, *arguments, kind / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")
+    assert done.returncode == 1
+    assert re.fullmatch(r"Error: .*the motion leaves the range of numbers after t = 0.0 s.*\n", done.stderr)
+
+
 def test_the_versions_are_told(tmp_path):
     own = f"friction-fmus {version('friction-fmus')}"
     said = harness(tmp_path, "--version").stdout

@@ -4,9 +4,8 @@ Of ours one instance is reset before each run, and the room for what is set and 
 takes 40 microseconds.  Others are run as `run --fmu` runs them, with steps that are halved until two results agree.
 """
 
-import io
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager
 from ctypes import c_double, c_int, c_void_p
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +15,18 @@ from typing import Any, Protocol
 from ...errors import HarnessError, SceneError, unknown
 from ...running import any_fmu
 from ...running.description import description
-from ...running.fmu import WARNING, FMICallException, buffer, callbacks, gather, instance, parameters, planned, traced
+from ...running.fmu import (
+    WARNING,
+    FMICallException,
+    buffer,
+    callbacks,
+    gather,
+    instance,
+    overheard,
+    parameters,
+    planned,
+    traced,
+)
 from ...running.settings import settings
 from ...running.specification import Specification
 from ...running.values import unit
@@ -180,10 +190,10 @@ def specified(runs: Runs, file: Path) -> Specification:
 
 @contextmanager
 def ready(runs: Runs, file: Path) -> Iterator[Runner]:
-    """The FMU in a file, ready to run; what it writes to standard error through Python is kept back."""
+    """The FMU in a file, ready to run."""
     wanted = specified(runs, file)
     found = description(file, wanted.lenient)
-    with redirect_stderr(io.StringIO()):
+    with overheard():
         if any_fmu.shows_steps(found):
             with instance(wanted, callbacks()[0]) as (_, fmu):
                 yield Ours(runs, found, fmu, wanted)
