@@ -263,26 +263,31 @@ def test_results_of_other_tools_compare(tmp_path, pair):
     assert {each.name: each.largest for each in found.differences} == {"x": 0, "on": 0, "turn[1]": 0, "turn[2]": 0}
 
 
-def modelica(file, rows):
+def modelica(file, rows, turned=True, version="4"):
     """A result as OpenModelica writes it: a MATLAB file of version 4, turned; one variable is an alias with a sign."""
     names = ["time", "x", "on", "turn[1]", "turn[2]", "minus", "p"]
     letters = {
-        "Aclass": ["Atrajectory", "1.1", "", "binTrans"],
+        "Aclass": ["Atrajectory", "1.1", "", "binTrans" if turned else "binNormal"],
         "name": names,
-        "description": ["time [s]", "place [m|mm]", "", "", "", "", ""],
+        "description": ["time [s]", "place [m|mm]", "[:#(type=Boolean)]", "", "", "", ""],
     }
-    turned = {"Aclass": np.array(letters.pop("Aclass"))}
-    for key, texts in letters.items():  # a name is a column of letters
-        turned[key] = np.array(["".join(row) for row in zip(*(text.ljust(16) for text in texts), strict=True)])
+    lines = {key: [text.ljust(20) for text in texts] for key, texts in letters.items()}
+    for key in ("name", "description") if turned else ():  # each is a column of letters
+        lines[key] = ["".join(row) for row in zip(*lines[key], strict=True)]
     info = [[0, 1, 0, -1], *([2, i, 0, -1] for i in range(2, 6)), [2, -2, 0, -1], [1, 2, 0, -1]]
     constants = np.array([[0.0, 2.0], [7.0, 7.0]])
-    savemat(file, turned | {"dataInfo": np.array(info, np.int32).T, "data_1": constants, "data_2": rows.T}, format="4")
+    tables = {"dataInfo": np.array(info, np.int32), "data_1": constants.T, "data_2": rows}
+    tables = {key: table.T if turned else table for key, table in tables.items()}
+    savemat(file, {key: np.array(texts) for key, texts in lines.items()} | tables, format=version)
 
 
-def test_units_and_signs_of_a_modelica_result_are_read(tmp_path):
-    modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4]]))
+@pytest.mark.parametrize("version", ["4", "5"])
+@pytest.mark.parametrize("turned", [True, False])
+def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version):
+    """In both of its layouts, and saved anew by MATLAB."""
+    modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4]]), turned, version)
     found = read(tmp_path / "modelica.mat")
-    assert found.units["x"] == "m"
+    assert (found.units["x"], found.units["on"]) == ("m", "")
     assert [*found.columns] == ["x", "on", "turn[1]", "turn[2]", "minus"]
     assert found.columns["minus"].tolist() == [-1.0, -2.0]
 

@@ -114,26 +114,32 @@ def numbers(cells: Sequence[str]) -> np.ndarray | None:
 
 
 def modelica(file: Path) -> Columns | None:
-    """The columns of a result of OpenModelica or Dymola, which is a MATLAB file of version 4; None if it is none."""
+    """The columns of a result of OpenModelica or Dymola, which is a MATLAB file of version 4, also where it was saved
+    anew as 5; None if it is none."""
     data = content(file)
-    if b"Aclass" not in data[:40]:
+    sure = b"Aclass" in data[:40]
+    if not sure and not data.startswith(b"MATLAB 5.0"):
         return None
     from scipy.io import loadmat
 
     try:
         found: dict[str, Any] = loadmat(io.BytesIO(data), chars_as_strings=False)
-        turned = "".join(found["Aclass"][3]).strip("\0 ") == "binTrans"
+        if "Aclass" not in found:
+            return None
+        turned = {"binTrans": True, "binNormal": False}[line(found["Aclass"][3])]
         name, description, info, values = (
             found[key].T if turned else found[key] for key in ("name", "description", "dataInfo", "data_2")
         )
         columns = Columns()
         for text, about, (place, signed, *_) in zip(map(line, name), map(line, description), info, strict=True):
             if place in (0, 2):  # what changes, and the time
-                unit = re.search(r"\[([^][|]+)[^][]*\]\s*$", about)
+                unit = re.search(r"\[([^][|:]+)[^][]*\]\s*$", about)
                 head = f"{text} [{unit[1]}]" if unit else text
                 columns[head] = np.sign(signed) * values[:, abs(int(signed)) - 1]
         return columns
     except Exception as error:  # scipy raises what it meets in a damaged file
+        if not sure:
+            return None
         raise SceneError(f"{file.name} is no whole result of OpenModelica or Dymola: {reason(error)}") from None
 
 
