@@ -227,7 +227,7 @@ def test_playing_paints_no_curve_anew_and_a_curve_is_no_more_points_than_pixels_
         "(() => { const { plot, panel } = bench.plots.get('step'); const [curve] = panel.content.curves;"
         "let points = 0; const context = { lineTo: () => points++ };"
         "const all = new Proxy(context, { get: (it, key) => it[key] ?? (() => ({ width: 0 })) });"
-        "plot.curve(all, curve, {}, plot.places(plot.host.clientWidth, plot.host.clientHeight)); return points })()"
+        "plot.curve(all, curve, plot.places(plot.host.clientWidth, plot.host.clientHeight)); return points })()"
     )
     assert width < page.run(count) < 4 * width
 
@@ -318,6 +318,23 @@ def test_what_is_no_number_is_told_and_changes_nothing(page):
         assert page.run(f"[{field}, bench.state().values, bench.state().stop]") == ["20", {"m": 20}, 16]
     page.put("m", "21")
     assert page.run(f"{alert}.hidden")
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_numbers_at_the_end_of_their_range_are_told_or_drawn_and_never_as_no_number(page, name):
+    page.open(f".model={name}")
+    body = page.run("bench.desk.portraits.get(bench.state().model).bodies[0]")
+    drawn = "document.getElementById('mechanism').innerHTML + document.querySelector('#panels').textContent"
+    for variable, text in (
+        ("start", "1e308"),
+        ("start", "1e-320"),
+        ("start", "0"),
+        ("input", "-1e308"),
+        ("input", "0"),
+    ):
+        page.put(body[variable], text)
+        assert not re.search("NaN|Infinity|undefined", page.settled(drawn)), (variable, text)
+    assert page.run("document.getElementById('alert').hidden")
 
 
 # ---- what was published

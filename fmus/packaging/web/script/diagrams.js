@@ -2,13 +2,14 @@
 
 import { make } from "./controls.js";
 import { panels, spotted } from "./panels.js";
-import { Plot } from "./plot.js";
+import { Plot, readColours } from "./plot.js";
 
 const LAST = ["phase", "step", "energy", "friction", "error"]; // in this order, after those of the motion
 
 export class Diagrams {
   constructor(host, onSeek) {
     Object.assign(this, { host, onSeek, plots: new Map() }); // key of a diagram -> {plot, figure, heading, reading, panel}
+    readColours();
   }
 
   clear() {
@@ -22,9 +23,11 @@ export class Diagrams {
     for (const panel of found) {
       if (!this.plots.has(panel.key)) this.plots.set(panel.key, this.placed(panel.key));
       const known = this.plots.get(panel.key);
+      if (known.panel?.title !== panel.title) {
+        known.heading.innerHTML = panel.symbol ? `<b>${panel.symbol}</b> ` : ""; // made by the builder
+        known.heading.append(panel.title);
+      }
       known.panel = panel;
-      known.heading.innerHTML = panel.symbol ? `<b>${panel.symbol}</b> ` : ""; // made by the builder
-      known.heading.append(panel.title);
       known.plot.show(panel.content);
     }
   }
@@ -52,7 +55,9 @@ export class Diagrams {
     return [...this.plots.values()].filter(({ figure }) => !figure.hidden);
   }
 
+  // Draw all anew, in the colours that there are now.
   paint() {
+    readColours();
     for (const { plot } of this.plots.values()) plot.paint();
   }
 }

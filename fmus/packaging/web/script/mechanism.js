@@ -12,6 +12,7 @@ const BLOCK = { width: 92, height: 62 };
 const WALL = 44;
 const REST = 190; // length of a spring at rest, as drawn
 const [PIN_Y, ROD] = [34, 150];
+const [SMALLEST, LARGEST] = [1e-150, 1e150]; // that is drawn
 const NAMESPACE = "http://www.w3.org/2000/svg";
 
 function element(name, attributes, parent) {
@@ -101,9 +102,9 @@ export class Mechanism {
   fit(run) {
     for (const part of this.parts.filter(({ body }) => body.kind === "block")) {
       const names = [part.body.position, part.body.driver].filter(Boolean);
-      const largest = Math.max(...names.map((name) => run.largest(name)));
-      const step = ticks(0, largest || 1, 4).at(1);
-      part.reach = step * Math.ceil((largest || 1) / step - 1e-9);
+      const largest = within(Math.max(...names.map((name) => run.largest(name))) || 1, SMALLEST);
+      const step = ticks(0, largest, 4).at(1);
+      part.reach = step * Math.ceil(largest / step - 1e-9);
       const forward = part.body.driver && run.columns[part.body.position].every((x) => x >= -0.05 * part.reach);
       part.origin = forward ? 110 : part.body.spring || part.body.dampers ? WALL + REST + BLOCK.width + 120 : WIDE / 2;
       const room = forward ? WIDE - part.origin - BLOCK.width - REST - 30 : Math.min(part.origin - WALL - BLOCK.width - 60, WIDE - part.origin - 60);
@@ -127,14 +128,15 @@ export class Mechanism {
 
   // Where everything is at a time; `value(name)` is that of an output.
   move(value) {
+    const size = (name) => within(value(name), -LARGEST);
     for (const part of this.parts) {
       const { body } = part;
-      const at = value(body.position);
+      const at = size(body.position);
       const stuck = body.mode && value(body.mode) === 0;
       part.moving.classList.toggle("stuck", Boolean(stuck));
       part.at = at;
-      if (body.kind === "block") this.slide(part, at, value);
-      else this.turn(part, at, value);
+      if (body.kind === "block") this.slide(part, at, size);
+      else this.turn(part, at, size);
       if (part.label && body.mode) part.label.textContent = stuck ? "sticks" : "slips";
     }
     this.svg?.setAttribute("aria-label", this.words(value));
@@ -155,9 +157,8 @@ export class Mechanism {
   }
 
   turn(part, at, value) {
-    part.moving.setAttribute("transform", `rotate(${((-at * 180) / Math.PI).toFixed(3)})`);
-    const driver = part.body.driver && value(part.body.driver);
-    part.driver?.setAttribute("transform", `rotate(${((-driver * 180) / Math.PI).toFixed(3)})`);
+    part.moving.setAttribute("transform", rotation(at));
+    part.driver?.setAttribute("transform", rotation(value(part.body.driver)));
     if (part.force) part.force.setAttribute("d", arc(part.body.kind === "pendulum" ? 34 : 86, -value(part.body.friction) / (this.strongest || 1)));
   }
 
@@ -199,6 +200,15 @@ export class Mechanism {
       });
     }
   }
+}
+
+function within(value, low) {
+  return Math.min(Math.max(value, low), LARGEST);
+}
+
+// Positive angles turn against the clock.
+function rotation(angle) {
+  return `rotate(${(((-angle % (2 * Math.PI)) * 180) / Math.PI).toFixed(3)})`;
 }
 
 function coil(from, to, y) {

@@ -56,6 +56,14 @@ export function thinned(x, y, place) {
   return kept;
 }
 
+const colours = {}; // of the page, by name
+
+// Read the colours, as they are on this screen or on paper.
+export function readColours() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of ["a", "b", "ghost", "line", "soft", "stick", "event", "cursor"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
+}
+
 export class Plot {
   // `host` is the element that it fills; `onSeek(x)` is told where a pointer asks for the cursor.
   constructor(host, onSeek) {
@@ -65,17 +73,20 @@ export class Plot {
     this.above = host.appendChild(document.createElement("canvas"));
     this.above.setAttribute("aria-hidden", "true");
     this.paints = 0; // how often the curves were drawn
-    this.content = null;
-    this.spot = null;
-    new ResizeObserver(() => this.paint()).observe(host);
+    this.content = this.spot = null;
+    this.width = this.height = 0;
+    new ResizeObserver(([{ contentRect: { width, height } }]) => { // who asks the host itself has all laid out anew
+      Object.assign(this, { width, height });
+      this.paint();
+    }).observe(host);
     if (onSeek) this.listen(onSeek);
   }
 
   listen(onSeek) {
     const seek = (event) => {
-      const { left } = this.host.getBoundingClientRect();
+      const { left, width } = this.host.getBoundingClientRect();
       const { low, high } = this.content.x;
-      const share = (event.clientX - left - LEFT) / (this.host.clientWidth - LEFT - RIGHT);
+      const share = (event.clientX - left - LEFT) / (width - LEFT - RIGHT);
       onSeek(low + Math.min(Math.max(share, 0), 1) * (high - low));
     };
     this.host.addEventListener("pointerdown", (event) => {
@@ -96,38 +107,31 @@ export class Plot {
   // The cursor: x, and points {x, y, colour} on the curves.
   point(spot) {
     this.spot = spot;
-    if (!this.content) return;
-    const { context, width, height } = this.ready(this.above);
+    if (!this.content || !this.width) return;
+    const { width, height } = this;
+    const context = this.ready(this.above);
     const place = this.places(width, height);
-    const colours = this.colours();
     if (spot.x !== undefined) line(context, colours.cursor, 1, [place.x(spot.x), TOP, place.x(spot.x), height - BOTTOM]);
     for (const { x, y, colour } of spot.points) dot(context, colours[colour], place.x(x), place.y(y), 3.5);
   }
 
   paint() {
-    if (!this.content || !this.host.clientWidth) return;
+    if (!this.content || !this.width) return;
     this.paints++;
-    const { context, width, height } = this.ready(this.curves);
-    this.drawn(context, width, height);
+    this.drawn(this.ready(this.curves), this.width, this.height);
     if (this.spot) this.point(this.spot);
   }
 
   // A canvas of the size of the host, cleared, measured in CSS pixels.
   ready(canvas) {
-    const [width, height] = [this.host.clientWidth, this.host.clientHeight];
-    const scale = globalThis.devicePixelRatio || 1;
+    const { width, height } = this;
+    const scale = devicePixelRatio;
     const [wide, high] = [Math.round(width * scale), Math.round(height * scale)];
     if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
     const context = canvas.getContext("2d");
     context.setTransform(scale, 0, 0, scale, 0, 0);
     context.clearRect(0, 0, width, height);
-    return { context, width, height };
-  }
-
-  colours() {
-    const style = getComputedStyle(this.host);
-    const names = ["a", "b", "ghost", "line", "soft", "ink", "stick", "event", "cursor"];
-    return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+    return context;
   }
 
   places(width, height) {
@@ -143,7 +147,6 @@ export class Plot {
   // All but the cursor, on any canvas.
   drawn(context, width, height) {
     const { x, y, curves, bands = [], marks = [] } = this.content;
-    const colours = this.colours();
     const place = this.places(width, height);
     const [right, bottom] = [width - RIGHT, height - BOTTOM];
     context.font = FONT;
@@ -171,12 +174,12 @@ export class Plot {
     context.beginPath();
     context.rect(LEFT, TOP, right - LEFT, bottom - TOP);
     context.clip();
-    for (const curve of curves) this.curve(context, curve, colours, place);
-    for (const mark of marks) this.mark(context, mark, colours, place, right, bottom);
+    for (const curve of curves) this.curve(context, curve, place);
+    for (const mark of marks) this.mark(context, mark, place, right, bottom);
     context.restore();
   }
 
-  curve(context, { x, y, colour, dash = [], dots = false, width = 1.6 }, colours, place) {
+  curve(context, { x, y, colour, dash = [], dots = false, width = 1.6 }, place) {
     const kept = thinned(x, y, place);
     if (dots) {
       for (let i = 0; i < kept.length; i += 2) dot(context, colours[colour], kept[i], kept[i + 1], 2.6);
@@ -187,7 +190,7 @@ export class Plot {
     context.setLineDash([]);
   }
 
-  mark(context, { x, label, colour }, colours, place, edge, bottom) {
+  mark(context, { x, label, colour }, place, edge, bottom) {
     line(context, colours[colour], 1, [place.x(x), label ? TOP : bottom - 6, place.x(x), bottom]);
     if (!label) return;
     context.fillStyle = colours[colour];

@@ -91,10 +91,11 @@ export class Run {
   record() {
     const [reals, integers] = [this.readReals(), this.readIntegers()];
     const { reals: names, modes, columns } = this;
+    this.next = reals[names.length];
+    if (!reals.every(Number.isFinite)) return; // the next step says why
     this.time.push(this.t);
     for (let i = 0; i < names.length; i++) columns[names[i]].push(reals[i]);
     for (let i = 0; i < modes.length; i++) columns[modes[i]].push(integers[i]);
-    this.next = reals[names.length];
     columns["solver.h"].push(reals[names.length + 1]);
     const count = integers[modes.length];
     if (count > (this.count ?? 0)) this.events.push({ t: reals[names.length + 2], row: this.time.length - 1 });
