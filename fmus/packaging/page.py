@@ -52,8 +52,9 @@ def page(model: type[Declaring], name: str, declared: Variables, found: Referenc
 
 
 def block(block: str) -> str:
-    """A paragraph of the docstring; what is indented there is equations."""
-    if block.startswith("    "):
+    """A paragraph of the docstring; what is indented there is equations, as is what says in each line what equals what
+    (a docstring of nothing else has no indentation)."""
+    if block.startswith("    ") or all(" = " in line for line in block.splitlines()):
         return f"<pre>{typeset(cleandoc(block))}</pre>"
     return f"<p>{typeset(block)}</p>"
 

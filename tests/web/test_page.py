@@ -293,9 +293,13 @@ def test_a_link_carries_everything(page):
     assert page.run("Object.values(bench.desk.runs).map(run => run.columns.x.at(-1))") == end
     page.open(".preset=pacejka-0.001")
     assert page.run("bench.state().values.x_m") == 0.001
-    page.open(".model=smd&mu_d=0.3&k=100&.change=1 nothing 2")
-    assert page.run("bench.state().values") == {"k": 100}
-    assert "mu_d" in page.run("document.getElementById('status').textContent")
+    wrong = "mu_d=0.3&solver.method=7&friction=1.5&c=&.stop=&.change=1 nothing 2&.change=x k 2"
+    page.open(f".model=coulomb&k=100&{wrong}")
+    assert page.run("bench.state()") | {"values": {"k": 100}, "changes": [], "stop": 4} == page.run("bench.state()")
+    told = "document.getElementById('status').textContent"
+    page.wait(f"{told}.includes('not known here: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
+    page.open(".model=nobody")
+    page.wait(f"{told}.includes('not known here: nobody. coulomb')")
 
 
 def test_what_the_fmu_refuses_is_told_in_its_own_sentence(page):

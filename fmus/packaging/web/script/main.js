@@ -33,6 +33,7 @@ const form = new Form(desk.portraits, desk.presets, {
   forget: () => { page.state.changes = []; edited(); },
   refuse: (sentence) => { refused = sentence; drawAlert(); },
 });
+let unknown = ""; // a sentence about what a link has
 let refused = ""; // a sentence about what was typed
 let waiting = false; // a frame is asked for
 let stale = { curves: true, cursor: true };
@@ -42,22 +43,24 @@ let settling = 0;
 // ---- the state, and what follows from it
 
 async function enter(next, lost = []) {
-  stop();
+  if (page.playing) play(false);
   await Promise.all([next.model, ...(next.other ? [next.other.model] : [])].map((name) => desk.ready(name)));
   const changed = next.model !== page.state?.model;
   page.state = next;
   page.portrait = desk.portraits.get(next.model);
   if (changed) arrange();
-  $$("status").textContent = lost.length ? `The link has what ${next.model} does not know: ${lost.join(", ")}` : "";
+  unknown = lost.length ? `The link has what is not known here: ${lost.join(", ")}. ` : "";
   restart();
 }
 
 // Go where a link leads: to a state, or to a published case by its name alone; the first model without.
 async function follow(hash) {
   const found = read(hash, desk.portraits);
-  const preset = new URLSearchParams(hash.slice(1)).get(".preset");
+  const words = new URLSearchParams(hash.slice(1));
+  const preset = words.get(".preset");
   if (found) await enter(found.state, found.lost);
-  else await enter(desk.presets.has(preset) ? ofPreset(preset) : fresh(desk.portraits.values().next().value));
+  else if (desk.presets.has(preset)) await enter(ofPreset(preset));
+  else await enter(fresh(desk.portraits.values().next().value), [words.get(".model")].filter(Boolean));
 }
 
 function ofPreset(name) {
@@ -91,7 +94,7 @@ function restart() {
 
 // A published case is one until something is changed.
 function edited() {
-  page.state.preset = "";
+  page.state.preset = unknown = "";
   restart();
 }
 
@@ -149,7 +152,10 @@ function frame(now) {
   const { one } = desk.runs;
   if (stale.curves) drawAlert();
   if (one.time.length) {
-    if (stale.curves) drawCurves();
+    if (stale.curves) {
+      mechanism.fit(one);
+      diagrams.draw(desk, page.state, { turns: $$("turns").checked });
+    }
     if (stale.curves || stale.cursor) drawCursor();
     stale = { curves: false, cursor: false };
   }
@@ -163,10 +169,7 @@ function advance(passed) {
   const end = desk.runs.one.time.at(-1) ?? 0; // of what there is
   state.t = Math.min(state.t + passed * Number($$("speed").value), end);
   stale.cursor = true;
-  if (state.t >= state.stop || (desk.runs.one.done && state.t >= end)) {
-    stop();
-    settle();
-  }
+  if (state.t >= state.stop || (desk.runs.one.done && state.t >= end)) play(false);
 }
 
 // What a run was refused for; the diagrams of the last one that went stay, and are faint.
@@ -175,11 +178,6 @@ function drawAlert() {
   $$("alert").textContent = refused || one.failure || other?.failure || "";
   $$("alert").hidden = !$$("alert").textContent;
   for (const id of ["panels", "mechanism"]) $$(id).classList.toggle("gone", !one.time.length);
-}
-
-function drawCurves() {
-  mechanism.fit(desk.runs.one);
-  diagrams.draw(desk, page.state, { turns: $$("turns").checked });
 }
 
 function drawCursor() {
@@ -204,7 +202,7 @@ function settle() {
     const made = one.time.length ? [published, cost, decay, events].map((table) => table(desk, state)) : [];
     $$("tables").replaceChildren(...made.filter(Boolean));
     remember();
-    if (!one.failure && !page.playing) $$("status").textContent = `${setting(one)}: ${one.events.length} events in ${told(state.stop)} s.`;
+    if (!one.failure && !page.playing) $$("status").textContent = `${unknown}${setting(one)}: ${one.events.length} events in ${told(state.stop)} s.`;
   }, SETTLED);
 }
 
@@ -218,31 +216,22 @@ function seek(t) {
   wake();
 }
 
-function play() {
-  if (page.state.t >= page.state.stop) page.state.t = 0;
+function play(playing = true) {
+  const { state } = page;
+  if (playing && state.t >= state.stop) state.t = 0;
   before = 0;
-  showPlaying(true);
-  wake();
-}
-
-function stop() {
-  showPlaying(false);
-  if (page.state) showControls();
-}
-
-function showPlaying(playing) {
   page.playing = playing;
   $$("play").textContent = playing ? "Pause" : "Play";
   $$("play").setAttribute("aria-pressed", String(playing));
-}
-
-function redraw() {
-  stale.curves = true;
+  if (!playing) {
+    showControls();
+    settle();
+  }
   wake();
 }
 
 for (const [id, act] of Object.entries({
-  play: () => (page.playing ? (stop(), settle()) : play()),
+  play: () => play(!page.playing),
   kick: () => hand.kick(),
   reset: () => enter(fresh(page.portrait)),
   print: () => print(),
@@ -252,7 +241,7 @@ for (const [id, act] of Object.entries({
 })) $$(id).addEventListener("click", act);
 $$("scrub").addEventListener("input", () => seek((page.state.stop * $$("scrub").value) / 1000));
 $$("live").addEventListener("change", showControls);
-$$("turns").addEventListener("change", redraw);
+$$("turns").addEventListener("change", () => { stale.curves = true; wake(); });
 
 // The address carries the state; within another page it is not ours.
 function remember() {

@@ -30,47 +30,44 @@ function extent({ content }, one) {
   return `from ${told(low, 3)} to ${told(high, 3)}, ${one.events.length} events`;
 }
 
-// A variable of a run, in the unit that people read.  Of a run of very many steps a picture needs the points of the
-// grid and the events alone, but for the steps themselves.
+// A variable {x, y} of a run over time, in the unit that people read; null where it has none of the name.  Of a run of
+// very many steps a picture needs the points of the grid and the events alone, but for the steps themselves.
 function series(run, { name, factor }) {
-  const [all, column] = [run.time.length < MANY || name === "solver.h", run.columns[name]];
-  if (all && factor === 1) return column;
-  if (all) return column.map((value) => value * factor);
-  return sparse(run).map((row) => column[row] * factor);
+  if (!run.columns[name]) return null;
+  const all = run.time.length < MANY || name === "solver.h";
+  const rows = all ? null : [...run.grid, ...run.events.map(({ row }) => row)].sort((one, next) => one - next);
+  const [x, y] = [run.time, run.columns[name]].map((column) => (all ? column : rows.map((row) => column[row])));
+  return { x, y: factor === 1 ? y : y.map((value) => value * factor) };
 }
 
-function times(run, name) {
-  return run.time.length < MANY || name === "solver.h" ? run.time : sparse(run).map((row) => run.time[row]);
-}
-
-function sparse(run) {
-  const rows = [...run.grid, ...run.events.map(({ row }) => row)];
-  return rows.sort((one, next) => one - next);
+// What `drawn` gives of each run, the run itself last and so above the others.
+function curves({ one, other, before, quick }, drawn) {
+  return [
+    before && { ...drawn(before), colour: "ghost", dash: [4, 4], width: 1 },
+    quick && !one.done && { ...drawn(quick), colour: "ghost", width: 1 },
+    other && { ...drawn(other), colour: "b" },
+    { ...drawn(one), colour: "a" },
+  ].filter((curve) => curve?.y);
 }
 
 // One variable of every run over time.
 function overTime(desk, state, tools, name, key, log = false) {
-  const { one, other, before, quick } = desk.runs;
+  const { one } = desk.runs;
   const variable = one.fmu.variables.get(name);
-  const { factor, shown, text } = variable;
-  const curve = (run, colour, dash) => ({ x: times(run, name), y: series(run, variable), colour, dash });
-  const curves = [];
+  const { factor, shown, text, symbol } = variable;
   const body = one.fmu.portrait.bodies[state.body];
-  if (name === body.position) curves.push(...companions(one, body, tools, factor));
-  if (before) curves.push({ ...curve(before, "ghost", [4, 4]), width: 1 });
-  if (quick && !one.done) curves.push({ ...curve(quick, "ghost"), width: 1 });
-  if (other?.columns[name]) curves.push(curve(other, "b"));
-  curves.push(curve(one, "a"));
-  const y = { ...bounds(curves.map((each) => each.y), log), log };
+  const beside = name === body.position ? companions(one, body, tools, factor) : [];
+  const all = [...beside, ...curves(desk.runs, (run) => series(run, variable))];
+  const y = { ...bounds(all.map((each) => each.y), log), log };
   const x = { low: 0, high: state.stop, label: "t in s" };
-  const title = `${text}${shown ? ` in ${shown}` : ""}`;
-  return { key, name, title, symbol: variable.symbol, factor, content: { x, y, curves, bands: one.stuck(body.mode), marks: marks(one, state, name === body.position) } };
+  const content = { x, y, curves: all, bands: one.stuck(body.mode), marks: marks(one, state, name === body.position) };
+  return { key, name, title: `${text}${shown ? ` in ${shown}` : ""}`, symbol, factor, content };
 }
 
 // Beside the position: the driver; envelope and turning points where they are wanted.
 function companions(one, body, tools, factor) {
   const found = [];
-  if (body.driver) found.push({ x: times(one), y: series(one, { name: body.driver, factor }), colour: "soft", dash: [2, 3], width: 1 });
+  if (body.driver) found.push({ ...series(one, { name: body.driver, factor }), colour: "soft", dash: [2, 3], width: 1 });
   if (!tools.turns) return found;
   const turning = turningPoints(one.time, one.columns[body.position], one.columns[body.speed]);
   for (const envelope of envelopes(turning)) {
@@ -108,18 +105,12 @@ function marks(one, state, labelled) {
 
 // Speed over position.
 function phase(desk, body) {
-  const { one, other, before } = desk.runs;
-  const [x, v] = [body.position, body.speed].map((name) => one.fmu.variables.get(name));
-  const curve = (run, colour, dash) => ({
-    x: series(run, x), y: series(run, v), colour, dash, width: 1.2,
-  });
-  const curves = [];
-  if (before) curves.push({ ...curve(before, "ghost", [4, 4]), width: 1 });
-  if (other?.columns[x.name] && other.columns[v.name]) curves.push(curve(other, "b"));
-  curves.push(curve(one, "a"));
+  const [x, v] = [body.position, body.speed].map((name) => desk.runs.one.fmu.variables.get(name));
+  const has = (run) => run.columns[x.name] && run.columns[v.name];
+  const all = curves(desk.runs, (run) => has(run) && { x: series(run, x).y, y: series(run, v).y, width: 1.2 });
   const content = {
-    x: { ...bounds(curves.map((each) => each.x)), label: `${x.name}${x.shown ? ` in ${x.shown}` : ""}` },
-    y: bounds(curves.map((each) => each.y)), curves,
+    x: { ...bounds(all.map((each) => each.x)), label: `${x.name}${x.shown ? ` in ${x.shown}` : ""}` },
+    y: bounds(all.map((each) => each.y)), curves: all,
   };
   return { key: "phase", title: `phase plane: ${v.name} in ${v.shown} over ${x.name}`, symbol: "", content, phase: [x, v] };
 }
@@ -133,37 +124,29 @@ function errors(desk, body, state) {
     const { time, apart } = difference(from, to, body.position);
     return { x: time, y: apart.map((value) => Math.abs(value) * factor), colour };
   };
-  const curves = [];
+  const found = [];
   let title = `error of ${body.position} against the closed form`;
   if (truth && (!other || same)) {
-    if (other) curves.push(curve(truth, other, "b"));
-    if (truth !== one) curves.push(curve(truth, one, "a"));
+    if (other) found.push(curve(truth, other, "b"));
+    if (truth !== one) found.push(curve(truth, one, "a"));
   } else if (other?.columns[body.position]) {
-    curves.push(curve(one, other, "b"));
+    found.push(curve(one, other, "b"));
     title = `difference of the two in ${body.position}`;
   }
-  if (!curves.length) return null;
-  const y = { ...bounds(curves.map((each) => each.y), true), log: true };
+  if (!found.length) return null;
+  const y = { ...bounds(found.map((each) => each.y), true), log: true };
   const x = { low: 0, high: state.stop, label: "t in s" };
-  return { key: "error", title: `${title}${shown ? ` in ${shown}` : ""}`, symbol: "", content: { x, y, curves } };
+  return { key: "error", title: `${title}${shown ? ` in ${shown}` : ""}`, symbol: "", content: { x, y, curves: found } };
 }
 
 // Where the cursor stands in a diagram, and what is read there: {spot, readings [{text, colour}]}.
-export function spotted(panel, desk, t) {
-  const { one, other } = desk.runs;
-  const points = [];
-  const readings = [];
-  for (const [run, colour] of [[one, "a"], [other, "b"]]) {
-    if (!run?.time.length) continue;
-    if (panel.phase) {
-      const [x, v] = panel.phase;
-      if (!run.columns[x.name] || !run.columns[v.name]) continue;
-      points.push({ x: run.at(x.name, t) * x.factor, y: run.at(v.name, t) * v.factor, colour });
-    } else if (panel.name && run.columns[panel.name]) {
-      const y = run.at(panel.name, t) * panel.factor;
-      points.push({ x: t, y, colour });
-      readings.push({ text: told(y), colour });
-    }
+export function spotted({ phase, name, factor }, { runs }, t) {
+  const [points, readings] = [[], []];
+  for (const [run, colour] of [[runs.one, "a"], [runs.other, "b"]]) {
+    if (!run?.time.length || !(phase ?? [{ name }]).every((each) => run.columns[each.name])) continue;
+    const [x, y] = phase ? phase.map((each) => run.at(each.name, t) * each.factor) : [t, run.at(name, t) * factor];
+    points.push({ x, y, colour });
+    if (!phase) readings.push({ text: told(y), colour });
   }
-  return { spot: { x: panel.phase ? undefined : t, points }, readings };
+  return { spot: { x: phase ? undefined : t, points }, readings };
 }

@@ -31,28 +31,23 @@ export function told(value, digits = 4) {
 // and last.  `place` gives pixels; what is no number, or has no place on the axis, is left out.
 export function thinned(x, y, place) {
   const kept = [];
-  let [column, count] = [NaN, 0];
-  let firstX, firstY, lowX, lowY, highX, highY, lastX, lastY, lowIsFirst;
-  const keep = () => {
-    if (count > 0) kept.push(firstX, firstY);
-    if (count > 3) kept.push(...(lowIsFirst ? [lowX, lowY, highX, highY] : [highX, highY, lowX, lowY]));
-    if (count === 3) kept.push(...(lowY < Math.min(firstY, lastY) ? [lowX, lowY] : [highX, highY]));
-    if (count > 1) kept.push(lastX, lastY);
-  };
-  for (let i = 0; i < x.length; i++) {
-    const [pixelX, pixelY] = [place.x(x[i]), place.y(y[i])];
+  let column, first, lowest, highest, last, low, high;
+  const keep = (row) => row !== undefined && kept.push(place.x(x[row]), place.y(y[row]));
+  const keepColumn = () => [...new Set([first, lowest, highest, last])].sort((one, next) => one - next).forEach(keep);
+  for (let row = 0; row < x.length; row++) {
+    const [pixelX, pixelY] = [place.x(x[row]), place.y(y[row])];
     if (!Number.isFinite(pixelX + pixelY)) continue;
     if (Math.floor(pixelX) !== column) {
-      keep();
-      [column, count, lowIsFirst] = [Math.floor(pixelX), 0, true];
-      firstX = lowX = highX = pixelX;
-      firstY = lowY = highY = pixelY;
-    } else if (pixelY < lowY) [lowX, lowY, lowIsFirst] = [pixelX, pixelY, false];
-    else if (pixelY > highY) [highX, highY, lowIsFirst] = [pixelX, pixelY, true];
-    [lastX, lastY] = [pixelX, pixelY];
-    count++;
+      keepColumn();
+      column = Math.floor(pixelX);
+      first = lowest = highest = row;
+      low = high = pixelY;
+    }
+    if (pixelY < low) [lowest, low] = [row, pixelY];
+    if (pixelY > high) [highest, high] = [row, pixelY];
+    last = row;
   }
-  keep();
+  keepColumn();
   return kept;
 }
 

@@ -58,14 +58,19 @@ export function read(hash, portraits) {
   if (!portrait) return null;
   const state = fresh(portrait);
   const lost = [];
-  const number = (key, fallback) => (words.has(key) && isFinite(words.get(key)) ? Number(words.get(key)) : fallback);
-  const takes = (owner, name, word) => settable(owner).some((variable) => variable.name === name) && isFinite(word);
+  const isNumber = (word) => Boolean(word?.trim()) && isFinite(word);
+  const number = (key, fallback) => (isNumber(words.get(key)) ? Number(words.get(key)) : fallback);
+  const takes = (owner, name, word) => {
+    const variable = settable(owner).find((each) => each.name === name);
+    const among = variable?.items.length ? variable.items.some(({ value }) => value === Number(word)) : variable;
+    return among && isNumber(word);
+  };
   const other = portraits.get(words.get(".beside"));
   if (other) state.other = { model: other.name, values: {} };
   for (const [key, word] of words) {
     if (key === ".change") {
       const [t, name, value] = word.split(" ");
-      if (takes(portrait, name, value) && Number(t) >= 0) state.changes.push({ t: Number(t), name, value: Number(value) });
+      if (takes(portrait, name, value) && isNumber(t) && Number(t) >= 0) state.changes.push({ t: Number(t), name, value: Number(value) });
       else lost.push(word);
     } else if (key.startsWith(".beside.")) {
       const name = key.slice(".beside.".length);
