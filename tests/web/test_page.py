@@ -269,6 +269,22 @@ def test_a_body_pulled_while_it_runs_feels_a_force_until_it_is_let_go(page, name
     assert page.run(f"(p => {apart})({body['position']!r})")
 
 
+def test_a_pull_on_a_slow_method_never_goes_back_in_time(page):
+    """The next force waits for the run of the last one."""
+    page.browser.size(1280)
+    page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=8")
+    x, y = page.middle("#mechanism .body")
+    page.browser.mouse("Pressed", x, y)
+    for way in (40, 80, 120):
+        page.browser.mouse("Moved", x + way, y)
+    page.wait("bench.state().changes.length > 1")
+    page.browser.mouse("Released", x + 120, y, buttons=0)
+    page.click("#play")
+    first, *_, last = page.settled("bench.state().changes")
+    assert first["t"] == 8 < last["t"] <= page.run("bench.state().t") + 0.1
+    assert (first["name"], last["value"]) == ("F_ext", 0)
+
+
 def test_a_kick_is_a_push_that_ends(page):
     page.open(".model=stickslip&.t=1")
     page.click("#kick")

@@ -57,7 +57,7 @@ export class Hand {
   act() {
     const { state, desk } = this.page;
     const { place, body, to, rest, stiffness } = this.pull;
-    if (to === undefined || !desk.runs.one.time.length) return;
+    if (to === undefined || !desk.runs.one.reaches(state.t)) return; // the last change is still being run
     if (place) {
       this.page.put(place, Number((to * place.factor).toPrecision(3)) / place.factor);
       return;

@@ -86,7 +86,7 @@ function arrange() {
 function restart() {
   desk.restart(page.state);
   refused = "";
-  stale.curves = true;
+  stale = { curves: true, cursor: true };
   settle();
   showControls();
   wake();
@@ -151,14 +151,15 @@ function frame(now) {
   if (desk.work(SLICE)) stale.curves = true;
   const { one } = desk.runs;
   if (stale.curves) drawAlert();
-  if (one.time.length) {
-    if (stale.curves) {
-      mechanism.fit(one);
-      diagrams.draw(desk, page.state, { turns: $$("turns").checked });
-    }
-    if (stale.curves || stale.cursor) drawCursor();
-    stale = { curves: false, cursor: false };
+  if (one.time.length && stale.curves) {
+    mechanism.fit(one);
+    diagrams.draw(desk, page.state, { turns: $$("turns").checked });
   }
+  if (one.time.length && (stale.curves || stale.cursor) && one.reaches(page.state.t)) {
+    drawCursor();
+    stale.cursor = false;
+  }
+  stale.curves = !one.time.length;
   if (page.playing || hand.pull || !desk.done) wake();
   else before = 0;
   if (!desk.done) settle();
@@ -167,7 +168,7 @@ function frame(now) {
 function advance(passed) {
   const { state } = page;
   const end = desk.runs.one.time.at(-1) ?? 0; // of what there is
-  state.t = Math.min(state.t + passed * Number($$("speed").value), end);
+  state.t = Math.max(state.t, Math.min(state.t + passed * Number($$("speed").value), end));
   stale.cursor = true;
   if (state.t >= state.stop || (desk.runs.one.done && state.t >= end)) play(false);
 }

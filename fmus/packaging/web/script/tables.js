@@ -1,6 +1,7 @@
 // The numbers under the diagrams, as tables.
 
 import { make } from "./controls.js";
+import { COUNTS } from "./fmu.js";
 import { decayBetween, difference, figures, forceByEnergy, turningPoints } from "./measure.js";
 import { told } from "./plot.js";
 import { inForce } from "./state.js";
@@ -46,12 +47,8 @@ export function cost(desk, state) {
   const runs = [one, other].filter(Boolean);
   const body = desk.portraits.get(state.model).bodies[state.body];
   const { shown, factor } = one.fmu.variables.get(body.position);
-  const count = (run, name) => (run.counts?.[name] === undefined ? "" : String(run.counts[name]));
   const rows = [
-    ["accepted steps", ...runs.map((run) => count(run, "solver.steps"))],
-    ["refused steps", ...runs.map((run) => count(run, "solver.rejected"))],
-    ["evaluations of the right-hand side", ...runs.map((run) => count(run, "solver.evaluations"))],
-    ["events", ...runs.map((run) => count(run, "events.count"))],
+    ...Object.entries(COUNTS).map(([name, words]) => [words, ...runs.map((run) => String(run.counts?.[name] ?? ""))]),
     ["run time here, drawing points included", ...runs.map((run) => `${told(1000 * run.seconds, 2)} ms`)],
   ];
   const off = (run) => (run === truth ? "is the closed form" : `${told(difference(truth, run, body.position).largest * factor, 3)} ${shown}`);
