@@ -170,6 +170,15 @@ def test_until_the_first_picture_one_model_is_compiled(page):
     assert page.run("bench.plots.get('x').plot.paints") > 0
 
 
+def test_of_two_models_chosen_at_once_the_last_is_shown(page):
+    page.open(".model=coulomb")
+    for first, last in (("pacejka", "smd"), ("smd", "pendulum"), ("stickslip", "smd")):  # known, and not yet compiled
+        page.run(f"for (const name of [{first!r}, {last!r}]) document.querySelector(`input[value=${{name}}]`).click()")
+        page.wait(f"bench.state().model === {last!r}")
+        page.run("new Promise(done => setTimeout(done, 100))")
+        assert page.settled("bench.state().model") == last == page.run("document.querySelector(':checked').value")
+
+
 def test_a_law_beside_another_shows_the_difference_and_the_counts(page):
     page.open(".model=coulomb")
     page.choose("other", "coulomb")

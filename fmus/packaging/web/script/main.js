@@ -33,6 +33,7 @@ const form = new Form(desk.portraits, desk.presets, {
   forget: () => { page.state.changes = []; edited(); },
   refuse: (sentence) => { refused = sentence; drawAlert(); },
 });
+let latest = null; // state that was to be entered
 let unknown = ""; // a sentence about what a link has
 let refused = ""; // a sentence about what was typed
 let waiting = false; // a frame is asked for
@@ -44,7 +45,9 @@ let settling = 0;
 
 async function enter(next, lost = []) {
   if (page.playing) play(false);
+  latest = next;
   await Promise.all([next.model, ...(next.other ? [next.other.model] : [])].map((name) => desk.ready(name)));
+  if (latest !== next) return; // somebody has chosen another since
   const changed = next.model !== page.state?.model;
   page.state = next;
   page.portrait = desk.portraits.get(next.model);
