@@ -223,11 +223,11 @@ fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real x[], 
     return put(it, x, nx, __func__);
 }
 
-#define TELLING(NAME, FIND, COUNT)                                                      \
-    fmi2Status fmi2Get##NAME(fmi2Component component, fmi2Real value[], size_t n)       \
-    {                                                                                   \
-        ENTER(component, ANY);                                                          \
-        return tell(it, exchange_##FIND, it->state.model.exchange.FIND, COUNT, value, n, __func__); \
+#define TELLING(NAME, found, COUNT)                                                 \
+    fmi2Status fmi2Get##NAME(fmi2Component component, fmi2Real value[], size_t n)   \
+    {                                                                               \
+        ENTER(component, ANY);                                                      \
+        TELL(it, found, COUNT, value, n);                                           \
     }
 
 TELLING(Derivatives, rates, STATES)

@@ -350,11 +350,11 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 cont
     return put(it, continuousStates, nContinuousStates, __func__);
 }
 
-#define TELLING(NAME, FIND, COUNT)                                                                        \
-    fmi3Status fmi3Get##NAME(fmi3Instance instance, fmi3Float64 values[], size_t n)                       \
-    {                                                                                                     \
-        ENTER(instance, ANY);                                                                             \
-        return tell(it, exchange_##FIND, it->state.model.exchange.FIND, COUNT, values, n, __func__);      \
+#define TELLING(NAME, found, COUNT)                                                     \
+    fmi3Status fmi3Get##NAME(fmi3Instance instance, fmi3Float64 values[], size_t n)     \
+    {                                                                                   \
+        ENTER(instance, ANY);                                                           \
+        TELL(it, found, COUNT, values, n);                                              \
     }
 
 TELLING(ContinuousStates, states, STATES)
