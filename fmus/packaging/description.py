@@ -28,6 +28,8 @@ CAPABILITIES = {
     "canSerializeFMUstate": "true",
 }
 SLOPES = {"providesDirectionalDerivative": "true"}
+RATES = {"maxOutputDerivativeOrder": "1"}
+RAMPS = {"canInterpolateInputs": "true"}  # at a constant rate
 EXCHANGE = {  # what is said of model exchange: the same, but for the steps
     **{key: able for key, able in CAPABILITIES.items() if "Communication" not in key},
     "completedIntegratorStepNotNeeded": "true",
@@ -57,7 +59,8 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime, excha
     if exchanging:
         root.set("numberOfEventIndicators", str(len(indicators_of(declared))))
         SubElement(root, "ModelExchange", EXCHANGE, modelIdentifier=name)
-    SubElement(root, "CoSimulation", CAPABILITIES | (SLOPES if exchanging else {}), modelIdentifier=name)
+    stepping = CAPABILITIES | (SLOPES | RATES if exchanging else {}) | (RAMPS if thing.ramps else {})
+    SubElement(root, "CoSimulation", stepping, modelIdentifier=name)
     define_units(root, declared)
     _define_types(root, declared)
     log_and_experiment(root, model, "fmi2")

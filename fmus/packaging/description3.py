@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 from ..runtime.declare import Declaring, variables
 from .dependencies import at_start
 from .description import (
+    RATES,
     add_items,
     closed,
     define_units,
@@ -41,6 +42,7 @@ STEPPING = {
     "canReturnEarlyAfterIntermediateUpdate": "true",
     "mightReturnEarlyFromDoStep": "true",
     "providesIntermediateUpdate": "true",
+    **RATES,
 }
 
 

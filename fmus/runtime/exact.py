@@ -1,14 +1,14 @@
-"""Closed form of one linear piece: m x'' + c x' + k x = F + k u t, and its next standstill.
+"""Closed form of one linear piece: m x'' + c x' + k x = F + (m q + k u) t, and its next standstill.
 
 With z = c/(2 m), n^2 = k/m, p = F/m and the impulse response G (G'' + 2 z G' + n^2 G = 0, G(0) = 0, G'(0) = 1)
 
-    x = x0 (G' + 2 z G) + v0 G + p I        I = integral of G
-    v = -n^2 x0 G + v0 G' + p G
+    x = x0 (G' + 2 z G) + v0 G + p I + q J  I = integral of G, J = integral of I
+    v = -n^2 x0 G + v0 G' + p G + q I
 
-G, G' and I are written for each kind of damping so that no digit is lost near critical damping, with a weak
+G, G', I and J are written for each kind of damping so that no digit is lost near critical damping, with a weak
 spring or without one (L. Meirovitch, Fundamentals of Vibrations, chapters 2 and 4, has the usual forms).
 A resting point that drifts at the speed u (a driver pulling the spring) is offered without damping only: no
-oscillator here has both.
+oscillator here has both.  Where inputs have no rates, neither has the force: q is zero.
 """
 
 from math import atan2, copysign, cos, exp, expm1, fabs, inf, log1p, pi, sin, sqrt
@@ -17,6 +17,7 @@ from .rounding import NEAR
 from .vectors import States
 
 UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE = 1, 2, 3, 4
+MOST_HALVINGS, MOST_DOUBLINGS = 200, 1000
 
 
 class Exact:
@@ -24,7 +25,8 @@ class Exact:
 
     def __init__(self):
         self.kind = UNDAMPED
-        self.z = self.n2 = self.drift = 0.0
+        self.ramps = True  # of some models, as Oscillator has it
+        self.z = self.n2 = self.drift = self.q = 0.0
         self.w = self.slow = 0.0
         self.x0 = self.v0 = self.a0 = self.p = self.lost = 0.0
 
@@ -43,6 +45,12 @@ class Exact:
             self.kind = OVERDAMPED
             self.slow = -self.n2 / (z + self.w)  # the slow root of s^2 + 2 z s + n^2, without cancellation
 
+    def follow(self, q):
+        """The force changes at a constant rate, and an acceleration that nothing else changed would at q (m/s3)."""
+        self.q = q
+        if self.kind == UNDAMPED:
+            self.drift += q / self.n2  # so does the resting point
+
     def begin(self, x, v, a, p, lost):
         """A piece from x, v with the acceleration a, of which p is due to the constant force; x lacks what it lost to
         rounding."""
@@ -59,6 +67,8 @@ class Exact:
                 self.x0 + (self.v0 * g + self.a0 * fall / self.n2 + self.drift * lag + self.lost),
                 self.v0 * (1.0 - fall) + self.a0 * g + self.drift * fall,
             )
+        if self.ramps and self.q != 0.0:
+            return self.ramped(t)
         if self.kind == FREE:
             return self.x0 + (self.v0 + 0.5 * self.a0 * t) * t, self.v0 + self.a0 * t
         if self.kind == UNDERDAMPED:
@@ -90,6 +100,27 @@ class Exact:
         moved = x - x0
         return x, 0.0, (x0 - (x - moved)) + (way - moved)
 
+    def ramped(self, t) -> States:
+        """The same where the force changes."""
+        z, w, n2 = self.z, self.w, self.n2
+        if self.kind == OVERDAMPED:
+            g, slope, once = self.overdamped(t)
+        else:
+            e, once = exp(-z * t), 0.0
+            g = e * sin(w * t) / w if w > 0.0 else t
+            slope = e * cos(w * t) - z * g
+        if (z + w) * t < 0.5:
+            once, twice = self.early(t, 0.5 * t * t, 2), self.early(t, t * t * t / 6.0, 3)
+        elif self.kind == OVERDAMPED and w > 0.5 * z:
+            twice = 0.5 * (summed_twice(self.slow, t) - summed_twice(-(z + w), t)) / w
+        else:
+            once = (1.0 - slope - 2.0 * z * g) / n2
+            twice = (t - 2.0 * z * once - g) / n2
+        return (
+            self.x0 * (slope + 2.0 * z * g) + self.v0 * g + self.p * once + self.q * twice,
+            (self.p - n2 * self.x0) * g + self.v0 * slope + self.q * once,
+        )
+
     def overdamped(self, t):
         """G, G' and I from the two real roots, which coincide at critical damping."""
         z, w, slow = self.z, self.w, self.slow
@@ -98,7 +129,7 @@ class Exact:
         g = -0.5 * e * u / w if w > 0.0 else e * t
         mean = e * (1.0 + 0.5 * u)
         if (z + w) * t < 0.5:
-            integral = self.early(t)
+            integral = self.early(t, 0.5 * t * t, 2)
         elif w > 0.5 * z:
             fast = -(z + w)
             far = expm1(slow * t) / slow if slow < 0.0 else t
@@ -107,12 +138,12 @@ class Exact:
             integral = (1.0 - mean - z * g) / self.n2
         return g, mean - z * g, integral
 
-    def early(self, t):
-        """The integral of G at small t, where its closed form cancels: the series of I'' = 1 - 2 z I' - n^2 I."""
+    def early(self, t, term, power):
+        """An integral of G at small t, where its closed form cancels, by its series, whose first term is of that power:
+        that of I'' = 1 - 2 z I' - n^2 I or J'' = t - 2 z J' - n^2 J."""
         y, y2 = 2.0 * self.z * t, self.n2 * t * t
-        term, last = 0.5 * t * t, 0.0
-        total = term
-        for j in range(2, 18):
+        last, total = 0.0, term
+        for j in range(power, 18):
             term, last = -(y * j * term + y2 * last) / ((j + 1.0) * j), term
             total += term
         return total
@@ -122,17 +153,65 @@ class Exact:
         v, a = fabs(self.v0), mode * self.a0  # a product would turn the speed of a body at rest into -0.0
         if self.kind == UNDAMPED:
             return self.undamped_standstill(v, a / self.w, mode * self.drift)
+        if self.ramps and self.q != 0.0:
+            return self.ramped_standstill(mode, v, a, mode * self.q)
+        return self.decay(v, a, mode * self.p)
+
+    def decay(self, v, a, p):
+        """When what begins at v with the rate a and obeys the homogeneous equation next comes to zero, from above."""
         b = a + self.z * v
         w = self.w
         if self.kind == UNDERDAMPED:
             return atan2(v * w, -b) / w
-        # the share of the slow root in the speed; without a spring that is the speed which the force keeps up
-        slow = b + w * v if self.n2 > 0.0 else mode * self.p
+        # the share of the slow root; without a spring that is what p keeps up
+        slow = b + w * v if self.n2 > 0.0 else p
         if v == 0.0 or slow >= 0.0:
             return inf
         if w == 0.0:
             return -v / b
         return -0.5 * log1p(2.0 * w * v / (slow - 2.0 * w * v)) / w
+
+    def ramped_standstill(self, mode, v, a, q):
+        """The same where the force changes at the rate q, in the direction of the mode.
+
+        The acceleration then obeys the homogeneous equation.  So its zeros have a closed form, and where the speed
+        falls from one to the next, the time of a standstill is halved down to.
+        """
+        if self.kind == FREE:
+            return free_standstill(v, a, q)
+        z, w = self.z, self.w
+        jerk = q - 2.0 * z * a - self.n2 * v
+        low, high = 0.0, inf
+        if a > 0.0 or (a == 0.0 and jerk > 0.0):
+            low = self.decay(fabs(a), jerk, q)
+            if self.kind == UNDERDAMPED:
+                high = low + pi / w
+        else:
+            high = self.decay(fabs(a), -jerk, -q)
+        if not low < inf or (high == inf and q > 0.0):
+            return inf  # it rises for ever, or falls towards a speed that lasts
+        if high < inf:
+            _, least = self.ramped(high)
+            if mode * least > NEAR * v:
+                return inf
+        else:
+            reach = 1.0 / (z + w)
+            for _ in range(MOST_DOUBLINGS):
+                high = low + reach
+                reach *= 2.0
+                _, least = self.ramped(high)
+                if mode * least <= 0.0:
+                    break
+        for _ in range(MOST_HALVINGS):
+            middle = 0.5 * (low + high)
+            if not low < middle < high:
+                break
+            _, here = self.ramped(middle)
+            if mode * here > 0.0:
+                low = middle
+            else:
+                high = middle
+        return high
 
     def undamped_standstill(self, v, q, u):
         """First root of u + (v - u) cos y + q sin y, a quadratic in T = tan(y/2), over w; it may be a double one."""
@@ -151,6 +230,35 @@ def early_lag(square):
     """1 - sin(y)/y for y below 0.5, from y^2, by its series."""
     tail = 1.0 - square / 72.0 * (1.0 - square / 110.0 * (1.0 - square / 156.0 * (1.0 - square / 210.0)))
     return square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * tail))
+
+
+def summed_twice(s, t):
+    """exp(s t), twice integrated."""
+    y = s * t
+    if fabs(y) > 0.5:
+        return (expm1(y) - y) / (s * s)
+    term = 0.5 * t * t
+    total = term
+    for j in range(3, 18):
+        term *= y / j
+        total += term
+    return total
+
+
+def free_standstill(v, a, q):
+    """First root of v + a t + q t^2/2 beyond zero; it may be a double one."""
+    square = a * a - 2.0 * q * v
+    if square < 0.0:
+        if square < -NEAR * a * a:
+            return inf
+        square = 0.0
+    s = -(a + copysign(sqrt(square), a))
+    if s == 0.0:
+        return inf
+    first, second = s / q, 2.0 * v / s
+    if first <= 0.0 or 0.0 < second < first:
+        first = second
+    return first if first > 0.0 else inf
 
 
 def half_angle(over, under):

@@ -116,6 +116,8 @@ class March(Declaring):
         if model.linear:
             mass, damping, stiffness, drift = model.piece()
             step.methods.exact.prepare(mass, damping, stiffness, drift)
+            if model.ramps:
+                step.methods.exact.follow(model.ramp())
 
     # ---- the present point
 

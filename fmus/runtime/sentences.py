@@ -27,6 +27,7 @@ from .codes import (
     NO_ADDRESS,
     NO_DERIVATIVE,
     NO_MEMORY,
+    NO_RATE,
     NO_VARIABLE,
     NOT_OFFERED,
     OUT_OF_ORDER,
@@ -74,6 +75,8 @@ CALLS = {
     WRONG_TOKEN: "{function} is refused: the GUID or token must be {word}, that of modelDescription.xml",
     NO_DERIVATIVE: "{function} is refused: value reference {reference} is not that of a state or an input, or of what "
     "follows from them",
+    NO_RATE: "{function} is refused: value reference {reference} has no such derivative; what it may have is of "
+    "the order 1, and of {word}",
     WRONG_LENGTH: "{function} is refused: {word} is another number than there are",
 }
 PHASES = {

@@ -30,6 +30,9 @@ class Names:
     def setInteger(self, references, values):
         self.setInt64(references, values)
 
+    def getRealOutputDerivatives(self, references, orders):
+        return self.getOutputDerivatives(references, orders)
+
     def getFMUstate(self):
         return self.getFMUState()
 

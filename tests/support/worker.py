@@ -100,6 +100,13 @@ class Instance:
         """Write it likewise."""
         getattr(self.slave, f"set{kind}")([reference], [value])
 
+    def ramp(self, name, rate, order=1):
+        self.slave.setRealInputDerivatives([self.variables[name][0]], [order], [rate])
+
+    def output_rates(self, names, order=1):
+        references = [self.variables[name][0] for name in names]
+        return list(self.slave.getRealOutputDerivatives(references, [order] * len(names)))
+
     def setup(self, start, stop, tolerance):
         self.slave.setupExperiment(startTime=start, stopTime=stop, tolerance=tolerance)
 

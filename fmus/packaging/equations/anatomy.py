@@ -6,7 +6,7 @@ The contacts are looked at as a whole: A F = b for the forces that make the rate
 from collections.abc import Collection
 from functools import cached_property
 from keyword import iskeyword
-from math import inf
+from math import inf, isfinite
 from sys import float_info
 from typing import Any
 
@@ -26,7 +26,7 @@ TIME.name = "t"
 class Anatomy:
     """Everything about a model that numerics, description, page and C ask for."""
 
-    def __init__(self, model: type[Model]) -> None:
+    def __init__(self, model: type[Model], ramps: bool = False) -> None:
         self.model, self.name = model, model.__name__
         if self.name in RESERVED or not self.name.isascii():
             raise Mistake(
@@ -48,9 +48,11 @@ class Anatomy:
             raise Mistake("rules are one Rule, or several in brackets", model.place)
         self._find_rates()
         self.moving = (TIME, *self.states, *self.drives, *self.contacts, *self.modes)
-        self.flow = {s: self.rate[s] for s in self.states} | {d: d.steady for d in self.drives} | {TIME: 1.0}
+        self.ramps = {e: rate for e in self.inputs if (rate := self._rate_of(e)) is not None} if ramps else {}
+        self.flow = {s: self.rate[s] for s in self.states} | self.by_time | self.ramps
         self._judge_parts()
         self._find_forces()
+        self.ramps = {e: rate for e, rate in self.ramps.items() if self._stays_closed(e)}
         self.rules += self._holding()
         for name, e in own if self.contacts and not self.waits else ():
             self._judge_name(name, e, RESERVED_WHERE_COUPLED)
@@ -225,6 +227,28 @@ class Anatomy:
     def sliding(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
         """The derivative of an expression while every contact slides."""
         return derivative(e, by | {c: made("*", c.mode, derivative(c.slide, by)) for c in self.contacts})
+
+    # ---- inputs that change at a constant rate
+
+    def _rate_of(self, e: Input) -> Parameter | None:
+        """What stands for the rate of an input; None where the names for it are taken, or it could leave its range."""
+        rate = Parameter(0.0, f"{e.unit}/s", f"rate of {e.name}")
+        rate.name = f"{e.name}_rate"
+        is_taken = any(one.name in (rate.name, f"{e.name}_base") for one in self.declared)
+        return None if is_taken or any(map(isfinite, (e.low, e.high, e.above, e.below))) else rate
+
+    def _stays_closed(self, e: Input) -> bool:
+        """Whether what is known in closed form stays so while an input changes: a release, and the motion."""
+        others = (TIME, *self.drives, *self.inputs)
+        if self.waits:
+            (c,) = self.contacts
+            if depends(self.hold[c], (e,)) or depends(derivative(self.load[c], {e: 1.0}), others):
+                return False
+        if not self.closed_form:
+            return True
+        constants = (*self.closed_form, *(c.slide for c in self.contacts))
+        acts = derivative(self.law[self.own[0]].means, {e: 1.0})
+        return not any(depends(one, (e,)) for one in constants) and not depends(acts, (*self.moving, *self.inputs))
 
     # ---- what the runtime asks
 

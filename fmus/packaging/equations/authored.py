@@ -33,6 +33,7 @@ class Authored:
 
     path: Path
     source: str
+    ramps: bool = False  # whether its inputs may have rates
 
     @property
     def name(self) -> str:
@@ -47,7 +48,7 @@ class Authored:
     def anatomy(self) -> Anatomy:
         """The model, judged."""
         try:
-            found = Anatomy(self._model())
+            found = Anatomy(self._model(), self.ramps)
             judge_units(found)
             return found
         except Mistake as mistake:

@@ -145,6 +145,7 @@ def follow_law(f: Frame, s: Scribe) -> None:
 def slip_terms(f: Frame) -> str:
     s = f.scribe()
     sizes = place_sizes(f, s, [size(c.slip) for c in f.an.contacts])
+    f.place_drive(s, sizes)
     return method("slip_terms", ["t", *f.states], returned(s, sizes))
 
 

@@ -58,7 +58,11 @@ class Frame:
         return Scribe(given, self.constants, self.taken, depth)
 
     def place_drive(self, s: Scribe, targets: Sequence[Operand]) -> None:
-        """Where the driver is, if that is needed."""
+        """Where the driver is, and what an input that has a rate is, if that is needed."""
+        for e, rate in self.an.ramps.items():
+            if e not in s.given and any(depends(one, (e,)) for one in targets):
+                s.given[e] = e.name
+                s.say(f"{e.name} = self.{e.name}_base + self.{rate.name} * (t - self.t_base)")
         if self.drive is not None and any(depends(e, (self.drive,)) for e in targets):
             s.given[self.drive] = self.drive.name
             s.say(f"{self.drive.name} = self.x_base + self.{self.drive.steady.name} * (t - self.t_base)")

@@ -16,7 +16,7 @@ def friction(f: Frame) -> list[str]:
 def hold(f: Frame, c: Contact) -> str:
     """The load on the body at rest, its rate, and the most that is held."""
     an = f.an
-    rate = derivative(an.load[c], an.by_time | {x: an.rate[x] for x in an.positions})
+    rate = derivative(an.load[c], an.by_time | an.ramps | {x: an.rate[x] for x in an.positions})
     wanted = [an.load[c], put(rate, {c.slip: 0.0}), an.hold[c]]
     return method("hold", ["t", *f.states], f.returning(f.scribe(), wanted))
 
@@ -25,6 +25,7 @@ def terms(f: Frame, c: Contact) -> str:
     """The sum of the sizes of what the load is made of."""
     s = f.scribe()
     (sizes,) = place_sizes(f, s, [size(f.an.load[c])])
+    f.place_drive(s, [sizes])
     s.count(sizes)
     s.say(f"return {s.text(sizes)}")
     return method("terms", ["t", *f.states], s.lines)

@@ -40,7 +40,7 @@ def rates(f: Frame) -> str:
 def jacobian(f: Frame) -> str:
     """For each of these rates its derivatives by time and by each state."""
     an, s, c = f.an, f.scribe(), f.alone
-    ways: list[dict[Expression, Operand]] = [an.by_time, *({state: 1.0} for state in an.states)]
+    ways: list[dict[Expression, Operand]] = [an.by_time | an.ramps, *({state: 1.0} for state in an.states)]
     if c is None and an.contacts:
         return method("jacobian", f.point, slopes(f, s, ways))
     if c is None:
@@ -94,7 +94,12 @@ def push(f: Frame) -> list[str]:
     targets = targets if f.alone is None else sliding_now(f.alone, targets)
     at_zero = dict.fromkeys(f.an.states, 0.0)
     piece = method("piece", (), f.returning(f.scribe(), f.an.closed_form))
-    return [piece, method("push", ["t", *f.modes], f.returning(f.scribe(), [put(e, at_zero) for e in targets]))]
+    ramp = method("ramp", (), f.returning(f.scribe(), [derivative(f.laws[0].means, f.an.ramps)]))
+    return [
+        piece,
+        *[ramp] * bool(f.an.ramps),
+        method("push", ["t", *f.modes], f.returning(f.scribe(), [put(e, at_zero) for e in targets])),
+    ]
 
 
 def sliding_now(c: Contact, targets: list[Operand]) -> list[Operand]:

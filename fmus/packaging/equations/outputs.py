@@ -8,7 +8,7 @@ from .friction import under_the_law
 
 def observe(f: Frame) -> str:
     an, s = f.an, f.scribe()
-    f.place_drive(s, an.drives)
+    f.place_drive(s, [*an.drives, *an.ramps])
     s.count(*an.outputs, *an.outputs)
     s.count(*an.load.values(), *an.load.values(), *(c.slide for c in an.contacts))
     if f.alone is not None:
@@ -18,7 +18,7 @@ def observe(f: Frame) -> str:
     for e in an.outputs:
         if isinstance(e.means, Term):
             s.hold(e)
-    for e in (*an.states, *an.drives, *an.outputs, *an.contacts, *an.modes):
+    for e in (*an.ramps, *an.states, *an.drives, *an.outputs, *an.contacts, *an.modes):
         s.say(f"self.{e.name} = {s.text(e)}")
     sizes = (s.text(e) if e.low >= 0.0 else f"fabs({s.text(e)})" for e in an.first_to_overflow)
     s.say(f"return {' + '.join(sizes)} < inf")

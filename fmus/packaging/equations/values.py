@@ -9,7 +9,7 @@ from .scribe import INDENT
 
 def values(f: Frame) -> list[str]:
     """All of them."""
-    return [init(f), initial(f), prepare(f), *finest(f), *drive(f)]
+    return [init(f), initial(f), prepare(f), *finest(f), *drive(f), *rebase(f)]
 
 
 def init(f: Frame) -> str:
@@ -17,6 +17,8 @@ def init(f: Frame) -> str:
     lines = ["super().__init__()", "self.solver = Solver()"]
     if f.drive is not None:
         lines.append("self.t_base = self.x_base = 0.0")
+    for e, rate in f.an.ramps.items():
+        lines.append(f"self.t_base = self.{e.name}_base = self.{rate.name} = 0.0")
     if f.constants:
         lines.append(" = ".join(f"self.{e.name}" for e in f.constants) + " = 0.0")
     return method("__init__", (), [2 * INDENT + line for line in lines])
@@ -27,6 +29,8 @@ def initial(f: Frame) -> str:
     s = f.scribe()
     if f.drive is not None:
         s.say("self.t_base, self.x_base = t, 0.0")
+    elif f.an.ramps:
+        s.say("self.t_base = t")
     return method("initial", ["t"], f.returning(s, [state.begins for state in f.an.states]))
 
 
@@ -35,6 +39,8 @@ def prepare(f: Frame) -> str:
     s, dry = f.scribe(), bool(f.an.contacts)
     done: list[Term] = []
     s.kept = done
+    for e in f.an.ramps:
+        s.say(f"self.{e.name}_base = self.{e.name}")
     s.count(*f.constants, *(rule.broken for rule in f.an.rules))
 
     def calculate(needed: set[int] | None = None) -> None:
@@ -61,3 +67,15 @@ def finest(f: Frame) -> list[str]:
 def drive(f: Frame) -> list[str]:
     """The speed of the driver."""
     return [] if f.drive is None else [method("drive", (), f.returning(f.scribe(), [f.drive.steady]))]
+
+
+def rebase(f: Frame) -> list[str]:
+    """Fix at time t what goes on by itself, where inputs have rates; prepare() takes them over."""
+    if not f.an.ramps:
+        return []
+    s = f.scribe()
+    for e, rate in f.an.ramps.items():
+        s.say(f"self.{e.name} = self.{e.name}_base + self.{rate.name} * (t - self.t_base)")
+    s.say("super().rebase(t)")
+    s.say("self.t_base = t")
+    return [method("rebase", ["t"], s.lines)]

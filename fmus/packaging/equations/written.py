@@ -124,7 +124,11 @@ def facts(an: Anatomy) -> list[str]:
     if an.contacts:
         slips = ", ".join(f"{quoted(c.mode.name)}: {quoted(c.slip.name if an.waits else '')}" for c in an.contacts)
         lines.append(f"contacts = {{{slips}}}")
-    lines += [f"{word} = True" for word, holds in (("linear", an.closed_form), ("driven", an.drives)) if holds]
+    lines += [
+        f"{word} = True"
+        for word, holds in (("linear", an.closed_form), ("driven", an.drives), ("ramps", an.ramps))
+        if holds
+    ]
     for word in RUN:
         if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
             lines.append(f"{word} = {value!r}")

@@ -170,6 +170,37 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s,
     return fmi2OK;
 }
 
+/* From the present point on the inputs change at these rates, each until it is set anew. */
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
+                                       const fmi2Integer order[], const fmi2Real value[])
+{
+    ENTER(component, NEW | 1 << INITIALISING | STEPPING);
+    State *state = &it->state;
+    const char *word = "an input without a range, a finite number";
+    bool fault = false;
+    if (nvr && (!vr || !order || !value)) return refuse(it, NO_ADDRESS, __func__, "vr, order or value");
+    for (size_t i = 0; i < nvr; i++) {
+        bool has_one = vr[i] < VARIABLES && variables[vr[i]].rate != NO_SLOPE;
+        if (has_one && order[i] == 1 && isfinite(value[i])) continue;
+        return refuse_call(it, NO_RATE, &(Call){.function = __func__, .word = word, .reference = vr[i]});
+    }
+    for (size_t i = 0; i < nvr && !fault; i++) {
+        double *rate = rate_of(state, &variables[vr[i]]);
+        if (*rate == value[i]) continue;
+        rules_change(&state->run, &state->model, &fault);
+        *rate = value[i];
+        state->run.observed = false;
+    }
+    return judged_by(it, OK, fault, NAN, NAN);
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
+                                        const fmi2Integer order[], fmi2Real value[])
+{
+    ENTER(component, STEPPING | 1 << TERMINATED);
+    return read_rates(it, vr, nvr, order, value, __func__);
+}
+
 /* ---- model exchange */
 
 fmi2Status fmi2EnterEventMode(fmi2Component component)
@@ -291,22 +322,6 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte seria
 }
 
 /* ---- what this FMU does not offer, as its description says */
-
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
-                                       const fmi2Integer order[], const fmi2Real value[])
-{
-    ENTER(component, ANY);
-    (void)vr, (void)nvr, (void)order, (void)value;
-    return refuse(it, NOT_OFFERED, __func__, "");
-}
-
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
-                                        const fmi2Integer order[], fmi2Real value[])
-{
-    ENTER(component, ANY);
-    (void)vr, (void)nvr, (void)order, (void)value;
-    return refuse(it, NOT_OFFERED, __func__, "");
-}
 
 fmi2Status fmi2CancelStep(fmi2Component component)
 {

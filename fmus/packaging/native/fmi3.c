@@ -406,6 +406,15 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     return fmi3OK;
 }
 
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueReference valueReferences[],
+                                    size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[],
+                                    size_t nValues)
+{
+    ENTER(instance, STEPPING | 1 << EVENT | 1 << INTERMEDIATE | 1 << TERMINATED);
+    ONE_EACH;
+    return read_rates(it, valueReferences, nValueReferences, orders, values, __func__);
+}
+
 /* ---- state */
 
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
@@ -477,8 +486,6 @@ NOT_OFFERED_HERE(fmi3GetNumberOfVariableDependencies, fmi3ValueReference valueRe
 NOT_OFFERED_HERE(fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t elementIndicesOfDependent[],
                  fmi3ValueReference independents[], size_t elementIndicesOfIndependents[],
                  fmi3DependencyKind dependencyKinds[], size_t nDependencies)
-NOT_OFFERED_HERE(fmi3GetOutputDerivatives, References valueReferences, size_t nValueReferences,
-                 const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
 NOT_OFFERED_HERE(fmi3GetIntervalDecimal, References valueReferences, size_t nValueReferences, fmi3Float64 intervals[],
                  fmi3IntervalQualifier qualifiers[])
 NOT_OFFERED_HERE(fmi3GetIntervalFraction, References valueReferences, size_t nValueReferences, fmi3UInt64 counters[],

@@ -9,6 +9,7 @@ model.png                                 the icon; FMI 3.0: terminalsAndIcons/,
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from xml.etree.ElementTree import SubElement, fromstring
@@ -33,7 +34,8 @@ USE = """\
 <p>In model exchange the importer's solver takes the place of ours, and <code>solver.*</code> says nothing; where
 friction is dry, the mode changes at events, which the importer finds by <code>events.to_rest</code> and
 <code>events.to_break_away</code>. In FMI 3.0 co-simulation, too, it may handle events itself: a step returns early at
-stick and slip.</p>
+stick and slip.  FMI 2.0 co-simulation takes rates of inputs (derivatives of order 1), FMUs of both versions tell those
+of outputs.</p>
 """
 
 
@@ -55,7 +57,7 @@ def build(
         if platform not in PLATFORMS:
             raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
     date = build_date()
-    source = find(model)
+    source = replace(find(model), ramps=fmi == "2")  # FMI 3.0 has no derivatives of inputs
     name, cls = source.name, written(source, offer(source.model, source.name, methods, laws))
     files, description = frozen(cls, name, date, fmi)
     declared = declared_by(cls)

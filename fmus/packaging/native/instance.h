@@ -185,6 +185,12 @@ static Status ready(Instance *it, const Type *type, const uint32_t vr[], size_t 
     return DISCARDED;
 }
 
+/* The rate of an input that has one. */
+static double *rate_of(State *state, const Variable *variable)
+{
+    return (double *)((char *)&state->model + variable->rate);
+}
+
 /* Take over a value, or remember that it cannot be used.  False after a fault. */
 static bool write_one(Instance *it, uint32_t reference, double value)
 {
@@ -192,7 +198,8 @@ static bool write_one(Instance *it, uint32_t reference, double value)
     const Variable *variable = &variables[reference];
     Refusal *refusal = &state->refused[reference];
     bool allowed = accepts(variable, value), fault = false;
-    if (value == value_of(&state->model, variable) && refusal->reason == OK) return true;
+    bool stays = variable->rate == NO_SLOPE || *rate_of(state, variable) == 0.0;
+    if (stays && value == value_of(&state->model, variable) && refusal->reason == OK) return true;
     state->run.observed = false;
     state->run.refused -= refusal->reason != OK;
     refusal->reason = rules_reason(&state->run, variable->is_calculated, variable->is_fixed, allowed, &fault);
@@ -378,6 +385,33 @@ static Status follow(Instance *it, struct Tangent *to)
     if (status != OK && state->run.phase >= RUNNING) return give_up(it, status, NAN, NAN);
     if (status == OK && !fault) along(&state->model, to, &fault);
     return status == OK && !fault ? DONE : DISCARDED;
+}
+
+/* The rates of outputs at the present point: what follows along the motion. */
+static Status read_rates(Instance *it, const uint32_t vr[], size_t n, const int32_t order[], double value[],
+                         const char *function)
+{
+    State *state = &it->state;
+    struct Tangent to = {0};
+    bool fault = false;
+    if (n && (!vr || !order || !value)) return refuse(it, NO_ADDRESS, function, "vr, order or value");
+    for (size_t i = 0; i < n; i++) {
+        bool has_one = vr[i] < VARIABLES && variables[vr[i]].slope != NO_SLOPE && variables[vr[i]].is_calculated;
+        if (has_one && order[i] == 1) continue;
+        return refuse_call(it, NO_RATE, &(Call){.function = function, .word = "an output", .reference = vr[i]});
+    }
+    int64_t status = exchange_ready(&state->run, &state->model, &fault);
+    if (status == OK && !fault) exchange_rates(&state->model, &fault);
+    const double *rate = state->model.exchange.rates;
+    for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
+        if (!variable->moves) continue;
+        double *seed = slope_of(&to, (uint32_t)(variable - variables));
+        if (variable->is_calculated) *seed = *rate++;
+        else if (variable->rate != NO_SLOPE) *seed = *rate_of(state, variable);
+    }
+    if (status == OK && !fault) along(&state->model, &to, &fault);
+    for (size_t i = 0; i < n; i++) value[i] = status == OK && !fault ? *slope_of(&to, vr[i]) : NAN;
+    return judged_by(it, status, fault, NAN, NAN);
 }
 
 static Status directional(Instance *it, const uint32_t unknowns[], size_t n, const uint32_t knowns[], size_t m,

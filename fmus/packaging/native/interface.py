@@ -140,7 +140,9 @@ def header(model: type[Declaring], fmi: str) -> str:
         indicators=len(indicators_of(declared)),
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {literal(kind is BOOL)}}},\n" for path, kind in members),
-        table="".join(_line(name, meaning, slots(declared)) for name, meaning in declared),
+        table="".join(
+            _line(name, meaning, slots(declared), hasattr(thing, f"{name}_rate")) for name, meaning in declared
+        ),
         statuses=_cases(statuses, PLACES) + _cases(broken, own),
         values=_cases(VALUES, PLACES),
         calls=_cases(CALLS, PLACES),
@@ -163,7 +165,7 @@ def _of(name: str) -> str:
     return f"items_of_{name.replace('.', '_')}"
 
 
-def _line(name: str, meaning: Declared, slots: dict[str, str]) -> str:
+def _line(name: str, meaning: Declared, slots: dict[str, str], ramps: bool) -> str:
     """One variable in the table."""
     words = (name, meaning.text, meaning.suffix, meaning.allowed)
     flags = (
@@ -181,6 +183,7 @@ def _line(name: str, meaning: Declared, slots: dict[str, str]) -> str:
         f"offsetof(Model, {place(name)})",
         f"offsetof(struct Tangent, {slots[name]})" if name in slots else "NO_SLOPE",
         *map(literal, flags),
+        f"offsetof(Model, {name}_rate)" if meaning.causality == "input" and ramps else "NO_SLOPE",
         *(literal(float(bound)) for bound in bounds),
         items,
     ]

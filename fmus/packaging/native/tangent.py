@@ -87,7 +87,8 @@ class Writer:
     def __init__(self, thing: Any, declared: Variables) -> None:
         inputs = [name for name, meaning in declared if meaning.causality == "input"]
         drivers = [name for name, meaning in declared if meaning.rate]
-        self.seeds = dict(zip([*inputs, *(["x_base"] * len(drivers))], [*inputs, *drivers], strict=True))
+        self.seeds = {attribute: name for name in inputs for attribute in (name, f"{name}_base")}
+        self.seeds |= dict(zip(["x_base"] * len(drivers), drivers, strict=True))
         self.outputs = {name for name, meaning in declared if is_smooth(meaning)}
         self.floats = set(thing.states)  # local names that have a change
         self.counts = set(thing.contacts)  # and those that have none

@@ -31,7 +31,8 @@ def spec_of(model: type[Declaring], offered: Offer | None, called: str = PLAIN) 
     thing: Any = model()
     dry = bool(thing.contacts)
     closed = thing.linear and (offered is None or offered.closed)
-    flags = {"dry": dry, "waits": thing.waits, "coupled": thing.coupled, "driven": thing.driven, "linear": closed}
+    same = {flag: getattr(thing, flag) for flag in ("waits", "coupled", "driven", "ramps")}
+    flags = {"dry": dry, "linear": closed} | same
     states, contacts = (
         {called.format(name): other and called.format(other) for name, other in pairs.items()}
         for pairs in (thing.states, thing.contacts)

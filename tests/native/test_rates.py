@@ -1,0 +1,315 @@
+"""Native FMUs: inputs that change at a constant rate, and the rates of outputs."""
+
+from dataclasses import replace
+from itertools import pairwise
+from math import asin, atan, inf, nan, pi, sin, tan
+
+import driver
+import fmi3_hosts
+import native_fmus
+import pytest
+from compare import close, identical
+from driver import Refused
+from fmpy import read_model_description
+from models import DOP853, MODELS, ODE23, ODE45, RODAS, outputs, push
+from mpmath import mp
+from ramps import Body
+from scipy.integrate import solve_ivp
+
+from fmus.packaging.catalogue import find
+
+DAMPING = {  # stiffness, damping
+    "none": (157.9, 0.0),
+    "under-critical": (157.9, 2.0),
+    "nearly critical": (100.0, 20.0 - 1e-7),
+    "critical": (100.0, 20.0),
+    "over-critical": (100.0, 60.0),
+    "weak spring": (1e-6, 30.0),
+    "no spring": (0.0, 3.0),
+    "no spring nor damper": (0.0, 0.0),
+}
+PIECES = ((0.0, 0.3, 2.0), (1.0, 2.3, -3.0), (2.5, -2.2, 1.7))  # from a time on a force, and its rate
+HARD = ((0.0, 0.0, 80.0), (2.0, 160.0, -120.0), (5.0, -200.0, 60.0))  # enough to drag the sled
+HELD, SLID = 0.9 * 12.5 * 9.81, 0.6 * 12.5 * 9.81
+POUND, INCH = 0.45359237, 0.0254
+
+_workers, worker, fresh = driver.processes(fmi3_hosts.Worker, "module")  # which runs those of FMI 2.0, too
+
+
+@pytest.fixture(scope="module")
+def fmus():
+    return native_fmus.built()
+
+
+def pushed(fmu, pieces, times, names):
+    """A row of the values of names at each of the times; the input changes in pieces."""
+    rows, left = [], list(pieces)
+    for t, end in pairwise([0.0, *times]):
+        if left and left[0][0] == t:
+            _, value, rate = left.pop(0)
+            fmu.set({"F_ext": value})
+            fmu.ramp("F_ext", rate)
+        fmu.step(t, end - t)
+        rows.append(fmu.get(*names))
+    return rows
+
+
+def followed(body, pieces, times):
+    """The same of the truth: position, speed, time of the last event."""
+    rows, left = [], list(pieces)
+    for t, end in pairwise([0.0, *times]):
+        if left and left[0][0] == t:
+            body.push(*left.pop(0)[1:])
+        rows.append([*map(float, body.go(end)), float(body.events[-1]) if body.events else 0.0])
+    return rows
+
+
+def agree(fmu, body, pieces, stop):
+    times = [stop * n / 20 for n in range(1, 21)]
+    names = ("x", "v", "events.t_last")
+    with mp.workdps(34):
+        close(pushed(fmu, pieces, times, names), followed(body, pieces, times), names, 1e-12)
+    assert fmu.get("events.count") == len(body.events)
+    return len(body.events)
+
+
+@pytest.mark.parametrize("damping", DAMPING)
+def test_a_ramp_is_exact_with_every_damping(launch, damping):
+    k, c = DAMPING[damping]
+    fmu = launch("smd", {"k": k, "c": c, "v0": 0.2}, stop=None)
+    agree(fmu, Body(k=k, c=c, x=0.1, v=0.2), PIECES, 5.0)
+
+
+@pytest.mark.parametrize("damping", DAMPING)
+def test_a_ramp_is_exact_through_stick_and_slip_with_every_damping(launch, damping):
+    k, c = DAMPING[damping]
+    fmu = launch("coulomb", {"k": k, "c": c, "v0": 0.2}, stop=None)
+    assert agree(fmu, Body(k=k, c=c, hold=0.5, slide=0.5, x=0.1, v=0.2), PIECES, 5.0) >= 2
+
+
+@pytest.mark.parametrize(("v_driver", "k"), [(0.034, 742.5), (0.0, 742.5), (0.034, 0.0)])
+def test_a_ramp_breaks_the_sled_away_in_time_behind_its_driver_and_alone(launch, v_driver, k):
+    fmu = launch("stickslip", {"v_driver": v_driver, "k": k}, stop=None)
+    assert agree(fmu, Body(m=12.5, k=k, hold=HELD, slide=SLID, u=v_driver), HARD, 10.0) >= 3
+
+
+# ---- the methods with steps
+
+STEPPING = {"ode23": 1e-8, "ode45": 1e-9, "dop853": 1e-10, "rodas": 1e-8}  # and the tolerances to ask for
+NUMBERS = {"ode23": ODE23, "ode45": ODE45, "dop853": DOP853, "rodas": RODAS}
+
+
+def drag(t, y):
+    """The sled on the curve of the magic formula, pushed with 50 N/s."""
+    x, v = y
+    C = 2.0 - 2.0 * asin(0.6 / 0.9) / pi
+    peak = 2.0 / C
+    E, z = (peak - tan(0.5 * pi / C)) / (peak - atan(peak)), peak * v / 0.01
+    mu = 0.9 * sin(C * atan(z - E * (z - atan(z))))
+    return v, (50.0 * t + 742.5 * (0.034 * t - x)) / 12.5 - mu * 9.81
+
+
+def swing(t, y):
+    """The pendulum while it turns forward, driven with 0.1 N m/s."""
+    theta, omega = y
+    m, a, J, g, arm = 0.46 * POUND, 3.7 * INCH, 1.5 * POUND * INCH**2, 386.0 * INCH, 0.1 * 0.25 * INCH
+    return omega, (0.1 * t - m * g * a * sin(theta) - arm * m * g) / (J + m * a * a)
+
+
+SMOOTH = {"pacejka": (drag, "F_ext", 50.0, {}, 2.0), "pendulum": (swing, "T_ext", 0.1, {"omega0": 12.0}, 0.1)}
+
+
+@pytest.mark.parametrize("method", STEPPING)
+@pytest.mark.parametrize("name", SMOOTH)
+def test_a_ramp_enters_every_method_by_the_time(launch, name, method):
+    rates, force, rate, values, stop = SMOOTH[name]
+    fmu = launch(name, {"solver.method": NUMBERS[method], "solver.rtol": STEPPING[method], **values}, stop=None)
+    start, names = fmu.get(*outputs(name)[:2]), outputs(name)[:2]
+    fmu.ramp(force, rate)
+    fmu.step(0.0, stop)
+    right = solve_ivp(rates, (0.0, stop), start, "LSODA", rtol=1e-11, atol=1e-13).y[:, -1]
+    close([fmu.get(*names)], [right.tolist()], names, 1e-6)
+
+
+@pytest.mark.parametrize("method", STEPPING)
+@pytest.mark.parametrize("name", ["coulomb", "stickslip"])
+def test_every_method_breaks_away_and_comes_to_rest_under_a_ramp(launch, name, method):
+    values = {"solver.method": NUMBERS[method], "solver.rtol": STEPPING[method]}
+    sled, pieces = name == "stickslip", HARD if name == "stickslip" else PIECES
+    fmu = launch(name, values, stop=None)
+    body = Body(m=12.5, k=742.5, hold=HELD, slide=SLID, u=0.034) if sled else Body(k=157.9, hold=0.5, slide=0.5, x=0.1)
+    times, names = [0.25 * n for n in range(1, 25)], ("x", "v", "events.t_last")
+    close(pushed(fmu, pieces, times, names), followed(body, pieces, times), names, 1e-5)
+    assert fmu.get("events.count") == len(body.events) >= 2
+
+
+# ---- an input that changes is as any other
+
+
+@pytest.fixture(params=MODELS)
+def ramped(request, launch):
+    """An instance whose input ramps, the names of its input and outputs, and how fast."""
+    name = request.param
+    force, size = push(name)
+    fmu = launch(name, stop=None)
+    fmu.set({force: 0.25 * size})
+    fmu.ramp(force, 0.5 * size)
+    return name, fmu, force, outputs(name), size
+
+
+def test_an_input_reads_as_what_it_is_and_its_rate_lasts_until_it_is_set_anew(ramped):
+    _, fmu, force, _names, size = ramped
+    fmu.step(0.0, 0.5)
+    assert fmu.get(force) == 0.5 * size
+    fmu.set({force: 0.25 * size})  # what it once was
+    assert fmu.get(force) == 0.25 * size
+    fmu.step(0.5, 1.0)
+    assert fmu.get(force) == 0.75 * size
+    fmu.ramp(force, 0.0)
+    fmu.step(1.5, 0.5)
+    assert fmu.get(force) == 0.75 * size
+
+
+def test_results_do_not_hang_on_the_grid_nor_on_what_is_told_twice(launch, ramped):
+    name, fmu, force, names, size = ramped
+    other = launch(name, stop=None)
+    other.ramp(force, 0.5 * size)
+    other.set({force: 0.25 * size})
+    for n in range(64):
+        fmu.step(n / 32, 1 / 32)
+        fmu.ramp(force, 0.5 * size)
+        fmu.get(*names, "solver.t_next")
+    other.step(0.0, 2.0)
+    identical([fmu.get(force, *names)], [other.get(force, *names)], [force, *names])
+
+
+def test_a_ramp_is_saved_and_goes_on_bit_for_bit(ramped):
+    _, fmu, force, names, size = ramped
+    fmu.step(0.0, 0.3)
+    state = fmu.save()
+    fmu.step(0.3, 0.7)
+    row = fmu.get(force, *names)
+    for again in state, fmu.deserialize(fmu.serialize(state)):
+        fmu.ramp(force, -size)
+        fmu.step(1.0, 0.1)
+        fmu.restore(again)
+        fmu.step(0.3, 0.7)
+        identical([fmu.get(force, *names)], [row], [force, *names])
+    fmu.reset()
+    fmu.init()
+    fmu.step(0.0, 0.5)
+    assert fmu.get(force) == 0.0
+
+
+def test_a_ramp_may_begin_before_the_run(worker, fmus):
+    rows = []
+    for early in True, False:
+        fmu = worker.instantiate(fmus / "stickslip.fmu")
+        fmu.setup(0.5, None, None)
+        if early:
+            fmu.ramp("F_ext", 90.0)
+        fmu.init()
+        if not early:
+            fmu.ramp("F_ext", 90.0)
+        fmu.step(0.5, 2.0)
+        rows.append(fmu.get("F_ext", *outputs("stickslip")))
+        fmu.free()
+    identical(rows[:1], rows[1:], ["F_ext", *outputs("stickslip")])
+    assert rows[0][0] == 180.0
+
+
+# ---- the rates of outputs
+
+BUILT = {"FMI 2.0": native_fmus.built, "FMI 3.0": fmi3_hosts.built}
+
+
+@pytest.mark.parametrize("version", BUILT)
+@pytest.mark.parametrize("name", MODELS)
+def test_the_rates_of_outputs_are_those_of_differences(worker, name, version):
+    """Central ones of fourth order, in stick and slip; the input ramps where it may."""
+    h, (force, size), names = 1e-3, push(name), [one for one in outputs(name) if one != "mode"]
+    fmu = worker.instantiate(BUILT[version]() / f"{name}.fmu").begin({"solver.rtol": 1e-12})
+    if version == "FMI 2.0":
+        fmu.ramp(force, 0.1 * size)
+    t, found = 0.0, []
+    for middle in (0.1, 0.4, 0.6, 1.0, 2.0):
+        times = [middle + n * h for n in (-2, -1, 0, 1, 2)]
+        a, b, here = fmu.run([t, *times[:3]], names)[1:]
+        rates = fmu.output_rates(names)
+        _, d, (*e, t_last) = fmu.run(times[2:], [*names, "events.t_last"])
+        t = times[-1]
+        if not middle - 3 * h < t_last:  # else an event lies between
+            right = [(w - 8.0 * x + 8.0 * y - z) / (12.0 * h) for w, x, y, z in zip(a, b, d, e, strict=False)]
+            found.append((here, rates, right))
+    assert len(found) >= 3
+    for values, rates, right in zip(*(zip(*rows, strict=True) for rows in zip(*found, strict=True)), strict=True):
+        bound = 1e-5 * max(map(abs, right)) + 1e-8 * (10.0 + max(map(abs, values)))
+        assert rates == pytest.approx(right, rel=0.0, abs=bound)
+    fmu.free()
+
+
+# ---- what is told, and what is refused
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_description_says_what_there_is(fmus, name):
+    two, three = (read_model_description(folder / f"{name}.fmu") for folder in (fmus, fmi3_hosts.built()))
+    assert two.coSimulation.canInterpolateInputs
+    assert [one.coSimulation.maxOutputDerivativeOrder for one in (two, three)] == [1, 1]
+
+
+def test_what_is_no_derivative_of_an_input_is_refused_and_changes_nothing(launch):
+    fmu = launch("smd")
+    fmu.step(0.0, 0.1)
+    row = fmu.get(*outputs("smd"))
+    wrong = [("m", 1.0, 1), ("x", 1.0, 1), ("solver.method", 1.0, 1)]
+    wrong += [("F_ext", value, 1) for value in (nan, inf, -inf)] + [("F_ext", 1.0, order) for order in (0, 2, -1)]
+    for arguments in wrong:
+        with pytest.raises(Refused, match="fmi2SetRealInputDerivatives returned status 3"):
+            fmu.ramp(*arguments)
+        ((_, _, sentence),) = fmu.messages()
+        assert "no such derivative; what it may have is of the order 1, and of an input" in sentence
+    for names, order in ((["x", "m"], 1), (["F_ext"], 1), (["events.count"], 1), (["x"], 0), (["v"], 2)):
+        with pytest.raises(Refused, match="fmi2GetRealOutputDerivatives returned status 3"):
+            fmu.output_rates(names, order)
+        ((_, _, sentence),) = fmu.messages()
+        assert "of an output" in sentence
+    identical([fmu.get(*outputs("smd"))], [row], outputs("smd"))
+    assert fmu.get("F_ext") == 0.0
+    fmu.terminate()
+    assert fmu.output_rates(["x"]) == fmu.get("v", "x")[:1]
+    with pytest.raises(Refused):
+        fmu.ramp("F_ext", 1.0)
+    assert "the FMU is terminated" in fmu.messages()[0][2]
+
+
+def test_a_model_says_which_inputs_may_ramp(tmp_path):
+    """None that has a range, or on which hangs what a contact holds, for its release would have no closed form; a
+    method with steps takes any course of a stiffness."""
+    text = """
+from fmus import Contact, Input, Mode, Model, Output, Parameter, State
+
+
+class Block(Model):
+    "Block that is pressed onto a table."
+
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    l = Parameter(1.0, "m", "a length")
+    F_ext = Input(0.0, "N", "force along the table")
+    F_n = Input(5.0, "N", "force across it")
+    F_near = Input(0.0, "N", "force of a range", low=-1.0, high=1.0)
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F_friction = Contact("N", "friction", mode=mode, slip=v, slide=0.5 * F_n)
+    a = Output("m/s2", "acceleration", (F_ext + F_near - F_friction) / m, rate_of=v)
+"""
+    (tmp_path / "block.py").write_text(text)
+    (tmp_path / "bar.py").write_text(
+        text.replace("slide=0.5 * F_n", "slide=2.0")
+        .replace("F_near -", "F_near - F_n * x / l -")
+        .replace("Block(", "Bar(")
+    )
+    for name, ramps in (("block", ["F_ext"]), ("bar", ["F_ext"])):
+        anatomy = replace(find(tmp_path / f"{name}.py"), ramps=True).anatomy
+        assert [e.name for e in anatomy.ramps] == ramps
