@@ -202,7 +202,9 @@ class Writer:
         body = self.first(node.body[0])
         if any(isinstance(one, ast.Name) and one.id == "each" for one in node.decorator_list):
             self.after = node.lineno - 1
-        if arguments == [one.arg for one in node.args.args] and not (returned(node) or any(map(annotated, node.args.args))):
+        if arguments == [one.arg for one in node.args.args] and not (
+            returned(node) or any(map(annotated, node.args.args))
+        ):
             self.copy(body, node.col_offset - depth)
         else:
             if i:
