@@ -21,7 +21,7 @@ KINDS = {  # the process, the folder of the FMUs, and the types of FMI
     "fmi3": (fmi3_hosts.Worker, fmi3_hosts.built, ("Float64", "Int32", "Int64", "UInt64", "Boolean", "String")),
 }
 SHORT = settings(
-    max_examples=40,
+    max_examples=25,
     stateful_step_count=40,
     derandomize=True,  # the same calls every time
     database=None,

@@ -37,7 +37,6 @@ def machine(request):
     target, _, (emulator, *options) = MACHINES[request.param]
     if not shutil.which(emulator) or (options and not os.path.isdir(ARM)):
         pytest.skip(f"{emulator} is not here: apt-get install wine64 wine qemu-user libc6-arm64-cross")
-    built(request.param)
     out = folder(f"host on {request.param}") / "host.exe"
     command = [
         sys.executable,
@@ -59,7 +58,7 @@ def machine(request):
 def play_there(machine, name, script):
     """As play, there."""
     platform, command = machine
-    fmu = built(platform) / f"{name}.fmu"
+    fmu = built(*MACHINES) / f"{name}.fmu"
     library = unpacked(fmu) / "binaries" / platform / f"{name}{MACHINES[platform][1]}"
     quiet = {"WINEDEBUG": "-all", "WINEPREFIX": str(folder("wine")), "HOME": room().name}
     done = subprocess.run(

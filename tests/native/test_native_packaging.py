@@ -223,11 +223,11 @@ def test_builds_are_the_same_from_another_folder_with_another_cache(tmp_path, sm
 
 
 def test_the_build_date_reaches_the_description_and_the_zip_only(tmp_path):
-    built()
-    for epoch in ("0", "1700000000"):
-        done = run("--native", "smd", "--platform", "linux64", "--out", tmp_path / epoch, SOURCE_DATE_EPOCH=epoch)
-        assert done.returncode == 0, done.stderr
-    first, second = (entries(tmp_path / epoch / "smd.fmu") for epoch in ("0", "1700000000"))
+    """Without one it is 0."""
+    first = entries(built() / "smd.fmu")
+    done = run("--native", "smd", "--platform", "linux64", "--out", tmp_path, SOURCE_DATE_EPOCH="1700000000")
+    assert done.returncode == 0, done.stderr
+    second = entries(tmp_path / "smd.fmu")
     assert [name for name in first if first[name] != second[name]] == ["modelDescription.xml"]
 
 

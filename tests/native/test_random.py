@@ -92,7 +92,7 @@ class Draw:
 
 
 def test_random_programs_do_what_python_does(tmp_path):
-    names = [f"random_{seed}" for seed in range(80)]
+    names = [f"random_{seed}" for seed in range(40)]
     text = "import math\n"
     text += "from tests.native.test_constructs import STEPS, THIRD, Allowed, half\n\n\nclass Random(Allowed):\n"
     (tmp_path / "random_programs.py").write_text(text + "\n".join(Draw(name).method(name) for name in names))

@@ -19,7 +19,7 @@ from models import EXACT, HYBRID, MODELS, declared
 
 KINDS = {"native": (driver.Worker, native_fmus.built), "FMI 3.0": (fmi3_hosts.Worker, fmi3_hosts.built)}
 OFTEN = settings(
-    max_examples=40,
+    max_examples=25,
     stateful_step_count=30,
     derandomize=True,  # the same calls every time
     database=None,

@@ -19,7 +19,9 @@ def needed():
 
 
 @cache
-def built(platform="linux64"):
-    """The folder of the native FMUs for a platform."""
+def built(*platforms):
+    """The folder of the native FMUs for Linux, or for these platforms."""
     needed()
-    return builds.once(platform, "--native", "--platform", platform, timeout=600)
+    platforms = platforms or ("linux64",)
+    words = [word for platform in platforms for word in ("--platform", platform)]
+    return builds.once("-".join(platforms), "--native", *words, timeout=600)

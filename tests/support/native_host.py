@@ -36,13 +36,14 @@ def folder(kind):
 def host(sanitizer=""):
     """The host, as a program."""
     out = folder(sanitizer) / "host"
-    command = [compiler(), *STRICT, "-g", *sanitized(sanitizer), f"-I{HEADERS}", str(SOURCE), "-o", str(out)]
+    command = [compiler(), *STRICT, "-g1", *sanitized(sanitizer), f"-I{HEADERS}", str(SOURCE), "-o", str(out)]
     subprocess.run([*command, "-ldl", "-lpthread"], check=True)
     return out
 
 
 def sanitized(kind):
-    return [f"-fsanitize={kind}", "-fno-sanitize-recover=all", "-O1"] if kind else []  # whose bits nobody compares
+    """Options for sanitizers, if any; nobody compares the bits of these, and to optimise takes longer than to run."""
+    return [f"-fsanitize={kind}", "-fno-sanitize-recover=all", "-O0"] if kind else []
 
 
 @cache
@@ -62,7 +63,7 @@ def guid(fmu):
 def compiled_here(fmu, sanitizer=""):
     """The library from the sources in the FMU, by the system's compiler."""
     out = folder(sanitizer) / f"{fmu.stem}.so"
-    command = [compiler(), *STRICT, *SAME_BITS, *LIBRARY, "-g", *sanitized(sanitizer), "fmi2.c", "-o", str(out), "-lm"]
+    command = [compiler(), *STRICT, *SAME_BITS, *LIBRARY, "-g1", *sanitized(sanitizer), "fmi2.c", "-o", str(out), "-lm"]
     subprocess.run(command, cwd=unpacked(fmu) / "sources", check=True)
     return out
 
