@@ -8,6 +8,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import commands
 import numpy as np
 import pytest
 from builds import ROOT
@@ -497,14 +498,9 @@ def test_of_many_samples_those_are_drawn_that_show_how_far_they_reach(count):
 # ---- the command line
 
 
-def harness(folder, *arguments, text=None):
+def harness(folder, *arguments, text=""):
     """The finished process of the harness in `folder`."""
-    environment = os.environ | {
-        "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
-        "COLUMNS": "120",
-    }
-    command = [sys.executable, "-m", "harness", *map(str, arguments)]
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120, input=text)
+    return commands.harness(folder, *arguments, text=text, COLUMNS="120")
 
 
 def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_path):
