@@ -14,6 +14,7 @@ from builds import ROOT, SUPPORT, build
 from compare import close, identical
 from driver import Refused
 from evidence import Trajectory
+from fmpy import read_model_description
 from models import CASES, MODELS, counts, declared, label, outputs
 
 PYTHONS = ["3.9", "3.10", "3.11", "3.12", "3.13"]
@@ -44,7 +45,9 @@ def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, 
     edited, number = re.subn(r"(\n    k = Parameter\()[^,]+", r"\g<1>900.0", file.read_text())
     assert number == 1
     file.write_text(edited)
-    paths = [fmus / "stickslip.fmu", build(tmp_path, tmp_path / "out", "stickslip") / "stickslip.fmu"]
+    build(tmp_path, tmp_path / "out", "stickslip")
+    paths = [fmus / "stickslip.fmu", tmp_path / "out" / "stickslip.fmu"]
+    assert len({read_model_description(path).guid for path in paths}) == 2
     times = [0.1 * i for i in range(161)]
     for path, k in [*zip(paths, (742.5, 900.0), strict=True)] * 2:
         fmu = worker.instantiate(path).begin(stop=16.0)

@@ -12,17 +12,22 @@ from commands import ROOT, SUPPORT  # noqa: F401 - both are told here as well
 room = Path()  # conftest.py tells where
 
 
-def build(root, out, *words, timeout=120):
-    """Build FMUs from the sources under `root` in a process of their own."""
+def build(root, out, *words, timeout=600):
+    """Build FMUs from the sources under `root` in a process of their own; what it printed."""
     command = [sys.executable, "build_fmus.py", *words, "--out", str(out)]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=timeout)
     assert done.returncode == 0, done.stderr
-    return out
+    return done.stdout
 
 
-def once(name, *words, timeout=120):
-    """The folder `name` of the room, with the FMUs that the build command makes of these words."""
-    return made(name, lambda folder: build(ROOT, folder, *words, timeout=timeout))
+def once(name, *words, timeout=600):
+    """The folder `name` of the room, with the FMUs that the build command makes of these words; beside it, in a file
+    `name`.txt, what it printed."""
+
+    def make(folder):
+        (room / f"{name}.txt").write_text(build(ROOT, folder, *words, timeout=timeout))
+
+    return made(name, make)
 
 
 def of_file(path, *words):
