@@ -71,11 +71,12 @@ def test_a_host_that_holds_the_sources_and_a_pythonfmu_changes_nothing(each):
     assert told["rows"][::2] == [host("in_folder", path, None) for path in each[::2]]
 
 
-@pytest.mark.parametrize("folder", ["with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200])
-def test_a_folder_may_have_any_name(each, folder, tmp_path):
+def test_a_folder_may_have_any_name(each, tmp_path):
     """But one with %20, which the native layer takes for a space."""
-    (tmp_path / folder).parent.mkdir(exist_ok=True)
-    assert host("in_folder", each[0], str(tmp_path / folder)) == host("in_folder", each[0], None)
+    expected = host("in_folder", each[0], None)
+    for folder in ("with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200):
+        (tmp_path / folder).parent.mkdir(exist_ok=True)
+        assert host("in_folder", each[0], str(tmp_path / folder)) == expected, folder
 
 
 def test_a_process_may_end_with_instances_alive(fresh):
