@@ -13,12 +13,12 @@ from math import inf, nan
 
 import pytest
 from driver import Refused, Worker
-from models import HYBRID, MODELS, combinations, declared, label, model_class, parameters, tunable
+from models import HYBRID, MODELS, declared, label, model_class, paired, parameters, tunable
 from native_fmus import built
 
 LIVES, EVENTS = 2, 30  # of every model, law and method; in a life
 BREAKDOWNS = 6  # of every model, law and method
-CASES = [(name, values, model_class(name).stop_time) for name in MODELS for values in combinations(name)]
+CASES = [(name, values, 0.0) for name in MODELS for values in paired(name)]
 
 
 @pytest.fixture(scope="module")
