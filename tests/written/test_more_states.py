@@ -11,6 +11,7 @@ import pytest
 from arrays import array_steps, begun, bits, spelled, start, written_steps
 from by_hand import BY_HAND, followed
 from models import DOP853, LARGER, ODE23, ODE45, RODAS
+from native_fmus import room
 from native_host import compiler
 from scipy.integrate import solve_ivp
 
@@ -113,12 +114,14 @@ def take(model):
     return model.solver.step.take(model)
 
 
-@EVERY_METHOD
-@pytest.mark.parametrize("name", STOPS)
-def test_c_does_what_the_scalars_do_to_the_last_bit(tmp_path, name, method):
-    file, stop = FILES[name], STOPS[name]
-    values = {"solver.method": method, "solver.rtol": 1e-5}
-    one = begun(written(file)(), values, stop)
+def ready(name, method):
+    return begun(written(FILES[name])(), {"solver.method": method, "solver.rtol": 1e-5}, STOPS[name])
+
+
+@cache
+def frozen(name):
+    """The library of a model, ready to run by any method."""
+    one, folder = ready(name, DOP853), Path(room().name)
     program = Program(one)
     program.entry("begin", {2: begin_2, 3: begin_3, 4: begin_4}[len(one.states)], FLOAT, FLOAT)
     program.entry("take", take)
@@ -126,8 +129,17 @@ def test_c_does_what_the_scalars_do_to_the_last_bit(tmp_path, name, method):
     told = "".join(f"    *out++ = it.solver.step.{name};\n" for name in ("t1", *names))
     text = f"""#include "numerics.h"
 {program.text()}
-static struct {type(one).__name__} it = {program.layout.image(one)};
-int begun(double stop) {{ bool fault = false; begin(&it, stop, 1e-6, &fault); return fault; }}
+static const struct {type(one).__name__} images[] = {{
+    {", ".join(program.layout.image(ready(name, method)) for method in RTOL)}
+}};
+static struct {type(one).__name__} it;
+int begun(int place, double stop)
+{{
+    bool fault = false;
+    it = images[place];
+    begin(&it, stop, 1e-6, &fault);
+    return fault;
+}}
 int taken(double *out)
 {{
     bool fault = false;
@@ -135,12 +147,19 @@ int taken(double *out)
 {told}    return fault || status;
 }}
 """
-    (tmp_path / "frozen.c").write_text(text)
+    (folder / f"{name}.c").write_text(text)
     command = [compiler(), *STRICT, *SAME_BITS, "-Wno-unused-function", "-shared", "-fPIC"]
     command.append(f"-I{Path(native.__file__).parent}")
-    subprocess.run([*command, "frozen.c", "-o", "frozen.so", "-lm"], cwd=tmp_path, check=True)
-    library, out = ctypes.CDLL(str(tmp_path / "frozen.so")), (ctypes.c_double * (1 + len(names)))()
-    assert library.begun(ctypes.c_double(stop)) == 0
+    subprocess.run([*command, f"{name}.c", "-o", f"{name}.so", "-lm"], cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / f"{name}.so"))
+
+
+@EVERY_METHOD
+@pytest.mark.parametrize("name", STOPS)
+def test_c_does_what_the_scalars_do_to_the_last_bit(name, method):
+    library, one, stop = frozen(name), ready(name, method), STOPS[name]
+    out = (ctypes.c_double * (1 + len(one.states)))()
+    assert library.begun([*RTOL].index(method), ctypes.c_double(stop)) == 0
     start(one, one.initial(0.0), stop)
     step = one.solver.step
     while step.t1 < stop:
