@@ -9,6 +9,7 @@ import threading
 import time
 from contextlib import suppress
 from functools import partial
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -37,8 +38,9 @@ def logging_goes_on():
     logging.disable(logging.NOTSET)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("command", "number"), [*product(COMMANDS, [signal.SIGINT]), ("run", signal.SIGTERM), ("sweep", signal.SIGTERM)]
+)
 def test_a_signal_ends_a_command_and_leaves_nothing_of_it(place, tmp_path, command, number):
     """To the whole group, as a terminal sends it."""
     (tmp_path / "temporary").mkdir()
