@@ -197,28 +197,16 @@ def check_signature(library, place):
 
 
 def test_builds_are_the_same_from_another_folder_with_another_cache(tmp_path, smd):
-    """Not for win64, whose C runtime takes a new cache minutes to compile."""
+    """Of all that is ours; what the compiler brings, as the C runtime of Windows, takes minutes."""
     source = tmp_path / "another place"
-    shutil.copytree(ROOT / "fmus", source / "fmus")
+    shutil.copytree(ROOT / "fmus", source / "fmus", ignore=shutil.ignore_patterns("*.fmu", "__pycache__"))
     for part in ("build_fmus.py", "LICENSE"):
         shutil.copy(ROOT / part, source)
-    done = run(
-        "--native",
-        "smd",
-        "--platform",
-        "linux64",
-        "--platform",
-        "darwin64",
-        "--out",
-        "out",
-        cwd=source,
-        ZIG_GLOBAL_CACHE_DIR=str(tmp_path / "cache"),
-        ZIG_LOCAL_CACHE_DIR=str(tmp_path / "local"),
-    )
+    done = run("--native", "smd", "--out", "out", cwd=source, ZIG_LOCAL_CACHE_DIR=str(tmp_path / "local"))
     assert done.returncode == 0, done.stderr
     expected = entries(smd[0])
     again = entries(source / "out" / "smd.fmu")
-    assert "binaries/darwin64/smd.dylib" in again
+    assert {f"binaries/{platform}/smd{PLATFORMS[platform].suffix}" for platform in USUAL} <= set(again)
     assert again == {name: expected[name] for name in again}
 
 
