@@ -17,16 +17,7 @@ IMPORTS = {  # module -> what may be needed of it
     "oscillator": ("Oscillator",),
 }
 ATTRIBUTES = ("friction", "solver", "events", "exact", "exchange", "x_base", "t_base", "time", "method")
-METHODS = (
-    "initial",
-    "rates",
-    "jacobian",
-    "push",
-    "piece",
-    "hold",
-    "terms",
-    "observe",
-)  # beside those that are inherited
+METHODS = ("initial", "rates", "jacobian", "push", "piece", "hold", "terms", "observe")  # beside those inherited
 COUPLED_METHODS = ("slips", "slip_terms", "forces", "changes", "struck")
 CLASSES = ("Solver", "Model", "Fmi3Slave")
 RESERVED = {

@@ -14,17 +14,8 @@ from .text import Line
 
 DOTTED = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
 HOSTS = (
-    "boundary",
-    "declare",
-    "exchange",
-    "failure",
-    "hosted",
-    "leaps",
-    "rules",
-    "sentences",
-    "slave",
-    "state",
-    "values",
+    *("boundary", "declare", "exchange", "failure", "hosted", "leaps"),
+    *("rules", "sentences", "slave", "state", "values"),
 )
 CALLED_BY_NAME = {f"runtime/{name}.py" for name in HOSTS}  # by a layer of FMI
 Files = dict[str, list[Line]]
