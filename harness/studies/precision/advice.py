@@ -85,4 +85,4 @@ def power(value: float) -> str:
 
 def series(words: list[str]) -> str:
     """Words in a row."""
-    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
+    return " and ".join(filter(None, (", ".join(words[:-1]), *words[-1:])))
