@@ -32,7 +32,7 @@ def run(
 ) -> None:
     """Run a SCENE, an FMU of any origin, or once more what made a folder of results.
 
-    SCENE is a shipped name (see list), the path of a TOML file, or a folder of results.
+    SCENE is a shipped name (see list), the path of a TOML file, a folder of results, or a model that has no scene.
 
     An FMU that does not show its solver's steps is run with ever shorter communication steps, until halving them
     changes no output by more than the tolerance.
@@ -44,18 +44,23 @@ def run(
       python -m harness run results/pendulum
       python -m harness run --fmu theirs.fmu --set mass=2 --stop 10 --tolerance 1e-4
     """
+    from ..scenes.fmus import fmu_of, known
+    from ..scenes.scene import again, load, shipped
+
+    scenes = [file.stem for file in shipped()]
+    if fmu is None and scene in known() - {*scenes} and not Path(scene).exists():
+        fmu, scene = fmu_of(scene), None
     if fmu is not None and scene is None:
         run_any(fmu, values, how, out, quiet, as_json)
         return
     if scene is None or fmu is not None or values or how["stop"] is not None:
         raise click.UsageError("name one SCENE, or --fmu PATH; --set and --stop go with --fmu")
     from ..results.provenance import trusted
-    from ..scenes.scene import again, load, shipped
     from ..studies.run import job
     from ..studies.run.table import comparison
 
     place = Path(scene)
-    if place.is_dir() and scene not in [file.stem for file in shipped()]:
+    if place.is_dir() and scene not in scenes:
         told = trusted(place)
         if not (place / job.FILES[0]).is_file() or "title" not in (told["scene"] or {}):
             repeat(context, told["command"])

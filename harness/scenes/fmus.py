@@ -4,20 +4,23 @@ from pathlib import Path
 
 from ..errors import HarnessError, SceneError, unknown
 
+FOLDERS = (Path("fmus"), Path(__file__).parents[2] / "fmus")
+
 
 def fmu_of(name: str) -> Path:
     """Where the FMU of a model is, or will be once it is built; a model is named, or is a file that lies anywhere."""
     if (path := Path(name)).suffix in (".py", ".fmu"):
         return path.with_suffix(".fmu")
-    folders = (Path("fmus"), Path(__file__).parents[2] / "fmus")
-    files = [file for folder in folders for file in folder.glob("*.fmu")]
-    sources = [file for folder in folders for file in folder.glob("[!_]*.py")]
-    names = {file.stem for file in files + sources}
-    if not names:
+    if not (names := known()):
         raise SceneError("there are no models here: run from the folder of the project, or name fmu = 'a/file.fmu'")
     if name not in names:
         raise SceneError(unknown("model", name, names))
-    return next((file for file in files if file.stem == name), Path("fmus") / f"{name}.fmu")
+    return next((file for folder in FOLDERS for file in folder.glob(f"{name}.fmu")), Path("fmus") / f"{name}.fmu")
+
+
+def known() -> set[str]:
+    """The names of the models here, built or not."""
+    return {file.stem for folder in FOLDERS for ending in ("*.fmu", "[!_]*.py") for file in folder.glob(ending)}
 
 
 def check_built(fmu: Path, error: type[HarnessError] = HarnessError) -> None:

@@ -6,7 +6,8 @@ Tools that are not installed are skipped with the reason; they are in the extra 
 import fmi3_hosts
 import native_fmus
 import pytest
-from models import MODELS
+from builds import of_file
+from models import AUTHORED, LARGER, MODELS
 
 from harness.errors import HarnessError
 from harness.studies.importers import table
@@ -28,12 +29,27 @@ def test_the_importer_passes(rows, importer, check):
         pytest.skip(mine[0].reason)
     (row,) = [row for row in mine if row.check == check]
     assert row.failed == ()
-    assert len(row.cells) == len(MODELS)
+    unfit = [row for row in rows if row.importer.endswith(".fmu")]
+    assert len(row.cells) + len(unfit) == len(MODELS)
 
 
 def test_the_table_lists_every_model_and_names_the_tools_that_are_not_there(rows):
-    assert list(table.models(rows)) == MODELS
+    unfit = [row.importer.removesuffix(".fmu") for row in rows if row.importer.endswith(".fmu")]
+    assert sorted([*table.models(rows), *unfit]) == MODELS
     assert {row.importer for row in rows if row.reason} >= set(ELSEWHERE)
+
+
+def test_an_fmu_that_the_checks_cannot_be_made_with_is_left_out_with_the_reason(tmp_path, monkeypatch):
+    """A brake has no mass m; the others are asked about, if there are any."""
+    monkeypatch.setattr(table, "IMPORTERS", ())
+    path = next(path for path in AUTHORED if path.stem == "rotor_brake")
+    (tmp_path / "rotor_brake.fmu").symlink_to(of_file(path) / "rotor_brake.fmu")
+    with pytest.raises(HarnessError, match="the checks want a mass m, an input, and an output of its unit"):
+        table.rows(tmp_path, print)
+    path = next(path for path in LARGER if path.stem == "belt")
+    (tmp_path / "belt.fmu").symlink_to(of_file(path) / "belt.fmu")
+    first, *_ = table.rows(tmp_path, print)
+    assert (first.importer, first.reason.split(",")[0]) == ("rotor_brake.fmu", "the checks want a mass m")
 
 
 def test_a_tool_that_is_not_asked_is_named_with_the_reason():

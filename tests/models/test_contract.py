@@ -62,7 +62,8 @@ def starts(name, wanted):
 
 
 def test_there_are_the_five_models():
-    assert sorted(MODELS) == sorted(TUNABLE)
+    """A sixth has a contract of its own."""
+    assert {*TUNABLE} <= {*MODELS}
 
 
 @pytest.mark.parametrize("name", TUNABLE)
@@ -79,7 +80,7 @@ def test_outputs_have_their_names(name):
     assert [v for v, d in declared(name).items() if isinstance(d, Output)] == OUTPUTS[name].split()
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", TUNABLE)
 def test_the_solver_has_its_settings_and_counts(name):
     settings = {v: d.start for v, d in declared(name).items() if v.startswith("solver.") and isinstance(d, Parameter)}
     default = {"pacejka": "rodas", "pendulum": "dop853"}.get(name, "exact")
@@ -92,7 +93,7 @@ def test_the_solver_has_its_settings_and_counts(name):
 
 
 def test_the_laws_offered_are_those_of_each_model():
-    laws = {name: declared(name)["friction"] for name in MODELS if "friction" in declared(name)}
+    laws = {name: declared(name)["friction"] for name in TUNABLE if "friction" in declared(name)}
     offered = {name: [item[:2] for item in law.items] for name, law in laws.items()}
     both = [("hybrid", 1), ("sign", 2)]
     assert offered == {"coulomb": both, "pendulum": both, "stickslip": [("hybrid", 1), ("threshold", 3)]}
@@ -100,7 +101,7 @@ def test_the_laws_offered_are_those_of_each_model():
     assert [item[:2] for item in declared("pendulum")["pin_load"].items] == [("weight", 1), ("reaction", 2)]
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", TUNABLE)
 def test_units_are_those_of_the_quantities(name):
     special = {"a": "m" if name == "pendulum" else "m/s2", "solver.atol": declared(name)["solver.atol"].unit}
     for v, d in declared(name).items():
@@ -111,7 +112,7 @@ def test_units_are_those_of_the_quantities(name):
             assert d.display.startswith("deg")
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", TUNABLE)
 def test_masses_are_above_zero_and_nothing_else_starts_out_of_range(name):
     assert declared(name)["m"].above == 0.0
     assert not declared(name)["m"].accepts(0.0)
@@ -139,7 +140,7 @@ def test_a_declaration_says_what_it_allows():
     assert not Sample.kind.accepts(3)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", TUNABLE)
 def test_a_rate_says_whose_it_is_so_that_a_motion_is_found_by_its_roles(fmus, name):
     variables = {v.name: v for v in read_model_description(fmus / f"{name}.fmu").modelVariables}
     whose = {v.name: v.derivative.name for v in variables.values() if v.derivative is not None}

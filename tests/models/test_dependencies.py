@@ -61,7 +61,7 @@ def situation(name, known, draw):
     """A value for each of the known; half of them of a body at rest that is about to break away, or just has."""
     values = {v: some(name, v, draw) for v in known}
     model, (x, v, *_), (entry, _) = model_class(name)(), outputs(name), push(name)
-    if model.dry and draw.random() < 0.5:
+    if model.waits and f"{v}0" in values and draw.random() < 0.5:
         values[f"{v}0"] = 0.0
         for variable in (each for each in values if "." not in each):
             setattr(model, variable, values[variable])

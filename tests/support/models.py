@@ -4,6 +4,7 @@ from functools import cache
 from itertools import combinations as choose
 from itertools import product
 
+import pytest
 from builds import ROOT
 
 from fmus.packaging.catalogue import load
@@ -11,6 +12,7 @@ from fmus.packaging.written import beside, written
 from fmus.runtime.declare import Choice, Input, Output, Parameter, variables
 
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
+BODIES = [name for name in MODELS if len(load(name)().states) == 2]  # position and speed are all their states
 AUTHORED = sorted((ROOT / "tests" / "authored").glob("*.py"))  # as users write them, in files of their own
 LARGER = sorted((ROOT / "tests" / "authored" / "larger").glob("*.py"))  # of more states, or more contacts
 EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
@@ -102,7 +104,10 @@ def counts(name):
 
 def push(name):
     """The input of a model, and a size that overcomes its friction."""
-    return ("T_ext", 0.02) if name == "pendulum" else ("F_ext", 200.0)
+    entry = next((v for v, d in declared(name).items() if isinstance(d, Input)), None)
+    if entry is None:
+        pytest.skip(f"{name} has no input")
+    return entry, {"pendulum": 0.02}.get(name, 200.0)
 
 
 def growing(folder):

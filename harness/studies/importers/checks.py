@@ -129,6 +129,10 @@ class Subject:
     change: dict[str, float]  # a tunable and its new value in mid-run
 
 
+class Unfit(HarnessError):
+    """An FMU that the checks cannot be made with."""
+
+
 def subject(fmu: Path) -> Subject:
     """Read the description of an FMU of this project."""
     if not fmu.is_file():
@@ -141,7 +145,7 @@ def subject(fmu: Path) -> Subject:
     entry = next((name for name, v in reals.items() if v.causality == "input"), "")
     source = next((name for name in outputs if entry and reals[name].unit == reals[entry].unit), "")
     if not source or "m" not in reals:
-        raise HarnessError(f"{fmu}: the checks want a mass m, an input, and an output of its unit; move it elsewhere")
+        raise Unfit("the checks want a mass m, an input, and an output of its unit")
     change = {name: FACTOR * float(v.start) for name, v in reals.items() if name in ("k", "r")}
     basis = Request(
         fmu=str(fmu.resolve()),

@@ -13,7 +13,7 @@ from ...results.files import write_rows
 from ...results.folder import replacing
 from ...results.provenance import named, of_each, record
 from ...running.description import parameters
-from .checks import CHECKS, ELSEWHERE, IMPORTERS, Importer, Subject, Wrong, absent, play, subject
+from .checks import CHECKS, ELSEWHERE, IMPORTERS, Importer, Subject, Unfit, Wrong, absent, play, subject
 
 WORKERS = 2
 FOLDER, FILES = "importers", ("importers.csv",)
@@ -43,8 +43,15 @@ def perform(fmus: Path, out: Path, report: Callable[[str, float], None]) -> list
 
 def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
     """Ask every importer everything about the FMUs in a folder; `report` is told the importer and the share done."""
-    subjects = [subject(fmu) for fmu in fmus(folder)]
+    subjects: list[Subject] = []
     found: list[Checked] = []
+    for fmu in fmus(folder):
+        try:
+            subjects.append(subject(fmu))
+        except Unfit as unfit:
+            found.append(Checked(fmu.name, "", reason=str(unfit)))
+    if not subjects:
+        raise HarnessError(f"no FMU in {folder} is asked about: {found[0].reason}; name another folder")
     with ThreadPoolExecutor(WORKERS) as workers:
         for importer in IMPORTERS:
             if reason := absent(importer, subjects[0].fmu):
