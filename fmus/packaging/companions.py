@@ -15,7 +15,8 @@ def companions(
     the page says `use` of the ways to run it."""
     name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
     found = reference(path, declared)
-    entries = {"documentation/index.html": page(model, name, declared, found, icon, use)}
+    shown = icon if picture.is_file() else ""
+    entries = {"documentation/index.html": page(model, name, declared, found, shown, use)}
     if found is not None:
         entries |= files(name, found, declared)
     if picture.is_file():

@@ -26,10 +26,12 @@ FREE = Declared("", "").allowed  # in words, where every finite number is
 
 
 def page(model: type[Declaring], name: str, declared: Variables, found: Reference | None, icon: str, use: str) -> bytes:
-    """The page of the FMU `name`, as HTML that needs nothing but the icon beside it; `use` says how it can be run."""
+    """The page of the FMU `name`, as HTML that needs nothing but the icon beside it, or nothing where that is ""; `use`
+    says how it can be run."""
     first, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
     title = f"<h1>{escape(name)}</h1><p>{escape(first)}</p>"
-    parts = [f"<header><img src='../{icon}' alt=''><div>{title}</div></header>", "<h2>Equations</h2>"]
+    picture = f"<img src='../{icon}' alt=''>" if icon else ""
+    parts = [f"<header>{picture}<div>{title}</div></header>", "<h2>Equations</h2>"]
     parts += map(block, blocks)
     if found is not None:
         parts += _figure(found, declared)

@@ -310,7 +310,7 @@ def another(declaration):
 def test_every_settable_variable_is_set_one_by_one(launch, name):
     """It reads back, before the run and where it is tunable in mid-run, and the run goes on."""
     for variable, d in declared(name).items():
-        if d.causality not in ("parameter", "input"):
+        if d.causality not in ("parameter", "input") or len(d.items) == 1:
             continue
         value = another(d)
         choices = {"solver.method": 2} if variable == "friction" else {}

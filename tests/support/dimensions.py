@@ -8,7 +8,7 @@ import operator
 import sys
 from fractions import Fraction
 
-from fmus.packaging.units import UNITS
+from fmus.packaging.units import unit_of
 
 ANY = (0.0, math.inf)  # zero and infinity are of every dimension
 
@@ -26,7 +26,7 @@ class Quantity:
     @classmethod
     def of(cls, value, symbol):
         """A value in a declared unit."""
-        unit = UNITS[symbol]
+        unit = unit_of(symbol, symbol)
         return cls(value, unit.kg, unit.m, unit.s)
 
     def __repr__(self):
