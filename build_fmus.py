@@ -1,7 +1,12 @@
 """Build FMUs: python build_fmus.py [NAME | FILE.py ...] [--fmi 3] [--native] [--web] [--method M] [--law L] ..."""
 
-from hashlib import sha256
+import sys
 from pathlib import Path
+
+if Path(sys.path[0]) != Path(__file__).parent:  # by -m: a model where one is may be called math.py, or fmus.py
+    sys.path.append(sys.path.pop(0))
+
+from hashlib import sha256
 
 import click
 

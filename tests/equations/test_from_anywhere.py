@@ -1,5 +1,7 @@
 """A model in a file anywhere, as a user writes it: built by its path, in every kind, and right."""
 
+import subprocess
+import sys
 from zipfile import ZipFile
 
 import commands
@@ -173,6 +175,17 @@ def test_what_lies_beside_the_file_under_its_name_goes_into_the_fmu_and_nothing_
         page = archive.read("documentation/index.html").decode()
     assert result.splitlines() == ["time,phi,omega", "0.0,0.3,0.0", "4.0,0.1,-0.2"]
     assert "Certified result of the default experiment: series and DOP853, relative difference 1e-13." in page
+
+
+def test_a_file_may_have_the_name_of_a_module_and_lie_anywhere(oil):
+    """As math.py, fmus.py: none of them is taken for the module, where the commands are run by their names."""
+    folder = oil / "Modelle für später"
+    folder.mkdir()
+    for name in ("math.py", "fmus.py", "random.py"):
+        (folder / name).write_bytes(b"\xef\xbb\xbf" + (oil / "pendulum.py").read_bytes().replace(b"\n", b"\r\n"))
+    for words in ("build_fmus", "fmus.py"), ("harness", "run", "--fmu", "fmus.fmu"):
+        done = subprocess.run([sys.executable, "-m", *words], cwd=folder, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
 
 
 def harness(*arguments, cwd):
