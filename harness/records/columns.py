@@ -103,12 +103,12 @@ def split(head: str) -> tuple[str, str | None]:
         for found in (SLASHED.match(name), INSIDE.match(name)):
             if found and (known(found[2]) or time_size(found[2])):
                 return " ".join(filter(None, (found[1], *found.groups()[2:]))), found[2]
-        words = re.split(r"[ _]+", name)
+        words = re.split(r"[ _,:]+|(?<=[a-z])(?=[A-Z])", name)
         for i in range(1, len(words)):
             first, last = " ".join(words[:i]), "/".join(words[i:])
-            if time_size(last) if CLOCK.search(first) else len(last) > 1 and last != "in" and known(last):
+            if time_size(last) if CLOCK.search(first) else len(last) > 1 and last.lower() != "in" and known(last):
                 return first, last
-        if len(name) > 1 and name != "min" and time_size(name):
+        if len(name) > 1 and name.lower() not in ("in", "min") and (time_size(name) or known(name)):
             return name, name
     return name, unit or None
 

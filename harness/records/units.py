@@ -32,6 +32,8 @@ class Unit(NamedTuple):
 def plain(text: str) -> str:
     """A unit as the tables below write it: µm is um, m·s⁻², m s^-2 and m/s/s are m/s2."""
     for old, new in (
+        ("º", "°"),
+        ("˚", "°"),
         ("µ", "u"),
         ("μ", "u"),
         ("²", "2"),

@@ -10,8 +10,8 @@ from decays import swung
 from harness.analyses.decay.figures import Known
 from harness.analyses.decay.fit import identify
 from harness.errors import HarnessError, SceneError
-from harness.records.columns import Columns, read
-from harness.records.units import known
+from harness.records.columns import Columns, read, split
+from harness.records.units import known, time_size
 
 T = np.arange(600) / 100
 TRUTH = {"omega": 12.566, "zeta": 0.01, "r": 0.002}
@@ -381,6 +381,24 @@ def test_a_heading_is_taken_as_it_stands_in_the_file(tmp_path):
 )
 def test_a_unit_tells_what_was_measured(written, order, base, size):
     assert known(written) == (order, base, pytest.approx(size, rel=1e-15))
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        *[(f"time{mark}ms", "time", "ms") for mark in ("_", " ", " / ", " in ", ", ", ":")],
+        ("timeMs", "time", "Ms"),
+        ("gyro_z_deg_s", "gyro z", "deg/s"),
+        ("x (mm) Run #2", "x Run #2", "mm"),
+        ("Yaw [º]", "Yaw", "º"),
+        ("millis", "millis", "millis"),
+        ("mm", "mm", "mm"),
+        *[(name, name, None) for name in ("x", "x_min", "x_in", "v_x", "min", "in", "s", "T", "ch1_v", "x_rel")],
+    ],
+)
+def test_a_heading_is_a_name_and_a_unit(heading, name, unit):
+    assert split(heading) == (name, unit)
+    assert unit is None or known(unit) or time_size(unit)
 
 
 def test_a_unit_that_is_not_known_is_kept_and_said(tmp_path):
