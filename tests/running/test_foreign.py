@@ -280,6 +280,16 @@ def described(change):
         ("Midpoint", described(lambda text: text.replace(' start="40"', "")), 'Variable "k" (line'),
         ("Midpoint", described(lambda text: text.replace("<ModelVariables", "<Nonsense")), "cannot be read: "),
         ("Midpoint", described(lambda text: text.replace('stopTime="1.0"', "")), "names no stop time; name one"),
+        *[
+            (
+                "Midpoint",
+                described(lambda text, times=times: text.replace('startTime="0.0" stopTime="1.0"', times)),
+                "are no times to step to",
+            )
+            for times in ('startTime="0.0" stopTime="INF"', 'startTime="1e17" stopTime="100000000000000016"')
+        ],
+        ("Midpoint", described(lambda text: text.replace('index="1"', 'index="77"')), "lacks what it names"),
+        ("Midpoint", described(lambda text: text.replace('fmiVersion="2.0"', "")), "lacks what it names, or a version"),
         ("Midpoint", {"modelDescription.xml": None}, "cannot be read: "),
         (
             "Midpoint",

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from ..run import Run
 from ..specification import Specification
 from ..unpacked import unpacked
 from ..values import accepted, in_force, unit
+from .agreement import FINEST
 from .request import ANSWER, COARSEST, HUNG, ROWS, SAID, SHARE, TEXTS, Answer, Request
 from .rows import RECORDED, Rows, Shaped, elements, read
 
@@ -85,6 +87,9 @@ def span(wanted: Specification, found: Any) -> tuple[float, float]:
     stop = float(experiment.stopTime) if wanted.stop is None else wanted.stop
     if not stop > start:
         raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
+    if not np.spacing(max(abs(start), abs(stop))) * FINEST <= stop - start < inf:
+        between = f"between start = {start!r} s and stop = {stop!r} s"
+        raise SceneError(f"{wanted.fmu.name}: {between} are no times to step to; name another --stop")
     return start, stop
 
 
