@@ -59,7 +59,7 @@ def main(out):
     """Build them all."""
     import pythonfmu
     import pythonfmu3
-    from harness.running.compiler import HEADERS
+    from harness.running.in_c import HEADERS
 
     from fmus.packaging.native.compiler import binaries
 
