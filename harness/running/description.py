@@ -30,7 +30,7 @@ def description(path: Path, lenient: bool = False) -> Any:
             f"{path.name} breaks the FMI standard in {count}:\n- {told}\n"
             "--lenient (run, compare) or lenient = true (a scene) runs it all the same, where it can run"
         ) from None
-    except (AttributeError, LookupError, TypeError) as error:  # of fmpy, which looks for what is not there
+    except (AttributeError, IndexError, TypeError) as error:  # of fmpy, which looks for what is not there
         lacks = f"its modelDescription.xml lacks what it names, or a version of FMI ({reason(error)})"
         raise HarnessError(f"{path.name} cannot be read: {lacks}") from None
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers

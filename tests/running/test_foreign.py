@@ -290,7 +290,7 @@ def described(change):
         ],
         ("Midpoint", described(lambda text: text.replace('index="1"', 'index="77"')), "lacks what it names"),
         ("Midpoint", described(lambda text: text.replace('fmiVersion="2.0"', "")), "lacks what it names, or a version"),
-        ("Midpoint", {"modelDescription.xml": None}, "cannot be read: "),
+        ("Midpoint", {"modelDescription.xml": None}, 'cannot be read: "There is no item'),
         (
             "Midpoint",
             {"binaries/linux64/Midpoint.so": None},

@@ -59,9 +59,9 @@ def main(out):
     """Build them all."""
     import pythonfmu
     import pythonfmu3
-    from harness.running.in_c import HEADERS
 
     from fmus.packaging.native.compiler import binaries
+    from harness.running.in_c import HEADERS
 
     for source in sorted(SOURCES.glob("*.py")):
         package = pythonfmu3 if "pythonfmu3" in source.read_text() else pythonfmu
