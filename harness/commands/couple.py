@@ -5,20 +5,19 @@ from pathlib import Path
 
 import click
 
-from .terminal import STOP, answer, progress, results
+from .terminal import POSITIVE, answer, progress, results
 
 
 @click.command()
 @click.argument("scene")
-@STOP
+@click.option("--stop", type=POSITIVE, help="Stop time in s (the one that it names).")
 @results
 def couple(scene: str, stop: float | None, out: Path, quiet: bool, as_json: bool) -> None:
     """Couple the FMUs of a SCENE: written as an SSP archive, run by Ecos beside a monolithic reference, and by libcosim
     and fmpy where they can.
 
     SCENE is two-masses, driven, chain, or the path of a TOML file; harness/scenes/coupled/scene.py says what it may
-    hold.  Or it is the path of an archive (.ssp) of anyone's, which is run beside its own finest run; --stop is for one
-    that names no stop time.
+    hold.  Or it is the path of an archive (.ssp) of anyone's, which is run beside its own finest run.
 
     \b
     Examples:

@@ -53,6 +53,8 @@ def run(
     if fmu is not None and scene is None:
         run_any(fmu, values, how, out, quiet, as_json)
         return
+    if scene and scene.endswith(".fmu"):
+        raise click.UsageError(f"an FMU is run by --fmu {scene}")
     if scene is None or fmu is not None or values or how["stop"] is not None:
         raise click.UsageError("name one SCENE, or --fmu PATH; --set and --stop go with --fmu")
     from ..results.provenance import trusted

@@ -34,7 +34,9 @@ def description(path: Path, lenient: bool = False) -> Any:
         lacks = f"its modelDescription.xml lacks what it names, or a version of FMI ({reason(error)})"
         raise HarnessError(f"{path.name} cannot be read: {lacks}") from None
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
-        raise HarnessError(f"{path.name} cannot be read: {reason(error)}") from None
+        raise HarnessError(
+            f"{path.name} cannot be read: {reason(error)}; export it anew, or name another file"
+        ) from None
     if found is None:
         raise HarnessError(f"{path.name} is an FMU of FMI {old}; FMI 2.0 and 3.0 are run here: export it anew as one")
     return found

@@ -51,7 +51,7 @@ def table(path):
 @pytest.fixture(scope="module")
 def main_job(place):
     """The finished main job and its results."""
-    done = harness(place, fresh=True)
+    done = harness(place, fresh=True, COLUMNS="80")
     return done, place / "results"
 
 
@@ -86,6 +86,13 @@ def test_the_table_shows_what_is_known(main_job, case, quantity, measured):
     block = main_job[0].stdout.split(f"\n{case} ")[1].split("\n   ")[0]
     line = next(line for line in block.splitlines() if line.strip().startswith(quantity))
     assert line.replace(quantity, "", 1).replace("(time points)", "").split()[0] == measured
+
+
+def test_the_table_of_all_cases_fits_into_80_columns_with_no_word_cut(main_job):
+    lines = main_job[0].stdout.splitlines()
+    assert lines[0].split() == ["measured", "published", "difference"]
+    assert max(map(len, lines)) <= 80
+    assert not [line for line in lines if re.search(r"\belsewh?e?r?$|[+-][\d.e-]+$", line)]
 
 
 def test_a_trajectory_reads_back_to_the_last_bit_and_in_order(main_job):

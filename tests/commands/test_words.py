@@ -50,8 +50,8 @@ def fits(said, *headings):
     ("arguments", "headings"),
     [
         (("list",), ("scene", "couple")),
-        (("run", "stickslip"), ("measured", "0.430665996656  s      0.430665996656")),
-        (("run", "coulomb-sign"), ("ms    half of smd's",)),
+        (("run", "stickslip"), ("measured", "0.430665996656 s     0.430665996656")),
+        (("run", "coulomb-sign"), ("ms   half of smd's",)),
         (("decay", "coulomb"), ("two peaks",)),
         (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), ("at t [s]",)),
     ],
@@ -146,6 +146,12 @@ def test_why_an_fmu_of_either_kind_fails_is_said_once(kind, tmp_path, arguments)
     done = harness(tmp_path, *arguments, kind / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")
     assert done.returncode == 1
     assert re.fullmatch(r"Error: .*the motion leaves the range of numbers after t = 0.0 s.*\n", done.stderr)
+
+
+def test_an_fmu_in_the_place_of_a_scene_says_how_it_is_run(here):
+    done = harness(here, "run", "fmus/smd.fmu")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.endswith("Error: an FMU is run by --fmu fmus/smd.fmu\n")
 
 
 def test_the_versions_are_told(tmp_path):

@@ -151,8 +151,9 @@ def shipped() -> list[Path]:
     return sorted(FOLDER.glob("*.toml"))
 
 
-def load(source: str) -> Coupled:
-    """The scene of a shipped name or a file; SceneError in one sentence if it is not one."""
+def load(source: str, stop: float | None = None) -> Coupled:
+    """The scene of a shipped name or a file, to another stop if one is named; SceneError in one sentence if it is not
+    one."""
     path = Path(source)
     if path.suffix != ".toml":
         names = {file.stem: file for file in shipped()}
@@ -161,7 +162,7 @@ def load(source: str) -> Coupled:
         path = names[source]
     table = read(path)
     try:
-        return build(path, structured(table, CoupledKeys))
+        return build(path, structured(table | ({"stop": stop} if stop else {}), CoupledKeys))
     except SceneError as error:
         raise SceneError(f"scene {path.stem}: {error}") from None
 

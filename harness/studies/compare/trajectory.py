@@ -64,7 +64,7 @@ def recorded(source: str) -> Trajectory | None:
     if path.exists() and path.suffix not in SUFFIXES:
         return read(path)
     if path.suffix in FILES:
-        raise SceneError(f"there is no {path}")
+        raise SceneError(f"there is no {path}: name a file or folder of results that is here, an FMU, or a scene")
     return None
 
 

@@ -34,8 +34,8 @@ Starts = dict[str, dict[str, float]]  # start values of the real parameters of e
 
 
 def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple[Convergence, Path]:
-    """Run a coupled scene or an archive at each communication step, compare, and write out/coupled/<name>; `stop` in s
-    is for an archive that names none."""
+    """Run a coupled scene or an archive at each communication step, compare, and write out/coupled/<name>; a stop, in
+    s, stands above its own."""
     try:
         from . import archive, theirs
     except ImportError as error:
@@ -48,12 +48,12 @@ def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple
             asked, fmus, scene = theirs.asked(Path(source), file, stop), [Path(source)], None
         else:
             defaults = {model: starts(fmu_of(model)) for model in MODELS}
-            scene = load(source)
+            scene = load(source, stop)
             check(scene, defaults)
             name, file = scene.name, plain / f"{scene.system}.ssp"
             asked, fmus = blank(scene), [part.fmu for part in scene.parts]
         folder = out / FOLDER / name
-        with replacing(folder, (file.name, *FILES), named(source)) as fresh:
+        with replacing(folder, (*FILES, file.name), named(source)) as fresh:
             if scene:
                 archive.write(scene, values(scene, defaults), built(scene, plain), file)
             copy(file, fresh)

@@ -23,7 +23,7 @@ def asked(source: Path, file: Path, stop: float | None) -> Convergence:
     """What is to be run: every real output that the archive names, of every component; `file` becomes a copy that any
     library can read."""
     if not source.is_file():
-        raise SceneError(f"there is no {source}")
+        raise SceneError(f"there is no {source}: name an archive that is here, or a scene of `python -m harness list`")
     copy(source, file)
     try:
         with SSP(file, mode="r") as archive, archive.system_structure as structure:

@@ -20,7 +20,7 @@ def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
     """One table for all outcomes; `everything`: also what has no published figure."""
     outcomes = list(outcomes)
     width = 5 if any(outcome.scene and outcome.scene.published for outcome in outcomes) else 3  # columns
-    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), caption_justify="left")
+    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0, caption_justify="left")
     table.add_column("", no_wrap=True)
     table.add_column("measured", justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)

@@ -138,7 +138,7 @@ def describe(runs: Runs, points: Points, file: Path) -> About:
         if each.name not in settable:
             raise SceneError(unknown("parameter to vary", each.name, settable))
         if each.name in dict(runs.values):
-            raise SceneError(f"{each.name} is both varied and set")
+            raise SceneError(f"{each.name} is both varied and set: leave one out")
         if variables[each.name].type not in REALS and any(value % 1 for value in each.values):
             raise SceneError(f"{each.name} is a choice: vary it over whole numbers, as in {each.name}=1,2")
     with ready(runs, file) as runner:
