@@ -119,4 +119,4 @@ def figures(outcome: Any, out: Path) -> dict[str, object]:
     from ..results.provenance import replaced
 
     told = {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error}
-    return told | {"replaced": replaced(out / outcome.name)}
+    return told | {"said": [*filter(None, [replaced(out / outcome.name)])]}

@@ -173,12 +173,18 @@ def test_the_list_as_json_is_what_the_commands_take(here):
             assert (each["title"], each["model"]) == (scene.title, scene.file.stem)
 
 
-@pytest.mark.parametrize("scene", ["stickslip-threshold", "pendulum"])
+def page_of(here):
+    """The report, whose cells say nothing of their look."""
+    text = html.unescape((here / "results/report.html").read_text(encoding="utf-8"))
+    return re.sub("<td[^>]*>", "<td>", text)
+
+
+@pytest.mark.parametrize("scene", ["stickslip-threshold", "pendulum", "smd"])
 def test_a_quantity_is_spelled_alike_on_the_screen_in_its_file_and_on_the_page(here, scene):
     """Every one that is measured: the same digits and the same unit."""
     said = harness(here, "run", scene, **PLAIN).stdout
     assert harness(here, "report").returncode == 0
-    page = html.unescape((here / "results/report.html").read_text(encoding="utf-8"))
+    page = page_of(here)
     with (here / f"results/{scene}/figures.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) > 10
@@ -203,7 +209,7 @@ def test_an_interval_is_spelled_alike_on_the_screen_and_on_the_page(here):
     np.savetxt(here / "mine.csv", np.column_stack([t, x]), header="t [s],x [m]", delimiter=",", comments="")
     said = harness(here, "decay", "mine.csv", COLUMNS="200", PATH="").stdout
     assert harness(here, "report").returncode == 0
-    page = html.unescape((here / "results/report.html").read_text(encoding="utf-8"))
+    page = page_of(here)
     told = re.findall(r"\S+ \u00b1 \S+|\S+ \(\S+ to \S+\)|< \S+", said.split("Best")[0])
     assert len(told) > 4
     assert all(f"<td>{each}</td>" in page for each in told)
