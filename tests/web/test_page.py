@@ -396,6 +396,8 @@ def test_every_published_case_measures_what_the_terminal_does(page):
                 there = quantities[figure]
                 value = there.in_unit(*unit) if unit and unit != [there.unit] else there.value
                 assert float(size) == pytest.approx(value, rel=1e-3), (name, figure)
+    page.choose("preset", "")  # my own: as it is, but no published case any more
+    assert page.run("[bench.state().preset, bench.state().model]") == ["", scene.model]
 
 
 # ---- what is taken away

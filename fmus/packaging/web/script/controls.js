@@ -32,7 +32,7 @@ export function span(variable, usual) {
 
 function placeOf(value, { low, high, log }) {
   const share = log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
-  return Math.round(STEPS * Math.min(Math.max(share, 0), 1));
+  return Math.round(STEPS * Math.min(Math.max(share || 0, 0), 1));
 }
 
 // The value at a place of a slider, in three digits of what the slider spans.

@@ -24,7 +24,7 @@ const hand = new Hand(page);
 const mechanism = new Mechanism($$("mechanism"), hand);
 const diagrams = new Diagrams($$("panels"), seek);
 const form = new Form(desk.portraits, desk.presets, {
-  preset: (name) => desk.presets.has(name) && enter(ofPreset(name)),
+  preset: (name) => (desk.presets.has(name) ? enter(ofPreset(name)) : edited()),
   choose: (name, value) => { choose(page.portrait, page.state.values, name, value); edited(); },
   beside: takeOther,
   body: (number) => { page.state.body = number; restart(); },
