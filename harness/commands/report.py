@@ -20,7 +20,8 @@ from .terminal import JSON, QUIET, tell
 def report(out: Path, quiet: bool, as_json: bool) -> None:
     """Make one page of all results there are: report.html, which needs nothing else.
 
-    It runs nothing; it says which results are missing, and the commands that make them.
+    It runs nothing; it says which results are missing, and the commands that make them.  The page that runs is in it,
+    where `python build_fmus.py --web` has written it.
 
     \b
     Example:

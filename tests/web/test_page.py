@@ -462,3 +462,7 @@ def test_models_of_users_run_in_a_page_of_their_own(browser):
         assert page.run("bench.desk.runs.one.events.length") > 2
         assert page.run("document.querySelectorAll('#mechanism .body').length") == count
         assert page.run("document.getElementById('body').parentElement.hidden") == (count == 1)
+    page.choose("body", 1)  # of its diagrams those of the motion stand first, too
+    shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
+    second = page.run("bench.desk.portraits.get('blocks').bodies[1]")
+    assert page.settled(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]

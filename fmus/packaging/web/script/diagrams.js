@@ -4,8 +4,6 @@ import { make } from "./controls.js";
 import { panels, spotted } from "./panels.js";
 import { Plot, readColours } from "./plot.js";
 
-const LAST = ["phase", "step", "energy", "friction", "error"]; // in this order, after those of the motion
-
 export class Diagrams {
   constructor(host, onSeek) {
     Object.assign(this, { host, onSeek, plots: new Map() }); // key of a diagram -> {plot, figure, heading, reading, panel}
@@ -20,8 +18,10 @@ export class Diagrams {
   draw(desk, state, tools) {
     const found = panels(desk, state, tools);
     for (const [key, { figure }] of this.plots) figure.hidden = !found.some((panel) => panel.key === key);
+    const fresh = found.filter(({ key }) => !this.plots.has(key));
+    for (const { key } of fresh) this.plots.set(key, this.made(key));
+    if (fresh.length) this.host.append(...found.map(({ key }) => this.plots.get(key).figure)); // in their order
     for (const panel of found) {
-      if (!this.plots.has(panel.key)) this.plots.set(panel.key, this.placed(panel.key));
       const known = this.plots.get(panel.key);
       if (known.panel?.title !== panel.title) {
         known.heading.innerHTML = panel.symbol ? `<b>${panel.symbol}</b> ` : ""; // made by the builder
@@ -32,13 +32,11 @@ export class Diagrams {
     }
   }
 
-  placed(key) {
+  made(key) {
     const heading = make("span");
     const reading = make("span", { class: "reading" });
     const host = make("div", { class: "plot" });
     const figure = make("figure", { id: `panel-${key}` }, make("figcaption", {}, heading, reading), host);
-    const after = LAST.includes(key) && LAST.slice(LAST.indexOf(key) + 1).map((each) => this.plots.get(each)?.figure).find(Boolean);
-    this.host.insertBefore(figure, after || null);
     return { plot: new Plot(host, key === "phase" ? null : this.onSeek), figure, heading, reading };
   }
 

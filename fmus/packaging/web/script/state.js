@@ -1,6 +1,8 @@
 // The state of the page: all that a link carries.  Values are in SI units, by the names of variables; keys of the page
 // begin with a dot, which no variable does.
 
+const BESIDE = ".beside."; // before the names of what the run beside has
+
 export function fresh(portrait) {
   return { model: portrait.name, values: {}, changes: [], stop: portrait.stop, t: 0, body: 0, other: null, preset: "" };
 }
@@ -46,7 +48,7 @@ export function written(state) {
   if (state.preset) words.set(".preset", state.preset);
   if (state.other) {
     words.set(".beside", state.other.model);
-    for (const [name, value] of Object.entries(state.other.values)) words.set(`.beside.${name}`, value);
+    for (const [name, value] of Object.entries(state.other.values)) words.set(BESIDE + name, value);
   }
   return `#${words}`;
 }
@@ -68,16 +70,14 @@ export function read(hash, portraits) {
   const other = portraits.get(words.get(".beside"));
   if (other) state.other = { model: other.name, values: {} };
   for (const [key, word] of words) {
+    const theirs = key.startsWith(BESIDE);
     if (key === ".change") {
       const [t, name, value] = word.split(" ");
       if (takes(portrait, name, value) && isNumber(t) && Number(t) >= 0) state.changes.push({ t: Number(t), name, value: Number(value) });
       else lost.push(word);
-    } else if (key.startsWith(".beside.")) {
-      const name = key.slice(".beside.".length);
-      if (other && takes(other, name, word)) state.other.values[name] = Number(word);
-      else lost.push(key);
-    } else if (!key.startsWith(".")) {
-      if (takes(portrait, key, word)) state.values[key] = Number(word);
+    } else if (theirs || !key.startsWith(".")) {
+      const [owner, values, name] = theirs ? [other, state.other?.values, key.slice(BESIDE.length)] : [portrait, state.values, key];
+      if (owner && takes(owner, name, word)) values[name] = Number(word);
       else lost.push(key);
     }
   }
