@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from html import escape
 from math import pi, sqrt
 
 import native_fmus
@@ -325,6 +326,14 @@ def test_a_link_carries_everything(page):
     page.wait(f"{told}.includes('not known here: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
     page.open(".model=nobody")
     page.wait(f"{told}.includes('not known here: nobody. coulomb')")
+
+
+def test_within_another_page_it_runs_and_has_no_address_to_carry(page, tmp_path):
+    outer = tmp_path / "outer.html"
+    outer.write_text(f'<iframe srcdoc="{escape(page.file.read_text(encoding="utf-8"))}"></iframe>', encoding="utf-8")
+    page.browser.open(outer.as_uri())
+    page.wait("frames[0].bench?.desk.done && frames[0].document.querySelector('#status').textContent")
+    assert page.run("[frames[0].location.hash, frames[0].document.getElementById('link').hidden]") == ["", True]
 
 
 def test_what_the_fmu_refuses_is_told_in_its_own_sentence(page):
