@@ -2,7 +2,8 @@
  *
  *     host LIBRARY GUID RESOURCES
  *
- *     I new NAME [quiet]     I begin                 I step T H              I setr REFERENCE VALUE
+ *     I new NAME [quiet [exchange]]                  I begin                 I step T H
+ *     I setr REFERENCE VALUE                         I calls STATES INDICATORS TURNS
  *     I getr REFERENCE...    I pass REFERENCE J TO   I save                  I restore             I reset
  *     I free                 0 unload                I time REPEAT STOP STEPS WORD...
  *
@@ -11,9 +12,13 @@
  * time runs from t = 0 to STOP in so many equal communication steps, several times.  The word R=VALUE sets the Real of
  * value reference R before each run; the word R has that Real read at every point.  It answers the seconds of the
  * fastest run, initialisation and reading included, and the values at every point of the last one.
+ *
+ * calls asks what an importer's solver asks in model exchange, each TURNS times, several times.  It answers the seconds
+ * of a call in the fastest: to set the time, to set the states, to get the derivatives, to get the indicators.
  */
 #define _POSIX_C_SOURCE 199309L
 #include <dlfcn.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,11 +27,13 @@
 
 #include "fmi2FunctionTypes.h"
 
-enum { INSTANCES = 4, WORDS = 64, LINE = 4096 };
+enum { INSTANCES = 4, WORDS = 64, LINE = 4096, OFTEN = 500 };
 
 #define FUNCTIONS(f)                                                                                               \
     f(Instantiate) f(FreeInstance) f(SetupExperiment) f(EnterInitializationMode) f(ExitInitializationMode) f(Reset) \
-    f(SetReal) f(GetReal) f(DoStep) f(GetFMUstate) f(SetFMUstate) f(FreeFMUstate)
+    f(SetReal) f(GetReal) f(DoStep) f(GetFMUstate) f(SetFMUstate) f(FreeFMUstate) f(NewDiscreteStates)              \
+    f(EnterContinuousTimeMode) f(GetContinuousStates) f(SetTime) f(SetContinuousStates) f(GetDerivatives)           \
+    f(GetEventIndicators)
 
 static struct {
 #define DECLARE(name) fmi2##name##TYPE *name;
@@ -120,6 +127,33 @@ static void take_time(fmi2Component c, char **words, int count)
     free(out);
 }
 
+#define TIME(call)                                                       \
+    do {                                                                 \
+        double fastest = INFINITY;                                       \
+        for (int i = 0; i < OFTEN; i++) {                                \
+            double begun = now();                                        \
+            for (long turn = 0; turn < turns; turn++) DO(call);          \
+            fastest = fmin(fastest, now() - begun);                      \
+        }                                                                \
+        printf(" %.9g", fastest / (double)turns);                        \
+    } while (0)
+
+static void time_calls(fmi2Component c, size_t states, size_t indicators, long turns)
+{
+    double x[WORDS], rates[WORDS], values[WORDS];
+    fmi2EventInfo event = {.newDiscreteStatesNeeded = fmi2True};
+    if (states > WORDS || indicators > WORDS) die("calls", "too many states or indicators");
+    while (event.newDiscreteStatesNeeded) DO(NewDiscreteStates(c, &event));
+    DO(EnterContinuousTimeMode(c));
+    DO(GetContinuousStates(c, x, states));
+    printf("seconds");
+    TIME(SetTime(c, 1e-6 * (double)turn));
+    TIME(SetContinuousStates(c, x, states));
+    TIME(GetDerivatives(c, rates, states));
+    TIME(GetEventIndicators(c, values, indicators));
+    printf("\n");
+}
+
 static void play(const char *command, int i, char **words, int count, char **host)
 {
     static fmi2Component instances[INSTANCES];
@@ -129,7 +163,8 @@ static void play(const char *command, int i, char **words, int count, char **hos
     fmi2Status status = fmi2OK;
 #define IS(name) (!strcmp(command, name))
     if (IS("new")) {
-        instances[i] = fmi.Instantiate(words[0], fmi2CoSimulation, host[2], host[3], &callbacks, fmi2False, count < 2);
+        fmi2Type type = count < 3 ? fmi2CoSimulation : fmi2ModelExchange;
+        instances[i] = fmi.Instantiate(words[0], type, host[2], host[3], &callbacks, fmi2False, count < 2);
         if (!instances[i]) die("new", "no instance");
     } else if (IS("begin")) {
         status = fmi.SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0);
@@ -152,6 +187,8 @@ static void play(const char *command, int i, char **words, int count, char **hos
         if (status == fmi2OK) status = fmi.SetReal(instances[atoi(words[1])], read.references + 1, 1, read.values);
     } else if (IS("time")) {
         take_time(c, words, count);
+    } else if (IS("calls")) {
+        time_calls(c, strtoul(words[0], NULL, 10), strtoul(words[1], NULL, 10), atol(words[2]));
     } else if (IS("reset")) {
         status = fmi.Reset(c);
     } else if (IS("free")) {

@@ -69,7 +69,7 @@ def built(fmu: Path) -> Library:
 @cache
 def host() -> Path:
     """The host, as a program."""
-    return compiled(Path(__file__).with_name("host.c"), "host", (), ("-ldl",))
+    return compiled(Path(__file__).with_name("host.c"), "host", (), ("-ldl", "-lm"))
 
 
 def compiled(source: Path, name: str, options: tuple[str, ...], libraries: tuple[str, ...]) -> Path:

@@ -1,10 +1,12 @@
 """The benchmark: every error is measured against a second route, every time beside somebody else's."""
 
 import csv
+import shutil
 from dataclasses import replace
 from functools import partial
 from math import inf, nan
 
+import fmi3_hosts
 import pytest
 from native_fmus import built as native_built
 
@@ -12,7 +14,7 @@ from harness.errors import HarnessError
 from harness.results.provenance import load
 from harness.running import in_c
 from harness.running.clock import best
-from harness.studies.bench import native
+from harness.studies.bench import exchange, native
 from harness.studies.bench import speed as bench_speed
 from harness.studies.bench.accuracy import default, drift, exact, last, late
 from harness.studies.bench.measure import Beside, Measure
@@ -37,7 +39,10 @@ def both_kinds(fmus, tmp_path, monkeypatch):
     (tmp_path / "fmus").mkdir()
     for file in fmus.glob("*.fmu"):
         (tmp_path / "fmus" / file.name).symlink_to(file)
-    (tmp_path / "fmus" / "native").symlink_to(native_built())
+    (tmp_path / "fmus" / "native").mkdir()
+    for file in native_built().glob("*.fmu"):
+        (tmp_path / "fmus" / "native" / file.name).symlink_to(file)
+    (tmp_path / "fmus" / "native" / "fmi3").symlink_to(fmi3_hosts.built())
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(native, "REPEAT", 3)
     forget()
@@ -138,7 +143,7 @@ def test_the_cvode_fmu_gets_better_with_its_tolerance_and_the_native_one_is_bett
 
 def test_what_a_machine_lacks_is_told_in_its_row_and_fails_nothing(both_kinds, monkeypatch):
     monkeypatch.setattr(in_c, "COMPILER", None)
-    (both_kinds / "native").unlink()
+    shutil.rmtree(both_kinds / "native")
     in_c.host.cache_clear()
     native.cvode.cache_clear()
     found = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.against_cvode("smd")]
@@ -157,3 +162,33 @@ def test_a_run_that_an_fmu_refuses_in_c_gives_its_sentence(both_kinds):
     library = in_c.built(both_kinds / "native" / "stickslip.fmu")
     with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
         native.runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
+
+
+@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+@pytest.mark.parametrize("case", native.REACH)
+def test_model_exchange_errs_as_cvode_does_with_its_events_by_hand(case, both_kinds):
+    """At most three times as much at any tolerance: the solver errs, not the FMU."""
+    found = [exchange.by_cvode(case, rtol) for rtol in exchange.TOLERANCES]
+    if "not installed" in found[0].beside[0].name:
+        pytest.skip(found[0].beside[0].name)
+    assert [measure.what for measure in found if not measure.reached] == []
+    assert {measure.reach for measure in found} == {3.0}
+
+
+@pytest.mark.parametrize("run", [*((model, {}, "default run") for model in exchange.MODELS), *exchange.TIES], ids=str)
+def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(run, both_kinds):
+    """Also at ties, where the last bit decides or the physics."""
+    assert exchange.beside_co_simulation(*run).reached
+
+
+@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+def test_a_call_of_model_exchange_is_measured_beside_that_of_a_reference_fmu(both_kinds, tmp_path, monkeypatch):
+    """An FMU of ours stands for theirs, whose sources are not here: that is told."""
+    assert exchange.calls("smd").beside[0].name.startswith("not here: Reference-FMUs")
+    sled = in_c.built(both_kinds / "native" / "stickslip.fmu")
+    monkeypatch.setattr(exchange, "bouncing_ball", lambda: sled)
+    monkeypatch.setattr(exchange, "TURNS", 10)
+    monkeypatch.setattr(exchange, "THEIRS", (3, 2))
+    measure = exchange.calls("stickslip")
+    assert 0.0 < measure.value < 100.0
+    assert len(measure.beside) == 8

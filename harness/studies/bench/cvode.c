@@ -7,6 +7,8 @@
  * Smooth and dry ones by Adams with fixed-point iteration, the stiff one by BDF with Newton's and the exact Jacobian.
  *
  *     cc -DMODEL=STICKSLIP ...    (SMD, COULOMB, STICKSLIP, PACEJKA, PENDULUM)
+ *     cc -DMODEL=STICKSLIP -DPLAIN=1 ...    as importers solve in model exchange: all by BDF, the Jacobian by
+ *                                           differences, the position of the driver a state as well
  *
  * SI units; the default experiments.
  */
@@ -27,28 +29,36 @@
 #define PACEJKA 4
 #define PENDULUM 5
 
+#ifndef PLAIN
+#define PLAIN 0
+#endif
+
 enum { X, V, RTOL, ATOL, X_M, VARIABLES }; /* value references */
 
 #define IS_DRY (MODEL == COULOMB || MODEL == STICKSLIP || MODEL == PENDULUM)
 #define IS_SLED (MODEL == STICKSLIP || MODEL == PACEJKA)
 #define IS_STIFF (MODEL == PACEJKA)
+#define IS_DRIVEN (PLAIN && IS_SLED)
+#define IS_IMPLICIT (IS_STIFF || PLAIN)
 #define PI 3.14159265358979323846
 #define POUND 0.45359237
 #define INCH 0.0254
 
 /* mass or moment of inertia; what friction can hold at most, and what it is while sliding */
+enum { STATES = 2 + IS_DRIVEN };
+
 #if IS_SLED
 static const double m = 12.5, k = 742.5, v_driver = 0.034, hold = 0.9 * 12.5 * 9.81, slide = 0.6 * 12.5 * 9.81;
-static const double start[] = {0.0, 0.0};
+static const double start[STATES] = {0.0, 0.0};
 #elif MODEL == PENDULUM
 #define WEIGHT (0.46 * POUND * 386.0 * INCH)
 #define ARM (3.7 * INCH)
 static const double m = 1.5 * POUND * INCH * INCH + 0.46 * POUND * ARM * ARM;
 static const double hold = 0.1 * 0.25 * INCH * WEIGHT, slide = 0.1 * 0.25 * INCH * WEIGHT;
-static const double start[] = {10.02 * PI / 180.0, 0.0};
+static const double start[STATES] = {10.02 * PI / 180.0, 0.0};
 #else
 static const double m = 1.0, k = 157.9, hold = 0.5, slide = 0.5;
-static const double start[] = {0.1, 0.0};
+static const double start[STATES] = {0.1, 0.0};
 #endif
 
 typedef struct {
@@ -63,13 +73,14 @@ typedef struct {
 } Instance;
 
 /* What pulls at the body besides friction and damping, N or N m. */
-static double load(double t, double x)
+static double load(double t, N_Vector y)
 {
+    double x = NV_Ith_S(y, 0);
 #if MODEL == PENDULUM
     (void)t;
     return -WEIGHT * ARM * sin(x);
 #elif IS_SLED
-    return k * (v_driver * t - x);
+    return k * ((IS_DRIVEN ? NV_Ith_S(y, STATES - 1) : v_driver * t) - x);
 #else
     (void)t;
     return -k * x;
@@ -79,7 +90,7 @@ static double load(double t, double x)
 static int slopes(sunrealtype t, N_Vector y, N_Vector slope, void *user)
 {
     const Instance *it = user;
-    double x = NV_Ith_S(y, 0), v = NV_Ith_S(y, 1), resistance = it->mode * slide;
+    double v = NV_Ith_S(y, 1), resistance = it->mode * slide;
     if (MODEL == SMD) resistance = 2.0 * v;
     if (MODEL == PACEJKA) {
         double z = it->B * v;
@@ -87,11 +98,14 @@ static int slopes(sunrealtype t, N_Vector y, N_Vector slope, void *user)
     }
     bool stuck = IS_DRY && it->mode == 0;
     NV_Ith_S(slope, 0) = stuck ? 0.0 : v;
-    NV_Ith_S(slope, 1) = stuck ? 0.0 : (load(t, x) - resistance) / m;
+    NV_Ith_S(slope, 1) = stuck ? 0.0 : (load(t, y) - resistance) / m;
+#if IS_DRIVEN
+    NV_Ith_S(slope, 2) = v_driver;
+#endif
     return 0;
 }
 
-#if IS_STIFF
+#if IS_STIFF && !PLAIN
 static int derivatives(sunrealtype t, N_Vector y, N_Vector slope, SUNMatrix jacobian, void *user, N_Vector a, N_Vector b,
                        N_Vector c)
 {
@@ -109,14 +123,14 @@ static int derivatives(sunrealtype t, N_Vector y, N_Vector slope, SUNMatrix jaco
 static int change_of_mode(sunrealtype t, N_Vector y, sunrealtype *root, void *user)
 {
     const Instance *it = user;
-    root[0] = it->mode ? NV_Ith_S(y, 1) : hold - fabs(load(t, NV_Ith_S(y, 0)));
+    root[0] = it->mode ? NV_Ith_S(y, 1) : hold - fabs(load(t, y));
     return 0;
 }
 
 /* The mode from here on, where the body stands still; it breaks away if it was stuck. */
 static void settle(Instance *it, bool was_stuck)
 {
-    double pull = load(it->t, NV_Ith_S(it->y, 0));
+    double pull = load(it->t, it->y);
     it->mode = was_stuck || fabs(pull) > hold ? (pull > 0.0) - (pull < 0.0) : 0;
 }
 
@@ -147,7 +161,7 @@ fmi2Status fmi2Reset(fmi2Component c)
     Instance *it = c;
     it->values[RTOL] = 1e-6, it->values[ATOL] = 1e-9, it->values[X_M] = 0.01;
     it->t = 0.0;
-    for (int i = 0; i < 2; i++) NV_Ith_S(it->y, i) = start[i];
+    for (int i = 0; i < STATES; i++) NV_Ith_S(it->y, i) = start[i];
     return fmi2OK;
 }
 
@@ -166,15 +180,18 @@ void fmi2FreeInstance(fmi2Component c)
 static bool prepared(Instance *it)
 {
     if (SUNContext_Create(0, &it->context)) return false;
-    it->y = N_VNew_Serial(2, it->context);
-    it->cvode = CVodeCreate(IS_STIFF ? CV_BDF : CV_ADAMS, it->context);
+    it->y = N_VNew_Serial(STATES, it->context);
+    it->cvode = CVodeCreate(IS_IMPLICIT ? CV_BDF : CV_ADAMS, it->context);
     if (!it->y || !it->cvode) return false;
     bool good = !CVodeInit(it->cvode, slopes, 0.0, it->y) && !CVodeSetUserData(it->cvode, it) &&
                 !CVodeSetMaxNumSteps(it->cvode, 1000000);
-#if IS_STIFF
-    it->matrix = SUNDenseMatrix(2, 2, it->context);
+#if IS_IMPLICIT
+    it->matrix = SUNDenseMatrix(STATES, STATES, it->context);
     it->linear = SUNLinSol_Dense(it->y, it->matrix, it->context);
-    good = good && !CVodeSetLinearSolver(it->cvode, it->linear, it->matrix) && !CVodeSetJacFn(it->cvode, derivatives);
+    good = good && !CVodeSetLinearSolver(it->cvode, it->linear, it->matrix);
+#if !PLAIN
+    good = good && !CVodeSetJacFn(it->cvode, derivatives);
+#endif
 #else
     it->fixed_point = SUNNonlinSol_FixedPoint(it->y, 0, it->context);
     good = good && !CVodeSetNonlinearSolver(it->cvode, it->fixed_point);

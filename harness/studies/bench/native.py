@@ -135,24 +135,30 @@ def runs(
     words = [f"{library.references[name]}={value!r}" for name, value in values.items()]
     words += [str(library.references[name]) for name in read]
     calls = f"0 new bench quiet\n0 time {repeat} {stop!r} {steps} {' '.join(words)}\n0 free\n"
+    (_, seconds), *rows = (line.split() for line in played(library, calls).splitlines())
+    return Timing(float(seconds), np.array([row[1:] for row in rows], dtype=float))
+
+
+def played(library: Library, calls: str) -> str:
+    """What the host in C answers."""
     done = ask(library.command, calls, library.environment)
     if done.returncode:
         raise HarnessError((done.stderr.splitlines() or [f"{library.file.name} ends the host in C"])[0])
-    (_, seconds), *rows = (line.split() for line in done.stdout.splitlines())
-    return Timing(float(seconds), np.array([row[1:] for row in rows], dtype=float))
+    return done.stdout
 
 
 # Measured once, for all rows that show it.
 
 
 @cache
-def cvode(model: str) -> Library:
-    """The CVODE FMU, compiled for a model."""
+def cvode(model: str, plain: bool = False) -> Library:
+    """The CVODE FMU, compiled for a model; `plain` as importers solve in model exchange."""
     looking = [compiler(), "-E", "-x", "c", "-", "-o", os.devnull]
     if ask(looking, "#include <cvode/cvode.h>\n").returncode:
         raise NotHereError("not installed: SUNDIALS for C (on Debian libsundials-dev)")
-    source, options = Path(__file__).with_name("cvode.c"), (f"-DMODEL={model.upper()}", "-shared", "-fPIC")
-    file = compiled(source, f"{model}-cvode.so", options, ("-lsundials_cvode", "-lsundials_nvecserial", "-lm"))
+    options = (f"-DMODEL={model.upper()}", f"-DPLAIN={plain:d}", "-shared", "-fPIC")
+    libraries = ("-lsundials_cvode", "-lsundials_nvecserial", "-lm")
+    file = compiled(Path(__file__).with_name("cvode.c"), f"{model}-{plain:d}-cvode.so", options, libraries)
     return Library(file, {name: place for place, name in enumerate(("x", "v", "rtol", "atol", "x_m"))})
 
 

@@ -16,13 +16,14 @@ FOLDER, FILE = "bench", "bench.csv"
 
 
 def measures() -> list[Callable[[], Measure]]:
-    """All that is measured: run times, then those of the native FMUs, then errors."""
+    """All that is measured: run times, then those of the native FMUs, then model exchange, then errors."""
     check()
     from .accuracy import accuracy
+    from .exchange import exchange
     from .native import native
     from .speed import speed
 
-    return [*speed(), *native(), *accuracy()]
+    return [*speed(), *native(), *exchange(), *accuracy()]
 
 
 def bench(chosen: list[Callable[[], Measure]], out: Path, report: Callable[[str, float], None]) -> list[Measure]:
