@@ -1,12 +1,15 @@
 """Where another body can be joined to that of a model: terminalsAndIcons.xml (FMI 3.0.2, section 2.4.9)."""
 
+from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from .document import document
 from .further import Variables
 
-PATH = "terminalsAndIcons/terminalsAndIcons.xml"
+FOLDER, FILE = "terminalsAndIcons", "terminalsAndIcons.xml"
 CORNERS = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+EDGE = {"x1": "90", "y1": "-10", "x2": "110", "y2": "10"}  # on the right
+ICON = Path(__file__).with_name("flange.png")
 FLANGES = {  # unit of the input -> units of position and speed, and what each is called
     "N": (("m", "m/s"), ("position", "speed", "force")),
     "N.m": (("rad", "rad/s"), ("angle", "angular_speed", "torque")),
@@ -14,7 +17,8 @@ FLANGES = {  # unit of the input -> units of position and speed, and what each i
 
 
 def terminals(declared: Variables) -> dict[str, bytes]:
-    """The file by its path, for a model of one body and one input that is a force or a torque on it: the flange."""
+    """The file, and the icon that it names, by their paths; for a model of one body and one input that is a force or a
+    torque on it: the flange."""
     names = {meaning.name: name for name, meaning in declared}
     inputs = [(name, meaning) for name, meaning in declared if meaning.causality == "input"]
     moving = [(name, meaning) for name, meaning in declared if meaning.role == "state" and meaning.rate_of]
@@ -34,4 +38,5 @@ def terminals(declared: Variables) -> dict[str, bytes]:
     for member, variable in zip(members, (position, speed, force), strict=True):
         kind = "inflow" if variable == force else "signal"
         SubElement(terminal, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind=kind)
-    return {PATH: document(root)}
+    SubElement(terminal, "TerminalGraphicalRepresentation", EDGE, iconBaseName=ICON.stem)
+    return {f"{FOLDER}/{FILE}": document(root), f"{FOLDER}/{ICON.name}": ICON.read_bytes()}

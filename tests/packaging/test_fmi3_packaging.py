@@ -2,6 +2,7 @@
 
 from functools import partial
 from html.parser import HTMLParser
+from io import BytesIO
 from math import inf
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
 from models import ROOT, model_class
+from PIL import Image
 
 from fmus.packaging.catalogue import load, names
 from fmus.packaging.further import exchanged
@@ -205,6 +207,7 @@ def test_the_files_are_those_of_fmi_3(fmu, name):
         "documentation/index.html",
         "documentation/licenses/license.txt",
         "modelDescription.xml",
+        "terminalsAndIcons/flange.png",
         "terminalsAndIcons/icon.png",
         "terminalsAndIcons/terminalsAndIcons.xml",
         f"binaries/x86_64-linux/{name}.so",
@@ -214,8 +217,9 @@ def test_the_files_are_those_of_fmi_3(fmu, name):
 
 
 @EVERY_MODEL
-def test_the_flange_is_that_of_the_body_and_valid(fmu, name):
-    content = entries(fmu(name))["terminalsAndIcons/terminalsAndIcons.xml"]
+def test_the_flange_is_that_of_the_body_valid_and_drawn(fmu, name):
+    files = entries(fmu(name))
+    content = files["terminalsAndIcons/terminalsAndIcons.xml"]
     schema = etree.XMLSchema(etree.parse(str(SCHEMA / "fmi3TerminalsAndIcons.xsd")))
     schema.assertValid(etree.fromstring(content))
     members = [
@@ -224,6 +228,9 @@ def test_the_flange_is_that_of_the_body_and_valid(fmu, name):
     ]
     x, v = [variable for variable, meaning in variables(load(name)()) if meaning.role == "state"][:2]
     assert members == [(x, "signal"), (v, "signal"), ("T_ext" if name == "pendulum" else "F_ext", "inflow")]
+    (drawn,) = etree.fromstring(content).iter("TerminalGraphicalRepresentation")
+    with Image.open(BytesIO(files[f"terminalsAndIcons/{drawn.get('iconBaseName')}.png"])) as icon:
+        icon.verify()
 
 
 @EVERY_MODEL
