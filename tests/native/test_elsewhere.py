@@ -7,17 +7,20 @@ import os
 import shutil
 import subprocess
 import sys
+from functools import cache
 
+import builds
+import fmi3_hosts
 import pytest
-from models import CASES, HYBRID, MODELS, RODAS, declared, label, outputs
+from models import CASES, HYBRID, MODELS, RODAS, declared, label, model_class, outputs
 from native_fmus import built, room
-from native_host import HEADERS, SOURCE, begin, folder, guid, play, references, unpacked
+from native_host import HEADERS, SOURCE, SOURCE3, begin, folder, guid, host, lives, play, references, unpacked
 
 ROWS = 50
 ARM = "/usr/aarch64-linux-gnu"  # where Debian puts the C library
-MACHINES = {
-    "win64": ("x86_64-windows-gnu", ".dll", ["wine"]),
-    "aarch64-linux": ("aarch64-linux-gnu.2.17", ".so", ["qemu-aarch64", "-L", ARM]),
+MACHINES = {  # the compiler's name, the suffix of libraries, their folder in FMI 3.0, what runs them
+    "win64": ("x86_64-windows-gnu", ".dll", "x86_64-windows", ["wine"]),
+    "aarch64-linux": ("aarch64-linux-gnu.2.17", ".so", "aarch64-linux", ["qemu-aarch64", "-L", ARM]),
 }
 CLOSE = dict.fromkeys(MODELS, 1e-11) | {"pacejka": 1e-9}  # of an output's largest value; break-aways amplify
 
@@ -33,41 +36,33 @@ STEADY = [case for case in CASES if is_steady(case)]
 
 @pytest.fixture(scope="module", params=MACHINES)
 def machine(request):
-    """A platform, and the command that starts the host there."""
-    target, _, (emulator, *options) = MACHINES[request.param]
+    """A platform, the command that starts a host there, by its source, and the environment for it."""
+    target, _, _, (emulator, *options) = MACHINES[request.param]
     if not shutil.which(emulator) or (options and not os.path.isdir(ARM)):
         pytest.skip(f"{emulator} is not here: apt-get install wine64 wine qemu-user libc6-arm64-cross")
-    out = folder(f"host on {request.param}") / "host.exe"
-    command = [
-        sys.executable,
-        "-m",
-        "ziglang",
-        "cc",
-        "-target",
-        target,
-        "-O1",
-        f"-I{HEADERS}",
-        str(SOURCE),
-        "-o",
-        str(out),
-    ]
-    subprocess.run(command, check=True)
-    return request.param, [emulator, *options, str(out)]
+
+    def program(source):
+        out = folder(f"{source.stem} on {request.param}") / "host.exe"
+        compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", f"-I{HEADERS}"]
+        subprocess.run([*compiler, str(source), "-o", str(out)], check=True)
+        return [emulator, *options, str(out)]
+
+    quiet = {"WINEDEBUG": "-all", "WINEPREFIX": str(folder(f"wine of {request.param}")), "HOME": room().name}
+    return request.param, cache(program), os.environ | quiet
 
 
 def play_there(machine, name, script):
     """As play, there."""
-    platform, command = machine
+    platform, program, environment = machine
     fmu = built(*MACHINES) / f"{name}.fmu"
     library = unpacked(fmu) / "binaries" / platform / f"{name}{MACHINES[platform][1]}"
-    quiet = {"WINEDEBUG": "-all", "WINEPREFIX": str(folder("wine")), "HOME": room().name}
     done = subprocess.run(
-        [*command, str(library), guid(fmu), "1"],
+        [*program(SOURCE), str(library), guid(fmu), "1"],
         input="\n".join(script),
         capture_output=True,
         text=True,
         timeout=120,
-        env={**os.environ, **quiet},
+        env=environment,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
@@ -84,6 +79,15 @@ def runs(name):
     return script
 
 
+def exchange(name):
+    """A script by Euler's steps in model exchange, with an event at each; a sled begins far behind its driver."""
+    ref, driven = references(name), "x_driver" in declared(name)
+    states, behind = len(model_class(name).states) + driven, [(ref["x0"], -0.2)] if driven else []
+    reals = " ".join(str(ref[v]) for v in outputs(name) if declared(name)[v].type == "Real")
+    spans = [f"0 euler {states} {k / ROWS!r} {(k + 1) / ROWS!r} 40 {reals}" for k in range(ROWS)]
+    return ["0 new exchange", *begin(0, behind)[1:], *spans]
+
+
 def tables(answers):
     """The rows of every case, column by column."""
     rows = [[float.fromhex(word) for word in line.split()[1:]] for line in answers if line.count(" ") > 2]
@@ -96,11 +100,37 @@ def test_the_answers_are_those_of_linux_on_x86(machine, name):
     here, there = tables(play(built() / f"{name}.fmu", script)[0]), tables(play_there(machine, name, script))
     cases = [case for case in STEADY if case[0] == name]
     for case, table, other in zip(cases, here, there, strict=True):
-        sizes = [max(map(abs, column)) or 1.0 for column in table]
-        apart = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in zip(table, other, strict=True)]
-        worst = max(difference / size for difference, size in zip(apart, sizes, strict=True))
-        print(f"{machine[0]} {label(case)}: largest difference {worst:.1e}")
-        assert worst <= CLOSE[name]
+        print(f"{machine[0]} {label(case)}: largest difference {apart(table, other):.1e}")
+        assert apart(table, other) <= CLOSE[name]
+
+
+def apart(table, other):
+    """The largest difference of two tables, as a share of the largest value of each column."""
+    sizes = [max(map(abs, column)) or 1.0 for column in table]
+    differences = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in zip(table, other, strict=True)]
+    return max(difference / size for difference, size in zip(differences, sizes, strict=True))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_model_exchange_is_that_of_linux_on_x86(machine, name):
+    script = exchange(name)
+    (here,), (there,) = tables(play(built() / f"{name}.fmu", script)[0]), tables(play_there(machine, name, script))
+    assert len(set(here[0])) > 3  # it moves
+    assert apart(here, there) <= CLOSE[name]
+
+
+def test_fmi_3_is_that_of_linux_on_x86(machine):
+    """Both ways to simulate the sled, its states saved, and a refusal; the numerics are those of FMI 2.0."""
+    platform, program, environment = machine
+    _, suffix, place, _ = MACHINES[platform]
+    platforms = [word for each in MACHINES for word in ("--platform", each)]
+    there = builds.once("fmi3-elsewhere", "stickslip", "--fmi", "3", *platforms, timeout=600)
+    program, library = program(SOURCE3), f"{place}/stickslip{suffix}"
+    ends, said = lives(program, there / "stickslip.fmu", library, 2, 4000, env=environment)
+    sled, library = fmi3_hosts.built() / "stickslip.fmu", "x86_64-linux/stickslip.so"
+    expected, sentences = lives([host(source=SOURCE3)], sled, library, 2, 4000)
+    assert ends == [pytest.approx(row, abs=1e-11) for row in expected]
+    assert said == sentences
 
 
 def test_the_sentences_are_those_of_linux_on_x86(machine):

@@ -9,13 +9,11 @@
  * Prints the POSITION and the SPEED (value references) at the stop, for co-simulation, then for model exchange; what is
  * logged goes to standard error.  The exit status is 0 if all went well and the library could be unloaded.
  */
-#include <dlfcn.h>
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "fmi3FunctionTypes.h"
+#include "library.h"
 
 enum { STATES = 3, OUTPUTS = 2 };
 
@@ -37,12 +35,6 @@ typedef struct {
     int steps;
     fmi3ValueReference outputs[OUTPUTS], bad;
 } Task;
-
-static void die(const char *what)
-{
-    fprintf(stderr, "host: %s\n", what);
-    exit(1);
-}
 
 static void ok(fmi3Status status, const char *what)
 {
@@ -176,9 +168,8 @@ static void refuse(const Task *task)
 int main(int argc, char **argv)
 {
     if (argc != 10) die("usage: fmi3_host LIBRARY TOKEN RESOURCES LIVES STOP STEPS POSITION SPEED PARAMETER");
-    void *library = dlopen(argv[1], RTLD_NOW | RTLD_LOCAL);
-    if (!library) die(dlerror());
-#define FIND(name) if (!(*(void **)&fmi.name = dlsym(library, "fmi3" #name))) die(#name);
+    void *library = opened(argv[1]);
+#define FIND(name) *(void **)&fmi.name = found(library, "fmi3" #name);
     FUNCTIONS(FIND)
     fmi3ValueReference references[3];
     for (int i = 0; i < 3; i++) references[i] = (fmi3ValueReference)strtoul(argv[7 + i], NULL, 10);
@@ -190,6 +181,5 @@ int main(int argc, char **argv)
     }
     refuse(&task);
     for (int exchange = 0; exchange < 2; exchange++) printf("%a %a\n", seen[exchange][0], seen[exchange][1]);
-    if (dlclose(library)) die(dlerror());
-    return 0;
+    return closed(library) ? 0 : 1;
 }

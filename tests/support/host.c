@@ -5,9 +5,10 @@
  * Every thread plays the whole script with instances of its own; what they say must agree.  One command a line, with
  * the number of an instance first, and what it answers on a line each: the status, then values as hexadecimal floats.
  *
- *     I new                      instantiate            I setup TOLERANCE START STOP   (nan: not given)
+ *     I new [exchange]           instantiate            I setup TOLERANCE START STOP   (nan: not given)
  *     I enter | exit | terminate | reset | free
  *     I step T H                 I run START STOP COUNT REFERENCE...   equal steps; the values after the last one
+ *     I euler STATES START STOP COUNT REFERENCE...    the same by Euler's steps in model exchange, each with an event
  *     I setr REFERENCE VALUE     I seti REFERENCE VALUE               I setb REFERENCE VALUE    I sets REFERENCE TEXT
  *     I getr REFERENCE...        I geti REFERENCE...                  I getb REFERENCE...       I gets REFERENCE...
  *     I save SLOT                I restore SLOT                       I drop SLOT
@@ -25,14 +26,13 @@
 #include <string.h>
 #include <time.h>
 #ifdef _WIN32
-#include <windows.h>
 #define strtok_r strtok_s
 #else
-#include <dlfcn.h>
 #include <pthread.h>
 #endif
 
 #include "fmi2FunctionTypes.h"
+#include "library.h"
 
 enum { INSTANCES = 1000, SLOTS = 16, WORDS = 40, THREADS = 32 };
 
@@ -42,7 +42,8 @@ enum { INSTANCES = 1000, SLOTS = 16, WORDS = 40, THREADS = 32 };
     f(GetString) f(SetReal) f(SetInteger) f(SetBoolean) f(SetString) f(GetFMUstate) f(SetFMUstate) f(FreeFMUstate)    \
     f(SerializedFMUstateSize) f(SerializeFMUstate) f(DeSerializeFMUstate) f(GetDirectionalDerivative)                 \
     f(SetRealInputDerivatives) f(GetRealOutputDerivatives) f(DoStep) f(CancelStep) f(GetStatus) f(GetRealStatus)      \
-    f(GetIntegerStatus) f(GetBooleanStatus) f(GetStringStatus)
+    f(GetIntegerStatus) f(GetBooleanStatus) f(GetStringStatus) f(EnterEventMode) f(NewDiscreteStates)                 \
+    f(EnterContinuousTimeMode) f(SetTime) f(GetContinuousStates) f(SetContinuousStates) f(GetDerivatives)
 
 static struct {
 #define DECLARE(name) fmi2##name##TYPE *name;
@@ -69,12 +70,6 @@ static void hear(fmi2ComponentEnvironment environment, fmi2String instance, fmi2
     vfprintf(player->out, message, values);
     fprintf(player->out, "\n");
     va_end(values);
-}
-
-static void die(const char *what)
-{
-    fprintf(stderr, "host: %s\n", what);
-    exit(1);
 }
 
 static void answer(Player *player, fmi2Status status) { fprintf(player->out, "%d\n", status); }
@@ -105,6 +100,23 @@ static void run(Player *player, fmi2Component c, char **words, int count)
         t = next;
     }
     say_reals(player, status, values, size);
+}
+
+/* From event mode to event mode. */
+static void euler(Player *player, fmi2Component c, size_t states, char **words, int count)
+{
+    fmi2ValueReference wanted[WORDS];
+    double values[WORDS], x[WORDS], rates[WORDS], start = strtod(words[0], NULL), stop = strtod(words[1], NULL);
+    int steps = atoi(words[2]), size = references(words + 3, count - 3, wanted), status = fmi2OK;
+    fmi2EventInfo event;
+    for (int i = 1; i <= steps; i++) {
+        status |= fmi.NewDiscreteStates(c, &event) | fmi.EnterContinuousTimeMode(c);
+        status |= fmi.GetContinuousStates(c, x, states) | fmi.GetDerivatives(c, rates, states);
+        for (size_t k = 0; k < states; k++) x[k] += (stop - start) / steps * rates[k];
+        status |= fmi.SetTime(c, start + (stop - start) * i / steps) | fmi.SetContinuousStates(c, x, states);
+        status |= fmi.EnterEventMode(c) | fmi.GetReal(c, wanted, (size_t)size, values);
+    }
+    say_reals(player, (fmi2Status)status, values, size);
 }
 
 static void refused_instances(Player *player)
@@ -190,7 +202,7 @@ static void play(Player *player, char *line)
         char name[24];
         snprintf(name, sizeof name, "%d", i);
         player->instances[i] =
-            fmi.Instantiate(name, fmi2CoSimulation, player->guid, "", &player->callbacks, fmi2False, fmi2True);
+            fmi.Instantiate(name, count > 2 ? fmi2ModelExchange : fmi2CoSimulation, player->guid, "", &player->callbacks, fmi2False, fmi2True);
         if (!player->instances[i]) die("no instance");
     } else if (IS("free")) {
         fmi.FreeInstance(c);
@@ -209,6 +221,8 @@ static void play(Player *player, char *line)
         answer(player, fmi.DoStep(c, strtod(words[2], NULL), strtod(words[3], NULL), fmi2True));
     } else if (IS("run")) {
         run(player, c, words + 2, count - 2);
+    } else if (IS("euler")) {
+        euler(player, c, (size_t)a, words + 3, count - 3);
     } else if (!strncmp(command, "set", 3) || !strncmp(command, "get", 3)) {
         values(player, c, command, words + 2, count - 2);
     } else if (IS("save")) {
@@ -265,25 +279,9 @@ static char *everything(FILE *file)
     return text;
 }
 
-static void *found(void *library, const char *name)
-{
-#ifdef _WIN32
-    void *function = (void *)GetProcAddress((HMODULE)library, name);
-#else
-    void *function = dlsym(library, name);
-#endif
-    if (!function) die(name);
-    return function;
-}
-
 static void load(const char *path)
 {
-#ifdef _WIN32
-    void *library = LoadLibraryA(path);
-#else
-    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-#endif
-    if (!library) die("the library does not load");
+    void *library = opened(path);
 #define FIND(name) *(void **)&fmi.name = found(library, "fmi2" #name);
     FUNCTIONS(FIND)
 }

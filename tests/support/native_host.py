@@ -1,5 +1,6 @@
 """The C host of tests/support, compiled by the system's compiler, and scripts for it."""
 
+import os
 import shutil
 import subprocess
 import zipfile
@@ -9,13 +10,14 @@ from xml.etree.ElementTree import fromstring
 
 import fmpy
 import pytest
-from models import declared
+from models import declared, model_class, outputs
 from native_fmus import room
 
 from fmus.packaging.native.compiler import LIBRARY, SAME_BITS, STRICT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 SOURCE = Path(__file__).with_name("host.c")
+SOURCE3 = SOURCE.with_name("fmi3_host.c")
 
 
 def compiler():
@@ -33,11 +35,11 @@ def folder(kind):
 
 
 @cache
-def host(sanitizer=""):
+def host(sanitizer="", source=SOURCE):
     """The host, as a program."""
-    out = folder(sanitizer) / "host"
-    command = [compiler(), *STRICT, "-g1", *sanitized(sanitizer), f"-I{HEADERS}", str(SOURCE), "-o", str(out)]
-    subprocess.run([*command, "-ldl", "-lpthread"], check=True)
+    out = folder(f"{sanitizer} {source.stem}") / "host"
+    command = [compiler(), *STRICT, "-g1", *sanitized(sanitizer), f"-I{HEADERS}", str(source), "-o", str(out)]
+    subprocess.run([*command, "-ldl", "-lpthread", "-lm"], check=True)
     return out
 
 
@@ -57,6 +59,21 @@ def unpacked(fmu):
 
 def guid(fmu):
     return fromstring((unpacked(fmu) / "modelDescription.xml").read_bytes()).attrib["guid"]
+
+
+def lives(program, fmu, library, number, steps, **options):
+    """What fmi3_host.c, started by `program`, tells of lives of an FMI 3.0 FMU: the last position and speed in
+    co-simulation and in model exchange, and the lines that it says."""
+    name, place = fmu.stem, unpacked(fmu)
+    token = fromstring((place / "modelDescription.xml").read_bytes()).attrib["instantiationToken"]
+    read = [references(name)[variable] for variable in (*outputs(name)[:2], "m")]
+    words = [place / "binaries" / library, token, f"{place / 'resources'}{os.sep}", number, model_class(name).stop_time]
+    command = [*program, *map(str, (*words, steps, *read))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
+    assert done.returncode == 0, done.stderr
+    return [
+        [float.fromhex(word) for word in line.split()] for line in done.stdout.splitlines()
+    ], done.stderr.splitlines()
 
 
 @cache
