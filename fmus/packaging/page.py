@@ -22,6 +22,18 @@ it, and every internal step and every event shows.</p>
 <p>A value that cannot be used, or a run that cannot go on, is told in one sentence, in the log and on standard error;
 <code>doStep</code> fails, and every calculated Real reads NaN from then on. Reset recovers.</p>
 """
+OFFERED = """\
+| | in Python | native | native, FMI 3.0 |
+| FMI | 2.0 | 2.0 | 3.0 |
+| co-simulation; state saved and serialised | yes | yes | yes |
+| model exchange: indicators, time events, nominals | | yes | yes |
+| directional derivatives | | yes | yes, adjoint too |
+| rates of outputs (derivatives of order 1) | | yes | yes |
+| rates of inputs: a force that ramps, exact in the closed forms through stick and slip | | yes | |
+| event mode, early return at stick and slip | | | yes |
+| intermediate update after every internal step | | | yes |
+| terminal `flange`: position, speed, force | | | yes |
+"""  # by each kind of FMU, as the README has it
 FREE = Declared("", "").allowed  # in words, where every finite number is
 
 
@@ -46,7 +58,7 @@ def page(model: type[Declaring], name: str, declared: Variables, found: Referenc
         ("Solver and events", [pair for pair in plain if "." in pair[0]]),
     ):
         parts += [f"<h2>{title}</h2>", _table(chosen)]
-    parts += ["<h2>Use</h2>", WAYS + use, _footer(model, found)]
+    parts += ["<h2>Use</h2>", WAYS + use, _offered(), _footer(model, found)]
     head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(name)}</title>"
     style = STYLE.read_text(encoding="utf-8")
     begin = f"<!doctype html>\n<html lang='en'><head>{head}<style>\n{style}</style></head><body>"
@@ -127,6 +139,15 @@ def _table(chosen: Variables) -> str:
     value = "default" if all(set_) else "default, unit" if any(set_) else "unit"
     head = f"<thead><tr><th>name</th><th>{value}</th><th>what it is</th></tr></thead>"
     return f"<table>{head}{''.join(rows)}</table>"
+
+
+def _offered() -> str:
+    """What every kind of FMU offers."""
+    marked = re.sub("`(.*?)`", r"<code>\1</code>", OFFERED)
+    head, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in marked.splitlines())
+    titles = "".join(f"<th>{title}</th>" for title in head)
+    lines = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<table class='offered'><thead><tr>{titles}</tr></thead>{lines}</table>"
 
 
 def _footer(model: type[Declaring], found: Reference | None) -> str:

@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 from io import StringIO
 from xml.etree import ElementTree
 
+import fmi3_hosts
 import native_fmus
 import pytest
 from builds import ROOT
@@ -40,6 +41,46 @@ def test_a_native_fmu_tells_the_same_and_the_ways_to_run_it(content, name):
     assert len(told) == 1 + (name in WITH["png"]) + 2 * (name in WITH["csv"])
     native[PAGE] = native[PAGE].replace(USE.encode(), b"", 1)
     assert told == {path: native.get(path) for path in told}
+
+
+TOLD = {  # by what a model description says it, where an attribute is not false: how its name begins in both versions
+    "FMI": (".", "fmiVersion"),
+    "co-simulation; state saved and serialised": ("CoSimulation", "canSerializeFMU"),
+    "model exchange: indicators, time events, nominals": ("ModelExchange", "modelIdentifier"),
+    "directional derivatives": ("CoSimulation", "providesDirectional"),
+    "rates of outputs (derivatives of order 1)": ("CoSimulation", "maxOutputDerivativeOrder"),
+    "rates of inputs: a force that ramps, exact in the closed forms through stick and slip": (
+        "CoSimulation",
+        "canInterpolateInputs",
+    ),
+    "event mode, early return at stick and slip": ("CoSimulation", "hasEventMode"),
+    "intermediate update after every internal step": ("CoSimulation", "providesIntermediateUpdate"),
+}
+
+
+def test_what_each_kind_offers_is_true_and_stands_on_every_page_as_in_the_readme(content):
+    """Of a model in closed form, which can all of it."""
+    kinds = [
+        content("stickslip"),
+        *(entries(built() / "stickslip.fmu") for built in (native_fmus.built, fmi3_hosts.built)),
+    ]
+    for files in kinds:
+        (table,) = re.findall(r"<table class='offered'>.*?</table>", files[PAGE].decode())
+        rows = [re.findall(r"<td>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
+        text = (ROOT / "README.md").read_text(encoding="utf-8")
+        told = text.split("## FMI 3.0 and model exchange")[1].split("|---|---|---|---|\n")[1].split("\n\n")[0]
+        assert rows == [
+            [re.sub("`(.*?)`", r"<code>\1</code>", cell.strip()) for cell in line.split("|")[1:-1]]
+            for line in told.splitlines()
+        ]
+    for what, *offered in rows:
+        if what.startswith("terminal"):
+            assert [bool(cell) for cell in offered] == [any("flange" in name for name in files) for files in kinds]
+            continue
+        element, start = TOLD[what]
+        found = [ElementTree.fromstring(files["modelDescription.xml"]).find(element) for files in kinds]
+        said = [{k: v for k, v in e.attrib.items() if k.startswith(start)} if e is not None else {} for e in found]
+        assert [bool(cell) for cell in offered] == [set(each.values()) not in (set(), {"false"}) for each in said]
 
 
 class Reader(HTMLParser):
