@@ -62,7 +62,8 @@ class Frame:
         for e, rate in self.an.ramps.items():
             if e not in s.given and any(depends(one, (e,)) for one in targets):
                 s.given[e] = e.name
-                s.say(f"{e.name} = self.{e.name}_base + self.{rate.name} * (t - self.t_base)")
+                moved = f"self.{e.name}_base + self.{rate.name} * (t - self.t_base)"
+                s.say(f"{e.name} = {moved} if self.{rate.name} != 0.0 else self.{e.name}_base")
         if self.drive is not None and any(depends(e, (self.drive,)) for e in targets):
             s.given[self.drive] = self.drive.name
             s.say(f"{self.drive.name} = self.x_base + self.{self.drive.steady.name} * (t - self.t_base)")
