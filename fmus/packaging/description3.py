@@ -60,6 +60,8 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
     elements = SubElement(root, "ModelVariables")
     for reference, (variable, meaning) in enumerate(declared):
         attributes = part_of_all(variable, meaning, reference) | part_of_type(variable, meaning)
+        if meaning.causality in ("input", "output") and meaning.variability == "continuous":
+            attributes["intermediateUpdate"] = "true"
         SubElement(elements, TYPES[meaning.type], attributes)
     tell_states(list(elements), thing, rates, first=0)
     _structure(root, thing, declared, rates, at_start(model, variables(thing)))

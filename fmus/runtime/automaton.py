@@ -93,7 +93,7 @@ class DryFriction(Oscillator):
         wait = (limit - modes[i] * load) / fabs(rate)
         _, J = self.jacobian(t, y, modes)
         stiffness = J[slip[i], place[i]]
-        return wait == 0.0 or 0.0 < -0.5 * stiffness * wait * wait < near
+        return (stiffness < 0.0 or wait == 0.0) and -0.5 * stiffness * wait * wait < near
 
     def departure(self, t, y: States, modes: Contacts, i: Contact):
         """The rate of a slip at a break-away, where the load is just the limit."""

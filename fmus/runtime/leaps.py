@@ -35,10 +35,11 @@ def leap(run, model, waits):
     march = model.solver
     step = march.step
     run.observed = False
-    if march.t >= step.t1:
+    status = rules.ready(run, model)  # an input may have been set here
+    if status == OK and march.t >= step.t1:
         status = step.take(model)
-        if status != OK:
-            return status
+    if status != OK:
+        return status
     exchange.leaps += 1
     if exchange.leaps > MOST_STEPS or step.called + step.looked > exchange.most:
         return ENDLESS

@@ -6,8 +6,9 @@ from math import inf
 import fmi3_hosts
 import fmpy
 import pytest
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
-from models import MODELS, declared, model_class, outputs
+from models import MODELS, declared, model_class, outputs, push
 
 from harness.truths.reference import load
 
@@ -146,7 +147,7 @@ def test_inside_a_step_the_master_is_shown_every_internal_step_and_may_stop_anyw
 
     def look(_, time, setting, getting, finished, may_return, request, when):
         looks.append((time, fmu.getFloat64([place])[0]))
-        assert (setting, getting, may_return) == (False, True, early)
+        assert (setting, getting, may_return) == (True, True, early)
         assert finished == (time > began)
         request[0], when[0] = True, wanted
 
@@ -189,6 +190,32 @@ def test_what_is_set_at_an_event_acts_from_there_on(unpacked):
             rows.append([read(variable) for variable in (*outputs("stickslip"), "events.count", "events.t_last")])
     assert rows[0] == rows[1]
     assert rows[0][-2] == 1
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_input_that_is_set_inside_a_step_acts_from_there_on(unpacked, name):
+    """As if it had been set between two steps at the same time; of what is no input, nothing can be set there."""
+    (force, size), stop = push(name), 0.5 * model_class(name).stop_time
+    places = [next(v.valueReference for v in unpacked(name)[1].modelVariables if v.name == one) for one in (force, "m")]
+    rows, turned = [], []
+
+    def look(_, time, setting, getting, finished, may_return, request, when):
+        if time > 0.3 * stop and not turned:
+            turned.append(time)
+            fmu.setFloat64(places[:1], [size])
+            with pytest.raises(FMICallException):
+                fmu.setFloat64(places[1:], [1.0])
+
+    for options in {"intermediateUpdate": look}, {}:
+        with master(unpacked, name, {"solver.method": 3}, **options) as (fmu, read, write):
+            t = 0.0
+            if turned:
+                (t,) = turned
+                fmu.doStep(0.0, t)
+                write(force, size)
+            fmu.doStep(t, stop - t)
+            rows.append([read(variable) for variable in (*outputs(name), force)])
+    assert rows[0] == rows[1]
 
 
 @pytest.mark.parametrize("name", COUNTED)

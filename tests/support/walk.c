@@ -144,7 +144,7 @@ static void look(fmi3InstanceEnvironment environment, fmi3Float64 t, fmi3Boolean
 {
     Desk *desk = environment;
     (void)finished;
-    HOLDS(!set && get && early && isfinite(t));
+    HOLDS(set && get && early && isfinite(t));
     if (desk->look) desk->look(desk);
     *wants = desk->wants, *wanted = desk->h;
 }

@@ -139,8 +139,13 @@ fmi3Status fmi3GetInt64(fmi3Instance instance, const fmi3ValueReference valueRef
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues)
 {
-    ENTER(instance, LIVING);
+    ENTER(instance, LIVING | 1 << INTERMEDIATE);
     ONE_EACH;
+    for (size_t i = 0; it->state.run.phase == INTERMEDIATE && valueReferences && i < nValueReferences; i++) {
+        uint32_t reference = valueReferences[i];
+        bool is_input = reference < VARIABLES && variables[reference].moves && !variables[reference].is_calculated;
+        if (!is_input) return refuse_order(it, LIVING, __func__);
+    }
     WRITE(it, &FLOAT64, valueReferences, nValueReferences, values);
 }
 
@@ -263,7 +268,8 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
     return fmi3OK;
 }
 
-/* Let the importer look at the present point, where a leap ends or the first begins, and say where it wants to stop. */
+/* Let the importer look at the present point, where a leap ends or the first begins, set inputs from there on, and say
+ * where it wants to stop. */
 static void show(Instance *it, bool finished)
 {
     struct Exchange *exchange = &it->state.model.exchange;
@@ -271,7 +277,7 @@ static void show(Instance *it, bool finished)
     bool wants = false;
     if (!it->host.look) return;
     it->state.run.phase = INTERMEDIATE;
-    it->host.look(it->host.environment, now, false, true, finished, it->host.returns, &wants, &wanted);
+    it->host.look(it->host.environment, now, true, true, finished, it->host.returns, &wants, &wanted);
     it->state.run.phase = RUNNING;
     if (!it->host.returns || !wants || !(wanted < exchange->end)) return;
     if (wanted > now) exchange->end = wanted;
