@@ -249,7 +249,7 @@ def update(model, march):
                         march.modes[i] = 1 if rate > 0.0 else -1
                 if march.modes[i] != mode:
                     changed = True
-                    if march.modes[i] != STUCK:
+                    if march.modes[i] != STUCK and march.y[slip[i]] == 0.0:
                         fits = fits and model.goes_its_way(march.t, march.y, march.modes, i)
     if not fits:
         for i in places:
