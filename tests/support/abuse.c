@@ -300,6 +300,8 @@ static void calls(uint64_t seed, int turns)
     static char bytes[CROWD][BYTES];
     Instance *quiet = life(3);
     static char before[BYTES], after[BYTES];
+    fmi2ValueReference push = 0; /* the input */
+    while (variables[push].rate == NO_SLOPE) push++;
     bytes_of(quiet, before);
     chance = seed;
     for (int turn = 0; turn < turns; turn++) {
@@ -314,9 +316,10 @@ static void calls(uint64_t seed, int turns)
         settings(references, reals, integers, count);
         double *places = draw(20) ? reals : NULL, slopes[FEW];
         size_t rows = draw(9) ? STATES : draw(FEW), limits = draw(9) ? INDICATORS : draw(FEW);
+        const fmi2Integer orders[FEW] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2};
         fmi2EventInfo event;
         fmi2Boolean flag;
-        switch (draw(38)) {
+        switch (draw(41)) {
         case 0:
             fmi2FreeInstance(it);
             crowd[i] = NULL;
@@ -365,6 +368,12 @@ static void calls(uint64_t seed, int turns)
                                                   slopes);
             if (status == fmi2Discard) status = fmi2OK;
             break;
+        case 37:
+        case 38:
+            references[0] = push;
+            status = fmi2SetRealInputDerivatives(it, references, draw(9) ? 1 : count, draw(50) ? orders : NULL, reals);
+            break;
+        case 39: status = fmi2GetRealOutputDerivatives(it, draw(9) ? references : NULL, count, orders, slopes); break;
         default: status = fmi2DeSerializeFMUstate(it, bytes[i], draw(9) ? BYTES : draw(BYTES), &states[k]); break;
         }
         HOLDS(status == fmi2OK || status == fmi2Error);
