@@ -15,28 +15,19 @@ from types import FunctionType
 from typing import Any
 
 from ...runtime.declare import Declaring
+from ..equations.expressions import FUNCTIONS, Expression, Term
+from ..equations.scribe import Scribe
 from ..further import Variables
 from ..written import definition
 from ..written.live import TREE, number_of
 
 # what the second number is called; the object that holds the direction and what follows: no name of an author's
 D, TO = "_d_", "_to"
-SLOPES = {  # function of a -> the factor of d_a
-    "sin": "cos({a})",
-    "cos": "-sin({a})",
-    "tan": "1.0 + tan({a}) * tan({a})",
-    "asin": "1.0 / sqrt(1.0 - ({a}) * ({a}))",
-    "acos": "-1.0 / sqrt(1.0 - ({a}) * ({a}))",
-    "atan": "1.0 / (1.0 + ({a}) * ({a}))",
-    "sinh": "cosh({a})",
-    "cosh": "sinh({a})",
-    "tanh": "1.0 - tanh({a}) * tanh({a})",
-    "exp": "exp({a})",
-    "log": "1.0 / ({a})",
+SLOPES = {
     "sqrt": "0.5 / sqrt({a})",
-    "fabs": "copysign(1.0, {a})",
     "copysign": "copysign(1.0, {a}) * copysign(1.0, {b})",
-}
+}  # not as the equations have it
+ARGUMENT = Expression()
 
 
 class Tangent:
@@ -129,8 +120,8 @@ class Writer:
             case ast.Call(func=ast.Name(id="threshold"), args=[v, eps, load, slide, hold]):
                 changes = [told(self.change(one)) for one in (load, slide, hold)]
                 return read(f"threshold_slope({', '.join(map(told, (v, eps, load, hold)))}, {', '.join(changes)})")
-            case ast.Call(func=ast.Name(id=name), args=[a, *more]) if name in SLOPES:
-                return times(read(SLOPES[name].format(a=told(a), b="".join(map(told, more)))), self.change(a))
+            case ast.Call(func=ast.Name(id=name), args=[a, *more]) if name in FUNCTIONS or name in SLOPES:
+                return times(read(slope(name, told(a), "".join(map(told, more)))), self.change(a))
         return None
 
     def of_two(self, e: ast.expr, a: ast.expr, op: ast.operator, b: ast.expr) -> ast.expr | None:
@@ -142,11 +133,15 @@ class Writer:
                 return plus(da, negative(db))
             case ast.Mult():
                 return plus(times(a, db), times(b, da))
-            case ast.Div():
-                first = None if da is None else read(f"({told(da)}) / ({told(b)})")
-                return plus(first, None if db is None else read(f"-({told(e)}) * ({told(db)}) / ({told(b)})"))
-        assert isinstance(op, ast.Pow), ast.unparse(e)
-        return times(read(f"({told(b)}) * ({told(a)}) ** ({told(b)} - 1.0)"), da)
+        first = None if da is None else read(f"({told(da)}) / ({told(b)})")
+        return plus(first, None if db is None else read(f"-({told(e)}) * ({told(db)}) / ({told(b)})"))
+
+
+def slope(name: str, a: str, b: str) -> str:
+    """The factor of the change of a in that of a function of a, and of b where it has two."""
+    if name in SLOPES:
+        return SLOPES[name].format(a=a, b=b)
+    return Scribe({ARGUMENT: a}, (), (), 0).text(FUNCTIONS[name](ARGUMENT, Term(name, ARGUMENT)))
 
 
 def threshold_slope(v, eps, load, hold, d_load, d_slide, d_hold):  # type: ignore[no-untyped-def] # it is translated
