@@ -2,8 +2,9 @@
 
 import pytest
 from arrays import begun, start
-from models import DOP853, RODAS
+from models import DOP853, LARGER, RODAS
 
+from fmus.packaging.catalogue import find
 from fmus.packaging.native.interface import header
 from fmus.packaging.written import beside, written
 
@@ -61,3 +62,15 @@ def test_a_name_that_the_numerics_have_for_something_else_changes_nothing(tmp_pa
         path.write_text(changed)
         assert numbers(path, written(path)(), names) == expected, names
     assert text == SLED or "typedef struct Mine Model;" in header(written(path), "3")  # with a slope of d_x
+
+
+def test_a_name_of_the_system_that_loads_solve_changes_nothing(tmp_path):
+    """Two blocks, whose modes are called like entries of their matrix."""
+    (blocks,) = (path for path in LARGER if path.stem == "blocks")
+    path, rates = tmp_path / "blocks.py", []
+    for names in ("mode1", "mode2"), ("A_F1_F2", "A_F2_F1"):
+        path.write_text(blocks.read_text().replace("mode1", names[0]).replace("mode2", names[1]))
+        model = find(path).model()
+        assert model.prepare() == 0
+        rates.append([model.rates(0.3, 0.1, 0.2, -0.1, 0.1, *modes) for modes in ((0, 0), (0, 1), (1, 0), (1, -1))])
+    assert rates[0] == rates[1]

@@ -48,7 +48,7 @@ class Scribe:
 
     def fresh(self, name: str) -> str:
         """The name, or another where it is taken: from here on it is."""
-        if name in self.taken and name not in self.given.values():
+        if name in self.taken:
             name = next(n for i in range(1, 1000) if (n := f"{name}_{i}") not in self.taken)
         self.taken.add(name)
         return name
