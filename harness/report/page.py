@@ -57,7 +57,7 @@ def page(found: list[Section], sketches: tuple[Sketch, ...], results: Path) -> s
     environment = Environment(
         loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    environment.filters["beside"] = lambda file: quote(Path(os.path.relpath(file, results)).as_posix())
+    environment.filters["beside"] = lambda file: quote(os.fsencode(Path(os.path.relpath(file, results)).as_posix()))
     measured = [part.sentences for section in found if section.name == "precision" for part in section.parts]
     return environment.get_template("page.html").render(
         sections=found,
