@@ -20,7 +20,7 @@ from .terminal import POSITIVE, answer, progress, results
 )
 @click.option("--unit", help="Its unit where the heading has none, as in mm, deg/s or g.")
 @click.option("--per-count", metavar="SIZE", help="What one count is, as in 0.36deg or 0.001mm.")
-@click.option("--time-unit", help="Unit of the time where the heading has none (s).")
+@click.option("--time-unit", help="Unit of the time where the heading has none (s), as in ms, or 0.01s of samples.")
 @click.option("--columns", "names", metavar="NAMES", help="Headings where the file has none: 't [s],x [mm]'.")
 @click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Leave out what is before, in s.")
 @click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Leave out what is after, in s.")

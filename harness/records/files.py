@@ -1,18 +1,21 @@
-"""The table in a file of any kind: text, spreadsheet (.xlsx, .xls, .ods), MATLAB's .mat of either sort, numpy's .npz.
+"""The table in a file of any kind: text, spreadsheet (.xlsx, .xls, .ods), MATLAB's .mat of either sort, numpy's .npz;
+any of them packed by gzip.
 
 The kind is told by the first bytes, so that standard input can be any of them.
 """
 
+import gzip
 import io
 import sys
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 
-from ..errors import HarnessError, SceneError, reason
+from ..errors import HarnessError, SceneError, reason, shown
 from . import text
 
 EXTRA = "python -m pip install 'friction-fmus[records]'"
@@ -71,7 +74,13 @@ def content(path: Path) -> bytes:
 
 def parse(data: bytes, name: str) -> Table:
     """The table in these bytes."""
+    if data.startswith(b"\x1f\x8b"):
+        return parse(gzip.decompress(data), name)
     if data.startswith(b"PK"):
+        with ZipFile(io.BytesIO(data)) as archive:
+            tables = [member for member in archive.namelist() if member.lower().endswith((".csv", ".tsv", ".txt"))]
+        if tables:
+            raise SceneError(f"{name} is an archive: unpack it and name what is in it, as in {shown(tables[0])}")
         return arrays(npz(data), name) if b".npy" in data[:200] else sheet(data, name)
     if data.startswith(b"\xd0\xcf\x11\xe0"):
         return sheet(data, name)

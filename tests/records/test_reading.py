@@ -1,7 +1,9 @@
 """Records as instruments, spreadsheets and phones write them: each is read for what it is, or told what it lacks."""
 
 import contextlib
+import gzip
 import io
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -255,6 +257,7 @@ WRITTEN = {  # and what is asked of it; in each stands the same motion
         lambda: "t [s];x [mm]\n9;NaN\n" + each(lambda t, x, s: f"{t + 10};{x:.3f}".replace(".", ",")),
         {},
     ),
+    "packed": (lambda: gzip.compress(("t [s],x [mm]\n" + each(lambda t, x, s: f"{t},{x:.6f}")).encode()), {}),
     "times of a spreadsheet": (
         lambda: xlsx([["t", "x [mm]"], *([s.item().time(), x] for s, x in zip(CLOCKS, MM, strict=True))]),
         {},
@@ -347,6 +350,15 @@ def test_no_bytes_end_in_a_traceback(tmp_path):
         path.write_bytes(bytes_)
         with contextlib.suppress(HarnessError):
             read(str(path), Columns(), "record")
+
+
+def test_an_archive_is_told_with_what_is_in_it(tmp_path):
+    """As phyphox exports."""
+    with ZipFile(tmp_path / "swing.zip", "w") as archive:
+        archive.writestr("Raw Data.csv", FILES["phone.csv"]())
+        archive.writestr("meta/device.csv", "property,value")
+    with pytest.raises(SceneError, match=r"swing.zip is an archive: unpack it .* 'Raw Data.csv'"):
+        read(str(tmp_path / "swing.zip"), Columns(), "swing")
 
 
 def test_a_missing_file_is_told_with_the_nearest(tmp_path):
