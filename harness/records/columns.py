@@ -246,7 +246,8 @@ def numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
     if isinstance(cells, np.ndarray):
         return cells
     try:
-        return np.array(cells, dtype=float)
+        everywhere = all("," in cell for cell in cells)
+        return np.array([cell.replace(",", ".") for cell in cells] if everywhere else cells, dtype=float)
     except ValueError:
         pass
     found = np.full(len(cells), np.nan)
