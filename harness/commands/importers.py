@@ -26,7 +26,7 @@ def importers(fmus: Path, out: Path, quiet: bool, as_json: bool) -> None:
 
     with progress(quiet or as_json, len(IMPORTERS)) as report:
         rows = work.perform(fmus, out, report)
-    answer(quiet, as_json, rows, work.table(rows), folder=out / work.FOLDER)
+    answer(quiet, as_json, rows, work.table(rows), *work.sentences(rows), folder=out / work.FOLDER)
     failed = [f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed]
     if failed:
         raise HarnessError("\n".join(failed))

@@ -53,8 +53,8 @@ def test_an_fmu_that_the_checks_cannot_be_made_with_is_left_out_with_the_reason(
 
 
 def test_a_tool_that_is_not_asked_is_named_with_the_reason():
-    shown = table.table([table.Checked("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")])
-    assert "Ecos was not asked: it is not installed: pip install -e '.[importers]'" in shown.caption
+    said = table.sentences([table.Checked("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")])
+    assert "Ecos was not asked: it is not installed: pip install -e '.[importers]'" in said
 
 
 def test_fmus_of_another_version_of_fmi_are_refused_in_one_sentence():

@@ -84,17 +84,20 @@ def ask(importer: Importer, check: str, subject: Subject) -> str:
 
 
 def table(found: list[Checked]) -> Table:
-    """The rows for reading; below them what the words mean, and which tools were not asked."""
-    notes = [f"{row.importer} was not asked: {row.reason}" for row in found if row.reason]
-    words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers, or the tool ends"
-    caption = "\n".join([words, *notes])
-    shown = Table("importer", "check", *models(found), box=None, caption=caption, caption_justify="left")
+    """The rows for reading."""
+    shown = Table("importer", "check", *models(found), box=None)
     last = ""
     for row in found:
         if row.check:
             shown.add_row(row.importer if row.importer != last else "", row.check, *row.cells)
             last = row.importer
     return shown
+
+
+def sentences(found: list[Checked]) -> list[str]:
+    """What the words in the table mean, and which tools were not asked."""
+    words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers, or the tool ends"
+    return [words, *(f"{row.importer} was not asked: {row.reason}" for row in found if row.reason)]
 
 
 def models(found: list[Checked]) -> tuple[str, ...]:
