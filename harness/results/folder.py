@@ -45,6 +45,7 @@ def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[P
         ours = (*ours, *drawn, FILE)
         refuse(folder, ours)
         keep(folder, source)
+        missing = [each for each in folder.parents if not each.exists()]
         folder.parent.mkdir(parents=True, exist_ok=True)
         tidy(folder, ours)
     except OSError as error:
@@ -64,6 +65,9 @@ def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[P
                 rmtree(fresh, ignore_errors=True)
             if lock >= 0:
                 os.close(lock)
+            with suppress(OSError):  # they are needed
+                for each in missing:
+                    each.rmdir()
 
 
 def refuse(folder: Path, ours: Collection[str]) -> None:

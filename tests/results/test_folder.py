@@ -49,6 +49,16 @@ def test_what_fails_half_way_leaves_the_old_result_and_nothing_else(older, reaso
     assert list(older.parent.iterdir()) == [older]
 
 
+def test_what_fails_leaves_no_folder_that_was_made_for_it(older):
+    def fail():
+        with replacing(older.parent / "new/place/case", OURS):
+            raise HarnessError("no")
+
+    with pytest.raises(HarnessError):
+        fail()
+    assert list(older.parent.iterdir()) == [older]
+
+
 def test_a_folder_with_other_files_is_not_replaced(older):
     (older / "notes.txt").write_text("mine")
     with pytest.raises(HarnessError, match=r"holds notes\.txt"), replacing(older, OURS):
