@@ -77,6 +77,12 @@ def test_a_result_agrees_with_a_new_run_of_its_fmu_events_included(harness):
     assert "8 changes of mode in both, at most 0 s apart" in done.stdout
 
 
+def test_a_scene_and_its_fmu_are_run_to_the_same_times(harness):
+    done = harness("compare", "stickslip", "fmus/stickslip.fmu", "--rtol", 1e-12)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "(common to both)" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "sentence"),
     [

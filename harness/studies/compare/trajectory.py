@@ -23,16 +23,17 @@ Report = Callable[[float], None]
 
 def both(sources: tuple[str, str], how: Specification, report: Report) -> tuple[Trajectory, Trajectory]:
     """The trajectories of two folders, files, FMUs' paths or scenes.  What can be run is run to the same times, those
-    of the other one if that is recorded, and to the same stop; `how` says the rest."""
+    of the other one if that is recorded or is a scene with a grid, and to the same stop; `how` says the rest."""
     found = [recorded(source) for source in sources]
     runs = [None if each else wanted(source, how) for each, source in zip(found, sources, strict=True)]
-    grid = next((spacing(each.time) for each in found if each), None)
+    grids = [spacing(each.time) for each in found if each] + [each.grid for each in runs if each]
+    grid = next(filter(None, grids), None)
     stops = {stop_of(each) for each in runs if each} | {float(each.time[-1]) for each in found if each}
     stop = how.stop if None in stops or len(stops) == 1 else min(filter(None, stops))
     sides = []
     for each, asked in zip(found, runs, strict=True):
         if asked:
-            asked = replace(asked, grid=grid or asked.grid, even=POINTS, stop=stop if how.stop is None else how.stop)
+            asked = replace(asked, grid=grid, even=POINTS, stop=stop if how.stop is None else how.stop)
             each = of_run(run(asked, report))
         assert each
         sides.append(each)

@@ -67,7 +67,7 @@ def draw(
     shown = Drawn(smooth(run), results, published or {})
     height = HEIGHT * max(2, *map(len, columns), 2)
     with sheet(path, WIDTH * len(columns), height) as figure:
-        figure.suptitle(f"{title}\n{run.setting}", fontsize=11)
+        figure.suptitle(f"{title}\n{run.setting}".strip(), fontsize=11)
         parts = figure.subfigures(1, len(columns), squeeze=False)[0]
         for part, names in zip(parts, columns, strict=True):
             over_time = names[0] not in BESIDE
