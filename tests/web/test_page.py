@@ -326,6 +326,9 @@ def test_a_link_carries_everything(page):
     page.wait(f"{told}.includes('not known here: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
     page.open(".model=nobody")
     page.wait(f"{told}.includes('not known here: nobody. coulomb')")
+    page.run("Object.defineProperty(navigator, 'clipboard', { value: undefined })")
+    page.click("#link")
+    page.wait(f"{told}.includes('The link is in the address bar')")
 
 
 def test_within_another_page_it_runs_and_has_no_address_to_carry(page, tmp_path):

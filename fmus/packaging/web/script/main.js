@@ -206,7 +206,8 @@ function settle() {
     const made = one.time.length ? [published, cost, decay, events].map((table) => table(desk, state)) : [];
     $$("tables").replaceChildren(...made.filter(Boolean));
     remember();
-    if (!one.failure && !page.playing) $$("status").textContent = `${unknown}${setting(one)}: ${one.events.length} events in ${told(state.stop)} s.`;
+    const ran = one.failure ? "" : `${setting(one)}: ${one.events.length} events in ${told(state.stop)} s.`;
+    if (!page.playing) $$("status").textContent = unknown + ran;
   }, SETTLED);
 }
 
@@ -254,8 +255,13 @@ function remember() {
 
 async function copyLink() {
   remember();
-  const told = (where) => { $$("status").textContent = `The link is in the ${where}: it carries all that is set.`; };
-  await navigator.clipboard.writeText(location.href).then(() => told("clipboard"), () => told("address bar"));
+  let place = "clipboard";
+  try {
+    await navigator.clipboard.writeText(location.href);
+  } catch {
+    place = "address bar"; // there is no clipboard, or it is not ours to write
+  }
+  $$("status").textContent = `The link is in the ${place}: it carries all that is set.`;
 }
 
 addEventListener("hashchange", () => { if (location.hash !== written(page.state)) follow(location.hash); });
