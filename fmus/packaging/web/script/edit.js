@@ -26,7 +26,7 @@ export function choose(portrait, values, name, value) {
   const [exact, hybrid] = [labelled(method, "exact"), labelled(law, "hybrid")];
   const now = inForce(portrait, values);
   if (exact === undefined || hybrid === undefined || now["solver.method"] !== exact || now.friction === hybrid) return;
-  if (name === "friction") values["solver.method"] = method.items.find((item) => item.value !== exact).value;
+  if (name === "friction") values["solver.method"] = method.items.find((item) => item.value !== exact)?.value ?? exact;
   else values.friction = hybrid;
 }
 
