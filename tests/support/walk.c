@@ -56,7 +56,7 @@ enum { NEVER = 0, AT_EVENT = 1 << EVENT, GOING = 1 << CONTINUOUS, BEGINNING = 1 
     f(EnterContinuousTimeMode, (AT_EVENT | EXCHANGED), CONTINUOUS, (it), (NULL))                                       \
     f(DoStep, STEPPING, STAYS, (it, AT->t, AT->h, true, AT->flags, AT->flags + 1, AT->flags + 2, &AT->real),           \
       (it, AT->t, AT->h, true, AT->flags, AT->flags + 1, AT->flags + 2, NULL))                                         \
-    f(SetTime, (GOING | SOME), STAYS, (it, AT->t), (NULL, 0.0))                                                        \
+    f(SetTime, (GOING | EXCHANGED | SOME), STAYS, (it, AT->t), (NULL, 0.0))                                            \
     f(SetContinuousStates, GOING, STAYS, (it, AT->reals, AT->states), (it, AT->reals, STATES + 1))                     \
     f(CompletedIntegratorStep, GOING, STAYS, (it, true, AT->flags, AT->flags + 1), (it, true, NULL, AT->flags))        \
     f(Reset, ANY, INSTANTIATED, (it), (NULL))                                                                          \

@@ -346,6 +346,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetF
 fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
 {
     ENTER(instance, EXCHANGING);
+    if (!exchanges(&it->state)) return refuse(it, NOT_OFFERED, __func__, "");
     return move_to(it, time);
 }
 
