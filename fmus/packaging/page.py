@@ -31,7 +31,7 @@ OFFERED = """\
 | rates of outputs (derivatives of order 1) | | yes | yes |
 | rates of inputs: a force that ramps, exact in the closed forms through stick and slip | | yes | |
 | event mode, early return at stick and slip | | | yes |
-| intermediate update after every internal step | | | yes |
+| intermediate update after every internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |
 """  # by each kind of FMU, as the README has it
 FREE = Declared("", "").allowed  # in words, where every finite number is

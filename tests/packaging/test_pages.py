@@ -54,7 +54,10 @@ TOLD = {  # by what a model description says it, where an attribute is not false
         "canInterpolateInputs",
     ),
     "event mode, early return at stick and slip": ("CoSimulation", "hasEventMode"),
-    "intermediate update after every internal step": ("CoSimulation", "providesIntermediateUpdate"),
+    "intermediate update after every internal step, where inputs can be set": (
+        "CoSimulation",
+        "providesIntermediateUpdate",
+    ),
 }
 
 

@@ -34,8 +34,7 @@ USE = """\
 <p>In model exchange the importer's solver takes the place of ours, and <code>solver.*</code> says nothing; where
 friction is dry, the mode changes at events, which the importer finds by <code>events.to_rest</code> and
 <code>events.to_break_away</code>. In FMI 3.0 co-simulation, too, it may handle events itself: a step returns early at
-stick and slip.  FMI 2.0 co-simulation takes rates of inputs (derivatives of order 1), FMUs of both versions tell those
-of outputs.</p>
+stick and slip.</p>
 """
 
 
