@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd
 
+from harness.errors import SceneError
 from harness.scenes.coupled.scene import shipped
+from harness.studies.coupled import study
 from harness.studies.coupled.engine import ENGINES
 from harness.truths.monolith import Bodies, solve
 
@@ -184,3 +186,10 @@ def test_what_a_coupled_scene_gets_wrong_is_one_sentence(couple, tmp_path, text,
     assert sentence in done.stderr
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "results/coupled/mine").exists()
+
+
+def test_a_scene_is_read_before_any_fmu_is(monkeypatch, tmp_path):
+    """A slip of the pen is told as such where nothing is built."""
+    monkeypatch.setattr(study, "starts", lambda fmu: pytest.fail("an FMU was read"))
+    with pytest.raises(SceneError, match="unknown coupled scene 'two-mases'"):
+        study.perform("two-mases", tmp_path, None, lambda share: None)

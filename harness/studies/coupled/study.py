@@ -47,8 +47,8 @@ def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple
             name, file = Path(source).stem, plain / "theirs.ssp"
             asked, fmus, scene = theirs.asked(Path(source), file, stop), [Path(source)], None
         else:
-            defaults = {model: starts(fmu_of(model)) for model in MODELS}
             scene = load(source, stop)
+            defaults = {model: starts(fmu_of(model)) for model in MODELS}
             check(scene, defaults)
             name, file = scene.name, plain / f"{scene.system}.ssp"
             asked, fmus = blank(scene), [part.fmu for part in scene.parts]
