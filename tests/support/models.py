@@ -40,6 +40,15 @@ def outputs(name):
     return [v for v, d in declared(name).items() if isinstance(d, Output)]
 
 
+def is_pushed(name):
+    """Whether a model has an input and a mass m, and starts where and as fast as it is told."""
+    x, v, *_ = outputs(name)
+    return {"m", f"{x}0", f"{v}0"} <= {*declared(name)} and any(isinstance(d, Input) for d in declared(name).values())
+
+
+PUSHED = [name for name in MODELS if is_pushed(name)]
+
+
 def parameters(name):
     """Names and declarations of what takes a number: parameters and inputs, but no choices."""
     kinds = (Parameter, Input)
