@@ -13,12 +13,12 @@ from math import inf, nan
 
 import pytest
 from driver import Refused, Worker
-from models import HYBRID, MODELS, declared, label, model_class, paired, parameters, tunable
+from models import HYBRID, MODELS, declared, label, meeting, model_class, parameters, tunable
 from native_fmus import built
 
 LIVES, EVENTS = 2, 30  # of every model, law and method; in a life
 BREAKDOWNS = 6  # of every model, law and method
-CASES = [(name, values, 0.0) for name in MODELS for values in paired(name)]
+CASES = [(name, values, 0.0) for name in MODELS for values in meeting(name)]
 
 
 @pytest.fixture(scope="module")

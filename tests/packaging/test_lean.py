@@ -7,7 +7,7 @@ from commands import build as command
 from compare import identical
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
-from models import CASES, MODELS, counts, declared, label, outputs
+from models import MODELS, counts, declared, experiment, label, meeting, outputs
 
 from fmus.packaging import archive
 from fmus.packaging.written import LAWS, METHODS
@@ -37,10 +37,10 @@ def lean(tmp_path_factory):
     return build
 
 
-EVERY_CASE = pytest.mark.parametrize("case", [case for case in CASES if case[1].get("pin_load", 1) == 1], ids=label)
+EACH = [experiment(name, values) for name in MODELS for values in meeting(name, 1)]  # method, and each law
 
 
-@EVERY_CASE
+@pytest.mark.parametrize("case", EACH, ids=label)
 def test_a_lean_fmu_offers_one_method_carries_its_code_alone_and_runs_alike(lean, launch, worker, case):
     name, values, stop = case
     path = lean(case)
@@ -103,4 +103,4 @@ def test_what_a_model_does_not_have_is_refused_in_one_sentence(arguments, words,
 
 
 def test_every_model_is_among_the_cases():
-    assert {case[0] for case in CASES} == set(MODELS)
+    assert {case[0] for case in EACH} == set(MODELS)

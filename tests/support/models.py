@@ -84,18 +84,18 @@ def experiment(name, values):
     return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.4 * stop
 
 
-def paired(name):
-    """Combinations in which every two choices meet, though not every three."""
-    pairs = [(values, {*choose(values.items(), min(2, len(values)))}) for values in combinations(name)]
-    kept, missing = [], set().union(*(each for _, each in pairs))
+def meeting(name, many=2):
+    """A few combinations in which every so many choices meet: every two, though not every three."""
+    groups = [(values, {*choose(values.items(), min(many, len(values)))}) for values in combinations(name)]
+    kept, missing = [], set().union(*(each for _, each in groups))
     while missing:
-        values, met = max(pairs, key=lambda pair: len(pair[1] & missing))
+        values, met = max(groups, key=lambda group: len(group[1] & missing))
         kept.append(values)
         missing -= met
     return kept
 
 
-CASES = [experiment(name, values) for name in MODELS for values in paired(name)]
+CASES = [experiment(name, values) for name in MODELS for values in meeting(name)]
 
 
 def label(case):
