@@ -381,6 +381,7 @@ class Sketch(Declaring):
     """
 
     stop_time, step_size, tolerance = 1.0, 0.1, 1e-6
+    ramps = False
 
 
 def sketch(**declared):
