@@ -110,6 +110,8 @@ class DryFriction(Oscillator):
         back = per_contact()
         back[i] = -modes[i]
         forward, backward = self.slip_rate(t, y, modes, i), self.slip_rate(t, y, back, i)
+        if modes[i] * backward <= 0.0:
+            return True  # nor does it stay: it moves the other way
         return modes[i] * forward >= -BACKWARDS * fabs(forward - backward)
 
     def release(self, t, y: States, i: Contact):
