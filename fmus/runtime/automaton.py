@@ -112,7 +112,12 @@ class DryFriction(Oscillator):
         forward, backward = self.slip_rate(t, y, modes, i), self.slip_rate(t, y, back, i)
         if modes[i] * backward <= 0.0:
             return True  # nor does it stay: it moves the other way
-        return modes[i] * forward >= -BACKWARDS * fabs(forward - backward)
+        load, _, limit = self.hold(t, y, i)
+        slack = NEAR * (self.terms(t, y, i) + limit)  # as settle has it: late, a load is a difference of large numbers
+        if fabs(load) <= slack:
+            return True
+        last_bits = BACKWARDS * fabs(forward - backward) + slack / fabs(load) * fabs(forward + backward)
+        return modes[i] * forward >= -last_bits
 
     def release(self, t, y: States, i: Contact):
         """When a contact breaks away if nothing moves, and in which direction; inf if it never does."""
