@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 if Path(sys.path[0]) != Path(__file__).parent:  # by -m: a model where one is may be called math.py, or fmus.py
-    sys.path.append(sys.path.pop(0))
+    sys.path += [str(Path(__file__).parent), sys.path.pop(0)]
 
 from hashlib import sha256
 

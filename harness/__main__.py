@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 if Path(sys.path[0]) != Path(__file__).parents[1]:  # a model in the folder that one is in may be called math.py
-    sys.path.append(sys.path.pop(0))
+    sys.path += [str(Path(__file__).parents[1]), sys.path.pop(0)]
 
 import click
 

@@ -471,7 +471,7 @@ def test_no_loss_is_called_a_loss():
 def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(tmp_path, monkeypatch):
     """Of a record whose clock counts from 1970."""
     figures = []
-    monkeypatch.setattr(Figure, "savefig", lambda figure, path: figures.append(figure))
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
     t = np.linspace(0.0, 9.0, 3001)
     record = swung(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
     found = identify(replace(record, t=record.t + 1.7e9), Known(pendulum=True))

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -134,7 +135,7 @@ def test_a_command_without_its_fmus_says_how_to_build_them(tmp_path, monkeypatch
     (tmp_path / "fmus").mkdir()
     for name in MODELS:
         (tmp_path / f"fmus/{name}.py").write_text("")
-    monkeypatch.setattr("harness.scenes.fmus.__file__", str(tmp_path / "elsewhere/harness/scenes/fmus.py"))
+    monkeypatch.setattr("harness.scenes.fmus.FOLDERS", (Path("fmus"),))
     monkeypatch.chdir(tmp_path)
     with pytest.raises(HarnessError, match=r"there is no .*fmus.*: build .* with `python build_fmus\.py`"):
         commands.main(arguments.split(), standalone_mode=False)

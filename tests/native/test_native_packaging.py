@@ -69,7 +69,9 @@ def test_the_description_is_that_of_the_python_fmu_but_for_sources_guid_and_mode
     native.remove(native.find("ModelExchange"))
     interface = native.find("CoSimulation")
     interface.remove(interface.find("SourceFiles"))
-    assert interface.attrib.pop("providesDirectionalDerivative") == "true"
+    for ability in ("providesDirectionalDerivative", "canInterpolateInputs"):
+        assert interface.attrib.pop(ability) == "true"
+    assert interface.attrib.pop("maxOutputDerivativeOrder") == "1"
     scalars, declared_ones = native.find("ModelVariables"), python.find("ModelVariables")
     for scalar in list(scalars)[len(declared_ones) :]:
         assert scalar.get("causality") in ("independent", "local")
@@ -122,7 +124,7 @@ def test_methods_and_laws_can_be_chosen_as_for_the_python_fmu(tmp_path):
     lean = entries(tmp_path / "native" / "stickslip.fmu")
     text = lean["sources/model.h"].decode()
     whole = entries(built() / "stickslip.fmu")["sources/model.h"]
-    assert len(text) < 0.7 * len(whole)  # rules and sentences are the same in both
+    assert len(text) < 0.72 * len(whole)  # rules and sentences are the same in both
     assert "Rodas" not in text
     assert b'name="ode45"' not in lean["modelDescription.xml"]
     results = [simulate_fmu(str(tmp_path / folder / "stickslip.fmu")) for folder in ("python", "native")]
