@@ -65,7 +65,7 @@ def test_no_indicator_is_zero_once_the_event_is_handled(launch, values):
         assert all(indicator > 0.0 for indicator in fmu.indicators())
 
 
-@pytest.mark.parametrize("ulps", range(-9, 10))
+@pytest.mark.parametrize("ulps", [*range(-9, 10), 300])
 def test_an_event_acts_where_the_indicator_is_no_more_above_zero(launch, ulps):
     """So a solver that stops at the root or a little beyond never stops for nothing.  An event that comes a few units
     in the last place before acts as well: the load is about to exceed the limit."""
@@ -77,7 +77,7 @@ def test_an_event_acts_where_the_indicator_is_no_more_above_zero(launch, ulps):
     fmu.place(here, [0.0, 0.0, here])
     to_break_away = fmu.indicators()[1]
     assert to_break_away > 0.0 or ulps > 0
-    assert to_break_away <= 0.0 or ulps < 9
+    assert to_break_away <= 0.0 or ulps < 300  # beyond what is held for the rounding of its terms
     assert at_event(fmu, here, [0.0, 0.0, here]) == ["states"]
     assert fmu.get("mode") == 1
     fmu.go_on()
