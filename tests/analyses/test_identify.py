@@ -120,7 +120,7 @@ def test_the_motion_has_no_step_in_its_drag(b, sine):
 @pytest.mark.parametrize("sine", [False, True])
 def test_a_clean_signal_gives_its_constants_back_to_nine_digits(law, sine, order):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.4}[term] for term in law}
-    t = np.linspace(0, 3, 400)
+    t = np.linspace(0, 3, 200)
     found = identify(swung(**truth, sine=sine, order=order, turn=0.0, t=t), Known(pendulum=sine))
     assert set(found.best.terms) == set(law)
     assert values(found.estimates) == pytest.approx(
@@ -159,14 +159,14 @@ def test_no_answer_is_far_off_without_a_remark(seed):
 
 @pytest.mark.parametrize(
     ("sine", "quantised", "order"),
-    [(False, False, 0), (False, True, 0), (True, False, 0), (True, True, 0), (False, False, 1), (False, False, 2)],
+    [(False, False, 0), (False, True, 0), (True, True, 0), (False, False, 1), (False, False, 2)],
 )
 def test_the_truth_lies_in_the_intervals_as_often_as_they_say(sine, quantised, order):
     """Of 35 intervals at 95 %, fewer than 28 would hold the truth once in a thousand times
     (tests/support/intervals.py counts a thousand records of every law)."""
     held = []
     for seed in range(7):
-        record, truth, _ = random_record(100 + seed, LAWS[seed], sine, quantised, 400, order)
+        record, truth, _ = random_record(100 + seed, LAWS[seed], sine, quantised, 200, order)
         each = {one.name: one for one in identify(record, Known(pendulum=sine)).estimates}
         held += [each[name].low <= value <= each[name].high for name, value in truth.items()]
     assert np.sum(held) >= 28
@@ -219,8 +219,17 @@ def test_the_interval_of_what_cannot_be_negative_holds_it_in_95_percent(mean):
     assert np.mean([low <= mean <= high for low, high in intervals]) == pytest.approx(0.95, abs=0.004)
 
 
-@pytest.mark.parametrize("rho", [-0.98, 0.5])
-@pytest.mark.parametrize("means", [(0.0, 0.0), (0.0, 1.0), (0.0, 5.0), (0.3, 0.0), (2.0, 0.0), (2.0, 2.0)])
+@pytest.mark.parametrize(
+    ("rho", "means"),
+    [
+        (-0.98, (0.0, 0.0)),
+        (-0.98, (0.0, 5.0)),
+        (-0.98, (2.0, 0.0)),
+        (0.5, (0.0, 1.0)),
+        (0.5, (0.3, 0.0)),
+        (0.5, (2.0, 2.0)),
+    ],
+)
 def test_the_interval_beside_what_cannot_be_negative_either_holds_it_in_95_percent(means, rho):
     """Of 200 draws; more only where both are zero, and there the interval is the shorter for it."""
     correlation = np.array([[1.0, rho], [rho, 1.0]])
@@ -255,7 +264,7 @@ def test_the_turning_points_alone_tell_the_same(sine, a):
 @pytest.mark.parametrize("term", TERMS)
 def test_two_peaks_of_a_pendulum_tell_its_only_loss(term, a):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.05}[term]}
-    found = identify(swung(**truth, sine=True, a=a, t=np.linspace(0, 4, 1601)), Known(pendulum=True))
+    found = identify(swung(**truth, sine=True, a=a, t=np.linspace(0, 4, 401)), Known(pendulum=True))
     assert values(found.published)[term] == pytest.approx(truth[term], rel=5e-3)
     assert set(found.best.terms) == {term}
 
@@ -421,28 +430,29 @@ def test_what_is_no_decay_is_refused_in_one_sentence(x, sentence):
     assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize(("sine", "order"), [(False, 0), (True, 0), (False, 2)])
-@pytest.mark.parametrize("drift", [0.05, 1.0])
+@pytest.mark.parametrize(
+    ("sine", "order", "drift"), [(False, 0, 0.05), (False, 0, 1.0), (True, 0, 0.05), (False, 2, 0.05), (False, 2, 1.0)]
+)
 def test_a_drift_too_large_for_a_fit_is_named_with_its_remedy(sine, order, drift):
     size = 0.1 * OMEGA**order
     record = swung(
-        0.01, sine=sine, drift=drift * size, noise=1e-3 * size, order=order, turn=0.0, t=np.linspace(0, 9, 900)
+        0.01, sine=sine, drift=drift * size, noise=1e-3 * size, order=order, turn=0.0, t=np.linspace(0, 5, 450)
     )
     with pytest.raises(HarnessError, match="over the record: --drift fits that as well") as refusal:
         identify(record, Known(pendulum=sine))
     over = float(str(refusal.value).split("drifts, by ")[1].split()[0])
-    assert over == pytest.approx(9 * drift * size, rel=0.02)
+    assert over == pytest.approx(5 * drift * size, rel=0.02)
 
 
 @pytest.mark.parametrize("a", [2.8, 3.0])
 def test_the_two_peaks_of_a_large_angular_acceleration_are_named_with_their_remedy(a):
-    record = swung(0.01, sine=True, a=a, omega=6.0, noise=0.05, order=2, turn=0.0, t=np.linspace(0, 10, 1500))
+    record = swung(0.01, sine=True, a=a, omega=6.0, noise=0.05, order=2, turn=0.0, t=np.linspace(0, 5, 500))
     with pytest.raises(HarnessError, match="two peaks a swing: record the angle or its rate"):
         identify(record, Known(pendulum=True))
 
 
 def test_a_pendulum_that_is_not_said_to_be_one_is_hinted_at():
-    record = swung(0.005, 0.001, sine=True, a=1.5, noise=1e-3, t=np.linspace(0, 10, 2000))
+    record = swung(0.005, 0.001, sine=True, a=1.5, noise=1e-3, t=np.linspace(0, 5, 700))
     with pytest.raises(HarnessError, match="say --pendulum"):
         identify(record, Known())
 
