@@ -272,17 +272,22 @@ def python(folder, *arguments, shell=None, **environment):
     )
 
 
+FULL = "Error: No space left on device\n"
+
+
 @pytest.mark.parametrize(
-    ("shell", "status", "said"),
+    ("command", "shell", "status", "said"),
     [
-        ("| head -1", 0, ""),
-        ("| true", 0, ""),
-        (">&-", 0, ""),
-        (">&- 2>&-", 0, ""),
-        ("> /dev/full", 1, "Error: No space left on device\n"),
+        (("list",), "| head -1", 0, ""),
+        (("list",), ">&- 2>&-", 0, ""),
+        (("list",), "> /dev/full", 1, FULL),
+        (("run", "coulomb", "--json"), "| true", 0, ""),
+        (("run", "coulomb", "--json"), "> /dev/full", 1, FULL),
+        (("run", "coulomb"), "| true", 0, ""),
+        (("run", "coulomb"), ">&-", 0, ""),
+        (("run", "coulomb"), "> /dev/full", 1, FULL),
     ],
 )
-@pytest.mark.parametrize("command", [("list",), ("run", "coulomb", "--json"), ("run", "coulomb")])
 def test_a_standard_output_that_takes_nothing_is_no_crash(place, tmp_path, command, shell, status, said):
     out = ("--out", tmp_path) if command[0] == "run" else ()
     done = python(place, *command, *out, shell=shell)
@@ -303,10 +308,19 @@ def test_a_record_comes_out_of_a_pipe_that_has_a_name(tmp_path):
     writer.join()
 
 
+ASCII, C = {"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
 @pytest.mark.parametrize(
-    "coding", [{"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}]
+    ("command", "coding"),
+    [
+        (("run", "smd"), ASCII),
+        (("run", "smd"), C),
+        (("decay", "coulomb"), C),
+        (("list",), ASCII),
+        (("sweep", "--help"), C),
+    ],
 )
-@pytest.mark.parametrize("command", [("run", "smd"), ("decay", "coulomb"), ("list",), ("sweep", "--help")])
 def test_a_standard_output_of_ascii_is_no_crash(place, tmp_path, command, coding):
     out = ("--out", tmp_path) if command[0] in ("run", "decay") else ()
     done = python(place, *command, *out, **coding)
