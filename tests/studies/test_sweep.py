@@ -24,7 +24,7 @@ from builds import ROOT
 from models import MODELS
 
 xarray = pytest.importorskip("xarray", reason="the extra 'sweep' is not installed")
-pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
+distributed = pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
 pandas = pytest.importorskip("pandas", reason="the extra 'sweep' is not installed")
 
 from harness.errors import HarnessError, SceneError  # noqa: E402
@@ -372,11 +372,6 @@ def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(harness, 
             "none of three runs of the sweep comes to its end: mu_d is 1.0, above",
         ),
         (["stickslip", "--vary", "friction=1.5,2"], 2, "friction is a choice"),
-        (
-            ["smd", "--vary", "m=1:2:3", "--scheduler", "tcp://127.0.0.1:1"],
-            1,
-            "no scheduler answers at tcp://127.0.0.1:1",
-        ),
     ],
 )
 def test_what_a_sweep_gets_wrong_is_one_sentence(harness, tmp_path, arguments, status, sentence):
@@ -385,6 +380,14 @@ def test_what_a_sweep_gets_wrong_is_one_sentence(harness, tmp_path, arguments, s
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "results/sweep").exists() or list((tmp_path / "results/sweep").iterdir()) == []
+
+
+def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
+    """After 10 s, of which a test waits for one."""
+    client, address = distributed.Client, "tcp://127.0.0.1:1"
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=timeout / 10))
+    with pytest.raises(HarnessError, match=f"no scheduler answers at {address}"), study.crew(address, 1, 1):
+        pass
 
 
 def test_the_fmu_belongs_to_what_tells_a_sweep_from_any_other():
