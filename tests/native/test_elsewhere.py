@@ -7,13 +7,14 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import contextmanager, nullcontext
 from functools import cache
 
 import builds
 import fmi3_hosts
 import pytest
 from models import CASES, HYBRID, MODELS, RODAS, declared, label, model_class, outputs
-from native_fmus import built, room
+from native_fmus import built
 from native_host import HEADERS, SOURCE, SOURCE3, begin, folder, guid, host, lives, play, references, unpacked
 
 ROWS = 50
@@ -47,8 +48,27 @@ def machine(request):
         subprocess.run([*compiler, str(source), "-o", str(out)], check=True)
         return [emulator, *options, str(out)]
 
-    quiet = {"WINEDEBUG": "-all", "WINEPREFIX": str(folder(f"wine of {request.param}")), "HOME": room().name}
-    return request.param, cache(program), os.environ | quiet
+    with windows() if emulator == "wine" else nullcontext({}) as environment:
+        yield request.param, cache(program), os.environ | environment
+
+
+@contextmanager
+def windows():
+    """The environment of a Windows that is set up once a run, and on while a program waits in it: to start it takes
+    ten times as long as a program."""
+
+    def make(folder):
+        subprocess.run(["wineboot", "--init"], env=environment(folder), capture_output=True, check=True, timeout=300)
+        subprocess.run(["wineserver", "--wait"], env=environment(folder), check=True, timeout=60)
+
+    def environment(folder):
+        return os.environ | {"WINEDEBUG": "-all", "WINEPREFIX": str(folder), "HOME": str(folder)}
+
+    here = environment(builds.made("windows", make))
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(["wine", "cmd"], env=here, **pipes) as waits:
+        waits.stdout.readline()  # it is on: else the services, which do not end, would hold the pipes of a test
+        yield here
 
 
 def play_there(machine, name, script):
