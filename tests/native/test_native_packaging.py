@@ -10,6 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from struct import unpack_from
 
+import builds
 import fmi3_hosts
 import lief
 import pytest
@@ -19,7 +20,7 @@ from fmpy.build import build_platform_binary
 from fmpy.model_description import read_build_description
 from fmpy.validation import validate_fmu
 from models import MODELS, ROOT, model_class
-from native_fmus import built
+from native_fmus import built, needed
 from native_host import compiler, unpacked
 
 from fmus.packaging import BuildError, native
@@ -45,13 +46,12 @@ def run(*arguments, cwd=ROOT, **environment):
 
 
 @pytest.fixture(scope="module")
-def smd(tmp_path_factory):
+def smd():
     """smd for every platform, and what was printed."""
-    built()  # tells why, if there is no compiler
-    out = tmp_path_factory.mktemp("platforms")
-    done = run("--native", "smd", *(word for p in PLATFORMS for word in ("--platform", p)), "--out", out)
-    assert done.returncode == 0, done.stderr
-    return out / "smd.fmu", done.stdout
+    needed()
+    platforms = [word for platform in PLATFORMS for word in ("--platform", platform)]
+    out = builds.once("everywhere", "smd", "--native", *platforms)
+    return out / "smd.fmu", out.with_suffix(".txt").read_text()
 
 
 @pytest.mark.parametrize("name", MODELS)
