@@ -113,9 +113,10 @@ class DryFriction(Oscillator):
         if modes[i] * backward <= 0.0:
             return True  # nor does it stay: it moves the other way
         load, _, limit = self.hold(t, y, i)
-        slack = NEAR * (self.terms(t, y, i) + limit)  # as settle has it: late, a load is a difference of large numbers
+        slack = NEAR * (self.terms(t, y, i) + limit)  # as settle has it
         if fabs(load) <= slack:
             return True
+        # late in a run a load is the difference of large numbers
         last_bits = BACKWARDS * fabs(forward - backward) + slack / fabs(load) * fabs(forward + backward)
         return modes[i] * forward >= -last_bits
 
