@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from signal import SIG_DFL, SIGINT, SIGTERM, default_int_handler
 from threading import current_thread, main_thread
 from time import sleep
+from traceback import clear_frames
 from typing import Any
 
 from ..errors import HarnessError
@@ -110,5 +111,6 @@ def interruptible() -> Iterator[None]:
         if isinstance(error, (OSError, EOFError, BrokenExecutor)):
             sleep(MEANWHILE)
         if isinstance(error, KeyboardInterrupt) or (HEARD and not isinstance(error, Interrupted)):
+            clear_frames(error.__traceback__)  # which hold a context that was entered and not yet begun: it is left
             raise Interrupted from None
         raise

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -74,6 +74,27 @@ def test_a_signal_ends_a_command_and_leaves_nothing_of_it(place, tmp_path, comma
         assert len(list((tmp_path / "out").glob("*"))) < 8
     else:
         assert left == []
+
+
+def test_a_context_is_left_though_a_signal_came_when_it_was_just_entered():
+    left = []
+
+    @contextmanager
+    def folder():
+        try:
+            yield
+        finally:
+            left.append("folder")
+
+    def entered():
+        held = folder()
+        held.__enter__()
+        raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted) as told, interruptible():
+        entered()
+    assert told
+    assert left == ["folder"]
 
 
 def test_an_interrupt_that_something_swallowed_still_ends_it(monkeypatch):
