@@ -45,7 +45,7 @@ def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[P
         ours = (*ours, *drawn, FILE)
         refuse(folder, ours)
         keep(folder, source)
-        missing = [each for each in folder.parents if not each.exists()]
+        missing = [each for each in folder.absolute().parents if not each.exists()]
         folder.parent.mkdir(parents=True, exist_ok=True)
         tidy(folder, ours)
     except OSError as error:
@@ -94,7 +94,8 @@ def keep(folder: Path, source: str, account: str = FILE) -> None:
 def begun(folder: Path) -> tuple[Path, int]:
     """A new folder beside, and what holds its lock, -1 where there are no locks."""
     while True:
-        fresh = Path(mkdtemp(prefix=f".{folder.name}-", suffix=FRESH, dir=folder.parent))
+        # absolute: an interrupt may come while fmpy, which loads a library, is in its folder
+        fresh = Path(mkdtemp(prefix=f".{folder.name}-", suffix=FRESH, dir=folder.parent.absolute()))
         fresh.chmod(0o755)  # mkdtemp gives 0o700
         lock = locked(fresh, wait=True)
         if fresh.exists():  # nobody took it for one that was left, before it was locked
