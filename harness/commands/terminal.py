@@ -130,12 +130,15 @@ def answer(quiet: bool, as_json: bool, result: Any, *shown: Any, folder: Path | 
     """Print a result as JSON, or, unless all is to be quiet, the tables and sentences that people are shown; last what
     is said of the older result in its folder, and where that is."""
     from rich.console import Console
+    from rich.table import Table
 
     if as_json:
         tell(result)
     elif not quiet:
         console = Console(markup=False, highlight=False)  # units and names have brackets, too
         for each in shown:
+            for column in each.columns if isinstance(each, Table) else ():
+                column.overflow = "fold"  # a name that is cut is not told
             console.print(each)
         if folder:
             from ..results.provenance import replaced

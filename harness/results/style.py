@@ -1,6 +1,7 @@
 """The look of every figure: colours, sizes, headings of axes."""
 
 import re
+import textwrap
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -76,6 +77,7 @@ ABOVE: dict[str, Any] = {  # of a legend above its panel, where it hides nothing
 }
 LARGEST = 1e150  # that is drawn
 LONGEST = 500  # letters of a text that are drawn
+NAME = re.compile(r"(\s+|(?<=[._\]]))")  # where a text may go on in the next line: a model's names have no blanks
 UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML: a path may be no text
 WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
 
@@ -97,6 +99,10 @@ def sheet(
         for text in texts(figure):
             text.set_parse_math(False)
             text.set_text(UNWRITABLE.sub("\N{REPLACEMENT CHARACTER}", text.get_text()[:LONGEST]))
+        for part, within in ((figure, figure.texts), *((axes, texts(axes)) for axes in figure.axes)):
+            place = part.get_window_extent()
+            for text in within:
+                fold(text, place.height if text.get_rotation() == 90 else place.width)
         for crowd in figure.findobj(crowded):
             crowd.set_rasterized(True)
         drawn = StringIO()
@@ -119,6 +125,15 @@ def texts(within: artist.Artist) -> Iterator[Text]:
             yield child
         elif not isinstance(child, Tick):
             yield from texts(child)
+
+
+def fold(text: Text, place: float) -> None:
+    """Break what is longer than its `place`, in pixels, into lines."""
+    extent, lines = text.get_window_extent(), text.get_text().splitlines()
+    if (longest := max(extent.width, extent.height)) > place:
+        folded = textwrap.TextWrapper(max(1, int(max(map(len, lines)) * place / longest)))
+        folded.wordsep_re = NAME
+        text.set_text("\n".join(map(folded.fill, lines)))
 
 
 def drawable(y: np.ndarray) -> np.ndarray:

@@ -27,3 +27,22 @@ def test_very_many_points_make_a_file_of_hundreds_of_kilobytes_at_most(tmp_path)
     line, marks = drawn(tmp_path / "a.svg"), drawn(tmp_path / "b.svg", marker=".", linestyle="")
     assert max(len(line), len(marks)) < 400_000
     assert drawn(tmp_path / "c.svg") == line
+
+
+def test_a_name_that_is_longer_than_its_panel_goes_on_in_the_next_line(tmp_path):
+    """As of a model in Modelica: without a blank, and told from the next by its end alone."""
+    name = "mechanics.axis1.bearing.friction.plate[12].frame_a.angular_acceleration_of_the_inner_ring.relative.x[{}]"
+    with sheet(tmp_path / "a.svg", 5.0, 6.0) as figure:
+        heading = figure.suptitle(f"{name}\nshort")
+        panels = figure.subplots(3)
+        for i, axes in enumerate(panels):
+            axes.set_ylabel(name.format(i))
+            axes.set_title(f"panel {i}" if i else name.format(i))
+    assert heading.get_text().endswith("\nshort")
+    assert heading.get_window_extent().width <= figure.bbox.width
+    for i, axes in enumerate(panels):
+        label, place = axes.yaxis.label, axes.get_window_extent()
+        assert label.get_text().replace("\n", "") == name.format(i)
+        assert label.get_window_extent().height <= 1.05 * place.height
+    assert panels[0].get_title(loc="left").count("\n") == 1
+    assert panels[1].get_title(loc="left") == "panel 1"

@@ -326,6 +326,14 @@ def test_rtol_and_atol_say_what_may_differ(tmp_path, bounds, status):
     assert ("x differs by 0.25 m at t = 1 s, more than" in done.stderr) == bool(status)
 
 
+def test_a_name_that_is_longer_than_its_column_stands_there_whole(tmp_path):
+    name = f"mechanics.{'axis.' * 20}position"
+    (tmp_path / "one.csv").write_text(f"t [s],{name}\n0,1\n1,4\n")
+    (tmp_path / "two.csv").write_text(f"t [s],{name}\n0,1\n1,3\n")
+    said = commands.harness(tmp_path, "compare", "one.csv", "two.csv", COLUMNS="80").stdout
+    assert name in "".join(line.split(" ")[0] for line in said.splitlines())
+
+
 @pytest.mark.parametrize(
     ("pair", "told"),
     [

@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 
 from ...results.quantity import in_degrees
-from ...results.style import ABOVE, BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, drawable, label, sheet, spelled
+from ...results.style import ABOVE, BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet, spelled
 from . import units
 from .difference import Comparison, textual
 
 MOST = 8  # variables drawn, those that differ most
+ROUNDING = 64 * np.finfo(float).eps
 
 
 def draw(found: Comparison, path: Path) -> None:
@@ -27,7 +28,9 @@ def draw(found: Comparison, path: Path) -> None:
                 values = drawable(side.columns[each.name]) * (units.size(side.units[each.name], each.unit) or 1.0)
                 both.plot(side.time, values / size, label=f"{side.name} ", **style)
             both.set_ylabel(label(each.name, unit))
-            off.plot(found.time, (drawable(each.left) - drawable(each.right)) / size, color=GREEN, linewidth=0.8)
+            left, right = (drawable(values) / size for values in (each.left, each.right))
+            off.plot(found.time, left - right, color=GREEN, linewidth=0.8)
+            resolved(off, np.nanmax(np.abs([left, right]), initial=0.0))
             largest, rms = each.largest / size, each.rms / size
             off.set_title(f"difference: largest {largest:.3g}, rms {rms:.3g} {spelled(unit)}")
             off.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
@@ -36,3 +39,11 @@ def draw(found: Comparison, path: Path) -> None:
         for axes in panels[-1]:
             axes.set_xlabel("t [s]")
             axes.set_xlim(np.min(found.time), np.max(found.time))
+
+
+def resolved(axes: Axes, largest: float) -> None:
+    """Show a difference that is constant but for what rounding leaves of values up to `largest` as constant."""
+    low, high = axes.get_ylim()
+    if high - low < ROUNDING * largest:
+        reach = max(ROUNDING * largest, 2 * abs(low), 2 * abs(high))
+        axes.set_ylim(-reach, reach)

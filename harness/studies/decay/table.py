@@ -13,7 +13,7 @@ def table(found: Identified) -> Table:
     shown = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), title=found.record.name, title_justify="left")
     shown.add_column("", min_width=14)
     for head in ("whole signal", "turning points", "two peaks"):
-        shown.add_column(head, justify="right", overflow="fold")
+        shown.add_column(head, justify="right")
     shown.add_column("", no_wrap=True)
     turns = {each.name: each for each in found.by_turns}
     peaks = {each.name: each for each in found.published}

@@ -30,7 +30,7 @@ def endings(rows: Iterable[Ending]) -> Table:
 def scenes(title: str) -> Table:
     """A table that begins with the scene, and breaks its lines rather than cut them off."""
     table = Table(title=title, box=SIMPLE_HEAD, show_edge=False, title_justify="left", expand=True)
-    table.add_column("scene", ratio=1, overflow="fold")
+    table.add_column("scene", ratio=1)
     return table
 
 
