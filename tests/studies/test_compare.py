@@ -103,7 +103,7 @@ UNITS = {"x": "m", "v": "m/s", "y": "m", "mode": ""}
 
 
 def path(name, times, events=None, **columns):
-    return Trajectory(name, times, columns, {name: UNITS[name] for name in columns}, events)
+    return Trajectory(name, times, columns, {name: UNITS.get(name, "") for name in columns}, events)
 
 
 def test_between_samples_a_variable_follows_its_rate_or_stays_between_its_neighbours():
@@ -117,6 +117,22 @@ def test_between_samples_a_variable_follows_its_rate_or_stays_between_its_neighb
     stairs = np.floor(one) + 0.25
     found = compare(path("stairs", one, x=stairs), path("line", two, x=np.zeros(400)))
     assert found.differences[0].largest == 5.25  # no spline swings beyond the stairs
+
+
+def test_a_variable_follows_its_own_rate_among_the_many_of_an_fmu_without_units():
+    pace = np.linspace(1, 3, 60)
+    one, two = np.linspace(0, 6, 1001), np.linspace(0.0005, 5.9, 400)
+    motions = [
+        np.concatenate([np.sin(pace * t[:, None]), pace * np.cos(pace * t[:, None])], axis=1) for t in (one, two)
+    ]
+    found = compare(
+        *(
+            path("many", t, **{f"y{i}": y for i, y in enumerate(each.T)})
+            for t, each in zip((one, two), motions, strict=True)
+        )
+    )
+    assert max(each.relative for each in found.differences[:60]) < 1e-8  # 81 times that of pace 1
+    assert min(each.relative for each in found.differences[60:]) > 1e-8  # of these no rate was recorded
 
 
 @pytest.mark.parametrize("late", [0.0, 1e-9, 1e-3])

@@ -1,5 +1,6 @@
 """How far two trajectories are apart: largest and root-mean-square difference of each variable, and event times."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import isnan
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...running.trajectory import Trajectory
-from .between import Sides, sides
+from .between import Motion, Sides
 from .pairs import Pairs, paired
 from .trajectory import common
 from .units import size
@@ -76,13 +77,13 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
     begin, end = common(one, two)
     time, interpolated = times(one, two, begin, end)
     pairs, jumps = events(one, two, begin, end)
-    differences, left_out = [], []
+    motions, differences, left_out = tuple(coded(one, two)), [], []
     for name in shared:
         unit, factor, differs = units(one, two, name)
         left_out += [differs] if differs else []
         if unit is not None:
-            same = alike(one, two, name, factor)
-            left, right = nearest(*(sides(each, name, time, at) for each, at in zip(same, jumps, strict=True)))
+            ours, theirs = (each.sides(name, time, at) for each, at in zip(motions, jumps, strict=True))
+            left, right = nearest(ours, Sides(factor * theirs.low, factor * theirs.high))
             if textual(one, name):
                 left, right = np.zeros(len(time)), (left != right).astype(float)
             differences.append(difference(name, unit, time, left, right))
@@ -114,17 +115,13 @@ def textual(path: Trajectory, name: str) -> bool:
     return path.columns[name].dtype.kind == "U"
 
 
-def alike(one: Trajectory, two: Trajectory, name: str, factor: float) -> tuple[Trajectory, Trajectory]:
-    """Both with a variable in the unit of the first; of texts, the place of each among all."""
-    left, right = one.columns[name], two.columns[name]
-    if textual(one, name):
-        known = np.unique(np.concatenate([left, right]))
-        left, right = (np.searchsorted(known, each).astype(float) for each in (left, right))
-    elif factor == 1.0:
-        return one, two
-    else:
-        right = factor * right
-    return replace(one, columns=one.columns | {name: left}), replace(two, columns=two.columns | {name: right})
+def coded(one: Trajectory, two: Trajectory) -> Iterator[Motion]:
+    """Both motions, of a text in both the place among all that either says."""
+    texts = [name for name in one.columns if name in two.columns and textual(one, name) and textual(two, name)]
+    known = {name: np.unique(np.concatenate([each.columns[name] for each in (one, two)])) for name in texts}
+    for each in (one, two):
+        places = {name: np.searchsorted(known[name], each.columns[name]).astype(float) for name in texts}
+        yield Motion(replace(each, columns=each.columns | places))
 
 
 def nearest(left: Sides, right: Sides) -> tuple[np.ndarray, np.ndarray]:

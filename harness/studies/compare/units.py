@@ -2,6 +2,7 @@
 
 import re
 from collections import Counter
+from functools import cache
 
 from ...records.units import known
 
@@ -39,6 +40,7 @@ def size(unit: str, other: str) -> float | None:
     return None
 
 
+@cache
 def is_rate(unit: str, of: str) -> bool:
     """Whether a unit is another one per second; where neither is known, it may be."""
     powers = spelled(of)
