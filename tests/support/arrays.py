@@ -3,6 +3,7 @@
 import struct
 
 import numpy as np
+from on_arrays import on_arrays
 
 from fmus.runtime import vectors
 
@@ -49,7 +50,7 @@ def written_steps(model, values, stop, most):
 def array_steps(model, values, stop, most):
     """The same of the sources."""
     begun(model, values, stop)
-    model = vectors.on_arrays(model)
+    model = on_arrays(model)
     start(model, [model.initial(0.0)], stop)
 
     def row(step):
