@@ -9,12 +9,14 @@ import builtins
 import inspect
 import math
 import operator
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import count
 from types import BuiltinFunctionType, FunctionType
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from .kinds import BOOL, FLOAT, INT, Group, Kind, Known, Method, Object, Row, Scalar, kind_of, literal
+from .kinds import BOOL, FLOAT, INT, Group, Kind, Known, Method, Object, Row, Scalar, declare, kind_of, literal
 from .refusal import Refused, refused
 
 if TYPE_CHECKING:
@@ -48,6 +50,9 @@ COMPARISONS: dict[type, tuple[str, int, Callable[..., Any]]] = {
     ast.NotEq: ("!=", EQUALITY, operator.ne),
 }
 
+LEAVE = "if (*fault) {leave}"
+LASTING = re.compile(r"-?\d[\w.+-]*|-?INFINITY|NAN|true|false|_\d+")
+
 
 @dataclass(frozen=True)
 class Value:
@@ -69,6 +74,9 @@ class Expressions(ast.NodeVisitor):
         self.program, self.function = program, function
         self.locals: dict[str, Kind] = {}
         self.assigned: set[str] = set()  # the names that have a value here, whatever way led here
+        self.lines: list[str] = []
+        self.depth = 1
+        self.temporaries = count(1)
         self.pure = True
         self.faults = False  # somewhere in the function
         # of the statement at hand:
@@ -80,15 +88,6 @@ class Expressions(ast.NodeVisitor):
     def refused(self, node: ast.AST, why: str, instead: str) -> Refused:
         return refused(self.function, node, why, instead)
 
-    def temporary(self, kind: Kind, text: str) -> str:
-        raise NotImplementedError
-
-    def kept(self, value: Value) -> Value:
-        raise NotImplementedError
-
-    def check(self) -> None:
-        raise NotImplementedError
-
     def generic_visit(self, node: ast.AST) -> NoReturn:
         raise self.refused(node, "is outside the subset", "write it with numbers, attributes, calls and if")
 
@@ -97,6 +96,29 @@ class Expressions(ast.NodeVisitor):
         self.faulty = self.faults = True
         self.clean = False
         return "fault"
+
+    # ---- lines
+
+    def emit(self, line: str) -> None:
+        self.lines.append("    " * self.depth + line)
+
+    def temporary(self, kind: Kind, text: str) -> str:
+        """Keep a value on a line of its own."""
+        name = f"_{next(self.temporaries)}"
+        self.emit(f"const {declare(kind, name)} = {text};")
+        return name
+
+    def kept(self, value: Value) -> Value:
+        """The same value, in a name of its own unless it is a number or has one."""
+        if LASTING.fullmatch(value.text):
+            return value
+        return Value(value.kind, self.temporary(value.kind, value.text))
+
+    def check(self) -> None:
+        """Leave the function if the line before has raised the fault flag."""
+        if self.faulty:
+            self.emit(LEAVE)
+        self.faulty = False
 
     # ---- numbers and truth
 

@@ -5,23 +5,18 @@ fault is followed by a check that leaves the function, just where Python's excep
 """
 
 import ast
-import re
 from collections.abc import Callable
-from itertools import count
 from types import FunctionType
 from typing import TYPE_CHECKING
 
 from ..words import OF_C
 from ..written import definition
-from .expressions import SIGN, Expressions, Value, group
+from .expressions import LEAVE, SIGN, Expressions, Value, group
 from .kinds import BOOL, FLOAT, INT, Group, Kind, Known, Object, Scalar, declare, spell
 from .refusal import place
 
 if TYPE_CHECKING:
     from .program import Program
-
-LEAVE = "if (*fault) {leave}"
-LASTING = re.compile(r"-?\d[\w.+-]*|-?INFINITY|NAN|true|false|_\d+")
 
 
 class Body(Expressions):
@@ -31,9 +26,6 @@ class Body(Expressions):
         super().__init__(program, function)
         self.result: Kind | None = None
         self.returns = False  # a return was seen, so the result is known
-        self.lines: list[str] = []
-        self.depth = 1
-        self.temporaries = count(1)
         self.breaks: list[list[set[str]]] = []  # for every loop around: what has a value at its breaks
         tree = definition(function)
         self.sentence = (ast.get_docstring(tree) or "").replace("*/", "* /").splitlines()[:1]
@@ -69,27 +61,6 @@ class Body(Expressions):
         return f"({self.result.c}){{0}}" if isinstance(self.result, Group) else "0"
 
     # ---- lines
-
-    def emit(self, line: str) -> None:
-        self.lines.append("    " * self.depth + line)
-
-    def temporary(self, kind: Kind, text: str) -> str:
-        """Keep a value on a line of its own."""
-        name = f"_{next(self.temporaries)}"
-        self.emit(f"const {declare(kind, name)} = {text};")
-        return name
-
-    def kept(self, value: Value) -> Value:
-        """The same value, in a name of its own unless it is a number or has one."""
-        if LASTING.fullmatch(value.text):
-            return value
-        return Value(value.kind, self.temporary(value.kind, value.text))
-
-    def check(self) -> None:
-        """Leave the function if the line before has raised the fault flag."""
-        if self.faulty:
-            self.emit(LEAVE)
-        self.faulty = False
 
     def braces(self, head: str, body: Callable[[], bool]) -> bool:
         if head.startswith("else") and self.lines[-1].endswith("}"):
