@@ -1,4 +1,6 @@
-"""Names that mean something else where a model goes."""
+"""Words where a model goes: names that mean something else there, texts as Python and C both read them."""
+
+from json import dumps
 
 OF_C = frozenset(
     """
@@ -9,3 +11,8 @@ OF_C = frozenset(
     RAND_MAX SEEK_CUR SEEK_END SEEK_SET TMP_MAX TOLERANCE errno offsetof stderr stdin stdout
     """.split()  # noqa: SIM905
 )
+
+
+def quoted(text: str) -> str:
+    """A string literal of printable letters."""
+    return dumps(text, ensure_ascii=False)

@@ -7,6 +7,7 @@ from textwrap import indent, wrap
 
 from ...runtime.methods import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
+from ..words import quoted
 from .anatomy import Anatomy
 from .coupled import coupled
 from .declared import Contact, Fixed, Mode, Output, State, Variable
@@ -149,9 +150,3 @@ def escaped(text: str) -> str:
     """A text as it stands between three quotes."""
     text = text.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
     return f'{text[:-1]}\\"' if text.endswith('"') else text
-
-
-def quoted(text: str) -> str:
-    """A string literal."""
-    literal = repr(text)
-    return literal if literal[0] == '"' else '"' + literal[1:-1].replace("\\'", "'").replace('"', '\\"') + '"'

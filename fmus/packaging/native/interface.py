@@ -11,6 +11,7 @@ from ...runtime.failure import ANSWERS
 from ...runtime.sentences import CALLS, PHASES, RUN, VALUES
 from ...runtime.values import SETTABLE
 from ..further import all_variables, exchanged, indicators_of, place, rates_of
+from ..words import quoted
 from ..written import beside
 from .entries import entries
 from .kinds import BOOL, FLOAT, INT, Object, literal
@@ -146,14 +147,9 @@ def header(model: type[Declaring], fmi: str) -> str:
         statuses=_cases(statuses, PLACES) + _cases(broken, own),
         values=_cases(VALUES, PLACES),
         calls=_cases(CALLS, PLACES),
-        phases=", ".join(_text(PHASES[phase]) for phase in range(len(PHASES))),
+        phases=", ".join(quoted(PHASES[phase]) for phase in range(len(PHASES))),
         count_of_phases=len(PHASES),
     )
-
-
-def _text(words: str) -> str:
-    """A string literal of C."""
-    return '"' + words.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _items(name: str, meaning: Declared) -> str:
@@ -179,7 +175,7 @@ def _line(name: str, meaning: Declared, slots: dict[str, str], ramps: bool) -> s
     bounds = (meaning.low, meaning.high, meaning.above, meaning.below)
     items = f"{_of(name)}, {_of(name)} + {len(meaning.items)}" if meaning.items else "NULL, NULL"
     parts = [
-        *map(_text, words),
+        *map(quoted, words),
         f"offsetof(Model, {place(name)})",
         f"offsetof(struct Tangent, {slots[name]})" if name in slots else "NO_SLOPE",
         *map(literal, flags),
@@ -197,7 +193,7 @@ def _cases(sentences: Mapping[int, str], places: Mapping[str, str]) -> str:
         lines.append(f"    case {case}:\n")
         for words, field, _, _ in Formatter().parse(sentence):
             if words:
-                lines.append(f"        add(text, {_text(words)});\n")
+                lines.append(f"        add(text, {quoted(words)});\n")
             if field:
                 lines.append(f"        {places[field]};\n")
         lines.append("        break;\n")
