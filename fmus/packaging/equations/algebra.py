@@ -38,24 +38,19 @@ def jumps(e: Operand, leaves: Collection[Expression]) -> bool:
     return depends(e, leaves) and (compares or any(jumps(one, leaves) for one in inside(e)))
 
 
-def leaves(e: Operand, found: dict[int, Expression] | None = None) -> list[Expression]:
-    """The declared variables in an expression, each once."""
+def parts(e: Operand, found: Memo | None = None) -> Memo:
+    """All that an expression is made of, each once, by identity: what comes first in the text stands first."""
     found = {} if found is None else found
-    if isinstance(e, Expression) and id(e) not in found:
-        found[id(e)] = e
-        for one in inside(e):
-            leaves(one, found)
-    return [one for one in found.values() if not isinstance(one, (Term, Output))]
-
-
-def parts(e: Operand, found: set[int] | None = None) -> set[int]:
-    """The identities of all that an expression is made of."""
-    found = set() if found is None else found
     if id(e) not in found:
-        found.add(id(e))
+        found[id(e)] = e
         for one in inside(e):
             parts(one, found)
     return found
+
+
+def leaves(e: Operand) -> list[Expression]:
+    """The declared variables in an expression, each once."""
+    return [one for one in parts(e).values() if isinstance(one, Expression) and not isinstance(one, (Term, Output))]
 
 
 def occurrences(e: Operand, leaf: Expression) -> int:
@@ -96,7 +91,10 @@ def made(op: str, *args: Operand) -> Operand:
     if op == "neg":
         return negative(args[0])
     if op == "choose":
-        return args[1] if same(args[1], args[2]) else Term(op, *args)
+        condition, this, that = args
+        if isinstance(condition, bool):  # which has been settled
+            return this if condition else that
+        return this if same(this, that) else Term(op, *args)
     if op in FUNCTIONS and not isinstance(args[0], Expression):
         with suppress(ArithmeticError, ValueError):  # as of a logarithm behind a condition that does not hold
             return getattr(math, op)(args[0])

@@ -39,15 +39,15 @@ class Choice(Variable, declare.Choice):
         if not items:
             raise Mistake("a Choice has items, each with what it is: label=sentence")
         super().__init__(1, text, tuple((label, n, sentence) for n, (label, sentence) in enumerate(items.items(), 1)))
-        self.numbers = {label: n for n, label in enumerate(items, 1)}
+        self.tests = {label: Term("==", self, n) for n, label in enumerate(items, 1)}
 
     def choose(self, **cases: Operand) -> Operand:
         """The expression of the item in force, by its label."""
-        if set(cases) != set(self.numbers):
-            raise Mistake(f"choose() has a case for each of {', '.join(self.numbers)}, and for nothing else")
+        if set(cases) != set(self.tests):
+            raise Mistake(f"choose() has a case for each of {', '.join(self.tests)}, and for nothing else")
         *rest, (_, value) = cases.items()
         for label, case in reversed(rest):
-            value = Term("choose", Term("==", self, self.numbers[label]), case, value)
+            value = Term("choose", self.tests[label], case, value)
         return value
 
 

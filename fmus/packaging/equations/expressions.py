@@ -50,6 +50,15 @@ def _both_ways(op: str) -> tuple[Any, Any]:
     return (lambda self, other: Term(op, self, other)), (lambda self, other: Term(op, other, self))
 
 
+def _refusing(sentence: str) -> Callable[..., Never]:
+    """A method that cannot be, with what it says."""
+
+    def refuse(e: "Expression", *_: object) -> Never:
+        raise Mistake(sentence.format(name=e.name or "an expression"))
+
+    return refuse
+
+
 class Expression:
     """What a number is calculated from: a declared variable, or a term of such."""
 
@@ -87,29 +96,16 @@ class Expression:
 
     __hash__ = object.__hash__
 
-    def __pow__(self, other: Operand) -> Never:
-        raise Mistake("** rounds in ways of its own: write a product, x * x, or exp and log")
-
-    __rpow__ = __pow__
-
-    def __bool__(self) -> Never:
-        raise Mistake(f"{self.name or 'an expression'} has no value yet: write choose(condition, this, that) for an if")
-
-    def __float__(self) -> Never:
-        raise Mistake(
-            f"{self.name or 'an expression'} has no value yet: functions of expressions are imported from fmus, "
-            f"which has {', '.join(FUNCTIONS)}"
-        )
-
-    def __iter__(self) -> Never:
-        raise Mistake(f"{self.name or 'an expression'} is one number: there is nothing to loop over")
-
-    def __index__(self) -> Never:
-        raise Mistake(
-            f"{self.name or 'an expression'} has no value yet, and no table can be read by it: write its law as a "
-            "formula, or as pieces with choose(condition, this, that)"
-        )
-
+    __pow__ = __rpow__ = _refusing("** rounds in ways of its own: write a product, x * x, or exp and log")
+    __bool__ = _refusing("{name} has no value yet: write choose(condition, this, that) for an if")
+    __float__ = _refusing(
+        f"{{name}} has no value yet: functions of expressions are imported from fmus, which has {', '.join(FUNCTIONS)}"
+    )
+    __iter__ = _refusing("{name} is one number: there is nothing to loop over")
+    __index__ = _refusing(
+        "{name} has no value yet, and no table can be read by it: write its law as a formula, or as pieces with "
+        "choose(condition, this, that)"
+    )
     __array_ufunc__ = None  # numpy leaves it alone
 
 

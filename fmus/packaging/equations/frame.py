@@ -2,9 +2,9 @@
 
 from collections.abc import Sequence
 
-from .algebra import depends, inside, made, put, same
+from .algebra import depends, inside, parts, put
 from .anatomy import TIME, Anatomy
-from .declared import Choice, Contact
+from .declared import Contact
 from .expressions import Expression, Operand, Term
 from .scribe import INDENT, Scribe
 
@@ -87,8 +87,8 @@ class Frame:
             s.count(*targets)
             return returned(s, targets)
         with s.block(f"if {s.text(test)}:"):
-            s.lines += self.returning(self.scribe(s.depth), [decided(e, test, True) for e in targets])
-        return s.lines + self.returning(self.scribe(s.depth), [decided(e, test, False) for e in targets])
+            s.lines += self.returning(self.scribe(s.depth), [put(e, {test: True}) for e in targets])
+        return s.lines + self.returning(self.scribe(s.depth), [put(e, {test: False}) for e in targets])
 
 
 def returned(s: Scribe, targets: Sequence[Operand]) -> list[str]:
@@ -113,14 +113,12 @@ def place_sizes(f: Frame, s: Scribe, sizes: list[Operand]) -> list[Operand]:
     reach.name = drive.name if drive not in s.given else s.fresh(f"reach_of_{drive.name}")
     s.say(f"{reach.name} = fabs(self.x_base) + fabs(self.{drive.steady.name}) * (fabs(t) + fabs(self.t_base))")
     s.given[reach] = reach.name
-    return [put(e, dict.fromkeys(magnitudes(e, drive), reach)) for e in sizes]
+    return [put(e, {one: reach for one in parts(e).values() if is_size(one, drive)}) for e in sizes]
 
 
-def magnitudes(e: Operand, drive: Expression) -> list[Term]:
-    """Where the size of the position of a driver is asked for."""
-    if isinstance(e, Term) and e.op == "fabs" and e.args[0] is drive:
-        return [e]
-    return [found for one in inside(e) for found in magnitudes(one, drive)]
+def is_size(e: Operand, drive: Expression) -> bool:
+    """Whether this asks for the size of the position of a driver."""
+    return isinstance(e, Term) and e.op == "fabs" and e.args[0] is drive
 
 
 def method(name: str, arguments: Sequence[str], lines: list[str]) -> str:
@@ -130,16 +128,4 @@ def method(name: str, arguments: Sequence[str], lines: list[str]) -> str:
 
 def choice_in(e: Operand) -> Term | None:
     """A test of a choice in an expression."""
-    if isinstance(e, Term) and e.op == "==" and isinstance(e.args[0], Choice):
-        return e
-    return next((found for one in inside(e) if (found := choice_in(one)) is not None), None)
-
-
-def decided(e: Operand, test: Term, holds: bool) -> Operand:
-    """The expression where a test has been settled."""
-    if isinstance(e, Term) and e.op == "choose" and same(e.args[0], test):
-        return decided(e.args[1 if holds else 2], test, holds)
-    if not isinstance(e, Expression) or choice_in(e) is None:
-        return e
-    found = [decided(one, test, holds) for one in inside(e)]
-    return made(e.op, *found) if isinstance(e, Term) else found[0]
+    return next((one for one in parts(e).values() if isinstance(one, Term) and one.op == "=="), None)

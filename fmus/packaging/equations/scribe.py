@@ -117,13 +117,18 @@ class Scribe:
         return self.known[number]
 
     def _keep(self, number: int, node: ast.expr) -> ast.expr:
+        name = self._local(number)
+        self.say(f"{name} = {ast.unparse(ast.fix_missing_locations(node))}")
+        self.known[number] = name
+        return ast.Name(name)
+
+    def _local(self, number: int) -> str:
+        """A name for an expression: the author's, if it is free."""
         name = self.names.get(number, "")
         if not name or name in self.known.values() or name in self.given.values():
             name = next(n for i in range(1, 1000) if (n := f"{name or 'u'}{i}") not in self.taken)
         self.taken.add(name)
-        self.say(f"{name} = {ast.unparse(ast.fix_missing_locations(node))}")
-        self.known[number] = name
-        return ast.Name(name)
+        return name
 
     def _node(self, e: Operand) -> ast.expr:
         if not isinstance(e, Expression):
@@ -146,11 +151,7 @@ class Scribe:
         return node
 
     def _branch(self, e: Term, number: int) -> ast.expr:
-        name = self.names.get(number, "")
-        if not name or name in self.known.values():
-            name = next(n for i in range(1, 1000) if (n := f"{name or 'u'}{i}") not in self.taken)
-        self.taken.add(name)
-        test = self.text(e.args[0])
+        name, test = self._local(number), self.text(e.args[0])
         for head, case in (f"if {test}:", e.args[1]), ("else:", e.args[2]):
             with self.block(head):
                 self.say(f"{name} = {self.text(case)}")

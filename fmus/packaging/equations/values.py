@@ -1,7 +1,7 @@
 """The methods of a written-out model about its values: at its birth, at the start, when they have changed."""
 
 from ...runtime.automaton import DryFriction
-from .algebra import parts
+from .algebra import Memo, parts
 from .expressions import Term
 from .frame import Frame, method
 from .scribe import INDENT
@@ -43,7 +43,7 @@ def prepare(f: Frame) -> str:
         s.say(f"self.{e.name}_base = self.{e.name}")
     s.count(*f.constants, *(rule.broken for rule in f.an.rules))
 
-    def calculate(needed: set[int] | None = None) -> None:
+    def calculate(needed: Memo | None = None) -> None:
         for e in f.constants:
             if (needed is None or id(e) in needed) and not any(e is one for one in done):
                 s.let(f"self.{e.name}", e)
