@@ -31,7 +31,7 @@ def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> di
     def of_mode(c: Contact) -> set[Expression]:
         near = [c] if c in an.lonely else an.contacts
         held = [*loads(c), *(an.hold[d] for d in near)] if HYBRID in laws else []
-        rates = [derivative(e, an.by_time | {x: an.rate[x] for x in an.positions}) for e in held]
+        rates = [derivative(e, an.coasting) for e in held]
         others = [e for d in near if d is not c for e in (d.slip, d.slide)]
         return among(c.slip, *held, *rates, *others, *([c.eps] if THRESHOLD in laws else []))
 

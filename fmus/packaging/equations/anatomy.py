@@ -257,6 +257,11 @@ class Anatomy:
         """What goes on by itself, while the states stay."""
         return {TIME: 1.0} | {d: d.steady for d in self.drives}
 
+    @property
+    def coasting(self) -> dict[Expression, Operand]:
+        """What goes on where nothing accelerates: that, inputs at their rates, positions at their speeds."""
+        return self.by_time | self.ramps | {x: self.rate[x] for x in self.positions}
+
     @cached_property
     def closed_form(self) -> tuple[Operand, Operand, Operand, Operand] | None:
         """Mass, damping, stiffness and the speed of the resting point where one body moves under a linear law."""

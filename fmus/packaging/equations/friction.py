@@ -16,8 +16,7 @@ def friction(f: Frame) -> list[str]:
 def hold(f: Frame, c: Contact) -> str:
     """The load on the body at rest, its rate, and the most that is held."""
     an = f.an
-    rate = derivative(an.load[c], an.by_time | an.ramps | {x: an.rate[x] for x in an.positions})
-    wanted = [an.load[c], put(rate, {c.slip: 0.0}), an.hold[c]]
+    wanted = [an.load[c], put(derivative(an.load[c], an.coasting), {c.slip: 0.0}), an.hold[c]]
     return method("hold", ["t", *f.states], f.returning(f.scribe(), wanted))
 
 
