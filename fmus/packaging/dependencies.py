@@ -5,15 +5,16 @@ The mode of a contact follows from its slip and, where it may stick, from its lo
 rates of both, which decide ties; of contacts that share bodies from those of all.
 """
 
-from ..runtime.declare import Declared, Declaring
+from ..runtime.declare import Declaring
 from ..runtime.values import SETTABLE
 from .equations.algebra import derivative, leaves, put
 from .equations.anatomy import TIME, Anatomy
 from .equations.declared import HYBRID, SIGN, THRESHOLD, Contact
 from .equations.expressions import Expression, Operand
+from .further import Variables
 
 
-def at_start(model: type[Declaring], declared: list[tuple[str, Declared]]) -> dict[str, list[str]]:
+def at_start(model: type[Declaring], declared: Variables) -> dict[str, list[str]]:
     """For every output the parameters and inputs that it follows from while the model is initialised."""
     outputs = [name for name, meaning in declared if meaning.causality == "output"]
     if not outputs:

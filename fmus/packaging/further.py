@@ -42,13 +42,18 @@ def place(name: str) -> str:
     return "exchange.driver" if name.startswith(DERIVATIVE[:4]) else name
 
 
+def integrated(declared: Variables) -> Variables:
+    """The states that a solver integrates, in order."""
+    return [(name, meaning) for name, meaning in declared if meaning.role == "state" and not meaning.rate]
+
+
 def all_variables(thing: Any) -> Variables:
     """Name and declaration of every variable of such an object: those declared, then the others, the time last."""
     declared = variables(thing)
     meanings = dict(declared)
     found: Variables = []
     forces = [meaning.unit for _, meaning in declared if meaning.role == "contact"]
-    states = [meaning for _, meaning in declared if meaning.role == "state" and not meaning.rate]
+    states = [meaning for _, meaning in integrated(declared)]
     speed = next((meaning.unit for meaning in states if meaning.rate_of), states[0].unit)
     for (mode, slip), force in zip(thing.contacts.items(), forces, strict=True):
         tail, where = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
@@ -70,9 +75,8 @@ def rates_of(declared: Variables) -> dict[int, int]:
     names = {name: place for place, (name, _) in enumerate(declared)}
     rates = {names[name]: names[meaning.rate_of] for name, meaning in declared if meaning.rate_of}
     of_state = {state: rate for rate, state in rates.items() if declared[state][1].role == "state"}
-    states = [names[name] for name, meaning in declared if meaning.role == "state" and not meaning.rate]
     drivers = {names[DERIVATIVE.format(name)]: names[name] for name, meaning in declared if meaning.rate}
-    return {of_state[state]: state for state in states} | drivers
+    return {of_state[names[name]]: names[name] for name, _ in integrated(declared)} | drivers
 
 
 def indicators_of(declared: Variables) -> list[int]:

@@ -9,8 +9,8 @@ from ..runtime.declare import Declared, Declaring
 from ..runtime.values import SETTABLE
 from . import __version__
 from .chart import chart
-from .further import Variables
-from .reference import INSIDE, Reference, integrated
+from .further import Variables, integrated
+from .reference import INSIDE, Reference
 from .units import unit_of
 
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from ..runtime.declare import Declared
 from . import BuildError
 from .document import document
+from .further import Variables, integrated
 
 INSIDE = "extra/org.fmi-standard.fmi-ls-ref"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
@@ -40,7 +40,7 @@ class Reference:
         return f"Certified result of the default experiment: {self.how}."
 
 
-def reference(path: Path, declared: list[tuple[str, Declared]]) -> Reference | None:
+def reference(path: Path, declared: Variables) -> Reference | None:
     """The reference of the model in a file, if it has one that holds for what is declared: with true sticking, where it
     sticks."""
     laws: Any = next((meaning.items for variable, meaning in declared if variable == "friction"), ())
@@ -70,12 +70,7 @@ def _is_row(row: list[str], states: int) -> bool:
         return False
 
 
-def integrated(declared: list[tuple[str, Declared]]) -> list[tuple[str, Declared]]:
-    """The states that a solver integrates, in order."""
-    return [(variable, meaning) for variable, meaning in declared if meaning.role == "state" and not meaning.rate]
-
-
-def files(name: str, found: Reference, declared: list[tuple[str, Declared]]) -> dict[str, bytes]:
+def files(name: str, found: Reference, declared: Variables) -> dict[str, bytes]:
     """The result and its manifest, by their paths in the FMU."""
     lines = [["time", *(variable for variable, _ in integrated(declared))], *found.rows]
     result = "".join(",".join(line) + "\n" for line in lines)
