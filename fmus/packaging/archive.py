@@ -56,7 +56,7 @@ def build(
     (written/offer.py); without a choice it has all there are.
     """
     source, date = find(model), build_date()
-    name, offered = source.name, offer(source.model, source.name, methods, laws)
+    name, offered = source.name, offer(source, methods, laws)
     cls, texts = written(source, offered), files_of(source, offered)
     sources = travelling(source, edit=lambda path, text: texts.get(path, text))
     code = digest(sources, ENTRY)

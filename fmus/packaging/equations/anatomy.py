@@ -364,6 +364,11 @@ class Anatomy:
         return METHODS if self.closed_form else METHODS[1:]
 
     @property
+    def laws(self) -> list[str]:
+        """The labels of the friction laws."""
+        return list(dict.fromkeys(law for c in self.contacts for law in c.laws))
+
+    @property
     def method(self) -> str:
         """The default one."""
         if self.model.method == METHODS[0] and not self.closed_form:

@@ -87,9 +87,9 @@ def declarations(an: Anatomy) -> list[str]:
         f"{e.name} = {'Fixed' if isinstance(e, Fixed) else 'Parameter'}({float(e.start)!r}, {described(e)})"
         for e in an.parameters
     ]
-    if laws := {law: None for c in an.contacts for law in c.laws}:
-        items = ", ".join(f"{law.upper()}_LAW" for law in laws)
-        lines.append(f'friction = Choice(HYBRID, "friction law", ({items}{"," if len(laws) == 1 else ""}))')
+    if an.laws:
+        items = ", ".join(f"{law.upper()}_LAW" for law in an.laws)
+        lines.append(f'friction = Choice(HYBRID, "friction law", ({items}{"," if len(an.laws) == 1 else ""}))')
     for e in an.choices:
         items = ", ".join(f"({quoted(label)}, {value}, {quoted(sentence)})" for label, value, sentence in e.items)
         lines.append(f"{e.name} = Choice({e.start}, {quoted(e.text)}, ({items},))")

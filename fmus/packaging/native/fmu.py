@@ -57,7 +57,7 @@ def build(
             raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
     date = build_date()
     source = replace(find(model), ramps=fmi == "2")  # FMI 3.0 has no derivatives of inputs
-    name, cls = source.name, written(source, offer(source.model, source.name, methods, laws))
+    name, cls = source.name, written(source, offer(source, methods, laws))
     files, description = frozen(cls, name, date, fmi)
     declared = declared_by(cls)
     entries = companions(cls, source.path, declared, ICONS[fmi], USE)

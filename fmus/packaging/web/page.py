@@ -45,7 +45,7 @@ def build(
 
 def with_code(source: Authored, methods: Sequence[str], laws: Sequence[str]) -> Portrait:
     """All that the page needs of a model."""
-    model = written(source, offer(source.model, source.name, methods, laws))
+    model = written(source, offer(source, methods, laws))
     files, description = frozen(model, source.name, build_date(), "2")
     told = portrait(source, model)
     return told | {"guid": fromstring(description).attrib["guid"], "code": packed(source.name, files)}

@@ -18,34 +18,33 @@ from ...runtime import declare
 from ...runtime.declare import Declaring
 from ..catalogue import FMUS, find
 from ..equations.authored import Authored
-from .offer import Offer
+from .offer import Offer, offer
 from .sources import APART, PLAIN, Files, written_out
 
 TREE = "written_out"  # in a module of a written-out package: its tree, with the lines of the source
 
 
-def read(source: str | Path | Authored) -> Authored:
-    """The model of a name or a path, or of an author's file."""
-    return source if isinstance(source, Authored) else find(source)
+def asked(source: str | Path | Authored, offered: Offer | None) -> tuple[Authored, Offer]:
+    """The model of a name or a path, or of an author's file; and what it offers, which without an offer is all."""
+    found = source if isinstance(source, Authored) else find(source)
+    return found, offered or offer(found)
 
 
-@cache
-def lines_of(source: Authored, offered: Offer | None = None) -> Files:
-    return written_out(source.model, f"{source.name}.py", source.text, offered)
+lines_of = cache(written_out)
 
 
 def files_of(source: str | Path | Authored, offered: Offer | None = None) -> dict[str, str]:
     """Path and text of every file of the runtime, and of the model, as they travel."""
-    return {path: "\n".join(lines) for path, lines in lines_of(read(source), offered).items()}
+    return {path: "\n".join(lines) for path, lines in lines_of(*asked(source, offered)).items()}
 
 
 def written(source: str | Path | Authored, offered: Offer | None = None) -> type[Declaring]:
     """The class of a model as it will travel, with what the runtime is for it; the same each time."""
-    return brought_in(read(source), offered)
+    return brought_in(*asked(source, offered))
 
 
 @cache
-def brought_in(source: Authored, offered: Offer | None = None) -> type[Declaring]:
+def brought_in(source: Authored, offered: Offer) -> type[Declaring]:
     """The model class out of a package of its files, imported under a name of its own."""
     files, name, model = lines_of(source, offered), source.name, source.model
     content = "".join(f"{path}\0" + "\n".join(lines) for path, lines in sorted(files.items()))

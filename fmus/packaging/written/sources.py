@@ -5,11 +5,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ...runtime.declare import Declaring, variables
+from ...runtime.declare import variables
 from .. import BuildError, __version__
+from ..equations.authored import Authored
 from .declarations import Declarations
 from .needed import pruned
-from .offer import Offer, choices, gone, stepping
+from .offer import EXACT, Offer
 from .spec import Spec
 from .text import Line, Writer
 
@@ -26,39 +27,37 @@ def runtime() -> dict[str, str]:
     return {f"runtime/{path.name}": path.read_text(encoding="utf-8") for path in paths}
 
 
-def spec_of(model: type[Declaring], offered: Offer | None, called: str = PLAIN) -> Spec:
+def spec_of(model: Any, offered: Offer, called: str) -> Spec:
     """What a model and an offer fix; `called`: as its states, rates and modes are."""
-    thing: Any = model()
-    dry = bool(thing.contacts)
-    closed = thing.linear and (offered is None or offered.closed)
-    same = {flag: getattr(thing, flag) for flag in ("waits", "coupled", "driven", "ramps")}
-    flags = {"dry": dry, "linear": closed} | same
+    flags = {flag: getattr(model, flag) for flag in ("dry", "waits", "coupled", "driven", "ramps")}
+    flags["linear"] = EXACT in offered.methods
     states, contacts = (
         {called.format(name): other and called.format(other) for name, other in pairs.items()}
-        for pairs in (thing.states, thing.contacts)
+        for pairs in (model.states, model.contacts)
     )
-    return Spec(states, contacts, flags, choices(model, offered), gone(offered), stepping(offered))
+    return Spec(states, contacts, flags, offered.choices, offered.gone, offered.stepping)
 
 
-def written_out(model: type[Declaring], file: str, text: str, offered: Offer | None = None) -> Files:
+def written_out(source: Authored, offered: Offer) -> Files:
     """The lines of every file of the runtime and of the file of a model.
 
     The numbers go by the names of the model, if these mean nothing else in the numerics.
     """
     try:
-        return expanded(spec_of(model, offered), model, file, text)
+        return expanded(source, spec_of(source.model, offered, PLAIN))
     except BuildError:
-        return expanded(spec_of(model, offered, APART), model, file, text)
+        return expanded(source, spec_of(source.model, offered, APART))
 
 
-def expanded(spec: Spec, model: type[Declaring], file: str, text: str) -> Files:
+def expanded(source: Authored, spec: Spec) -> Files:
     """The lines with the names of `spec`."""
-    texts = runtime() | {file: text}
+    file = f"{source.name}.py"
+    texts = runtime() | {file: source.text}
     declared = Declarations([ast.parse(text, path) for path, text in texts.items() if path != file])
     if name := declared.clash(spec):
         raise BuildError(f"The name {name} means something else in the numerics; take another.")
     files = {path: Writer(spec, declared, path, text, path != file).lines for path, text in texts.items()}
-    names = {"." + part for variable, _ in variables(model()) for part in variable.split(".")}
+    names = {"." + part for variable, _ in variables(source.model()) for part in variable.split(".")}
     files = pruned(files, file, names)
     return {path: with_origin(path, lines, texts[path], spec) for path, lines in files.items()}
 
