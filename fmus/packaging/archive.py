@@ -58,7 +58,7 @@ def build(
     source, date = find(model), build_date()
     name, offered = source.name, offer(source, methods, laws)
     cls, texts = written(source, offered), files_of(source, offered)
-    sources = travelling(source, edit=lambda path, text: texts.get(path, text))
+    sources = travelling(source, texts)
     code = digest(sources, ENTRY)
     package = f"{name}_{code[:12]}"
     entries = companions(cls, source.path, declared_by(cls))

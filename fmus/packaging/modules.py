@@ -6,7 +6,7 @@ travels inside as `<package>/pythonfmu`, so the FMU never meets the pythonfmu of
 
 import ast
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
@@ -16,7 +16,6 @@ from .catalogue import FMUS
 from .equations.authored import Authored
 
 ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # what stands in the originals of these does not travel
-Edit = Callable[[str, str], str]  # of the text of the file at a path
 GUARD, SLAVE = "guard.py", "runtime/slave.py"  # travel with the model
 INIT = '''\
 """{name} as an FMI 2.0 co-simulation slave."""
@@ -29,11 +28,6 @@ from .runtime.slave import slave_for
 '''
 
 
-def unchanged(path: str, text: str) -> str:
-    """The edit that is none."""
-    return text
-
-
 def installed(layer: str) -> Path:
     """Where the package that brings a native layer is installed; it is found without being imported."""
     spec = find_spec(layer)
@@ -42,17 +36,16 @@ def installed(layer: str) -> Path:
     return Path(spec.origin).parent
 
 
-def travelling(source: Authored, root: Path = FMUS, edit: Edit = unchanged) -> dict[str, str]:
-    """Path inside the package and text, after `edit`, of the written-out model and of every file in `root` it needs."""
+def travelling(source: Authored, texts: Mapping[str, str], root: Path = FMUS) -> dict[str, str]:
+    """Path inside the package and text of the model and of every file that it needs, of `texts` or else in `root`."""
     files = {ROOT: INIT.format(name=source.name, model=source.title)}
-    model = f"{source.name}.py"
-    waiting = [model, GUARD, SLAVE]
+    waiting = [f"{source.name}.py", GUARD, SLAVE]
     for path in waiting:  # which grows on the way
         if path == VENDORED:
             files[path] = ""
         elif path not in files:
-            text = source.text if path == model else _on_disk(path, root).read_text(encoding="utf-8")
-            files[path], needed = _embed(path, edit(path, text), root)
+            text = texts[path] if path in texts else _on_disk(path, root).read_text(encoding="utf-8")
+            files[path], needed = _embed(path, text, root)
             waiting += needed
     return files
 

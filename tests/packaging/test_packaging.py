@@ -328,9 +328,7 @@ def test_a_failed_write_leaves_the_older_fmu_and_nothing_else(tmp_path, monkeypa
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"smd.fmu": b"older"}
 
 
-def odd(text):
-    """A model by that name, written out as this text."""
-    return SimpleNamespace(name="odd", title="Odd", text=text)
+ODD = SimpleNamespace(name="odd", title="Odd")
 
 
 @pytest.mark.parametrize(
@@ -347,7 +345,7 @@ def odd(text):
 )
 def test_an_import_that_no_fmu_can_serve_stops_the_build(line, sentence, tmp_path):
     with pytest.raises(BuildError, match=re.escape(f"odd.py {sentence}")):
-        travelling(odd(line), tmp_path)
+        travelling(ODD, {"odd.py": line}, tmp_path)
 
 
 def test_imports_are_followed_through_packages_and_line_ends_do_not_matter(tmp_path):
@@ -363,7 +361,7 @@ def test_imports_are_followed_through_packages_and_line_ends_do_not_matter(tmp_p
     }
     for path, content in files.items():
         (tmp_path / path).write_bytes(content)
-    found = travelling(odd((tmp_path / "odd.py").read_text()), tmp_path)
+    found = travelling(ODD, {}, tmp_path)
     assert set(found) == set(files) - {"runtime/idle.py"} | {
         "__init__.py",
         "guard.py",
