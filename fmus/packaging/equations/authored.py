@@ -8,7 +8,6 @@ import sys
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
-from importlib.util import module_from_spec, spec_from_file_location
 from keyword import iskeyword
 from pathlib import Path
 from traceback import extract_tb
@@ -96,9 +95,8 @@ class Authored:
             raise BuildError(
                 f"{self.path}: a model has the name of its file, in letters, digits and _{taken}: rename it."
             )
-        spec = spec_from_file_location(f"{PACKAGE}.authored.{self.name}", self.path)
-        assert spec is not None
-        module = module_from_spec(spec)
+        module = ModuleType(f"{PACKAGE}.authored.{self.name}")
+        module.__file__ = str(self.path)
         try:
             exec(compile(self.source, str(self.path), "exec"), vars(module))
         except Mistake:

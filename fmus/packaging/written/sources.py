@@ -67,5 +67,5 @@ def with_origin(path: str, lines: list[Line], text: str, spec: Spec) -> list[Lin
     if "\n".join(lines) == text:
         return lines
     modes = f"; {', '.join(spec.contacts)}" if spec.contacts else ""
-    origin = f"# Written out for {spec.told}{modes} from fmus/{path} of friction-fmus {__version__}."
+    origin = f"# Written out for {', '.join(spec.states)}{modes} from fmus/{path} of friction-fmus {__version__}."
     return [Line.of(origin, 1), *lines]

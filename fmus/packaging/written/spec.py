@@ -33,13 +33,6 @@ class Spec:
         for name in names:
             if (other := name.rstrip("0123456789")) in names - {name}:
                 raise BuildError(f"{name} is what {other} is called at a stage of a step; take another name.")
-        for mode, state in self.contacts.items():
-            if state and state not in self.states:
-                raise BuildError(f"The slip of {mode} is {state}, which is no state; states are {self.told}.")
-
-    @property
-    def told(self) -> str:
-        return ", ".join(self.states)
 
     def parts(self, kind: str) -> list[str]:
         """The names of the states, or of the modes."""

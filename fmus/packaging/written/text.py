@@ -97,14 +97,9 @@ class Writer:
                 return self.chosen(node, depth) if isinstance(node.body[0], ast.If) else self.of_methods(node, depth)
             case ast.If():
                 return self.branch(node, depth, "if")
-            case ast.While() | ast.For() | ast.With():
+            case ast.While() | ast.For():
                 self.head(node, depth)
                 self.block(node.body, depth + 4)
-            case ast.Try():
-                for part in [node.body, *(one.body for one in node.handlers), node.orelse, node.finalbody]:
-                    if part:
-                        self.copy(self.first(part[0]), shift)
-                        self.block(part, depth + 4)
             case _:
                 self.simple(node, depth)
         return isinstance(node, (ast.Return, ast.Raise))
