@@ -4,7 +4,6 @@ A Python FMU is for co-simulation; a native one for model exchange as well, with
 does not depend on the version of FMI is shared with description3.py.
 """
 
-from collections.abc import Iterable
 from datetime import datetime
 from math import isfinite
 from typing import Any, cast
@@ -17,7 +16,7 @@ from . import BuildError, __version__
 from .dependencies import at_start
 from .document import document
 from .further import DERIVATIVE, TIME, Variables, all_variables, exchanged, indicators_of, rates_of
-from .units import in_order, unit_of
+from .units import UNITS, Unit, unit_of
 
 CAPABILITIES = {
     "needsExecutionTool": "false",
@@ -56,7 +55,6 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime, excha
     declared = variables(thing)
     if exchanging:  # FMI 2.0 needs no variable for the time, and FMILibrary takes one for a mistake
         declared = [one for one in all_variables(thing) if one[0] != TIME]
-    if exchanging:
         root.set("numberOfEventIndicators", str(len(indicators_of(declared))))
         SubElement(root, "ModelExchange", EXCHANGE, modelIdentifier=name)
     stepping = CAPABILITIES | (SLOPES | RATES if exchanging else {}) | (RAMPS if thing.ramps else {})
@@ -65,15 +63,15 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime, excha
     _define_types(root, declared)
     log_and_experiment(root, model, "fmi2")
     scalars = SubElement(root, "ModelVariables")
-    for reference, (variable, meaning) in enumerate(declared):
-        scalars.append(_scalar(variable, meaning, reference))
     places = {variable: str(place) for place, (variable, _) in enumerate(declared, 1)}
-    for scalar, (_, meaning) in zip(scalars, declared, strict=True):
+    for reference, (variable, meaning) in enumerate(declared):
+        scalar = SubElement(scalars, "ScalarVariable", part_of_all(variable, meaning, reference))
+        of_type = SubElement(scalar, meaning.type, part_of_type(variable, meaning))
         if meaning.rate_of:
-            scalar[0].set("derivative", places[meaning.rate_of])
+            of_type.set("derivative", places[meaning.rate_of])
     rates = rates_of(declared) if exchanging else {}
     tell_states([scalar[0] for scalar in scalars], thing, rates, first=1)
-    _structure(root, declared, at_start(model, variables(thing)), rates)
+    _structure(root, model, declared, rates)
     return closed(root, "guid", code, date)
 
 
@@ -112,10 +110,8 @@ def declared_by(model: type[Declaring]) -> Variables:
 
 def define_units(root: Element, declared: Variables) -> None:
     """UnitDefinitions: every unit that a variable has, in the order of the table."""
-    used = {meaning.unit: unit_of(name, meaning.unit) for name, meaning in declared if meaning.type == "Real"}
     definitions = SubElement(root, "UnitDefinitions")
-    for symbol in in_order(used):
-        unit = used[symbol]
+    for symbol, unit in units_of(declared):
         powers = {base: str(getattr(unit, base)) for base in ("kg", "m", "s", "rad") if getattr(unit, base)}
         element = SubElement(definitions, "Unit", name=symbol)
         SubElement(element, "BaseUnit", powers)
@@ -137,13 +133,14 @@ def _define_types(root: Element, declared: Variables) -> None:
 
 def quantities(declared: Variables) -> list[dict[str, str]]:
     """What is measured and in which unit, for every unit that a variable has."""
+    found = [{"quantity": u.quantity, "unit": symbol, "displayUnit": u.display} for symbol, u in units_of(declared)]
+    return [{key: value for key, value in one.items() if value} for one in found]
+
+
+def units_of(declared: Variables) -> list[tuple[str, Unit]]:
+    """Every unit that a variable has: those with a name in the order of the table, then the others."""
     used = {meaning.unit: unit_of(name, meaning.unit) for name, meaning in declared if meaning.type == "Real"}
-    found = []
-    for symbol in in_order(used):
-        unit = used[symbol]
-        attributes = {"quantity": unit.quantity, "unit": symbol, "displayUnit": unit.display}
-        found.append({key: value for key, value in attributes.items() if value})
-    return found
+    return [(symbol, used[symbol]) for symbol in dict.fromkeys((*UNITS, *used)) if symbol in used]
 
 
 def add_items(element: Element, meaning: Declared) -> None:
@@ -156,13 +153,6 @@ def add_items(element: Element, meaning: Declared) -> None:
 def type_name(variable: str) -> str:
     """The name of an enumeration: `solver.method` is of the type SolverMethod."""
     return "".join(word.capitalize() for word in variable.replace(".", "_").split("_"))
-
-
-def _scalar(name: str, meaning: Declared, reference: int) -> Element:
-    """One ScalarVariable."""
-    scalar = Element("ScalarVariable", part_of_all(name, meaning, reference))
-    SubElement(scalar, meaning.type, part_of_type(name, meaning))
-    return scalar
 
 
 def part_of_all(name: str, meaning: Declared, reference: int) -> dict[str, str]:
@@ -206,11 +196,6 @@ def tell_states(elements: list[Element], thing: Any, rates: dict[int, int], firs
         elements[list(rates.values())[list(thing.states).index(slip)]].set("reinit", "true")
 
 
-def followed_at_start(declared: Variables, followed: dict[str, list[str]]) -> dict[str, list[str]]:
-    """Name of every output and derivative, and of what it follows from at the start."""
-    return followed | {DERIVATIVE.format(name): [meaning.rate] for name, meaning in declared if meaning.rate}
-
-
 def depends(declared: Variables, rates: dict[int, int], place: int) -> list[int]:
     """The places of what a variable follows from between events: an output or a derivative.
 
@@ -226,26 +211,29 @@ def depends(declared: Variables, rates: dict[int, int], place: int) -> list[int]
     return states + inputs * cast(Output, meaning).direct
 
 
-def _structure(root: Element, declared: Variables, followed: dict[str, list[str]], rates: dict[int, int]) -> None:
-    """ModelStructure: what follows an input or a state at once, and from what each follows at the start.
+Followed = dict[int, list[int]]  # the place of a variable -> those of what it follows from
+
+
+def followed(model: type[Declaring], declared: Variables, rates: dict[int, int]) -> list[Followed]:
+    """What outputs and what derivatives follow from between events, and what both follow from at the start.
 
     Without the latter an importer must assume that it is everything, and sees loops where there are none.
     """
-    structure = SubElement(root, "ModelStructure")
-    outputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "output"]
-    unknown: list[tuple[str, Iterable[int]]] = [("Outputs", outputs), ("Derivatives", rates)]
-    for kind, known in unknown if rates else unknown[:1]:
-        element = SubElement(structure, kind)
-        for place in known:
-            SubElement(element, "Unknown", index=str(place + 1), dependencies=numbers(depends(declared, rates, place)))
     places = {name: place for place, (name, _) in enumerate(declared)}
-    known_at_start = followed_at_start(declared, followed)
-    element = SubElement(structure, "InitialUnknowns")
-    for place in sorted({*outputs, *rates}):
-        at_first = [places[known] for known in known_at_start[declared[place][0]]]
-        SubElement(element, "Unknown", index=str(place + 1), dependencies=numbers(at_first))
+    outputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "output"]
+    known = at_start(model, declared) | {DERIVATIVE.format(name): [one.rate] for name, one in declared if one.rate}
+    at_first = {place: [places[one] for one in known[declared[place][0]]] for place in sorted({*outputs, *rates})}
+    between = [{place: depends(declared, rates, place) for place in unknown} for unknown in (outputs, rates)]
+    return [*between, at_first]
 
 
-def numbers(places: Iterable[int]) -> str:
-    """Variables by their numbers, the first being 1."""
-    return " ".join(str(place + 1) for place in places)
+def _structure(root: Element, model: type[Declaring], declared: Variables, rates: dict[int, int]) -> None:
+    """ModelStructure: what follows an input or a state at once, and from what each follows at the start."""
+    structure = SubElement(root, "ModelStructure")
+    outputs, derivatives, at_first = followed(model, declared, rates)
+    kinds = {"Outputs": outputs} | ({"Derivatives": derivatives} if rates else {}) | {"InitialUnknowns": at_first}
+    for kind, unknown in kinds.items():
+        element = SubElement(structure, kind)
+        for place, known in unknown.items():
+            dependencies = " ".join(str(one + 1) for one in known)  # the first variable is number 1
+            SubElement(element, "Unknown", index=str(place + 1), dependencies=dependencies)

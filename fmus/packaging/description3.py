@@ -7,15 +7,13 @@ from datetime import datetime
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from ..runtime.declare import Declaring, variables
-from .dependencies import at_start
+from ..runtime.declare import Declaring
 from .description import (
     RATES,
     add_items,
     closed,
     define_units,
-    depends,
-    followed_at_start,
+    followed,
     log_and_experiment,
     opened,
     part_of_all,
@@ -64,7 +62,7 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
             attributes["intermediateUpdate"] = "true"
         SubElement(elements, TYPES[meaning.type], attributes)
     tell_states(list(elements), thing, rates, first=0)
-    _structure(root, thing, declared, rates, at_start(model, variables(thing)))
+    _structure(root, model, thing, declared, rates)
     return closed(root, "instantiationToken", code, date)
 
 
@@ -78,28 +76,24 @@ def _define_types(root: Element, declared: Variables) -> None:
             add_items(SubElement(types, "EnumerationType", name=type_name(name), description=meaning.text), meaning)
 
 
-def _structure(
-    root: Element, thing: Any, declared: Variables, rates: dict[int, int], followed: dict[str, list[str]]
-) -> None:
+def _structure(root: Element, model: type[Declaring], thing: Any, declared: Variables, rates: dict[int, int]) -> None:
     """ModelStructure: what follows from which states and inputs, and at the start from which parameters.
 
     Of a smooth model some factors are known: one, and those that parameters make.
     """
     structure, states = SubElement(root, "ModelStructure"), list(rates.values())
-    outputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "output"]
-    for place in outputs:
-        _unknown(structure, "Output", place, depends(declared, rates, place))
-    for place in rates:
+    outputs, derivatives, at_first = followed(model, declared, rates)
+    for place, known in outputs.items():
+        _unknown(structure, "Output", place, known)
+    for place, known in derivatives.items():
         steady = "" if thing.dry else "constant" if place in states else "tunable" if thing.linear else ""
-        _unknown(structure, "ContinuousStateDerivative", place, depends(declared, rates, place), steady)
+        _unknown(structure, "ContinuousStateDerivative", place, known, steady)
+    for place, known in at_first.items():
+        _unknown(structure, "InitialUnknown", place, known)
     places = {name: place for place, (name, _) in enumerate(declared)}
-    known_at_start = followed_at_start(declared, followed)
-    for place in sorted({*outputs, *rates}):
-        _unknown(structure, "InitialUnknown", place, [places[known] for known in known_at_start[declared[place][0]]])
     inputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "input"]
     slips = [[places[slip]] if slip else states for slip in thing.contacts.values()]
-    coupled = len(slips) > 1 or not thing.waits  # something moves while a contact is stuck
-    at_rest = [state for state in states if coupled or [state] not in slips]
+    at_rest = [state for state in states if not thing.waits or [state] not in slips]
     for place, slip in zip(indicators_of(declared), slips * 2, strict=True):
         rests = declared[place][0].startswith(TO_REST)
         _unknown(structure, "EventIndicator", place, slip if rests else at_rest + inputs)

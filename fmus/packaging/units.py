@@ -4,7 +4,6 @@
 """
 
 import re
-from collections.abc import Collection
 from dataclasses import dataclass
 from math import pi
 
@@ -65,11 +64,6 @@ def derived(symbol: str) -> Unit | None:
     each = [[n * power for power in SYMBOLS[part]] for n, (_, part, _) in zip(times, factors, strict=True)]
     kg, m, s, rad = map(sum, zip(*each, strict=True))
     return Unit(symbol, kg, m, s, rad)
-
-
-def in_order(symbols: Collection[str]) -> list[str]:
-    """Each unit once: those with a name in the order of the table, then the others."""
-    return [*filter(symbols.__contains__, UNITS), *dict.fromkeys(symbol for symbol in symbols if symbol not in UNITS)]
 
 
 def unit_of(name: str, symbol: str, display: str = "") -> Unit:
