@@ -5,7 +5,7 @@ import math
 import pytest
 from native_frozen import PAIRS, Frozen, compare
 
-THIRD, FEW, STEPS = 1.0 / 3.0, 3, (0.25, 0.5)
+THIRD, FEW = 1.0 / 3.0, 3
 
 
 def half(x):
@@ -62,7 +62,7 @@ class Allowed(Base):
         return x**2 + y**-THIRD if y > 0.0 else x**3.0
 
     def folding(self, x, y):
-        return x * (2.0 * math.pi / 3.0) + math.sin(0.7) * STEPS[1] - 2**0.5 + y * -FEW
+        return x * (2.0 * math.pi / 3.0) + math.sin(0.7) * 0.5 - 2**0.5 + y * -FEW
 
     def total_functions(self, x, y):
         return math.fabs(x) + math.atan(y), math.copysign(x, y), math.atan2(x, y), math.tanh(x)
@@ -128,9 +128,7 @@ class Allowed(Base):
         return z
 
     def constants_of_a_class(self, x, y):
-        if self.smooth and self.kind == 2:
-            return x
-        return self.missing + y
+        return x if self.smooth and self.kind == 2 else y
 
     def endless(self, x, y):
         tries = 0

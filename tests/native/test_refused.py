@@ -269,12 +269,6 @@ def loop_with_steps(self, x, y):
     return x
 
 
-def loop_never_run(self, x, y):
-    while False:
-        x = y
-    return x
-
-
 def by_name(self, x, y):
     return math.copysign(x, y=y)
 

@@ -41,13 +41,9 @@ FOLDED: dict[type, Callable[..., Any]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-COMPARISONS: dict[type, tuple[str, int, Callable[..., Any]]] = {
-    ast.Lt: ("<", ORDER, operator.lt),
-    ast.LtE: ("<=", ORDER, operator.le),
-    ast.Gt: (">", ORDER, operator.gt),
-    ast.GtE: (">=", ORDER, operator.ge),
-    ast.Eq: ("==", EQUALITY, operator.eq),
-    ast.NotEq: ("!=", EQUALITY, operator.ne),
+COMPARISONS: dict[type, tuple[str, int]] = {
+    **{ast.Lt: ("<", ORDER), ast.LtE: ("<=", ORDER), ast.Gt: (">", ORDER), ast.GtE: (">=", ORDER)},
+    **{ast.Eq: ("==", EQUALITY), ast.NotEq: ("!=", EQUALITY)},
 }
 
 LEAVE = "if (*fault) {leave}"
@@ -142,11 +138,11 @@ class Expressions(ast.NodeVisitor):
         return value
 
     def truth(self, node: ast.expr) -> Value:
-        """An expression that must be a bool, known or not."""
-        value = self.visit(node)
-        if value.kind is BOOL or (isinstance(value.kind, Known) and isinstance(value.kind.value, bool)):
-            return value
-        raise self.refused(node, "is used as a truth value", "compare it")
+        """An expression that must be a bool; what a model fixes has been settled when it was written out."""
+        value = self.number(node)
+        if value.kind is not BOOL:
+            raise self.refused(node, "is used as a truth value", "compare it")
+        return value
 
     # ---- names
 
@@ -188,8 +184,6 @@ class Expressions(ast.NodeVisitor):
 
     def visit_Subscript(self, node: ast.Subscript) -> Value:
         row, index = self.visit(node.value), self.visit(node.slice)
-        if isinstance(row.kind, Known) and isinstance(index.kind, Known):
-            return Value(Known(row.kind.value[index.kind.value]))  # type: ignore[index]
         if not isinstance(row.kind, Row):
             raise self.refused(node, "is no element of a list of floats", "make the list in __init__")
         if isinstance(index.kind, Known):
@@ -208,10 +202,7 @@ class Expressions(ast.NodeVisitor):
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> Value:
         if isinstance(node.op, ast.Not):
-            value = self.truth(node.operand)
-            if isinstance(value.kind, Known):
-                return Value(Known(not value.kind.value))
-            return Value(BOOL, "!" + value.within(WHOLE), SIGN)
+            return Value(BOOL, "!" + self.truth(node.operand).within(WHOLE), SIGN)
         value = self.visit(node.operand)
         if isinstance(value.kind, Known) and kind_of(value.kind.value) in (FLOAT, INT):
             return Value(Known(-value.kind.value if isinstance(node.op, ast.USub) else value.kind.value))  # type: ignore[operator]
@@ -256,52 +247,29 @@ class Expressions(ast.NodeVisitor):
         for middle in nodes[1:-1]:
             if any(isinstance(part, ast.Call) for part in ast.walk(middle)):
                 raise self.refused(node, "has a call in the middle", "give the call a line of its own")
-        values = [self.visit(nodes[0]), self.visit(nodes[1]), *self.sometimes(nodes[2:])]
-        if len(values) == 2 and all(isinstance(value.kind, Known) for value in values):
-            compare = COMPARISONS[type(node.ops[0])][2]
-            known = [value.kind.value for value in values if isinstance(value.kind, Known)]
-            return Value(Known(self.folded(node, compare, *known)))
-        values = [self.at_run_time(part, value) for part, value in zip(nodes, values, strict=True)]
-        signs = [COMPARISONS[type(op)][:2] for op in node.ops]
+        values = [self.number(nodes[0]), self.number(nodes[1]), *self.sometimes(self.number, nodes[2:])]
+        signs = [COMPARISONS[type(op)] for op in node.ops]
         tests = [
             f"{low.within(SUM)} {sign} {high.within(SUM)}"
             for low, high, (sign, _) in zip(values, values[1:], signs, strict=False)
         ]
         return Value(BOOL, " && ".join(tests), signs[0][1] if len(tests) == 1 else AND)
 
-    def sometimes(self, nodes: Sequence[ast.expr]) -> list[Value]:
+    def sometimes(self, visit: Callable[[ast.expr], Value], nodes: Sequence[ast.expr]) -> list[Value]:
         """Expressions that are evaluated only sometimes."""
         self.lazy += 1
-        values = [self.visit(node) for node in nodes]
+        values = [visit(node) for node in nodes]
         self.lazy -= 1
         return values
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Value:
-        sign, level, last = ("&&", AND, False) if isinstance(node.op, ast.And) else ("||", OR, True)
-        parts: list[Value] = []
-        for part in node.values:
-            self.lazy += bool(parts)
-            value = self.truth(part)
-            self.lazy -= bool(parts)
-            if isinstance(value.kind, Known):
-                if value.kind.value is not last:
-                    continue
-                if not any(
-                    isinstance(inner, ast.Call) for before in node.values[: len(parts)] for inner in ast.walk(before)
-                ):
-                    return value  # whatever the parts before say: they do nothing but look
-                parts.append(self.at_run_time(part, value))
-                break
-            parts.append(value)
-        if len(parts) < 2:
-            return parts[0] if parts else Value(Known(not last))
+        sign, level = ("&&", AND) if isinstance(node.op, ast.And) else ("||", OR)
+        parts = [self.truth(node.values[0]), *self.sometimes(self.truth, node.values[1:])]
         return Value(BOOL, f" {sign} ".join(part.within(EQUALITY) for part in parts), level)
 
     def visit_IfExp(self, node: ast.IfExp) -> Value:
         test = self.truth(node.test)
-        if isinstance(test.kind, Known):
-            return self.visit(node.body if test.kind.value else node.orelse)
-        yes, no = self.sometimes((node.body, node.orelse))
+        yes, no = self.sometimes(self.visit, (node.body, node.orelse))
         if not (isinstance(yes.kind, Group) and yes.kind == no.kind):
             yes, no = self.at_run_time(node.body, yes), self.at_run_time(node.orelse, no)
         if yes.kind != no.kind:
@@ -375,7 +343,6 @@ class Expressions(ast.NodeVisitor):
 
     def built_in(self, node: ast.Call, function: Callable[..., Any], values: list[Value]) -> Value:
         """A function of math, or one of the few built-in ones."""
-        known = [value.kind.value for value in values if isinstance(value.kind, Known)]
         allowed = (*TOTAL, *PARTIAL, *TESTS, abs, min, max, float)
         if function not in allowed:
             raise self.refused(node, "is no call of the subset", "use abs, min, max, float or one of C in math")
@@ -384,8 +351,6 @@ class Expressions(ast.NodeVisitor):
                 raise self.refused(node, "needs numbers to choose from", "give two or more")
         elif len(values) != ARGUMENTS.get(function, 1):
             raise self.refused(node, "has the wrong number of arguments", "look into the documentation of math")
-        if len(known) == len(values):
-            return Value(Known(self.folded(node, function, *known)))
         values = [self.arithmetic(argument, value) for argument, value in zip(node.args, values, strict=True)]
         texts = ", ".join(value.text for value in values)
         if function in (min, max, abs):

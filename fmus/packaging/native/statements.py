@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ..words import OF_C
 from ..written import definition
 from .expressions import LEAVE, SIGN, Expressions, Value, group
-from .kinds import BOOL, FLOAT, INT, Group, Kind, Known, Object, Scalar, declare, spell
+from .kinds import FLOAT, INT, Group, Kind, Known, Object, Scalar, declare, spell
 from .refusal import place
 
 if TYPE_CHECKING:
@@ -200,8 +200,6 @@ class Body(Expressions):
 
     def branch(self, node: ast.If, word: str) -> bool:
         test = self.truth(node.test)
-        if isinstance(test.kind, Known):
-            return self.block(node.body if test.kind.value else node.orelse)
         condition = self.tested(test)
         before = set(self.assigned)
         falls = self.braces(f"{word} ({condition})", lambda: self.block(node.body))
@@ -220,8 +218,8 @@ class Body(Expressions):
         match statements:
             case [ast.If(test=test) as inner]:
                 lines, self.lines = self.lines, []
-                plain = self.truth(test).kind is BOOL and not self.lines and not self.faulty
-                self.lines = lines
+                self.truth(test)
+                plain, self.lines = not self.lines and not self.faulty, lines
                 self.begin()
                 if plain:
                     return self.branch(inner, "else if")
@@ -243,10 +241,7 @@ class Body(Expressions):
         lines, self.lines = self.lines, []
         self.depth += 1
         test = self.truth(node.test)
-        endless = isinstance(test.kind, Known) and test.kind.value is True
-        if isinstance(test.kind, Known) and not endless:
-            raise self.refused(node, "never runs", "leave it out")
-        condition = "true" if endless else self.tested(test)
+        endless, condition = test.text == "true", self.tested(test)
         prelude, self.lines = self.lines, lines
         self.depth -= 1
         head = f"while ({'true' if prelude else condition})"
