@@ -1,14 +1,12 @@
 """The command line: one file a command, all that there are; parse, one call, print."""
 
 from importlib import import_module
-from pathlib import Path
 from pkgutil import iter_modules
 
 import click
 
-from ..errors import HarnessError
 from .run import figures
-from .terminal import answer, progress, results
+from .terminal import Terminal, results
 
 
 def version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
@@ -33,7 +31,7 @@ class Commands(click.Group):
 @results
 @click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=version, help="Print versions.")
 @click.pass_context
-def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> None:
+def commands(context: click.Context, terminal: Terminal) -> None:
     """Run the built FMUs, measure what they do, and set it beside what was published.
 
     Without a command: every published case.  Exit status 0: all well, 1: a run failed, 2: wrong usage,
@@ -46,20 +44,17 @@ def commands(context: click.Context, out: Path, quiet: bool, as_json: bool) -> N
       python -m harness run my-scene.toml --out elsewhere
       python -m harness list
     """
-    given = {"out": out, "quiet": quiet, "as_json": as_json}  # before the command, they hold for it too
-    context.default_map = dict.fromkeys(commands.commands, given)
+    context.default_map = dict.fromkeys(commands.commands, vars(terminal))  # before the command, they hold for it too
     if context.invoked_subcommand is None:
         from ..studies.run import job
         from ..studies.run.table import comparison
 
         names = job.published()
-        with progress(quiet or as_json, len(names)) as report:
-            outcomes = list(job.main_job(names, out, report))
-        table = comparison(outcomes, everything=False)
-        answer(quiet, as_json, [figures(outcome, out) for outcome in outcomes], table, folder=out)
-        failed = [outcome.error for outcome in outcomes if outcome.error]
-        if failed:
-            raise HarnessError("\n".join(failed))
+        with terminal.progress(len(names)) as report:
+            outcomes = list(job.main_job(names, terminal.out, report))
+        told = [figures(outcome, terminal.out) for outcome in outcomes]
+        failed = (outcome.error for outcome in outcomes if outcome.error)
+        terminal.answer(told, comparison(outcomes, everything=False), folder=terminal.out, failed=failed)
 
 
 for file in iter_modules(__path__):

@@ -1,15 +1,13 @@
 """bench: the numbers to reach."""
 
-from pathlib import Path
-
 import click
 
-from .terminal import answer, progress, results
+from .terminal import Terminal, results
 
 
 @click.command()
 @results
-def bench(out: Path, quiet: bool, as_json: bool) -> None:
+def bench(terminal: Terminal) -> None:
     """Measure the numbers to reach, each beside what it is compared with in the same run.
 
     \b
@@ -20,6 +18,6 @@ def bench(out: Path, quiet: bool, as_json: bool) -> None:
     from ..studies.bench.table import numbers
 
     chosen = work.measures()
-    with progress(quiet or as_json, len(chosen)) as report:
-        found = work.bench(chosen, out, report)
-    answer(quiet, as_json, found, numbers(found), folder=out / work.FOLDER)
+    with terminal.progress(len(chosen)) as report:
+        found = work.bench(chosen, terminal.out, report)
+    terminal.answer(found, numbers(found), folder=terminal.out / work.FOLDER)

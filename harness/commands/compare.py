@@ -6,8 +6,7 @@ from typing import Any
 
 import click
 
-from ..errors import HarnessError
-from .terminal import Number, answer, anyones, progress, results
+from .terminal import Number, Terminal, anyones, results
 
 
 @click.command()
@@ -17,16 +16,7 @@ from .terminal import Number, answer, anyones, progress, results
 @click.option("--rtol", "--within", type=Number(min=0), help="Share of its largest value by which each may differ.")
 @click.option("--atol", type=Number(min=0), help="What each may differ by on top, in its unit.")
 @results
-def compare(
-    one: str,
-    two: str,
-    rtol: float | None,
-    atol: float | None,
-    out: Path,
-    quiet: bool,
-    as_json: bool,
-    **how: Any,
-) -> None:
+def compare(one: str, two: str, rtol: float | None, atol: float | None, terminal: Terminal, **how: Any) -> None:
     """Show how far A and B are apart: FMUs of any origin (FMI 2.0, 3.0), scenes, result folders or files, those of
     other tools too (fmpy's CSV; OpenModelica's and Dymola's .csv and .mat; any table whose first column is the time).
 
@@ -44,12 +34,11 @@ def compare(
     from ..running.specification import Specification
     from ..studies.compare import job
 
-    with progress(quiet or as_json, 1) as report:
+    with terminal.progress(1) as report:
         asked = Specification(Path(), **how)
-        found, folder = job.perform_compare((one, two), asked, out, partial(report, "compare"))
-    answer(quiet, as_json, job.numbers(found), job.table(found), "", *job.sentences(found), folder=folder)
+        found, folder = job.perform_compare((one, two), asked, terminal.out, partial(report, "compare"))
     failed = [each.failed for each in (found.one, found.two) if each.failed]
     if rtol is not None or atol is not None:
         failed += found.beyond(rtol or 0.0, atol or 0.0)
-    if failed:
-        raise HarnessError("\n".join(failed))
+    shown = (job.table(found), "", *job.sentences(found))
+    terminal.answer(job.numbers(found), *shown, folder=folder, failed=failed)

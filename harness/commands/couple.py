@@ -1,18 +1,17 @@
 """couple: several FMUs in one scene."""
 
 from functools import partial
-from pathlib import Path
 
 import click
 
-from .terminal import POSITIVE, answer, progress, results
+from .terminal import POSITIVE, Terminal, results
 
 
 @click.command()
 @click.argument("scene")
 @click.option("--stop", type=POSITIVE, help="Stop time in s (the one that it names).")
 @results
-def couple(scene: str, stop: float | None, out: Path, quiet: bool, as_json: bool) -> None:
+def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
     """Couple the FMUs of a SCENE: written as an SSP archive, run by Ecos beside a monolithic reference, and by libcosim
     and fmpy where they can.
 
@@ -27,8 +26,8 @@ def couple(scene: str, stop: float | None, out: Path, quiet: bool, as_json: bool
     """
     from ..studies.coupled.study import perform
 
-    with progress(quiet or as_json, 1) as report:
-        found, folder = perform(scene, out, stop, partial(report, scene))
+    with terminal.progress(1) as report:
+        found, folder = perform(scene, terminal.out, stop, partial(report, scene))
     engines = {name: {"largest error": off, "why not": why} for name, (_, off, why) in found.engines.items()}
     told = {"steps": found.steps, "errors": found.errors, "order": found.order, "engines": engines, "folder": folder}
     shown = [
@@ -37,4 +36,4 @@ def couple(scene: str, stop: float | None, out: Path, quiet: bool, as_json: bool
         f"The error falls with the power {found.order:.2f} of the step.",
         *(f"{name:<24} {why or f'{off:.3e} with the finest step'}" for name, (_, off, why) in found.engines.items()),
     ]
-    answer(quiet, as_json, told, *shown, folder=folder)
+    terminal.answer(told, *shown, folder=folder)

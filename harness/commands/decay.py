@@ -1,11 +1,11 @@
 """decay: damping, dry friction and drag of a record or a scene."""
 
 from functools import partial
-from pathlib import Path
+from typing import Any
 
 import click
 
-from .terminal import POSITIVE, answer, progress, results
+from .terminal import POSITIVE, Terminal, results
 
 
 @click.command()
@@ -32,24 +32,14 @@ from .terminal import POSITIVE, answer, progress, results
 @results
 def decay(
     source: str,
-    time: str | None,
-    position: str | None,
     velocity: str | None,
-    quantity: str | None,
-    unit: str | None,
-    per_count: str | None,
-    time_unit: str | None,
-    names: str | None,
-    begin: float,
-    end: float,
     k: float | None,
     m: float | None,
     pendulum: bool,
     drag: bool,
     drift: bool,
-    out: Path,
-    quiet: bool,
-    as_json: bool,
+    terminal: Terminal,
+    **columns: Any,
 ) -> None:
     """Tell damping, dry friction and drag from the decay in a FILE with columns, or in the run of a SCENE.
 
@@ -77,11 +67,11 @@ def decay(
     if k is not None and m is not None:
         raise click.UsageError("--k and --m: give one of them; the frequency tells the other")
     if velocity is not None:
-        if position is not None or quantity not in (None, "velocity"):
+        if columns["position"] is not None or columns["quantity"] not in (None, "velocity"):
             raise click.UsageError("--velocity: one column is fitted; leave out --position and --quantity")
-        position, quantity = velocity, "velocity"
-    columns = Columns(time, position, quantity, unit, time_unit, per_count, names, begin, end)
-    with decays.uncollected(), progress(quiet or as_json, 1) as report:
+        columns |= {"position": velocity, "quantity": "velocity"}
+    asked, known = Columns(**columns), Known(k, m, pendulum)
+    with decays.uncollected(), terminal.progress(1) as report:
         progressed = partial(report, "standard input" if source == "-" else source)
-        found, folder = decays.perform(source, columns, Known(k, m, pendulum), drag, drift, out, progressed)
-    answer(quiet, as_json, decays.numbers(found), table(found), "", *sentences(found), folder=folder)
+        found, folder = decays.perform(source, asked, known, drag, drift, terminal.out, progressed)
+    terminal.answer(decays.numbers(found), table(found), "", *sentences(found), folder=folder)

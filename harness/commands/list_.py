@@ -2,7 +2,7 @@
 
 import click
 
-from .terminal import JSON, answer
+from .terminal import JSON, Terminal
 
 
 @click.command("list")
@@ -28,7 +28,7 @@ def list_(as_json: bool) -> None:
     table = Table(*HEADS, box=None, padding=(0, 1, 0, 0))
     for row in rows:
         table.add_row(*row)
-    answer(False, as_json, [dict(zip(HEADS, row, strict=True)) for row in rows], table)
+    Terminal(False, as_json).answer([dict(zip(HEADS, row, strict=True)) for row in rows], table)
 
 
 HEADS = ("command", "scene", "model", "title")

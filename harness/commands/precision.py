@@ -1,17 +1,15 @@
 """precision: what accuracy costs."""
 
-from pathlib import Path
-
 import click
 
-from .terminal import answer, progress, results
+from .terminal import Terminal, results
 
 
 @click.command()
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
 @results
 @click.option("--quick", is_flag=True, help="Three tolerances only, and little patience.")
-def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, quick: bool) -> None:
+def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
     """Show what accuracy costs: error against run time and right-hand sides, for each MODEL (without one: all of ours).
 
     A MODEL is a name, or the path of a file (belt.py, whose FMU lies beside it, or belt.fmu).  What somebody else has
@@ -29,11 +27,11 @@ def precision(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool, qu
     from ..studies.precision.survey import FOLDER, survey
     from ..truths.models import MODELS
 
-    with progress(quiet or as_json, len(models or MODELS) + 1) as report:
-        found = survey(models or MODELS, QUICK if quick else FULL, out, report)
+    with terminal.progress(len(models or MODELS) + 1) as report:
+        found = survey(models or MODELS, QUICK if quick else FULL, terminal.out, report)
     told = {"points": {study.model: study.points for study in found.studies}} | {
         name: getattr(found, name) for name in ("laws", "anchors", "advice", "missing")
     }
     errors = (tables.exchange(found.studies), tables.laws(found.laws), tables.anchors(found.anchors))
     shown = [each for table in (*map(tables.work, found.studies), *errors) if table.rows for each in (table, "")]
-    answer(quiet, as_json, told, *shown, *found.advice, *found.missing, folder=out / FOLDER)
+    terminal.answer(told, *shown, *found.advice, *found.missing, folder=terminal.out / FOLDER)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from .terminal import JSON, QUIET, answer
+from .terminal import JSON, QUIET, Terminal
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
@@ -28,4 +28,4 @@ def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
 
     made = [one for file in files for one in certify(file)]
     shown = (f"{one.path}, relative difference {one.difference:.1e}" for one in made)
-    answer(quiet, as_json, made, *shown)
+    Terminal(quiet, as_json).answer(made, *shown)

@@ -2,6 +2,7 @@
 
 import shlex
 import sys
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from ..errors import HarnessError
-from .terminal import answer, anyones, progress, results
+from .terminal import Terminal, anyones, results
 
 
 @click.command()
@@ -25,9 +25,7 @@ def run(
     scene: str | None,
     fmu: Path | None,
     values: tuple[str, ...],
-    out: Path,
-    quiet: bool,
-    as_json: bool,
+    terminal: Terminal,
     **how: Any,
 ) -> None:
     """Run a SCENE, an FMU of any origin, or once more what made a folder of results.
@@ -51,7 +49,7 @@ def run(
     if fmu is None and scene in known() - {*scenes} and not Path(scene).exists():
         fmu, scene = fmu_of(scene), None
     if fmu is not None and scene is None:
-        run_any(fmu, values, how, out, quiet, as_json)
+        run_any(fmu, values, how, terminal)
         return
     if scene and scene.endswith(".fmu"):
         raise click.UsageError(f"an FMU is run by --fmu {scene}")
@@ -68,16 +66,16 @@ def run(
             repeat(context, told["command"])
             return
         chosen = again(told["scene"])
-        out = out if context.get_parameter_source("out") is ParameterSource.COMMANDLINE else place.parent
+        if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
+            terminal = replace(terminal, out=place.parent)
     else:
         chosen = load(scene)
-    with progress(quiet or as_json, 1) as report:
-        outcome = job.perform(chosen, out, partial(report, chosen.name))
+    with terminal.progress(1) as report:
+        outcome = job.perform(chosen, terminal.out, partial(report, chosen.name))
     table = comparison([outcome], everything=True)
-    folder, said = out / chosen.name, [outcome.run.note] if outcome.run and outcome.run.note else []
-    answer(quiet, as_json, figures(outcome, out), table, *said, folder=folder)
-    if outcome.error:
-        raise HarnessError(f"{outcome.error}; what it computed until then is in {folder}")
+    folder, said = terminal.out / chosen.name, [outcome.run.note] if outcome.run and outcome.run.note else []
+    failed = unfinished(outcome.error, folder)
+    terminal.answer(figures(outcome, terminal.out), table, *said, folder=folder, failed=failed)
 
 
 def repeat(context: click.Context, command: str) -> None:
@@ -87,16 +85,16 @@ def repeat(context: click.Context, command: str) -> None:
         root.command.invoke(fresh)
 
 
-def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], out: Path, quiet: bool, as_json: bool) -> None:
+def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], terminal: Terminal) -> None:
     """What `run --fmu` does."""
     from ..results.files import heading
     from ..running.specification import EVEN, Specification
     from ..scenes.assigned import assigned
-    from ..studies.run.any_fmu import perform_run
+    from ..studies.run.job import perform_run
 
-    with progress(quiet or as_json, 1) as report:
+    with terminal.progress(1) as report:
         wanted = Specification(path, values=dict(map(assigned, values)), even=EVEN, **how)
-        found, folder = perform_run(wanted, out, partial(report, path.stem))
+        found, folder = perform_run(wanted, terminal.out, partial(report, path.stem))
     ends = {name: column[[0, -1]].tolist() for name, column in found.columns.items()}
     final = {name: last for name, (_, last) in ends.items()}
     told = {"fmu": found.name, "note": found.note, "failed": found.failed, "final": final, "folder": folder}
@@ -104,9 +102,13 @@ def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], out: Path,
         f"{heading(name, found.units[name])}: from {shown(first)} to {shown(last)}"
         for name, (first, last) in ends.items()
     ]
-    answer(quiet, as_json, told, *said, *filter(None, [found.note]), folder=folder)
-    if found.failed:
-        raise HarnessError(f"{found.failed}; what it computed until then is in {folder}")
+    failed = unfinished(found.failed, folder)
+    terminal.answer(told, *said, *filter(None, [found.note]), folder=folder, failed=failed)
+
+
+def unfinished(why: str | None, folder: Path) -> list[str]:
+    """The sentence about a run that has failed, if it has."""
+    return [f"{why}; what it computed until then is in {folder}"] if why else []
 
 
 def shown(value: float | str) -> str:

@@ -1,17 +1,14 @@
 """stability: stiff and extreme scenes."""
 
-from pathlib import Path
-
 import click
 
-from ..errors import HarnessError
-from .terminal import answer, progress, results
+from .terminal import Terminal, results
 
 
 @click.command()
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
 @results
-def stability(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool) -> None:
+def stability(models: tuple[str, ...], terminal: Terminal) -> None:
     """Run stiff and extreme scenes with every method: each ends right, or is refused with a sentence.
 
     They are those of each MODEL (without one: all there are).  A MODEL is a name, or the path of a file (belt.py, whose
@@ -28,11 +25,9 @@ def stability(models: tuple[str, ...], out: Path, quiet: bool, as_json: bool) ->
     from ..studies.stability.study import FOLDER, all_cases, survey
 
     chosen = all_cases(models=models)
-    with progress(quiet or as_json, sum(map(len, chosen))) as report:
-        rows, regions = survey(out, report, chosen, named(*models))
+    with terminal.progress(sum(map(len, chosen))) as report:
+        rows, regions = survey(terminal.out, report, chosen, named(*models))
     told = [{"scene": row.case.label, "well": row.well, "ended": row.ended} for row in rows]
     shown = (tables.endings(rows), "", tables.refusals(rows), "", tables.summary(rows, regions))
-    answer(quiet, as_json, told, *shown, folder=out / FOLDER)
-    wrong = [f"{row.case.label}: {row.text}" for row in rows if not row.well]
-    if wrong:
-        raise HarnessError("\n".join(wrong))
+    wrong = (f"{row.case.label}: {row.text}" for row in rows if not row.well)
+    terminal.answer(told, *shown, folder=terminal.out / FOLDER, failed=wrong)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import LONGEST, HarnessError
-from .terminal import answer, anyones, progress, results
+from .terminal import Terminal, anyones, results
 
 if TYPE_CHECKING:
     from ..studies.sweep.file import Swept
@@ -44,9 +44,7 @@ def sweep(
     workers: int,
     scheduler: str | None,
     name: str | None,
-    out: Path,
-    quiet: bool,
-    as_json: bool,
+    terminal: Terminal,
     **options: Any,
 ) -> None:
     """Run MODEL (a name, or the path of anyone's FMU) over many parameters, and measure every run.
@@ -70,17 +68,15 @@ def sweep(
         raise HarnessError(f"a sweep needs {error.name}: python -m pip install 'friction-fmus[sweep]'") from None
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
     asked = sweep_file.Asked(model, vary, values, random, seed, measures, name, options)
-    with progress(quiet or as_json, 1) as report:
-        swept = sweep_file.carry_out(asked, out, scheduler, workers, partial(report, model))
+    with terminal.progress(1) as report:
+        swept = sweep_file.carry_out(asked, terminal.out, scheduler, workers, partial(report, model))
     fresh = swept.runs - swept.before
     shown = [f"{swept.runs} runs, {swept.before} of them done before, {swept.failed} failed"]
     if swept.damaged:
         shown.append(f"{swept.damaged} damaged lines of the earlier sweep's journal were left out, and run again")
     if fresh:
         shown.append(f"{fresh} runs in {swept.seconds:.3g} s: {fresh / swept.seconds:.4g} runs/s")
-    answer(quiet, as_json, swept, *shown, folder=swept.folder)
-    if swept.failed:
-        raise HarnessError("\n".join(told(swept)))
+    terminal.answer(swept, *shown, folder=swept.folder, failed=told(swept) if swept.failed else ())
 
 
 def told(swept: "Swept") -> Iterator[str]:

@@ -6,8 +6,10 @@ What takes long to import is imported where it is used: help and small commands 
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import wraps
 from io import TextIOWrapper
 from math import isfinite
 from pathlib import Path
@@ -15,6 +17,7 @@ from typing import Any
 
 import click
 
+from ..errors import HarnessError
 from ..process.interrupt import check
 from ..process.room import temporary
 
@@ -42,8 +45,13 @@ OVERWRITE = click.option(
 
 
 def results(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options of all commands that have results."""
-    return OUT(OVERWRITE(QUIET(JSON(command))))
+    """The options of all commands that have results: they become its `terminal`."""
+
+    @wraps(command)
+    def told(out: Path, quiet: bool, as_json: bool, **others: Any) -> Any:
+        return command(terminal=Terminal(quiet, as_json, out), **others)
+
+    return OUT(OVERWRITE(QUIET(JSON(told))))
 
 
 class Number(click.FloatRange):
@@ -126,21 +134,34 @@ def tell(result: Any) -> None:
     click.echo(as_text(result))
 
 
-def answer(quiet: bool, as_json: bool, result: Any, *shown: Any, folder: Path | None = None) -> None:
-    """Print a result as JSON, or, unless all is to be quiet, the tables and sentences that people are shown; last what
-    is said of the older result in its folder, and where that is."""
-    from rich.console import Console
-    from rich.table import Table
+@dataclass(frozen=True)
+class Terminal:
+    """How a command answers: errors only if `quiet`, JSON only if `as_json`; `out`: the folder of its results."""
 
-    if as_json:
-        tell(result)
-    elif not quiet:
-        console = Console(markup=False, highlight=False)  # units and names have brackets, too
-        for each in shown:
-            for column in each.columns if isinstance(each, Table) else ():
-                column.overflow = "fold"  # a name that is cut is not told
-            console.print(each)
-        if folder:
-            from ..results.provenance import replaced
+    quiet: bool
+    as_json: bool
+    out: Path = Path()
 
-            console.print("\n".join(filter(None, (replaced(folder), f"Results in {folder}"))))
+    def progress(self, total: int) -> AbstractContextManager[Callable[[str, float], None]]:
+        return progress(self.quiet or self.as_json, total)
+
+    def answer(self, result: Any, *shown: Any, folder: Path | None = None, failed: Iterable[str] = ()) -> None:
+        """Print a result as JSON, or, unless all is to be quiet, the tables and sentences that people are shown; last
+        what is said of the older result in its folder, and where that is.  HarnessError if something has `failed`."""
+        from rich.console import Console
+        from rich.table import Table
+
+        if self.as_json:
+            tell(result)
+        elif not self.quiet:
+            console = Console(markup=False, highlight=False)  # units and names have brackets, too
+            for each in shown:
+                for column in each.columns if isinstance(each, Table) else ():
+                    column.overflow = "fold"  # a name that is cut is not told
+                console.print(each)
+            if folder:
+                from ..results.provenance import replaced
+
+                console.print("\n".join(filter(None, (replaced(folder), f"Results in {folder}"))))
+        if sentences := [*failed]:
+            raise HarnessError("\n".join(sentences))

@@ -2,7 +2,7 @@
 
 import csv
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from math import isfinite
 from pathlib import Path
@@ -19,6 +19,12 @@ def heading(name: str, unit: str) -> str:
 def write(path: Path, heads: Sequence[str], columns: Sequence[np.ndarray]) -> None:
     """A CSV file of equally long columns; every number reads back to the last bit."""
     write_rows(path, heads, zip(*(column.tolist() for column in columns), strict=True))
+
+
+def write_motion(path: Path, time: np.ndarray, columns: Mapping[str, np.ndarray], units: Mapping[str, str]) -> None:
+    """The same of columns (n,) by name, with their units, over the time (n,) in s."""
+    heads = ["t [s]", *(heading(name, units[name]) for name in columns)]
+    write(path, heads, [time, *columns.values()])
 
 
 def write_rows(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]], first: str = "") -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import HarnessError
-from ..results.files import heading, write
+from ..results.files import write, write_motion
 from ..results.quantity import Quantity
 from .specification import Specification
 
@@ -90,9 +90,7 @@ class Run:
 
     def save(self, folder: Path) -> None:
         """Write trajectory.csv, and steps.csv and events.csv where there are any."""
-        names = list(self.columns)
-        heads = [heading(name, self.units[name]) for name in names]
-        write(folder / "trajectory.csv", ["t [s]", *heads], [self.time, *(self.columns[name] for name in names)])
+        write_motion(folder / "trajectory.csv", self.time, self.columns, self.units)
         if self.steps:
             columns = [self.steps.t[1:], self.steps.h, self.steps.rejected]
             write(folder / "steps.csv", ["t [s]", "h [s]", "rejected"], columns)

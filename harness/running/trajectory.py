@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..results.files import heading, write
 from .run import Run
 
 
@@ -25,13 +24,6 @@ class Trajectory:
     file: Path | None = None
     parameters: Mapping[str, tuple[object, str]] = field(default_factory=dict)
     failed: str = ""
-
-    def save(self, path: Path) -> None:
-        """Write it as CSV."""
-        names = list(self.columns)
-        write(
-            path, ["t [s]", *(heading(name, self.units[name]) for name in names)], [self.time, *self.columns.values()]
-        )
 
 
 def of_run(run: Run) -> Trajectory:

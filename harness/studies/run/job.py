@@ -1,4 +1,4 @@
-"""One scene from file to results, and the main job: every published one.
+"""One scene from file to results, the main job, which is every published one, and an FMU of any origin by its path.
 
 What a scene does not name is not imported: analyses and plots load here, when they are asked for.
 """
@@ -11,15 +11,17 @@ from typing import Any
 
 from ...errors import HarnessError, SceneError, unknown
 from ...process.interrupt import check
+from ...results.files import write_motion
 from ...results.folder import replacing
-from ...results.provenance import record
+from ...results.provenance import named, record
 from ...results.quantity import Quantity
 from ...running import any_fmu
 from ...running.run import Run
-from ...running.specification import of_scene
+from ...running.specification import Specification, of_scene
+from ...running.trajectory import Trajectory, of_run
 from ...scenes.fmus import check_built
-from ...scenes.scene import Scene, load, shipped
-from .outcome import Outcome
+from ...scenes.scene import Scene, load, shipped, usual
+from .table import Outcome, save
 
 FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.svg")  # all that a result folder may hold
 
@@ -74,8 +76,6 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
         as_run = replace(as_run, follow=run.wanted.follow)
     record(folder, [scene.file], run.in_force, as_run, source=scene.source)
     if results:
-        from .table import save
-
         save(quantities, scene.published, folder / "figures.csv")
     if scene.plots:
         from .figure import draw
@@ -127,3 +127,17 @@ def main_job(names: Iterable[str], out: Path, report: Callable[[str, float], Non
         except HarnessError as error:
             check()  # an FMU in Python may have swallowed the interrupt that made it fail
             yield Outcome(name, None, None, (), str(error))
+
+
+def perform_run(wanted: Specification, out: Path, report: Callable[[float], None]) -> tuple[Trajectory, Path]:
+    """Run an FMU of any origin, and write its outputs to out/<name of the file>."""
+    from .figure import draw
+
+    folder, source = out / wanted.model, named(str(wanted.fmu))
+    with replacing(folder, FILES, source) as fresh:
+        done = any_fmu.run(wanted, report)
+        found = of_run(done)
+        write_motion(fresh / FILES[0], found.time, found.columns, found.units)
+        draw(wanted.fmu.name, usual(tuple(found.columns)), done, {}, fresh / "figure.svg")
+        record(fresh, [wanted.fmu], found.parameters, wanted, source=source)
+    return found, folder

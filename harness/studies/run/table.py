@@ -1,6 +1,7 @@
 """The table that sets measured figures beside published ones."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,22 @@ from rich.text import Text
 
 from ...results.files import write_rows
 from ...results.quantity import Quantity, spelled
-from .outcome import Outcome
+from ...running.run import Run
+from ...scenes.scene import Scene
 
 ELSEWHERE = "elsewhere: the published run time is that of another machine"
 ALWAYS = ("steps", "mean_step", "run_time")  # shown in the main job even where nothing was published
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a scene: its measured quantities, or the sentence that says why there are none."""
+
+    name: str
+    scene: Scene | None
+    run: Run | None
+    quantities: tuple[Quantity, ...]
+    error: str | None
 
 
 def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
