@@ -1,6 +1,6 @@
 """What can go wrong, each with one sentence and an exit status."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
 LONGEST = 100  # letters of a value in a sentence
@@ -40,3 +40,10 @@ def unknown(kind: str, word: object, allowed: Iterable[str]) -> str:
     hint = f" (nearest: '{close[0]}')" if close else ""
     more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
     return f"unknown {kind} {text}{hint}; allowed: {', '.join(names[:MOST]) or 'none'}{more}"
+
+
+def check_names(kind: str, names: Iterable[str], allowed: Collection[str]) -> None:
+    """SceneError about the first of some names that is not among the allowed ones."""
+    for name in names:
+        if name not in allowed:
+            raise SceneError(unknown(kind, name, allowed))

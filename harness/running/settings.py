@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ..errors import SceneError, shown, unknown
+from ..errors import SceneError, check_names, shown
 from .specification import SHORT, Specification
 from .values import accepted
 
@@ -15,19 +15,15 @@ def check_fmu(run: Specification, variables: dict[str, Any]) -> None:
         if name not in variables:
             raise SceneError(f"{run.fmu.name} has no variable {name}; the harness runs the FMUs of this project only")
     readable = [name for name, variable in variables.items() if variable.causality in ("output", "local")]
-    for name in run.outputs:
-        if name not in readable:
-            raise SceneError(unknown("output", name, readable))
+    check_names("output", run.outputs, readable)
 
 
 def settings(run: Specification, variables: dict[str, Any]) -> list[tuple[Any, float | int]]:
     """The variables to set before the run and their values, each within its declared range."""
     settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
-    keys = {name: key for key, name in SHORT.items()}
-    for name, value in run.values.items():
-        if name in keys and name not in variables:
-            key = keys[name]
-            raise SceneError(f"{key} = {shown(value)}: {run.model} has nothing to choose there; leave {key} out")
-        if name not in settable:
-            raise SceneError(unknown("name in [values]", name, settable))
+    for key, name in SHORT.items():
+        if name in run.values and name not in variables:
+            asked = f"{key} = {shown(run.values[name])}"
+            raise SceneError(f"{asked}: {run.model} has nothing to choose there; leave {key} out")
+    check_names("name in [values]", run.values, settable)
     return [(variables[name], accepted(variables[name], value)) for name, value in run.values.items()]

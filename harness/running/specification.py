@@ -1,8 +1,9 @@
 """What to run: an FMU, what to set in it, and what to record."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
+from typing import Any
 
 from ..errors import SceneError
 from ..scenes.roles import roles
@@ -62,18 +63,7 @@ def of_scene(scene: Scene) -> Specification:
     for name in short:
         if name in scene.values:
             raise SceneError(f"{name} is set twice, in [values] and above: leave one out")
-    return Specification(
-        fmu=scene.file,
-        outputs=scene.outputs,
-        values=short | scene.values,
-        start=scene.start,
-        stop=scene.stop,
-        grid=scene.grid,
-        even=EVEN if scene.follow is None else 0,
-        follow=scene.follows,
-        repeat=scene.repeat,
-        tolerance=scene.tolerance,
-        exchange=scene.exchange,
-        lenient=scene.lenient,
-        patience=scene.patience,
-    )
+    even = EVEN if scene.follow is None else 0
+    own: dict[str, Any] = {"fmu": scene.file, "values": short | scene.values, "even": even, "follow": scene.follows}
+    same = {each.name: getattr(scene, each.name) for each in fields(Specification) if each.name not in own}
+    return Specification(**same, **own)

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ..errors import HarnessError, SceneError, unknown
+from ..errors import HarnessError, SceneError, check_names
 
 FOLDERS = (Path("fmus"), Path(__file__).parents[2] / "fmus")
 
@@ -13,8 +13,7 @@ def fmu_of(name: str) -> Path:
         return path.with_suffix(".fmu")
     if not (names := known()):
         raise SceneError("there are no models here: run from the folder of the project, or name fmu = 'a/file.fmu'")
-    if name not in names:
-        raise SceneError(unknown("model", name, names))
+    check_names("model", [name], names)
     return next((file for folder in FOLDERS for file in folder.glob(f"{name}.fmu")), Path("fmus") / f"{name}.fmu")
 
 

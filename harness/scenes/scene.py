@@ -30,7 +30,7 @@ from math import inf
 from pathlib import Path
 from typing import Annotated, Any
 
-from ..errors import SceneError, unknown
+from ..errors import SceneError, check_names, unknown
 from .fmus import fmu_of
 from .roles import ROLES, roles
 from .schema import (
@@ -176,10 +176,8 @@ def build(path: Path, table: dict[str, Any], source: str) -> Scene:
     """A scene from the table that its file holds."""
     keys = structured(table, SceneKeys)
     plots = usual(keys.outputs) if keys.plots is None else keys.plots
-    for key, names, allowed in (("analyses", keys.analyses, ANALYSES), ("plots", plots, (*PLOTS, *keys.outputs))):
-        for name in names:
-            if name not in allowed:
-                raise SceneError(unknown(f"name in {key}", name, allowed))
+    check_names("name in analyses", keys.analyses, ANALYSES)
+    check_names("name in plots", plots, (*PLOTS, *keys.outputs))
     scene = Scene(**vars(keys) | {"name": path.stem, "source": source, "file": find(path, keys), "plots": plots})
     check_needs(scene)
     return scene

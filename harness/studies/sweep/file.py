@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import HarnessError, SceneError, unknown
+from ...errors import HarnessError, SceneError, check_names
 from ...results.files import heading
 from ...results.folder import replacing
 from ...results.netcdf import NetCDF, Variable
@@ -97,7 +97,7 @@ class About:
 
 def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, report: Callable[[float], None]) -> Swept:
     """Run the sweep and write its files to out/sweep/<name>; HarnessError in one sentence."""
-    file = fmu_file(asked.model)
+    check_built(file := fmu_of(asked.model))
     axes = tuple(axis(text, asked.random is not None) for text in asked.vary)
     names = tuple(each.name for each in axes)
     if len(set(names)) < len(names):
@@ -119,13 +119,6 @@ def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, repo
     return Swept(len(points), folder, before, kept.damaged, failures, seconds)
 
 
-def fmu_file(model: str) -> Path:
-    """The FMU of a model's name, or of a path."""
-    file = Path(model) if model.endswith(".fmu") else fmu_of(model)
-    check_built(file)
-    return file
-
-
 def describe(runs: Runs, points: Points, file: Path) -> About:
     """What the FMU says of the sweep; SceneError where it cannot be done.
 
@@ -134,9 +127,8 @@ def describe(runs: Runs, points: Points, file: Path) -> About:
     said = description(file, specified(runs, file).lenient)
     variables = {variable.name: variable for variable in said.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
+    check_names("parameter to vary", runs.varied, settable)
     for each in points.axes:
-        if each.name not in settable:
-            raise SceneError(unknown("parameter to vary", each.name, settable))
         if each.name in dict(runs.values):
             raise SceneError(f"{each.name} is both varied and set: leave one out")
         if variables[each.name].type not in REALS and any(value % 1 for value in each.values):
