@@ -1,15 +1,21 @@
 """A program in a process of its own, with a temporary folder of its own: both end with the command that started it."""
 
+import json
 import os
 import subprocess
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
+from pathlib import Path
 from time import monotonic
+from typing import Any, TypeVar
 
 from ..errors import HarnessError
 from .interrupt import check, later
 from .room import room
 
+HOME = Path(__file__).parents[2]  # of the harness, and of what builds FMUs
+Asked = TypeVar("Asked")
 OFTEN = 0.1  # s between two looks at whether a signal has come: a thread that waits does not hear it
 
 
@@ -55,6 +61,21 @@ def ask(
             if process:
                 end(process)
             raise
+
+
+def ask_module(module: str, text: str, *arguments: str, **how: Any) -> subprocess.CompletedProcess[str]:
+    """The same of a module of ours, wherever one is."""
+    path = os.pathsep.join(filter(None, (str(HOME), os.environ.get("PYTHONPATH", ""))))
+    return ask([sys.executable, "-m", module, *arguments], text, os.environ | {"PYTHONPATH": path}, **how)
+
+
+def serve(request: Callable[..., Asked], answer: Callable[[Asked], Any]) -> None:
+    """In such a module: answer the one request on standard input, both in JSON.  What is printed meanwhile, as by FMUs,
+    is no answer, and goes to standard error."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    json.dump(answer(request(**json.load(sys.stdin))), answers)
+    answers.close()
 
 
 def end(process: subprocess.Popen[str]) -> None:

@@ -28,13 +28,6 @@ def run(wanted: Specification, report: Report) -> Run:
     return simulate(wanted, report) if ours else foreign.simulate(wanted, found, report)
 
 
-def stop_of(wanted: Specification) -> float | None:
-    """Where a run stops, in s; None if nobody says."""
-    experiment = description(wanted.fmu, wanted.lenient).defaultExperiment
-    own = experiment.stopTime if experiment else None
-    return wanted.stop if wanted.stop is not None else None if own is None else float(own)
-
-
 def shows_steps(found: Any) -> bool:
     """Whether an FMU tells the steps of its solver, as ours of FMI 2.0 do."""
     names = [variable.name for variable in found.modelVariables]

@@ -10,6 +10,7 @@ from fmpy.model_description import ValidationError
 
 from ..errors import HarnessError, SceneError, reason
 from ..scenes.fmus import check_built
+from .specification import Specification
 from .values import in_force, unit
 
 MOST = 50  # faults that are told
@@ -46,6 +47,25 @@ def parameters(fmu: Path) -> dict[str, tuple[object, str]]:
     """The start value of every parameter of an FMU, and its unit."""
     found = [each for each in description(fmu, lenient=True).modelVariables if each.causality == "parameter"]
     return {each.name: (in_force(each, each.start), unit(each)) for each in found}
+
+
+def span(wanted: Specification, found: Any) -> tuple[float, float]:
+    """Start and stop of a run in s, the FMU's own where none are wanted; SceneError if nothing lies between."""
+    own = found.defaultExperiment
+    start, stop = wanted.start, stop_of(wanted, found)
+    if start is None:
+        start = float(own.startTime or 0.0) if own else 0.0
+    if stop is None:
+        raise SceneError(f"{wanted.fmu.name} names no stop time; name one, as in --stop 10")
+    if not stop > start:
+        raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
+    return start, stop
+
+
+def stop_of(wanted: Specification, found: Any) -> float | None:
+    """Where a run stops, in s; None if nobody says."""
+    own = found.defaultExperiment.stopTime if found.defaultExperiment else None
+    return wanted.stop if wanted.stop is not None else None if own is None else float(own)
 
 
 def version(path: Path) -> str:

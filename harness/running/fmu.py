@@ -20,7 +20,7 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException as FMICallException  # which those that run step by step catch
 
 from ..errors import HarnessError, SceneError, reason
-from .description import description
+from .description import description, span
 from .run import Cost, Events, Run, Steps
 from .settings import check_fmu, settings
 from .specification import Specification
@@ -59,14 +59,29 @@ class Trace:
 
 def simulate(wanted: Specification, report: Report = lambda share: None) -> Run:
     """The run that is wanted; HarnessError with the FMU's sentence if it fails, SceneError if it has not got that."""
-    functions, messages = callbacks()
-    messages.clear()
-    with overheard() as spoken, instance(wanted, functions) as (found, fmu):
+    with instance(wanted) as (found, fmu, heard):
         try:
             return passes(planned(wanted, found), fmu, report)
         except FMICallException as error:
-            lines = [text for status, text in messages if status > WARNING] or spoken.getvalue().strip().splitlines()
-            raise HarnessError(lines[-1] if lines else f"{wanted.fmu.name}: {error}") from None
+            raise HarnessError(heard.sentence or f"{wanted.fmu.name}: {error}") from None
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What an FMU says: `messages` of its log as (status, text), and what is `spoken` on standard error."""
+
+    messages: list[tuple[int, str]]
+    spoken: io.StringIO
+
+    @property
+    def sentence(self) -> str:
+        """The last that is more than a warning; empty if it says nothing."""
+        logged = [text for status, text in self.messages if status > WARNING]
+        return (logged or self.spoken.getvalue().strip().splitlines() or [""])[-1]
+
+    def forget(self) -> None:
+        self.messages.clear()
+        self.spoken.seek(self.spoken.truncate(0))
 
 
 @contextmanager
@@ -94,11 +109,13 @@ def described(wanted: Specification) -> Any:
 
 
 @contextmanager
-def instance(wanted: Specification, functions: fmi2.fmi2CallbackFunctions) -> Iterator[tuple[Any, Any]]:
-    """The description and a fresh instance of the FMU; its files and its library are gone afterwards."""
-    with ExitStack() as files:
-        found = described(wanted)
-        folder = files.enter_context(unpacked(wanted.fmu))
+def instance(wanted: Specification) -> Iterator[tuple[Any, Any, Heard]]:
+    """The description and a fresh instance of the FMU, and what it says; its files and its library are gone
+    afterwards."""
+    functions, messages = callbacks()
+    messages.clear()
+    found = described(wanted)
+    with overheard() as spoken, unpacked(wanted.fmu) as folder:
         try:
             fmu = fmi2.FMU2Slave(
                 guid=found.guid,
@@ -110,7 +127,7 @@ def instance(wanted: Specification, functions: fmi2.fmi2CallbackFunctions) -> It
         except Exception as error:  # fmpy raises bare Exceptions
             raise HarnessError(f"{wanted.fmu.name} cannot be loaded: {reason(error)}") from None
         try:
-            yield found, fmu
+            yield found, fmu, Heard(messages, spoken)
         finally:
             fmu.freeInstance()
 
@@ -137,11 +154,7 @@ def callbacks() -> tuple[fmi2.fmi2CallbackFunctions, list[tuple[int, str]]]:
 def planned(wanted: Specification, description: Any) -> Plan:
     """The plan of a run: what it names, and what follows the solver's steps."""
     variables = {variable.name: variable for variable in description.modelVariables}
-    experiment = description.defaultExperiment
-    start = float(experiment.startTime or 0.0) if wanted.start is None else wanted.start
-    stop = float(experiment.stopTime) if wanted.stop is None else wanted.stop
-    if not stop > start:
-        raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
+    start, stop = span(wanted, description)
     if wanted.grid is None and wanted.even:
         wanted = replace(wanted, grid=(stop - start) / wanted.even or None)
     if wanted.grid is not None and (points := (stop - start) / wanted.grid) > MOST_POINTS:

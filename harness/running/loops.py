@@ -10,7 +10,7 @@ from pathlib import Path
 import fmpy
 
 from .clock import best
-from .fmu import callbacks, described, instance, simulate
+from .fmu import described, instance, simulate
 from .specification import Specification
 
 POINTS = 1600
@@ -19,7 +19,7 @@ REPEAT = 10
 
 def usual(file: Path, steps: int) -> float:
     """Run time in s of fmpy's loop, the shortest of several runs of one instance."""
-    with instance(Specification(file), callbacks()[0]) as (description, fmu):
+    with instance(Specification(file)) as (description, fmu, _):
         stop = float(description.defaultExperiment.stopTime)
 
         def run() -> None:

@@ -3,7 +3,6 @@
 Values go to the FMU as they are, unchecked: what it makes of NaN is the question.
 """
 
-import io
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -18,7 +17,7 @@ from fmpy.fmi1 import FMICallException
 from ..errors import HarnessError
 from ..scenes.fmus import fmu_of
 from ..scenes.roles import roles
-from .fmu import WARNING, begin, callbacks, described, instance, overheard, put
+from .fmu import Heard, begin, described, instance, put
 from .specification import Specification
 from .values import labels
 
@@ -114,8 +113,8 @@ def card(model: str) -> Card:
 class Probe:
     """An instance of an FMU that can be run anew and anew."""
 
-    def __init__(self, description: Any, fmu: Any, messages: list[tuple[int, str]], spoken: io.StringIO) -> None:
-        self.fmu, self.messages, self.spoken = fmu, messages, spoken
+    def __init__(self, description: Any, fmu: Any, heard: Heard) -> None:
+        self.fmu, self.heard = fmu, heard
         self.variables = {variable.name: variable for variable in description.modelVariables}
         motion = roles(self.variables)
         if "velocity" not in motion:
@@ -142,23 +141,19 @@ class Probe:
 
     def refusal(self) -> Refusal:
         """What the FMU said when it refused."""
-        said = [text for status, text in self.messages if status > WARNING] or self.spoken.getvalue().splitlines()
-        return Refusal(said[-1] if said else "", all(map(isnan, self.read(self.reals("output", "local")))))
+        return Refusal(self.heard.sentence, all(map(isnan, self.read(self.reals("output", "local")))))
 
     def forget(self) -> None:
         """A new beginning."""
-        self.messages.clear()
-        self.spoken.truncate(0)
+        self.heard.forget()
         self.fmu.reset()
 
 
 @contextmanager
 def probe(model: str) -> Iterator[Probe]:
     """A fresh instance of a model's FMU, whose words are kept from the terminal."""
-    functions, messages = callbacks()
-    wanted = Specification(fmu_of(model))
-    with overheard() as spoken, instance(wanted, functions) as (description, fmu):
-        yield Probe(description, fmu, messages, spoken)
+    with instance(Specification(fmu_of(model))) as (description, fmu, heard):
+        yield Probe(description, fmu, heard)
 
 
 def run(setting: Setting, calls: Calls, changes: Changes) -> Motion | Refusal:

@@ -4,15 +4,13 @@
 It reads the set of parameters only where it is told to, and shows no values before the first step.
 """
 
-import json
-import os
-import sys
 from typing import Any
 from zipfile import ZipFile
 
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 
+from ..process.child import serve
 from ..process.room import room
 
 
@@ -28,7 +26,4 @@ def run(archive: str, step: float, count: int, read: list[tuple[str, str, int]],
 
 
 if __name__ == "__main__":
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # what FMUs print is no answer
-    json.dump(run(**json.load(sys.stdin)), answers)
-    answers.close()
+    serve(dict, lambda asked: run(**asked))

@@ -1,9 +1,7 @@
 """One run of somebody's FMU, from this side: what is asked of the process that holds it, and what comes of it."""
 
 import json
-import os
 import signal
-import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -14,10 +12,11 @@ from typing import Any
 import fmpy
 import numpy as np
 
-from ...errors import LONGEST, HarnessError, SceneError, unknown
-from ...process.child import ask
+from ...errors import LONGEST, HarnessError, SceneError, check_names
+from ...process.child import ask_module
 from ...process.interrupt import check
 from ...process.room import room
+from ..description import span
 from ..run import Run
 from ..specification import Specification
 from ..unpacked import unpacked
@@ -26,7 +25,8 @@ from .agreement import FINEST
 from .request import ANSWER, COARSEST, HUNG, ROWS, SAID, SHARE, TEXTS, Answer, Request
 from .rows import RECORDED, Rows, Shaped, elements, read
 
-HARNESS = Path(__file__).parents[3]
+Values = dict[str, Any]  # by the name of the variable
+
 SETTABLE = ("parameter", "structuralParameter", "input")
 
 
@@ -43,7 +43,7 @@ def simulate(wanted: Specification, found: Any, report: Callable[[float], None])
         raise HarnessError(f"{wanted.fmu.name} offers {offered}; {lacks}")
     values = set_values(wanted, variables)
     chosen = recorded(wanted, variables, values)
-    start, stop = span(wanted, found)
+    start, stop = even_span(wanted, found)
     with unpacked(wanted.fmu) as folder, room("rows-") as place:
         check_library(wanted.fmu, found, exchange, folder)
         request = Request(
@@ -68,7 +68,9 @@ def simulate(wanted: Specification, found: Any, report: Callable[[float], None])
         failed += f", after t = {rows.time[-1]:.9g} s"
     if len(rows.time) < 2:
         raise HarnessError(failed or f"{wanted.fmu.name} gives nothing to record")
-    return result(wanted, variables, values, chosen, rows, texts, answer.note, failed, said)
+    prints = f"it prints: {said[-1][:LONGEST]}" if said else ""
+    note = "; ".join(filter(None, (answer.note, prints)))
+    return replace(result(wanted, variables, values, chosen, rows, texts), note=note, failed=failed)
 
 
 def ways(found: Any) -> list[str]:
@@ -77,33 +79,25 @@ def ways(found: Any) -> list[str]:
     return [way for way, interface in offered.items() if interface]
 
 
-def span(wanted: Specification, found: Any) -> tuple[float, float]:
-    """Start and stop in s."""
-    experiment = found.defaultExperiment
-    start = float(experiment.startTime or 0.0) if experiment else 0.0
-    start = start if wanted.start is None else wanted.start
-    if wanted.stop is None and not (experiment and experiment.stopTime):
-        raise SceneError(f"{wanted.fmu.name} names no stop time; name one, as in --stop 10")
-    stop = float(experiment.stopTime) if wanted.stop is None else wanted.stop
-    if not stop > start:
-        raise SceneError(f"stop = {stop!r} s is not after start = {start!r} s")
+def even_span(wanted: Specification, found: Any) -> tuple[float, float]:
+    """Start and stop in s, between which a clock can be counted on."""
+    start, stop = span(wanted, found)
     if not np.spacing(max(abs(start), abs(stop))) * FINEST <= stop - start < inf:
         between = f"between start = {start!r} s and stop = {stop!r} s"
         raise SceneError(f"{wanted.fmu.name}: {between} are no times to step to; name another --stop")
     return start, stop
 
 
-def set_values(wanted: Specification, variables: dict[str, Any]) -> dict[str, Any]:
+def set_values(wanted: Specification, variables: Values) -> Values:
     """What is set, as it is set; lists for arrays."""
     settable = [
         name
         for name, one in variables.items()
         if one.causality in SETTABLE or (one.initial in ("exact", "approx") and one.variability != "constant")
     ]
-    values: dict[str, Any] = {}
-    for name in sorted(wanted.values, key=lambda name: name in variables and bool(variables[name].dimensions)):
-        if name not in settable:
-            raise SceneError(unknown("variable to set", name, settable))
+    check_names("variable to set", wanted.values, settable)
+    values: Values = {}
+    for name in sorted(wanted.values, key=lambda name: bool(variables[name].dimensions)):
         values[name] = accepted(variables[name], wanted.values[name], shape(variables[name], values))
     return values
 
@@ -117,13 +111,11 @@ def shape(variable: Any, values: Mapping[str, Any]) -> tuple[int, ...]:
     return tuple(sizes)
 
 
-def recorded(wanted: Specification, variables: dict[str, Any], values: dict[str, Any]) -> list[Shaped]:
+def recorded(wanted: Specification, variables: Values, values: Values) -> list[Shaped]:
     """The variables to record, whole, whether one names them or some of their elements."""
     shapes = {name: shape(one, values) for name, one in variables.items() if one.type in RECORDED}
     owner = {element: name for name, each in shapes.items() for element in (name, *elements(name, each))}
-    for name in wanted.outputs:
-        if name not in owner:
-            raise SceneError(unknown("output", name, owner))
+    check_names("output", wanted.outputs, owner)
     chosen = dict.fromkeys(owner[name] for name in wanted.outputs)
     return [(variables[name], shapes[name]) for name in chosen]
 
@@ -148,9 +140,7 @@ def asked(request: Request, place: Path, report: Callable[[float], None]) -> Ans
         with suppress(OSError, ValueError):  # it is just being written
             report(float((place / SHARE).read_text()))
 
-    path = os.pathsep.join(filter(None, (str(HARNESS), os.environ.get("PYTHONPATH", ""))))
-    command = [sys.executable, "-m", f"{__package__}.child"]
-    done = ask(command, json.dumps(asdict(request)), os.environ | {"PYTHONPATH": path}, meanwhile=meanwhile)
+    done = ask_module(f"{__package__}.child", json.dumps(asdict(request)), meanwhile=meanwhile)
     if (place / ANSWER).is_file():
         return Answer(**json.loads((place / ANSWER).read_text(encoding="utf-8")))
     if lines(place / HUNG):
@@ -174,15 +164,7 @@ def lines(path: Path) -> list[str]:
 
 
 def result(
-    wanted: Specification,
-    variables: dict[str, Any],
-    values: dict[str, Any],
-    chosen: list[Shaped],
-    rows: Rows,
-    texts: list[str],
-    note: str,
-    failed: str,
-    said: list[str],
+    wanted: Specification, variables: Values, values: Values, chosen: list[Shaped], rows: Rows, texts: list[str]
 ) -> Run:
     """The run that the rows show."""
     columns, units, descriptions = {}, {}, {}
@@ -192,18 +174,8 @@ def result(
                 column = rows.columns[name]
                 columns[name] = np.array(texts)[column] if variable.type == "String" else column
                 units[name], descriptions[name] = unit(variable), variable.description or name
-    parameters: dict[str, Any] = {}
+    parameters: Values = {}
     for name, one in variables.items():
         if one.causality in SETTABLE or name in values:
             parameters[name], units[name] = in_force(one, values.get(name, one.start)), unit(one)
-    prints = f"it prints: {said[-1][:LONGEST]}" if said else ""
-    return Run(
-        wanted=replace(wanted, outputs=tuple(columns)),
-        time=rows.time,
-        columns=columns,
-        units=units,
-        descriptions=descriptions,
-        parameters=parameters,
-        note="; ".join(filter(None, (note, prints))),
-        failed=failed,
-    )
+    return Run(replace(wanted, outputs=tuple(columns)), rows.time, columns, units, descriptions, parameters)

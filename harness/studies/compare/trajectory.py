@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError, SceneError
-from ...running.any_fmu import POINTS, run, stop_of
+from ...running.any_fmu import POINTS, run
+from ...running.description import description, stop_of
 from ...running.specification import Specification, of_scene
 from ...running.trajectory import Trajectory, of_run
 from ...scenes.fmus import check_built
@@ -28,7 +29,8 @@ def both(sources: tuple[str, str], how: Specification, report: Report) -> tuple[
     runs = [None if each else wanted(source, how) for each, source in zip(found, sources, strict=True)]
     grids = [spacing(each.time) for each in found if each] + [each.grid for each in runs if each]
     grid = next(filter(None, grids), None)
-    stops = {stop_of(each) for each in runs if each} | {float(each.time[-1]) for each in found if each}
+    ends = [stop_of(each, description(each.fmu, each.lenient)) for each in runs if each]
+    stops = {*ends, *(float(each.time[-1]) for each in found if each)}
     stop = how.stop if None in stops or len(stops) == 1 else min(filter(None, stops))
     sides = []
     for each, asked in zip(found, runs, strict=True):

@@ -4,7 +4,8 @@ import ctypes
 import sys
 from pathlib import Path
 
-from .engine import Request, serve
+from ...process.child import serve
+from .engine import Request
 
 
 def run(asked: Request) -> list[list[float]]:
@@ -25,4 +26,4 @@ def run(asked: Request) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    serve(run)
+    serve(Request, run)

@@ -1,14 +1,11 @@
 """Engines that run an SSP archive, each in a process of its own: what they are asked and how they answer, in JSON."""
 
 import json
-import os
-import sys
-from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ...errors import HarnessError
-from ...process.child import ask
+from ...process.child import ask_module
 
 PATIENCE = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
@@ -32,20 +29,10 @@ class Request:
     values: str = "initialValues"
 
 
-def serve(run: Callable[[Request], list[list[float]]]) -> None:
-    """Answer the request on standard input; what an engine or an FMU prints is no answer."""
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    json.dump(run(Request(**json.load(sys.stdin))), answers)
-    answers.close()
-
-
 def rows(engine: str, asked: Request) -> list[list[float]]:
     """A row for each communication point, without the start where an engine does not show it; HarnessError with the
     last words of the engine if it gives none."""
-    path = os.pathsep.join(filter(None, (str(Path(__file__).parents[3]), os.environ.get("PYTHONPATH", ""))))
-    environment = os.environ | {"PYTHONPATH": path}
-    done = ask([sys.executable, "-m", ENGINES[engine]], json.dumps(asdict(asked)), environment, PATIENCE)
+    done = ask_module(ENGINES[engine], json.dumps(asdict(asked)), patience=PATIENCE)
     if done.returncode or not done.stdout:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
         hint = f"; {EXTRA}" if "ModuleNotFoundError" in last else ""

@@ -1,6 +1,7 @@
 """Runs an SSP archive with libcosim (package libcosimpy), whose first values are those after the first step."""
 
-from .engine import Request, serve
+from ...process.child import serve
+from .engine import Request
 
 NANO = 1e9  # libcosim counts time in whole ns
 
@@ -25,4 +26,4 @@ def run(asked: Request) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    serve(run)
+    serve(Request, run)

@@ -6,8 +6,6 @@
    it never comes to an end, with any solver; with modes it is one event.
 """
 
-import os
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache, partial
@@ -17,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.child import ask
+from ...process.child import ask_module
 from ...process.room import room
 from ...running.answer import Answer
 from ...running.inside import Inside, embedded, offered
@@ -65,10 +63,8 @@ def analyse() -> Iterator[AnchorRun]:
 @cache
 def block() -> type:
     """The model of the block, inside the FMU that is built of block.py on the spot."""
-    home = Path(__file__)
     with room("block-") as folder:
-        command = [sys.executable, "-m", "build_fmus", str(home.with_name("block.py")), "--out", str(folder)]
-        done = ask(command, environment=os.environ | {"PYTHONPATH": str(home.parents[3])})
+        done = ask_module("build_fmus", "", str(Path(__file__).with_name("block.py")), "--out", str(folder))
         if done.returncode:
             raise HarnessError(f"the block on a belt cannot be built: {(done.stderr.splitlines() or ['?'])[-1]}")
         return embedded(folder / "block.fmu")

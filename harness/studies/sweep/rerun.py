@@ -12,21 +12,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Protocol
 
-from ...errors import HarnessError, SceneError, unknown
+from ...errors import HarnessError, check_names
 from ...running import any_fmu
 from ...running.description import description
-from ...running.fmu import (
-    WARNING,
-    FMICallException,
-    buffer,
-    callbacks,
-    gather,
-    instance,
-    overheard,
-    parameters,
-    planned,
-    traced,
-)
+from ...running.fmu import WARNING, FMICallException, Heard, buffer, gather, instance, parameters, planned, traced
 from ...running.settings import settings
 from ...running.specification import Specification
 from ...running.values import unit
@@ -63,8 +52,8 @@ class Runner(Protocol):
 class Ours:
     """An instance of an FMU of ours.  The library is called as it stands: fmpy's own calls take as long as a run."""
 
-    def __init__(self, runs: Runs, found: Any, fmu: Any, wanted: Specification) -> None:
-        self.fmu, self.component, self.messages = fmu, c_void_p(fmu.component), callbacks()[1]
+    def __init__(self, runs: Runs, found: Any, fmu: Any, heard: Heard, wanted: Specification) -> None:
+        self.fmu, self.component, self.heard = fmu, c_void_p(fmu.component), heard
         self.variables = {variable.name: variable for variable in found.modelVariables}
         measures = chosen(runs, self.variables, ours=True)
         motion = roles(self.variables)
@@ -103,12 +92,11 @@ class Ours:
         return [(name, getattr(self.fmu.dll, name), (self.component, *rest)) for name, *rest in calls]
 
     def run(self, point: Sequence[float]) -> list[float] | str:
-        self.messages.clear()
+        self.heard.forget()
         try:
             return self.measured(point)
         except FMICallException as error:
-            lines = [text for status, text in self.messages if status > WARNING]
-            return lines[-1] if lines else str(error)
+            return self.heard.sentence or str(error)
         except HarnessError as error:
             return str(error)
 
@@ -177,9 +165,7 @@ class Theirs:
 def chosen(runs: Runs, variables: dict[str, Any], ours: bool) -> tuple[str, ...]:
     """The measures of an FMU; SceneError if it cannot give one."""
     there = offered(variables, ours, dict(runs.values))
-    for name in runs.measures:
-        if name not in there:
-            raise SceneError(unknown(f"measure of {runs.model}", name, there))
+    check_names(f"measure of {runs.model}", runs.measures, there)
     return runs.measures or tuple(name for name in USUAL if name in there)
 
 
@@ -193,9 +179,8 @@ def ready(runs: Runs, file: Path) -> Iterator[Runner]:
     """The FMU in a file, ready to run."""
     wanted = specified(runs, file)
     found = description(file, wanted.lenient)
-    with overheard():
-        if any_fmu.shows_steps(found):
-            with instance(wanted, callbacks()[0]) as (_, fmu):
-                yield Ours(runs, found, fmu, wanted)
-        else:
-            yield Theirs(runs, found, replace(wanted, follow=True))
+    if any_fmu.shows_steps(found):
+        with instance(wanted) as (_, fmu, heard):
+            yield Ours(runs, found, fmu, heard, wanted)
+    else:
+        yield Theirs(runs, found, replace(wanted, follow=True))
