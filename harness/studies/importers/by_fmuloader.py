@@ -1,6 +1,9 @@
 """A request carried out by fmuloader, call by call, in the order of fmpy."""
 
+import re
 import sys
+from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -24,39 +27,23 @@ class Instance:
             name, Fmi2Type.CO_SIMULATION, guid=found.guid, logging_on=True, log_message_callback=hear
         )
 
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        return partial(self.call, snake(name))
+
     def call(self, name: str, *arguments: Any, **named: Any) -> Any:
         """What a call returns; above a warning, which for fmuloader is no error yet, an exception."""
         try:
-            answer = getattr(self.slave, name)(*arguments, **named)
+            answer = getattr(self.slave, name)(*arguments, **{snake(key): value for key, value in named.items()})
         except Fmi2Error as error:
             raise FMICallException(error.func_name, int(error.status)) from None
         if answer is Fmi2Status.DISCARD:
             raise FMICallException(name, int(answer))
         return answer
 
-    def setReal(self, references: list[int], values: list[float]) -> None:
-        self.call("set_real", references, values)
 
-    def getReal(self, references: list[int]) -> Any:
-        return self.call("get_real", references)
-
-    def setupExperiment(self, startTime: float) -> None:
-        self.call("setup_experiment", start_time=startTime)
-
-    def enterInitializationMode(self) -> None:
-        self.call("enter_initialization_mode")
-
-    def exitInitializationMode(self) -> None:
-        self.call("exit_initialization_mode")
-
-    def doStep(self, t: float, h: float) -> None:
-        self.call("do_step", t, h)
-
-    def reset(self) -> None:
-        self.call("reset")
-
-    def freeInstance(self) -> None:
-        self.slave.free_instance()
+def snake(name: str) -> str:
+    """What fmuloader calls something: do_step for doStep."""
+    return re.sub("[A-Z]", lambda capital: f"_{capital[0].lower()}", name)
 
 
 def hear(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:

@@ -26,6 +26,7 @@ LIVES = 100
 POINTS = 200  # communication steps of a run
 DIVERGED = "the motion leaves the range of numbers"
 EXCHANGE = "fmi2EnterEventMode"
+NEGATIVE, TINY = {"m": -1.0}, {"m": 1e-300}  # masses: one is refused, with the other a motion diverges
 FACTOR = 1.1  # a tunable is changed by this factor
 
 
@@ -124,8 +125,7 @@ class Subject:
 
     fmu: Path
     basis: Request  # the default experiment, its first two outputs and acceleration read
-    entry: str  # the input
-    source: str  # an output of the same unit
+    wire: list[str]  # an output, and the input, which is of the same unit
     change: dict[str, float]  # a tunable and its new value in mid-run
 
 
@@ -154,64 +154,7 @@ def subject(fmu: Path) -> Subject:
         steps=POINTS,
         read=outputs[:2],
     )
-    return Subject(fmu, basis, entry, source, change)
-
-
-# ---- the checks: each returns what the table shows, or raises Wrong
-
-
-def default_run(importer: Importer, subject: Subject) -> str:
-    return agreement(importer, subject.basis)
-
-
-def tunable_changed(importer: Importer, subject: Subject) -> str:
-    return agreement(importer, replace(subject.basis, change=subject.change))
-
-
-def two_connected(importer: Importer, subject: Subject) -> str:
-    connection = [subject.source, subject.entry]
-    return agreement(importer, replace(subject.basis, instances=["a", "b"], connect=connection))
-
-
-def bad_parameter(importer: Importer, subject: Subject) -> str:
-    return failure(importer, replace(subject.basis, values={"m": -1.0}), "m = -1.0")
-
-
-def bad_input(importer: Importer, subject: Subject) -> str:
-    return failure(importer, replace(subject.basis, change={subject.entry: nan}), f"{subject.entry} = nan")
-
-
-def diverging(importer: Importer, subject: Subject) -> str:
-    return failure(importer, replace(subject.basis, change={"m": 1e-300, subject.entry: 1e308}), DIVERGED)
-
-
-def percent_signs(importer: Importer, subject: Subject) -> str:
-    request = replace(subject.basis, instances=["100%s%n"], values={"m": -1.0})
-    return failure(importer, request, "m = -1.0")
-
-
-def lives(importer: Importer, subject: Subject) -> str:
-    """Runs, saves, runs on, restores, runs on, resets, runs and frees, in one process; then unloads the library."""
-    if importer.player != "by_c":
-        return "-"
-    request = replace(subject.basis, steps=10, lives=LIVES)
-    rows = play(importer, request).answer.rows
-    if len(rows) != 3 * LIVES or any(row != rows[0] for row in rows):
-        raise Wrong("the lives differ")
-    difference([[], rows[0]], [[], play(IMPORTERS[0], replace(request, lives=0)).answer.rows[-1]])
-    return "alike"
-
-
-CHECKS: dict[str, Callable[[Importer, Subject], str]] = {
-    "default run": default_run,
-    "tunable changed": tunable_changed,
-    "two connected": two_connected,
-    "100 lives": lives,
-    "bad parameter": bad_parameter,
-    "bad input": bad_input,
-    "diverging run": diverging,
-    "% in a name": percent_signs,
-}
+    return Subject(fmu, basis, [source, entry], change)
 
 
 def agreement(importer: Importer, request: Request) -> str:
@@ -264,3 +207,29 @@ def failure(importer: Importer, request: Request, sentence: str) -> str:
     fresh = play(IMPORTERS[0], replace(asked, values={}, change={}, instances=["a"], again=False)).answer.rows
     difference(played.answer.again, fresh)
     return "told"
+
+
+def lives(importer: Importer, subject: Subject) -> str:
+    """Runs, saves, runs on, restores, runs on, resets, runs and frees, in one process; then unloads the library."""
+    if importer.player != "by_c":
+        return "-"
+    request = replace(subject.basis, steps=10, lives=LIVES)
+    rows = play(importer, request).answer.rows
+    if len(rows) != 3 * LIVES or any(row != rows[0] for row in rows):
+        raise Wrong("the lives differ")
+    difference([[], rows[0]], [[], play(IMPORTERS[0], replace(request, lives=0)).answer.rows[-1]])
+    return "alike"
+
+
+CHECKS: dict[str, Callable[[Importer, Subject], str]] = {  # each returns what the table shows, or raises Wrong
+    "default run": lambda tool, its: agreement(tool, its.basis),
+    "tunable changed": lambda tool, its: agreement(tool, replace(its.basis, change=its.change)),
+    "two connected": lambda tool, its: agreement(tool, replace(its.basis, instances=["a", "b"], connect=its.wire)),
+    "100 lives": lives,
+    "bad parameter": lambda tool, its: failure(tool, replace(its.basis, values=NEGATIVE), "m = -1.0"),
+    "bad input": lambda tool, its: failure(tool, replace(its.basis, change={its.wire[1]: nan}), f"{its.wire[1]} = nan"),
+    "diverging run": lambda tool, its: failure(tool, replace(its.basis, change={**TINY, its.wire[1]: 1e308}), DIVERGED),
+    "% in a name": lambda tool, its: failure(
+        tool, replace(its.basis, instances=["100%s%n"], values=NEGATIVE), "m = -1.0"
+    ),
+}
