@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 
 from ..errors import HarnessError
 from ..scenes.coupled.scene import Coupled
+from .models import FOUND
 
 RTOL, ATOL = 1e-11, 1e-14
 MOST = 10_000  # events
@@ -39,6 +40,9 @@ class Bodies:
         return forces
 
 
+LINEAR = {name: each.friction for name, each in FOUND.items() if hasattr(each, "friction")}  # the models of bodies
+
+
 def bodies(scene: Coupled, defaults: dict[str, dict[str, float]]) -> tuple[Bodies, np.ndarray]:
     """The bodies of a scene and their start (x, v) (2 n,), from the values of the models and of the scene."""
     values = [defaults[part.model] | part.values for part in scene.parts]
@@ -47,19 +51,11 @@ def bodies(scene: Coupled, defaults: dict[str, dict[str, float]]) -> tuple[Bodie
     def each(name: str) -> np.ndarray:
         return np.array([value.get(name, 0.0) for value in values])
 
-    weight = each("m") * each("g")
-    return (
-        Bodies(
-            m=each("m"),
-            k=each("k"),
-            c=each("c"),
-            hold=each("f") + each("mu_s") * weight,
-            slide=each("f") + each("mu_d") * weight,
-            driver=each("v_driver"),
-            couplings=tuple(couplings(scene, places)),
-        ),
-        np.concatenate([each("x0"), each("v0")]),
-    )
+    frictions = [LINEAR[part.model] for part in scene.parts]
+    limits = [friction(its) if friction else (0.0, 0.0) for friction, its in zip(frictions, values, strict=True)]
+    slide, hold = np.array(limits).T
+    constants = each("m"), each("k"), each("c"), hold, slide, each("v_driver")
+    return Bodies(*constants, tuple(couplings(scene, places))), np.concatenate([each("x0"), each("v0")])
 
 
 def couplings(scene: Coupled, places: dict[str, int]) -> Iterator[tuple[int, int, str, float]]:

@@ -4,7 +4,7 @@
     stop = 4.0                         s
     steps = [0.02, 0.01, 0.005]        communication steps in s, the finest one is drawn
     [parts.left]                       one table for each part
-    model = "smd"                      smd, coulomb or stickslip
+    model = "smd"                      one whose closed form is known: smd, coulomb or stickslip
     values = {m = 2.0, x0 = 0.1}       its parameters, SI units
     [[springs]]                        a spring and damper between two parts, without force at equal positions
     between = ["left", "right"]
@@ -30,7 +30,6 @@ from ..fmus import fmu_of
 from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Kind, is_names, is_number, read, structured
 
 FOLDER = Path(__file__).parent
-MODELS = ("smd", "coulomb", "stickslip")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 MOST_STEPS = 1_000_000
 SOURCES = ("x", "v", "F_spring")  # outputs that a connection may come from
@@ -151,9 +150,9 @@ def shipped() -> list[Path]:
     return sorted(FOLDER.glob("*.toml"))
 
 
-def load(source: str, stop: float | None = None) -> Coupled:
-    """The scene of a shipped name or a file, to another stop if one is named; SceneError in one sentence if it is not
-    one."""
+def load(source: str, models: Collection[str], stop: float | None = None) -> Coupled:
+    """The scene of a shipped name or a file, of such models, to another stop if one is named; SceneError in one
+    sentence if it is not one."""
     path = Path(source)
     if path.suffix != ".toml":
         names = {file.stem: file for file in shipped()}
@@ -162,20 +161,20 @@ def load(source: str, stop: float | None = None) -> Coupled:
         path = names[source]
     table = read(path)
     try:
-        return build(path, structured(table | ({"stop": stop} if stop else {}), CoupledKeys))
+        return build(path, structured(table | ({"stop": stop} if stop else {}), CoupledKeys), models)
     except SceneError as error:
         raise SceneError(f"scene {path.stem}: {error}") from None
 
 
-def build(path: Path, keys: CoupledKeys) -> Coupled:
+def build(path: Path, keys: CoupledKeys, models: Collection[str]) -> Coupled:
     """The scene that the keys of its file say."""
     if not keys.parts:
         raise SceneError("parts is empty; name each part in a table of its own, as in [parts.left]")
     for name, part in keys.parts.items():
         if not NAME.fullmatch(name):
             raise SceneError(f"part {shown(name)}: a name has letters, digits and _, and begins with a letter")
-        if part.model not in MODELS:
-            raise SceneError(f"part {name}: {unknown('model', part.model, MODELS)}")
+        if part.model not in models:
+            raise SceneError(f"part {name}: {unknown('model', part.model, models)}")
     springs, passed = [], []
     for spring in keys.springs:
         one, two = (known(name, keys.parts) for name in spring.between)

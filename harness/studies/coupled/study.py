@@ -3,7 +3,6 @@
 An archive that somebody else wrote is run the same way; the finest run takes the place of the reference.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,22 +11,22 @@ from shutil import copy
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.child import ask
+from ...process.child import HOME, ask_module
 from ...process.room import room
 from ...results.files import heading, write_rows
 from ...results.files import write as write_csv
 from ...results.folder import replacing
 from ...results.provenance import named, record
 from ...running.description import description
-from ...scenes.coupled.scene import MODELS, Coupled, load
+from ...scenes.coupled.scene import Coupled, load
 from ...scenes.fmus import fmu_of
-from ...truths.monolith import bodies, solve
+from ...truths.monolith import LINEAR, bodies, solve
 from .convergence import Convergence
 from .engine import ENGINES, EXTRA, MAIN, Request, rows
 
 FOLDER = "coupled"
 FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.svg")
-SPRING = Path(__file__).parents[3] / "fmus" / "more" / "spring.py"
+SPRING = HOME / "fmus" / "more" / "spring.py"
 
 Report = Callable[[float], None]
 Starts = dict[str, dict[str, float]]  # start values of the real parameters of each model
@@ -47,8 +46,8 @@ def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple
             name, file = Path(source).stem, plain / "theirs.ssp"
             asked, fmus, scene = theirs.asked(Path(source), file, stop), [Path(source)], None
         else:
-            scene = load(source, stop)
-            defaults = {model: starts(fmu_of(model)) for model in MODELS}
+            scene = load(source, LINEAR, stop)
+            defaults = {model: starts(fmu_of(model)) for model in LINEAR}
             check(scene, defaults)
             name, file = scene.name, plain / f"{scene.system}.ssp"
             asked, fmus = blank(scene), [part.fmu for part in scene.parts]
@@ -96,7 +95,7 @@ def built(scene: Coupled, folder: Path) -> dict[str, Path]:
     """The FMU of each element; that of the springs is built for the occasion."""
     fmus = {part.name: part.fmu for part in scene.parts}
     if scene.springs:
-        done = ask([sys.executable, "-m", "build_fmus", str(SPRING), "--out", str(folder)])
+        done = ask_module("build_fmus", "", str(SPRING), "--out", str(folder))
         if done.returncode:
             raise HarnessError(f"the spring could not be built: {done.stderr.strip()}")
     return fmus | {each.name: folder / "spring.fmu" for each in scene.springs}

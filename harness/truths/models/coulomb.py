@@ -1,6 +1,8 @@
 """Spring and mass with Coulomb friction."""
 
+from collections.abc import Mapping
 from functools import partial
+from typing import Any
 
 from ..problem import Equations, Jacobian, Rates, closed
 from ..reference import Case
@@ -24,7 +26,12 @@ class Coulomb(Equations):
         return -self.k * x, 0.0, self.f
 
 
-pieces = partial(closed, lambda value: (value["f"], value["f"]))
+def friction(value: Mapping[str, Any]) -> tuple[Any, Any]:
+    """What slides and what holds."""
+    return value["f"], value["f"]
+
+
+pieces = partial(closed, friction)
 CASES = (
     Case("coulomb", "coulomb", "hybrid", "coulomb", Coulomb()),
     Case("coulomb-sign", "coulomb", "sign", "coulomb", Coulomb(), {"friction": 2}, "coulomb"),

@@ -21,6 +21,7 @@ class Smd(Equations):
         return lambda t, y: matrix
 
 
-pieces = partial(closed, None)
+friction = None
+pieces = partial(closed, friction)
 CASES = (Case("smd", "smd", "linear damping", "smd", Smd()),)
 CLOSED = {"smd": lambda stop: pieces([(0.0, stop, Smd().values("m", "k", "c"))])}
