@@ -12,7 +12,7 @@ J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998) (decrements) and Journal 
 
 import numpy as np
 
-from .law import LAWS, TERMS, Terms
+from .law import TERMS, Terms, laws_of
 
 POINTS = 40  # of Gauss's rule
 
@@ -38,7 +38,7 @@ def losses(a: np.ndarray, terms: Terms, sine: bool) -> np.ndarray:
 def not_negative(columns: np.ndarray, right: np.ndarray, terms: Terms) -> np.ndarray:
     """Least squares with values >= 0: the best of the few sets of columns whose own solution is so."""
     best, least = np.zeros(len(TERMS)), float(right @ right)
-    for law in (law for law in LAWS if set(law) <= set(terms)):
+    for law in laws_of(terms):
         places = [TERMS.index(term) for term in law]
         scale = np.linalg.norm(columns[:, places], axis=0)
         found = np.linalg.lstsq(columns[:, places] / scale, right, rcond=1e-12)[0] / scale

@@ -70,6 +70,15 @@ def sizes(problem: Problem) -> dict[int, float]:
     return {OMEGA: 1.0, ZETA: 1.0, R: unit, B: 1 / unit, REST: unit, DRIFT: unit}
 
 
+def in_record(
+    record: Record, problem: Problem, place: int, value: float, error: float, low: float, high: float
+) -> Estimate:
+    """An estimate of the problem in the record's units."""
+    size, level = sizes(problem)[place], problem.level if place == REST else 0.0
+    name, unit, text = symbols(record)[place]
+    return Estimate(name, size * value + level, size * error, size * low + level, size * high + level, unit, text)
+
+
 def estimates(
     record: Record, problem: Problem, law: Law, full: Law, spread: Spread, known: Known
 ) -> tuple[Estimate, ...]:
@@ -84,12 +93,11 @@ def estimates(
     if any(not low <= law.p[place] <= high for place, (low, high) in ends.items()):
         law = full
     errors = dict(zip(ends, spread.errors.tolist(), strict=True))
-    for place, (name, unit, text) in symbols(record).items():
+    for place in symbols(record):
         if place in ends:  # elsewhere it was not to be tried
             value, (low, high) = float(law.p[place]), ends[place]
-            size, level = sizes(problem)[place], problem.level if place == REST else 0.0
-            low, high = size * min(low, value) + level, size * max(high, value) + level
-            found[place] = Estimate(name, size * value + level, size * errors[place], low, high, unit, text)
+            bounds = min(low, value), max(high, value)
+            found[place] = in_record(record, problem, place, value, errors[place], *bounds)
     return (*found.values(), *forces(record, found, known))
 
 

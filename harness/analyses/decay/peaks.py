@@ -14,7 +14,7 @@ from ...records.record import Record
 from .chain import chain
 from .choice import Law
 from .decrement import damping_ratio, friction
-from .figures import Estimate, Known, forces, sizes, symbols
+from .figures import Estimate, Known, forces, in_record
 from .intervals import correlated, interval
 from .law import AMPLITUDE, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
 from .model import Model
@@ -74,15 +74,6 @@ def begins_before(problem: Problem, turns: Turns, p: np.ndarray) -> np.ndarray:
     """The half swings of the fit that have ended about the first turning point seen."""
     _, begins = problem.half_swings(p)
     return begins[1:][begins[1:] < turns.t[0] - problem.origin + turns.half / 2]
-
-
-def in_record(
-    record: Record, problem: Problem, place: int, value: float, error: float, low: float, high: float
-) -> Estimate:
-    """An estimate of the problem in the record's units."""
-    size, level = sizes(problem)[place], problem.level if place == REST else 0.0
-    name, unit, text = symbols(record)[place]
-    return Estimate(name, size * value + level, size * error, size * low + level, size * high + level, unit, text)
 
 
 def by_two_peaks(
