@@ -6,45 +6,17 @@ Otherwise it begins where the sled becomes as fast as the driver, which is where
 There too m da/dt = k (v_driver - v) is zero, so that the peak acceleration lies in the slip, apart from any chatter.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..errors import HarnessError
-from ..results.quantity import Quantity
+from ..results.quantity import Measured, Quantity
 from ..running.run import Run
 from . import samples
 
 
-@dataclass(frozen=True)
-class Slips:
-    """Number of slips; start of the first and period in s; `duration` (s) where modes show it; peak speed in m/s, and
-    peak acceleration in m/s2 where the acceleration is recorded."""
-
-    count: int
-    first: float
-    period: float
-    duration: float | None
-    peak_speed: float
-    peak_acceleration: float | None
-
-    @property
-    def quantities(self) -> tuple[Quantity, ...]:
-        found = [
-            Quantity("slips", self.count, "", "slips"),
-            Quantity("first_slip", self.first, "s", "first slip"),
-            Quantity("period", self.period, "s", "slip period"),
-            Quantity("peak_speed", self.peak_speed, "m/s", "peak speed"),
-        ]
-        if self.peak_acceleration is not None:
-            found.append(Quantity("peak_acceleration", self.peak_acceleration, "m/s2", "peak acceleration"))
-        if self.duration is not None:
-            found.insert(3, Quantity("slip_time", self.duration, "s", "duration of a slip"))
-        return tuple(found)
-
-
-def analyse(run: Run) -> Slips:
-    """The slips of a sled; HarnessError with fewer than two, or too few samples in one."""
+def analyse(run: Run) -> Measured:
+    """The slips of a sled, their `slip_time` where modes show it, and the peak acceleration where that is recorded;
+    HarnessError with fewer than two, or too few samples in one."""
     driver = run.parameter("v_driver", "the analysis 'slip'")
     v = run.motion("velocity")
     if not driver:
@@ -61,15 +33,18 @@ def analyse(run: Run) -> Slips:
         raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: take a later stop")
     samples.check(run.time, starts[: len(ends)], ends, "slip")
     fast = ahead >= 0
-    accelerated = "acceleration" in run.wanted.motion
-    return Slips(
-        count=len(starts),
-        first=float(starts[0]),
-        period=float(np.mean(np.diff(starts))),
-        duration=float(np.mean(durations)) if len(durations) else None,
-        peak_speed=crest(run.time, np.abs(v), fast),
-        peak_acceleration=crest(run.time, np.abs(run.motion("acceleration")), widened(fast)) if accelerated else None,
-    )
+    found = [
+        Quantity("slips", len(starts), "", "slips"),
+        Quantity("first_slip", float(starts[0]), "s", "first slip"),
+        Quantity("period", float(np.mean(np.diff(starts))), "s", "slip period"),
+    ]
+    if len(durations):
+        found.append(Quantity("slip_time", float(np.mean(durations)), "s", "duration of a slip"))
+    found.append(Quantity("peak_speed", crest(run.time, np.abs(v), fast), "m/s", "peak speed"))
+    if "acceleration" in run.wanted.motion:
+        peak = crest(run.time, np.abs(run.motion("acceleration")), widened(fast))
+        found.append(Quantity("peak_acceleration", peak, "m/s2", "peak acceleration"))
+    return Measured(tuple(found))
 
 
 def slips_of_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,13 +3,14 @@
 import numpy as np
 
 from ..errors import HarnessError
-from ..results.steps import StepSizes, sizes
+from ..results.quantity import Measured
+from ..results.steps import sizes
 from ..running.run import Run
 
 NEAR = 5  # steps on either side of a reversal that belong to it
 
 
-def analyse(run: Run) -> StepSizes:
+def analyse(run: Run) -> Measured:
     """The step sizes of a run that followed its solver."""
     if run.steps is None or not len(run.steps.h):
         raise HarnessError("the analysis 'steps' needs a run that follows the solver's own steps: add follow = true")
@@ -17,7 +18,7 @@ def analyse(run: Run) -> StepSizes:
     collapse = None
     if "velocity" in run.wanted.motion:
         collapse = collapse_at_reversals(run.steps.t, h, run.time, run.motion("velocity"))
-    return sizes(h, int(run.steps.rejected.sum()), collapse)
+    return Measured(sizes(h, int(run.steps.rejected.sum()), collapse))
 
 
 def collapse_at_reversals(ends: np.ndarray, h: np.ndarray, t: np.ndarray, v: np.ndarray) -> float | None:

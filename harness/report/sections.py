@@ -75,11 +75,23 @@ class Section:
 
 def sections(results: Path, scenes: Sequence[Published]) -> list[Section]:
     """Every section, from the results below a folder; those of the published scenes stand first."""
-    made: list[Callable[[Path], Section]] = [
-        *(partial(oscillators, scenes), partial(runs, scenes), decays, partial(steps, scenes)),
-        *(partial(precision, scenes), stability, importers, sweeps, comparisons, coupled, bench),
+    found = [
+        *(oscillators(scenes, results), runs(scenes, results), decays(results), steps(scenes, results)),
+        *(precision(scenes, results), stability(results), importers(results), sweeps(results)),
+        *(comparisons(results), coupled(results), bench(results)),
     ]
-    return [section for make in made if (section := make(results)).parts or section.missing]
+    return [section for section in found if section.parts or section.missing]
+
+
+def one_of(name: str, title: str, intro: str, parts: list[Item], lack: str, command: str) -> Section:
+    """A section that lacks nothing as soon as it has a part."""
+    return Section(name, title, intro, tuple(parts), () if parts else ((lack, f"python -m harness {command}"),))
+
+
+def each(results: Path, pattern: str, show: Callable[[Path], Item]) -> list[Item]:
+    """What is shown of every file of a pattern below a folder; of the folder that holds it, where that is free."""
+    files = sorted(results.glob(pattern))
+    return [read(file.parent if "*" in pattern else file, show) for file in files]
 
 
 def read(place: Path, make: Callable[[Path], Item]) -> Item:
@@ -125,7 +137,7 @@ def oscillator(said: tuple[str, ...], folder: Path) -> Item:
 def runs(scenes: Sequence[Published], results: Path) -> Section:
     """What was run besides: scenes and FMUs of whoever reads the page."""
     cases = [scene.name for scene in scenes]
-    found = folders(results, SHOWN)
+    found = sorted(file.parent for file in results.glob(f"[!.]*/{SHOWN}"))
     others = [folder for folder in found if folder.name not in cases or not (folder / "figures.csv").is_file()]
     intro = "Scenes and FMUs of one's own, from their first value to their last."
     return Section("runs", "Other runs", intro, tuple(read(folder, own) for folder in others), ())
@@ -139,32 +151,22 @@ def own(folder: Path) -> Item:
 
 
 def decays(results: Path) -> Section:
-    parts = [read(folder, decay) for folder in folders(results / "decay", "decay.json")]
-    missing = () if parts else (("a decay", "python -m harness decay coulomb"),)
     intro = "Damping and dry friction told apart, by the whole signal and by its turning points, with 95 % margins."
-    return Section("decay", "Decay", intro, tuple(parts), missing)
+    parts = each(results, "decay/[!.]*/decay.json", decay)
+    return one_of("decay", "Decay", intro, parts, "a decay", "decay coulomb")
 
 
 def decay(folder: Path) -> Item:
     found = json.loads((folder / "decay.json").read_text(encoding="utf-8"))
-    turns = {each["name"]: each for each in found["turning_points"]}
-    peaks = {each["name"]: each for each in found["published"]}
+    ways = [{one["name"]: interval(one) for one in found[way]} for way in ("fit", "turning_points", "published")]
     rows = tuple(
-        (
-            each["text"],
-            interval(each),
-            interval(turns.get(each["name"])),
-            interval(peaks.get(each["name"])),
-            unit(each),
-        )
-        for each in found["fit"]
+        (one["text"], *(way.get(one["name"], "") for way in ways), "" if one["unit"] == "1" else one["unit"])
+        for one in found["fit"]
     )
     grid = TableCells(("", "whole signal", "turning points", "first and last peak", "unit"), rows)
-    alternative = (
-        f"Decay of {found['record']}: signal, turning points, envelope and fit, and residuals. {found['sentence']}"
-    )
-    sentences = (found["sentence"], *found["remarks"])
-    return Item(found["record"], sentences, grid, drawn(folder / "figure.svg", alternative))
+    said = found["sentence"]
+    text = f"Decay of {found['record']}: signal, turning points, envelope and fit, and residuals. {said}"
+    return Item(found["record"], (said, *found["remarks"]), grid, drawn(folder / "figure.svg", text))
 
 
 def steps(scenes: Sequence[Published], results: Path) -> Section:
@@ -184,7 +186,7 @@ def steps(scenes: Sequence[Published], results: Path) -> Section:
 def sizes(folder: Path) -> Item:
     """The row of one case."""
     _, h, rejected = np.array(table(folder / "steps.csv", cut=False).rows, float).T
-    told = step_sizes(h, int(rejected.sum())).quantities
+    told = step_sizes(h, int(rejected.sum()))
     row = (folder.name, *(" ".join(each.told()).strip() for each in told))
     return Item(folder.name, grid=TableCells(("case", *(each.text for each in told)), (row,)))
 
@@ -200,7 +202,7 @@ def precision(scenes: Sequence[Published], results: Path) -> Section:
         if model in models and not (folder / f"{model}-exchange.csv").is_file():
             again = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
             missing.append((f"{model} in model exchange", again))
-    parts += whole(folder / "anchors.csv", "Anchors from the literature")
+    parts += each(folder, "anchors.csv", partial(whole, "Anchors from the literature"))
     intro = "Error against run time and against right-hand sides; lower left is better. References are certified."
     return Section("precision", "Error against run time", intro, tuple(parts), tuple(missing))
 
@@ -216,11 +218,9 @@ def tradeoff(place: Path) -> Item:
 
 
 def stability(results: Path) -> Section:
-    file = results / "stability/stability.csv"
-    parts = [read(file, endings)] if file.is_file() else []
     intro = "Every case either finishes within its error bound or is refused with a sentence: none hangs, none lies."
-    missing = () if parts else (("stability", "python -m harness stability"),)
-    return Section("stability", "Stability", intro, tuple(parts), missing)
+    parts = each(results, "stability/stability.csv", endings)
+    return one_of("stability", "Stability", intro, parts, "stability", "stability")
 
 
 def endings(file: Path) -> Item:
@@ -238,16 +238,15 @@ def endings(file: Path) -> Item:
 
 
 def importers(results: Path) -> Section:
-    parts = whole(results / "importers/importers.csv", "Checks")
-    missing = () if parts else (("importers", "python -m harness importers"),)
-    return Section("importers", "Importers", "The same FMUs in other tools, beside fmpy.", tuple(parts), missing)
+    parts = each(results, "importers/importers.csv", partial(whole, "Checks"))
+    intro = "The same FMUs in other tools, beside fmpy."
+    return one_of("importers", "Importers", intro, parts, "importers", "importers")
 
 
 def sweeps(results: Path) -> Section:
-    parts = [read(folder, swept) for folder in folders(results / "sweep", "sweep.csv")]
-    command = "python -m harness sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measure slips"
+    command = "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measure slips"
     intro = "What happens over many parameters; known boundaries are dashed."
-    return Section("sweeps", "Sweeps", intro, tuple(parts), () if parts else (("a sweep", command),))
+    return one_of("sweeps", "Sweeps", intro, each(results, "sweep/[!.]*/sweep.csv", swept), "a sweep", command)
 
 
 def swept(folder: Path) -> Item:
@@ -262,21 +261,17 @@ def swept(folder: Path) -> Item:
 
 
 def comparisons(results: Path) -> Section:
-    parts = [read(folder, comparison) for folder in folders(results / "compare", "compare.json")]
-    command = "python -m harness compare results/coulomb results/coulomb-sign"
-    intro = "How far two results or two FMUs are apart."
-    return Section("compare", "Comparisons", intro, tuple(parts), () if parts else (("a comparison", command),))
+    intro, command = "How far two results or two FMUs are apart.", "compare results/coulomb results/coulomb-sign"
+    parts = each(results, "compare/[!.]*/compare.json", comparison)
+    return one_of("compare", "Comparisons", intro, parts, "a comparison", command)
 
 
 def comparison(folder: Path) -> Item:
     found = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
+    figures = {"largest": ".3e", "rms": ".3e", "relative": ".2e"}
     rows = tuple(
-        (
-            each["name"],
-            *(digits(each[key], how) for key, how in (("largest", ".3e"), ("rms", ".3e"), ("relative", ".2e"))),
-            each["unit"],
-        )
-        for each in found["variables"]
+        (one["name"], *(digits(one[key], how) for key, how in figures.items()), one["unit"])
+        for one in found["variables"]
     )
     grid = TableCells(("variable", "largest", "rms", "relative", "unit"), rows)
     title = f"{found['one']['name']} and {found['two']['name']}"
@@ -285,10 +280,9 @@ def comparison(folder: Path) -> Item:
 
 
 def coupled(results: Path) -> Section:
-    parts = [read(folder, pair) for folder in folders(results / "coupled", "error.csv")]
-    missing = () if parts else (("a coupled scene", "python -m harness couple two-masses"),)
     intro = "Several FMUs joined, run by an existing engine, beside one model of the whole."
-    return Section("coupled", "Coupled", intro, tuple(parts), missing)
+    parts = each(results, "coupled/[!.]*/error.csv", pair)
+    return one_of("coupled", "Coupled", intro, parts, "a coupled scene", "couple two-masses")
 
 
 def pair(folder: Path) -> Item:
@@ -297,21 +291,14 @@ def pair(folder: Path) -> Item:
 
 
 def bench(results: Path) -> Section:
-    parts = whole(results / "bench/bench.csv", "Reached and seen")
-    missing = () if parts else (("numbers", "python -m harness bench"),)
-    return Section(
-        "bench", "Numbers", "What was to be reached, and what was measured beside it.", tuple(parts), missing
-    )
+    parts = each(results, "bench/bench.csv", partial(whole, "Reached and seen"))
+    intro = "What was to be reached, and what was measured beside it."
+    return one_of("bench", "Numbers", intro, parts, "numbers", "bench")
 
 
-def whole(file: Path, title: str) -> list[Item]:
-    """The part that shows all of a table, if there is one."""
-    return [read(file, lambda place: Item(title, (), table(place)))] if file.is_file() else []
-
-
-def folders(parent: Path, file: str) -> list[Path]:
-    """The result folders below a folder that hold a file, by name."""
-    return sorted(path.parent for path in parent.glob(f"[!.]*/{file}"))
+def whole(title: str, file: Path) -> Item:
+    """All of a table."""
+    return Item(title, (), table(file))
 
 
 def drawn(file: Path, text: str) -> tuple[Picture, ...]:
@@ -346,15 +333,9 @@ def digits(number: float | None, how: str) -> str:
     return "not finite" if number is None else f"{number:{how}}"
 
 
-def interval(each: dict[str, Any] | None) -> str:
-    """Value and 95 % interval, where there is one."""
-    if each is None:
-        return ""
-    if each["value"] is None:
+def interval(one: dict[str, Any]) -> str:
+    """Value and 95 % interval."""
+    if one["value"] is None:
         return "not finite"
-    low, high = (nan if each[end] is None else each[end] for end in ("low", "high"))
-    return spelled_interval(each["value"], low, high)
-
-
-def unit(each: dict[str, Any]) -> str:
-    return "" if each["unit"] == "1" else each["unit"]
+    low, high = (nan if one[end] is None else one[end] for end in ("low", "high"))
+    return spelled_interval(one["value"], low, high)

@@ -40,6 +40,13 @@ class Quantity:
         return self.value / size
 
 
+@dataclass(frozen=True)
+class Measured:
+    """What an analysis has found."""
+
+    quantities: tuple[Quantity, ...]
+
+
 def in_degrees(unit: str) -> tuple[str, float]:
     """The unit in which people look at what is in a `unit`, degrees for angles and their rates, and its size in it."""
     return (unit.replace("rad", "deg"), pi / 180) if unit in ("rad", "rad/s", "rad/s2") else (unit, 1.0)

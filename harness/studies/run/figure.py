@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...results.quantity import UNITS, Quantity, in_degrees
+from ...results.steps import published_mean
 from ...results.style import ABOVE, BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet
 from ...running import any_fmu
 from ...running.description import description
@@ -194,7 +195,7 @@ def steps(axes: Axes, shown: Drawn) -> None:
     axes.semilogy(run.steps.t[:-1], run.steps.h, color=BLUE, linewidth=0.6, marker=".", markersize=3)
     if "steps" in shown.results:
         found = {
-            "mean": (shown.results["steps"].mean, ORANGE, "--"),
+            "mean": (published_mean(run.steps.h), ORANGE, "--"),
             "published": (shown.figure("mean_step"), GREEN, ":"),
         }
         for word, (mean, color, style) in found.items():
