@@ -44,14 +44,7 @@ def numbers(found: Comparison) -> dict[str, Any]:
         "times": len(found.time),
         "interpolated": found.interpolated,
         "variables": [
-            {
-                "name": each.name,
-                "unit": each.unit,
-                "largest": each.largest,
-                "at": each.at,
-                "rms": each.rms,
-                "relative": each.relative,
-            }
+            {name: getattr(each, name) for name in ("name", "unit", "largest", "at", "rms", "relative")}
             for each in found.differences
         ],
         "left_out": list(found.left_out),
@@ -90,14 +83,11 @@ def sentences(found: Comparison) -> list[str]:
     """How the two came about, what was compared, and what their events say."""
     how = "those of the coarser one; the other lies between its samples" if found.interpolated else "common to both"
     said = [f"{each.name}: {each.note}" for each in (found.one, found.two) if each.note]
+    lost = [each for each in found.differences if isnan(each.largest)]
     return [
         *said,
         f"Compared at {len(found.time)} times ({how}).",
-        *(
-            f"{each.name} is not a finite number at t = {each.at:g} s"
-            for each in found.differences
-            if isnan(each.largest)
-        ),
+        *(f"{each.name} is not a finite number at t = {each.at:g} s" for each in lost),
         *found.left_out,
         *([found.pairs.sentence((found.one.name, found.two.name))] if found.pairs else []),
     ]

@@ -137,28 +137,76 @@ def default(model: str, file: Path, carried: Any) -> Case:
     return Case(file.stem, model, law, truth, Unwritten(float(truth.times[-1])), outputs=outputs)
 
 
+@dataclass(frozen=True)
+class Asking:
+    """The ways to ask about a case: the model that its FMU carries, that FMU in a file, its sibling, and peers.  Each
+    takes rtol and an extent, and gives the answer with the run time in s."""
+
+    case: Case
+    carried: Any
+    file: Path
+
+    @property
+    def times(self) -> np.ndarray:
+        return self.case.reference.times
+
+    def inside(self, method: str, taken: dict[float, float], rtol: float, extent: Extent) -> tuple[Answer, float]:
+        """The FMU's own code, in this process."""
+        run, times = Inside.prepared(self.carried, self.case.values, method, rtol), self.times.tolist()
+        answer = run.answer(times, extent.patience)
+        taken[rtol] = best(partial(run.motion, times), extent.budget)
+        return answer, taken[rtol]
+
+    def through_fmpy(
+        self, method: str, taken: dict[float, float], rtol: float, extent: Extent
+    ) -> tuple[Answer, float] | None:
+        """The FMU through fmpy, states recorded; only where it did not fail without fmpy, then it must not."""
+        if rtol not in taken:
+            return None
+        outputs, tolerance = self.case.outputs, {"solver.rtol": rtol} if rtol else {}
+        values: dict[str, float | str] = {**self.case.values, **tolerance, "solver.method": method}
+        grid, repeat = float(self.times[1]), repeats(taken[rtol], extent.budget)
+        run = simulate(Specification(self.file, outputs, values, grid=grid, follow=False, repeat=repeat))
+        assert run.cost  # ours tell it
+        columns = np.column_stack([run.columns[name] for name in outputs])
+        return Answer(columns, None, run.cost.evaluations), run.cost.seconds
+
+    def by_importer(self, tool: str, rtol: float, extent: Extent) -> tuple[Answer, float]:
+        """The FMI 3.0 FMU through fmpy, states recorded, and in model exchange every change of mode; the run time is
+        that of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
+        outputs, stop, step = self.case.outputs, float(self.times[-1]), float(self.times[1])
+        marks = tuple(self.carried.contacts) if tool == ME and self.case.reference.modes else ()
+        with fmi3.instance(fmi3.sibling(self.file), WAYS[tool]) as fmu:
+            run = partial(fmu.simulate, self.case.values, outputs + marks, stop, step, rtol or None)
+            found = run(extent.patience)
+            seconds = best(run, extent.budget)
+        events = found.changes(*marks) if marks else None
+        return Answer(found.at(self.times, outputs), events, found.evaluations), seconds
+
+    def by_peer(self, peer: str, method: str, rtol: float, extent: Extent) -> tuple[Answer, float]:
+        """Somebody else's solver."""
+        problem = self.case.problem
+        ask = partial(peers.solve, peer, method, problem, self.times, rtol, problem.absolute * rtol)
+        return ask(peers.within(extent.patience)), best(ask, extent.budget)
+
+
 def jobs(case: Case, carried: Any, file: Path) -> Iterator[Job]:
     """Every solver that is asked about a case."""
-    truth = case.reference
-    times = truth.times
+    ask, absolute = Asking(case, carried, file), case.problem.absolute
     for method in offered(carried):
         if not (method == "exact" and case.chatters):
             taken: dict[float, float] = {}  # run time in s by rtol, from the first of the two for the second
             swept = method != "exact"
-            own = partial(inside, case, carried, method, times.tolist(), taken)
-            yield Job(FMU, method, nan, own, swept=swept)
-            yield Job(FMPY, method, nan, partial(through_fmpy, case, file, method, times, taken), True, swept)
+            yield Job(FMU, method, nan, partial(ask.inside, method, taken), swept=swept)
+            yield Job(FMPY, method, nan, partial(ask.through_fmpy, method, taken), True, swept)
     if not case.chatters:
-        three = fmi3.sibling(file)
         usual = {number: name for name, number in offered(carried).items()}[carried().solver.method]
-        for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", three.is_file())):
-            marks = tuple(carried.contacts) if tool == ME and len(truth.modes) else ()
-            yield Job(tool, method, nan, partial(by_importer, case, three, WAYS[tool], marks, times), swept=swept)
+        for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3.sibling(file).is_file())):
+            yield Job(tool, method, nan, partial(ask.by_importer, tool), swept=swept)
         absent = peers.PACKAGES if isinstance(case.problem, Unwritten) else peers.missing()
         for peer, methods in (("scipy", peers.SCIPY), ("cvode", ("BDF",) if case.problem.stiff else ("Adams",))):
-            for method in methods:
-                if peer not in absent:
-                    yield Job(peer, method, case.problem.absolute, partial(by_peer, case, peer, method, times))
+            for method in methods if peer not in absent else ():
+                yield Job(peer, method, absolute, partial(ask.by_peer, peer, method))
 
 
 def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
@@ -183,78 +231,8 @@ def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
         if not found:
             continue
         answer, seconds = found
-        off = errors(answer, truth)
-        yield point(
-            seconds=seconds,
-            evaluations=answer.evaluations,
-            final=off.final,
-            rms=off.rms,
-            largest=off.largest,
-            events=off.events,
-            beside_dry=errors(answer, dry).largest if dry else None,
-        )
-
-
-def inside(
-    case: Case,
-    carried: type,
-    method: str,
-    times: list[float],
-    taken: dict[float, float],
-    rtol: float,
-    extent: Extent,
-) -> tuple[Answer, float]:
-    """The FMU's own code, in this process."""
-    run = Inside.prepared(carried, case.values, method, rtol)
-    answer = run.answer(times, extent.patience)
-    taken[rtol] = best(partial(run.motion, times), extent.budget)
-    return answer, taken[rtol]
-
-
-def through_fmpy(
-    case: Case,
-    file: Path,
-    method: str,
-    times: np.ndarray,
-    taken: dict[float, float],
-    rtol: float,
-    extent: Extent,
-) -> tuple[Answer, float] | None:
-    """The FMU through fmpy, states recorded; only where it did not fail without fmpy, then it must not."""
-    if rtol not in taken:
-        return None
-    tolerance = {"solver.rtol": rtol} if rtol else {}
-    wanted = Specification(
-        file,
-        case.outputs,
-        {**case.values, **tolerance, "solver.method": method},
-        grid=float(times[1]),
-        follow=False,
-        repeat=repeats(taken[rtol], extent.budget),
-    )
-    run = simulate(wanted)
-    assert run.cost  # ours tell it
-    columns = np.column_stack([run.columns[name] for name in case.outputs])
-    return Answer(columns, None, run.cost.evaluations), run.cost.seconds
-
-
-def by_importer(
-    case: Case, file: Path, way: str, marks: tuple[str, ...], times: np.ndarray, rtol: float, extent: Extent
-) -> tuple[Answer, float]:
-    """The FMI 3.0 FMU through fmpy, states recorded, and in model exchange every change of mode; the run time is that
-    of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
-    with fmi3.instance(file, way) as fmu:
-        run = partial(fmu.simulate, case.values, case.outputs + marks, float(times[-1]), float(times[1]), rtol or None)
-        found = run(extent.patience)
-        seconds = best(run, extent.budget)
-    events = found.changes(*marks) if marks else None
-    return Answer(found.at(times, case.outputs), events, found.evaluations), seconds
-
-
-def by_peer(case: Case, peer: str, method: str, times: np.ndarray, rtol: float, extent: Extent) -> tuple[Answer, float]:
-    """Somebody else's solver."""
-    ask = partial(peers.solve, peer, method, case.problem, times, rtol, case.problem.absolute * rtol)
-    return ask(peers.within(extent.patience)), best(ask, extent.budget)
+        beside_dry = errors(answer, dry).largest if dry else None
+        yield point(seconds, answer.evaluations, **vars(errors(answer, truth)), beside_dry=beside_dry)
 
 
 def best(call: Callable[[], object], budget: float) -> float:

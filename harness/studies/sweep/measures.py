@@ -5,6 +5,7 @@ A measure that a run does not have (the period of a single slip, the rest of wha
 
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -88,13 +89,8 @@ def decayed(run: Run, law: Callable[[float, float, float], float]) -> float:
         return np.nan
 
 
-def zeta(run: Run) -> float:
-    return decayed(run, damping_ratio)
-
-
-def f_over_k(run: Run) -> float:
-    return decayed(run, lambda x_0, x_n, cycles: friction(x_0, x_n, cycles, 1.0))
-
+zeta = partial(decayed, law=damping_ratio)
+f_over_k = partial(decayed, law=partial(friction, stiffness=1.0))
 
 AT_END = {  # and the variable that tells it
     "events": (Column("events", "", "changes of mode"), "events.count"),
