@@ -151,9 +151,9 @@ def identified(record: Record, known: Known, drag: bool, drift: bool, report: Ca
     refuse(record, problem, full, found, known.pendulum)
     values = plausible(laws, full, problem)
     told = estimates(record, problem, values, full, found, known)
-    said = [*record.notes, *window.notes, *remarks(record, problem, laws, full, found, turns.step)]
+    said = [*record.notes, *window.notes, *remarks(record, problem, laws, full, found)]
     if found.alike and found.rms > ROUGH * problem.noise:
-        told, more = halves_apart(record, problem, full, told)
+        told, more = halves_apart(problem, full, told)
         said += more
     omega = told[0]
     turning, no_turning = by_turning_points(record, problem, turns, laws[0], known, omega)

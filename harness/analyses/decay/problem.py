@@ -30,8 +30,9 @@ Fitted = tuple[np.ndarray, float]  # the values of UNKNOWNS, and the squares the
 
 @dataclass(frozen=True)
 class Problem:
-    """Samples `t`, `x` (n,) to be fitted by `model`; `origin` s, `level` and `unit` turn them back
-    into the record's; `noise` of a sample; with or without `drift`."""
+    """Samples `t`, `x` (n,) to be fitted by `model`; `origin` s, `level` and `unit` turn them back into the record's;
+    `noise` of a sample; with or without `drift`; the half period `swing` in s; the `step` of a quantiser (or 0), in
+    the unit of the record."""
 
     t: np.ndarray
     x: np.ndarray
@@ -41,6 +42,8 @@ class Problem:
     unit: float
     noise: float
     drift: bool
+    swing: float
+    step: float
 
     @property
     def exact(self) -> float:
@@ -75,9 +78,9 @@ class Problem:
         found, cost, _, _ = least_squares(lambda q: self.off(q, terms), p, unknowns, steps)
         return found, cost
 
-    def grown(self, p: np.ndarray, terms: Terms, swing: float) -> np.ndarray:
-        """The same by growing windows, none shorter than five half swings `swing` in s."""
-        least = int(np.searchsorted(self.t, self.t[0] + 5 * swing))
+    def grown(self, p: np.ndarray, terms: Terms) -> np.ndarray:
+        """The same by growing windows, none shorter than five half swings."""
+        least = int(np.searchsorted(self.t, self.t[0] + 5 * self.swing))
         for share in WINDOWS:
             size = max(int(share * len(self.t)), min(len(self.t), least))
             p, _ = self.only(slice(size)).fit(p, terms, STEPS)
@@ -126,15 +129,15 @@ def prepare(record: Record, turns: Turns, pendulum: bool, drift: bool) -> tuple[
     if pendulum:
         start[AMPLITUDE] = min(start[AMPLITUDE], 3.1)
     at_turns = replace(model, order=0)
-    seed = numbered(at_turns, start, times, places, a * omega / (3 * error), error, drift)
+    seed = numbered(at_turns, start, times, places, a * omega / (3 * error), error)
     if record.order:
         seed[REST] = seed[DRIFT] = 0.0
     elif drift and len(middle) > 1 and times[-1] > times[0]:
         slope = (middle[-1] - middle[0]) / (times[-1] - times[0]) / unit
         seed[DRIFT] += slope
         seed[REST] += slope * (model.middle - times[-1])
-    problem = Problem(record.t - origin, (record.x - level) / unit, model, origin, level, unit, noise, drift)
-    return problem, seed
+    t, x = record.t - origin, (record.x - level) / unit
+    return Problem(t, x, model, origin, level, unit, noise, drift, turns.half, turns.step), seed
 
 
 def middles(times: np.ndarray, places: np.ndarray, moving: bool) -> np.ndarray:
@@ -148,17 +151,10 @@ def middles(times: np.ndarray, places: np.ndarray, moving: bool) -> np.ndarray:
 
 
 def numbered(
-    model: Model,
-    start: np.ndarray,
-    times: np.ndarray,
-    places: np.ndarray,
-    weights: np.ndarray,
-    error: float,
-    drift: bool,
-    terms: Terms = TERMS,
+    model: Model, start: np.ndarray, times: np.ndarray, places: np.ndarray, weights: np.ndarray, error: float
 ) -> np.ndarray:
     """The values that agree best with turning points matched by their number, in which no phase can slip."""
-    unknowns = unknowns_of(terms, False)
+    unknowns = unknowns_of(TERMS, False)
     if 2 * len(times) <= len(unknowns):
         return start
 

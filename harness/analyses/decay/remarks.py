@@ -59,9 +59,7 @@ def gains(problem: Problem, full: Law) -> float:
     return float(found.free[-1] / found.errors[-1]) if found.errors[-1] > 0 else 0.0
 
 
-def remarks(
-    record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, spread: Spread, step: float
-) -> tuple[str, ...]:
+def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, spread: Spread) -> tuple[str, ...]:
     """The sentences."""
     said = []
     noise, rms, unit = problem.noise * problem.unit, spread.rms * problem.unit, record.unit
@@ -93,17 +91,17 @@ def remarks(
             "sample to sample; the intervals are widened."
         )
     drift = drifting(record, problem, full) if spread.alike and not problem.drift else ""
-    alike = rounded_alike(problem, full, step, unit)
+    alike = rounded_alike(problem, full, unit)
     return (*said, *([drift] if drift else []), *alike, *undecided(problem, laws))
 
 
-def rounded_alike(problem: Problem, full: Law, step: float, unit: str) -> tuple[str, ...]:
+def rounded_alike(problem: Problem, full: Law, unit: str) -> tuple[str, ...]:
     """A sentence where the steps of a sensor and the loss of a half swing keep time, so that its rounding is no noise:
     Rayleigh's test of where the turning points lie between two steps."""
     amplitudes, begins = problem.half_swings(full.p)
     places = full.p[REST] + problem.model.side * amplitudes * (-1.0) ** np.arange(len(amplitudes))
     seen = (begins >= 0) & (begins <= problem.t[-1])
-    amplitudes, places = amplitudes[seen], places[seen]
+    amplitudes, places, step = amplitudes[seen], places[seen], problem.step
     if not step or problem.model.order or len(amplitudes) < LEAST_TURNS:
         return ()
     alike = abs(np.mean(np.exp(2j * np.pi * places * problem.unit / step)))
@@ -151,7 +149,7 @@ def undecided(problem: Problem, laws: tuple[Law, ...]) -> tuple[str, ...]:
 
 
 def halves_apart(
-    record: Record, problem: Problem, full: Law, estimates: tuple[Estimate, ...]
+    problem: Problem, full: Law, estimates: tuple[Estimate, ...]
 ) -> tuple[tuple[Estimate, ...], tuple[str, ...]]:
     """Where the fit is rough: the law in the first and in the second half of the record; where they disagree by more
     than their errors that is told, and the intervals hold both."""

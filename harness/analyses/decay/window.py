@@ -11,7 +11,7 @@ import numpy as np
 from ...records.record import FEWEST, Record
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
 from .noise import FAR, scatter, typical
-from .problem import LEAST_NOISE, Problem, prepare
+from .problem import LEAST_NOISE, Fitted, Problem, prepare
 from .turning import Turns
 
 SWINGS = 2.0  # steps of a quantiser that a swing spans at least
@@ -22,6 +22,9 @@ LOST = 4.0  # times the noise: where a half swing leaves the law
 PARTLY = 0.05  # of the samples of the half swing before it
 LEAST = 6  # turning points before that
 ROUNDS = 6  # of going on from there
+
+
+Part = tuple[Problem, np.ndarray, float]  # some of the samples, the values of UNKNOWNS, and the squares they leave
 
 
 @dataclass(frozen=True)
@@ -40,22 +43,22 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
     problem, seed = prepare(record, turns, pendulum, drift)
     for place in (UNKNOWNS.index(term) for term in TERMS if term not in terms):
         seed[place] = 0.0
-    swing, notes = turns.half, []
+    notes = []
     if turns.start > record.t[0]:
         notes.append(
             f"Before the gap that ends at t = {record.at(turns.start)} s are too few swings; they are left out."
         )
     begin = max(turns.start - problem.origin, seed[T0])
     later = problem.only(problem.t >= begin)
-    sure = later.only(later.t <= turns.t[-1] - problem.origin + 0.6 * swing)
-    p, squares = fitted(sure, seed, terms, swing)
+    sure = later.only(later.t <= turns.t[-1] - problem.origin + 0.6 * turns.half)
+    p, squares = fitted(sure, seed, terms)
 
-    used, p, squares = until_stop(later, p, terms, turns, sure, squares)
-    used, p, squares, strayed = without_strays(used, p, squares, terms, swing)
-    pushed = after_push(used, p, squares, terms, swing)
+    used, p, squares = until_stop(later, p, squares, terms, sure)
+    used, p, squares, strayed = without_strays(used, p, squares, terms)
+    pushed = after_push(used, p, squares, terms)
     if pushed is not None:
         used, p, squares = pushed
-        used, p, squares = until_stop(used, p, terms, turns, used, squares)
+        used, p, squares = until_stop(used, p, squares, terms, used)
         notes.append(
             f"The motion is free from t = {record.at(used.t[0] + used.origin)} s on; what is before is left out."
         )
@@ -63,7 +66,7 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
     if used.rough(squares) and squares > len(used.t) * (2 * used.noise) ** 2:
         broken = until_disturbed(record, turns, used, squares, terms)
         if broken is not None:
-            used, p, squares, strayed = without_strays(*broken, terms, swing)
+            used, p, squares, strayed = without_strays(*broken, terms)
             at = record.at(used.t[-1] + used.origin)
             notes.append(
                 f"The record follows the law until t = {at} s, and then departs from it; it is used until there."
@@ -75,37 +78,35 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
     return Window(used, p, squares, tuple(notes))
 
 
-def fitted(problem: Problem, p: np.ndarray, terms: Terms, swing: float) -> tuple[np.ndarray, float]:
+def fitted(problem: Problem, p: np.ndarray, terms: Terms) -> Fitted:
     """The full law, at once where that succeeds, otherwise by growing windows; the better of both."""
     found = problem.fit(p, terms)
     if not problem.rough(found[1]):
         return found
-    return min(found, problem.fit(problem.grown(p, terms, swing), terms), key=lambda fit: fit[1])
+    return min(found, problem.fit(problem.grown(p, terms), terms), key=lambda fit: fit[1])
 
 
-def until_stop(
-    problem: Problem, p: np.ndarray, terms: Terms, turns: Turns, fit_to: Problem, squares: float
-) -> tuple[Problem, np.ndarray, float]:
+def until_stop(problem: Problem, p: np.ndarray, squares: float, terms: Terms, fit_to: Problem) -> Part:
     """The problem until the motion stops, with its fit; p leaves `squares` of the samples `fit_to`."""
-    used = problem.only(problem.t <= end(problem, p, terms, turns))
-    return (used, p, squares) if len(used.t) == len(fit_to.t) else (used, *fitted(used, p, terms, turns.half))
+    used = problem.only(problem.t <= end(problem, p))
+    return (used, p, squares) if len(used.t) == len(fit_to.t) else (used, *fitted(used, p, terms))
 
 
-def end(problem: Problem, p: np.ndarray, terms: Terms, turns: Turns) -> float:
+def end(problem: Problem, p: np.ndarray) -> float:
     """In s: half a swing before the motion stops, or where its swings are lost in the steps of a quantiser.
 
     A tail that is stuck repeats one sample, and its end makes kinks.
     """
     amplitudes, begins = problem.half_swings(p)
     spans = (amplitudes[:-1] + amplitudes[1:]) * p[OMEGA] ** problem.model.order
-    lost = np.flatnonzero(spans < SWINGS * turns.step / problem.unit)
+    lost = np.flatnonzero(spans < SWINGS * problem.step / problem.unit)
     stop = len(begins) - (1 if begins[-1] > problem.t[-1] else 2)
     last = min(int(lost[0]), stop) if len(lost) else stop
     return float(begins[max(last, min(3, len(begins) - 1))])
 
 
 def without_strays(
-    problem: Problem, p: np.ndarray, squares: float, terms: Terms, swing: float
+    problem: Problem, p: np.ndarray, squares: float, terms: Terms
 ) -> tuple[Problem, np.ndarray, float, np.ndarray]:
     """The problem without the samples that are far off where all others are not, and their times; whole where such
     samples are many."""
@@ -117,15 +118,13 @@ def without_strays(
             break
         farthest = far & (np.abs(e) >= np.sort(np.abs(e))[-most])
         rest = problem.only(~farthest)
-        q, less = fitted(rest, q, terms, swing)
+        q, less = fitted(rest, q, terms)
         if far.sum() <= most:
             return rest, q, less, problem.t[far]
     return problem, p, squares, problem.t[:0]
 
 
-def after_push(
-    problem: Problem, p: np.ndarray, squares: float, terms: Terms, swing: float
-) -> tuple[Problem, np.ndarray, float] | None:
+def after_push(problem: Problem, p: np.ndarray, squares: float, terms: Terms) -> Part | None:
     """The problem from its first turning point on, where the half swing before that is no free motion."""
     e, _ = problem.off(p, terms)
     _, begins = problem.half_swings(p, most=1)
@@ -137,13 +136,11 @@ def after_push(
         return None
     turned, q = problem.turned(p, 1)
     turned = turned.only(~first)
-    q, less = fitted(turned, q, terms, swing)
+    q, less = fitted(turned, q, terms)
     return (turned, q, less) if less / len(turned.t) < 0.5 * squares / len(e) else None
 
 
-def until_disturbed(
-    record: Record, turns: Turns, used: Problem, squares: float, terms: Terms
-) -> tuple[Problem, np.ndarray, float] | None:
+def until_disturbed(record: Record, turns: Turns, used: Problem, squares: float, terms: Terms) -> Part | None:
     """The problem up to where the record leaves the law that it followed until then; None where it follows none."""
     begin, unfit = used.t[0] + used.origin, float(np.sqrt(squares / len(used.t))) * used.unit
     for share in PARTS:
@@ -159,7 +156,7 @@ def until_disturbed(
         for _ in range(ROUNDS):  # what is fitted reaches farther than what was
             early = problem.only(problem.t <= last)
             noise, _ = scatter(early.t, early.x)  # what disturbs the rest may be quieter
-            p, cost = fitted(replace(early, noise=max(noise, early.noise)), p, terms, turns.half)
+            p, cost = fitted(replace(early, noise=max(noise, early.noise)), p, terms)
             level = max(noise, early.noise, typical(early.off(p, terms)[0]))
             leaves = leaving(problem, p, terms, last - turns.half / 2, LOST * level)
             if leaves < last + turns.half / 2 or leaves >= problem.t[-1]:
