@@ -37,6 +37,7 @@ BY_NAME = (
 EXPONENT = re.compile("[dD](?=[-+0-9])")  # of Fortran
 LENGTH_ONLY = re.compile(r"\b(abs|absolute|magnitude|norm)\b", re.I)  # of a vector: it has no sign
 MOST_MISSING = 0.2  # share of the samples
+RATES = ("", "/s", "/s2")  # what the unit of a derivative adds to that of the position
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,22 @@ class Columns:
     end: float = np.inf
 
 
+@dataclass(frozen=True)
+class Column:
+    """A column at its place in a table: its heading as it stands in the file, and the name and the unit in that."""
+
+    place: int
+    head: str
+    name: str
+    unit: str | None
+
+    @property
+    def order(self) -> int | None:
+        """The order of the derivative that the heading tells, by its unit or else by its name."""
+        found = known(self.unit) if self.unit else None
+        return found.order if found else by_name(self.name)
+
+
 def read(source: str, columns: Columns, name: str) -> Record:
     """The record in a file, from `columns.begin` to `columns.end` in s; SceneError in one sentence if it is not one."""
     table = load(source, columns.names)
@@ -62,27 +79,25 @@ def read(source: str, columns: Columns, name: str) -> Record:
         raise SceneError(f"{table.name} has one column that is not empty; time and position are needed")
     if not any(table.heads):
         raise SceneError(f"{table.name} has no heading; name its columns, as in --columns 't [s],x [mm]'")
-    parts = [split(head) for head in table.heads]
-    i_t = time_column(table, parts, columns)
-    i_x, notes = signal_column(table, parts, columns, i_t)
-    label, unit = parts[i_x][0] or table.heads[i_x], columns.unit or parts[i_x][1]
-    x = numbers(table, i_x)
+    parts = [Column(place, head, *split(head)) for place, head in enumerate(table.heads)]
+    clock = time_column(table, parts, columns)
+    signal, notes = signal_column(table, parts, columns, clock)
+    label, unit = signal.name or signal.head, columns.unit or signal.unit
+    x = numbers(table, signal.place)
     order, base, size, guessed = measured(label, unit, columns, table.name)
-    t = times(table, parts[i_t], i_t, columns)
-    if columns.time is None and not (CLOCK.search(parts[i_t][0]) or parts[i_t][1]):
-        notes.append(f"{table.heads[i_t]} is taken for the time; --time takes another.")
+    t = times(table, clock, columns)
+    if columns.time is None and not (CLOCK.search(clock.name) or clock.unit):
+        notes.append(f"{clock.head} is taken for the time; --time takes another.")
     keep = np.isfinite(t) & np.isfinite(x)
     missing = int(len(t) - keep.sum())
     if missing > MOST_MISSING * len(t):
-        raise SceneError(f"{table.name}: {missing} of {len(t)} rows have no number for {table.heads[i_t]} or {label}")
+        raise SceneError(f"{table.name}: {missing} of {len(t)} rows have no number for {clock.head} or {label}")
     if missing:
         notes.append(f"{missing} of {len(t)} rows have a missing cell and are left out.")
     t, rounded = spread_evenly(t)
-    notes += [rounded] if rounded else []
-    notes += [guessed] if guessed else []
+    notes += filter(None, (rounded, guessed))
     t, x = t[keep], size * x[keep]
-    rate = ("", "/s", "/s2")[order]
-    record = Record(name, t, x, base + rate, order, base, tuple(notes)).between(columns.begin, columns.end)
+    record = Record(name, t, x, base + RATES[order], order, base, tuple(notes)).between(columns.begin, columns.end)
     check(record)
     return record
 
@@ -113,60 +128,51 @@ def split(head: str) -> tuple[str, str | None]:
     return name, unit or None
 
 
-def place(asked: str, table: Table, parts: Sequence[tuple[str, str | None]]) -> int:
+def column_of(asked: str, table: Table, parts: Sequence[Column]) -> Column:
     """The column of that heading: as it stands in the file, or by its name without the unit."""
-    for heads in (list(table.heads), [head.strip() for head in table.heads], [part for part, _ in parts]):
+    for heads in (list(table.heads), [head.strip() for head in table.heads], [part.name for part in parts]):
         for fold in (str, str.lower):
-            matches = [i for i, head in enumerate(heads) if fold(head) == fold(asked)]
+            matches = [part for part, head in zip(parts, heads, strict=True) if fold(head) == fold(asked)]
             if matches:
                 return matches[0]
     raise SceneError(f"{table.name}: {unknown('column', asked, filter(None, table.heads))}")
 
 
-def time_column(table: Table, parts: Sequence[tuple[str, str | None]], columns: Columns) -> int:
+def time_column(table: Table, parts: Sequence[Column], columns: Columns) -> Column:
     """The one that is asked for, named or measured as a time; otherwise the first that has a heading."""
     if columns.time is not None:
-        return place(columns.time, table, parts)
-    named = [i for i, (name, _) in enumerate(parts) if CLOCK.search(name)]
-    named = [i for i in named if not DATE.search(parts[i][0])] or named
-    measured = [i for i, (_, unit) in enumerate(parts) if unit and time_size(unit) and known(unit) is None]
-    both = [i for i in named if i in measured]
-    return (both or named or measured or [i for i, head in enumerate(table.heads) if head])[0]
+        return column_of(columns.time, table, parts)
+    clocks = [part for part in parts if CLOCK.search(part.name)]
+    clocks = [part for part in clocks if not DATE.search(part.name)] or clocks
+    measured = [part for part in parts if part.unit and time_size(part.unit) and known(part.unit) is None]
+    both = [part for part in clocks if part in measured]
+    return (both or clocks or measured or [part for part in parts if part.head])[0]
 
 
-def signal_column(
-    table: Table, parts: Sequence[tuple[str, str | None]], columns: Columns, i_t: int
-) -> tuple[int, list[str]]:
+def signal_column(table: Table, parts: Sequence[Column], columns: Columns, clock: Column) -> tuple[Column, list[str]]:
     """The column of the motion: a position rather than a velocity or an acceleration; of several the liveliest."""
     if columns.position is not None:
-        return place(columns.position, table, parts), []
-    others = [i for i in range(len(parts)) if i != i_t]
-    others = [i for i in others if table.heads[i] and not CLOCK.search(parts[i][0])] or others
-    next_t = next((i for i in range(i_t + 1, len(parts)) if CLOCK.search(parts[i][0])), len(parts))
-    others = [i for i in others if i_t < i < next_t] or others  # of several runs beside each other that of this time
-    kinds = {i: kind(*parts[i]) for i in others}
+        return column_of(columns.position, table, parts), []
+    others = [part for part in parts if part is not clock]
+    others = [part for part in others if part.head and not CLOCK.search(part.name)] or others
+    later = (part.place for part in parts[clock.place + 1 :] if CLOCK.search(part.name))
+    next_t = next(later, len(parts))  # of several runs beside each other that of this time
+    others = [part for part in others if clock.place < part.place < next_t] or others
     if columns.quantity is not None:
         wanted: int | None = QUANTITIES.index(columns.quantity)
-        chosen = [i for i in others if kinds[i] == wanted]
     else:
-        wanted = min((order for order in kinds.values() if order is not None), default=None)
-        chosen = [i for i in others if kinds[i] == wanted]
-    chosen = [i for i in chosen if not LENGTH_ONLY.search(parts[i][0])] or chosen or others
-    if kinds.get(chosen[0]) is None:
+        wanted = min((part.order for part in others if part.order is not None), default=None)
+    chosen = [part for part in others if part.order == wanted]
+    chosen = [part for part in chosen if not LENGTH_ONLY.search(part.name)] or chosen or others
+    if chosen[0].order is None:
         return chosen[0], []  # nothing is known of any: the first
-    first = [i for i in chosen if parts[i][1] == parts[chosen[0]][1]]
-    if len(first) == 1 or (wanted == 0 and parts[first[0]][0].lower() in ("x", "theta")):
+    first = [part for part in chosen if part.unit == chosen[0].unit]
+    if len(first) == 1 or (wanted == 0 and first[0].name.lower() in ("x", "theta")):
         return first[0], []
-    spans = [np.nanstd(numbers(table, i, strict=False)) for i in first]
+    spans = [np.nanstd(numbers(table, part.place, strict=False)) for part in first]
     best = first[int(np.argmax(spans))]
-    names = ", ".join(table.heads[i] for i in first)
-    return best, [f"Of {names} the one that moves most is taken: {table.heads[best]}; --position takes another."]
-
-
-def kind(name: str, unit: str | None) -> int | None:
-    """The order of the derivative that a heading tells, by its unit or else by its name."""
-    found = known(unit) if unit else None
-    return found.order if found else by_name(name)
+    names = ", ".join(part.head for part in first)
+    return best, [f"Of {names} the one that moves most is taken: {best.head}; --position takes another."]
 
 
 def by_name(name: str) -> int | None:
@@ -189,20 +195,13 @@ def measured(name: str, unit: str | None, columns: Columns, file: str) -> tuple[
         raise SceneError(f"{name} is in {unit}; say what one of them is, as in --per-count 0.36deg or 0.001mm")
     found = known(unit)
     if found is None:
-        order = asked if asked is not None else named if named is not None else 0
-        doubt = asked is None and named is None
-        said = (
+        told = next((order for order in (asked, named) if order is not None), None)
+        order, rate = told or 0, RATES[told or 0]
+        base = unit.removesuffix(rate) if unit.endswith(rate) else f"{unit}.s{order if order > 1 else ''}"
+        doubt = (
             f"{name} in {unit} is taken for a position, in {unit}; --quantity velocity or acceleration says otherwise."
         )
-        rate = ("", "/s", "/s2")[order]
-        base = (
-            unit
-            if not order
-            else unit[: -len(rate)]
-            if unit.endswith(rate)
-            else f"{unit}.s{order if order > 1 else ''}"
-        )
-        return order, base, 1.0, said if doubt else ""
+        return order, base, 1.0, doubt if told is None else ""
     order = found.order if asked is None else asked
     if asked is not None and asked != found.order:
         raise SceneError(
@@ -220,21 +219,21 @@ def a(noun: str) -> str:
     return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
 
 
-def times(table: Table, part: tuple[str, str | None], i: int, columns: Columns) -> np.ndarray:
+def times(table: Table, clock: Column, columns: Columns) -> np.ndarray:
     """Times (n,) in s."""
-    cells = table.columns[i]
+    cells = table.columns[clock.place]
     first = next((cell for cell in cells if isinstance(cell, str) and cell), None)
     if first is not None and ":" in first and STAMP.match(first):
         return seconds(cells, table.name)  # type: ignore[arg-type]
-    unit = columns.time_unit or part[1]
+    unit = columns.time_unit or clock.unit
     size = time_size(unit or "s")  # s: every simulation program and nearly every instrument
     if unit and not size:
-        raise SceneError(unknown(f"unit of {part[0]}", unit, TIMES))
-    t = numbers(table, i)
+        raise SceneError(unknown(f"unit of {clock.name}", unit, TIMES))
+    t = numbers(table, clock.place)
     some = t[np.isfinite(t)]
     if unit is None and len(some) and ((some == np.round(some)).all() or some.max() > LATE):
         raise SceneError(
-            f"{table.name}: {part[0]} has whole or huge numbers and no unit: say what one is, as in --time-unit ms, "
+            f"{table.name}: {clock.name} has whole or huge numbers and no unit: say what one is, as in --time-unit ms, "
             "s, or 0.01s of samples that are counted"
         )
     return t * size
