@@ -4,17 +4,11 @@ from pathlib import Path
 
 import click
 
-from .terminal import JSON, QUIET, tell
+from .terminal import JSON, QUIET, out, tell
 
 
 @click.command()
-@click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results"),
-    show_default=True,
-    help="Folder of the results; the page is written into it.",
-)
+@out("Folder of the results; the page is written into it.")
 @QUIET
 @JSON
 def report(out: Path, quiet: bool, as_json: bool) -> None:

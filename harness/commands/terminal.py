@@ -21,13 +21,14 @@ from ..errors import HarnessError
 from ..process.interrupt import check
 from ..process.room import temporary
 
-OUT = click.option(
-    "--out",
-    type=click.Path(file_okay=False, path_type=Path),
-    default=Path("results"),
-    show_default=True,
-    help="Folder that receives one folder for each scene.",
-)
+
+def out(text: str) -> Callable[..., Any]:
+    """The option that names the folder of results, and what is said of it."""
+    folder = click.Path(file_okay=False, path_type=Path)
+    return click.option("--out", type=folder, default=Path("results"), show_default=True, help=text)
+
+
+OUT = out("Folder that receives one folder for each scene.")
 QUIET = click.option("--quiet", is_flag=True, help="Print errors only.")
 JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 

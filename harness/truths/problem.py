@@ -58,6 +58,18 @@ class Equations:
         return (t + (limit - direction * load) / abs(rate), direction) if rate else (inf, 0)
 
 
+class Linear(Equations):
+    """A mass on a spring, with a viscous damper or without."""
+
+    m: float
+    k: float
+    c = 0.0
+
+    def jacobian(self, mode: int) -> Jacobian | None:
+        matrix = [[0.0, 1.0], [-self.k / self.m, -self.c / self.m]]
+        return lambda t, y: matrix
+
+
 class Unwritten(Equations):
     """A model that nobody has written a second time: there is nothing to ask a peer."""
 

@@ -81,7 +81,7 @@ class Model:
 
     def turns(self, p: np.ndarray, unknowns: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Times (count,) in s and positions (count,) of the turning points after the first, and the Jacobian
-        (2, count, unknowns) of both; NaN after the end of the motion."""
+        (2, count, unknowns) of both, without that by a drift; NaN after the end of the motion."""
         laws, places, changes = self.varied(p, unknowns)
         found = chain(laws, self.sine, self.floor, count)
         amplitudes, begins = found.amplitudes, found.begins
@@ -92,20 +92,13 @@ class Model:
         way = self.side * (-1.0) ** np.arange(1, count + 1)
         times = p[T0] + theta[:, 0] / p[OMEGA]
         jacobian = np.zeros((2, count, len(unknowns)))
-        for i, place in enumerate(unknowns.tolist()):
-            if place == T0:
-                jacobian[0, :, i] = 1.0
-            elif place == OMEGA:
-                jacobian[0, :, i] = -theta[:, 0] / p[OMEGA] ** 2
-            elif place == REST:
-                jacobian[1, :, i] = 1.0
-            elif place == DRIFT:
-                jacobian[1, :, i] = times - self.middle
-            else:
-                variant = 1 + int(np.flatnonzero(places == place)[0])
-                change = changes[variant - 1]
-                jacobian[0, :, i] = (theta[:, variant] - theta[:, 0]) / (change * p[OMEGA])
-                jacobian[1, :, i] = way * (sizes[:, variant] - sizes[:, 0]) / change
+        column = {place: i for i, place in enumerate(unknowns.tolist())}
+        jacobian[0, :, column[T0]] = 1.0
+        jacobian[0, :, column[OMEGA]] = -theta[:, 0] / p[OMEGA] ** 2
+        jacobian[1, :, column[REST]] = 1.0
+        for variant, (place, change) in enumerate(zip(places.tolist(), changes.tolist(), strict=True), 1):
+            jacobian[0, :, column[place]] = (theta[:, variant] - theta[:, 0]) / (change * p[OMEGA])
+            jacobian[1, :, column[place]] = way * (sizes[:, variant] - sizes[:, 0]) / change
         return times, p[REST] + p[DRIFT] * (times - self.middle) + way * sizes[:, 0], jacobian
 
 

@@ -158,12 +158,13 @@ def request(asked: Convergence, archive: Path, step: float) -> Request:
 def save(found: Convergence, folder: Path) -> None:
     """Write the three tables."""
     names = [f"{element}.{variable}" for element, variable, _ in found.read]
-    heads = [heading(name, size) for name, size in zip(names, found.units, strict=True)]
-    truths = [heading(f"{name} reference", size) for name, size in zip(names, found.units, strict=True)]
+    heads, truths, ends = (
+        [heading(name + more, size) for name, size in zip(names, found.units, strict=True)]
+        for more in ("", " reference", " at the stop")
+    )
     write_csv(folder / "trajectory.csv", ["t [s]", *heads, *truths], [found.time, *found.x.T, *found.truth.T])
     columns = [np.array(found.steps[: len(found.errors)]), np.array(found.errors)]
     write_csv(folder / "error.csv", ["communication step [s]", heading("largest error", found.unit)], columns)
     table = [[engine, *(end or [None] * len(names)), off, why] for engine, (end, off, why) in found.engines.items()]
     table.append([found.reference, *found.truth[-1].tolist(), 0.0, ""])
-    ends = [heading(f"{name} at the stop", size) for name, size in zip(names, found.units, strict=True)]
     write_rows(folder / "engines.csv", ["engine", *ends, heading("largest error", found.unit), "why not"], table)

@@ -57,6 +57,11 @@ def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) ->
             figure.legend(handles=list(shown.values()), labels=list(shown), loc="outside lower center", ncols=2)
 
 
+def named(axes: Axes, data: xarray.Dataset, across: str, up: str) -> None:
+    """Name what the axes show, and spread it as it is spread."""
+    axes.set(xscale=scale(data, across), yscale=scale(data, up), xlabel=words(data, across), ylabel=words(data, up))
+
+
 def words(data: xarray.Dataset, name: str) -> str:
     """A name with its unit."""
     unit = data[name].attrs["units"]
@@ -81,7 +86,7 @@ def curve(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[B
     """A measure over the one parameter; a failed run is a gap."""
     (name,) = map(str, data.dims)
     axes.plot(data[name], data[measure], color=BLUE, marker="." if data.sizes[name] < 100 else None)
-    axes.set(xscale=scale(data, name), yscale=scale(data, measure))
+    named(axes, data, name, measure)
     fine = spread(data, name)
     for each, color in zip(boundaries, COLOURS, strict=False):
         below = np.broadcast_to(each.at(parameters(data) | {name: fine}, stop(data)), fine.shape) < 1
@@ -91,8 +96,6 @@ def curve(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[B
             shade = axes.fill_between(fine, 0, 1, below, transform=axes.get_xaxis_transform(), label=each.below)
             shade.set(color=color, alpha=0.15)
     axes.set_title(data[measure].attrs["long_name"])
-    axes.set_xlabel(words(data, name))
-    axes.set_ylabel(words(data, measure))
 
 
 def chart(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
@@ -117,20 +120,16 @@ def chart(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[B
             shade.set_edgecolor(color)
             axes.plot([], [], color=color, linestyle="--", label=each.text)
             axes.fill([], [], facecolor="none", edgecolor=color, hatch=hatch, linewidth=0, label=each.below)
-    axes.set(xscale=scale(data, across), yscale=scale(data, up))
+    named(axes, data, across, up)
     axes.grid(visible=False)
     axes.set_title(data[measure].attrs["long_name"])
-    axes.set_xlabel(words(data, across))
-    axes.set_ylabel(words(data, up))
 
 
 def scatter(axes: Axes, data: xarray.Dataset, measure: str, name: str) -> None:
     """A measure over one of the parameters, every run a point."""
     where = data[name].broadcast_like(data[measure]).to_numpy()
     axes.plot(where.ravel(), data[measure].to_numpy().ravel(), ".", color=BLUE, markersize=3, alpha=0.6)
-    axes.set(xscale=scale(data, name), yscale=scale(data, measure))
-    axes.set_xlabel(words(data, name))
-    axes.set_ylabel(words(data, measure))
+    named(axes, data, name, measure)
 
 
 def parameters(data: xarray.Dataset) -> dict[str, Any]:

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from ..problem import Equations, Jacobian, Rates, closed
+from ..problem import Linear, Rates, closed
 from ..reference import Case
 
 
-class Coulomb(Equations):
+class Coulomb(Linear):
     """m v' = -k x - f sign(v)."""
 
     start, stop, dry = (0.1, 0.0), 4.0, True
@@ -17,10 +17,6 @@ class Coulomb(Equations):
     def rates(self, mode: int) -> Rates:
         square, drag = self.k / self.m, mode * self.f / self.m
         return lambda t, y: (y[1], -square * y[0] - drag)
-
-    def jacobian(self, mode: int) -> Jacobian | None:
-        matrix = [[0.0, 1.0], [-self.k / self.m, 0.0]]
-        return lambda t, y: matrix
 
     def hold(self, t: float, x: float) -> tuple[float, float, float]:
         return -self.k * x, 0.0, self.f

@@ -2,11 +2,11 @@
 
 from functools import partial
 
-from ..problem import Equations, Jacobian, Rates, closed
+from ..problem import Linear, Rates, closed
 from ..reference import Case
 
 
-class Smd(Equations):
+class Smd(Linear):
     """m v' = -k x - c v."""
 
     start, stop = (0.1, 0.0), 4.0
@@ -15,10 +15,6 @@ class Smd(Equations):
     def rates(self, mode: int) -> Rates:
         square, damping = self.k / self.m, self.c / self.m
         return lambda t, y: (y[1], -square * y[0] - damping * y[1])
-
-    def jacobian(self, mode: int) -> Jacobian:
-        matrix = [[0.0, 1.0], [-self.k / self.m, -self.c / self.m]]
-        return lambda t, y: matrix
 
 
 friction = None

@@ -5,13 +5,13 @@ from functools import partial
 from typing import Any
 
 from ..pieces import Piece
-from ..problem import Equations, Jacobian, Rates, closed
+from ..problem import Linear, Rates, closed
 from ..reference import Case
 
 THRESHOLD = "stickslip-threshold"
 
 
-class Stickslip(Equations):
+class Stickslip(Linear):
     """m v' = k (v_driver t - x) - mu m g sign(v)."""
 
     start, stop, dry = (0.0, 0.0), 16.0, True
@@ -20,10 +20,6 @@ class Stickslip(Equations):
     def rates(self, mode: int) -> Rates:
         square, drag, speed = self.k / self.m, mode * self.mu_d * self.g, self.v_driver
         return lambda t, y: (y[1], square * (speed * t - y[0]) - drag)
-
-    def jacobian(self, mode: int) -> Jacobian | None:
-        matrix = [[0.0, 1.0], [-self.k / self.m, 0.0]]
-        return lambda t, y: matrix
 
     def hold(self, t: float, x: float) -> tuple[float, float, float]:
         return self.k * (self.v_driver * t - x), self.k * self.v_driver, self.mu_s * self.m * self.g
