@@ -1,5 +1,6 @@
 """Fixtures: the FMUs built once, and a process that runs them."""
 
+import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -8,6 +9,8 @@ import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
 from driver import Worker, processes
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: as a command has it
 
 
 def pytest_configure(config):
