@@ -31,8 +31,8 @@ class Halves:
 
 
 def product(one: np.ndarray, two: np.ndarray, k: int) -> np.ndarray:
-    """The k-th coefficients of the products of L pairs of series."""
-    return np.einsum("ij,ij->j", one[: k + 1], two[k::-1])
+    """The k-th coefficients (..., L) of the products of series (K, L) and others (..., K, L)."""
+    return np.einsum("ij,...ij->...j", one[: k + 1], two[..., k::-1, :])
 
 
 def taylor(y: np.ndarray, w: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: bool) -> np.ndarray:
@@ -42,20 +42,22 @@ def taylor(y: np.ndarray, w: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.
     c[0], c[1], speed[0] = y, w, w
     restoring = c
     if sine:
-        restoring, cosine = np.empty_like(speed), np.empty_like(speed)
+        both = restoring, cosine = np.empty((2, *speed.shape))
         restoring[0], cosine[0] = np.sin(y), np.cos(y)
-    drag = bool(b.any())
+    drag, twice = bool(b.any()), 2 * zeta
     for k in range(order - 1):
-        force = restoring[k] + 2 * zeta * speed[k]
+        force = twice * speed[k]
+        force += restoring[k]
         if k == 0:
-            force = force - r
+            force -= r
         if drag:
-            force = force - b * product(speed, speed, k)
+            force -= b * product(speed, speed, k)
         if sine:
-            rise, fall = product(speed, cosine, k), product(speed, restoring, k)
-            restoring[k + 1], cosine[k + 1] = rise / (k + 1), -fall / (k + 1)
-        c[k + 2] = -force / ((k + 1) * (k + 2))
-        speed[k + 1] = (k + 2) * c[k + 2]
+            fall, rise = product(speed, both, k)
+            np.divide(rise, k + 1, out=restoring[k + 1])
+            np.divide(fall, -(k + 1), out=cosine[k + 1])
+        np.divide(force, -(k + 1) * (k + 2), out=c[k + 2])
+        np.multiply(c[k + 2], k + 2, out=speed[k + 1])
     return c
 
 
@@ -65,11 +67,19 @@ def slopes(series: np.ndarray) -> np.ndarray:
     return series[1:] * powers
 
 
+def with_slopes(series: np.ndarray) -> np.ndarray:
+    """Series (K, L), and beside them their derivatives (K, 2, L)."""
+    both = np.zeros((len(series), 2, series.shape[1]))
+    both[:, 0], both[:-1, 1] = series, slopes(series)
+    return both
+
+
 def value(series: np.ndarray, h: np.ndarray | float) -> np.ndarray:
     """Series at h, by Horner's rule."""
     total = series[-1].copy()
     for term in series[-2::-1]:
-        total = total * h + term
+        total *= h
+        total += term
     return total
 
 
@@ -86,11 +96,11 @@ def halves(a: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: 
         h = reach(c, SMALL[sine])
         begins.append(at)
         series.append(c)
-        speed = slopes(c)
-        y, w = value(c, h), value(speed, h)
+        both = with_slopes(c)
+        y, w = value(both, h)
         ends = np.flatnonzero(np.isnan(end) & (w >= 0))
         if len(ends):
-            root = standstill(speed[:, ends], h)
+            root = standstill(both[:-1, 1, ends], h)
             duration[ends], end[ends] = at + root, value(c[:, ends], root)
         if not np.isnan(end).any() or not np.isfinite(y).all():
             break
@@ -107,10 +117,10 @@ def reach(c: np.ndarray, small: float) -> float:
 
 def standstill(speed: np.ndarray, h: float) -> np.ndarray:
     """Where in (0, h] series of speeds, negative before and not at h, are zero: Newton's method from h."""
-    bend, root = slopes(speed), np.full(speed.shape[1], h)
+    both, root = with_slopes(speed), np.full(speed.shape[1], h)
     for _ in range(12):
-        slope = value(bend, root)
-        step = value(speed, root) / np.where(slope > 1e-300, slope, 1e-300)
+        w, slope = value(both, root)
+        step = w / np.where(slope > 1e-300, slope, 1e-300)
         root = np.clip(root - step, 0, h)
         if np.abs(step).max() < 1e-8:
             break  # the next one would be as small as the square of it
