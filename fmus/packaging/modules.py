@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 from . import BuildError
 from .catalogue import FMUS
 from .equations.authored import Authored
+from .trees import nodes, tree
 
 ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # what stands in the originals of these does not travel
 GUARD, SLAVE = "guard.py", "runtime/slave.py"  # travel with the model
@@ -89,10 +90,10 @@ def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
 
 def _imports(path: str, source: str) -> Iterator[ast.Import | ast.ImportFrom]:
     """Every import statement; all stand at the top, for a host may delete the files once they are loaded."""
-    tree = ast.parse(source, path)
-    for node in ast.walk(tree):
+    body = tree(source).body
+    for node in nodes(source):
         if isinstance(node, (ast.Import, ast.ImportFrom)):
-            if node not in tree.body:
+            if node not in body:
                 raise BuildError(f"{path} imports inside a block in line {node.lineno}: import at the top of the file.")
             yield node
 

@@ -9,7 +9,6 @@ A. Griewank, A. Walther, Evaluating Derivatives, chapter 3.
 import ast
 import math
 import sys
-from copy import deepcopy
 from math import fabs
 from types import FunctionType
 from typing import Any
@@ -18,6 +17,7 @@ from ...runtime.declare import Declaring
 from ..equations.expressions import FUNCTIONS, Expression, Term
 from ..equations.scribe import Scribe
 from ..further import Variables
+from ..trees import copied
 from ..written import definition
 from ..written.live import TREE, number_of
 
@@ -156,7 +156,7 @@ def read(text: str) -> ast.expr:
 
 
 def told(e: ast.expr | None) -> str:
-    return "0.0" if e is None else ast.unparse(ast.fix_missing_locations(deepcopy(e)))
+    return "0.0" if e is None else ast.unparse(ast.fix_missing_locations(copied(e)))
 
 
 def plus(a: ast.expr | None, b: ast.expr | None) -> ast.expr | None:

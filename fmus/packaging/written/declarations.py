@@ -4,6 +4,7 @@ import ast
 from collections.abc import Iterable
 from typing import Any, TypeGuard
 
+from ..trees import walked
 from .spec import CONTACTS, STATES, STEM, Spec
 
 KINDS = {"States": STATES, "Rates": STATES, "Contacts": CONTACTS}
@@ -47,7 +48,7 @@ class Declarations(ast.NodeVisitor):
     def visit_ClassDef(self, node: ast.ClassDef) -> None:
         self.generic_visit(node)
         names = {getattr(one.targets[0], "id", "") for one in node.body if isinstance(one, ast.Assign)}
-        self.classes.append(names | {one.attr for one in ast.walk(node) if is_own(one)})
+        self.classes.append(names | {one.attr for one in walked(node) if is_own(one)})
 
     def clash(self, spec: Spec) -> str:
         """A name of the model that means something else in the numerics, if there is one."""

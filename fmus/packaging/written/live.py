@@ -3,7 +3,6 @@
 import ast
 import inspect
 import sys
-from copy import deepcopy
 from functools import cache
 from hashlib import sha256
 from importlib import import_module
@@ -18,6 +17,7 @@ from ...runtime import declare
 from ...runtime.declare import Declaring
 from ..catalogue import FMUS, find
 from ..equations.authored import Authored
+from ..trees import copied, walked
 from .offer import Offer, offer
 from .sources import APART, PLAIN, Files, written_out
 
@@ -75,7 +75,7 @@ class Finder(MetaPathFinder, Loader):
         path = self.path(module.__name__)
         lines = self.files[path]
         tree = ast.parse("\n".join(lines), path)
-        for node in ast.walk(tree):
+        for node in walked(tree):
             if isinstance(node, (ast.stmt, ast.expr, ast.excepthandler, ast.arg, ast.keyword, ast.alias)):
                 node.lineno, node.col_offset = lines[node.lineno - 1].source, 0
                 node.end_lineno = node.end_col_offset = None
@@ -102,6 +102,6 @@ def definition(function: FunctionType) -> ast.FunctionDef:
         found = function.__globals__[TREE]
         for name in function.__qualname__.split("."):
             found = next(one for one in reversed(found.body) if getattr(one, "name", "") == name)
-        found = ast.increment_lineno(deepcopy(found), 1 - function.__code__.co_firstlineno)
+        found = copied(found, 1 - function.__code__.co_firstlineno)
     assert isinstance(found, ast.FunctionDef)
     return found

@@ -8,8 +8,9 @@ import ast
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import lru_cache
 
+from ..trees import nodes, tree, walked
+from .declarations import is_own
 from .text import Line
 
 DOTTED = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
@@ -33,17 +34,10 @@ def pruned(files: Files, model: str, names: Iterable[str]) -> Files:
         files, found = left, found | {path: readers(path, left[path]) for path in changed}
 
 
-@lru_cache(200)
-def nodes(text: str) -> list[ast.AST]:
-    """Every node of a text, its tree first; nobody changes them, for most files are looked at again and again."""
-    return [*ast.walk(ast.parse(text))]
-
-
 def parsed(lines: list[Line]) -> tuple[ast.Module, list[ast.AST]]:
     """The tree of a file, and every node of it."""
-    found = nodes("\n".join(lines))
-    assert isinstance(found[0], ast.Module)
-    return found[0], found
+    text = "\n".join(lines)
+    return tree(text), nodes(text)
 
 
 @dataclass
@@ -56,10 +50,9 @@ class Reader:
 
 def readers(path: str, lines: list[Line]) -> list[Reader]:
     """The functions of a file, each with what it reads; what stands outside of them is always read."""
-    tree, _ = parsed(lines)
     outside = Reader(set(), set())
     found = [outside]
-    for part in tree.body:
+    for part in parsed(lines)[0].body:
         inner = part.body if isinstance(part, ast.ClassDef) else [part]
         for node in inner:
             if not isinstance(node, ast.FunctionDef) or node.name.startswith("__") or path in CALLED_BY_NAME:
@@ -82,10 +75,10 @@ def live(found: list[Reader], names: set[str]) -> set[str]:
         names = more
 
 
-def read(tree: ast.AST) -> set[str]:
+def read(part: ast.AST) -> set[str]:
     """What is read somewhere, and every word of a dotted name in a text, as an attribute."""
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in walked(part):
         match node:
             case ast.Name(id=name, ctx=ast.Load()):
                 found.add(name)
@@ -104,17 +97,17 @@ def without(path: str, lines: list[Line], wanted: set[str], is_model: bool) -> l
     """One file without what is not wanted."""
     if path in CALLED_BY_NAME:
         return lines
-    lines_before, lines, (tree, every) = lines, list(lines), parsed(lines)
+    lines_before, lines, (whole, every) = lines, list(lines), parsed(lines)
     methods = {part for one in every if isinstance(one, ast.ClassDef) for part in one.body}
-    classes = [one for one in tree.body if isinstance(one, ast.ClassDef) and not is_model]
+    classes = [one for one in whole.body if isinstance(one, ast.ClassDef) and not is_model]
     classes = [one for one in classes if one.name not in wanted and "." + one.name not in wanted]
-    gone = {part for one in classes for part in ast.walk(one)}
+    gone = {part for one in classes for part in walked(one)}
     functions = [one for one in every if isinstance(one, ast.FunctionDef) and one not in gone]
     spare: list[ast.ClassDef | ast.FunctionDef] = [
         *classes,
         *(one for one in functions if is_spare(one, wanted, one in methods)),
     ]
-    inside = {part for one in spare for part in ast.walk(one)} - {*spare}
+    inside = {part for one in spare for part in walked(one)} - {*spare}
     assigned = [] if is_model else [one for one in every if isinstance(one, ast.Assign) and one not in inside]
     parts: list[ast.ClassDef | ast.FunctionDef | ast.Assign] = [*spare, *assigned]
     for node in sorted(parts, key=lambda one: one.lineno, reverse=True):
@@ -180,20 +173,20 @@ def single(node: ast.Assign) -> list[tuple[ast.expr, ast.expr]]:
 def kept_by(node: ast.Assign) -> set[str]:
     """The attributes that an assignment sets in a way that does more, or may."""
     kept = [target for target, value in single(node) if not idle(target, value, set())]
-    return {part.attr for one in kept for part in ast.walk(one) if isinstance(part, ast.Attribute)}
+    return {part.attr for one in kept for part in walked(one) if isinstance(part, ast.Attribute)}
 
 
 def idle(target: ast.expr, value: ast.expr, wanted: set[str]) -> bool:
     """Whether this only sets an attribute of self, or of what self is made of, that nobody reads."""
     makes = isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and not value.args
-    mine = isinstance(target, ast.Attribute) and ast.unparse(target.value) == "self" and "." + target.attr not in wanted
+    mine = is_own(target) and "." + target.attr not in wanted
     return mine and (makes or isinstance(value, (ast.Name, ast.Constant, ast.Attribute)))
 
 
 def without_dead_imports(lines: list[Line]) -> list[Line]:
-    tree, every = parsed(lines)
+    whole, every = parsed(lines)
     used = {node.id for node in every if isinstance(node, ast.Name)}
-    for node in reversed([node for node in tree.body if isinstance(node, ast.ImportFrom)]):
+    for node in reversed([node for node in whole.body if isinstance(node, ast.ImportFrom)]):
         kept = [alias.name for alias in node.names if alias.name in used]
         if len(kept) < len(node.names) and not any(alias.asname for alias in node.names):
             text = f"from {'.' * node.level}{node.module or ''} import {', '.join(kept)}"

@@ -3,9 +3,9 @@
 import ast
 import re
 from collections.abc import Sequence
-from copy import deepcopy
 
 from .. import BuildError
+from ..trees import copied, walked
 from .declarations import Declarations, annotated
 from .elimination import factored, solved
 from .settled import Settled
@@ -102,13 +102,13 @@ class Numbers(Settled):
         """One number of a vector; a number as it is."""
         kind = self.kind(node)
         if kind is None:
-            return self.visit(deepcopy(node))
+            return self.visit(copied(node))
         match node:
             case ast.Name(id=vector):
                 name = self.name(node, vector, kind, place)
                 return ast.Constant(0.0) if name in self.zeros else ast.Name(name, ast.Load())
             case ast.Attribute(value=owner, attr=vector):
-                return ast.Attribute(self.visit(deepcopy(owner)), self.spec.number(vector, kind, place), ast.Load())
+                return ast.Attribute(self.visit(copied(owner)), self.spec.number(vector, kind, place), ast.Load())
             case ast.BinOp(left=left, op=op, right=right):
                 return without_zero(self.part(left, place), op, self.part(right, place))
             case ast.UnaryOp(op=op, operand=one):
@@ -129,7 +129,7 @@ class Numbers(Settled):
     def terms(self, node: ast.expr) -> list[ast.expr]:
         """All the numbers of an argument, a target or a result that are its own."""
         kind = self.kind(node)
-        return [self.part(node, i) for i in self.places(node, kind)] if kind else [self.visit(deepcopy(node))]
+        return [self.part(node, i) for i in self.places(node, kind)] if kind else [self.visit(copied(node))]
 
     def all_terms(self, node: ast.expr) -> list[ast.expr]:
         """All the numbers of a vector, those that it borrows as well."""
@@ -147,7 +147,7 @@ class Numbers(Settled):
 
     def at_method(self, item: ast.expr, target: ast.expr, label: str) -> ast.expr:
         self.stands_for(target, label)
-        found = self.visit(deepcopy(item))
+        found = self.visit(copied(item))
         self.named = {}
         return found
 
@@ -167,7 +167,7 @@ class Numbers(Settled):
         return self.part(node.value, self.known(node.slice)) if self.kind(node.value) else self.generic_visit(node)
 
     def known(self, index: ast.expr) -> int:
-        found = self.visit(deepcopy(index))
+        found = self.visit(copied(index))
         if not (isinstance(found, ast.Constant) and isinstance(found.value, int)):
             raise self.refused(index, "is an index that is not known; loop over contacts or places")
         return found.value
@@ -234,7 +234,7 @@ class Numbers(Settled):
     def touched(self, node: ast.AST) -> bool:
         """Whether anything in a node may become something else."""
         known_names = self.kinds, self.index, self.slopes, self.named, LINEAR
-        for one in ast.walk(node):
+        for one in walked(node):
             match one:
                 case ast.Name(id=name) | ast.Attribute(attr=name) if name in self.spec.flags or name in self.choices:
                     return True
@@ -321,11 +321,11 @@ class Numbers(Settled):
         pairs: list[tuple[ast.expr, ast.expr]] = []
         for to, one, kind in zip(left, right, kinds, strict=True):
             for i in self.places(to, kind) if kind else [-1]:
-                number = self.part(one, i) if kind else self.visit(deepcopy(one))
+                number = self.part(one, i) if kind else self.visit(copied(one))
                 if isinstance(to, ast.Name) and kind and isinstance(number, ast.Constant) and number.value == 0.0:
                     self.zeros.add(self.name(to, to.id, kind, i))
                 else:
-                    pairs.append((self.part(to, i) if kind else self.visit(deepcopy(to)), number))
+                    pairs.append((self.part(to, i) if kind else self.visit(copied(to)), number))
         pairs = [(to, number) for to, number in pairs if ast.unparse(to) != ast.unparse(number)]
         later = [set().union(*(uses(number) for _, number in pairs[n + 1 :])) for n in range(len(pairs))]
         if any(ast.unparse(to) in later[n] for n, (to, _) in enumerate(pairs)):
@@ -382,7 +382,11 @@ def row(terms: list[ast.expr]) -> ast.expr:
 
 
 def uses(node: ast.AST) -> set[str]:
-    return {ast.unparse(one) for one in ast.walk(node) if isinstance(one, (ast.Name, ast.Attribute))}
+    return {spelled(one) for one in walked(node) if isinstance(one, (ast.Name, ast.Attribute))}
+
+
+def spelled(node: ast.expr) -> str:
+    return node.id if isinstance(node, ast.Name) else ast.unparse(node)
 
 
 def without_zero(left: ast.expr, op: ast.operator, right: ast.expr) -> ast.expr:

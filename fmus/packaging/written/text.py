@@ -2,8 +2,8 @@
 
 import ast
 import re
-from copy import deepcopy
 
+from ..trees import copied, tree, walked
 from .declarations import Declarations, annotated, label, returned
 from .numbers import METHODS, RANGES, Numbers
 from .settled import truth
@@ -34,10 +34,10 @@ class Writer:
         self.lines: list[Line] = []
         self.after = 0  # the lines of the source that have been dealt with
         self.numbers = self.fresh()
-        tree = ast.parse(text, path)
-        imports = [node for node in tree.body if isinstance(node, ast.ImportFrom) and stays_at_home(node)]
+        body = tree(text).body
+        imports = [node for node in body if isinstance(node, ast.ImportFrom) and stays_at_home(node)]
         self.ranges = {alias.name for node in imports for alias in node.names} & {*RANGES, METHODS}
-        self.block(tree.body, 0)
+        self.block(body, 0)
         self.lines += self.old[self.after :]
 
     def fresh(self, index: dict[str, int] | None = None) -> Numbers:
@@ -129,7 +129,7 @@ class Writer:
         for n, name in enumerate(self.spec.methods, 1):
             self.numbers.stands_for(node.target, name)
             if many > 1:
-                asked = f"{'if' if n == 1 else 'elif'} {ast.unparse(self.numbers.visit(deepcopy(test.test)))}:"
+                asked = f"{'if' if n == 1 else 'elif'} {ast.unparse(self.numbers.visit(copied(test.test)))}:"
                 self.write(" " * depth + (asked if n < many else "else:"), test)
             self.after = self.first(test.body[0])
             leaves = self.block(test.body, depth + (4 if many > 1 else 0)) and leaves
@@ -139,7 +139,7 @@ class Writer:
     def simple(self, node: ast.stmt, depth: int) -> None:
         if not self.numbers.touched(node):
             if isinstance(node, ast.Assign):
-                self.numbers.learn([name for name in ast.walk(node.targets[0]) if isinstance(name, ast.Name)])
+                self.numbers.learn([name for name in walked(node.targets[0]) if isinstance(name, ast.Name)])
             self.copy(node.end_lineno or 0, node.col_offset - depth)
             return
         old = ast.unparse(node)
@@ -154,25 +154,22 @@ class Writer:
                 new = [ast.ImportFrom(module.removeprefix("fmus."), node.names, 1)]
             case ast.Import() | ast.ImportFrom():
                 new = [node]
-            case ast.Assign():
-                self.offered(node)
-                new = self.numbers.statements(deepcopy(node))
             case _:
-                new = self.numbers.statements(deepcopy(node))
-        new = [ast.fix_missing_locations(one) for one in new]
-        if [ast.unparse(one) for one in new] == [old]:
+                new = self.numbers.statements(self.offered(copied(node)))
+        texts = [ast.unparse(ast.copy_location(one, node)) for one in new]
+        if texts == [old]:
             self.copy(node.end_lineno or 0, node.col_offset - depth)
             return
-        for n, one in enumerate(new):
-            text = " " * depth + bare(one)
-            text = text if len(text) <= WIDTH else folded(" " * depth + ast.unparse(one))
+        for n, (one, whole) in enumerate(zip(new, texts, strict=True)):
+            text = " " * depth + bare(one, whole)
+            text = text if len(text) <= WIDTH else folded(" " * depth + whole)
             self.write(text + self.comment(node) * (n == 0), node)
 
     def head(self, node: ast.stmt, depth: int, word: str = "", test: ast.expr | None = None) -> None:
         """The first line of a compound statement; copied unless its test has changed."""
         body = self.first(node.body[0])  # type: ignore[attr-defined]
         if isinstance(node, ast.While):
-            word, test = "while", self.numbers.visit(deepcopy(node.test))
+            word, test = "while", self.numbers.visit(copied(node.test))
         if test is None or self.stands(node, word, test):
             self.copy(body, node.col_offset - depth)
         else:
@@ -218,7 +215,7 @@ class Writer:
         self.numbers = outer
 
     def branch(self, node: ast.If, depth: int, word: str) -> bool:
-        test = self.numbers.visit(deepcopy(node.test))
+        test = self.numbers.visit(copied(node.test))
         if truth(test) is not None:
             chosen = node.body if truth(test) else node.orelse
             if not chosen:
@@ -235,7 +232,7 @@ class Writer:
         other, mark = node.orelse[0], len(self.lines)
         if isinstance(other, ast.If) and len(node.orelse) == 1 and other.col_offset == node.col_offset:
             self.after = self.first(other)
-            if truth(self.numbers.visit(deepcopy(other.test))) is None:
+            if truth(self.numbers.visit(copied(other.test))) is None:
                 return self.branch(other, depth, "elif") and leaves
             self.write(" " * depth + "else:", other)
         else:
@@ -246,9 +243,12 @@ class Writer:
             return False
         return leaves
 
-    def offered(self, node: ast.Assign) -> None:
-        """Take out the items that are not offered; a choice that starts with one starts with the first that is."""
-        for part in ast.walk(node.value):
+    def offered(self, node: ast.stmt) -> ast.stmt:
+        """An assignment without the items that are not offered; a choice that starts with one starts with the first
+        that is."""
+        if not isinstance(node, ast.Assign):
+            return node
+        for part in walked(node.value):
             if isinstance(part, ast.Tuple):
                 part.elts = [one for one in part.elts if not self.is_gone(one)]
         match node:
@@ -260,6 +260,7 @@ class Writer:
                 kept = ast.unparse(start).removesuffix(".NUMBER") in self.spec.methods
                 if possible and not kept and self.declared.constants.get(getattr(start, "id", "")) not in possible:
                     choice.args[0] = ast.Constant(possible[0])
+        return node
 
     def is_gone(self, node: ast.expr) -> bool:
         """Whether this is an item that is not offered, or its name."""
@@ -275,12 +276,13 @@ def is_contact(argument: ast.arg) -> bool:
     return isinstance(argument.annotation, ast.Name) and argument.annotation.id == "Contact"
 
 
-def bare(node: ast.stmt) -> str:
+def bare(node: ast.stmt, text: str) -> str:
     """The text of a simple statement, without brackets around a row."""
-    text, value = ast.unparse(node), getattr(node, "value", None)
+    value = getattr(node, "value", None)
     if not (isinstance(value, ast.Tuple) and value.elts):
         return text
-    return text.removesuffix(ast.unparse(value)) + ast.unparse(value)[1:-1]
+    row = ast.unparse(value)
+    return text.removesuffix(row) + row[1:-1]
 
 
 def folded(text: str, depth: int = 0) -> str:
