@@ -1,6 +1,5 @@
 """All the files of the runtime and the file of a model, written out."""
 
-import ast
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 from ...runtime.declare import variables
 from .. import BuildError, __version__
 from ..equations.authored import Authored
+from ..trees import tree
 from .declarations import Declarations
 from .needed import pruned
 from .offer import EXACT, Offer
@@ -25,6 +25,12 @@ def runtime() -> dict[str, str]:
     """Path and text of every file of the numerics and of what hosts them."""
     paths = [path for path in sorted((FMUS / "runtime").glob("*.py")) if path.name not in (*AT_HOME, "__init__.py")]
     return {f"runtime/{path.name}": path.read_text(encoding="utf-8") for path in paths}
+
+
+@cache
+def declarations() -> Declarations:
+    """What they say, for any model."""
+    return Declarations(map(tree, runtime().values()))
 
 
 def spec_of(model: Any, offered: Offer, called: str) -> Spec:
@@ -53,7 +59,7 @@ def expanded(source: Authored, spec: Spec) -> Files:
     """The lines with the names of `spec`."""
     file = f"{source.name}.py"
     texts = runtime() | {file: source.text}
-    declared = Declarations([ast.parse(text, path) for path, text in texts.items() if path != file])
+    declared = declarations()
     if name := declared.clash(spec):
         raise BuildError(f"The name {name} means something else in the numerics; take another.")
     files = {path: Writer(spec, declared, path, text, path != file).lines for path, text in texts.items()}
