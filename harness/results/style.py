@@ -87,7 +87,7 @@ def sheet(
     path: Path, width: float, height: float, layout: Literal["constrained"] | None = "constrained"
 ) -> Iterator[Figure]:
     """A figure in this look, of a size in inches; saved as SVG, light or dark as the reader's screen is, when all has
-    been drawn.  Without a `layout`, which draws all of it once more to find the margins, these are given.
+    been drawn.  Without a `layout`, which measures all of it twice to find the margins, these are given.
 
     Names and titles are drawn letter by letter, whatever is in them.  What nobody can draw, such as letters that the
     font lacks and numbers near the end of their range, is left out of the picture without a word.
@@ -105,6 +105,9 @@ def sheet(
                 fold(text, place.height if text.get_rotation() == 90 else place.width)
         for crowd in figure.findobj(crowded):
             crowd.set_rasterized(True)
+        if engine := figure.get_layout_engine():
+            engine.execute(figure)
+            figure.set_layout_engine(None)  # with one, all is drawn twice
         drawn = StringIO()
         figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
     short = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d\d)\d+", r"\1", line[0]), drawn.getvalue())
