@@ -203,7 +203,11 @@ def show(model):
 
 
 def handle(run, model):
-    """An event is handled: `jumped` and `rescaled` tell the importer what is new, `due` when the next is.  Status."""
+    """An event is handled: `jumped` and `rescaled` tell the importer what is new, `due` when the next is.  Status.
+
+    What was set makes another motion, as a new mode does: some importers restart their solver only where a state is
+    said to have jumped, and an input that jumps ends their run.
+    """
     exchange = model.exchange
     march = model.solver
     exchange.jumped = exchange.rescaled = run.observed = False
@@ -215,8 +219,10 @@ def handle(run, model):
     finest = exchange.finest
     nominals(model)
     exchange.rescaled = exchange.finest != finest
+    exchange.jumped, run.renewed = run.renewed, False
     if model.dry and march.step.sticks:
-        exchange.jumped = update(model, march)
+        if update(model, march):
+            exchange.jumped = True
         exchange.due = release(model, march)
     return OK if total(magnitude(march.y)) < HUGE else DIVERGED
 

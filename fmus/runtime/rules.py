@@ -34,6 +34,7 @@ class Run:
         self.start_time, self.stop_time, self.tolerance = 0.0, inf, tolerance
         self.refused = 0  # how many values were set that cannot be used
         self.changed = False  # values were set that are not yet in force
+        self.renewed = False  # and such that came into force since the last event
         self.observed = False  # the outputs are those of the present point
         self.failed = False
 
@@ -117,6 +118,7 @@ def renew(run, model, beginning):
         elif run.interface != MODEL_EXCHANGE:  # where nothing starts anew: the mode follows at the next event
             march.restart(model)
         run.changed = run.observed = False
+        run.renewed = not beginning
     return status
 
 
