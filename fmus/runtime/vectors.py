@@ -1,10 +1,10 @@
 """The vectors of the numerics, and what they mean on numpy arrays, for whoever runs the sources as they stand.
 
 A vector runs over the states of a model or over its contacts.  Sources that speak of vectors are written out in scalars
-before they travel (packaging/written), so this file stays at home.  One model at a time runs on arrays: `on_arrays`.
+before they travel (packaging/written), so this file stays at home.  One model at a time runs on arrays, that of the
+places below: tests/support/on_arrays.py sets them.
 """
 
-import re
 from functools import wraps
 
 import numpy as np
@@ -27,7 +27,6 @@ own: list[bool] = []  # for each state whether its rate is calculated, and is no
 rate: list[int] = []  # the place of that rate, where it is a state
 
 SMALL = 1e-6  # a pivot over what it shall eliminate
-VECTOR = re.compile(r"(y|f|modes)(\d*|_\w+)")
 
 
 def per_state():
@@ -144,106 +143,3 @@ def solved(system, r):
         if not own[p]:
             k[p] = g * (r[p] + h * k[rate[p]])
     return k
-
-
-def on_arrays(model):
-    """A model of the sources as they stand, with its vectors on arrays: what the numerics take for a model.
-
-    The classes of all that it owns learn that a number fills a vector, and that what is assigned is copied.
-    """
-    states, modes = list(model.states), list(model.contacts)
-    rates, slips = list(model.states.values()), list(model.contacts.values())
-    places[:], contacts[:] = range(len(states)), range(len(modes))
-    speeds[:] = [states.index(name) for name in states if name in rates]
-    slip[:] = [states.index(name) if name in states else -1 for name in slips]
-    place[:] = [rates.index(name) if name in rates else -1 for name in slips]
-    own[:] = [name not in states for name in rates]
-    rate[:] = [states.index(name) if name in states else -1 for name in rates]
-    fill(model.solver)
-    if model.linear:
-        methods = model.solver.step.methods
-        methods.exact = exact_on_arrays(methods.exact)
-    cls = type(model)
-    alone, all_of_them = ("hold", "terms", "departure"), ("slips", "slip_terms", "forces", "changes", "struck")
-    about = {}
-    for name in ("rates", "jacobian", "push", "observe", *(all_of_them if cls.coupled else ())):
-        about[name] = called_with_numbers(cls, name)
-    for name in alone if modes and not cls.coupled else ():
-        if not getattr(cls, name).__module__.startswith(__package__):
-            about[name] = called_of_a_contact(cls, name)
-    model.__class__ = type(cls.__name__, (cls,), about)
-    return model
-
-
-def fill(thing):
-    """Make vectors of the attributes of an object, and of the objects that it owns, that are vectors."""
-    said = {name for one in type(thing).__mro__ for name in vars(one).get("__annotations__", {})}
-    over_contacts = {name for name in said if "modes" in name}
-
-    def assign(self, name, value):
-        if name in said or VECTOR.fullmatch(name):
-            long = len(contacts) if name in over_contacts or name.startswith("modes") else len(places)
-            value = np.full(long, value) if np.ndim(value) == 0 else np.array(value)
-        object.__setattr__(self, name, value)
-
-    type(thing).__setattr__ = assign
-    for name, value in list(vars(thing).items()):
-        setattr(thing, name, 0.0 if isinstance(value, np.ndarray) else value)  # that of another model
-        if hasattr(value, "__dict__"):
-            fill(value)
-
-
-def called_with_numbers(cls, name):
-    """A method of a model, called with vectors; what it returns becomes one."""
-
-    def call(self, t, *vectors):
-        found = getattr(cls, name)(self, t, *numbers(vectors))
-        if name == "rates":
-            y, found = vectors[0], iter(found if isinstance(found, tuple) else (found,))
-            return np.array([next(found) if own[i] else y[rate[i]] for i in places])
-        if name == "jacobian":
-            found, f_t, J = iter(found), per_state(), np.zeros((len(places), len(places)))
-            for i in places:
-                if own[i]:
-                    f_t[i], J[i] = next(found), [next(found) for _ in places]
-            return f_t, J
-        if name in ("slips", "slip_terms", "forces", "changes", "struck"):
-            found = np.array(found if isinstance(found, tuple) else (found,))
-            parts = len(found) // (len(places) if name == "struck" else len(contacts))
-            return found if parts == 1 else np.split(found, parts)
-        return found
-
-    return call
-
-
-def called_of_a_contact(cls, name):
-    """What a model says of its only contact, called with vectors and the number of the contact."""
-
-    def call(self, t, *vectors):
-        *vectors, _ = vectors
-        return getattr(cls, name)(self, t, *numbers(vectors))
-
-    return call
-
-
-def numbers(vectors):
-    """All the numbers of some vectors, as Python has them."""
-    return [one for vector in vectors for one in (vector.tolist() if isinstance(vector, np.ndarray) else [vector])]
-
-
-def exact_on_arrays(exact):
-    """The closed form, called with vectors."""
-    cls = type(exact)
-
-    class Exact(cls):
-        def begin(self, y, f, p, lost):
-            cls.begin(self, *y.tolist(), float(f[1]), p, lost)
-
-        def standstill(self, modes):
-            return cls.standstill(self, int(modes[0]))
-
-        def end(self, t):
-            x, v, lost = cls.end(self, t)
-            return (x, v), lost
-
-    return Exact()
