@@ -20,6 +20,7 @@ HOSTS = (
 )
 CALLED_BY_NAME = {f"runtime/{name}.py" for name in HOSTS}  # by a layer of FMI
 Files = dict[str, list[Line]]
+Part = ast.ClassDef | ast.FunctionDef | ast.Assign
 
 
 def pruned(files: Files, model: str, names: Iterable[str]) -> Files:
@@ -34,10 +35,9 @@ def pruned(files: Files, model: str, names: Iterable[str]) -> Files:
         files, found = left, found | {path: readers(path, left[path]) for path in changed}
 
 
-def parsed(lines: list[Line]) -> tuple[ast.Module, list[ast.AST]]:
-    """The tree of a file, and every node of it."""
-    text = "\n".join(lines)
-    return tree(text), nodes(text)
+def parsed(lines: list[Line]) -> ast.Module:
+    """The tree of a file."""
+    return tree("\n".join(lines))
 
 
 @dataclass
@@ -52,14 +52,12 @@ def readers(path: str, lines: list[Line]) -> list[Reader]:
     """The functions of a file, each with what it reads; what stands outside of them is always read."""
     outside = Reader(set(), set())
     found = [outside]
-    for part in parsed(lines)[0].body:
-        inner = part.body if isinstance(part, ast.ClassDef) else [part]
-        for node in inner:
+    for part in parsed(lines).body:
+        for node in part.body if isinstance(part, ast.ClassDef) else [part]:
             if not isinstance(node, ast.FunctionDef) or node.name.startswith("__") or path in CALLED_BY_NAME:
                 outside.reads |= read(node)
             else:
-                alone = {node.name} if inner == [part] else set()
-                found.append(Reader({"." + node.name} | alone, read(node)))
+                found.append(Reader(called(node), read(node)))
         if isinstance(part, ast.ClassDef):
             outside.reads |= set().union(*map(read, [*part.bases, *part.decorator_list]))
     return found
@@ -97,35 +95,35 @@ def without(path: str, lines: list[Line], wanted: set[str], is_model: bool) -> l
     """One file without what is not wanted."""
     if path in CALLED_BY_NAME:
         return lines
-    lines_before, lines, (whole, every) = lines, list(lines), parsed(lines)
-    methods = {part for one in every if isinstance(one, ast.ClassDef) for part in one.body}
-    classes = [one for one in whole.body if isinstance(one, ast.ClassDef) and not is_model]
-    classes = [one for one in classes if one.name not in wanted and "." + one.name not in wanted]
-    gone = {part for one in classes for part in walked(one)}
-    functions = [one for one in every if isinstance(one, ast.FunctionDef) and one not in gone]
-    spare: list[ast.ClassDef | ast.FunctionDef] = [
-        *classes,
-        *(one for one in functions if is_spare(one, wanted, one in methods)),
-    ]
-    inside = {part for one in spare for part in walked(one)} - {*spare}
-    assigned = [] if is_model else [one for one in every if isinstance(one, ast.Assign) and one not in inside]
-    parts: list[ast.ClassDef | ast.FunctionDef | ast.Assign] = [*spare, *assigned]
-    for node in sorted(parts, key=lambda one: one.lineno, reverse=True):
+    whole, lines = parsed(lines), list(lines)
+    for node in sorted(spare(whole, wanted, is_model), key=lambda one: one.lineno, reverse=True):
         if isinstance(node, ast.Assign):
             unset(lines, node, wanted)
         else:
             cut(lines, node)
-    for node in [one for one in functions if one not in spare]:
-        if all(isinstance(one, ast.Assign) and all(idle(*pair, wanted) for pair in single(one)) for one in node.body):
-            place = next(n for n, line in enumerate(lines) if line.source == lines_before[node.lineno - 1].source)
-            lines.insert(place + 1, Line.of(" " * (node.col_offset + 4) + "pass", lines[place].source))
     return without_dead_imports(lines)
 
 
-def is_spare(node: ast.FunctionDef, wanted: set[str], is_method: bool) -> bool:
-    """Whether nobody calls a function."""
-    called = "." + node.name in wanted or (node.name in wanted and not is_method)
-    return not called and not node.name.startswith("__")
+def spare(whole: ast.Module, wanted: set[str], is_model: bool) -> list[Part]:
+    """The classes and functions that nobody needs, and all assignments outside of these; of a model its functions."""
+    found: list[Part] = []
+    waiting: list[ast.AST] = [*whole.body]
+    for node in waiting:  # which grows on the way
+        match node:
+            case ast.ClassDef(name=name) if not is_model and not {name, "." + name} & wanted:
+                found.append(node)
+            case ast.FunctionDef(name=name) if not name.startswith("__") and not called(node) & wanted:
+                found.append(node)
+            case ast.Assign() if not is_model:
+                found.append(node)
+            case _:
+                waiting += ast.iter_child_nodes(node)
+    return found
+
+
+def called(node: ast.FunctionDef) -> set[str]:
+    """By what a function is called: a method by .name alone."""
+    return {"." + node.name} if node.col_offset else {"." + node.name, node.name}
 
 
 def cut(lines: list[Line], node: ast.ClassDef | ast.FunctionDef) -> None:
@@ -133,12 +131,7 @@ def cut(lines: list[Line], node: ast.ClassDef | ast.FunctionDef) -> None:
     first = node.lineno - 1
     while first and not lines[first - 1].strip():
         first -= 1
-    end = node.end_lineno or first
-    if not any(line.strip() for line in lines[:first]) or lines[first - 1].lstrip().startswith("class "):
-        first = node.lineno - 1
-        while end < len(lines) and not lines[end].strip():
-            end += 1
-    del lines[first:end]
+    del lines[first : node.end_lineno]
 
 
 def unset(lines: list[Line], node: ast.Assign, wanted: set[str]) -> None:
@@ -150,11 +143,13 @@ def unset(lines: list[Line], node: ast.Assign, wanted: set[str]) -> None:
     if len(pairs) > 1:
         sides = [", ".join(map(ast.unparse, side)) for side in zip(*((t[0], v) for t, v in kept if t), strict=True)]
     else:
-        sides = [ast.unparse(one) for one in kept[0][0]] + [ast.unparse(kept[0][1])]
-    old = lines[node.lineno - 1]
-    comment = re.search(r"  #.*$", lines[(node.end_lineno or 1) - 1])
-    text = " " * node.col_offset + " = ".join(sides) + (comment[0] if comment else "")
-    lines[node.lineno - 1 : node.end_lineno] = [Line.of(text, old.source)] if len(sides) > 1 else []
+        sides = [ast.unparse(one) for one in (*kept[0][0], kept[0][1])]
+    old, end = lines[node.lineno - 1], node.end_lineno or 0
+    comment = re.search(r"  #.*$", lines[end - 1])
+    text = " = ".join(sides) + (comment[0] if comment else "") if len(sides) > 1 else ""
+    if not text and lines[node.lineno - 2].endswith(":") and not "".join(lines[end : end + 1]).strip():
+        text = "pass"  # nothing else is left of the function
+    lines[node.lineno - 1 : end] = [Line.of(" " * node.col_offset + text, old.source)] if text else []
 
 
 def paired(node: ast.Assign) -> list[tuple[list[ast.expr], ast.expr]]:
@@ -184,9 +179,8 @@ def idle(target: ast.expr, value: ast.expr, wanted: set[str]) -> bool:
 
 
 def without_dead_imports(lines: list[Line]) -> list[Line]:
-    whole, every = parsed(lines)
-    used = {node.id for node in every if isinstance(node, ast.Name)}
-    for node in reversed([node for node in whole.body if isinstance(node, ast.ImportFrom)]):
+    used = {node.id for node in nodes("\n".join(lines)) if isinstance(node, ast.Name)}
+    for node in reversed([node for node in parsed(lines).body if isinstance(node, ast.ImportFrom)]):
         kept = [alias.name for alias in node.names if alias.name in used]
         if len(kept) < len(node.names) and not any(alias.asname for alias in node.names):
             text = f"from {'.' * node.level}{node.module or ''} import {', '.join(kept)}"

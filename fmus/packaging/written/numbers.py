@@ -177,8 +177,6 @@ class Numbers(Settled):
         match node:
             case ast.BinOp(left=ast.Constant(value=int(a)), op=ast.Add(), right=ast.Constant(value=int(b))):
                 return ast.Constant(a + b)
-            case ast.BinOp(left=ast.Constant(value=int(a)), op=ast.Mult(), right=ast.Constant(value=int(b))):
-                return ast.Constant(a * b)
         return node
 
     def visit_List(self, node: ast.List) -> ast.List:

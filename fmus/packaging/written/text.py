@@ -150,8 +150,6 @@ class Writer:
                 new = [ast.ImportFrom(None, names, 1)] if names else []
             case ast.ImportFrom() if stays_at_home(node):
                 return
-            case ast.ImportFrom(module=str(module), level=0) if module.startswith("fmus."):
-                new = [ast.ImportFrom(module.removeprefix("fmus."), node.names, 1)]
             case ast.Import() | ast.ImportFrom():
                 new = [node]
             case _:
