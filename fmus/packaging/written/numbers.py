@@ -14,7 +14,6 @@ from .spec import STATES, STEM, Spec
 EACH = {"magnitude": "{0} if {0} > 0.0 else -{0}", "greater": "{0} if {0} > {1} else {1}"}  # number by number
 CHOSEN = {"largest": ">", "first": "<"}  # one of the numbers
 BLANK = ("per_state", "per_contact")
-LINEAR = ("factored", "solved")
 RANGES = ("places", "speeds", "contacts")  # what a loop may run over
 METHODS = "methods"  # or (label, file, class) of every one
 LOOKED_UP = ("slip", "place")
@@ -228,23 +227,6 @@ class Numbers(Settled):
         return node
 
     # ---- simple statements
-
-    def touched(self, node: ast.AST) -> bool:
-        """Whether anything in a node may become something else."""
-        known_names = self.kinds, self.index, self.slopes, self.named, LINEAR
-        for one in walked(node):
-            match one:
-                case ast.Name(id=name) | ast.Attribute(attr=name) if name in self.spec.flags or name in self.choices:
-                    return True
-                case ast.Name(id=name) if self.vectors and any(name in known for known in known_names):
-                    return True
-                case ast.Attribute(attr=name) if self.vectors and self.declared.attribute(name):
-                    return True
-                case ast.Call() if self.vectors and any(self.returned(one)):
-                    return True
-                case ast.AnnAssign() | ast.ImportFrom() | ast.Tuple():
-                    return True
-        return False
 
     def statements(self, node: ast.stmt) -> list[ast.stmt]:
         """What a simple statement becomes."""

@@ -137,11 +137,6 @@ class Writer:
         return leaves and many > 0
 
     def simple(self, node: ast.stmt, depth: int) -> None:
-        if not self.numbers.touched(node):
-            if isinstance(node, ast.Assign):
-                self.numbers.learn([name for name in walked(node.targets[0]) if isinstance(name, ast.Name)])
-            self.copy(node.end_lineno or 0, node.col_offset - depth)
-            return
         old = ast.unparse(node)
         new: list[ast.stmt]
         match node:
