@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from ..runtime.declare import Declaring
 from . import BuildError
 from .equations.authored import Authored, authored
 
@@ -26,8 +25,3 @@ def find(source: str | Path) -> Authored:
             f"There is no model {str(source)!r}; known are {', '.join(names())}, and any .py file by its path."
         )
     return authored(FMUS / f"{source}.py")
-
-
-def load(source: str | Path) -> type[Declaring]:
-    """The class of a model, written out in plain scalars."""
-    return find(source).model

@@ -16,7 +16,7 @@ from lxml import etree
 from models import ROOT, model_class
 from PIL import Image
 
-from fmus.packaging.catalogue import load, names
+from fmus.packaging.catalogue import find, names
 from fmus.packaging.further import exchanged
 from fmus.packaging.native.sources import FMI_HEADERS, WRITTEN
 from fmus.runtime.declare import variables
@@ -29,8 +29,8 @@ from tests.packaging.test_packaging import (  # noqa: F401
 )
 
 SCHEMA = Path(fmpy.__file__).parent / "schema/fmi3"
-DRY = {name for name in names() if load(name).dry}
-DRIVEN = {name for name in names() if load(name).driven}
+DRY = {name for name in names() if find(name).model.dry}
+DRIVEN = {name for name in names() if find(name).model.driven}
 TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
 STRUCTURE = ("Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator")
 # Nothing is without effect, and friction often holds.
@@ -94,7 +94,7 @@ def test_every_number_has_a_unit_and_every_enumeration_its_items(fmu, name):
     units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
     assert {element.get("unit") for element in root.iterfind("ModelVariables/Float64")} == units
     types = {kind.get("name"): kind for kind in root.find("TypeDefinitions")}
-    for variable, meaning in variables(load(name)()):
+    for variable, meaning in variables(find(name).model()):
         if meaning.items:
             element = root.find(f"ModelVariables/Enumeration[@name='{variable}']")
             items = types[element.get("declaredType")].findall("Item")
@@ -127,7 +127,7 @@ def test_the_structure_lists_all_unknowns_in_the_order_of_the_schema(fmu, name):
 @EVERY_MODEL
 def test_only_the_speed_may_jump_and_only_where_friction_is_dry(fmu, name):
     jumping = [element.get("name") for element in described(fmu(name)).findall("ModelVariables/*[@reinit='true']")]
-    _, speed, *_ = [variable for variable, meaning in variables(load(name)()) if meaning.causality == "output"]
+    _, speed, *_ = [variable for variable, meaning in variables(find(name).model()) if meaning.causality == "output"]
     assert jumping == ([speed] if name in DRY else [])
 
 
@@ -187,7 +187,7 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_takes_others(fmu, nam
     assert set(told["starts"]) == {e.get("name") for e in elements}
     assert starts == {variable: told["starts"][variable] for variable in starts}
     settable = {
-        variable for variable, meaning in variables(load(name)()) if meaning.causality in ("parameter", "input")
+        variable for variable, meaning in variables(find(name).model()) if meaning.causality in ("parameter", "input")
     }
     assert set(told["after"]) == settable == set(starts)
     for e in elements:
@@ -226,7 +226,7 @@ def test_the_flange_is_that_of_the_body_valid_and_drawn(fmu, name):
         tuple(map(m.get, ("variableName", "variableKind")))
         for m in etree.fromstring(content).iter("TerminalMemberVariable")
     ]
-    x, v = [variable for variable, meaning in variables(load(name)()) if meaning.role == "state"][:2]
+    x, v = [variable for variable, meaning in variables(find(name).model()) if meaning.role == "state"][:2]
     assert members == [(x, "signal"), (v, "signal"), ("T_ext" if name == "pendulum" else "F_ext", "inflow")]
     (drawn,) = etree.fromstring(content).iter("TerminalGraphicalRepresentation")
     with Image.open(BytesIO(files[f"terminalsAndIcons/{drawn.get('iconBaseName')}.png"])) as icon:

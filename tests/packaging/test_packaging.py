@@ -23,7 +23,7 @@ from fmpy.validation import validate_fmu
 
 from fmus.packaging import BuildError
 from fmus.packaging.archive import write
-from fmus.packaging.catalogue import load, names
+from fmus.packaging.catalogue import find, names
 from fmus.packaging.description import describe
 from fmus.packaging.modules import installed, travelling
 from fmus.runtime.declare import Declaring, Fixed, Output, Parameter, variables
@@ -126,7 +126,7 @@ def test_validation_finds_nothing(fmu, name):
 @EVERY_MODEL
 def test_the_xml_says_what_is_declared(fmu, name):
     scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
-    for place, (scalar, (variable, meaning)) in enumerate(zip(scalars, variables(load(name)()), strict=True)):
+    for place, (scalar, (variable, meaning)) in enumerate(zip(scalars, variables(find(name).model()), strict=True)):
         value = scalar[0]
         assert (scalar.get("name"), scalar.get("valueReference"), value.tag) == (variable, str(place), meaning.type)
         assert (scalar.get("description"), scalar.get("causality")) == (meaning.text, meaning.causality)
@@ -155,7 +155,7 @@ def test_every_real_has_a_unit_every_angle_is_shown_in_degrees(fmu, name):
 def test_enumerations_list_their_items(fmu, name):
     root = described(fmu(name))
     types = {kind.get("name"): kind for kind in root.findall("TypeDefinitions/SimpleType")}
-    choices = {variable: meaning for variable, meaning in variables(load(name)()) if meaning.items}
+    choices = {variable: meaning for variable, meaning in variables(find(name).model()) if meaning.items}
     assert "solver.method" in choices
     for variable, meaning in choices.items():
         value = root.find(f"ModelVariables/ScalarVariable[@name='{variable}']/Enumeration")
@@ -166,7 +166,7 @@ def test_enumerations_list_their_items(fmu, name):
 @EVERY_MODEL
 def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name):
     root = described(fmu(name))
-    meanings = [meaning for _, meaning in variables(load(name)())]
+    meanings = [meaning for _, meaning in variables(find(name).model())]
     (force,) = [place for place, meaning in enumerate(meanings, 1) if meaning.causality == "input"]
     outputs = {int(u.get("index")): u.get("dependencies") for u in root.findall("ModelStructure/Outputs/Unknown")}
     assert outputs == {
@@ -180,7 +180,7 @@ def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name)
 
 @EVERY_MODEL
 def test_capabilities_and_experiment_are_those_of_the_contract(fmu, name):
-    root, model = described(fmu(name)), load(name)
+    root, model = described(fmu(name)), find(name).model
     able = root.find("CoSimulation").attrib
     assert able["modelIdentifier"] == root.get("modelName") == name
     for flag in ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"):

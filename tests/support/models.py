@@ -7,12 +7,12 @@ from itertools import product
 import pytest
 from builds import ROOT
 
-from fmus.packaging.catalogue import load
+from fmus.packaging.catalogue import find
 from fmus.packaging.written import beside, written
 from fmus.runtime.declare import Choice, Input, Output, Parameter, variables
 
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
-BODIES = [name for name in MODELS if len(load(name)().states) == 2]  # position and speed are all their states
+BODIES = [name for name in MODELS if len(find(name).model().states) == 2]  # position and speed are all their states
 AUTHORED = sorted((ROOT / "tests" / "authored").glob("*.py"))  # as users write them, in files of their own
 LARGER = sorted((ROOT / "tests" / "authored" / "larger").glob("*.py"))  # of more states, or more contacts
 EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
@@ -32,7 +32,7 @@ def runtime(name, part):
 @cache
 def declared(name):
     """Name and declaration of every variable of a model, in the order of the XML."""
-    return dict(variables(load(name)()))
+    return dict(variables(find(name).model()))
 
 
 def outputs(name):
@@ -78,7 +78,7 @@ def experiment(name, values):
     Laws that chatter run as published, at rtol 1e-3, and not for long: where friction should hold, they take steps
     without number.
     """
-    stop, exact = load(name).stop_time, values["solver.method"] == EXACT
+    stop, exact = find(name).model.stop_time, values["solver.method"] == EXACT
     if values.get("friction", HYBRID) == HYBRID:
         return name, values if exact else {**values, "solver.rtol": 1e-5}, stop
     return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.4 * stop

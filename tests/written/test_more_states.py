@@ -16,7 +16,7 @@ from native_host import compiler
 from scipy.integrate import solve_ivp
 
 import fmus.packaging.native as native
-from fmus.packaging.catalogue import load
+from fmus.packaging.catalogue import find
 from fmus.packaging.native.compiler import SAME_BITS, STRICT
 from fmus.packaging.native.kinds import FLOAT
 from fmus.packaging.native.program import Program
@@ -35,7 +35,7 @@ def test_arrays_and_scalars_give_the_same_bits_at_every_step(name, method):
     file, stop = FILES[name], STOPS[name]
     values = {"solver.method": method, "solver.rtol": 1e-5}
     scalars = written_steps(written(file)(), values, stop, STEPS)
-    assert scalars == array_steps(load(file)(), values, stop, STEPS)
+    assert scalars == array_steps(find(file).model(), values, stop, STEPS)
     assert len(scalars) > 15
 
 

@@ -8,7 +8,7 @@ import pytest
 from arrays import array_steps, written_steps
 from models import CASES, MODELS, ROOT, label, model_class
 
-from fmus.packaging.catalogue import load
+from fmus.packaging.catalogue import find
 from fmus.packaging.written import Refused, files_of, written
 from fmus.packaging.written.declarations import Declarations
 from fmus.packaging.written.spec import Spec
@@ -23,7 +23,7 @@ EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 def test_arrays_and_scalars_give_the_same_bits_at_every_step(case):
     name, values, stop = case
     scalars = written_steps(model_class(name)(), values, stop, STEPS)
-    assert scalars == array_steps(load(name)(), values, stop, STEPS)
+    assert scalars == array_steps(find(name).model(), values, stop, STEPS)
     assert scalars
 
 
