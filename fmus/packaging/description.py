@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 from ..runtime.declare import Declared, Declaring, Output, variables
 from ..runtime.values import SETTABLE
-from . import BuildError, __version__
+from . import __version__
 from .dependencies import at_start
 from .document import document
 from .further import DERIVATIVE, TIME, Variables, all_variables, exchanged, indicators_of, rates_of
@@ -77,10 +77,8 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime, excha
 
 def opened(model: type[Declaring], name: str, version: str, key: str) -> Element:
     """The root; the attribute `key` is the last to be known."""
-    if not model.__doc__:
-        raise BuildError(f"{model.__name__} has no docstring; its first line is the description of the FMU.")
     root = Element("fmiModelDescription", {"fmiVersion": version, "modelName": name, key: ""})
-    root.set("description", model.__doc__.strip().splitlines()[0])
+    root.set("description", (model.__doc__ or "").strip().splitlines()[0])
     root.attrib |= {"author": "friction-fmus", "version": __version__, "license": "MIT"}
     root.attrib |= {"generationTool": f"friction-fmus {__version__}", "variableNamingConvention": "structured"}
     return root

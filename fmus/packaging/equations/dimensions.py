@@ -21,19 +21,19 @@ def judge_units(an: Anatomy) -> None:
     """Every output, rate, start, slip and force has the unit that it says."""
     known: dict[int, Powers | None] = {}
     for e in an.declared:
-        powers(e)
+        own, said = powers(e), f"{e.name} is declared in {e.unit}, and"
         if isinstance(e, Output):
-            agree(e, e.means, powers(e), f"{e.name} is declared in {e.unit}, and", known)
-        if isinstance(e, (State, Output)) and e.whose is not None and powers(e) != over(powers(e.whose), SECOND):
+            agree(e, e.means, own, said, known)
+        if isinstance(e, (State, Output)) and e.whose is not None and own != over(powers(e.whose), SECOND):
             raise Mistake(f"{e.name} in {e.unit} cannot be the rate of {e.whose.name} in {e.whose.unit}", e.place)
         if isinstance(e, State):
-            agree(e, e.begins, powers(e), f"{e.name} is declared in {e.unit}, and its start", known)
-            agree(e, e.finest, powers(e), f"{e.name} is declared in {e.unit}, and its finest", known)
-            agree(e, e.steady, over(powers(e), SECOND), f"{e.name} is declared in {e.unit}, and its rate", known)
+            agree(e, e.begins, own, f"{said} its start", known)
+            agree(e, e.finest, own, f"{said} its finest", known)
+            agree(e, e.steady, over(own, SECOND), f"{said} its rate", known)
         if isinstance(e, Contact):
             slip = of(e.slip, known)
             for word, one in ("slide", e.slide), ("hold", e.hold):
-                agree(e, one, powers(e), f"{e.name} is declared in {e.unit}, and {word}", known)
+                agree(e, one, own, f"{said} {word}", known)
             agree(e, e.eps, slip, f"the slip of {e.name} is in {told(slip)}, and eps", known)
     for rule in an.rules:
         of(rule.broken, known)
