@@ -9,7 +9,7 @@ Sources: Thomson, Theory of Vibration, sections 2.6 and 2.7 (logarithmic decreme
 """
 
 from dataclasses import dataclass
-from math import log, pi, sqrt
+from math import log, pi, prod, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +20,9 @@ from .. import samples
 
 if TYPE_CHECKING:
     from ...running.run import Run  # a record from a file needs nothing that runs
+
+
+FORCES = {"f": ("N", "friction force", False), "T_f": ("N.m", "joint torque", True)}  # unit, words, of a rotation
 
 
 @dataclass(frozen=True)
@@ -42,14 +45,10 @@ def analyse(run: "Run", gives: str, first: int = 0, cycles: float | None = None)
     x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
     if gives == "zeta":
         result = Quantity("zeta", damping_ratio(x_0, x_n, cycles), "1", f"damping ratio, {cycles:g} cycles")
-    elif gives == "f":
-        k = run.parameter("k", "the decay to f")
-        result = Quantity("f", friction(x_0, x_n, cycles, k), "N", f"friction force, {cycles:g} cycles")
     else:
-        stiffness = 1.0
-        for name in ("m", "g", "a"):
-            stiffness *= run.parameter(name, "the decay to T_f")
-        result = Quantity("T_f", friction(x_0, x_n, cycles, stiffness), "N.m", f"joint torque, {cycles:g} cycles")
+        unit, words, turning = FORCES[gives]
+        force = friction(x_0, x_n, cycles, stiffness(run, turning, f"the decay to {gives}"))
+        result = Quantity(gives, force, unit, f"{words}, {cycles:g} cycles")
     unit = run.units[run.wanted.motion["position"]]
     ends = (
         Quantity("x_0", x_0, unit, f"peak {first:g}"),
@@ -58,6 +57,11 @@ def analyse(run: "Run", gives: str, first: int = 0, cycles: float | None = None)
         Quantity("sample_n", sampled(run, times[-1]), unit, f"peak {first + cycles:g}, as sampled"),
     )
     return Decay(result, cycles, times, positions, (*ends, result))
+
+
+def stiffness(run: "Run", turning: bool, purpose: str) -> float:
+    """That of a spring, k, or of a pendulum, m g a; HarnessError if the model has none."""
+    return prod(run.parameter(name, purpose) for name in (("m", "g", "a") if turning else ("k",)))
 
 
 def sampled(run: "Run", time: float) -> float:

@@ -49,18 +49,16 @@ class Estimate:
 def symbols(record: Record) -> dict[int, tuple[str, str, str]]:
     """Name, unit and words of each unknown that is told."""
     base, turning = record.base, record.base == "rad"
-    rest = "rest position" if record.order == 0 else f"offset of the {record.quantity}"
+    rest, drift = "rest position", "drift of the rest position"
+    if record.order:
+        rest, drift = f"offset of the {record.quantity}", "drift of the offset"
     return {
         OMEGA: ("omega", "rad/s", "natural frequency"),
         ZETA: ("zeta", "1", "damping ratio"),
         R: ("r", base, "friction over stiffness, T_f/k" if turning else "friction over stiffness, f/k"),
         B: ("b", f"1/{base}", "drag over inertia" if turning else "drag over mass, q/m"),
         REST: ("rest", record.unit, rest),
-        DRIFT: (
-            "drift",
-            f"{record.unit}/s",
-            "drift of the rest position" if record.order == 0 else "drift of the offset",
-        ),
+        DRIFT: ("drift", f"{record.unit}/s", drift),
     }
 
 

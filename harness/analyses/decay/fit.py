@@ -142,9 +142,7 @@ def identified(record: Record, known: Known, drag: bool, drift: bool, report: Ca
     window = free_motion(record, turns, terms, known.pendulum, drift)
     problem = window.problem
     report(0.5)
-    amplitudes = (
-        np.abs(turns.x - np.median(turns.x)) / problem.unit if len(turns.x) < 4 else sizes_of(turns) / problem.unit
-    )
+    amplitudes = sizes_of(turns) / problem.unit
     laws = all_laws(problem, (window.p, window.squares), terms, amplitudes, lambda share: report(0.5 + 0.4 * share))
     full = next(law for law in laws if law.terms == terms)
     found = spread(problem, full.p, terms)
@@ -165,5 +163,5 @@ def identified(record: Record, known: Known, drag: bool, drift: bool, report: Ca
 def sizes_of(turns: Turns) -> np.ndarray:
     """Amplitudes at the turning points (n,), each about the middle of its neighbours."""
     x = turns.x
-    between = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4
+    between = (x[:-2] + 2 * x[1:-1] + x[2:]) / 4 if len(x) > 3 else x
     return np.abs(x - np.median(between))

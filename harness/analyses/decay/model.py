@@ -32,9 +32,8 @@ class Model:
     def varied(self, p: np.ndarray, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The laws A, zeta, r, b (1 + V, 4) of p and of its V small changes, their places in p (V,) and sizes (V,)."""
         places = unknowns[(unknowns == AMPLITUDE) | (unknowns >= ZETA)]
-        sizes = dict(
-            zip(LAW.tolist(), (1e-6 * p[AMPLITUDE], 1e-7, 1e-7 * p[AMPLITUDE], 1e-6 / p[AMPLITUDE]), strict=True)
-        )
+        a = p[AMPLITUDE]
+        sizes = {AMPLITUDE: 1e-6 * a, ZETA: 1e-7, R: 1e-7 * a, B: 1e-6 / a}
         changes = np.array([sizes[place] for place in places.tolist()])
         rows = np.tile(p[LAW], (1 + len(places), 1))
         for row, (place, change) in enumerate(zip(places, changes, strict=True), 1):

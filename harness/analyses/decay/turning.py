@@ -51,9 +51,8 @@ def find(record: Record, pendulum: bool) -> Turns:
     pieces = whole_pieces(record, half)
     found = [turns_of(record, piece, half, noise, step, span, pendulum) for piece in pieces]
     enough = [turns for turns in found if turns is not None and len(turns.t) >= ENOUGH]
-    best = (
-        enough[0] if enough else max((turns for turns in found if turns), key=lambda turns: len(turns.t), default=None)
-    )
+    longest = max(filter(None, found), key=lambda turns: len(turns.t), default=None)
+    best = enough[0] if enough else longest
     if best is None or len(best.t) < FEWEST - 1:
         count = 0 if best is None else len(best.t) + 1
         if span < 1.5 * SURE * noise:

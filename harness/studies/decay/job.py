@@ -2,14 +2,14 @@
 
 import gc
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
-from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...analyses.decay.decrement import stiffness
 from ...analyses.decay.figures import Known
 from ...analyses.decay.fit import Identified, identify
 from ...analyses.decay.law import AMPLITUDE, T0
@@ -91,12 +91,8 @@ def recorded(source: str, columns: Columns, known: Known, report: Callable[[floa
     check(record)
     told = {"files": (scene.file,), "parameters": run.in_force, "scene": vars(scene)}
     if known.k is None and known.m is None:
-        names = ("m", "g", "a") if unit == "rad" else ("k",)
-        try:
-            k = prod(run.parameter(name, "the decay of a scene") for name in names)
-        except HarnessError:
-            return record, known, told  # a model without them has no force to tell
-        known = Known(k=k, pendulum=unit == "rad")
+        with suppress(HarnessError):  # a model without it has no force to tell
+            known = Known(k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad")
     return record, known, told
 
 
