@@ -57,13 +57,7 @@ def spread_evenly(t: np.ndarray) -> tuple[np.ndarray, str]:
     steps = np.diff(t)
     usual = float(np.median(steps))
     sizes = np.unique(np.round(steps, 9))
-    if (
-        (steps < 0).any()
-        or not t[-1] > t[0]
-        or len(sizes) > 3
-        or len(sizes) < 2
-        or sizes.max() - sizes.min() <= EVEN * usual
-    ):
+    if (steps < 0).any() or not t[-1] > t[0] or not 2 <= len(sizes) <= 3 or np.ptp(sizes) <= EVEN * usual:
         return t, ""
     unit = float(np.min(np.diff(sizes)))
     line = np.polyval(np.polyfit(np.arange(len(t)), t - t[0], 1), np.arange(len(t))) + t[0]

@@ -125,15 +125,9 @@ def headings(above: list[list[str]], width: int) -> list[str]:
 
 def looks_like_unit(cell: str) -> bool:
     """Whether a cell under a heading is a unit: in brackets, known, short or empty."""
-    inner = cell.strip("[]() ")
-    bare = inner == cell
-    return (
-        not bare
-        or not cell
-        or known(cell) is not None
-        or time_size(cell) is not None
-        or cell in (*COUNTS, "V", "mV", "N", "A", "1")
-    )
+    bracketed = cell.strip("[]() ") != cell
+    measures = known(cell) is not None or time_size(cell) is not None
+    return bracketed or not cell or measures or cell in (*COUNTS, "V", "mV", "N", "A", "1")
 
 
 def commented(above: list[str], mark: str, width: int, name: str) -> list[str]:

@@ -21,6 +21,9 @@ SPELLED = {
 }  # fmt: skip
 
 
+LETTERS = str.maketrans("º˚µμ²⁻¹·*", "°°uu2-1  ", "^")  # what stands for what, and what for nothing
+
+
 class Unit(NamedTuple):
     """What a unit measures: the `order` of the derivative of a position in `base` (m or rad), and its size in SI."""
 
@@ -31,21 +34,7 @@ class Unit(NamedTuple):
 
 def plain(text: str) -> str:
     """A unit as the tables below write it: µm is um, m·s⁻², m s^-2 and m/s/s are m/s2."""
-    for old, new in (
-        ("º", "°"),
-        ("˚", "°"),
-        ("µ", "u"),
-        ("μ", "u"),
-        ("²", "2"),
-        ("⁻", "-"),
-        ("¹", "1"),
-        ("^", ""),
-        ("**", ""),
-        ("·", " "),
-        ("*", " "),
-    ):
-        text = text.replace(old, new)
-    text = re.sub(r"\s+", " ", text.strip())
+    text = re.sub(r"\s+", " ", text.replace("**", "").translate(LETTERS).strip())
     text = re.sub(r"[ .]?s-2$|/s/s$|/\(s2\)$|/sec2$", "/s2", text)
     text = re.sub(r"[ .]s-1$|/sec$", "/s", text)
     return re.sub(r"\s", "", text)
