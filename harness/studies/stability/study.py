@@ -7,7 +7,7 @@ every run has a process of its own with a time limit (bounded.py).
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import astuple, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -188,17 +188,13 @@ def regions(rows: Iterable[Ending]) -> list[Region]:
 
 def save(rows: list[Ending], path: Path) -> None:
     """Write stability.csv: one line for each row."""
-    columns: dict[str, list[Any]] = {
-        "model": [row.case.name for row in rows],
-        "scene": [row.case.title for row in rows],
-        "method": [row.case.method for row in rows],
-        "expected": [row.expected for row in rows],
-        "ended": [row.ended for row in rows],
-        "error [1]": [row.error for row in rows],
-        "energy rise [1]": [row.rise for row in rows],
-    }
-    for name in ("events", "steps", "rejected", "evaluations"):
-        columns[name] = [getattr(row.motion.counts, name) if row.motion else "" for row in rows]
-    columns["run time [s]"] = [row.motion.seconds if row.motion else math.nan for row in rows]
-    columns["sentence"] = [row.text for row in rows]
-    write_rows(path, list(columns), zip(*columns.values(), strict=True))
+    told = ["model", "scene", "method", "expected", "ended", "error [1]", "energy rise [1]"]
+    heads = [*told, "events", "steps", "rejected", "evaluations", "run time [s]", "sentence"]
+    write_rows(path, heads, map(line, rows))
+
+
+def line(row: Ending) -> list[Any]:
+    """What that file says of a row."""
+    case, motion = row.case, row.motion
+    counts = (*astuple(motion.counts), motion.seconds) if motion else ("", "", "", "", math.nan)
+    return [case.name, case.title, case.method, row.expected, row.ended, row.error, row.rise, *counts, row.text]
