@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any
 
 from ..errors import HarnessError
@@ -15,7 +14,6 @@ from .settings import NEEDED
 from .specification import Specification
 
 POINTS = 512  # communication steps of a run from which nothing else is asked
-NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 def run(wanted: Specification, report: Report) -> Run:
@@ -34,14 +32,14 @@ def shows_steps(found: Any) -> bool:
     return found.fmiVersion == "2.0" and found.coSimulation is not None and all(name in names for name in NEEDED)
 
 
-def outputs(found: Any, values: Mapping[str, Any] = NOTHING) -> tuple[str, ...]:
+def outputs(found: Any, values: Mapping[str, Any] | None = None) -> tuple[str, ...]:
     """The outputs of an FMU with such values, arrays by their elements; without any, what it computes inside."""
     for causality in ("output", "local"):
         names = [
             element
             for variable in found.modelVariables
             if variable.causality == causality and variable.variability != "constant" and variable.type in RECORDED
-            for element in elements(variable.name, foreign.shape(variable, values))
+            for element in elements(variable.name, foreign.shape(variable, values or {}))
         ]
         if names:
             return tuple(names)

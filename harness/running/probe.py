@@ -95,19 +95,13 @@ class Refusals:
 def card(model: str) -> Card:
     """The card of a model's FMU."""
     description = described(Specification(fmu_of(model)))
-    experiment, variables = description.defaultExperiment, description.modelVariables
-    settable = [variable for variable in variables if variable.causality in ("parameter", "input")]
+    settable = [variable for variable in description.modelVariables if variable.causality in ("parameter", "input")]
     enumerations = {v.name: v for v in settable if v.type == "Enumeration"}
     choices = {name: {label: number for number, label in labels(v).items()} for name, v in enumerations.items()}
     defaults = {v.name: int(v.start) if v.name in choices else float(v.start) for v in settable}
     methods = {number: label for label, number in choices["solver.method"].items()}
-    return Card(
-        methods=tuple(methods.values()),
-        default=methods[int(defaults["solver.method"])],
-        defaults=defaults,
-        choices=choices,
-        stop=float(experiment.stopTime),
-    )
+    default = methods[int(defaults["solver.method"])]
+    return Card(tuple(methods.values()), default, defaults, choices, float(description.defaultExperiment.stopTime))
 
 
 class Probe:

@@ -24,7 +24,6 @@
 Only title, outputs and one of model and fmu are needed.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from math import inf
 from pathlib import Path
@@ -54,8 +53,8 @@ MOST_REPEATS = 1000
 MOST_PLOTS = 6  # over time that are drawn unasked
 
 # What may be asked for, and the roles that it needs among the outputs.
-ANALYSES = {"decay": ("position", "velocity"), "slip": ("velocity",), "steps": ()}
-PLOTS = {
+ANALYSES: dict[str, tuple[str, ...]] = {"decay": ("position", "velocity"), "slip": ("velocity",), "steps": ()}
+PLOTS: dict[str, tuple[str, ...]] = {
     "position": ("position",),
     "velocity": ("velocity",),
     "acceleration": ("acceleration",),
@@ -195,11 +194,7 @@ def check_needs(scene: Scene) -> None:
     """What the scene asks for goes together."""
     if not scene.outputs:
         raise SceneError("outputs is empty; name at least one, as in outputs = ['x', 'v']")
-    asked: Iterable[tuple[str, tuple[str, ...], dict[str, tuple[str, ...]]]] = (
-        ("analysis", scene.analyses, ANALYSES),
-        ("plot", scene.plots, PLOTS),
-    )
-    for kind, names, needs in asked:
+    for kind, names, needs in ("analysis", scene.analyses, ANALYSES), ("plot", scene.plots, PLOTS):
         for name in names:
             for role in needs.get(name, ()):
                 if role not in scene.motion:

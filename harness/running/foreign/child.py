@@ -77,9 +77,7 @@ class Host:
         except Refused as error:
             sentence, refused = str(error), True
         except FMICallException as error:
-            sentence = (
-                f"{error.function} answered {STATUS[error.status] if error.status < len(STATUS) else error.status}"
-            )
+            sentence = f"{error.function} answered {dict(enumerate(STATUS)).get(error.status, error.status)}"
         except Exception as error:  # fmpy raises bare Exceptions
             sentence = reason(error)
         path.touch()
