@@ -76,16 +76,8 @@ def solve(system: Bodies, start: np.ndarray, times: np.ndarray) -> np.ndarray:
     positions = np.empty((len(times), n))
     mode = np.array([settled(system, i, t, state) for i in range(n)])
     for _ in range(MOST):
-        piece = solve_ivp(
-            rates(system, mode),
-            (t, stop),
-            state,
-            "DOP853",
-            events=guards(system, mode),
-            dense_output=True,
-            rtol=RTOL,
-            atol=ATOL,
-        )
+        options = {"events": guards(system, mode), "dense_output": True, "rtol": RTOL, "atol": ATOL}
+        piece = solve_ivp(rates(system, mode), (t, stop), state, "DOP853", **options)
         inside = (times >= t) & (times <= piece.t[-1])
         if inside.any():
             positions[inside] = piece.sol(times[inside])[:n].T

@@ -10,6 +10,7 @@ from functools import partial
 from importlib.util import find_spec
 from itertools import count
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -125,20 +126,14 @@ def by_scipy(task: Task, mode: int, t: float, state: tuple[float, float], times:
         return y[1]
 
     standstill.terminal, standstill.direction = True, -mode  # type: ignore[attr-defined]
-    options = {"jac": problem.jacobian(mode)} if task.method in IMPLICIT else {}
+    options: dict[str, Any] = {"t_eval": times, "rtol": task.rtol, "atol": task.atol}
+    if problem.dry:
+        options["events"] = standstill
+    if task.method in IMPLICIT:
+        options["jac"] = problem.jacobian(mode)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a failure is told by its status
-        run = solve_ivp(
-            task.watched(problem.rates(mode)),
-            (t, problem.stop),
-            state,
-            task.method,
-            t_eval=times,
-            events=standstill if problem.dry else None,
-            rtol=task.rtol,
-            atol=task.atol,
-            **options,
-        )
+        run = solve_ivp(task.watched(problem.rates(mode)), (t, problem.stop), state, task.method, **options)
     if run.status < 0:
         raise HarnessError(run.message.splitlines()[0])
     evaluations = int(run.nfev + run.njev)

@@ -61,24 +61,14 @@ def survey(models: Sequence[str], extent: Extent, out: Path, report: Callable[[s
 
 def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float], None]) -> Survey:
     """Run everything."""
-    studies = []
-    for model in models:
-        studies.append(study(model, extent, partial(report, model)))
+    studies = tuple(study(model, extent, partial(report, model)) for model in models)
     carried = {model: embedded(fmu_of(model)) for model in models}
     told = [laws.analyse(case, carried[case.model]) for case in CASES if case.dry and case.model in models]
     report("anchors", 0.0)
     rows = tuple(anchors.analyse()) if told or any(case.model in models for case in CASES) else ()
-    return Survey(
-        tuple(studies),
-        tuple(told),
-        rows,
-        tuple(advise(each, [law for law in told if law.model == each.model], extent.clear) for each in studies),
-        (
-            *map(gaps, studies),
-            *reasons(studies),
-            *(f"{peer} is left out: pip install {package}" for peer, package in missing().items()),
-        ),
-    )
+    said = tuple(advise(each, [law for law in told if law.model == each.model], extent.clear) for each in studies)
+    absent = (f"{peer} is left out: pip install {package}" for peer, package in missing().items())
+    return Survey(studies, tuple(told), rows, said, (*map(gaps, studies), *reasons(studies), *absent))
 
 
 def gaps(found: Study) -> str:
