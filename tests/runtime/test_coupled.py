@@ -23,12 +23,12 @@ class Mine(Model):
 '''
 
 
-@pytest.fixture
-def mine(tmp_path):
-    """mine(body): a model whose class goes on with these lines, written out."""
+@pytest.fixture(scope="module")
+def mine(tmp_path_factory):
+    """mine(body): a model whose class goes on with these lines, written out; of the same lines once."""
+    path = tmp_path_factory.mktemp("mine") / "mine.py"
 
     def make(*body):
-        path = tmp_path / "mine.py"
         path.write_text(HEAD + "".join(f"    {line}\n" for line in body))
         return written(path)()
 
