@@ -87,6 +87,7 @@ def serve():
             with suppress(ImportError):  # an extra that is not installed
                 if not module.name.endswith("__main__"):
                     import_module(module.name)
+    import_module("fmus.packaging.written").written("smd")  # reads what every model is written out from
     gc.freeze()  # else whoever is forked copies all that there is, to count who refers to it
     for line in sys.stdin:
         child = os.fork()
