@@ -2,7 +2,8 @@
 own, in a folder of his.
 
 The process is forked from one that has loaded both and their libraries, for to load them takes a second, and there are
-hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).
+hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).  Figures,
+which take most of a run, are left `blank` where nobody looks at them.
 """
 
 import atexit
@@ -16,8 +17,8 @@ import subprocess
 import sys
 import tempfile
 import threading
-from contextlib import suppress
-from functools import cache
+from contextlib import contextmanager, suppress
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
@@ -25,13 +26,15 @@ from pkgutil import walk_packages
 SUPPORT = Path(__file__).parent
 ROOT = SUPPORT.parents[1]
 PATIENCE = 300.0  # s
+LATE = ("dask.array", "fmpy.validation", "rich.progress", "scipy.io", "xarray")  # imported where they are used
+BLANK = '<svg xmlns="http://www.w3.org/2000/svg"><style></style></svg>'
 
 
-def harness(folder, *arguments, base=os.environ, fresh=False, text="", module="harness", **environment):
+def harness(folder, *arguments, base=os.environ, fresh=False, blank=False, text="", module="harness", **environment):
     """The finished process; it reads `text`, and has the environment `base` with what is named."""
     words, environment = [*map(str, arguments)], {**base, "PYTHONPATH": str(ROOT)} | environment
     if not fresh:
-        return _server().run(module, words, str(folder), environment, text)
+        return _server().run(module, words, str(folder), environment, text, blank)
     command = [sys.executable, "-m", module, *words]
     options = {"cwd": folder, "env": environment, "capture_output": True, "text": True, "timeout": PATIENCE}
     return subprocess.run(command, input=text, **options)
@@ -61,11 +64,11 @@ class Server:
             command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=self.room.name, start_new_session=True
         )
 
-    def run(self, module, words, folder, environment, text):
+    def run(self, module, words, folder, environment, text, blank):
         for file in self.files:
             file.write_text(text if file.name == "in" else "")
         asked = {"words": words, "folder": folder, "environment": environment, "files": [*map(str, self.files)]}
-        print(json.dumps([module, asked]), file=self.process.stdin, flush=True)
+        print(json.dumps([module, blank, asked]), file=self.process.stdin, flush=True)
         if not select.select([self.process.stdout], [], [], PATIENCE)[0]:
             os.killpg(self.process.pid, signal.SIGKILL)
             _server.cache_clear()
@@ -82,21 +85,35 @@ class Server:
 
 def serve():
     """Load all that can be; then fork for every line that is read, and answer with the exit status."""
-    for package in ("harness", "fmus.packaging"):
-        for module in walk_packages(import_module(package).__path__, f"{package}."):
-            with suppress(ImportError):  # an extra that is not installed
-                if not module.name.endswith("__main__"):
-                    import_module(module.name)
+    packages = [(import_module(name).__path__, f"{name}.") for name in ("harness", "fmus.packaging")]
+    for name in (*(module.name for package in packages for module in walk_packages(*package)), *LATE):
+        with suppress(ImportError):  # an extra that is not installed
+            if not name.endswith("__main__"):
+                import_module(name)
     import_module("fmus.packaging.written").written("smd")  # reads what every model is written out from
+    from harness.results import style
+
+    with style.sheet(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
+        figure.subplots().set_title("a title")
     gc.freeze()  # else whoever is forked copies all that there is, to count who refers to it
     for line in sys.stdin:
         child = os.fork()
         if not child:
-            module, asked = json.loads(line)
+            module, blank, asked = json.loads(line)
             become(**asked)
+            if blank:
+                for each in [each for each in sys.modules.values() if getattr(each, "sheet", None) is style.sheet]:
+                    each.sheet = partial(unseen, style.Figure)
             run(module)
             return
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+
+
+@contextmanager
+def unseen(kind, path, width, height, layout=None):
+    """In the place of a sheet: what is plotted is neither laid out nor drawn."""
+    yield kind((width, height))
+    path.write_text(BLANK)
 
 
 def become(words, folder, environment, files):
