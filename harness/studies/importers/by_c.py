@@ -1,26 +1,40 @@
-"""A request carried out by a C program (running/host.c), for which Python is a library at most."""
+"""A request carried out by a C program (running/host.c), for which Python is a library at most.
+
+No player of its own stands between: it would compile the program for each request.
+"""
 
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
 
+from ...process.child import ask
 from ...running.in_c import built, compiler
-from .request import Reply, Request, serve
+from .request import Reply, Request
 
 
-def play(request: Request) -> Reply:
-    count = len(request.instances)
-    if request.lives:
-        rows, _ = told(host(request.fmu, life(request) * request.lives + ["0 unload"]), 1)
-        return Reply(version(), rows, [], 0)
+def ran(request: Request, patience: float) -> subprocess.CompletedProcess[str]:
+    """The C program, ended, which has played the request; its log went to standard error.  Hangs after `patience` s."""
+    calls, library = life(request) * request.lives or runs(request), built(Path(request.fmu))
+    text = "".join(f"{call}\n" for call in [*calls, "0 unload"])
+    return ask(library.command, text, library.environment, patience)
+
+
+def reply(request: Request, text: str) -> Reply:
+    """What it printed."""
+    rows, statuses = told(text.splitlines(), len(request.instances))
+    size = len(rows) if request.lives else request.steps + 1
+    return Reply(version(), rows[:size], rows[size:], sum(statuses[: request.steps]))
+
+
+def runs(request: Request) -> list[str]:
+    """The calls of all runs of a request that has no lives."""
+    every = range(len(request.instances))
     calls = [f"{i} new {name}" for i, name in enumerate(request.instances)]
     calls += run(request, request.values, request.change)
     if request.again:
-        calls += [f"{i} reset" for i in range(count)] + run(request, {}, {})
-    calls += [f"{i} free" for i in range(count)] + ["0 unload"]
-    rows, statuses = told(host(request.fmu, calls), count)
-    size = request.steps + 1
-    return Reply(version(), rows[:size], rows[size:], sum(statuses[: request.steps]))
+        calls += [f"{i} reset" for i in every] + run(request, {}, {})
+    return calls + [f"{i} free" for i in every]
 
 
 def run(request: Request, values: dict[str, float], change: dict[str, float]) -> list[str]:
@@ -59,20 +73,8 @@ def told(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
     return rows, [all(statuses[i : i + count]) for i in range(0, len(statuses), count)]
 
 
-def host(fmu: str, calls: list[str]) -> list[str]:
-    """What the C program prints when it plays the calls on the FMU; its log goes to standard error."""
-    library, text = built(Path(fmu)), "".join(f"{call}\n" for call in calls)
-    done = subprocess.run(
-        library.command, input=text, stdout=subprocess.PIPE, text=True, env=library.environment, check=True
-    )
-    return done.stdout.splitlines()
-
-
+@cache
 def version() -> str:
     """The version that the compiler tells of itself."""
     told = subprocess.run([compiler(), "--version"], capture_output=True, text=True, check=True)
     return (re.findall(r"\d+(?:\.\d+)+", told.stdout.splitlines()[0]) or ["of unknown version"])[-1]
-
-
-if __name__ == "__main__":
-    serve(play)

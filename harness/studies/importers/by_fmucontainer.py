@@ -4,19 +4,20 @@ log what the embedded FMUs say is shown; of itself it tells much, also when all 
 """
 
 import json
-import subprocess
 import sys
+from contextlib import redirect_stdout
 from dataclasses import replace
 from importlib.metadata import version
+from io import StringIO
 from pathlib import Path
 from shutil import copy
+
+from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer
 
 from ...process.room import room
 from ...running.description import description
 from . import by_fmpy
 from .request import Reply, Request, serve
-
-TOOL = "from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer; fmucontainer()"
 
 
 def play(request: Request) -> Reply:
@@ -50,8 +51,9 @@ def built(request: Request, folder: Path) -> Path:
     }
     (folder / "container.json").write_text(json.dumps(told), encoding="utf-8")
     options = ["-no-auto-input", "-no-auto-output", "-no-auto-link", "-fmu-directory", str(folder)]
-    command = [sys.executable, "-c", TOOL, "-container", "container.json", *options]
-    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    sys.argv[1:] = ["-container", "container.json", *options]
+    with redirect_stdout(StringIO()):
+        fmucontainer()
     return folder / "container.fmu"
 
 

@@ -18,6 +18,8 @@ from zipfile import ZipFile
 from ...errors import HarnessError
 from ...process.child import Hangs, ask
 from ...running.description import description
+from ...running.in_c import COMPILER, EMBEDDED
+from . import by_c
 from .request import Reply, Request
 
 AGREE = 1e-6
@@ -82,8 +84,6 @@ def absent(importer: Importer, fmu: Path | None = None) -> str:
         except PackageNotFoundError:
             return f"{package} is not installed: pip install -e '.[importers]'"
     if importer.player == "by_c":
-        from ...running.in_c import COMPILER, EMBEDDED
-
         if COMPILER is None:
             return "there is no C compiler here"
         if not EMBEDDED.is_file():
@@ -109,14 +109,17 @@ def play(importer: Importer, request: Request) -> Played:
 def asked(player: str, request: str) -> Played:
     """The same, asked once."""
     command = [sys.executable, "-m", f"{__package__}.{player}"]
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
+    in_c = Request(**json.loads(request)) if player == "by_c" else None
     try:
-        done = ask(command, request, os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}, PATIENCE)
+        done = by_c.ran(in_c, PATIENCE) if in_c else ask(command, request, environment, PATIENCE)
     except Hangs:
         raise Wrong(f"hangs for {PATIENCE} s") from None
     if done.returncode:
         last = done.stderr.strip().splitlines()[-1:] or ["nothing said"]
         raise Wrong(f"exit status {done.returncode}: {last[0]}")
-    return Played(Reply(**json.loads(done.stdout)), done.stderr)
+    reply = by_c.reply(in_c, done.stdout) if in_c else Reply(**json.loads(done.stdout))
+    return Played(reply, done.stderr)
 
 
 @dataclass(frozen=True)
