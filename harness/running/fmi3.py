@@ -15,6 +15,7 @@ from typing import Any
 import fmpy
 import numpy as np
 from fmpy.fmi3 import FMU3Model, FMU3Slave
+from fmpy.simulation import Input
 
 from ..errors import HarnessError, reason
 from ..process.interrupt import check
@@ -27,16 +28,22 @@ QUIET = ("SUNLOGGER_ERROR_FILENAME", "SUNLOGGER_WARNING_FILENAME")  # CVode woul
 
 
 class Counted(FMU3Model):
-    """An instance for model exchange that counts its right-hand sides."""
+    """An instance for model exchange that counts its right-hand sides, and whose inputs can be led along."""
 
     evaluations = 0
+    led: Any = None  # the inputs that are
+
+    def setTime(self, time: float) -> None:
+        super().setTime(time)
+        if self.led:
+            self.led.apply(time, after_event=True)
 
     def getContinuousStateDerivatives(self, derivatives: Any, size: int) -> None:
         self.evaluations += 1
         super().getContinuousStateDerivatives(derivatives, size)
 
     def reset(self) -> None:
-        self.evaluations = 0
+        self.evaluations, self.led = 0, None
         super().reset()
 
 
@@ -77,17 +84,26 @@ class Instance:
         interval: float,
         rtol: float | None = None,
         patience: float | None = None,
+        start: float = 0.0,
+        signals: np.ndarray | None = None,
+        led: bool = False,
     ) -> Recording:
-        """A run from 0 s to the stop, recorded at every interval (s); without rtol that of the FMU's default
-        experiment.  HarnessError if it fails or outlasts `patience` s."""
+        """A run from the start to the stop, recorded at every interval (all in s); without rtol that of the FMU's
+        default experiment.  Inputs follow `signals`, a structured array of `time` and theirs, in straight lines and,
+        where a time stands twice, jumps; `led` along wherever the solver looks, or held by fmpy within its steps.
+        HarnessError if it fails or outlasts `patience` s."""
+        if led:
+            self.fmu.led = Input(self.fmu, self.description, signals)
         try:
             rows = fmpy.simulate_fmu(
                 self.folder,
                 fmi_type=self.way,
+                start_time=start,
                 stop_time=stop,
                 output_interval=interval,
                 relative_tolerance=rtol,
                 start_values=values,
+                input=signals,
                 output=[*outputs, COUNT],
                 timeout=patience,
                 model_description=self.description,

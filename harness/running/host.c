@@ -2,7 +2,7 @@
  *
  *     host LIBRARY GUID RESOURCES
  *
- *     I new NAME [quiet [exchange]]                  I begin                 I step T H
+ *     I new NAME [quiet [exchange]]                  I begin [T]             I step T H
  *     I setr REFERENCE VALUE                         I calls STATES INDICATORS TURNS
  *     I getr REFERENCE...    I pass REFERENCE J TO   I save                  I restore             I reset
  *     I free                 0 unload                I time REPEAT STOP STEPS WORD...
@@ -167,7 +167,7 @@ static void play(const char *command, int i, char **words, int count, char **hos
         instances[i] = fmi.Instantiate(words[0], type, host[2], host[3], &callbacks, fmi2False, count < 2);
         if (!instances[i]) die("new", "no instance");
     } else if (IS("begin")) {
-        status = fmi.SetupExperiment(c, fmi2False, 0.0, 0.0, fmi2False, 0.0);
+        status = fmi.SetupExperiment(c, fmi2False, 0.0, count ? strtod(words[0], NULL) : 0.0, fmi2False, 0.0);
         if (status == fmi2OK) status = fmi.EnterInitializationMode(c);
         if (status == fmi2OK) fmi.ExitInitializationMode(c); /* what it refuses, the steps refuse too */
     } else if (IS("step")) {

@@ -23,7 +23,8 @@ GRAZE = mpf(10) ** -30  # of the speed: what only touches zero is no standstill
 
 @dataclass(frozen=True)
 class System:
-    """The forces of one span: `slide` and `hold` are those of friction, `u` is the speed of the driver."""
+    """The forces of one span: `slide` and `hold` are those of friction; `u` is the speed of the driver, and of one that
+    pulls as the input does that grows, which alone has the speed `ramp`."""
 
     m: Any
     k: Any
@@ -31,6 +32,7 @@ class System:
     slide: Any
     hold: Any
     u: Any
+    ramp: Any
     push: Any
     dry: bool
 
@@ -47,8 +49,10 @@ def system(values: Values, friction: Friction | None) -> System:
     """The system that a model's values make."""
     value = {name: mpf(number) for name, number in values.items()}
     slide, hold = friction(value) if friction else (mpf(0), mpf(0))
-    c, u = value.get("c", mpf(0)), value.get("v_driver", mpf(0))
-    return System(value["m"], value["k"], c, slide, hold, u, value["F_ext"], friction is not None)
+    rate = value.get("rate", mpf(0))
+    ramp = rate / value["k"] if rate else rate
+    c, u = value.get("c", mpf(0)), value.get("v_driver", mpf(0)) + ramp
+    return System(value["m"], value["k"], c, slide, hold, u, ramp, value["F_ext"], friction is not None)
 
 
 def pieces(spans: list[Span], friction: Friction | None = None) -> Iterator[Piece]:
@@ -75,6 +79,7 @@ def pieces(spans: list[Span], friction: Friction | None = None) -> Iterator[Piec
                 load = mode * s.hold
             else:
                 mode = s.direction(load)
+        drive -= s.ramp * (mpf(end) - mpf(begin))
 
 
 def threshold(s: System, eps: float, stop: float) -> Iterator[Piece]:

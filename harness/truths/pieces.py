@@ -6,7 +6,7 @@ from typing import Any
 
 Values = dict[str, float]
 Course = Callable[[Any], tuple[Any, Any]]  # position and speed at a time
-Span = tuple[float, float, Values]  # from, to in s, and the values that hold
+Span = tuple[float, float, Values]  # from, to in s, and the values that hold; `rate` is that of the input, per s
 Friction = Callable[[Mapping[str, Any]], tuple[Any, Any]]  # of values: the sliding force, and the most that is held
 
 

@@ -33,7 +33,7 @@
 #define PLAIN 0
 #endif
 
-enum { X, V, RTOL, ATOL, X_M, VARIABLES }; /* value references */
+enum { X, V, RTOL, ATOL, X_M, FORCE, RATE, VARIABLES }; /* value references */
 
 #define IS_DRY (MODEL == COULOMB || MODEL == STICKSLIP || MODEL == PENDULUM)
 #define IS_SLED (MODEL == STICKSLIP || MODEL == PACEJKA)
@@ -63,6 +63,8 @@ static const double start[STATES] = {0.1, 0.0};
 
 typedef struct {
     double values[VARIABLES], t, B, C, E;
+    double since; /* when the force of the outside began to change at its rate */
+    bool pushed;  /* anew */
     int mode;
     SUNContext context;
     N_Vector y;
@@ -73,17 +75,15 @@ typedef struct {
 } Instance;
 
 /* What pulls at the body besides friction and damping, N or N m. */
-static double load(double t, N_Vector y)
+static double load(const Instance *it, double t, N_Vector y)
 {
-    double x = NV_Ith_S(y, 0);
+    double x = NV_Ith_S(y, 0), force = it->values[FORCE] + it->values[RATE] * (t - it->since);
 #if MODEL == PENDULUM
-    (void)t;
-    return -WEIGHT * ARM * sin(x);
+    return force - WEIGHT * ARM * sin(x);
 #elif IS_SLED
-    return k * ((IS_DRIVEN ? NV_Ith_S(y, STATES - 1) : v_driver * t) - x);
+    return force + k * ((IS_DRIVEN ? NV_Ith_S(y, STATES - 1) : v_driver * t) - x);
 #else
-    (void)t;
-    return -k * x;
+    return force - k * x;
 #endif
 }
 
@@ -98,7 +98,7 @@ static int slopes(sunrealtype t, N_Vector y, N_Vector slope, void *user)
     }
     bool stuck = IS_DRY && it->mode == 0;
     NV_Ith_S(slope, 0) = stuck ? 0.0 : v;
-    NV_Ith_S(slope, 1) = stuck ? 0.0 : (load(t, y) - resistance) / m;
+    NV_Ith_S(slope, 1) = stuck ? 0.0 : (load(it, t, y) - resistance) / m;
 #if IS_DRIVEN
     NV_Ith_S(slope, 2) = v_driver;
 #endif
@@ -123,14 +123,14 @@ static int derivatives(sunrealtype t, N_Vector y, N_Vector slope, SUNMatrix jaco
 static int change_of_mode(sunrealtype t, N_Vector y, sunrealtype *root, void *user)
 {
     const Instance *it = user;
-    root[0] = it->mode ? NV_Ith_S(y, 1) : hold - fabs(load(t, y));
+    root[0] = it->mode ? NV_Ith_S(y, 1) : hold - fabs(load(it, t, y));
     return 0;
 }
 
 /* The mode from here on, where the body stands still; it breaks away if it was stuck. */
 static void settle(Instance *it, bool was_stuck)
 {
-    double pull = load(it->t, it->y);
+    double pull = load(it, it->t, it->y);
     it->mode = was_stuck || fabs(pull) > hold ? (pull > 0.0) - (pull < 0.0) : 0;
 }
 
@@ -143,7 +143,11 @@ static bool begin(Instance *it)
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, const fmi2Real values[])
 {
-    for (size_t i = 0; i < count; i++) ((Instance *)c)->values[references[i]] = values[i];
+    Instance *it = c;
+    for (size_t i = 0; i < count; i++) {
+        it->values[references[i]] = values[i];
+        it->pushed |= references[i] == FORCE || references[i] == RATE;
+    }
     return fmi2OK;
 }
 
@@ -160,7 +164,8 @@ fmi2Status fmi2Reset(fmi2Component c)
 {
     Instance *it = c;
     it->values[RTOL] = 1e-6, it->values[ATOL] = 1e-9, it->values[X_M] = 0.01;
-    it->t = 0.0;
+    it->t = it->since = it->values[FORCE] = it->values[RATE] = 0.0;
+    it->pushed = false;
     for (int i = 0; i < STATES; i++) NV_Ith_S(it->y, i) = start[i];
     return fmi2OK;
 }
@@ -216,7 +221,8 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
                                fmi2Boolean has_stop, fmi2Real stop)
 {
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    ((Instance *)c)->t = start_time;
+    Instance *it = c;
+    it->t = it->since = start_time;
     return fmi2OK;
 }
 
@@ -227,6 +233,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c)
     it->C = 1.0 + (1.0 - 2.0 * asin(slide / hold) / PI);
     it->B = 2.0 / (x_m * it->C);
     it->E = (it->B * x_m - tan(PI / (2.0 * it->C))) / (it->B * x_m - atan(it->B * x_m));
+    it->pushed = false;
     if (IS_DRY) settle(it, false);
     return CVodeSStolerances(it->cvode, it->values[RTOL], it->values[ATOL]) || !begin(it) ? fmi2Error : fmi2OK;
 }
@@ -242,6 +249,12 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean final
     (void)final;
     Instance *it = c;
     double target = t + h;
+    if (it->pushed) {
+        it->pushed = false;
+        it->since = it->t = t;
+        if (IS_DRY && !it->mode) settle(it, false);
+        if (!begin(it)) return fmi2Discard;
+    }
     while (target - it->t > 1e-13 * target) { /* nearer than that it would not start again */
         int told = CVode(it->cvode, target, it->y, &it->t, CV_NORMAL);
         if (told < 0) return fmi2Discard;

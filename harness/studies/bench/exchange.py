@@ -4,6 +4,7 @@ import re
 import shutil
 from collections.abc import Callable
 from functools import cache, partial
+from itertools import pairwise
 from math import inf
 from pathlib import Path
 from xml.etree import ElementTree
@@ -15,18 +16,20 @@ from ...process.child import ask
 from ...process.room import room
 from ...running.fmi3 import COSIMULATION, EXCHANGE, Recording, instance, sibling
 from ...running.in_c import Library, NotHereError, built, compiled
-from ...running.loops import POINTS
 from ...scenes.fmus import fmu_of
-from ...truths.models import MODELS
-from ...truths.reference import POINTS as COMMON
 from ...truths.reference import relative
 from .measure import NUMBERS, Beside, Measure
-from .native import CASE, REACH, Figures, cvode, fmu, of_cvode, off, played, row, runs
+from .native import CASE, REACH, Figures, cvode, fmu, of_cvode, off, played, row
+from .scene import Scene
 
 TOLERANCES = (1e-6, 1e-8, 1e-10)
 REFERENCES = Path("Reference-FMUs")  # a clone in the folder that one is in
 THEIRS = (2, 1)  # states and indicators of BouncingBall
-TIES = [(model, values, what) for model, its in NUMBERS["ties"].items() for what, values in its.items()]
+PLAIN = [Scene(case) for case in REACH]
+LED = [Scene(case, *its) for case in REACH for its in NUMBERS["led"][CASE[case].model].items()]
+LATE = [Scene(each.case, each.what, each.values, 1000.0) for each in LED]
+TIES = [Scene(model, *its) for model, ties in NUMBERS["ties"].items() for its in ties.items()]
+BOTH_WAYS = [scene for scene in (*PLAIN, *LED, *TIES) if not scene.ramps]  # which fmpy holds in co-simulation
 CALLS = ("the time", "the states", "the derivatives", "the indicators")
 TURNS = 20_000
 
@@ -34,73 +37,107 @@ TURNS = 20_000
 def exchange() -> list[Callable[[], Measure]]:
     """What to measure: errors, answers, and calls (of those whose derivatives need no sine, which costs more)."""
     return [
-        *(partial(by_cvode, case, rtol) for case in REACH for rtol in TOLERANCES),
-        *(partial(beside_co_simulation, model, {}, "default run") for model in MODELS),
-        *(partial(beside_co_simulation, *tie) for tie in TIES),
+        *(partial(by_cvode, scene) for scene in (*PLAIN, *LED, *LATE)),
+        *(partial(beside_co_simulation, scene) for scene in BOTH_WAYS),
         *(partial(calls, model) for model in ("smd", "coulomb", "stickslip")),
     ]
 
 
-def by_cvode(case: str, rtol: float) -> Measure:
+def by_cvode(scene: Scene, tolerances: tuple[float, ...] = TOLERANCES) -> Measure:
     """The largest error through importers' CVode, as a multiple of that of CVODE on the same equations with the events
     written by hand in C: both by BDF with a Jacobian by differences, the position of the driver being a state."""
 
     def figures() -> Figures:
-        values = {**CASE[case].values, "rtol": rtol, "atol": rtol * CASE[case].problem.absolute}
-        plain = runs(cvode(CASE[case].model, plain=True), values, ("x", "v"), CASE[case].problem.stop, POINTS, 1)
-        errors, told = [], [Beside(f"CVODE at its best, error {off(case, of_cvode(case, rtol)):.1e}")]
-        for name, way in ("fmpy", by_fmpy), ("fmusim", by_fmusim):
+        ratio, told, lacks = 0.0, [], set()
+        for rtol in tolerances:
+            errors = {"CVODE by hand": error(scene, hand(scene, rtol)), "fmpy": error(scene, fmpy(scene, rtol))}
             try:
-                errors.append(way(case, rtol))
-                told.append(Beside(f"{name}, error {errors[-1]:.1e}"))
-            except NotHereError as error:
-                told.append(Beside(str(error)))
-        return max(errors) / off(case, plain), 3.0, (Beside(f"CVODE by hand, error {off(case, plain):.1e}"), *told)
+                errors["fmusim"] = error(scene, fmusim(scene, rtol))
+            except NotHereError as why:
+                lacks.add(Beside(str(why)))
+            by_hand, *theirs = errors.values()
+            ratio = max(ratio, *(each / by_hand for each in theirs))
+            if scene.is_plain:
+                errors["CVODE at its best"] = off(scene.case, of_cvode(scene.case, rtol))
+            words = ", ".join(f"{name} {each:.1e}" for name, each in errors.items())
+            told.append(Beside(f"errors at rtol {rtol:.0e}: {words}"))
+        return ratio, 3.0, (*told, *lacks)
 
-    return row(f"{case}, model exchange at rtol {rtol:.0e}: error, ratio to CVODE's by hand", "1", figures)
-
-
-def by_fmpy(case: str, rtol: float) -> float:
-    """The largest error through fmpy."""
-    its, truth = CASE[case], CASE[case].reference
-    found = recorded(its.model, EXCHANGE, its.values, its.outputs, its.problem.stop, rtol)
-    return float(relative(found.at(truth.times, its.outputs), truth.motion).max())
+    return row(f"{scene}, model exchange: largest error, ratio to CVODE's by hand", "1", figures)
 
 
-def by_fmusim(case: str, rtol: float) -> float:
-    """The largest error through fmusim."""
-    program, its, truth = shutil.which("fmusim"), CASE[case], CASE[case].reference
+def error(scene: Scene, found: Recording | np.ndarray) -> float:
+    """The largest at the common times, of a recording or of position and speed (n, 2)."""
+    motion = found.at(scene.times, scene.its.outputs) if isinstance(found, Recording) else found
+    return float(relative(motion, scene.truth).max())
+
+
+def hand(scene: Scene, rtol: float) -> np.ndarray:
+    """Position and speed (n, 2) at the common times, by CVODE."""
+    its, library = scene.its, cvode(scene.its.model, plain=True)
+
+    def put(**values: float) -> list[str]:
+        return [f"0 setr {library.references[name]} {value!r}" for name, value in values.items()]
+
+    read = "0 getr {} {}".format(*map(library.references.__getitem__, ("x", "v")))
+    led = {t: put(force=value, rate=rate) for t, _, value, rate in scene.lines}
+    common = {*scene.times.tolist()}
+    calls = ["0 new hand quiet", *put(**its.values, rtol=rtol, atol=rtol * its.problem.absolute)]
+    calls += [*led.pop(scene.start), f"0 begin {scene.start!r}", read]
+    for t, ahead in pairwise(sorted(common | led.keys())):
+        calls += [*led.get(t, []), f"0 step {t!r} {ahead - t!r}", *[read] * (ahead in common)]
+    answers = played(library, "\n".join([*calls, "0 free\n"])).splitlines()
+    if {answer for answer in answers if answer.startswith("status")} != {"status 0"}:
+        raise HarnessError(f"{scene}: CVODE by hand gives up")
+    return np.array([answer.split()[1:] for answer in answers if answer.startswith("values")], dtype=float)
+
+
+def fmpy(scene: Scene, rtol: float, way: str = EXCHANGE) -> Recording:
+    """A run of the FMI 3.0 FMU through fmpy, its events counted."""
+    its = scene.its
+    outputs = (*its.outputs, *["events.count"] * its.problem.dry)
+    span = scene.stop, scene.interval, rtol, None, scene.start
+    with instance(three(its.model), way) as fmu:
+        return fmu.simulate(scene.numbers, outputs, *span, signals=scene.signals, led=scene.ramps)
+
+
+def fmusim(scene: Scene, rtol: float) -> Recording:
+    """A run of the FMI 3.0 FMU through fmusim."""
+    program, its = shutil.which("fmusim"), scene.its
     if program is None:
         raise NotHereError("not installed: fmusim")
+    if scene.ramps:
+        raise NotHereError("fmusim holds an input within its steps")
+    if scene.start:
+        raise NotHereError("fmusim takes times for the same that differ by 1e-5 of them")
     with room("fmusim-") as folder:
-        file = folder / "out.csv"
+        file, led = folder / "out.csv", folder / "in.csv"
         command = [program, "--interface-type", "me", "--solver", "cvode", "--tolerance", repr(rtol)]
-        command += ["--output-interval", repr(its.problem.stop / (COMMON - 1)), "--output-file", str(file)]
-        command += [word for name, value in its.values.items() for word in ("--start-value", name, repr(value))]
+        command += ["--start-time", repr(scene.start), "--stop-time", repr(scene.stop)]
+        command += ["--output-interval", repr(scene.interval), "--output-file", str(file)]
+        command += [word for name, value in scene.numbers.items() for word in ("--start-value", name, repr(value))]
+        if scene.signals is not None:
+            heads = ",".join(scene.signals.dtype.names or ())
+            np.savetxt(led, scene.signals, "%.17g", ",", header=heads, comments="")
+            command += ["--input-file", str(led)]
         done = ask([*command, str(three(its.model))])
         if done.returncode:
-            raise HarnessError((done.stderr or done.stdout or "fmusim gives no reason").splitlines()[0])
-        rows = np.genfromtxt(file, delimiter=",", names=True)
-    return float(relative(Recording(rows, 0).at(truth.times, its.outputs), truth.motion).max())
+            raise HarnessError(" ".join((done.stderr or done.stdout).split()) or "fmusim gives no reason")
+        return Recording(np.genfromtxt(file, delimiter=",", names=True), 0)
 
 
-def beside_co_simulation(model: str, values: dict[str, float], what: str) -> Measure:
+def beside_co_simulation(scene: Scene) -> Measure:
     """The largest difference of model exchange and co-simulation at common times, as a share of the largest value of
     each output; without bound if they count different events."""
 
     def figures() -> Figures:
-        case = next(case for case in CASE.values() if case.model == model)
-        problem, outputs = case.problem, case.outputs
-        its = (*outputs, *["events.count"] * problem.dry)
-        times = np.linspace(0.0, problem.stop, COMMON)
-        both = [recorded(model, way, values, its, problem.stop, 1e-10) for way in (EXCHANGE, COSIMULATION)]
-        one, other = (found.at(times, outputs) for found in both)
-        counts = [int(found.rows["events.count"][-1]) if problem.dry else 0 for found in both]
-        same = counts[0] == counts[1]
-        told = Beside(f"{counts[0]} events in model exchange, {counts[1]} in co-simulation")
-        return float(relative(one, other).max()) if same else inf, 1e-6, (told,)
+        one, other = (fmpy(scene, 1e-10, way) for way in (EXCHANGE, COSIMULATION))
+        counts = [int(found.rows["events.count"][-1]) if scene.its.problem.dry else 0 for found in (one, other)]
+        told = Beside("{} events in model exchange, {} in co-simulation".format(*counts))
+        apart = relative(*(found.at(scene.times, scene.its.outputs) for found in (one, other))).max()
+        return float(apart) if counts[0] == counts[1] else inf, 1e-6, (told,)
 
-    return row(f"{model}, {what}: model exchange at rtol 1e-10, difference from co-simulation", "1", figures)
+    return row(f"{scene}: model exchange at rtol 1e-10, difference from co-simulation", "1", figures)
 
 
 def calls(model: str) -> Measure:
@@ -146,11 +183,3 @@ def three(model: str) -> Path:
     if not file.is_file():
         raise NotHereError(f"not built: {file} (python build_fmus.py --fmi 3)")
     return file
-
-
-def recorded(
-    model: str, way: str, values: dict[str, float], outputs: tuple[str, ...], stop: float, rtol: float
-) -> Recording:
-    """A run of the FMI 3.0 FMU through fmpy, recorded at the common times."""
-    with instance(three(model), way) as fmu:
-        return fmu.simulate(values, outputs, stop, stop / (COMMON - 1), rtol)

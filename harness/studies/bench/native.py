@@ -159,7 +159,7 @@ def cvode(model: str, plain: bool = False) -> Library:
     options = (f"-DMODEL={model.upper()}", f"-DPLAIN={plain:d}", "-shared", "-fPIC")
     libraries = ("-lsundials_cvode", "-lsundials_nvecserial", "-lm")
     file = compiled(Path(__file__).with_name("cvode.c"), f"{model}-{plain:d}-cvode.so", options, libraries)
-    return Library(file, {name: place for place, name in enumerate(("x", "v", "rtol", "atol", "x_m"))})
+    return Library(file, {name: place for place, name in enumerate(("x", "v", "rtol", "atol", "x_m", "force", "rate"))})
 
 
 @cache

@@ -67,7 +67,7 @@ def pieces(spans: list[Span]) -> Iterator[Piece]:
         def rates(
             s: float, y: np.ndarray, p: Values = p, curve: Curve = curve, drive: float = drive
         ) -> tuple[float, float]:
-            pull = p["F_ext"] + p["k"] * (drive + p["v_driver"] * s - y[0])
+            pull = p["F_ext"] + p.get("rate", 0.0) * s + p["k"] * (drive + p["v_driver"] * s - y[0])
             return y[1], pull / p["m"] - curve.mu(y[1]) * p["g"]
 
         def slopes(s: float, y: np.ndarray, p: Values = p, curve: Curve = curve) -> list[list[float]]:

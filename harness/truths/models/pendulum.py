@@ -1,7 +1,7 @@
 """Compound pendulum with friction in its pin, by scipy's DOP853, restarted at every change of mode or value."""
 
 from collections.abc import Iterator
-from math import copysign, cos, hypot, pi, radians, sin, sqrt
+from math import copysign, cos, hypot, inf, pi, radians, sin, sqrt
 
 import numpy as np
 
@@ -68,11 +68,14 @@ def pieces(spans: list[Span]) -> Iterator[Piece]:
     for begin, end, p in spans:
         pin, t = Pin(p, -1 if half_turns % 2 else 1), begin
         while t < end:
-            mode = int(copysign(1, omega)) if omega else pin.direction(angle)
+            load = pin.load(angle, t - begin)
+            mode = int(copysign(1, omega)) if omega else pin.direction(load)
             if mode == 0:
                 yield Piece(t, 0, turned(gliding(angle, 0.0), half_turns * pi))
-                break
-            ahead, angle, omega, at = swing(pin, mode, end - t, angle, omega)
+                t, mode = t + pin.wait(load), int(copysign(1, pin.rate))
+                if not t < end:
+                    break
+            ahead, angle, omega, at = swing(pin, mode, t - begin, end - t, angle, omega)
             yield Piece(t, mode, turned(later(at, t), half_turns * pi))
             t += ahead
 
@@ -83,24 +86,29 @@ def turned(at: Course, angle: float) -> Course:
 
 
 class Pin:
-    """The torques of one span; `down` is 1 where the angle is counted from below, -1 from above."""
+    """The torques of one span, with the time from its beginning; `down` is 1 where the angle is counted from below, -1
+    from above."""
 
     def __init__(self, p: Values, down: int):
-        self.push, self.weight, self.ma, self.down = p["T_ext"], p["m"] * p["g"], p["m"] * p["a"], down
+        self.push, self.rate, self.down = p["T_ext"], p.get("rate", 0.0), down
+        self.weight, self.ma = p["m"] * p["g"], p["m"] * p["a"]
         self.moment, self.inertia = self.weight * p["a"], p["J_G"] + p["m"] * p["a"] ** 2
         self.arm, self.reaction = p["mu"] * p["r"], p["pin_load"] == REACTION
 
-    def load(self, angle: float) -> float:
-        return self.push - self.down * self.moment * sin(angle)
+    def load(self, angle: float, t: float) -> float:
+        return self.push + self.rate * t - self.down * self.moment * sin(angle)
 
-    def direction(self, angle: float) -> int:
+    def direction(self, load: float) -> int:
         """Where it goes from rest."""
-        load = self.load(angle)
         return int(copysign(1, load)) if abs(load) > self.arm * self.weight else 0
 
-    def acceleration(self, angle: float, omega: float, mode: int) -> float:
+    def wait(self, load: float) -> float:
+        """How long it rests."""
+        return (self.arm * self.weight - copysign(1, self.rate) * load) / abs(self.rate) if self.rate else inf
+
+    def acceleration(self, t: float, angle: float, omega: float, mode: int) -> float:
         """The load on the pin depends on the answer: iterated, at least two digits gained a round with thin pins."""
-        load = self.load(angle)
+        load = self.load(angle, t)
         alpha = (load - mode * self.arm * self.weight) / self.inertia
         if self.reaction:
             radial = self.down * self.weight * cos(angle) + self.ma * omega * omega
@@ -110,13 +118,15 @@ class Pin:
         return alpha
 
 
-def swing(pin: Pin, mode: int, longest: float, angle: float, omega: float) -> tuple[float, float, float, Course]:
+def swing(
+    pin: Pin, mode: int, begin: float, longest: float, angle: float, omega: float
+) -> tuple[float, float, float, Course]:
     """To the next standstill, or as long as may be: how long, angle, angular speed and the motion until then."""
 
     from scipy.integrate import solve_ivp
 
-    def rates(_: float, y: np.ndarray) -> tuple[float, float]:
-        return y[1], pin.acceleration(y[0], y[1], mode)
+    def rates(t: float, y: np.ndarray) -> tuple[float, float]:
+        return y[1], pin.acceleration(begin + t, y[0], y[1], mode)
 
     def still(_: float, y: np.ndarray) -> float:
         return y[1]
