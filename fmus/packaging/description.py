@@ -28,7 +28,7 @@ CAPABILITIES = {
 }
 SLOPES = {"providesDirectionalDerivative": "true"}
 RATES = {"maxOutputDerivativeOrder": "1"}
-RAMPS = {"canInterpolateInputs": "true"}  # at a constant rate
+RAMPS = {"canInterpolateInputs": "true"}  # as polynomials
 EXCHANGE = {  # what is said of model exchange: the same, but for the steps
     **{key: able for key, able in CAPABILITIES.items() if "Communication" not in key},
     "completedIntegratorStepNotNeeded": "true",

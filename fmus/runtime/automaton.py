@@ -8,7 +8,7 @@ based on the synchronous data flow principle, CACSD 1999).
 
 from math import fabs, inf
 
-from .codes import BACKWARD, EXACT, FORWARD, HYBRID, RULES, SIGN, STUCK, THRESHOLD
+from .codes import BACKWARD, EXACT, FORWARD, HIGHEST, HYBRID, RULES, SIGN, STUCK, THRESHOLD
 from .oscillator import Oscillator
 from .rounding import NEAR
 from .vectors import Contact, Contacts, States, per_contact, place, slip
@@ -41,7 +41,8 @@ class DryFriction(Oscillator):
     It says of its contact
         hold(t, states)         the load on it at rest, its rate and the holding limit
         terms(t, states)        the sum of the sizes of what the load is made of, of which rounding takes its share
-    While the body stands still, the load is linear in time.
+        load_rate(t, states, n) the n-th derivative of the load, where inputs have any
+    While the body stands still, the load is linear in time, unless an input bends.
     """
 
     contacts: dict[str, str] = {"mode": "v"}
@@ -123,11 +124,31 @@ class DryFriction(Oscillator):
     def release(self, t, y: States, i: Contact):
         """When a contact breaks away if nothing moves, and in which direction; inf if it never does."""
         load, rate, limit = self.hold(t, y, i)
+        if self.ramps and self.bends():
+            return self.bent_release(t, y, load, rate, limit, i)
         if rate == 0.0:
             return inf, STUCK
         direction = FORWARD if rate > 0.0 else BACKWARD
         wait = (limit - direction * load) / fabs(rate)
         return t + (wait if wait > 0.0 else 0.0), direction
+
+    def bent_release(self, t, y: States, load, rate, limit, i: Contact):
+        """The same where inputs bend; in no direction where it is to be looked for again from there on."""
+        series = self.solver.step.series
+        span = scale = self.solver.step.longest
+        series.c[1] = rate * span
+        for n in range(2, HIGHEST + 1):
+            scale *= span / n
+            series.c[n] = self.load_rate(t, y, n, i) * scale
+        series.c[0] = load - limit if load < limit else 0.0
+        up, forward = series.first_zero(BACKWARD)
+        series.c[0] = load + limit if load > -limit else 0.0
+        down, backward = series.first_zero(FORWARD)
+        if forward and up <= down:
+            return t + up * span, FORWARD
+        if backward and down <= up:
+            return t + down * span, BACKWARD
+        return t + (up if up < down else down) * span, STUCK
 
     def guard(self, step, t, i: Contact):
         """Positive while the mode lasts: the speed, in the direction of the mode."""

@@ -15,5 +15,6 @@ BAD_STEP, BAD_START, BAD_STOP, BAD_VALUE = 5, 6, 7, 8
 CALCULATED, FIXED, OUT_OF_RANGE = 10, 11, 12  # why a value is bad
 NO_VARIABLE, FOREIGN_STATE, INTERRUPTED = 13, 14, 15
 OUT_OF_ORDER, NO_ADDRESS, NO_MEMORY, NOT_OFFERED, TOO_SHORT, WRONG_TOKEN, WRONG_LENGTH = 16, 17, 18, 19, 20, 21, 22
-NO_DERIVATIVE, NO_RATE = 23, 24
+NO_DERIVATIVE, NO_RATE, NO_COURSE = 23, 24, 25
+HIGHEST = 8  # order of a derivative of an input: that of dop853, to which one beyond it says nothing
 RULES = 100  # and the number of the rule of the model that the values break

@@ -8,15 +8,18 @@ With z = c/(2 m), n^2 = k/m, p = F/m and the impulse response G (G'' + 2 z G' + 
 G, G', I and J are written for each kind of damping so that no digit is lost near critical damping, with a weak
 spring or without one (L. Meirovitch, Fundamentals of Vibrations, chapters 2 and 4, has the usual forms).
 A resting point that drifts at the speed u (a driver pulling the spring) is offered without damping only: no
-oscillator here has both.  Where inputs have no rates, neither has the force: q is zero.
+oscillator here has both.  Where inputs have no rates, neither has the force: q is zero.  Where it changes at a rate
+that changes as well, it bends: the motion is then taken in stretches, each by its power series.
 """
 
 from math import atan2, copysign, cos, exp, expm1, fabs, inf, log1p, pi, sin, sqrt
 
+from .codes import HIGHEST
 from .rounding import NEAR
+from .series import TERMS, Series
 from .vectors import States
 
-UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE = 1, 2, 3, 4
+UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE, BENT = 1, 2, 3, 4, 5
 MOST_HALVINGS, MOST_DOUBLINGS = 200, 1000
 
 
@@ -29,6 +32,7 @@ class Exact:
         self.z = self.n2 = self.drift = self.q = 0.0
         self.w = self.slow = 0.0
         self.x0 = self.v0 = self.a0 = self.p = self.lost = 0.0
+        self.series = Series()  # of the speed, where the force bends
 
     def prepare(self, m, c, k, drift):
         """Take over mass (kg), damping (N.s/m), stiffness (N/m) and the speed of the resting point (m/s)."""
@@ -67,6 +71,8 @@ class Exact:
                 self.x0 + (self.v0 * g + self.a0 * fall / self.n2 + self.drift * lag + self.lost),
                 self.v0 * (1.0 - fall) + self.a0 * g + self.drift * fall,
             )
+        if self.ramps and self.kind == BENT:
+            return self.bent(t)
         if self.ramps and self.q != 0.0:
             return self.ramped(t)
         if self.kind == FREE:
@@ -120,6 +126,31 @@ class Exact:
             self.x0 * (slope + 2.0 * z * g) + self.v0 * g + self.p * once + self.q * twice,
             (self.p - n2 * self.x0) * g + self.v0 * slope + self.q * once,
         )
+
+    def bend(self, model, t, span):
+        """Work out the series from t on, over so many seconds: v'' + 2 z v' + n^2 v = p', as the model tells it."""
+        series = self.series
+        series.span = span
+        series.c[0], series.c[1] = self.v0, self.a0 * span
+        scale = span * span
+        push = self.n2 * self.drift
+        for k in range(TERMS - 1):
+            if k < HIGHEST:
+                push += model.push_rate(t, k + 1)
+            back = 2.0 * self.z * span * (k + 1) * series.c[k + 1] + self.n2 * span * span * series.c[k]
+            series.c[k + 2] = (push * scale - back) / ((k + 1) * (k + 2.0))
+            push = 0.0
+            scale *= span / (k + 1)
+
+    def bent(self, t) -> States:
+        """Position and speed where the force bends."""
+        series = self.series
+        mean = v = 0.0
+        for i in range(TERMS + 1):
+            k = TERMS - i
+            v = series.c[k] + v * t / series.span
+            mean = series.c[k] / (k + 1) + mean * t / series.span
+        return self.x0 + mean * t, v
 
     def overdamped(self, t):
         """G, G' and I from the two real roots, which coincide at critical damping."""

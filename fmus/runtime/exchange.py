@@ -157,6 +157,12 @@ def rates(model):
         exchange.rates[len(y)] = model.drive()
 
 
+def input_rates(model):
+    """Set the rates of the inputs that have any."""
+    if model.ramps:
+        model.input_rates(model.solver.t)
+
+
 def indicators(model):
     """The event indicators; where the law of friction knows no modes, they are 1."""
     exchange = model.exchange

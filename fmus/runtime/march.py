@@ -9,6 +9,7 @@ from math import inf, nan
 from . import ode23
 from .codes import DIVERGED, ENDLESS, HYBRID, OK, STUCK
 from .declare import Choice, Count, Declaring, Fixed, Local
+from .exact import BENT
 from .methods import ITEMS
 from .step import HUGE, Step
 from .vectors import Contacts, States, contacts, every, magnitude, slip, some, speeds, total
@@ -116,8 +117,10 @@ class March(Declaring):
         if model.linear:
             mass, damping, stiffness, drift = model.piece()
             step.methods.exact.prepare(mass, damping, stiffness, drift)
-            if model.ramps:
-                step.methods.exact.follow(model.ramp())
+            if model.ramps and model.bends():
+                step.methods.exact.kind = BENT
+            elif model.ramps:
+                step.methods.exact.follow(model.push_rate(self.t, 1))
 
     # ---- the present point
 

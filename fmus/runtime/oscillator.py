@@ -25,7 +25,7 @@ class Oscillator(Declaring):
     and if it is linear, between its modes, m v' + c v + k x = F + k u t,
         piece()                        m, c, k and u
         push(t, modes)                 what of the acceleration is due to forces, at x = v = 0
-        ramp()                         the rate of that, where inputs have rates
+        push_rate(t, n)                the n-th derivative of that, where inputs have any
     """
 
     states: dict[str, str] = {"x": "v", "v": "a"}  # name -> name of its rate, which may be a state
@@ -34,7 +34,7 @@ class Oscillator(Declaring):
     waits = False  # while its contact is stuck nothing moves
     coupled = False  # a contact may be stuck while something moves
     driven = False  # it follows a driver, who stood at x_base at the time t_base and moves at the speed drive()
-    ramps = False  # its inputs have rates: each was the number input_base at the time t_base
+    ramps = False  # its inputs have derivatives, those in input_course at the time t_base; some bend, if bends()
     linear = False  # piecewise linear: see exact.py
     rules: tuple[str, ...] = ()  # one sentence for each rule that binds several values, in their names
     own_solver = 0  # the number of the rule that is about our solver, and does not bind an importer's

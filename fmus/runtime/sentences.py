@@ -20,11 +20,13 @@ from .codes import (
     EVENT,
     FIXED,
     FOREIGN_STATE,
+    HIGHEST,
     INITIALISING,
     INSTANTIATED,
     INTERMEDIATE,
     INTERRUPTED,
     NO_ADDRESS,
+    NO_COURSE,
     NO_DERIVATIVE,
     NO_MEMORY,
     NO_RATE,
@@ -75,8 +77,10 @@ CALLS = {
     WRONG_TOKEN: "{function} is refused: the GUID or token must be {word}, that of modelDescription.xml",
     NO_DERIVATIVE: "{function} is refused: value reference {reference} is not that of a state or an input, or of what "
     "follows from them",
-    NO_RATE: "{function} is refused: value reference {reference} has no such derivative; what it may have is of "
-    "the order 1, and of {word}",
+    NO_RATE: "{function} is refused: value reference {reference} has no such derivative; those told are of outputs, "
+    "and of the order 1",
+    NO_COURSE: "{function} is refused: value reference {reference} takes no such derivative; an input without a range "
+    f"takes finite ones of the orders 1 to {HIGHEST}, so leave out those above and take shorter communication steps",
     WRONG_LENGTH: "{function} is refused: {word} is another number than there are",
 }
 PHASES = {

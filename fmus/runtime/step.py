@@ -9,9 +9,11 @@ from math import inf
 
 from .automaton import UNSETTLED
 from .codes import DIVERGED, EXACT, OK, STALLED, STUCK
+from .exact import BENT
 from .interpolant import Interpolant
 from .methods import Methods
 from .rounding import NEAR, ULP
+from .series import Series
 from .vectors import (
     Contacts,
     States,
@@ -84,6 +86,7 @@ class Step:
         # the length of the step before an event cut it, and what holds within
         self.span = 0.0
         self.interpolant = Interpolant()
+        self.series = Series()  # of a load, where inputs bend
         # counts up to t1, and the size to try next; the same at t0
         self.taken = self.refused = self.called = self.looked = 0
         self.size = 0.0
@@ -144,7 +147,10 @@ class Step:
         if model.waits and self.sticks and (every(self.modes0 == STUCK) or self.touches):
             status = self.wait(model)
         elif model.linear and self.methods.chosen == EXACT:
-            status = self.take_piece(model)
+            if model.ramps and self.methods.exact.kind == BENT:
+                status = self.take_stretch(model)
+            else:
+                status = self.take_piece(model)
         else:
             status = self.take_step(model)
         self.taken += 1
@@ -179,7 +185,8 @@ class Step:
                 self.modes1[i] = ways[i]
             self.begin_anew(model)
             for i in contacts:
-                self.f1[slip[i]] = model.departure(end, self.y1, self.modes1, i)
+                if self.modes1[i] != STUCK:
+                    self.f1[slip[i]] = model.departure(end, self.y1, self.modes1, i)
         else:
             self.t1, self.f1 = self.t_end, 0.0
         return OK
@@ -208,6 +215,31 @@ class Step:
             if not total(magnitude(self.y1)) < HUGE:
                 return DIVERGED
         return OK
+
+    def take_stretch(self, model):
+        """A stretch of a motion under a force that bends, up to the next standstill."""
+        exact = self.methods.exact
+        pace = exact.z + exact.w
+        span = self.longest if self.longest * pace < 1.0 else 1.0 / pace
+        left = self.t_end - self.t0
+        last = span >= left
+        if last:
+            span = left
+        exact.begin(self.y0, self.f0, 0.0, 0.0)
+        exact.bend(model, self.t0, span)
+        self.t1 = self.t_end if last else self.t0 + span
+        if model.dry:
+            share, ends = exact.series.first_zero(self.modes0)
+            if share < 1.0:
+                self.t1 = self.t0 + share * span
+            if ends:
+                self.y1 = exact.at(share * span)
+                for i in contacts:
+                    self.y1[slip[i]] = 0.0
+                return self.stop(model)
+        self.y1 = exact.at(self.t1 - self.t0)
+        self.f1 = model.rates(self.t1, self.y1, self.modes1)
+        return OK if total(magnitude(self.y1)) < HUGE else DIVERGED
 
     def take_step(self, model):
         """One step of the method that meets the tolerance, cut where the mode changes."""

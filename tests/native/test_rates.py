@@ -1,8 +1,8 @@
-"""Native FMUs: inputs that change at a constant rate, and the rates of outputs."""
+"""Native FMUs: inputs that change by themselves, up to polynomials of order 8, and the rates of outputs."""
 
 from dataclasses import replace
 from itertools import pairwise
-from math import asin, atan, inf, nan, pi, sin, tan
+from math import asin, atan, inf, log2, nan, pi, sin, tan
 
 import driver
 import fmi3_hosts
@@ -11,7 +11,7 @@ import pytest
 from compare import close, identical
 from driver import Refused
 from fmpy import read_model_description
-from models import DOP853, MODELS, ODE23, ODE45, RODAS, outputs, push
+from models import DOP853, EXACT, MODELS, ODE23, ODE45, RODAS, outputs, push
 from mpmath import mp
 from ramps import Body
 from scipy.integrate import solve_ivp
@@ -30,6 +30,8 @@ DAMPING = {  # stiffness, damping
 }
 PIECES = ((0.0, 0.3, 2.0), (1.0, 2.3, -3.0), (2.5, -2.2, 1.7))  # from a time on a force, and its rate
 HARD = ((0.0, 0.0, 80.0), (2.0, 160.0, -120.0), (5.0, -200.0, 60.0))  # enough to drag the sled
+BENT = ((0.0, 0.3, 2.1, -9.0, 12.5), (1.0, 2.3, -3.0, 8.0), (2.5, -2.2, 1.7, 0.0, 30.0, -400.0))  # and its derivatives
+DRAGGED = ((0.0, 0.0, 20.0, 60.0, -30.0), (3.0, 60.0, -400.0, 250.0), (6.0, -150.0, 0.0, 0.0, 90.0))
 HELD, SLID = 0.9 * 12.5 * 9.81, 0.6 * 12.5 * 9.81
 POUND, INCH = 0.45359237, 0.0254
 
@@ -46,9 +48,10 @@ def pushed(fmu, pieces, times, names):
     rows, left = [], list(pieces)
     for t, end in pairwise([0.0, *times]):
         if left and left[0][0] == t:
-            _, value, rate = left.pop(0)
+            _, value, *rates = left.pop(0)
+            for order in range(len(rates), 0, -1):
+                fmu.ramp("F_ext", rates[order - 1], order)
             fmu.set({"F_ext": value})
-            fmu.ramp("F_ext", rate)
         fmu.step(t, end - t)
         rows.append(fmu.get(*names))
     return rows
@@ -93,39 +96,59 @@ def test_a_ramp_breaks_the_sled_away_in_time_behind_its_driver_and_alone(launch,
     assert agree(fmu, Body(m=12.5, k=k, hold=HELD, slide=SLID, u=v_driver), HARD, 10.0) >= 3
 
 
+@pytest.mark.parametrize("damping", DAMPING)
+def test_a_force_that_bends_is_exact_through_stick_and_slip_with_every_damping(launch, damping):
+    """What is not set anew goes on: orders 3 and 4 of the second piece are those of the first."""
+    k, c = DAMPING[damping]
+    for name, friction in ("smd", 0.0), ("coulomb", 0.5):
+        fmu = launch(name, {"k": k, "c": c, "v0": 0.2}, stop=None)
+        body = Body(k=k, c=c, hold=friction, slide=friction, x=0.1, v=0.2)
+        assert agree(fmu, body, BENT, 5.0) >= 2 * friction
+
+
+@pytest.mark.parametrize(("v_driver", "k"), [(0.034, 742.5), (0.0, 742.5), (0.034, 0.0)])
+def test_a_force_that_bends_breaks_the_sled_away_in_time(launch, v_driver, k):
+    fmu = launch("stickslip", {"v_driver": v_driver, "k": k}, stop=None)
+    assert agree(fmu, Body(m=12.5, k=k, hold=HELD, slide=SLID, u=v_driver), DRAGGED, 10.0) >= 3
+
+
 # ---- the methods with steps
 
 STEPPING = {"ode23": 1e-8, "ode45": 1e-9, "dop853": 1e-10, "rodas": 1e-8}  # and the tolerances to ask for
-NUMBERS = {"ode23": ODE23, "ode45": ODE45, "dop853": DOP853, "rodas": RODAS}
+NUMBERS = {"exact": EXACT, "ode23": ODE23, "ode45": ODE45, "dop853": DOP853, "rodas": RODAS}
 
 
 def drag(t, y):
-    """The sled on the curve of the magic formula, pushed with 50 N/s."""
+    """The sled on the curve of the magic formula, pushed with 50 N/s at first."""
     x, v = y
     C = 2.0 - 2.0 * asin(0.6 / 0.9) / pi
     peak = 2.0 / C
     E, z = (peak - tan(0.5 * pi / C)) / (peak - atan(peak)), peak * v / 0.01
     mu = 0.9 * sin(C * atan(z - E * (z - atan(z))))
-    return v, (50.0 * t + 742.5 * (0.034 * t - x)) / 12.5 - mu * 9.81
+    return v, (50.0 * t - 30.0 * t * t + 12.0 * t**3 + 742.5 * (0.034 * t - x)) / 12.5 - mu * 9.81
 
 
 def swing(t, y):
-    """The pendulum while it turns forward, driven with 0.1 N m/s."""
+    """The pendulum while it turns forward, driven with 0.1 N m/s at first."""
     theta, omega = y
     m, a, J, g, arm = 0.46 * POUND, 3.7 * INCH, 1.5 * POUND * INCH**2, 386.0 * INCH, 0.1 * 0.25 * INCH
-    return omega, (0.1 * t - m * g * a * sin(theta) - arm * m * g) / (J + m * a * a)
+    return omega, (0.1 * t + 4.0 * t * t - 20.0 * t**3 - m * g * a * sin(theta) - arm * m * g) / (J + m * a * a)
 
 
-SMOOTH = {"pacejka": (drag, "F_ext", 50.0, {}, 2.0), "pendulum": (swing, "T_ext", 0.1, {"omega0": 12.0}, 0.1)}
+SMOOTH = {
+    "pacejka": (drag, "F_ext", (50.0, -60.0, 72.0), {}, 2.0),
+    "pendulum": (swing, "T_ext", (0.1, 8.0, -120.0), {"omega0": 12.0}, 0.1),
+}
 
 
 @pytest.mark.parametrize("method", STEPPING)
 @pytest.mark.parametrize("name", SMOOTH)
-def test_a_ramp_enters_every_method_by_the_time(launch, name, method):
-    rates, force, rate, values, stop = SMOOTH[name]
+def test_a_force_that_bends_enters_every_method_by_the_time(launch, name, method):
+    rates, force, derivatives, values, stop = SMOOTH[name]
     fmu = launch(name, {"solver.method": NUMBERS[method], "solver.rtol": STEPPING[method], **values}, stop=None)
     start, names = fmu.get(*outputs(name)[:2]), outputs(name)[:2]
-    fmu.ramp(force, rate)
+    for order, value in enumerate(derivatives, 1):
+        fmu.ramp(force, value, order)
     fmu.step(0.0, stop)
     right = solve_ivp(rates, (0.0, stop), start, "LSODA", rtol=1e-11, atol=1e-13).y[:, -1]
     close([fmu.get(*names)], [right.tolist()], names, 1e-6)
@@ -133,14 +156,70 @@ def test_a_ramp_enters_every_method_by_the_time(launch, name, method):
 
 @pytest.mark.parametrize("method", STEPPING)
 @pytest.mark.parametrize("name", ["coulomb", "stickslip"])
-def test_every_method_breaks_away_and_comes_to_rest_under_a_ramp(launch, name, method):
+def test_every_method_breaks_away_and_comes_to_rest_under_a_force_that_bends(launch, name, method):
     values = {"solver.method": NUMBERS[method], "solver.rtol": STEPPING[method]}
-    sled, pieces = name == "stickslip", HARD if name == "stickslip" else PIECES
+    sled, pieces = name == "stickslip", DRAGGED if name == "stickslip" else BENT
     fmu = launch(name, values, stop=None)
     body = Body(m=12.5, k=742.5, hold=HELD, slide=SLID, u=0.034) if sled else Body(k=157.9, hold=0.5, slide=0.5, x=0.1)
     times, names = [0.25 * n for n in range(1, 25)], ("x", "v", "events.t_last")
     close(pushed(fmu, pieces, times, names), followed(body, pieces, times), names, 1e-5)
     assert fmu.get("events.count") == len(body.events) >= 2
+
+
+LIMITS = {
+    "coulomb": ({"x0": 0.0}, 0.5),
+    "stickslip": ({"v_driver": 0.0}, HELD),
+    "pendulum": ({"theta0": 0.0}, 0.1 * 0.25 * INCH * 0.46 * POUND * 386.0 * INCH),
+}  # at rest without a load, and what is held
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_load_that_turns_just_below_the_limit_is_held_and_let_go_at_the_other(launch, name):
+    """Of what is held it is 3 t - 4 t^3, but for 1e-9: 1 at most at 0.5 s, and -1 at 1 s."""
+    values, limit = LIMITS[name]
+    fmu = launch(name, values, stop=None)
+    for order, value in (3, -24.0), (1, 3.0):
+        fmu.ramp(push(name)[0], value * limit * (1.0 - 1e-9), order)
+    fmu.step(0.0, 1.05)
+    assert fmu.get("mode", "events.count") == [-1, 1]
+    assert fmu.get("events.t_last") == pytest.approx(1.0 + 1e-9 / 9.0, rel=0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_load_of_just_the_limit_goes_the_way_of_its_first_derivative_that_is_not_zero(launch, name):
+    values, limit = LIMITS[name]
+    for order, value in (2, 1.0), (3, -1.0), (4, -1.0), (5, 1.0):
+        fmu = launch(name, values, stop=None)
+        fmu.set({push(name)[0]: limit})
+        fmu.ramp(push(name)[0], value * limit, order)
+        fmu.step(0.0, 0.2)
+        assert fmu.get("mode") == (value > 0.0)
+        assert fmu.get("events.t_last") == 0.0
+
+
+ORDERS = {"ode23": 3, "ode45": 5, "dop853": 8, "rodas": 4, "exact": 6}  # of the last any
+
+
+@pytest.mark.parametrize("method", ORDERS)
+def test_with_the_derivatives_of_its_input_a_method_has_its_own_order(launch, method):
+    """Without them it has order 1, with a rate order 2: one internal step for each communication step, at a loose
+    tolerance, under the force sin(3 t) N; the truth is that of steps of the exact method with all derivatives."""
+
+    def left_at(number, order, many):
+        h = 1.0 / many
+        loose = {"solver.method": number, "solver.rtol": 0.9, "solver.atol": 1e3, "solver.h_max": h}
+        fmu = launch("smd", loose | {"k": 4.0, "c": 1.0}, stop=None)
+        for n in range(many):
+            fmu.set({"F_ext": sin(3.0 * n * h)})
+            for k in range(1, order):
+                fmu.ramp("F_ext", 3.0**k * sin(3.0 * n * h + 0.5 * pi * k), k)
+            fmu.step(n * h, h)
+        return fmu.get("x")
+
+    truth, many = left_at(EXACT, 9, 64), 32 if method == "ode23" else 8
+    for order in sorted({1, 2, ORDERS[method]}):
+        coarse, fine = (abs(left_at(NUMBERS[method], order, n) - truth) for n in (many, 2 * many))
+        assert log2(coarse / fine) == pytest.approx(order, abs=0.25)
 
 
 # ---- an input that changes is as any other
@@ -173,11 +252,13 @@ def test_an_input_reads_as_what_it_is_and_its_rate_lasts_until_it_is_set_anew(ra
 def test_results_do_not_hang_on_the_grid_nor_on_what_is_told_twice(launch, ramped):
     name, fmu, force, names, size = ramped
     other = launch(name, stop=None)
+    fmu.ramp(force, -2.0 * size, 3)
+    other.ramp(force, -2.0 * size, 3)
     other.ramp(force, 0.5 * size)
     other.set({force: 0.25 * size})
     for n in range(64):
         fmu.step(n / 32, 1 / 32)
-        fmu.ramp(force, 0.5 * size)
+        fmu.ramp(force, -2.0 * size, 3)
         fmu.get(*names, "solver.t_next")
     other.step(0.0, 2.0)
     identical([fmu.get(force, *names)], [other.get(force, *names)], [force, *names])
@@ -185,12 +266,13 @@ def test_results_do_not_hang_on_the_grid_nor_on_what_is_told_twice(launch, rampe
 
 def test_a_ramp_is_saved_and_goes_on_bit_for_bit(ramped):
     _, fmu, force, names, size = ramped
+    fmu.ramp(force, 9.0 * size, 4)
     fmu.step(0.0, 0.3)
     state = fmu.save()
     fmu.step(0.3, 0.7)
     row = fmu.get(force, *names)
     for again in state, fmu.deserialize(fmu.serialize(state)):
-        fmu.ramp(force, -size)
+        fmu.ramp(force, -size, 2)
         fmu.step(1.0, 0.1)
         fmu.restore(again)
         fmu.step(0.3, 0.7)
@@ -263,17 +345,17 @@ def test_what_is_no_derivative_of_an_input_is_refused_and_changes_nothing(launch
     fmu.step(0.0, 0.1)
     row = fmu.get(*outputs("smd"))
     wrong = [("m", 1.0, 1), ("x", 1.0, 1), ("solver.method", 1.0, 1)]
-    wrong += [("F_ext", value, 1) for value in (nan, inf, -inf)] + [("F_ext", 1.0, order) for order in (0, 2, -1)]
+    wrong += [("F_ext", value, 1) for value in (nan, inf, -inf)] + [("F_ext", 1.0, order) for order in (0, 9, -1)]
     for arguments in wrong:
         with pytest.raises(Refused, match="fmi2SetRealInputDerivatives returned status 3"):
             fmu.ramp(*arguments)
         ((_, _, sentence),) = fmu.messages()
-        assert "no such derivative; what it may have is of the order 1, and of an input" in sentence
+        assert "an input without a range takes finite ones of the orders 1 to 8" in sentence
     for names, order in ((["x", "m"], 1), (["F_ext"], 1), (["events.count"], 1), (["x"], 0), (["v"], 2)):
         with pytest.raises(Refused, match="fmi2GetRealOutputDerivatives returned status 3"):
             fmu.output_rates(names, order)
         ((_, _, sentence),) = fmu.messages()
-        assert "of an output" in sentence
+        assert "those told are of outputs, and of the order 1" in sentence
     identical([fmu.get(*outputs("smd"))], [row], outputs("smd"))
     assert fmu.get("F_ext") == 0.0
     fmu.terminate()

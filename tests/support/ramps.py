@@ -1,11 +1,12 @@
-"""One body under a force that changes at a constant rate, by power series in many digits: friction, spring and damper.
+"""One body under a force that is a polynomial in time, by power series in many digits: friction, spring and damper.
 
-m a = F + R t + k u t - k x - c v - mode slide,   stuck while |F + R t + k u t - k x| <= hold
+m a = F(t) + k u t - k x - c v - mode slide,   stuck while |F(t) + k u t - k x| <= hold
 """
 
+import numpy as np
 from mpmath import mp, mpf
 
-STEP, TERMS, HALVINGS = mpf(1) / 32, 50, 100
+STEP, TERMS, HALVINGS, NEWTONS = mpf(1) / 32, 50, 100, 8
 TIE = mpf("1e-25")
 
 
@@ -15,43 +16,70 @@ class Body:
     def __init__(self, m=1.0, k=0.0, c=0.0, hold=0.0, slide=0.0, u=0.0, x=0.0, v=0.0):
         self.m, self.k, self.c, self.hold, self.slide, self.u = map(mpf, (m, k, c, hold, slide, u))
         self.t, self.x, self.v, self.mode, self.events = mpf(0), mpf(x), mpf(v), 0, []
+        self.force, self.pushed = [mpf(0)], mpf(0)
 
-    def push(self, force, rate):
-        """From here on there is this force, and it changes at this rate."""
-        self.rate = rate + self.k * self.u
-        self.force = force + self.k * self.u * self.t - self.rate * self.t
-        self.mode = self.settled()
+    def push(self, *force):
+        """From here on the force has this value and these derivatives; those of higher orders go on."""
+        self.force, self.pushed = [*map(mpf, force), *self.course()[len(force) :]], self.t
+        before, self.mode = self.mode, self.settled()
+        self.events += [self.t] * bool(self.hold and self.t and self.mode != before)
 
-    def load(self):
-        return self.force + self.rate * self.t - self.k * self.x
+    def course(self):
+        """The force and its derivatives."""
+        s, many = self.t - self.pushed, len(self.force)
+        return [sum(self.force[j] * s ** (j - n) / mp.factorial(j - n) for j in range(n, many)) for n in range(many)]
+
+    def forces(self):
+        """The load and its derivatives, while the body stays where it is."""
+        found = [*self.course(), mpf(0), mpf(0)]
+        found[0] += self.k * (self.u * self.t - self.x)
+        found[1] += self.k * self.u
+        return found
 
     def settled(self):
         """The mode that holds from here on; without dry friction any does."""
-        load = self.load()
+        load, *rates = self.forces()
         if self.v or not self.hold:
             return mp.sign(self.v)
-        near = TIE if load * self.rate > 0 else -TIE
-        return 0 if abs(load) + near <= self.hold else mp.sign(load)
+        outward = next((load * rate > 0 for rate in rates if rate), False)
+        return 0 if abs(load) + (TIE if outward else -TIE) <= self.hold else mp.sign(load)
 
     def series(self):
         """The coefficients of position and speed, the highest first."""
-        forces = [self.load() + self.k * self.x - self.mode * self.slide, self.rate]
+        forces = self.forces()
+        forces[0] += self.k * self.x - self.mode * self.slide
         x = [self.x, self.v]
         for n in range(TERMS):
-            force = forces[n] if n < 2 else 0
+            force = forces[n] / mp.factorial(n) if n < len(forces) else 0
             x.append((force - self.k * x[n] - self.c * (n + 1) * x[n + 1]) / (self.m * (n + 1) * (n + 2)))
         return x[::-1], [n * one for n, one in enumerate(x)][:0:-1]
+
+    def release(self):
+        """How long it stays where it is, and in which direction it goes then."""
+        load, *others = [one / mp.factorial(n) for n, one in enumerate(self.forces())]
+        found = [(mp.inf, 0)]
+        for side in 1, -1:
+            terms = [load - side * self.hold, *others]
+            while terms and not terms[-1]:
+                terms.pop()
+            rates = [n * one for n, one in enumerate(terms)][1:]
+            for root in np.polynomial.polynomial.polyroots([*map(float, terms or [1])]):
+                wait = mpf(root.real)
+                for _ in range(NEWTONS * (abs(root.imag) < 1e-9)):
+                    wait -= value(terms[::-1], wait) / value(rates[::-1], wait)
+                found += [(wait, side)] * bool(abs(root.imag) < 1e-9 and wait > TIE)
+        return min(found)
 
     def go(self, t):
         """Position and speed at time t."""
         while self.t < t:
             h = min(STEP, t - self.t)
             if self.hold and not self.mode:
-                wait = (mp.sign(self.rate) * self.hold - self.load()) / self.rate if self.rate else mp.inf
+                wait, side = self.release()
                 if wait > t - self.t:
                     self.t = mpf(t)
                 else:
-                    self.t, self.mode = self.t + wait, mp.sign(self.rate)
+                    self.t, self.mode = self.t + wait, side
                     self.events.append(self.t)
                 continue
             x, v = self.series()

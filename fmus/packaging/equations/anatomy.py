@@ -228,13 +228,13 @@ class Anatomy:
         """The derivative of an expression while every contact slides."""
         return derivative(e, by | {c: made("*", c.mode, derivative(c.slide, by)) for c in self.contacts})
 
-    # ---- inputs that change at a constant rate
+    # ---- inputs that change by themselves
 
     def _rate_of(self, e: Input) -> Parameter | None:
         """What stands for the rate of an input; None where the names for it are taken, or it could leave its range."""
         rate = Parameter(0.0, f"{e.unit}/s", f"rate of {e.name}")
         rate.name = f"{e.name}_rate"
-        is_taken = any(one.name in (rate.name, f"{e.name}_base") for one in self.declared)
+        is_taken = any(one.name in (rate.name, f"{e.name}_course") for one in self.declared)
         return None if is_taken or any(map(isfinite, (e.low, e.high, e.above, e.below))) else rate
 
     def _stays_closed(self, e: Input) -> bool:

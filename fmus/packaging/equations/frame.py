@@ -60,13 +60,25 @@ class Frame:
     def place_drive(self, s: Scribe, targets: Sequence[Operand]) -> None:
         """Where the driver is, and what an input that has a rate is, if that is needed."""
         for e, rate in self.an.ramps.items():
+            course = f"self.{e.name}_course"
             if e not in s.given and any(depends(one, (e,)) for one in targets):
                 s.given[e] = e.name
-                moved = f"self.{e.name}_base + self.{rate.name} * (t - self.t_base)"
-                s.say(f"{e.name} = {moved} if self.{rate.name} != 0.0 else self.{e.name}_base")
+                s.say(f"{e.name} = {course}.now(t - self.t_base)")
+            if rate not in s.given and any(depends(one, (rate,)) for one in targets):
+                s.given[rate] = rate.name
+                s.say(f"{rate.name} = {course}.rate(t - self.t_base)")
         if self.drive is not None and any(depends(e, (self.drive,)) for e in targets):
             s.given[self.drive] = self.drive.name
             s.say(f"{self.drive.name} = self.x_base + self.{self.drive.steady.name} * (t - self.t_base)")
+
+    def of_order(self, name: str, arguments: Sequence[str], targets: Sequence[Operand]) -> str:
+        """The text of a method that returns targets in which n-th derivatives of inputs stand for their rates."""
+        s = self.scribe()
+        n = s.fresh("n")
+        for e, rate in self.an.ramps.items():
+            s.given[rate] = rate.name
+            s.say(f"{rate.name} = self.{e.name}_course.at(t - self.t_base, {n})")
+        return method(name, [*arguments, n], self.returning(s, targets))
 
     @property
     def alone(self) -> Contact | None:

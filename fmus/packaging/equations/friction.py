@@ -10,7 +10,7 @@ from .scribe import Scribe
 def friction(f: Frame) -> list[str]:
     """All of them."""
     c = f.alone
-    return [] if c is None else [hold(f, c), terms(f, c), *departure(f, c)]
+    return [] if c is None else [hold(f, c), *load_rate(f, c), terms(f, c), *departure(f, c)]
 
 
 def hold(f: Frame, c: Contact) -> str:
@@ -18,6 +18,12 @@ def hold(f: Frame, c: Contact) -> str:
     an = f.an
     wanted = [an.load[c], put(derivative(an.load[c], an.coasting), {c.slip: 0.0}), an.hold[c]]
     return method("hold", ["t", *f.states], f.returning(f.scribe(), wanted))
+
+
+def load_rate(f: Frame, c: Contact) -> list[str]:
+    """The n-th derivative of that load, as far as inputs make it."""
+    ramps = f.an.ramps
+    return [f.of_order("load_rate", ["t", *f.states], [derivative(f.an.load[c], ramps)])] if ramps else []
 
 
 def terms(f: Frame, c: Contact) -> str:

@@ -49,9 +49,10 @@ def jacobian(f: Frame) -> str:
     if THRESHOLD in c.laws:
         with s.block(f"if {c.mode.name} == 0 and fabs({s.text(c.slip)}) < {s.text(c.eps)}:"):
             inner = f.scribe(s.depth)
-            f.place_drive(inner, [an.load[c]])
+            held = [an.held(law, by) for law in f.laws for by in ways]
+            f.place_drive(inner, [an.load[c], *held])
             with inner.block(f"if fabs({inner.text(an.load[c])}) <= {inner.text(an.hold[c])}:"):
-                inner.say("return " + ", ".join(inner.text(an.held(law, by)) for law in f.laws for by in ways))
+                inner.say("return " + ", ".join(map(inner.text, held)))
             s.lines += inner.lines
             if depends(c.slide, an.moving) or depends(an.hold[c], an.moving):
                 limits = [by | {c: limited(f, c, by)} for by in ways]
@@ -94,10 +95,9 @@ def push(f: Frame) -> list[str]:
     targets = targets if f.alone is None else sliding_now(f.alone, targets)
     at_zero = dict.fromkeys(f.an.states, 0.0)
     piece = method("piece", (), f.returning(f.scribe(), f.an.closed_form))
-    ramp = method("ramp", (), f.returning(f.scribe(), [derivative(f.laws[0].means, f.an.ramps)]))
     return [
         piece,
-        *[ramp] * bool(f.an.ramps),
+        *[f.of_order("push_rate", ["t"], [derivative(f.laws[0].means, f.an.ramps)])] * bool(f.an.ramps),
         method("push", ["t", *f.modes], f.returning(f.scribe(), [put(e, at_zero) for e in targets])),
     ]
 

@@ -10,6 +10,7 @@ IMPORTS = {  # module -> what may be needed of it
     "": tuple(label for label, _, _ in methods),
     "automaton": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
     "codes": ("EXACT", "HYBRID"),
+    "course": ("Course",),
     "coupled": ("CoupledFriction",),
     "declare": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
     "march": ("March",),
@@ -17,7 +18,10 @@ IMPORTS = {  # module -> what may be needed of it
     "oscillator": ("Oscillator",),
 }
 ATTRIBUTES = ("friction", "solver", "events", "exact", "exchange", "x_base", "t_base", "time", "method")
-METHODS = ("initial", "rates", "jacobian", "push", "piece", "hold", "terms", "observe")  # beside those inherited
+METHODS = (  # beside those inherited
+    *("initial", "rates", "jacobian", "push", "piece", "hold", "terms", "observe"),
+    *("push_rate", "load_rate", "input_rates", "bends"),
+)
 COUPLED_METHODS = ("slips", "slip_terms", "forces", "changes", "struck")
 CLASSES = ("Solver", "Model", "Fmi3Slave")
 RESERVED = {

@@ -9,7 +9,7 @@ from .scribe import INDENT
 
 def values(f: Frame) -> list[str]:
     """All of them."""
-    return [init(f), initial(f), prepare(f), *finest(f), *drive(f), *rebase(f)]
+    return [init(f), initial(f), prepare(f), *finest(f), *drive(f), *courses(f)]
 
 
 def init(f: Frame) -> str:
@@ -18,7 +18,8 @@ def init(f: Frame) -> str:
     if f.drive is not None:
         lines.append("self.t_base = self.x_base = 0.0")
     for e, rate in f.an.ramps.items():
-        lines.append(f"self.t_base = self.{e.name}_base = self.{rate.name} = 0.0")
+        lines.append(f"self.{e.name}_course = Course()")
+        lines.append(f"self.t_base = self.{rate.name} = 0.0")
     if f.constants:
         lines.append(" = ".join(f"self.{e.name}" for e in f.constants) + " = 0.0")
     return method("__init__", (), [2 * INDENT + line for line in lines])
@@ -40,7 +41,7 @@ def prepare(f: Frame) -> str:
     done: list[Term] = []
     s.kept = done
     for e in f.an.ramps:
-        s.say(f"self.{e.name}_base = self.{e.name}")
+        s.say(f"self.{e.name}_course.begin(self.{e.name})")
     s.count(*f.constants, *(rule.broken for rule in f.an.rules))
 
     def calculate(needed: Memo | None = None) -> None:
@@ -69,13 +70,18 @@ def drive(f: Frame) -> list[str]:
     return [] if f.drive is None else [method("drive", (), f.returning(f.scribe(), [f.drive.steady]))]
 
 
-def rebase(f: Frame) -> list[str]:
-    """Fix at time t what goes on by itself, where inputs have rates; prepare() takes them over."""
+def courses(f: Frame) -> list[str]:
+    """Where inputs have derivatives: fix at time t what goes on by itself, which prepare() takes over; tell their rates
+    there; and whether any has more than a rate."""
     if not f.an.ramps:
         return []
-    s = f.scribe()
+    base, rates = f.scribe(), f.scribe()
     for e, rate in f.an.ramps.items():
-        s.say(f"self.{e.name} = self.{e.name}_base + self.{rate.name} * (t - self.t_base)")
-    s.say("super().rebase(t)")
-    s.say("self.t_base = t")
-    return [method("rebase", ["t"], s.lines)]
+        base.say(f"self.{e.name} = self.{e.name}_course.move(t - self.t_base)")
+        rates.say(f"self.{rate.name} = self.{e.name}_course.rate(t - self.t_base)")
+    base.say("super().rebase(t)")
+    base.say("self.t_base = t")
+    bends = f.scribe()
+    bends.say("return " + " or ".join(f"self.{e.name}_course.order > 1" for e in f.an.ramps))
+    scribes = {"rebase": base, "input_rates": rates, "bends": bends}
+    return [method(name, ["t"] * (name != "bends"), s.lines) for name, s in scribes.items()]

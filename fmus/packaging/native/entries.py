@@ -27,6 +27,7 @@ def entries(rules: Any, exchange: Any, leaps: Any, model: Object, fmi: str) -> d
         exchange.put: [run, model],
         exchange.states: [model],
         exchange.rates: [model],
+        exchange.input_rates: [model],
         exchange.indicators: [model],
         exchange.show: [model],
         exchange.handle: [run, model],

@@ -170,25 +170,24 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s,
     return fmi2OK;
 }
 
-/* From the present point on the inputs change at these rates, each until it is set anew. */
+/* What the inputs are to be from the present point on; each derivative goes its way until it is set anew. */
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[])
 {
     ENTER(component, NEW | 1 << INITIALISING | STEPPING);
     State *state = &it->state;
-    const char *word = "an input without a range, a finite number";
     bool fault = false;
     if (nvr && (!vr || !order || !value)) return refuse(it, NO_ADDRESS, __func__, "vr, order or value");
     for (size_t i = 0; i < nvr; i++) {
-        bool has_one = vr[i] < VARIABLES && variables[vr[i]].rate != NO_SLOPE;
-        if (has_one && order[i] == 1 && isfinite(value[i])) continue;
-        return refuse_call(it, NO_RATE, &(Call){.function = __func__, .word = word, .reference = vr[i]});
+        bool has_any = vr[i] < VARIABLES && variables[vr[i]].derivatives != NO_SLOPE;
+        if (has_any && 1 <= order[i] && order[i] <= HIGHEST && isfinite(value[i])) continue;
+        return refuse_call(it, NO_COURSE, &(Call){.function = __func__, .reference = vr[i]});
     }
     for (size_t i = 0; i < nvr && !fault; i++) {
-        double *rate = rate_of(state, &variables[vr[i]]);
-        if (*rate == value[i]) continue;
+        double *derivatives = derivatives_of(state, &variables[vr[i]]);
+        if (derivatives[order[i]] == value[i] && are_zero(derivatives, order[i] + 1)) continue;
         rules_change(&state->run, &state->model, &fault);
-        *rate = value[i];
+        derivatives[order[i]] = value[i];
         state->run.observed = false;
     }
     return judged_by(it, OK, fault, NAN, NAN);

@@ -185,10 +185,17 @@ static Status ready(Instance *it, const Type *type, const uint32_t vr[], size_t 
     return DISCARDED;
 }
 
-/* The rate of an input that has one. */
-static double *rate_of(State *state, const Variable *variable)
+/* The derivatives of an input that has any, from order 0 on. */
+static double *derivatives_of(State *state, const Variable *variable)
 {
-    return (double *)((char *)&state->model + variable->rate);
+    return (double *)((char *)&state->model + variable->derivatives);
+}
+
+/* Whether those from an order on are zero, and so the one before stays what it is. */
+static bool are_zero(const double *derivatives, int order)
+{
+    while (order <= HIGHEST && derivatives[order] == 0.0) order++;
+    return order > HIGHEST;
 }
 
 /* Take over a value, or remember that it cannot be used.  False after a fault. */
@@ -198,7 +205,7 @@ static bool write_one(Instance *it, uint32_t reference, double value)
     const Variable *variable = &variables[reference];
     Refusal *refusal = &state->refused[reference];
     bool allowed = accepts(variable, value), fault = false;
-    bool stays = variable->rate == NO_SLOPE || *rate_of(state, variable) == 0.0;
+    bool stays = variable->derivatives == NO_SLOPE || are_zero(derivatives_of(state, variable), 1);
     if (stays && value == value_of(&state->model, variable) && refusal->reason == OK) return true;
     state->run.observed = false;
     state->run.refused -= refusal->reason != OK;
@@ -398,16 +405,17 @@ static Status read_rates(Instance *it, const uint32_t vr[], size_t n, const int3
     for (size_t i = 0; i < n; i++) {
         bool has_one = vr[i] < VARIABLES && variables[vr[i]].slope != NO_SLOPE && variables[vr[i]].is_calculated;
         if (has_one && order[i] == 1) continue;
-        return refuse_call(it, NO_RATE, &(Call){.function = function, .word = "an output", .reference = vr[i]});
+        return refuse_call(it, NO_RATE, &(Call){.function = function, .reference = vr[i]});
     }
     int64_t status = exchange_ready(&state->run, &state->model, &fault);
     if (status == OK && !fault) exchange_rates(&state->model, &fault);
+    if (status == OK && !fault) exchange_input_rates(&state->model, &fault);
     const double *rate = state->model.exchange.rates;
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
         if (!variable->moves) continue;
         double *seed = slope_of(&to, (uint32_t)(variable - variables));
         if (variable->is_calculated) *seed = *rate++;
-        else if (variable->rate != NO_SLOPE) *seed = *rate_of(state, variable);
+        else if (variable->rate != NO_SLOPE) *seed = *(double *)((char *)&state->model + variable->rate);
     }
     if (status == OK && !fault) along(&state->model, &to, &fault);
     for (size_t i = 0; i < n; i++) value[i] = status == OK && !fault ? *slope_of(&to, vr[i]) : NAN;

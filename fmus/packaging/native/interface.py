@@ -179,7 +179,7 @@ def _line(name: str, meaning: Declared, slots: dict[str, str], ramps: bool) -> s
         f"offsetof(Model, {place(name)})",
         f"offsetof(struct Tangent, {slots[name]})" if name in slots else "NO_SLOPE",
         *map(literal, flags),
-        f"offsetof(Model, {name}_rate)" if meaning.causality == "input" and ramps else "NO_SLOPE",
+        f"offsetof(Model, {name}_rate), offsetof(Model, {name}_course.derivatives)" if ramps else "NO_SLOPE, NO_SLOPE",
         *(literal(float(bound)) for bound in bounds),
         items,
     ]

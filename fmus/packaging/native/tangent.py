@@ -78,7 +78,7 @@ class Writer:
     def __init__(self, thing: Any, declared: Variables) -> None:
         inputs = [name for name, meaning in declared if meaning.causality == "input"]
         drivers = [name for name, meaning in declared if meaning.rate]
-        self.seeds = {attribute: name for name in inputs for attribute in (name, f"{name}_base")}
+        self.seeds = {attribute: name for name in inputs for attribute in (name, f"{name}_course")}
         self.seeds |= dict(zip(["x_base"] * len(drivers), drivers, strict=True))
         self.outputs = {name for name, meaning in declared if is_smooth(meaning)}
         self.floats = set(thing.states)  # local names that have a change
@@ -110,6 +110,8 @@ class Writer:
                 return ast.Name(D + name)
             case ast.Attribute(attr=name) if name in self.seeds:
                 return ast.parse(f"{TO}.{self.seeds[name]}", mode="eval").body
+            case ast.Call(func=ast.Attribute(value=course)):
+                return self.change(course)
             case ast.UnaryOp(op=ast.USub(), operand=inner):
                 return negative(self.change(inner))
             case ast.BinOp(left=a, op=op, right=b):

@@ -1,0 +1,47 @@
+"""An input that changes while nobody sets it: a polynomial in time, known by its derivatives."""
+
+from .codes import HIGHEST
+
+
+class Course:
+    """Its derivatives at one time, from order 0 on; s is how many seconds have passed since."""
+
+    def __init__(self):
+        self.order = 0  # of the highest that is not zero
+        self.derivatives = [0.0] * (HIGHEST + 1)
+        self.c = [0.0] * (HIGHEST + 1)  # the coefficients of the powers of s
+
+    def begin(self, value):
+        """The value is this one; some derivatives may have been set."""
+        self.derivatives[0] = self.c[0] = value
+        self.order = 0
+        factorial = 1.0
+        for n in range(1, HIGHEST + 1):
+            factorial *= n
+            self.c[n] = self.derivatives[n] / factorial
+            if self.derivatives[n] != 0.0:
+                self.order = n
+
+    def now(self, s):
+        """The value; without loops and faults, for every right-hand side wants it."""
+        c = self.c[4] + s * (self.c[5] + s * (self.c[6] + s * (self.c[7] + s * self.c[8])))
+        c = self.c[1] + s * (self.c[2] + s * (self.c[3] + s * c))
+        return self.c[0] if self.order == 0 else self.c[0] + s * c
+
+    def rate(self, s):
+        """The first derivative."""
+        return self.c[1] if self.order < 2 else self.at(s, 1)
+
+    def at(self, s, n):
+        """The n-th derivative."""
+        total = 0.0
+        for i in range(self.order + 1 - n):
+            k = self.order - i
+            total = self.derivatives[k] + total * s / (k + 1 - n)
+        return total
+
+    def move(self, s):
+        """Tell all derivatives as they are now, and the value."""
+        for n in range(self.order + 1):
+            self.derivatives[n] = self.at(s, n)
+        return self.derivatives[0]
