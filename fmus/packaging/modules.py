@@ -29,11 +29,11 @@ from .runtime.slave import slave_for
 '''
 
 
-def installed(layer: str) -> Path:
-    """Where the package that brings a native layer is installed; it is found without being imported."""
-    spec = find_spec(layer)
+def installed(package: str) -> Path:
+    """Where a package is installed of which an FMU carries a part; it is found without being imported."""
+    spec = find_spec(package)
     if spec is None or spec.origin is None:
-        raise BuildError(f"{layer} is not installed, and an FMU carries a part of it: try 'pip install {layer}'.")
+        raise BuildError(f"{package} is not installed, and an FMU carries a part of it: try 'pip install {package}'.")
     return Path(spec.origin).parent
 
 

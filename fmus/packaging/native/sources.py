@@ -1,12 +1,11 @@
 """The folder sources/ of a native FMU: all that a C compiler needs, the FMI headers included."""
 
-from importlib.util import find_spec
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ...runtime.declare import Declaring
-from .. import BuildError
 from ..document import document
+from ..modules import installed
 from .interface import header
 
 COMPILED = {"2": "fmi2.c", "3": "fmi3.c"}  # by the version of FMI: includes all the others
@@ -21,7 +20,8 @@ def sources(model: type[Declaring], fmi: str) -> dict[str, str]:
     """Name and text of every file but guid.h, which follows from these."""
     here = Path(__file__).parent
     written = {name: (here / name).read_text(encoding="utf-8") for name in (COMPILED[fmi], *WRITTEN)}
-    headers = {name: (_fmi_folder() / name).read_text(encoding="utf-8") for name in FMI_HEADERS[fmi]}
+    theirs = installed("fmpy") / "c-code"
+    headers = {name: (theirs / name).read_text(encoding="utf-8") for name in FMI_HEADERS[fmi]}
     return written | headers | {"model.h": header(model, fmi)}
 
 
@@ -38,11 +38,3 @@ def build_description(name: str, fmi: str) -> bytes:
     SubElement(files, "SourceFile", name=COMPILED[fmi])
     SubElement(configuration, "Library", name="m", external="true", description="the C library of mathematics")
     return document(root)
-
-
-def _fmi_folder() -> Path:
-    """Where fmpy keeps the headers of FMI; it is found without being imported."""
-    spec = find_spec("fmpy")
-    if spec is None or spec.origin is None:
-        raise BuildError("fmpy is not installed, and a native FMU carries its FMI headers: try 'pip install fmpy'.")
-    return Path(spec.origin).parent / "c-code"
