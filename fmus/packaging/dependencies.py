@@ -26,18 +26,15 @@ def at_start(model: type[Declaring], declared: Variables) -> dict[str, list[str]
     def among(*terms: Operand) -> set[Expression]:
         return {leaf for e in terms for leaf in leaves(put(e, start))}
 
-    def loads(c: Contact) -> list[Operand]:
-        return [an.load[c]] if c in an.lonely else [an.slip_rate[d] for d in an.contacts]
-
     def of_mode(c: Contact) -> set[Expression]:
         near = [c] if c in an.lonely else an.contacts
-        held = [*loads(c), *(an.hold[d] for d in near)] if HYBRID in laws else []
+        held = [*an.loads(c), *(an.hold[d] for d in near)] if HYBRID in laws else []
         rates = [derivative(e, an.coasting) for e in held]
         others = [e for d in near if d is not c for e in (d.slip, d.slide)]
         return among(c.slip, *held, *rates, *others, *([c.eps] if THRESHOLD in laws else []))
 
     def of_force(c: Contact) -> set[Expression]:
-        return of_mode(c) | among(c.slide, *([] if laws == [SIGN] else [*loads(c), an.hold[c]]))
+        return of_mode(c) | among(c.slide, *([] if laws == [SIGN] else [*an.loads(c), an.hold[c]]))
 
     def follows(e: Expression) -> set[str]:
         found = among(e)

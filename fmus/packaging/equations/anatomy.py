@@ -220,6 +220,10 @@ class Anatomy:
                 load = undone(e, c) if occurrences(e, c) == 1 else made("/", put(e, {c: 0.0}), self.A[c, c])
                 self.load[c] = put(load, {c.mode: 0.0} | (at_rest if isinstance(c.slip, State) else {}))
 
+    def loads(self, c: Contact) -> list[Operand]:
+        """What the load of a contact follows from: of those that share bodies from the rates of all slips."""
+        return [self.load[c]] if c in self.lonely else [self.slip_rate[d] for d in self.contacts]
+
     def held(self, e: Operand, by: dict[Expression, Operand]) -> Operand:
         """The derivative of an expression while every contact holds."""
         return derivative(e, by | {c: derivative(self.load[c], by) for c in self.lonely})
@@ -379,8 +383,7 @@ class Anatomy:
         """Whether an output follows an input at once."""
         if isinstance(e, (Contact, Mode)):
             (c,) = (c for c in self.contacts if e in (c, c.mode))
-            near = [self.load[c]] if c in self.lonely else [self.slip_rate[d] for d in self.contacts]
-            return any(depends(one, self.inputs) for one in (*near, c.slide))
+            return any(depends(one, self.inputs) for one in (*self.loads(c), c.slide))
         return depends(e, self.inputs) or any(depends(e, (c,)) and self.direct(c) for c in self.contacts)
 
     @property
