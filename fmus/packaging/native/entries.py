@@ -2,36 +2,29 @@
 
 from typing import Any
 
+from ...runtime.declare import Declaring
+from ..written import beside
 from .kinds import BOOL, FLOAT, Kind, Object
 
+ASKED = {  # file of the runtime -> its functions; one that others call stands before them
+    "rules": ("within", "reason", "change", "setup", "begin", "step", "observe", "report", "is_sound"),
+    "exchange": (
+        *("take_over", "nominals", "begin", "ready", "move_to", "put", "states", "rates", "input_rates"),
+        *("indicators", "show", "handle"),
+    ),
+    "leaps": ("aim", "leap", "handle"),  # for FMI 3.0
+}
+FLAGS = ("calculated", "fixed", "allowed", "exchanges", "ahead", "waits")  # of their parameters those that are bools
 
-def entries(rules: Any, exchange: Any, leaps: Any, model: Object, fmi: str) -> dict[Any, list[Kind]]:
-    """Every function of the rules, of model exchange and, for FMI 3.0, of steps in leaps, as written out, with what it
-    takes; one that others call stands before them."""
-    run = Object(rules.Run)
-    found: dict[Any, list[Kind]] = {
-        rules.within: [FLOAT] * 5,
-        rules.reason: [run, BOOL, BOOL, BOOL],
-        rules.change: [run, model],
-        rules.setup: [run, FLOAT, FLOAT, FLOAT],
-        rules.begin: [run, model],
-        rules.step: [run, model, FLOAT, FLOAT],
-        rules.observe: [run, model],
-        rules.report: [model, BOOL],
-        rules.is_sound: [run, model, BOOL],
-        exchange.take_over: [run],
-        exchange.nominals: [model],
-        exchange.begin: [model],
-        exchange.ready: [run, model],
-        exchange.move_to: [run, model, FLOAT],
-        exchange.put: [run, model],
-        exchange.states: [model],
-        exchange.rates: [model],
-        exchange.input_rates: [model],
-        exchange.indicators: [model],
-        exchange.show: [model],
-        exchange.handle: [run, model],
-    }
-    if fmi == "3":
-        found |= {leaps.aim: [run, model, FLOAT, FLOAT], leaps.leap: [run, model, BOOL], leaps.handle: [run, model]}
+
+def entries(model: type[Declaring], run: Object, led: Object, fmi: str) -> dict[Any, list[Kind]]:
+    """All these functions, as written out for a model, with what they take: the names of their parameters tell it."""
+    kinds: dict[str, Kind] = {"run": run, "model": led, **dict.fromkeys(FLAGS, BOOL)}
+    found = {}
+    for file in [file for file in ASKED if file != "leaps" or fmi == "3"]:
+        functions = beside(model, f"runtime.{file}")
+        for name in ASKED[file]:
+            code = getattr(functions, name).__code__
+            taken = code.co_varnames[: code.co_argcount]
+            found[getattr(functions, name)] = [kinds.get(parameter, FLOAT) for parameter in taken]
     return found

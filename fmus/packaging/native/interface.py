@@ -106,17 +106,16 @@ ELSEWHERE = (INTERRUPTED,)  # statuses of other kinds
 def header(model: type[Declaring], fmi: str) -> str:
     """The text of model.h, for a version of FMI."""
     thing = exchanged(model)
-    rules, exchange, leaps = (beside(model, f"runtime.{part}") for part in ("rules", "exchange", "leaps"))
-    run = rules.Run(thing.tolerance)
+    run = beside(model, "runtime.rules").Run(thing.tolerance)
     declared = all_variables(thing)
     to, along = tangent(model, thing, declared)
     program = Program(thing, run, to)
     program.entry("along", along, Object(Tangent))
-    for function, kinds in entries(rules, exchange, leaps, program.layout.model, fmi).items():
+    for function, kinds in entries(model, Object(type(run)), program.layout.model, fmi).items():
         program.exported(function, kinds)
     layout = program.layout
     names = [name for name, _ in declared]
-    numbers = [("run", rules.Run), ("model", type(thing))]
+    numbers = [("run", type(run)), ("model", type(thing))]
     members = [(path, kind) for prefix, cls in numbers for path, kind in layout.scalars(cls, f"{prefix}.")]
     members = [(path, kind) for path, kind in members if kind in (INT, BOOL)]
     statuses = {status: sentence for status, sentence in RUN.items() if status not in ELSEWHERE}
