@@ -8,20 +8,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from ..runtime.declare import Declaring
-from .description import (
-    RATES,
-    add_items,
-    closed,
-    define_units,
-    followed,
-    log_and_experiment,
-    opened,
-    part_of_all,
-    part_of_type,
-    quantities,
-    tell_states,
-    type_name,
-)
+from . import description
 from .further import TO_REST, Variables, all_variables, exchanged, indicators_of, rates_of
 
 TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
@@ -40,40 +27,41 @@ STEPPING = {
     "canReturnEarlyAfterIntermediateUpdate": "true",
     "mightReturnEarlyFromDoStep": "true",
     "providesIntermediateUpdate": "true",
-    **RATES,
+    **description.RATES,
 }
 
 
 def describe(model: type[Declaring], name: str, code: str, date: datetime) -> bytes:
     """The model description of the FMU `name` as XML; the instantiation token is to it what the guid is in FMI 2.0."""
-    root = opened(model, name, "3.0", "instantiationToken")
+    root = description.opened(model, name, "3.0", "instantiationToken")
     for interface, abilities in ("ModelExchange", EXCHANGE), ("CoSimulation", STEPPING):
         SubElement(root, interface, {"modelIdentifier": name} | BOTH | abilities)
     thing = exchanged(model)
     declared = all_variables(thing)
-    define_units(root, declared)
+    description.define_units(root, declared)
     _define_types(root, declared)
-    log_and_experiment(root, model, "fmi3")
+    description.log_and_experiment(root, model, "fmi3")
     rates = rates_of(declared)
     elements = SubElement(root, "ModelVariables")
     for reference, (variable, meaning) in enumerate(declared):
-        attributes = part_of_all(variable, meaning, reference) | part_of_type(variable, meaning)
+        attributes = description.part_of_all(variable, meaning, reference) | description.part_of_type(variable, meaning)
         if meaning.causality in ("input", "output") and meaning.variability == "continuous":
             attributes["intermediateUpdate"] = "true"
         SubElement(elements, TYPES[meaning.type], attributes)
-    tell_states(list(elements), thing, rates, first=0)
+    description.tell_states(list(elements), thing, rates, first=0)
     _structure(root, model, thing, declared, rates)
-    return closed(root, "instantiationToken", code, date)
+    return description.closed(root, "instantiationToken", code, date)
 
 
 def _define_types(root: Element, declared: Variables) -> None:
     """TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
     types = SubElement(root, "TypeDefinitions")
-    for quantity in quantities(declared):
+    for quantity in description.quantities(declared):
         SubElement(types, "Float64Type", quantity, name=quantity["quantity"])
     for name, meaning in declared:
         if meaning.items:
-            add_items(SubElement(types, "EnumerationType", name=type_name(name), description=meaning.text), meaning)
+            words = {"name": description.type_name(name), "description": meaning.text}
+            description.add_items(SubElement(types, "EnumerationType", words), meaning)
 
 
 def _structure(root: Element, model: type[Declaring], thing: Any, declared: Variables, rates: dict[int, int]) -> None:
@@ -82,7 +70,7 @@ def _structure(root: Element, model: type[Declaring], thing: Any, declared: Vari
     Of a smooth model some factors are known: one, and those that parameters make.
     """
     structure, states = SubElement(root, "ModelStructure"), list(rates.values())
-    outputs, derivatives, at_first = followed(model, declared, rates)
+    outputs, derivatives, at_first = description.followed(model, declared, rates)
     for place, known in outputs.items():
         _unknown(structure, "Output", place, known)
     for place, known in derivatives.items():
