@@ -4,7 +4,6 @@ import ast
 import inspect
 import sys
 from functools import cache
-from hashlib import sha256
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
@@ -17,6 +16,7 @@ from ...runtime import declare
 from ...runtime.declare import Declaring
 from ..catalogue import FMUS, find
 from ..equations.authored import Authored
+from ..modules import digest
 from ..trees import copied, walked
 from .offer import Offer, offer
 from .sources import APART, PLAIN, Files, written_out
@@ -30,12 +30,9 @@ def asked(source: str | Path | Authored, offered: Offer | None) -> tuple[Authore
     return found, offered or offer(found)
 
 
-lines_of = cache(written_out)
-
-
 def files_of(source: str | Path | Authored, offered: Offer | None = None) -> dict[str, str]:
     """Path and text of every file of the runtime, and of the model, as they travel."""
-    return {path: "\n".join(lines) for path, lines in lines_of(*asked(source, offered)).items()}
+    return {path: "\n".join(lines) for path, lines in written_out(*asked(source, offered)).items()}
 
 
 def written(source: str | Path | Authored, offered: Offer | None = None) -> type[Declaring]:
@@ -46,9 +43,8 @@ def written(source: str | Path | Authored, offered: Offer | None = None) -> type
 @cache
 def brought_in(source: Authored, offered: Offer) -> type[Declaring]:
     """The model class out of a package of its files, imported under a name of its own."""
-    files, name, model = lines_of(source, offered), source.name, source.model
-    content = "".join(f"{path}\0" + "\n".join(lines) for path, lines in sorted(files.items()))
-    package = f"written_{name}_{sha256(content.encode()).hexdigest()[:12]}"
+    files, name, model = written_out(source, offered), source.name, source.model
+    package = f"written_{name}_{digest(files_of(source, offered))[:12]}"
     for parent in package, f"{package}.runtime":
         sys.modules[parent] = ModuleType(parent)
         sys.modules[parent].__path__ = []

@@ -44,6 +44,7 @@ def spec_of(model: Any, offered: Offer, called: str) -> Spec:
     return Spec(states, contacts, flags, offered.choices, offered.gone, offered.stepping)
 
 
+@cache
 def written_out(source: Authored, offered: Offer) -> Files:
     """The lines of every file of the runtime and of the file of a model.
 
