@@ -103,10 +103,6 @@ class Allowed(Base):
     def conditional(self, x, y):
         return 1 if x > y else -1 if x < y else 0, (x if x > 0.0 else y) * 2.0, 1.0 / x if y > 0.0 else 0.0
 
-    def several_or_several(self, x, y):
-        p, q = self.arithmetic_pair(x, y) if x > y else self.division_pair(x, y)
-        return q, p
-
     def arithmetic_pair(self, x, y):
         return x + y, x - y
 

@@ -269,9 +269,7 @@ class Expressions(ast.NodeVisitor):
 
     def visit_IfExp(self, node: ast.IfExp) -> Value:
         test = self.truth(node.test)
-        yes, no = self.sometimes(self.visit, (node.body, node.orelse))
-        if not (isinstance(yes.kind, Group) and yes.kind == no.kind):
-            yes, no = self.at_run_time(node.body, yes), self.at_run_time(node.orelse, no)
+        yes, no = self.sometimes(self.number, (node.body, node.orelse))
         if yes.kind != no.kind:
             raise self.refused(node, "has values of two kinds", "make both a float, or both an int")
         return Value(yes.kind, f"{test.within(OR)} ? {yes.within(OR)} : {no.within(CHOICE)}", CHOICE)
