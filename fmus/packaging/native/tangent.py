@@ -23,10 +23,6 @@ from ..written.live import TREE, number_of
 
 # what the second number is called; the object that holds the direction and what follows: no name of an author's
 D, TO = "_d_", "_to"
-SLOPES = {
-    "sqrt": "0.5 / sqrt({a})",
-    "copysign": "copysign(1.0, {a}) * copysign(1.0, {b})",
-}  # not as the equations have it
 ARGUMENT = Expression()
 
 
@@ -122,8 +118,8 @@ class Writer:
             case ast.Call(func=ast.Name(id="threshold"), args=[v, eps, load, slide, hold]):
                 changes = [told(self.change(one)) for one in (load, slide, hold)]
                 return read(f"threshold_slope({', '.join(map(told, (v, eps, load, hold)))}, {', '.join(changes)})")
-            case ast.Call(func=ast.Name(id=name), args=[a, *more]) if name in FUNCTIONS or name in SLOPES:
-                return times(read(slope(name, told(a), "".join(map(told, more)))), self.change(a))
+            case ast.Call(func=ast.Name(id=name), args=[a]) if name in FUNCTIONS:
+                return times(read(slope(name, told(a))), self.change(a))
         return None
 
     def of_two(self, e: ast.expr, a: ast.expr, op: ast.operator, b: ast.expr) -> ast.expr | None:
@@ -139,10 +135,10 @@ class Writer:
         return plus(first, None if db is None else read(f"-({told(e)}) * ({told(db)}) / ({told(b)})"))
 
 
-def slope(name: str, a: str, b: str) -> str:
-    """The factor of the change of a in that of a function of a, and of b where it has two."""
-    if name in SLOPES:
-        return SLOPES[name].format(a=a, b=b)
+def slope(name: str, a: str) -> str:
+    """The factor of the change of a in that of a function of a."""
+    if name == "sqrt":
+        return f"0.5 / sqrt({a})"  # not as the equations have it, where it is zero at zero
     return Scribe({ARGUMENT: a}, (), (), 0).text(FUNCTIONS[name](ARGUMENT, Term(name, ARGUMENT)))
 
 
