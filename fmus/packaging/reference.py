@@ -51,7 +51,7 @@ def reference(path: Path, declared: Variables) -> Reference | None:
 
 
 def _checked(file: Path, states: int) -> Reference:
-    """Of any other; BuildError where the file is not such a table."""
+    """That in a file; BuildError where it is no such table."""
     text = file.read_text(encoding="utf-8", errors="replace")
     how, _, table = text.partition("\n")
     rows = list(csv.reader(table.splitlines()))[1:]

@@ -24,18 +24,15 @@ def inside(e: Operand) -> tuple[Operand, ...]:
     return e.args if isinstance(e, Term) else (e.means,) if isinstance(e, Output) else ()
 
 
-def depends(e: Operand, leaves: Collection[Expression], memo: dict[int, bool] | None = None) -> bool:
+def depends(e: Operand, leaves: Collection[Expression]) -> bool:
     """Whether an expression has one of the leaves in it."""
-    memo = {} if memo is None else memo
-    if id(e) not in memo:
-        memo[id(e)] = any(e is leaf for leaf in leaves) or any(depends(one, leaves, memo) for one in inside(e))
-    return memo[id(e)]
+    return not parts(e).keys().isdisjoint(map(id, leaves))
 
 
 def jumps(e: Operand, leaves: Collection[Expression]) -> bool:
     """Whether a condition in an expression has one of the leaves in it: derivatives do not tell."""
-    compares = isinstance(e, Term) and e.op in COMPARISONS
-    return depends(e, leaves) and (compares or any(jumps(one, leaves) for one in inside(e)))
+    conditions = (one for one in parts(e).values() if isinstance(one, Term) and one.op in COMPARISONS)
+    return any(depends(one, leaves) for one in conditions)
 
 
 def parts(e: Operand, found: Memo | None = None) -> Memo:

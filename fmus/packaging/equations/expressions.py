@@ -74,10 +74,8 @@ class Expression:
     __sub__, __rsub__ = _both_ways("-")
     __mul__, __rmul__ = _both_ways("*")
     __truediv__, __rtruediv__ = _both_ways("/")
-    __lt__ = _both_ways("<")[0]  # Python turns a < b round to b > a by itself
-    __le__ = _both_ways("<=")[0]
-    __gt__ = _both_ways(">")[0]
-    __ge__ = _both_ways(">=")[0]
+    # Python turns a < b round to b > a by itself
+    __lt__, __le__, __gt__, __ge__ = (_both_ways(op)[0] for op in ("<", "<=", ">", ">="))
 
     def __neg__(self) -> "Term":
         return Term("neg", self)

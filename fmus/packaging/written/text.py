@@ -82,10 +82,9 @@ class Writer:
         return False
 
     def statement(self, node: ast.stmt, depth: int) -> bool:
-        shift = node.col_offset - depth
         match node:
             case ast.ClassDef():
-                self.copy(self.first(node.body[0]), shift)
+                self.copy(self.first(node.body[0]), node.col_offset - depth)
                 self.block(node.body, depth + 4)
             case ast.FunctionDef():
                 counted = [one.arg for one in node.args.args if is_contact(one)]
