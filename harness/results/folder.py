@@ -14,7 +14,7 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from shutil import rmtree
@@ -50,10 +50,10 @@ def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[P
         tidy(folder, ours)
     except OSError as error:
         raise HarnessError(f"cannot write below {folder.parent}: {error.strerror}; choose another --out") from None
-    fresh, lock = None, -1
+    fresh, held = None, ExitStack()
     try:
         with later():
-            fresh, lock = begun(folder)
+            fresh = begun(folder, held)
         yield fresh
         succeed(folder, fresh, ours[0])
         swap(fresh, folder)
@@ -63,8 +63,7 @@ def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[P
         with later():
             if fresh:
                 rmtree(fresh, ignore_errors=True)
-            if lock >= 0:
-                os.close(lock)
+            held.close()
             with suppress(OSError):  # they are needed
                 for each in missing:
                     each.rmdir()
@@ -91,32 +90,31 @@ def keep(folder: Path, source: str, account: str = FILE) -> None:
         )
 
 
-def begun(folder: Path) -> tuple[Path, int]:
-    """A new folder beside, and what holds its lock, -1 where there are no locks."""
+def begun(folder: Path, held: ExitStack) -> Path:
+    """A new folder beside, whose lock is `held`."""
     while True:
         # absolute: an interrupt may come while fmpy, which loads a library, is in its folder
         fresh = Path(mkdtemp(prefix=f".{folder.name}-", suffix=FRESH, dir=folder.parent.absolute()))
         fresh.chmod(0o755)  # mkdtemp gives 0o700
-        lock = locked(fresh, wait=True)
+        held.enter_context(locked(fresh, wait=True))
         if fresh.exists():  # nobody took it for one that was left, before it was locked
-            return fresh, lock
-        if lock >= 0:
-            os.close(lock)
+            return fresh
+        held.close()
 
 
-def locked(folder: Path, wait: bool = False) -> int:
-    """What holds the lock of a folder, -1 where there are no locks; OSError if another process has it."""
+@contextmanager
+def locked(folder: Path, wait: bool = False) -> Iterator[None]:
+    """Within, the folder is locked, where there are locks; OSError if another process has it, and one does not wait."""
     if sys.platform == "win32":
-        return -1
+        yield
+        return
     lock = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
+        with suppress(OSError) if wait else nullcontext():  # of a file system without locks
+            fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
         os.close(lock)
-        if wait:
-            return -1  # a file system without locks
-        raise
-    return lock
 
 
 def tidy(folder: Path, ours: Collection[str]) -> None:
@@ -124,13 +122,10 @@ def tidy(folder: Path, ours: Collection[str]) -> None:
     beside = re.compile(rf"\.{re.escape(folder.name)}-[a-z0-9_]{{8}}({FRESH}|{OLD})")
     for left in sorted(folder.parent.iterdir()):
         if beside.fullmatch(left.name) and left.is_dir() and {file.name for file in left.iterdir()} <= set(ours):
-            with suppress(OSError):  # somebody writes it
-                lock = locked(left)
+            with suppress(OSError), locked(left):  # or somebody writes it
                 if left.suffix == OLD and not folder.exists():
                     left.rename(folder)
                 rmtree(left, ignore_errors=True)
-                if lock >= 0:
-                    os.close(lock)
 
 
 def swap(fresh: Path, folder: Path) -> None:
