@@ -64,8 +64,13 @@ class Comparison:
         lost = [each.name for each in self.differences if isnan(each.largest)]
         said += [f"{name} holds what is not a finite number, which is in no bound" for name in lost]
         if self.pairs and isnan(self.pairs.shift):
-            said.append(f"their events do not match: {self.pairs.sentence((self.one.name, self.two.name))}")
+            said.append(f"their events do not match: {self.events}")
         return said
+
+    @property
+    def events(self) -> str:
+        """What is to be said of them; nothing where they are not known."""
+        return self.pairs.sentence((self.one.name, self.two.name)) if self.pairs else ""
 
 
 def compare(one: Trajectory, two: Trajectory) -> Comparison:

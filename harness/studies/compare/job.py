@@ -58,7 +58,7 @@ def events(found: Comparison) -> dict[str, Any]:
     if pairs is None:
         return {"events": "", "event_shift": None}
     return {
-        "events": pairs.sentence((found.one.name, found.two.name)),
+        "events": found.events,
         "event_shift": pairs.shift,
         "matched": {"one": pairs.one.tolist(), "two": pairs.two.tolist(), "shift": pairs.apart},
         "only_one": pairs.only[0].tolist(),
@@ -89,5 +89,5 @@ def sentences(found: Comparison) -> list[str]:
         f"Compared at {len(found.time)} times ({how}).",
         *(f"{each.name} is not a finite number at t = {each.at:g} s" for each in lost),
         *found.left_out,
-        *([found.pairs.sentence((found.one.name, found.two.name))] if found.pairs else []),
+        *filter(None, [found.events]),
     ]

@@ -10,7 +10,7 @@ from ctypes import c_double, c_int, c_void_p
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any
 
 from ...errors import HarnessError, check_names
 from ...running import any_fmu
@@ -20,7 +20,7 @@ from ...running.settings import settings
 from ...running.specification import Specification
 from ...running.values import unit
 from ...scenes.roles import roles
-from .measures import AT_END, OF_OUTPUTS, ON_PATH, PIECES, USUAL, Column, columns, of_outputs, offered
+from .measures import AT_END, OF_OUTPUTS, ON_PATH, PIECES, USUAL, columns, of_outputs, offered
 
 
 @dataclass(frozen=True)
@@ -35,22 +35,11 @@ class Runs:
     options: tuple[tuple[str, Any], ...] = ()
 
 
-class Runner(Protocol):
-    """The FMU's `variables` by name, the `columns` that are measured in a run, and the time in s at which one stops."""
-
-    variables: dict[str, Any]
-    columns: tuple[Column, ...]
-    stop: float
-
-    def run(self, point: Sequence[float]) -> list[float] | str:
-        """The measures at a point of the varied values, or the sentence why there are none."""
-
-    def constants(self) -> dict[str, tuple[object, str]]:
-        """The value of every parameter in the last run, and its unit."""
-
-
 class Ours:
-    """An instance of an FMU of ours.  The library is called as it stands: fmpy's own calls take as long as a run."""
+    """An instance of an FMU of ours.  The library is called as it stands: fmpy's own calls take as long as a run.
+
+    `columns` are what is measured in a run; `stop` is the time in s at which one stops.
+    """
 
     def __init__(self, runs: Runs, found: Any, fmu: Any, heard: Heard, wanted: Specification) -> None:
         self.fmu, self.component, self.heard = fmu, c_void_p(fmu.component), heard
@@ -92,6 +81,7 @@ class Ours:
         return [(name, getattr(self.fmu.dll, name), (self.component, *rest)) for name, *rest in calls]
 
     def run(self, point: Sequence[float]) -> list[float] | str:
+        """The measures at a point of the varied values, or the sentence why there are none."""
         self.heard.forget()
         try:
             return self.measured(point)
@@ -121,6 +111,7 @@ class Ours:
         return [read[i] for i in self.order]
 
     def constants(self) -> dict[str, tuple[object, str]]:
+        """The value of every parameter in the last run, and its unit."""
         return {name: (value, unit(self.variables[name])) for name, value in parameters(self.plan, self.fmu).items()}
 
 
@@ -130,7 +121,7 @@ def heed(function: str, status: int) -> None:
 
 
 class Theirs:
-    """An FMU that does not show its steps; each run is in a process of its own, and is whole or a sentence."""
+    """The same of an FMU that does not show its steps; each run is in a process of its own, whole or a sentence."""
 
     def __init__(self, runs: Runs, found: Any, wanted: Specification) -> None:
         self.varied, self.stop = runs.varied, 0.0
@@ -160,6 +151,9 @@ class Theirs:
 
     def constants(self) -> dict[str, tuple[object, str]]:
         return self.told
+
+
+Runner = Ours | Theirs
 
 
 def chosen(runs: Runs, variables: dict[str, Any], ours: bool) -> tuple[str, ...]:
