@@ -38,9 +38,13 @@ def plausible(laws: tuple[Law, ...], full: Law, problem: Problem) -> Law:
 
     Of nested fits no value moves by more standard errors than the root of what n ln(squares) changes by.
     """
-    n = len(problem.t)
-    least = n * problem.exact**2
-    return full if n * np.log(max(laws[0].squares, least) / max(full.squares, least)) > SAME else laws[0]
+    return full if more(problem, laws[0], full) > SAME else laws[0]
+
+
+def more(problem: Problem, law: Law, other: Law) -> float:
+    """By how much n ln(squares) of a law is more than that of another, as far as a fit is exact."""
+    n, least = len(problem.t), len(problem.t) * problem.exact**2
+    return n * float(np.log(max(law.squares, least) / max(other.squares, least)))
 
 
 def all_laws(

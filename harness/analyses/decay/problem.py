@@ -50,6 +50,11 @@ class Problem:
         """Residuals below which no fit is better than another."""
         return EXACT * float(np.std(self.x))
 
+    @property
+    def motion(self) -> float:
+        """The root mean square of the samples about their mean."""
+        return float(np.sqrt(np.mean((self.x - self.x.mean()) ** 2)))
+
     def unknowns(self, terms: Terms) -> np.ndarray:
         return unknowns_of(terms, self.drift)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...records.record import Record
-from .choice import Law
+from .choice import Law, more
 from .figures import Estimate, sizes
 from .intervals import Spread, spread
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
@@ -28,8 +28,7 @@ FEWEST = 100  # samples of a half that is fitted apart
 def refuse(record: Record, problem: Problem, full: Law, spread: Spread, pendulum: bool) -> None:
     """Unfit where the best fit is no answer."""
     e, _ = problem.off(full.p, full.terms)
-    motion = float(np.sqrt(np.mean((problem.x - problem.x.mean()) ** 2)))
-    share = spread.rms / motion
+    share = spread.rms / problem.motion
     if share > UNFIT and spread.rms > 2 * problem.noise:
         advice = "cut the record there with --from or --until"
         if record.base == "rad" and not pendulum:
@@ -61,34 +60,28 @@ def gains(problem: Problem, full: Law) -> float:
 
 def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, spread: Spread) -> tuple[str, ...]:
     """The sentences."""
-    said = []
     noise, rms, unit = problem.noise * problem.unit, spread.rms * problem.unit, record.unit
-    motion = float(np.sqrt(np.mean((problem.x - problem.x.mean()) ** 2)))
     rough, exact = spread.rms > ROUGH * problem.noise, spread.rms < 1e-9 * full.p[AMPLITUDE]
     if exact:
         return ()
-    if rough and spread.rms > PART * motion:
+    said, off, scatter = [], f"The fit is off by {rms:.3g} {unit} (rms)", f"samples scatter by {noise:.3g}"
+    alone = "the noise is not independent from sample to sample"
+    also = f"something else acts as well, or {alone}"
+    share = spread.rms / problem.motion
+    if rough and share > PART:
         e, _ = problem.off(full.p, full.terms)
+        most = f"most of it about t = {record.at(worst(problem, full.p, e))} s"
         said.append(
-            f"The fit is off by {rms:.3g} {unit} (rms), {100 * spread.rms / motion:.1f} % of the motion, where the "
-            f"samples scatter by {noise:.3g}: something else acts as well, or the noise is not independent from sample "
-            f"to sample, most of it about t = {record.at(worst(problem, full.p, e))} s; the intervals are widened, but "
-            "where the law does not hold its values mean little."
+            f"{off}, {100 * share:.1f} % of the motion, where the {scatter}: {also}, {most}; the intervals are "
+            "widened, but where the law does not hold its values mean little."
         )
     elif rough and spread.alike:
-        said.append(
-            f"The fit is off by {rms:.3g} {unit} (rms) where the samples scatter by {noise:.3g}: something else acts "
-            "as well, or the noise is not independent from sample to sample; the intervals are widened."
-        )
+        said.append(f"{off} where the {scatter}: {also}; the intervals are widened.")
     elif rough:
-        said.append(
-            f"The fit is off by {rms:.3g} {unit} (rms) where neighbouring samples scatter by {noise:.3g}: look at the "
-            "time stamps."
-        )
+        said.append(f"{off} where neighbouring {scatter}: look at the time stamps.")
     elif spread.alike:
         said.append(
-            f"Neighbouring residuals are alike (correlation {spread.rho:.2f}): the noise is not independent from "
-            "sample to sample; the intervals are widened."
+            f"Neighbouring residuals are alike (correlation {spread.rho:.2f}): {alone}; the intervals are widened."
         )
     drift = drifting(record, problem, full) if spread.alike and not problem.drift else ""
     alike = rounded_alike(problem, full, unit)
@@ -129,9 +122,8 @@ def drifting(record: Record, problem: Problem, full: Law) -> str:
 
 def undecided(problem: Problem, laws: tuple[Law, ...]) -> tuple[str, ...]:
     """Laws that this record cannot tell from the best one, and what would."""
-    best = laws[0]
-    n, least = len(problem.t), len(problem.t) * problem.exact**2
-    gains = [n * float(np.log(max(law.squares, least) / max(best.squares, least))) for law in laws]
+    best, n = laws[0], len(problem.t)
+    gains = [more(problem, law, best) for law in laws]
     rivals = [
         law
         for law, gain in zip(laws[1:], gains[1:], strict=True)

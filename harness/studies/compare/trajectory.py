@@ -1,6 +1,5 @@
 """The trajectories that are compared, wherever they come from: a result folder, a file, or a run of any FMU."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from os.path import abspath
 from pathlib import Path
@@ -10,6 +9,7 @@ import numpy as np
 from ...errors import HarnessError, SceneError
 from ...running.any_fmu import POINTS, run
 from ...running.description import description, stop_of
+from ...running.fmu import Report
 from ...running.specification import Specification, of_scene
 from ...running.trajectory import Trajectory, of_run
 from ...scenes.fmus import check_built
@@ -18,8 +18,6 @@ from .files import read
 
 FILES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
 SUFFIXES = (".fmu", ".toml")  # of what is run
-
-Report = Callable[[float], None]
 
 
 def both(sources: tuple[str, str], how: Specification, report: Report) -> tuple[Trajectory, Trajectory]:

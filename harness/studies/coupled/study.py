@@ -18,6 +18,7 @@ from ...results.files import write as write_csv
 from ...results.folder import replacing
 from ...results.provenance import named, record
 from ...running.description import description
+from ...running.fmu import Report
 from ...scenes.coupled.scene import Coupled, load
 from ...scenes.fmus import fmu_of
 from ...truths.monolith import LINEAR, bodies, solve
@@ -28,7 +29,6 @@ FOLDER = "coupled"
 FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.svg")
 SPRING = HOME / "fmus" / "more" / "spring.py"
 
-Report = Callable[[float], None]
 Starts = dict[str, dict[str, float]]  # start values of the real parameters of each model
 
 
