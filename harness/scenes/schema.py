@@ -39,10 +39,6 @@ class Kind:
     words: str
 
 
-class Refused(ValueError):
-    """A value that is not of its kind."""
-
-
 def is_text(value: object) -> bool:
     return isinstance(value, str) and bool(value)
 
@@ -90,7 +86,7 @@ def of_kind(kind: Kind, then: Hook) -> Hook:
 
     def hook(value: Any, annotation: Any) -> Any:
         if not kind.accepts(value):
-            raise Refused(f"{shown(value)} is not {kind.words}")
+            raise ValueError(f"{shown(value)} is not {kind.words}")
         return then(value, annotation)
 
     return hook

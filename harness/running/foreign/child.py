@@ -12,7 +12,7 @@ from time import perf_counter
 import fmpy
 from fmpy.fmi1 import FMICallException
 
-from ...errors import reason
+from ...errors import HarnessError, reason
 from .agreement import agreed
 from .cosimulation import cosimulate
 from .exchange import exchange
@@ -69,17 +69,15 @@ class Host:
         del MESSAGES[:]
         self.life.next = 0.0
         self.life.heed(0.0)
-        sentence, ended, refused = "", False, False
+        why: Exception | None = None
         try:
             self.step(path, h, tolerance)
-        except Ended as error:
-            sentence, ended = f"it ends itself: {error}", True
-        except Refused as error:
-            sentence, refused = str(error), True
         except FMICallException as error:
-            sentence = f"{error.function} answered {dict(enumerate(STATUS)).get(error.status, error.status)}"
+            status = dict(enumerate(STATUS)).get(error.status, error.status)
+            why = HarnessError(f"{error.function} answered {status}")
         except Exception as error:  # fmpy raises bare Exceptions
-            sentence = reason(error)
+            why = error
+        sentence = reason(why) if why else ""
         path.touch()
         rows = read(path, self.chosen)
         for older in self.room.glob(f"{ROWS}*") if not sentence else ():
@@ -89,7 +87,7 @@ class Host:
             at = f" at t = {rows.time[-1]:.9g} s" if len(rows.time) and " at t = " not in sentence else ""
             sentence = ": ".join(filter(None, (sentence + at, words())))
         self.life.passes += 1
-        return Pass(number, rows, sentence, ended, refused)
+        return Pass(number, rows, sentence, isinstance(why, Ended), isinstance(why, Refused))
 
     def step(self, path: Path, h: float, tolerance: float) -> None:
         """The same; whatever ends it is raised."""

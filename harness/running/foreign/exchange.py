@@ -7,7 +7,8 @@ from typing import Any
 from fmpy.simulation import Input
 from fmpy.sundials import CVodeSolver
 
-from .passes import Ended, Failed, Span
+from ...errors import HarnessError
+from .passes import Ended, Span
 
 MOST_STEPS = 100_000  # of CVode from one point to the next
 MOST_EVENTS = 1000  # at one time
@@ -43,7 +44,7 @@ class Solver(CVodeSolver):
         try:
             return super().step(t, target)
         except (RuntimeError, TypeError) as error:  # the path of CVode's source stands before its sentence
-            raise self.failed or Failed(f"fmpy's CVode: {str(error).rpartition(': ')[2]}") from None
+            raise self.failed or HarnessError(f"fmpy's CVode: {str(error).rpartition(': ')[2]}") from None
 
 
 def exchange(
@@ -95,7 +96,7 @@ def exchange(
             sample(t)
         still = 0 if t > before else still + 1
         if still > MOST_EVENTS:
-            raise Failed(f"{MOST_EVENTS} events in a row at t = {t:.9g} s")
+            raise HarnessError(f"{MOST_EVENTS} events in a row at t = {t:.9g} s")
         point += t >= target
 
 
@@ -107,4 +108,4 @@ def settled(update: Callable[[], tuple[bool, bool, bool, bool, bool, float]], t:
             raise Ended(t, "it answered terminateSimulation to an event")
         if not again:
             return upcoming if defined else inf
-    raise Failed(f"its discrete states do not settle at t = {t:.9g} s")
+    raise HarnessError(f"its discrete states do not settle at t = {t:.9g} s")

@@ -5,9 +5,8 @@ from typing import Any
 from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from ...errors import reason
+from ...errors import HarnessError, reason
 from ..fmu import WARNING, callbacks
-from .passes import Failed
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 LONGEST = 50  # messages of the log that are kept
@@ -25,7 +24,7 @@ def instantiated(found: Any, folder: str, exchange: bool) -> Any:
         fmu.instantiate(loggingOn=True, **({"callbacks": callbacks()[0]} if old else {"logMessage": keep}))
     except Exception as error:  # fmpy raises bare Exceptions
         tool = "; it needs the tool that made it (needsExecutionTool)" if interface.needsExecutionTool else ""
-        raise Failed(f"{reason(error)}{tool}") from None
+        raise HarnessError(f"{reason(error)}{tool}") from None
     return fmu
 
 

@@ -34,13 +34,9 @@ class Ended(Exception):
     """The FMU has ended the simulation, at `t` in s if it tells."""
 
     def __init__(self, t: float | None, how: str) -> None:
-        super().__init__(how)
+        super().__init__(f"it ends itself: {how}")
         self.t = t
 
 
 class Refused(Exception):
     """The FMU does not take a step of this size; it may take a shorter one."""
-
-
-class Failed(Exception):
-    """It cannot go on."""

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import HarnessError
 from ..values import REALS
 
 WHOLES = ("Integer", "Enumeration", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
@@ -21,10 +22,6 @@ RECORDED = {  # what one element is in a row; a text is the number of its line i
 FORMATS = {"d": np.float64, "q": np.int64, "Q": np.uint64}
 
 Shaped = tuple[Any, tuple[int, ...]]  # a variable, and its shape
-
-
-class Lost(Exception):
-    """An output that is not finite."""
 
 
 @dataclass(frozen=True)
@@ -74,13 +71,13 @@ class Recorder:
             self.reads.append((kind, getter, (references,) if version == "2.0" else (references, count)))
 
     def sample(self, t: float) -> None:
-        """Write the present row; Lost if a number in it is not finite."""
+        """Write the present row; HarnessError if a number in it is not finite."""
         row: list[Any] = []
         for kind, getter, asked in self.reads:
             row += map(self.texts.number, getter(*asked)) if kind == "String" else getter(*asked)
         for name, value in zip(self.names, row, strict=True):
             if not isfinite(value):
-                raise Lost(f"{name} is {value} at t = {t:.9g} s")
+                raise HarnessError(f"{name} is {value} at t = {t:.9g} s")
         self.file.write(self.row.pack(t, *row))
 
 
