@@ -80,15 +80,15 @@ def sections(results: Path, scenes: Sequence[Published]) -> list[Section]:
         *(precision(scenes, results), stability(results), importers(results), sweeps(results)),
         *(comparisons(results), coupled(results), bench(results)),
     ]
-    return [section for section in found if section.parts or section.missing]
+    return [each for each in found if each.parts or each.missing]
 
 
-def one_of(name: str, title: str, intro: str, parts: list[Item], lack: str, command: str) -> Section:
+def section(name: str, title: str, intro: str, parts: list[Item], lack: str, command: str) -> Section:
     """A section that lacks nothing as soon as it has a part."""
     return Section(name, title, intro, tuple(parts), () if parts else ((lack, f"python -m harness {command}"),))
 
 
-def each(results: Path, pattern: str, show: Callable[[Path], Item]) -> list[Item]:
+def items(results: Path, pattern: str, show: Callable[[Path], Item]) -> list[Item]:
     """What is shown of every file of a pattern below a folder; of the folder that holds it, where that is free."""
     files = sorted(results.glob(pattern))
     return [read(file.parent if "*" in pattern else file, show) for file in files]
@@ -152,8 +152,8 @@ def own(folder: Path) -> Item:
 
 def decays(results: Path) -> Section:
     intro = "Damping and dry friction told apart, by the whole signal and by its turning points, with 95 % margins."
-    parts = each(results, "decay/[!.]*/decay.json", decay)
-    return one_of("decay", "Decay", intro, parts, "a decay", "decay coulomb")
+    parts = items(results, "decay/[!.]*/decay.json", decay)
+    return section("decay", "Decay", intro, parts, "a decay", "decay coulomb")
 
 
 def decay(folder: Path) -> Item:
@@ -202,7 +202,7 @@ def precision(scenes: Sequence[Published], results: Path) -> Section:
         if model in models and not (folder / f"{model}-exchange.csv").is_file():
             again = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
             missing.append((f"{model} in model exchange", again))
-    parts += each(folder, "anchors.csv", partial(whole, "Anchors from the literature"))
+    parts += items(folder, "anchors.csv", partial(whole, "Anchors from the literature"))
     intro = "Error against run time and against right-hand sides; lower left is better. References are certified."
     return Section("precision", "Error against run time", intro, tuple(parts), tuple(missing))
 
@@ -219,8 +219,8 @@ def tradeoff(place: Path) -> Item:
 
 def stability(results: Path) -> Section:
     intro = "Every case either finishes within its error bound or is refused with a sentence: none hangs, none lies."
-    parts = each(results, "stability/stability.csv", endings)
-    return one_of("stability", "Stability", intro, parts, "stability", "stability")
+    parts = items(results, "stability/stability.csv", endings)
+    return section("stability", "Stability", intro, parts, "stability", "stability")
 
 
 def endings(file: Path) -> Item:
@@ -238,15 +238,15 @@ def endings(file: Path) -> Item:
 
 
 def importers(results: Path) -> Section:
-    parts = each(results, "importers/importers.csv", partial(whole, "Checks"))
+    parts = items(results, "importers/importers.csv", partial(whole, "Checks"))
     intro = "The same FMUs in other tools, beside fmpy."
-    return one_of("importers", "Importers", intro, parts, "importers", "importers")
+    return section("importers", "Importers", intro, parts, "importers", "importers")
 
 
 def sweeps(results: Path) -> Section:
     command = "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measure slips"
     intro = "What happens over many parameters; known boundaries are dashed."
-    return one_of("sweeps", "Sweeps", intro, each(results, "sweep/[!.]*/sweep.csv", swept), "a sweep", command)
+    return section("sweeps", "Sweeps", intro, items(results, "sweep/[!.]*/sweep.csv", swept), "a sweep", command)
 
 
 def swept(folder: Path) -> Item:
@@ -262,8 +262,8 @@ def swept(folder: Path) -> Item:
 
 def comparisons(results: Path) -> Section:
     intro, command = "How far two results or two FMUs are apart.", "compare results/coulomb results/coulomb-sign"
-    parts = each(results, "compare/[!.]*/compare.json", comparison)
-    return one_of("compare", "Comparisons", intro, parts, "a comparison", command)
+    parts = items(results, "compare/[!.]*/compare.json", comparison)
+    return section("compare", "Comparisons", intro, parts, "a comparison", command)
 
 
 def comparison(folder: Path) -> Item:
@@ -281,8 +281,8 @@ def comparison(folder: Path) -> Item:
 
 def coupled(results: Path) -> Section:
     intro = "Several FMUs joined, run by an existing engine, beside one model of the whole."
-    parts = each(results, "coupled/[!.]*/error.csv", pair)
-    return one_of("coupled", "Coupled", intro, parts, "a coupled scene", "couple two-masses")
+    parts = items(results, "coupled/[!.]*/error.csv", pair)
+    return section("coupled", "Coupled", intro, parts, "a coupled scene", "couple two-masses")
 
 
 def pair(folder: Path) -> Item:
@@ -291,9 +291,9 @@ def pair(folder: Path) -> Item:
 
 
 def bench(results: Path) -> Section:
-    parts = each(results, "bench/bench.csv", partial(whole, "Reached and seen"))
+    parts = items(results, "bench/bench.csv", partial(whole, "Reached and seen"))
     intro = "What was to be reached, and what was measured beside it."
-    return one_of("bench", "Numbers", intro, parts, "numbers", "bench")
+    return section("bench", "Numbers", intro, parts, "numbers", "bench")
 
 
 def whole(title: str, file: Path) -> Item:
