@@ -129,11 +129,6 @@ class Scene(SceneKeys):
     plots: tuple[str, ...]
 
     @property
-    def motion(self) -> dict[str, str]:
-        """The output that plays each role, of those recorded."""
-        return roles(self.outputs)
-
-    @property
     def follows(self) -> bool:
         """Whether the ends of the solver's own steps are visited."""
         return self.grid is None if self.follow is None else self.follow
@@ -192,12 +187,13 @@ def usual(outputs: tuple[str, ...]) -> tuple[str, ...]:
 
 def check_needs(scene: Scene) -> None:
     """What the scene asks for goes together."""
+    motion = roles(scene.outputs)
     if not scene.outputs:
         raise SceneError("outputs is empty; name at least one, as in outputs = ['x', 'v']")
     for kind, names, needs in ("analysis", scene.analyses, ANALYSES), ("plot", scene.plots, PLOTS):
         for name in names:
             for role in needs.get(name, ()):
-                if role not in scene.motion:
+                if role not in motion:
                     wanted = " or ".join(ROLES[role])
                     raise SceneError(f"the {kind} '{name}' needs the {role}: add {wanted} to the outputs")
             if name == "steps" and not scene.follows:

@@ -83,10 +83,11 @@ def recorded(source: str, columns: Columns, known: Known, report: Callable[[floa
 
     scene = load(source)
     check_built(scene.file)
-    if "position" not in scene.motion:
+    wanted = of_scene(scene)
+    if "position" not in wanted.motion:
         raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
-    run = simulate(of_scene(scene), report)
-    unit = run.units[scene.motion["position"]]
+    run = simulate(wanted, report)
+    unit = run.units[wanted.motion["position"]]
     record = Record(scene.name, run.time, run.motion("position"), unit, 0, unit).between(columns.begin, columns.end)
     check(record)
     told = {"files": (scene.file,), "parameters": run.in_force, "scene": vars(scene)}

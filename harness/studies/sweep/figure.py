@@ -7,7 +7,6 @@ evenly among them.
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray
@@ -89,7 +88,7 @@ def curve(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[B
     named(axes, data, name, measure)
     fine = spread(data, name)
     for each, color in zip(boundaries, COLOURS, strict=False):
-        below = np.broadcast_to(each.at(parameters(data) | {name: fine}, stop(data)), fine.shape) < 1
+        below = quantity(each, data, {name: fine}) < 1
         for at in fine[1:][np.diff(below)]:
             axes.axvline(at, color=color, linestyle="--", label=each.text)
         if below.any() and not below.all():
@@ -113,10 +112,10 @@ def chart(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[B
     axes.figure.colorbar(image, ax=axes, label=words(data, measure))
     plane = dict(zip((across, up), np.meshgrid(spread(data, across), spread(data, up)), strict=True))
     for each, color, hatch in zip(boundaries, COLOURS, HATCHES, strict=False):
-        quantity = np.broadcast_to(each.at(parameters(data) | plane, stop(data)), plane[up].shape)
-        if np.nanmin(quantity) < 1 < np.nanmax(quantity):
-            axes.contour(*plane.values(), quantity, levels=[1.0], colors=color, linestyles="--")
-            shade = axes.contourf(*plane.values(), quantity, levels=[-np.inf, 1.0], colors="none", hatches=[hatch])
+        found = quantity(each, data, plane)
+        if np.nanmin(found) < 1 < np.nanmax(found):
+            axes.contour(*plane.values(), found, levels=[1.0], colors=color, linestyles="--")
+            shade = axes.contourf(*plane.values(), found, levels=[-np.inf, 1.0], colors="none", hatches=[hatch])
             shade.set_edgecolor(color)
             axes.plot([], [], color=color, linestyle="--", label=each.text)
             axes.fill([], [], facecolor="none", edgecolor=color, hatch=hatch, linewidth=0, label=each.below)
@@ -132,10 +131,8 @@ def scatter(axes: Axes, data: xarray.Dataset, measure: str, name: str) -> None:
     named(axes, data, name, measure)
 
 
-def parameters(data: xarray.Dataset) -> dict[str, Any]:
-    """The parameters that were not varied."""
-    return json.loads(data.attrs["parameters"])
-
-
-def stop(data: xarray.Dataset) -> float:
-    return float(data.attrs["stop_time"])
+def quantity(boundary: Boundary, data: xarray.Dataset, varied: dict[str, np.ndarray]) -> np.ndarray:
+    """That of a boundary, where the varied parameters are these, of one shape."""
+    (shape,) = {each.shape for each in varied.values()}
+    held = json.loads(data.attrs["parameters"])
+    return np.broadcast_to(boundary.at(held | varied, float(data.attrs["stop_time"])), shape)
