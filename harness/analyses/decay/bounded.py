@@ -8,7 +8,7 @@ others is the hybrid resampling of C.-S. Chuang and T. L. Lai, Statistica Sinica
 likeliest value, knows what the others cannot be, and holds the truth also where that is zero.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import combinations
 from statistics import NormalDist
@@ -24,19 +24,19 @@ CLOSE, STEPS = 2e-3, 40  # errors, of the ends, and how long they are looked for
 def bounded(z: np.ndarray, correlation: np.ndarray) -> tuple[float, float]:
     """The interval, in errors, of the first of k means measured as z (k,) with the correlation (k, k)."""
     cone = Cone(correlation)
-    likeliest, least = cone.nearest(z[None])
+    likeliest, least = cone.nearest(z)
     squares, axes = np.linalg.eigh(correlation)
     draws = normal(len(z)) @ (axes * np.sqrt(np.maximum(squares, 0.0))).T
 
     def beyond(m: float) -> float:
         """How much farther z is from the means with that m than 95 % of their draws."""
-        means, squares = cone.nearest(z[None], m)
+        means, square = cone.nearest(z, m)
         drawn = means + draws
-        farther = cone.nearest(drawn, m)[1] - cone.nearest(drawn)[1]
+        farther = cone.squares(drawn, m) - cone.squares(drawn)
         limit = np.partition(farther, int(0.95 * DRAWS))[int(0.95 * DRAWS)]
-        return float(np.sqrt(max(squares[0] - least[0], 0.0)) - np.sqrt(max(limit, 0.0)))
+        return float(np.sqrt(max(square - least, 0.0)) - np.sqrt(max(limit, 0.0)))
 
-    best = float(likeliest[0, 0])
+    best = float(likeliest[0])
     high = root(beyond, best, best + WIDEST)
     return (0.0 if best == 0 or beyond(0.0) <= 0 else root(lambda m: -beyond(m), 0.0, best)), high
 
@@ -52,25 +52,30 @@ class Cone:
             weight = np.linalg.pinv(correlation[np.ix_(held, held)])
             self.faces.append((held, free, weight, weight @ correlation[np.ix_(held, free)]))
 
-    def nearest(self, z: np.ndarray, first: float | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """The means (n, k) nearest to the points z (n, k), those with that `first` one if it is given, and the squares
-        of their distances (n,): of all faces on whose own side the nearest point lies the best."""
-        means, least = np.zeros_like(z), np.full(len(z), np.inf)
-        for held, free, weight, slope in self.faces:
-            if first is not None and 0 not in held:
-                continue
-            off = z[:, held]
-            if first is not None:
-                off = off - np.where(np.array(held) == 0, first, 0.0)
-            squares = np.sum(off @ weight * off, axis=1)
-            moved = z[:, free] - off @ slope
-            better = (moved >= 0).all(axis=1) & (squares < least)
-            least[better] = squares[better]
-            means[better] = 0.0
-            means[np.ix_(better, free)] = moved[better]
+    def nearest(self, z: np.ndarray, first: float | None = None) -> tuple[np.ndarray, float]:
+        """The means (k,) nearest to the point z (k,), those with that `first` one if it is given, and the square of
+        their distance: of all faces on whose own side the nearest point lies the best."""
+        free, moved, squares = min(self.sides(z[None], first), key=lambda side: float(side[2][0]))
+        means = np.zeros_like(z)
+        means[free] = moved[0]
         if first is not None:
-            means[:, 0] = first
-        return means, least
+            means[0] = first
+        return means, float(squares[0])
+
+    def squares(self, z: np.ndarray, first: float | None = None) -> np.ndarray:
+        """The squares (n,) of such distances of points z (n, k)."""
+        return np.min([squares for _, _, squares in self.sides(z, first)], axis=0)
+
+    def sides(self, z: np.ndarray, first: float | None) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
+        """Of each face the means that it leaves free, these nearest to the points z (n, k), and the squares of the
+        distances (n,), infinite where the nearest point does not lie on its own side."""
+        if first is not None:
+            z = z - first * (np.arange(z.shape[1]) == 0)
+        for held, free, weight, slope in self.faces:
+            if first is None or 0 in held:
+                off = z[:, held]
+                moved = z[:, free] - off @ slope
+                yield free, moved, np.where((moved >= 0).all(axis=1), np.sum(off @ weight * off, axis=1), np.inf)
 
 
 @cache
