@@ -112,12 +112,13 @@ def test_the_motion_has_no_step_in_its_drag(b, sine):
 # ---- the answers
 
 
-@pytest.mark.parametrize(
-    ("law", "order"),
-    [(law, 0) for law in LAWS] + [(law, order) for law in (LAWS[0], ("zeta",), ("r",)) for order in (1, 2)],
-    ids=lambda each: "+".join(each) if isinstance(each, tuple) else QUANTITIES[each],
+@pytest.mark.parametrize(  # every law of a mass and of a pendulum, of which the quantities take turns
+    ("law", "sine", "order"),
+    [(law, False, 0) for law in LAWS]
+    + [(law, True, i % 3) for i, law in enumerate(LAWS)]
+    + [(LAWS[0], False, order) for order in (1, 2)],
+    ids=lambda each: "+".join(each) if isinstance(each, tuple) else None,
 )
-@pytest.mark.parametrize("sine", [False, True])
 def test_a_clean_signal_gives_its_constants_back_to_nine_digits(law, sine, order):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.4}[term] for term in law}
     t = np.linspace(0, 3, 200)
@@ -260,7 +261,7 @@ def test_the_turning_points_alone_tell_the_same(sine, a):
     assert {"zeta", "r"} <= set(values(found.by_turns))
 
 
-@pytest.mark.parametrize("a", [0.1, 1.0, 2.5])
+@pytest.mark.parametrize("a", [0.1, 2.5])
 @pytest.mark.parametrize("term", TERMS)
 def test_two_peaks_of_a_pendulum_tell_its_only_loss(term, a):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.05}[term]}
