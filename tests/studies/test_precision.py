@@ -1,6 +1,5 @@
 """Work-precision: what is measured, what counts as a gap, what the sentences say."""
 
-import csv
 from functools import partial
 from math import nan
 from time import sleep
@@ -176,32 +175,6 @@ def test_stuck_points_are_those_between_a_stop_and_the_next_break_away():
     stuck = laws.stuck(truth)
     assert np.array_equal(stuck, truth.motion[:, 1] == 0.0)
     assert not laws.stuck(load("coulomb"))[1:].any()
-
-
-def test_the_command_writes_every_point_and_says_what_to_use_and_results_on_other_models_stay(place, tmp_path):
-    folder = tmp_path / "precision"
-    folder.mkdir()
-    (folder / "pendulum.csv").write_text("older")
-    done = command(place, "smd", "--quick", "--out", tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "smd: use exact: " in done.stdout
-    made = {"smd.csv", "smd.json", "smd.svg", "smd.txt", "anchors.csv"}
-    assert {path.name for path in folder.iterdir()} == made | {"pendulum.csv"}
-    assert (folder / "pendulum.csv").read_text() == "older"
-    with (folder / "smd.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    tools = {FMU, FMPY, *WAYS, "scipy", "cvode"} - peers.missing().keys()
-    assert {row["tool"] for row in rows} == tools
-    unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
-    assert [row["failure"] for row in rows if row["tool"] in WAYS] == [unbuilt, unbuilt]
-    assert done.stdout.count(unbuilt) == 1
-    inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
-    assert len(inside) == 1 + 4 * len(QUICK.tolerances)
-    assert float(inside[0]["largest [1]"]) < 1e-13
-    numbers = ("method", "rtol [1]", "evaluations", "largest [1]")
-    same = [[[row[name] for name in numbers] for row in each if not row["failure"]] for each in (inside, outside)]
-    assert same[0] == same[1]
-    assert all(bool(row["failure"]) == (row["seconds [s]"] == "") for row in rows)
 
 
 @pytest.mark.parametrize("path", AUTHORED, ids=lambda path: path.stem)

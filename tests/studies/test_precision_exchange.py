@@ -14,7 +14,8 @@ from harness.errors import HarnessError
 from harness.running import fmi3
 from harness.running.inside import embedded
 from harness.studies.precision import advice
-from harness.studies.precision.study import CS, ME, Extent, jobs, sweep
+from harness.studies.precision.study import CS, FMPY, FMU, ME, QUICK, WAYS, Extent, jobs, sweep
+from harness.truths import peers
 from harness.truths.models import CASES
 from harness.truths.reference import load
 
@@ -114,7 +115,7 @@ def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
 
 def harness(folder, *arguments):
     """The finished process of a command in a folder."""
-    return commands.harness(folder, *arguments, base={}, PATH="", COLUMNS="80")
+    return commands.harness(folder, *arguments, base={}, PATH="", COLUMNS="100")
 
 
 def test_the_command_shows_both_ways_beside_the_others_and_error_against_tolerance(both, tmp_path):
@@ -139,24 +140,55 @@ def test_the_command_shows_both_ways_beside_the_others_and_error_against_toleran
     assert told == [[advice.power(float(number)) if number else "-" for number in row] for row in table]
 
 
-def test_json_holds_all_of_it_and_the_page_has_error_against_tolerance_or_names_the_commands_that_make_it(
-    both, fmus, tmp_path
-):
-    def page(folder):
-        done = harness(folder, "--json", "precision", "smd", "--quick", "--out", tmp_path)  # before any command
-        assert done.returncode == 0, done.stderr
-        found = json.loads(done.stdout)
-        assert {point["method"] for point in found["points"]["smd"]} >= {"exact", "dop853", "Radau"}
-        assert found["advice"][0].startswith("smd: use exact")
-        assert harness(folder, "report", "--quiet", "--out", tmp_path).returncode == 0
-        return unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
-
-    without = tmp_path / "without"
-    without.mkdir()
+@pytest.fixture(scope="module")
+def twice(both, fmus, tmp_path_factory):
+    """A study of the smd and the page of all results, where its FMU for FMI 3.0 is built and then where it is not, the
+    second beside results on another model: what each study said, the pages, and the folder of the second."""
+    (out, without), said, pages = map(tmp_path_factory.mktemp, ("out", "without")), [], []
     (without / "fmus").symlink_to(fmus)
+    for folder, words in ((both, ("--json", "precision")), (without, ("precision",))):  # --json before any command
+        done = harness(folder, *words, "smd", "--quick", "--out", out)
+        assert (done.returncode, done.stderr) == (0, "")
+        said.append(done.stdout)
+        assert harness(folder, "report", "--quiet", "--out", out).returncode == 0
+        pages.append(unescape((out / "report.html").read_text(encoding="utf-8")))
+        (out / "precision/pendulum.txt").write_text("older")
+    return said, pages, out / "precision"
+
+
+def test_json_holds_all_of_it(twice):
+    found = json.loads(twice[0][0])
+    assert {point["method"] for point in found["points"]["smd"]} >= {"exact", "dop853", "Radau"}
+    assert found["advice"][0].startswith("smd: use exact")
+
+
+def test_the_page_has_error_against_tolerance_or_names_the_commands_that_make_it(twice):
     head = "model exchange by fmpy's CVode: largest error at rtol"
     commands = "python build_fmus.py smd --fmi 3 && python -m harness precision smd"
-    assert head in (shown := page(both))
-    assert commands not in shown
-    assert head not in (shown := page(without))  # what was there of another build is gone
-    assert commands in shown
+    whole, lacking = twice[1]
+    assert head in whole
+    assert commands not in whole
+    assert head not in lacking  # what was there of another build is gone
+    assert commands in lacking
+
+
+def test_the_command_writes_every_point_and_says_what_to_use_and_results_on_other_models_stay(twice):
+    (_, said), _, folder = twice
+    assert "smd: use exact: " in said
+    made = {"smd.csv", "smd.json", "smd.svg", "smd.txt", "anchors.csv"}
+    assert {path.name for path in folder.iterdir()} == made | {"pendulum.txt"}
+    assert (folder / "pendulum.txt").read_text() == "older"
+    with (folder / "smd.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    tools = {FMU, FMPY, *WAYS, "scipy", "cvode"} - peers.missing().keys()
+    assert {row["tool"] for row in rows} == tools
+    unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
+    assert [row["failure"] for row in rows if row["tool"] in WAYS] == [unbuilt, unbuilt]
+    assert said.count(unbuilt) == 1
+    inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
+    assert len(inside) == 1 + 4 * len(QUICK.tolerances)
+    assert float(inside[0]["largest [1]"]) < 1e-13
+    numbers = ("method", "rtol [1]", "evaluations", "largest [1]")
+    same = [[[row[name] for name in numbers] for row in each if not row["failure"]] for each in (inside, outside)]
+    assert same[0] == same[1]
+    assert all(bool(row["failure"]) == (row["seconds [s]"] == "") for row in rows)
