@@ -121,13 +121,13 @@ def test_decay_measures_are_those_of_the_parameters(fmus):
 
 
 def test_a_map_is_labelled_for_xarray_and_pandas_the_same_for_any_number_of_workers(harness, tmp_path):
-    for workers in (1, 8):
+    for workers in (1, 4):
         done = harness(*MAP, "--workers", workers, "--out", f"out{workers}")
         assert (done.returncode, done.stderr) == (0, "")
         assert "12 runs, 0 of them done before, 0 failed" in done.stdout
-    one, eight = (folder_of(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 8))
+    one, four = (folder_of(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 4))
     for file in ("sweep.nc", "sweep.csv"):
-        assert (one / file).read_bytes() == (eight / file).read_bytes()
+        assert (one / file).read_bytes() == (four / file).read_bytes()
     assert {file.name for file in one.iterdir()} == {"sweep.nc", "sweep.csv", "figure.svg", "provenance.json"}
     assert [file.name for file in one.parent.iterdir()] == [one.name]
     data = opened(one)
@@ -167,10 +167,8 @@ TOLD = {  # why some have no run to show
 @pytest.mark.parametrize("name", foreign.VARY)
 def test_an_fmu_of_anyone_is_swept_or_says_why_not(harness, tmp_path, name):
     """Numbers alone are measured: of arrays each element, of texts nothing."""
-    vary = foreign.VARY[name].replace(":3", ":2")
-    done = harness(
-        "sweep", foreign.built() / f"{name}.fmu", "--vary", vary, "--measure", "final,largest", "--name", "a"
-    )
+    fmu, vary = foreign.built() / f"{name}.fmu", foreign.VARY[name].replace(":3", ":2")
+    done = harness("sweep", fmu, "--vary", vary, "--measure", "final,largest", "--name", "a", "--tolerance", 1e-3)
     if name in TOLD:
         assert (done.returncode, TOLD[name] in done.stderr) == (1, True)
         return
@@ -308,16 +306,13 @@ def test_a_cluster_one_of_whose_workers_is_killed_does_the_same(harness, whole, 
     with ExitStack() as held:
         _, line = held.enter_context(dask("scheduler", "--host", "127.0.0.1", "--port", "0", *quiet, cwd=tmp_path))
         address = re.findall(r"tcp://\S+", line("tcp://"))[0]
-        workers = []
-        for _ in range(2):
-            worker, line = held.enter_context(
-                dask("worker", address, "--no-dashboard", "--nthreads", "2", "--no-nanny", cwd=tmp_path)
-            )
+        words = (address, "--no-dashboard", "--nthreads", "2", "--no-nanny")
+        workers = [held.enter_context(dask("worker", *words, cwd=tmp_path)) for _ in range(2)]
+        for _, line in workers:
             line("Registered to")
-            workers.append(worker)
         process, journal = begun(tmp_path, *LONG, "--scheduler", address)
         before = Journal(journal, 200, 1).done
-        workers[0].kill()
+        workers[0][0].kill()
         said = process.communicate(timeout=120)[1]
     assert (process.returncode, said) == (0, "")
     assert before < 200
