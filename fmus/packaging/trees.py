@@ -49,3 +49,12 @@ def _part(name: str, value: Any, down: int) -> Any:
     if isinstance(value, list):
         return [copied(one, down) if isinstance(one, ast.AST) else one for one in value]
     return value + down if down and value is not None and name in ("lineno", "end_lineno") else value
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two trees say the same, wherever they stand."""
+    if type(a) is not type(b):
+        return False
+    if isinstance(a, ast.AST):
+        return all(same(getattr(a, name, None), getattr(b, name, None)) for name in a._fields if name != "ctx")
+    return a == b if not isinstance(a, list) else len(a) == len(b) and all(map(same, a, b))

@@ -3,7 +3,7 @@
 import ast
 import re
 
-from ..trees import copied, tree, walked
+from ..trees import copied, same, tree, walked
 from .declarations import Declarations, annotated, label, returned
 from .numbers import METHODS, RANGES, Numbers
 from .settled import truth
@@ -136,7 +136,6 @@ class Writer:
         return leaves and many > 0
 
     def simple(self, node: ast.stmt, depth: int) -> None:
-        old = ast.unparse(node)
         new: list[ast.stmt]
         match node:
             case ast.ImportFrom(module="found"):
@@ -148,11 +147,11 @@ class Writer:
                 new = [node]
             case _:
                 new = self.numbers.statements(self.offered(copied(node)))
-        texts = [ast.unparse(ast.copy_location(one, node)) for one in new]
-        if texts == [old]:
+        if len(new) == 1 and same(new[0], node):
             self.copy(node.end_lineno or 0, node.col_offset - depth)
             return
-        for n, (one, whole) in enumerate(zip(new, texts, strict=True)):
+        for n, one in enumerate(new):
+            whole = ast.unparse(ast.copy_location(one, node))
             text = " " * depth + bare(one, whole)
             text = text if len(text) <= WIDTH else folded(" " * depth + whole)
             self.write(text + self.comment(node) * (n == 0), node)
@@ -171,8 +170,8 @@ class Writer:
 
     def stands(self, node: ast.stmt, word: str, test: ast.expr) -> bool:
         """Whether the head of a compound statement can stay as it is."""
-        same = ast.unparse(test) == ast.unparse(node.test)  # type: ignore[attr-defined]
-        return same and self.old[node.lineno - 1].lstrip().startswith(word + " ")
+        kept = same(test, node.test)  # type: ignore[attr-defined]
+        return kept and self.old[node.lineno - 1].lstrip().startswith(word + " ")
 
     def function(self, node: ast.FunctionDef, depth: int, counted: list[str], i: int) -> None:
         outer, self.numbers = self.numbers, self.fresh(dict.fromkeys(counted, i))
