@@ -7,11 +7,12 @@ import shutil
 import subprocess
 import sys
 from functools import partial
+from types import SimpleNamespace
 
 import commands
 import numpy as np
 import pytest
-from builds import ROOT
+from builds import ROOT, published
 from models import MODELS, outputs
 
 BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
@@ -20,7 +21,7 @@ BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 ENVIRONMENT = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
 TIME = r'"name": "run_time",\s+"value": [^,]+'
 NUMBER = r"-?\b\d+\.?\d*(?:e[-+]\d+)?"
-harness = partial(commands.harness, base=ENVIRONMENT)
+harness = partial(commands.harness, base=ENVIRONMENT, blank=True)
 
 
 def python(folder, *arguments):
@@ -49,10 +50,11 @@ def table(path):
 
 
 @pytest.fixture(scope="module")
-def main_job(place):
+def main_job():
     """The finished main job and its results."""
-    done = harness(place, fresh=True, COLUMNS="80")
-    return done, place / "results"
+    folder = published()
+    said = json.loads((folder / "said.json").read_text())
+    return SimpleNamespace(**dict(zip(("returncode", "stdout", "stderr"), said, strict=True))), folder / "results"
 
 
 def test_the_main_job_runs_every_published_case(main_job):
@@ -275,7 +277,7 @@ def test_a_missing_fmu_says_how_to_build_it(tmp_path):
 def test_a_process_that_is_forked_answers_as_a_fresh_one(place, tmp_path, arguments):
     def done(fresh):
         shutil.rmtree(tmp_path / "results", ignore_errors=True)  # else the second says that it is the same again
-        return harness(place, *arguments, *out, fresh=fresh)
+        return harness(place, *arguments, *out, fresh=fresh, blank=False)
 
     out = ["--out", tmp_path / "results"] if "--json" in arguments else []
     fresh, forked = done(True), done(False)

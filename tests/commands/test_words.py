@@ -6,13 +6,14 @@ import json
 import re
 import subprocess
 import sys
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
+import commands as processes
 import numpy as np
 import pytest
 from builds import ROOT
-from commands import harness
 from rich.console import Console
 
 from harness.commands import commands
@@ -30,6 +31,7 @@ from harness.truths.models import CASES, MODELS
 
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
+harness = partial(processes.harness, blank=True)
 
 
 @pytest.fixture

@@ -4,11 +4,13 @@ import csv
 import json
 import re
 import shutil
+from functools import partial
 from hashlib import sha256
 
+import commands
 import numpy as np
 import pytest
-from commands import harness
+from builds import published
 from fmpy import read_model_description
 from models import MODELS
 
@@ -21,6 +23,7 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "decay": (("decay", "coulomb"), "decay/coulomb"),
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
 }
+drawn, harness = commands.harness, partial(commands.harness, blank=True)
 
 
 @pytest.fixture
@@ -35,7 +38,7 @@ def made(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""
     here, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]
     (here / "fmus").symlink_to(fmus)
-    done = harness(here, *arguments)
+    done = drawn(here, *arguments)
     assert (done.returncode, done.stderr) == (0, "")
     return here, arguments, here / "results" / folder
 
@@ -130,7 +133,7 @@ def files(folder):
 def test_a_result_is_made_again_by_its_folder_and_to_the_last_bit(made):
     here, (command, *_), folder = made
     before, account = files(folder), told(folder)
-    done = harness(here, "run", folder.relative_to(here))
+    done = drawn(here, "run", folder.relative_to(here))
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == before
     for key in ("files", "parameters", "scene", "source"):
@@ -142,7 +145,7 @@ def test_a_result_is_made_again_by_its_folder_and_to_the_last_bit(made):
 
 @pytest.mark.parametrize("scene", [path.stem for path in shipped() if path.stem not in ("coulomb", "pacejka-0.001")])
 def test_every_shipped_scene_is_run_again_to_the_last_bit(here, scene):
-    assert harness(here, "run", scene).returncode == 0
+    shutil.copytree(published() / "results" / scene, here / "results" / scene)
     assert "the same, bit for bit" in harness(here, "run", f"results/{scene}").stdout
 
 

@@ -30,9 +30,9 @@ def theirs():
 def run(theirs, tmp_path):
     """run(name, ...): the finished `run --fmu`, and the rows of its result by the names of the columns."""
 
-    def run(name, *arguments):
+    def run(name, *arguments, blank=True):
         fmu = name if name.endswith(".fmu") else theirs / f"{name}.fmu"
-        done = commands.harness(tmp_path, "run", "--fmu", fmu, *arguments, COLUMNS="120")
+        done = commands.harness(tmp_path, "run", "--fmu", fmu, *arguments, COLUMNS="120", blank=blank)
         assert "Traceback" not in done.stderr
         assert "np." not in done.stdout + done.stderr
         return done, table(tmp_path / "results" / name.removesuffix(".fmu") / "trajectory.csv")
@@ -99,7 +99,7 @@ def test_an_fmu_whose_own_step_is_fixed_is_told_as_such(run):
 
 
 def test_booleans_integers_and_texts_are_recorded_drawn_and_set(run, tmp_path):
-    done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007")
+    done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007", blank=False)
     fine(done)
     assert (tmp_path / "results/Switching/figure.svg").is_file()
     assert {*rows["on"]} == {0, 1}
@@ -157,7 +157,9 @@ def test_a_scene_may_be_of_any_fmu(theirs, tmp_path, name, outputs, more, column
         assert rows["place[2]"][-1] == pytest.approx(2 * cos(3))
     assert (tmp_path / "results/mine/figure.svg").is_file()
     assert "error unknown" in done.stdout or "changes no output by more than" in done.stdout
-    assert "the same, bit for bit" in commands.harness(tmp_path, "run", "results/mine", COLUMNS="120").stdout
+    assert (
+        "the same, bit for bit" in commands.harness(tmp_path, "run", "results/mine", blank=True, COLUMNS="120").stdout
+    )
 
 
 @pytest.mark.parametrize(

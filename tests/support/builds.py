@@ -1,5 +1,6 @@
 """What is built for the tests is built once a run: its processes share a room, and the first that asks builds."""
 
+import json
 import subprocess
 import sys
 from fcntl import LOCK_EX, flock
@@ -40,6 +41,17 @@ def of_file(path, *words):
         assert done.stdout.startswith(f"{path.stem}.fmu ")
 
     return made("-".join((path.stem, *words)), make)
+
+
+def published():
+    """The folder of a user who has run the published cases; in said.json the status, and what the command said."""
+
+    def make(folder):
+        (folder / "fmus").symlink_to(once("fmi2"))
+        done = commands.harness(folder, fresh=True, COLUMNS="80")
+        (folder / "said.json").write_text(json.dumps([done.returncode, done.stdout, done.stderr]))
+
+    return made("published", make)
 
 
 def made(name, make):
