@@ -263,6 +263,12 @@ def test_a_missing_fmu_says_how_to_build_it(tmp_path):
     assert "there is no fmus/absent.fmu: build the FMUs with `python build_fmus.py`" in done.stderr
 
 
+PAIR = (
+    'title = "a title"\nstop = 0.1\nsteps = [0.01]\n[parts.one]\nmodel = "coulomb"\n[parts.two]\nmodel = "smd"\n'
+    '[[connections]]\nfrom = "one.F_spring"\nto = "two"\n'
+)
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -270,16 +276,17 @@ def test_a_missing_fmu_says_how_to_build_it(tmp_path):
         ["run", "nosuch"],
         ["run", "stickslip", "--json"],
         ["decay", "coulomb", "--json"],
-        ["couple", "two-masses", "--stop", "0.5", "--json"],
+        ["couple", "pair.toml", "--json"],
         ["report", "--help"],
     ],
 )
-def test_a_process_that_is_forked_answers_as_a_fresh_one(place, tmp_path, arguments):
+def test_a_process_that_is_forked_answers_as_a_fresh_one(fmus, tmp_path, arguments):
     def done(fresh):
         shutil.rmtree(tmp_path / "results", ignore_errors=True)  # else the second says that it is the same again
-        return harness(place, *arguments, *out, fresh=fresh, blank=False)
+        return harness(tmp_path, *arguments, fresh=fresh, blank=False)
 
-    out = ["--out", tmp_path / "results"] if "--json" in arguments else []
+    (tmp_path / "fmus").symlink_to(fmus)
+    (tmp_path / "pair.toml").write_text(PAIR)
     fresh, forked = done(True), done(False)
     assert (forked.returncode, forked.stderr) == (fresh.returncode, fresh.stderr)
     told = [re.sub(TIME, "", done.stdout) for done in (forked, fresh)]
