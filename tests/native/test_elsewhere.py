@@ -8,21 +8,21 @@ import shutil
 import subprocess
 import sys
 from contextlib import contextmanager, nullcontext
-from functools import cache
+from pathlib import Path
 
 import builds
 import fmi3_hosts
 import pytest
 from models import CASES, HYBRID, MODELS, RODAS, declared, label, model_class, outputs
-from native_fmus import built
-from native_host import HEADERS, SOURCE, SOURCE3, begin, folder, guid, host, lives, play, references, unpacked
+from native_fmus import built, needed
+from native_host import HEADERS, SOURCE, SOURCE3, begin, guid, host, lives, play, references, unpacked
+
+from fmus.packaging.native.compiler import PLATFORMS, binaries
+from fmus.packaging.native.sources import COMPILED
 
 ROWS = 50
 ARM = "/usr/aarch64-linux-gnu"  # where Debian puts the C library
-MACHINES = {  # the compiler's name, the suffix of libraries, their folder in FMI 3.0, what runs them
-    "win64": ("x86_64-windows-gnu", ".dll", "x86_64-windows", ["wine"]),
-    "aarch64-linux": ("aarch64-linux-gnu.2.17", ".so", "aarch64-linux", ["qemu-aarch64", "-L", ARM]),
-}
+MACHINES = {"win64": ["wine"], "aarch64-linux": ["qemu-aarch64", "-L", ARM]}  # and what runs their programs
 CLOSE = dict.fromkeys(MODELS, 1e-11) | {"pacejka": 1e-9}  # of an output's largest value; break-aways amplify
 
 
@@ -38,18 +38,21 @@ STEADY = [case for case in CASES if is_steady(case)]
 @pytest.fixture(scope="module", params=MACHINES)
 def machine(request):
     """A platform, the command that starts a host there, by its source, and the environment for it."""
-    target, _, _, (emulator, *options) = MACHINES[request.param]
+    emulator, *options = MACHINES[request.param]
     if not shutil.which(emulator) or (options and not os.path.isdir(ARM)):
         pytest.skip(f"{emulator} is not here: apt-get install wine64 wine qemu-user libc6-arm64-cross")
+    needed()
+    (target,) = PLATFORMS[request.param].targets.values()
 
     def program(source):
-        out = folder(f"{source.stem} on {request.param}") / "host.exe"
-        compiler = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", f"-I{HEADERS}"]
-        subprocess.run([*compiler, str(source), "-o", str(out)], check=True)
-        return [emulator, *options, str(out)]
+        def make(folder):
+            command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", f"-I{HEADERS}"]
+            subprocess.run([*command, str(source), "-o", str(folder / "host.exe")], check=True)
+
+        return [emulator, *options, str(builds.made(f"{source.stem}-{request.param}", make) / "host.exe")]
 
     with windows() if emulator == "wine" else nullcontext({}) as environment:
-        yield request.param, cache(program), os.environ | environment
+        yield request.param, program, os.environ | environment
 
 
 @contextmanager
@@ -71,13 +74,23 @@ def windows():
         yield here
 
 
+def library(fmu, version, platform):
+    """The library for a platform, as the build command makes it of the sources that are in the FMU for any."""
+
+    def make(folder):
+        sources = {path.name: path.read_text() for path in (unpacked(fmu) / "sources").iterdir()}
+        for path, content in binaries(fmu.stem, sources, COMPILED[version], platform, version).items():
+            (folder / Path(path).name).write_bytes(content)
+
+    return builds.made(f"{fmu.stem}-{version}-{platform}", make) / f"{fmu.stem}{PLATFORMS[platform].suffix}"
+
+
 def play_there(machine, name, script):
     """As play, there."""
     platform, program, environment = machine
-    fmu = built(*MACHINES) / f"{name}.fmu"
-    library = unpacked(fmu) / "binaries" / platform / f"{name}{MACHINES[platform][1]}"
+    fmu = built() / f"{name}.fmu"
     done = subprocess.run(
-        [*program(SOURCE), str(library), guid(fmu), "1"],
+        [*program(SOURCE), str(library(fmu, "2", platform)), guid(fmu), "1"],
         input="\n".join(script),
         capture_output=True,
         text=True,
@@ -142,13 +155,9 @@ def test_model_exchange_is_that_of_linux_on_x86(machine, name):
 def test_fmi_3_is_that_of_linux_on_x86(machine):
     """Both ways to simulate the sled, its states saved, and a refusal; the numerics are those of FMI 2.0."""
     platform, program, environment = machine
-    _, suffix, place, _ = MACHINES[platform]
-    platforms = [word for each in MACHINES for word in ("--platform", each)]
-    there = builds.once("fmi3-elsewhere", "stickslip", "--fmi", "3", *platforms, timeout=600)
-    program, library = program(SOURCE3), f"{place}/stickslip{suffix}"
-    ends, said = lives(program, there / "stickslip.fmu", library, 2, 4000, env=environment)
-    sled, library = fmi3_hosts.built() / "stickslip.fmu", "x86_64-linux/stickslip.so"
-    expected, sentences = lives([host(source=SOURCE3)], sled, library, 2, 4000)
+    sled = fmi3_hosts.built() / "stickslip.fmu"
+    ends, said = lives(program(SOURCE3), sled, library(sled, "3", platform), 2, 4000, env=environment)
+    expected, sentences = lives([host(source=SOURCE3)], sled, "x86_64-linux/stickslip.so", 2, 4000)
     assert ends == [pytest.approx(row, abs=1e-11) for row in expected]
     assert said == sentences
 
