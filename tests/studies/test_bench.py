@@ -1,10 +1,11 @@
 """The benchmark: every error is measured against a second route, every time beside somebody else's."""
 
 import csv
+import ctypes
 import shutil
 from dataclasses import replace
 from functools import partial
-from math import inf, nan
+from math import atan, inf, nan, sin
 
 import fmi3_hosts
 import pytest
@@ -191,9 +192,57 @@ def test_a_call_of_model_exchange_is_measured_beside_that_of_a_reference_fmu(bot
     """An FMU of ours stands for theirs, whose sources are not here: that is told."""
     assert exchange.calls("smd").beside[0].name.startswith("not here: Reference-FMUs")
     sled = in_c.built(both_kinds / "native" / "stickslip.fmu")
-    monkeypatch.setattr(exchange, "bouncing_ball", lambda: sled)
+    monkeypatch.setattr(exchange, "bouncing_ball", lambda acceleration: sled)
     monkeypatch.setattr(exchange, "TURNS", 10)
     monkeypatch.setattr(exchange, "THEIRS", (3, 2))
+    monkeypatch.setattr(exchange, "START", {"x0": 0.1, "v0": 0.3})
     measure = exchange.calls("stickslip")
     assert 0.0 < measure.value < 100.0
-    assert len(measure.beside) == 8
+    assert len(measure.beside) == 9
+
+
+THEIRS = {  # a Reference FMU that has just what the bench puts aside, and asks for it
+    "include/model.h": """
+typedef struct { double h, v, g, e; } ModelInstance;
+typedef int Status;
+#define M(variable) comp->variable
+Status getDerivatives(ModelInstance *comp, double dx[], size_t nx);
+""",
+    "BouncingBall/config.h": '#define INSTANTIATION_TOKEN "{1}"',
+    "BouncingBall/model.c": """
+#include <stddef.h>
+#include "model.h"
+Status getDerivatives(ModelInstance *comp, double dx[], size_t nx)
+{
+    dx[0] = M(v);
+    dx[1] = M(g);
+    return nx != 2;
+}
+""",
+    "src/cosimulation.c": "typedef int nothing;",
+    "src/fmi2Functions.c": """
+#include <stddef.h>
+#include "model.h"
+__attribute__((visibility("default"))) double ask(double x, double v, double force, double mass)
+{
+    ModelInstance it = {x, v, force, mass};
+    double dx[2];
+    return getDerivatives(&it, dx, 2) || dx[0] != v ? 0.0 : dx[1];
+}
+""",
+}
+
+
+@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+def test_a_reference_fmu_is_given_the_acceleration_of_each_model(tmp_path, monkeypatch):
+    for file, text in THEIRS.items():
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        (tmp_path / file).write_text(text + "\n")
+    monkeypatch.setattr(exchange, "REFERENCES", tmp_path)
+    given = {"x": 0.1, "v": 0.3, "force": -2.0, "mass": 4.0}
+    for name in exchange.MODELS:
+        equation = exchange.NUMBERS["acceleration"][name]
+        ask = ctypes.CDLL(str(exchange.bouncing_ball(equation).file)).ask
+        ask.restype, ask.argtypes = ctypes.c_double, [ctypes.c_double] * len(given)
+        assert ask(*given.values()) == pytest.approx(eval(equation, {"sin": sin, "atan": atan, **given}), rel=1e-14)
+    exchange.bouncing_ball.cache_clear()

@@ -27,7 +27,7 @@ static inline double quotient(double a, double b, bool *fault)
 /* A function of libm faults where it has no value, or none that a double can hold. */
 static inline double judged(double y, bool has_nan, bool all_finite, bool *fault)
 {
-    if (isnan(y) ? !has_nan : isinf(y) && all_finite) *fault = true;
+    if (!isfinite(y) && (isnan(y) ? !has_nan : all_finite)) *fault = true;
     return y;
 }
 
