@@ -7,16 +7,16 @@ class Course:
     """Its derivatives at one time, from order 0 on; s is how many seconds have passed since."""
 
     def __init__(self):
-        self.order = 0  # of the highest that is not zero
+        self.order = 0  # of the highest that is not zero; where one has been set, a higher one until begin()
         self.derivatives = [0.0] * (HIGHEST + 1)
         self.c = [0.0] * (HIGHEST + 1)  # the coefficients of the powers of s
 
     def begin(self, value):
         """The value is this one; some derivatives may have been set."""
         self.derivatives[0] = self.c[0] = value
-        self.order = 0
+        highest, self.order = self.order, 0
         factorial = 1.0
-        for n in range(1, HIGHEST + 1):
+        for n in range(1, highest + 1):
             factorial *= n
             self.c[n] = self.derivatives[n] / factorial
             if self.derivatives[n] != 0.0:
@@ -24,9 +24,12 @@ class Course:
 
     def now(self, s):
         """The value; without loops and faults, for every right-hand side wants it."""
+        return self.c[0] if self.order == 0 else self.c[0] + s * (self.c[1] if self.order == 1 else self.bent(s))
+
+    def bent(self, s):
+        """What it has changed by since then, over s."""
         c = self.c[4] + s * (self.c[5] + s * (self.c[6] + s * (self.c[7] + s * self.c[8])))
-        c = self.c[1] + s * (self.c[2] + s * (self.c[3] + s * c))
-        return self.c[0] if self.order == 0 else self.c[0] + s * c
+        return self.c[1] + s * (self.c[2] + s * (self.c[3] + s * c))
 
     def rate(self, s):
         """The first derivative."""
@@ -42,6 +45,7 @@ class Course:
 
     def move(self, s):
         """Tell all derivatives as they are now, and the value."""
-        for n in range(self.order + 1):
-            self.derivatives[n] = self.at(s, n)
+        if self.order > 0:
+            for n in range(self.order):
+                self.derivatives[n] = self.at(s, n)
         return self.derivatives[0]

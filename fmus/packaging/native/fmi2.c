@@ -179,15 +179,18 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
     bool fault = false;
     if (nvr && (!vr || !order || !value)) return refuse(it, NO_ADDRESS, __func__, "vr, order or value");
     for (size_t i = 0; i < nvr; i++) {
-        bool has_any = vr[i] < VARIABLES && variables[vr[i]].derivatives != NO_SLOPE;
+        bool has_any = vr[i] < VARIABLES && variables[vr[i]].order != NO_SLOPE;
         if (has_any && 1 <= order[i] && order[i] <= HIGHEST && isfinite(value[i])) continue;
         return refuse_call(it, NO_COURSE, &(Call){.function = __func__, .reference = vr[i]});
     }
     for (size_t i = 0; i < nvr && !fault; i++) {
-        double *derivatives = derivatives_of(state, &variables[vr[i]]);
-        if (derivatives[order[i]] == value[i] && are_zero(derivatives, order[i] + 1)) continue;
+        const Variable *variable = &variables[vr[i]];
+        int64_t *highest = order_of(state, variable);
+        double *derivative = (double *)((char *)&state->model + variable->derivatives) + order[i];
+        if (*derivative == value[i] && *highest <= order[i]) continue; /* it stays what it is */
         rules_change(&state->run, &state->model, &fault);
-        derivatives[order[i]] = value[i];
+        *derivative = value[i];
+        if (*highest < order[i]) *highest = order[i];
         state->run.observed = false;
     }
     return judged_by(it, OK, fault, NAN, NAN);

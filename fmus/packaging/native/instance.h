@@ -185,17 +185,10 @@ static Status ready(Instance *it, const Type *type, const uint32_t vr[], size_t 
     return DISCARDED;
 }
 
-/* The derivatives of an input that has any, from order 0 on. */
-static double *derivatives_of(State *state, const Variable *variable)
+/* Of an input that has derivatives: that they are zero above this order. */
+static int64_t *order_of(State *state, const Variable *variable)
 {
-    return (double *)((char *)&state->model + variable->derivatives);
-}
-
-/* Whether those from an order on are zero, and so the one before stays what it is. */
-static bool are_zero(const double *derivatives, int order)
-{
-    while (order <= HIGHEST && derivatives[order] == 0.0) order++;
-    return order > HIGHEST;
+    return (int64_t *)((char *)&state->model + variable->order);
 }
 
 /* Take over a value, or remember that it cannot be used.  False after a fault. */
@@ -205,7 +198,7 @@ static bool write_one(Instance *it, uint32_t reference, double value)
     const Variable *variable = &variables[reference];
     Refusal *refusal = &state->refused[reference];
     bool allowed = accepts(variable, value), fault = false;
-    bool stays = variable->derivatives == NO_SLOPE || are_zero(derivatives_of(state, variable), 1);
+    bool stays = variable->order == NO_SLOPE || *order_of(state, variable) == 0;
     if (stays && value == value_of(&state->model, variable) && refusal->reason == OK) return true;
     state->run.observed = false;
     state->run.refused -= refusal->reason != OK;

@@ -101,6 +101,7 @@ PLACES = {  # field of a sentence -> what adds it to the text
     "reference": "add_integer(text, call->reference)",
 }
 ELSEWHERE = (INTERRUPTED,)  # statuses of other kinds
+COURSE = ("rate", "course.order", "course.derivatives")  # of an input that has derivatives
 
 
 def header(model: type[Declaring], fmi: str) -> str:
@@ -178,7 +179,7 @@ def _line(name: str, meaning: Declared, slots: dict[str, str], ramps: bool) -> s
         f"offsetof(Model, {place(name)})",
         f"offsetof(struct Tangent, {slots[name]})" if name in slots else "NO_SLOPE",
         *map(literal, flags),
-        f"offsetof(Model, {name}_rate), offsetof(Model, {name}_course.derivatives)" if ramps else "NO_SLOPE, NO_SLOPE",
+        ", ".join(f"offsetof(Model, {name}_{part})" if ramps else "NO_SLOPE" for part in COURSE),
         *(literal(float(bound)) for bound in bounds),
         items,
     ]

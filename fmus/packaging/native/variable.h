@@ -20,7 +20,7 @@ typedef struct {
     bool is_answer;   /* reads NaN once the run has failed */
     bool is_reported; /* tells of the solver, and is brought up to date when it is read */
     bool moves;       /* a state or an input: one along which there are derivatives */
-    size_t rate, derivatives; /* of an input, in the model: its present rate, and the row; NO_SLOPE if it has none */
+    size_t rate, order, derivatives; /* of an input, in the model: its present rate, and its course; or NO_SLOPE */
     double low, high, above, below;     /* low <= value <= high, above < value < below */
     const int64_t *items, *end_of_items; /* of an enumeration */
 } Variable;
