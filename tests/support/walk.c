@@ -78,10 +78,11 @@ enum { NEVER = 0, AT_EVENT = 1 << EVENT, GOING = 1 << CONTINUOUS, BEGINNING = 1 
     f(SetFloat64, SOME, STAYS, (it, &AT->known, 1, &AT->real, 1), (it, &AT->known, 1, NULL, 1))                        \
     f(SetInt64, SOME, STAYS, (it, R, AT->integers, AT->count), (it, NULL, 1, AT->integers, 1))                         \
     f(SetDebugLogging, SOME, STAYS, (it, true, 0, NULL), (it, true, 1, NULL))                                          \
-    f(GetContinuousStates, SOME, STAYS, (it, AT->others, AT->states), (it, AT->others, STATES - 1))                    \
-    f(GetContinuousStateDerivatives, SOME, STAYS, (it, AT->others, AT->states), (it, NULL, STATES))                    \
-    f(GetNominalsOfContinuousStates, SOME, STAYS, (it, AT->others, AT->states), (it, AT->others, STATES + 1))          \
-    f(GetEventIndicators, SOME, STAYS, (it, AT->others, AT->limits), (it, AT->others, INDICATORS + 1))                 \
+    f(GetContinuousStates, (EXCHANGED | SOME), STAYS, (it, AT->others, AT->states), (it, AT->others, STATES - 1))      \
+    f(GetContinuousStateDerivatives, (EXCHANGED | SOME), STAYS, (it, AT->others, AT->states), (it, NULL, STATES))      \
+    f(GetNominalsOfContinuousStates, (EXCHANGED | SOME), STAYS,                                                        \
+      (it, AT->others, AT->states), (it, AT->others, STATES + 1))                                                      \
+    f(GetEventIndicators, (EXCHANGED | SOME), STAYS, (it, AT->others, AT->limits), (it, AT->others, INDICATORS + 1))   \
     f(GetNumberOfContinuousStates, SOME, STAYS, (it, &AT->size), (it, NULL))                                           \
     f(GetNumberOfEventIndicators, SOME, STAYS, (it, &AT->size), (it, NULL))                                            \
     f(GetDirectionalDerivative, SOME, STAYS, (it, &AT->unknown, 1, &AT->known, 1, AT->reals, 1, AT->others, 1),        \

@@ -1,12 +1,21 @@
-/* FMI 2.0, co-simulation and model exchange, of the model in model.h: instance.h says what a call does. */
+/* FMI 2.0, co-simulation and model exchange, of the model in model.h: calls.h and instance.h say what a call does. */
 #define _POSIX_C_SOURCE 200809L /* beside C99: signal masks */
 
 #include "fmi2Functions.h"
 
 typedef fmi2CallbackFunctions Host;
 typedef fmi2Status Status;
+typedef fmi2Component Handle;
+typedef fmi2Boolean Boolean;
+typedef fmi2Byte Byte;
+typedef fmi2String Word;
+typedef fmi2FMUstate Saved;
 
-#include "instance.h"
+#define FMI(name) fmi2##name
+#define OF_STATE(before, after) fmi2##before##FMUstate##after
+#define DESERIALIZE fmi2DeSerializeFMUstate
+
+#include "calls.h"
 
 static const Type REAL = {"Real", true}, INTEGER = {"Integer", false};
 
@@ -42,16 +51,6 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     return it;
 }
 
-void fmi2FreeInstance(fmi2Component component) { free(component); }
-
-fmi2Status fmi2SetDebugLogging(fmi2Component component, fmi2Boolean loggingOn, size_t nCategories,
-                               const fmi2String categories[])
-{
-    ENTER(component, ANY);
-    if (nCategories) NEED(categories);
-    return choose_log(it, loggingOn, nCategories, categories);
-}
-
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDefined, fmi2Real tolerance,
                                fmi2Real startTime, fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
@@ -73,20 +72,6 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component component)
 {
     ENTER(component, 1 << INITIALISING);
     return begin(it, exchanges(&it->state));
-}
-
-fmi2Status fmi2Terminate(fmi2Component component)
-{
-    ENTER(component, BEGUN);
-    it->state.run.phase = TERMINATED;
-    return fmi2OK;
-}
-
-fmi2Status fmi2Reset(fmi2Component component)
-{
-    ENTER(component, ANY);
-    fresh(it);
-    return fmi2OK;
 }
 
 /* ---- values */
@@ -176,6 +161,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
 {
     ENTER(component, NEW | 1 << INITIALISING | STEPPING);
     State *state = &it->state;
+    if (exchanges(state)) return refuse(it, NOT_OFFERED, __func__, "");
     bool fault = false;
     if (nvr && (!vr || !order || !value)) return refuse(it, NO_ADDRESS, __func__, "vr, order or value");
     for (size_t i = 0; i < nvr; i++) {
@@ -226,47 +212,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventIn
     return status;
 }
 
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component component)
-{
-    ENTER(component, 1 << EVENT);
-    it->state.run.phase = CONTINUOUS;
-    return fmi2OK;
-}
-
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component component, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
-{
-    ENTER(component, 1 << CONTINUOUS);
-    NEED(enterEventMode);
-    NEED(terminateSimulation);
-    (void)noSetFMUStatePriorToCurrentPoint;
-    *enterEventMode = *terminateSimulation = fmi2False;
-    return fmi2OK;
-}
-
-fmi2Status fmi2SetTime(fmi2Component component, fmi2Real time)
-{
-    ENTER(component, EXCHANGING);
-    return move_to(it, time);
-}
-
-fmi2Status fmi2SetContinuousStates(fmi2Component component, const fmi2Real x[], size_t nx)
-{
-    ENTER(component, 1 << CONTINUOUS);
-    return put(it, x, nx, __func__);
-}
-
-#define TELLING(NAME, found, COUNT)                                                 \
-    fmi2Status fmi2Get##NAME(fmi2Component component, fmi2Real value[], size_t n)   \
-    {                                                                               \
-        ENTER(component, ANY);                                                      \
-        TELL(it, found, COUNT, value, n);                                           \
-    }
-
 TELLING(Derivatives, rates, STATES)
-TELLING(EventIndicators, indicators, INDICATORS)
-TELLING(ContinuousStates, states, STATES)
-TELLING(NominalsOfContinuousStates, nominals, STATES)
 
 /* ---- directional derivatives */
 
@@ -278,58 +224,9 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2Value
     return directional(it, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown, __func__);
 }
 
-/* ---- state */
-
-fmi2Status fmi2GetFMUstate(fmi2Component component, fmi2FMUstate *FMUstate)
-{
-    ENTER(component, ANY);
-    NEED(FMUstate);
-    return save(it, FMUstate, __func__);
-}
-
-fmi2Status fmi2SetFMUstate(fmi2Component component, fmi2FMUstate FMUstate)
-{
-    ENTER(component, ANY);
-    return restore(it, FMUstate);
-}
-
-fmi2Status fmi2FreeFMUstate(fmi2Component component, fmi2FMUstate *FMUstate)
-{
-    ENTER(component, ANY);
-    return forget(it, FMUstate);
-}
-
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component component, fmi2FMUstate FMUstate, size_t *size)
-{
-    ENTER(component, ANY);
-    NEED(size);
-    return measure(it, FMUstate, size);
-}
-
-fmi2Status fmi2SerializeFMUstate(fmi2Component component, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
-                                 size_t size)
-{
-    ENTER(component, ANY);
-    NEED(serializedState);
-    return serialize(it, FMUstate, serializedState, size, __func__);
-}
-
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component component, const fmi2Byte serializedState[], size_t size,
-                                   fmi2FMUstate *FMUstate)
-{
-    ENTER(component, ANY);
-    NEED(serializedState);
-    NEED(FMUstate);
-    return deserialize(it, serializedState, size, FMUstate, __func__);
-}
-
 /* ---- what this FMU does not offer, as its description says */
 
-fmi2Status fmi2CancelStep(fmi2Component component)
-{
-    ENTER(component, ANY);
-    return refuse(it, NOT_OFFERED, __func__, "");
-}
+NOT_OFFERED_HERE(CancelStep, Handle instance)
 
 /* Every step is done when fmi2DoStep returns, so there is nothing more to tell. */
 #define NOTHING_TO_TELL(NAME, TYPE)                                                           \

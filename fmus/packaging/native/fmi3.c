@@ -1,4 +1,4 @@
-/* FMI 3.0, co-simulation and model exchange, of the model in model.h: instance.h says what a call does. */
+/* FMI 3.0, co-simulation and model exchange, of the model in model.h: calls.h and instance.h say what a call does. */
 #define _POSIX_C_SOURCE 200809L /* beside C99: signal masks */
 
 #include "fmi3Functions.h"
@@ -11,8 +11,17 @@ typedef struct {
     bool returns;                        /* early */
 } Host;
 typedef fmi3Status Status;
+typedef fmi3Instance Handle;
+typedef fmi3Boolean Boolean;
+typedef fmi3Byte Byte;
+typedef fmi3String Word;
+typedef fmi3FMUState Saved;
 
-#include "instance.h"
+#define FMI(name) fmi3##name
+#define OF_STATE(before, after) fmi3##before##FMUState##after
+#define DESERIALIZE fmi3DeserializeFMUState
+
+#include "calls.h"
 
 static const Type FLOAT64 = {"Float64", true}, INT64 = {"Int64", false};
 
@@ -73,16 +82,6 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     return it ? dismissed(it, NOT_OFFERED, __func__, "") : NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance instance) { free(instance); }
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
-                               const fmi3String categories[])
-{
-    ENTER(instance, ANY);
-    if (nCategories) NEED(categories);
-    return choose_log(it, loggingOn, nCategories, categories);
-}
-
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
@@ -98,20 +97,6 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 {
     ENTER(instance, 1 << INITIALISING);
     return begin(it, it->host.handles);
-}
-
-fmi3Status fmi3Terminate(fmi3Instance instance)
-{
-    ENTER(instance, BEGUN);
-    it->state.run.phase = TERMINATED;
-    return fmi3OK;
-}
-
-fmi3Status fmi3Reset(fmi3Instance instance)
-{
-    ENTER(instance, ANY);
-    fresh(it);
-    return fmi3OK;
 }
 
 /* ---- values */
@@ -324,50 +309,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 
 /* ---- model exchange */
 
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
-{
-    ENTER(instance, 1 << EVENT);
-    if (!exchanges(&it->state)) return refuse(it, NOT_OFFERED, __func__, "");
-    it->state.run.phase = CONTINUOUS;
-    return fmi3OK;
-}
-
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
-{
-    ENTER(instance, 1 << CONTINUOUS);
-    NEED(enterEventMode);
-    NEED(terminateSimulation);
-    (void)noSetFMUStatePriorToCurrentPoint;
-    *enterEventMode = *terminateSimulation = false;
-    return fmi3OK;
-}
-
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
-{
-    ENTER(instance, EXCHANGING);
-    if (!exchanges(&it->state)) return refuse(it, NOT_OFFERED, __func__, "");
-    return move_to(it, time);
-}
-
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
-                                   size_t nContinuousStates)
-{
-    ENTER(instance, 1 << CONTINUOUS);
-    return put(it, continuousStates, nContinuousStates, __func__);
-}
-
-#define TELLING(NAME, found, COUNT)                                                     \
-    fmi3Status fmi3Get##NAME(fmi3Instance instance, fmi3Float64 values[], size_t n)     \
-    {                                                                                   \
-        ENTER(instance, ANY);                                                           \
-        TELL(it, found, COUNT, values, n);                                              \
-    }
-
-TELLING(ContinuousStates, states, STATES)
 TELLING(ContinuousStateDerivatives, rates, STATES)
-TELLING(NominalsOfContinuousStates, nominals, STATES)
-TELLING(EventIndicators, indicators, INDICATORS)
 
 #define COUNTING(NAME, COUNT)                                                    \
     fmi3Status fmi3GetNumberOf##NAME(fmi3Instance instance, size_t *number)      \
@@ -422,89 +364,31 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
     return read_rates(it, valueReferences, nValueReferences, orders, values, __func__);
 }
 
-/* ---- state */
-
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
-{
-    ENTER(instance, ANY);
-    NEED(FMUState);
-    return save(it, FMUState, __func__);
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
-{
-    ENTER(instance, ANY);
-    return restore(it, FMUState);
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
-{
-    ENTER(instance, ANY);
-    return forget(it, FMUState);
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
-{
-    ENTER(instance, ANY);
-    NEED(size);
-    return measure(it, FMUState, size);
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
-{
-    ENTER(instance, ANY);
-    NEED(serializedState);
-    return serialize(it, FMUState, serializedState, size, __func__);
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
-                                   fmi3FMUState *FMUState)
-{
-    ENTER(instance, ANY);
-    NEED(serializedState);
-    NEED(FMUState);
-    return deserialize(it, serializedState, size, FMUState, __func__);
-}
-
 /* ---- what this FMU does not offer, as its description says */
-
-#define NOT_OFFERED_HERE(NAME, ...)                              \
-    fmi3Status NAME(fmi3Instance instance, __VA_ARGS__)          \
-    {                                                            \
-        ENTER(instance, ANY);                                    \
-        return refuse(it, NOT_OFFERED, __func__, "");            \
-    }
 
 typedef const fmi3ValueReference References[];
 
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance)
-{
-    ENTER(instance, ANY);
-    return refuse(it, NOT_OFFERED, __func__, "");
-}
-
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance)
-{
-    ENTER(instance, ANY);
-    return refuse(it, NOT_OFFERED, __func__, "");
-}
-
-NOT_OFFERED_HERE(fmi3GetNumberOfVariableDependencies, fmi3ValueReference valueReference, size_t *nDependencies)
-NOT_OFFERED_HERE(fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t elementIndicesOfDependent[],
-                 fmi3ValueReference independents[], size_t elementIndicesOfIndependents[],
-                 fmi3DependencyKind dependencyKinds[], size_t nDependencies)
-NOT_OFFERED_HERE(fmi3GetIntervalDecimal, References valueReferences, size_t nValueReferences, fmi3Float64 intervals[],
-                 fmi3IntervalQualifier qualifiers[])
-NOT_OFFERED_HERE(fmi3GetIntervalFraction, References valueReferences, size_t nValueReferences, fmi3UInt64 counters[],
-                 fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
-NOT_OFFERED_HERE(fmi3GetShiftDecimal, References valueReferences, size_t nValueReferences, fmi3Float64 shifts[])
-NOT_OFFERED_HERE(fmi3GetShiftFraction, References valueReferences, size_t nValueReferences, fmi3UInt64 counters[],
-                 fmi3UInt64 resolutions[])
-NOT_OFFERED_HERE(fmi3SetIntervalDecimal, References valueReferences, size_t nValueReferences,
+NOT_OFFERED_HERE(EnterConfigurationMode, Handle instance)
+NOT_OFFERED_HERE(ExitConfigurationMode, Handle instance)
+NOT_OFFERED_HERE(GetNumberOfVariableDependencies, Handle instance, fmi3ValueReference valueReference,
+                 size_t *nDependencies)
+NOT_OFFERED_HERE(GetVariableDependencies, Handle instance, fmi3ValueReference dependent,
+                 size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
+                 size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
+NOT_OFFERED_HERE(GetIntervalDecimal, Handle instance, References valueReferences, size_t nValueReferences,
+                 fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+NOT_OFFERED_HERE(GetIntervalFraction, Handle instance, References valueReferences, size_t nValueReferences,
+                 fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
+NOT_OFFERED_HERE(GetShiftDecimal, Handle instance, References valueReferences, size_t nValueReferences,
+                 fmi3Float64 shifts[])
+NOT_OFFERED_HERE(GetShiftFraction, Handle instance, References valueReferences, size_t nValueReferences,
+                 fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+NOT_OFFERED_HERE(SetIntervalDecimal, Handle instance, References valueReferences, size_t nValueReferences,
                  const fmi3Float64 intervals[])
-NOT_OFFERED_HERE(fmi3SetIntervalFraction, References valueReferences, size_t nValueReferences,
+NOT_OFFERED_HERE(SetIntervalFraction, Handle instance, References valueReferences, size_t nValueReferences,
                  const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-NOT_OFFERED_HERE(fmi3SetShiftDecimal, References valueReferences, size_t nValueReferences, const fmi3Float64 shifts[])
-NOT_OFFERED_HERE(fmi3SetShiftFraction, References valueReferences, size_t nValueReferences, const fmi3UInt64 counters[],
-                 const fmi3UInt64 resolutions[])
-NOT_OFFERED_HERE(fmi3ActivateModelPartition, fmi3ValueReference clockReference, fmi3Float64 activationTime)
+NOT_OFFERED_HERE(SetShiftDecimal, Handle instance, References valueReferences, size_t nValueReferences,
+                 const fmi3Float64 shifts[])
+NOT_OFFERED_HERE(SetShiftFraction, Handle instance, References valueReferences, size_t nValueReferences,
+                 const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+NOT_OFFERED_HERE(ActivateModelPartition, Handle instance, fmi3ValueReference clockReference, fmi3Float64 activationTime)

@@ -88,6 +88,10 @@ static Status refuse_reference(const Instance *it, uint32_t reference, const cha
     Instance *it = handle;     \
     if (!it || !(1 << it->state.run.phase & (allowed))) return refuse_order(it, (allowed), __func__)
 
+/* A call that co-simulation does not have, where its states do not tell. */
+#define EXCHANGE_ONLY \
+    if (!exchanges(&it->state)) return refuse(it, NOT_OFFERED, __func__, "")
+
 /* An address that the call cannot do without. */
 #define NEED(address) \
     if (!(address)) return refuse(it, NO_ADDRESS, __func__, #address)
@@ -311,37 +315,7 @@ static Status step_by(Instance *it, double t, double h)
     return judged_by(it, status, fault, t, h);
 }
 
-/* ---- model exchange */
-
-static Status move_to(Instance *it, double t)
-{
-    bool fault = false;
-    exchange_move_to(&it->state.run, &it->state.model, t, &fault);
-    return DONE;
-}
-
-static Status put(Instance *it, const double states[], size_t n, const char *function)
-{
-    bool fault = false;
-    if (n != STATES) return refuse(it, WRONG_LENGTH, function, "the number of states");
-    if (!states) return refuse(it, NO_ADDRESS, function, "states");
-    memcpy(it->state.model.exchange.states, states, STATES * sizeof *states);
-    exchange_put(&it->state.run, &it->state.model, &fault);
-    return DONE;
-}
-
-/* What is found of the present point, in a row of the model; NaN where there is nothing to calculate with, for a state
- * that the importer's solver only tries may be anything.  No function: a call takes half as long. */
-#define TELL(it, found, count, value, n)                                                                     \
-    State *state = &it->state;                                                                               \
-    bool fault = false;                                                                                      \
-    if ((n) != (count)) return refuse(it, WRONG_LENGTH, __func__, "the number of values");                   \
-    if ((n) && !(value)) return refuse(it, NO_ADDRESS, __func__, "the address of the values");               \
-    int64_t status = exchange_ready(&state->run, &state->model, &fault);                                     \
-    if (status == OK && !fault) exchange_##found(&state->model, &fault);                                     \
-    bool is_there = status == OK && !fault;                                                                  \
-    for (size_t i = 0; i < (n); i++) (value)[i] = is_there ? state->model.exchange.found[i] : NAN;           \
-    return status == OK || state->run.phase < RUNNING ? DONE : give_up(it, status, NAN, NAN)
+/* ---- events */
 
 /* An event is handled; what is new stands in the exchange. */
 static Status handle(Instance *it)
@@ -431,7 +405,7 @@ static Status directional(Instance *it, const uint32_t unknowns[], size_t n, con
 static Status refuse_state(const Instance *it) { return refuse(it, FOREIGN_STATE, "", ""); }
 
 /* The state under a seal; NULL if it is broken, or that of an instance for something else. */
-static const State *own(const Instance *it, Sealed *sealed)
+static const State *own_state(const Instance *it, Sealed *sealed)
 {
     const State *state = unsealed(sealed);
     return state && exchanges(state) == exchanges(&it->state) ? state : NULL;
@@ -444,57 +418,6 @@ static Status keep(const Instance *it, const State *state, void **kept, const ch
     if (!*kept && !(*kept = malloc(sizeof(Sealed)))) return refuse(it, NO_MEMORY, function, "");
     seal(*kept, state);
     return DONE;
-}
-
-static Status save(Instance *it, void **kept, const char *function)
-{
-    it->state.run.observed = false; /* here and there, outputs are calculated anew */
-    return keep(it, &it->state, kept, function);
-}
-
-static Status restore(Instance *it, void *kept)
-{
-    const State *state = own(it, kept);
-    if (!state) return refuse_state(it);
-    memcpy(&it->state, state, sizeof *state);
-    return DONE;
-}
-
-static Status forget(const Instance *it, void **kept)
-{
-    if (!kept || !*kept) return DONE;
-    if (!is_ours(*kept)) return refuse_state(it);
-    free(*kept);
-    *kept = NULL;
-    return DONE;
-}
-
-static Status measure(const Instance *it, void *kept, size_t *size)
-{
-    if (!is_ours(kept)) return refuse_state(it);
-    *size = sizeof(Sealed);
-    return DONE;
-}
-
-static Status serialize(const Instance *it, void *kept, void *bytes, size_t size, const char *function)
-{
-    if (!own(it, kept)) return refuse_state(it);
-    if (size < sizeof(Sealed)) return refuse(it, TOO_SHORT, function, "");
-    memset(bytes, 0, size);
-    memcpy(bytes, kept, sizeof(Sealed));
-    return DONE;
-}
-
-static Status deserialize(const Instance *it, const void *bytes, size_t size, void **kept, const char *function)
-{
-    if (size != sizeof(Sealed)) return refuse_state(it);
-    Sealed *sealed = malloc(sizeof *sealed); /* for bytes may lie where a state cannot */
-    if (!sealed) return refuse(it, NO_MEMORY, function, "");
-    memcpy(sealed, bytes, size);
-    const State *state = own(it, sealed);
-    Status status = state ? keep(it, state, kept, function) : refuse_state(it);
-    free(sealed);
-    return status;
 }
 
 #endif

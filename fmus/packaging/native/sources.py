@@ -9,7 +9,7 @@ from ..modules import installed
 from .interface import header
 
 COMPILED = {"2": "fmi2.c", "3": "fmi3.c"}  # by the version of FMI: includes all the others
-WRITTEN = ("instance.h", "numerics.h", "say.h", "state.h", "text.h", "variable.h")
+WRITTEN = ("calls.h", "instance.h", "numerics.h", "say.h", "state.h", "text.h", "variable.h")
 FMI_HEADERS = {  # 2-clause BSD, as they say
     "2": ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     "3": ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
