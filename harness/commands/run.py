@@ -30,7 +30,8 @@ def run(
 ) -> None:
     """Run a SCENE, an FMU of any origin, or once more what made a folder of results.
 
-    SCENE is a shipped name (see list), the path of a TOML file, a folder of results, or a model that has no scene.
+    SCENE is a shipped name (see list), the path of a TOML file, a folder of results, or a model that has no scene, by
+    its name or the path of its file.
 
     An FMU that does not show its solver's steps is run with ever shorter communication steps, until halving them
     changes no output by more than the tolerance.
@@ -46,7 +47,7 @@ def run(
     from ..scenes.scene import again, load, shipped
 
     scenes = [file.stem for file in shipped()]
-    if fmu is None and scene in known() - {*scenes} and not Path(scene).exists():
+    if fmu is None and scene and (scene.endswith(".py") or (scene in known() - {*scenes} and not Path(scene).exists())):
         fmu, scene = fmu_of(scene), None
     if fmu is not None and scene is None:
         run_any(fmu, values, how, terminal)

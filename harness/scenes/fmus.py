@@ -25,4 +25,6 @@ def known() -> set[str]:
 def check_built(fmu: Path, error: type[HarnessError] = HarnessError) -> None:
     """The FMU is there."""
     if not fmu.is_file():
-        raise error(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another file")
+        model = fmu.with_suffix(".py")
+        what, which = ("it", f" {model}") if model.is_file() and fmu.parent not in FOLDERS else ("the FMUs", "")
+        raise error(f"there is no {fmu}: build {what} with `python build_fmus.py{which}`, or name another file")

@@ -262,6 +262,25 @@ def test_a_run_of_it_by_the_harness_shows_its_events_by_whatever_name_its_mode_h
     assert [int(row.split(",")[1]) for row in rows[:4]] == [0, 1, 0, 1]
 
 
+@pytest.mark.parametrize("words", [["run"], ["precision"], ["stability"], ["references"], ["compare", "brake.py"]])
+def test_every_command_takes_it_by_its_path_and_says_how_it_is_built(tmp_path, words):
+    (tmp_path / "brake.py").write_text("")
+    done = harness(*words, "brake.py", cwd=tmp_path)
+    assert done.returncode
+    assert done.stderr.count("\n") == 1
+    assert "there is no brake.fmu: build it with `python build_fmus.py brake.py`" in done.stderr
+
+
+def test_it_is_run_and_compared_by_its_path_as_its_fmu_is(tmp_path):
+    source = next(path for path in AUTHORED if path.stem == "rotor_brake")
+    for path in (source, built(source, "")):
+        (tmp_path / path.name).symlink_to(path)
+    harness("run", "rotor_brake.py", cwd=tmp_path)
+    assert "the same, bit for bit" in harness("run", "--fmu", "rotor_brake.fmu", cwd=tmp_path).stdout
+    done = harness("compare", "rotor_brake.py", "rotor_brake.fmu", "--atol", "0", "--stop", "1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
 PUCK = '''
 from fmus import Contact, Mode, Model, Output, Parameter, State
 

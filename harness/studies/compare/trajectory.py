@@ -12,12 +12,12 @@ from ...running.description import description, stop_of
 from ...running.fmu import Report
 from ...running.specification import Specification, of_scene
 from ...running.trajectory import Trajectory, of_run
-from ...scenes.fmus import check_built
+from ...scenes.fmus import check_built, fmu_of
 from ...scenes.scene import load
 from .files import read
 
 FILES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
-SUFFIXES = (".fmu", ".toml")  # of what is run
+SUFFIXES = (".fmu", ".py", ".toml")  # of what is run
 
 
 def both(sources: tuple[str, str], how: Specification, report: Report) -> tuple[Trajectory, Trajectory]:
@@ -51,9 +51,9 @@ def names(sources: tuple[str, str]) -> list[str]:
 
 
 def wanted(source: str, how: Specification) -> Specification:
-    """What runs an FMU's path, or a scene."""
-    if Path(source).suffix == ".fmu":
-        return replace(how, fmu=Path(source))
+    """What runs an FMU by its path or by that of its model, or a scene."""
+    if Path(source).suffix in (".fmu", ".py"):
+        return replace(how, fmu=fmu_of(source))
     scene = load(source)
     check_built(scene.file)
     return of_scene(scene)
