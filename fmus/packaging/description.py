@@ -143,8 +143,7 @@ def units_of(declared: Variables) -> list[tuple[str, Unit]]:
 
 def add_items(element: Element, meaning: Declared) -> None:
     """The items of an enumeration."""
-    items: tuple[tuple[str, int, str], ...] = meaning.items
-    for label, value, text in items:
+    for label, value, text in meaning.items:
         SubElement(element, "Item", name=label, value=str(value), description=text)
 
 

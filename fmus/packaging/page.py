@@ -108,11 +108,10 @@ def _figure(found: Reference, declared: Variables) -> list[str]:
 def _choice(variable: str, meaning: Declared) -> str:
     """The items of an enumeration."""
     title = meaning.text[0].upper() + meaning.text[1:]
-    items: tuple[tuple[str, int, str], ...] = meaning.items
     rows = "".join(
         f"<tr><td><code>{value}</code></td><td><b>{escape(label)}</b>{' (default)' if value == meaning.start else ''}"
         f"</td><td>{escape(sentence)}</td></tr>"
-        for label, value, sentence in items
+        for label, value, sentence in meaning.items
     )
     head = "<thead><tr><th>value</th><th>name</th><th>what it is</th></tr></thead>"
     return f"<h2>{escape(title)}: <code>{escape(variable)}</code></h2>\n<table>{head}{rows}</table>"

@@ -80,7 +80,9 @@ class Authored:
         """Refuse start values that go nowhere: nobody could run the model as it is."""
         try:
             rule = thing.prepare()
-            thing.observe(0.0, *first_states(thing), *(0 for _ in self.anatomy.contacts))
+            begins = thing.initial(0.0)
+            states = begins if isinstance(begins, tuple) else (begins,)  # of one state a number
+            thing.observe(0.0, *states, *(0 for _ in self.anatomy.contacts))
         except (ArithmeticError, ValueError) as error:
             mistake = Mistake(f"the start values lead out of the range of numbers: {error}", self.anatomy.model.place)
             raise self._told(mistake) from error
@@ -122,12 +124,6 @@ class Authored:
         file, line = mistake.place
         where = f"{self.path}, line {line}" if file == str(self.path) else str(self.path)
         return BuildError(f"{where}: {mistake}.")
-
-
-def first_states(thing: Any) -> tuple[float, ...]:
-    """The states at time zero; a model of one state says it as a number."""
-    found = thing.initial(0.0)
-    return found if isinstance(found, tuple) else (found,)
 
 
 _known: dict[Path, Authored] = {}
