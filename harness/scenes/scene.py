@@ -63,10 +63,6 @@ PLOTS: dict[str, tuple[str, ...]] = {
 }
 
 
-def is_half_count(value: Any) -> bool:
-    return is_number(value) and value > 0 and float(2 * value).is_integer()
-
-
 def is_published(value: Any) -> bool:
     pair = isinstance(value, list) and len(value) == 2 and is_number(value[0]) and is_text(value[1])
     return pair or is_number(value) or is_text(value)
@@ -75,7 +71,7 @@ def is_published(value: Any) -> bool:
 REPEATS = Kind(lambda value: is_whole(value, 1, MOST_REPEATS), f"a whole number from 1 to {MOST_REPEATS}")
 GIVES = Kind(lambda value: value in ("zeta", "f", "T_f"), "'zeta', 'f' or 'T_f'")
 NATURAL = Kind(lambda value: is_whole(value, 0, inf), "a whole number of at least 0")
-CYCLES = Kind(is_half_count, "a whole or half number above 0")
+CYCLES = Kind(lambda value: POSITIVE.accepts(value) and (2.0 * value) % 1 == 0, "a whole or half number above 0")
 FIGURE = Kind(is_published, "a number, [number, 'unit'] or a text")
 
 

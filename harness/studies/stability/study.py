@@ -109,8 +109,9 @@ def judged(group: Iterable[Trial]) -> Iterator[Ending]:
                 yield all_refused(case, bounded(LIMIT, poison, case.setting))
                 continue
             if case.refuse is None and answer is None and not doubt:
+                answering = truth if case.model in MODELS else by_two_methods
                 try:
-                    answer = bounded(LIMIT, answering(case), case.model, case.spans, case.grid)
+                    answer = bounded(LIMIT, answering, case.model, case.spans, case.grid)
                 except HarnessError as error:
                     if not case.either:
                         raise
@@ -126,11 +127,6 @@ def judged(group: Iterable[Trial]) -> Iterator[Ending]:
                 yield finished(case, ending, answer)
         except HarnessError as error:
             yield Ending(case, WRONG, str(error))
-
-
-def answering(case: Trial) -> Callable[..., Truth]:
-    """What tells the true answer to a case."""
-    return truth if case.model in MODELS else by_two_methods
 
 
 def all_refused(case: Trial, ending: Refusals) -> Ending:
