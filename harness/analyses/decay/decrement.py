@@ -78,19 +78,15 @@ def turning_points(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> tuple[np.ndar
     distance to the fourth.
     """
     sign = np.sign(v)
-    times, positions = [], []
-    for i in np.flatnonzero(sign[:-1] * sign[1:] <= 0).tolist():
-        if sign[i] * sign[i + 1] < 0:
-            s = slope_zero(t[i + 1] - t[i], x[i + 1] - x[i], v[i], v[i + 1])
-            times.append(t[i] + s * (t[i + 1] - t[i]))
-            positions.append(cubic(s, t[i + 1] - t[i], x[i], x[i + 1], v[i], v[i + 1]))
-        elif sign[i] == 0 and turns(sign, i):
-            times.append(t[i])
-            positions.append(x[i])
-    if len(t) and sign[-1] == 0 and turns(sign, len(t) - 1):
-        times.append(t[-1])
-        positions.append(x[-1])
-    return np.array(times), np.array(positions)
+    i = np.flatnonzero(sign[:-1] * sign[1:] < 0)
+    h, x0, x1, v0, v1 = t[i + 1] - t[i], x[i], x[i + 1], v[i], v[i + 1]
+    s = slope_zero(h, x1 - x0, v0, v1)
+    r = 1 - s
+    cubic = (1 + 2 * s) * r * r * x0 + s * r * r * h * v0 + s * s * (3 - 2 * s) * x1 - s * s * r * h * v1
+    rests = np.array([j for j in np.flatnonzero(sign == 0).tolist() if turns(sign, j)], int)
+    times, positions = np.append(t[i] + s * h, t[rests]), np.append(cubic, x[rests])
+    order = np.argsort(times, kind="stable")
+    return times[order], positions[order]
 
 
 def turns(sign: np.ndarray, i: int) -> bool:
@@ -104,23 +100,18 @@ def turns(sign: np.ndarray, i: int) -> bool:
     return sign[i + 1 + moving[0]] != before and (i > 0 or moving[0] == 0)
 
 
-def slope_zero(h: float, rise: float, v0: float, v1: float) -> float:
-    """Where in [0, 1] the cubic of step h (s) and slopes v0, v1 of opposite sign is level.
+def slope_zero(h: np.ndarray, rise: np.ndarray, v0: np.ndarray, v1: np.ndarray) -> np.ndarray:
+    """Where in [0, 1] cubics (n,) of steps h (s) and slopes v0, v1 of opposite sign are level.
 
-    Its slope is v0 + 2 b s + c s^2 with b = 3 rise/h - 2 v0 - v1 and c = 3 (v0 + v1) - 6 rise/h.
+    Their slope is v0 + 2 b s + c s^2 with b = 3 rise/h - 2 v0 - v1 and c = 3 (v0 + v1) - 6 rise/h.
     """
     b = 3 * rise / h - 2 * v0 - v1
     c = 3 * (v0 + v1) - 6 * rise / h
-    root = sqrt(max(b * b - c * v0, 0.0))
-    q = -(b + root) if b > 0 else -(b - root)
-    candidates = [v0 / q if q else 0.5, q / c if c else 2.0]
-    return min(candidates, key=lambda s: abs(s - 0.5))  # the one inside: slopes of opposite sign allow just one
-
-
-def cubic(s: float, h: float, x0: float, x1: float, v0: float, v1: float) -> float:
-    """The cubic of positions x0, x1 and slopes v0, v1 a step h apart, at the share s of it."""
-    r = 1 - s
-    return (1 + 2 * s) * r * r * x0 + s * r * r * h * v0 + s * s * (3 - 2 * s) * x1 - s * s * r * h * v1
+    root = np.sqrt(np.maximum(b * b - c * v0, 0.0))
+    q = np.where(b > 0, -(b + root), -(b - root))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = np.where(q == 0, 0.5, v0 / q), np.where(c == 0, 2.0, q / c)
+    return np.where(abs(one - 0.5) <= abs(other - 0.5), one, other)  # inside: opposite slopes allow just one
 
 
 def chosen(
