@@ -96,14 +96,13 @@ def estimates(
             value, (low, high) = float(law.p[place]), ends[place]
             bounds = min(low, value), max(high, value)
             found[place] = in_record(record, problem, place, value, errors[place], *bounds)
-    return (*found.values(), *forces(record, found, known))
+    return (*found.values(), *forces(record, found[OMEGA], found, known))
 
 
-def forces(record: Record, found: dict[int, Estimate], known: Known) -> tuple[Estimate, ...]:
+def forces(record: Record, omega: Estimate, found: dict[int, Estimate], known: Known) -> tuple[Estimate, ...]:
     """Friction force, damping and drag constants from k or m: f = k r, c = 2 zeta k/omega, q = b k/omega^2."""
     if known.k is None and known.m is None:
         return ()
-    omega = found[OMEGA]
     share = omega.error / omega.value
     k, k_share = (known.k, 0.0) if known.k is not None else (known.m * omega.value**2, 2 * share)  # type: ignore[operator]
     m, m_share = (known.m, 0.0) if known.m is not None else (k / omega.value**2, 2 * share)

@@ -60,14 +60,13 @@ def by_turning_points(
     freedom = len(places) - len(unknowns)
     scale = scales(jacobian)
     covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * cost / freedom
-    found = {OMEGA: omega}
+    found = {}
     errors, correlation = np.sqrt(np.diag(covariance)) / scale, correlated(covariance)
     for i, place in enumerate(unknowns.tolist()):
         if place != AMPLITUDE:
             low, high = interval(i, unknowns, p[unknowns], errors, correlation, freedom)
             found[place] = in_record(record, problem, place, float(p[place]), float(errors[i]), low, high)
-    told = (*(each for place, each in found.items() if place != OMEGA), *forces(record, found, known))
-    return told, ""
+    return (*found.values(), *forces(record, omega, found, known)), ""
 
 
 def begins_before(problem: Problem, turns: Turns, p: np.ndarray) -> np.ndarray:
@@ -90,13 +89,13 @@ def by_two_peaks(
         return (), "the rest position drifts"
     if not first > last:
         return (), "the last turning point is no smaller than the first"
-    found = {OMEGA: omega}
+    found = {}
     for term in TERMS:
         place = UNKNOWNS.index(term)
         value = alone(place, first / problem.unit, last / problem.unit, count, problem.model.sine)
         if np.isfinite(value):
             found[place] = in_record(record, problem, place, value, np.nan, np.nan, np.nan)
-    return (*(each for place, each in found.items() if place != OMEGA), *forces(record, found, known)), ""
+    return (*found.values(), *forces(record, omega, found, known)), ""
 
 
 def alone(place: int, first: float, last: float, count: int, sine: bool) -> float:
