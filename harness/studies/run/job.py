@@ -69,11 +69,9 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     if not run.failed:
         check_published(scene, quantities)
     run.save(folder)
-    as_run = replace(scene, start=float(run.time[0]), grid=run.wanted.grid)
-    if not run.failed:
-        as_run = replace(as_run, stop=float(run.time[-1]))
-    if run.wanted.grid is not None:
-        as_run = replace(as_run, follow=run.wanted.follow)
+    stop = scene.stop if run.failed else float(run.time[-1])
+    follow = scene.follow if run.wanted.grid is None else run.wanted.follow
+    as_run = replace(scene, start=float(run.time[0]), stop=stop, grid=run.wanted.grid, follow=follow)
     record(folder, [scene.file], run.in_force, as_run, source=scene.source)
     if results:
         save(quantities, scene.published, folder / "figures.csv")
