@@ -26,8 +26,8 @@ def theirs():
 def harness(fmus, tmp_path):
     (tmp_path / "fmus").symlink_to(fmus)
 
-    def run(*arguments):
-        return commands.harness(tmp_path, *arguments, COLUMNS="120")
+    def run(*arguments, blank=True):
+        return commands.harness(tmp_path, *arguments, blank=blank, COLUMNS="120")
 
     return run
 
@@ -54,7 +54,7 @@ def test_two_fmus_are_compared_as_their_closed_forms_differ(harness, theirs, tmp
     stiffer = {"resources/Midpoint.py": lambda text: text.replace("40.0", "40.4")}
     other = foreign.edited(theirs / "Midpoint.fmu", tmp_path / "Other.fmu", stiffer)
     arguments = (theirs / "Midpoint.fmu", other, "--tolerance", 1e-4)
-    done = harness("compare", *arguments, "--json")
+    done = harness("compare", *arguments, "--json", blank=False)
     assert (done.returncode, done.stderr) == (0, "")
     found = json.loads(done.stdout)
     times = np.linspace(0, 1, 1001)
@@ -72,7 +72,7 @@ def test_two_fmus_are_compared_as_their_closed_forms_differ(harness, theirs, tmp
 
 def test_a_result_agrees_with_a_new_run_of_its_fmu_events_included(harness):
     assert harness("run", "stickslip", "--quiet").returncode == 0
-    done = harness("compare", "results/stickslip", "fmus/stickslip.fmu", "--within", 1e-12)
+    done = harness("compare", "results/stickslip", "fmus/stickslip.fmu", "--within", 1e-12, blank=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert "8 changes of mode in both, at most 0 s apart" in done.stdout
 
@@ -337,7 +337,7 @@ def test_texts_are_compared_as_texts(tmp_path):
 def test_rtol_and_atol_say_what_may_differ(tmp_path, bounds, status):
     (tmp_path / "one.csv").write_text("t [s],x [m]\n0,1\n1,4\n2,3\n")
     (tmp_path / "two.csv").write_text("t [s],x [m]\n0,1\n1,3.75\n2,3\n")
-    done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds, "--quiet")
+    done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds, "--quiet", blank=True)
     assert done.returncode == status
     assert ("x differs by 0.25 m at t = 1 s, more than" in done.stderr) == bool(status)
 
@@ -403,7 +403,7 @@ def test_within_fails_on_what_is_not_a_number(tmp_path):
     (tmp_path / "good.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
     (tmp_path / "bad.csv").write_text("t [s],x [m]\n0,1\n1,nan\n2,3\n")
     for pair in (("good.csv", "bad.csv"), ("bad.csv", "good.csv"), ("bad.csv", "bad.csv")):
-        done = commands.harness(tmp_path, "compare", *pair, "--within", "1e9", COLUMNS="120")
+        done = commands.harness(tmp_path, "compare", *pair, "--within", "1e9", blank=True, COLUMNS="120")
         assert done.returncode == 1
         assert "x is not a finite number at t = 1 s" in done.stdout
         assert done.stderr.count("\n") == 1

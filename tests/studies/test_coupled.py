@@ -40,7 +40,7 @@ def couple(fmus, tmp_path):
         if "\n" in scene:
             (tmp_path / "mine.toml").write_text(scene)
             scene = "mine.toml"
-        return commands.harness(tmp_path, "couple", scene, *options)
+        return commands.harness(tmp_path, "couple", scene, *options, blank=True)
 
     return run
 
@@ -139,7 +139,9 @@ def test_an_archive_asks_of_a_tool_neither_factors_nor_values_in_line_nor_odd_na
 
 
 def test_an_archive_of_anyone_s_is_run_beside_its_own_finest_run(run, place):
-    done = commands.harness(place, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json")
+    done = commands.harness(
+        place, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json", blank=True
+    )
     assert (done.returncode, done.stderr) == (0, "")
     told = json.loads(done.stdout)
     assert told["order"] > 0.8

@@ -113,9 +113,9 @@ def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
     assert err.startswith("Stickslip (stickslip): m = -1.0 kg is refused")
 
 
-def harness(folder, *arguments):
+def harness(folder, *arguments, blank=False):
     """The finished process of a command in a folder."""
-    return commands.harness(folder, *arguments, base={}, PATH="", COLUMNS="100")
+    return commands.harness(folder, *arguments, base={}, blank=blank, PATH="", COLUMNS="100")
 
 
 def test_the_command_shows_both_ways_beside_the_others_and_error_against_tolerance(both, tmp_path):
@@ -147,7 +147,7 @@ def twice(both, fmus, tmp_path_factory):
     (out, without), said, pages = map(tmp_path_factory.mktemp, ("out", "without")), [], []
     (without / "fmus").symlink_to(fmus)
     for folder, words in ((both, ("--json", "precision")), (without, ("precision",))):  # --json before any command
-        done = harness(folder, *words, "smd", "--quick", "--out", out)
+        done = harness(folder, *words, "smd", "--quick", "--out", out, blank=True)
         assert (done.returncode, done.stderr) == (0, "")
         said.append(done.stdout)
         assert harness(folder, "report", "--quiet", "--out", out).returncode == 0

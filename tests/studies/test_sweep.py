@@ -168,7 +168,9 @@ TOLD = {  # why some have no run to show
 def test_an_fmu_of_anyone_is_swept_or_says_why_not(harness, tmp_path, name):
     """Numbers alone are measured: of arrays each element, of texts nothing."""
     fmu, vary = foreign.built() / f"{name}.fmu", foreign.VARY[name].replace(":3", ":2")
-    done = harness("sweep", fmu, "--vary", vary, "--measure", "final,largest", "--name", "a", "--tolerance", 1e-3)
+    done = harness(
+        "sweep", fmu, "--vary", vary, "--measure", "final,largest", "--name", "a", "--tolerance", 1e-3, blank=True
+    )
     if name in TOLD:
         assert (done.returncode, TOLD[name] in done.stderr) == (1, True)
         return
@@ -183,7 +185,7 @@ def test_an_fmu_of_anyone_is_swept_or_says_why_not(harness, tmp_path, name):
 def test_runs_of_anyone_s_fmu_that_crash_or_fail_are_sentences_among_many(harness, tmp_path):
     """With kind 0 it does well, with 2 it crashes, with 6 it fails."""
     trouble = foreign.built() / "Trouble.fmu"
-    done = harness("sweep", trouble, "--vary", "kind=2,6,0", "--name", "a", "--workers", 2)
+    done = harness("sweep", trouble, "--vary", "kind=2,6,0", "--name", "a", "--workers", 2, blank=True)
     assert done.returncode == 1
     assert done.stderr.startswith("Error: 2 of 3 runs failed")
     assert "its binary has crashed" in done.stderr
@@ -233,7 +235,7 @@ LONG = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:200", "--measure", "peak_s
 @pytest.fixture(scope="module")
 def whole(place):
     """The files of that sweep, by their name, when nothing happens to it."""
-    assert commands.harness(place, *LONG).returncode == 0
+    assert commands.harness(place, *LONG, blank=True).returncode == 0
     return files(place)
 
 
@@ -255,7 +257,7 @@ def test_what_a_kill_left_is_kept_and_only_the_rest_is_run(harness, whole, tmp_p
     assert 0 < kept < 200
     with journal.open("a") as file:
         file.write("[299, [0.1")  # cut off in the middle of a line
-    done = harness(*LONG)
+    done = harness(*LONG, blank=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert f"200 runs, {kept} of them done before" in done.stdout
     assert files(tmp_path) == whole
@@ -263,7 +265,7 @@ def test_what_a_kill_left_is_kept_and_only_the_rest_is_run(harness, whole, tmp_p
 
 
 @pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="processes are found in /proc")
-def test_no_worker_outlives_a_sweep_that_is_killed(tmp_path):
+def test_no_worker_outlives_a_sweep_that_is_killed(harness, tmp_path):
     """The kill reaches the sweep alone; what it started is known by its environment."""
     mark = f"SWEEP_OF={tmp_path}".encode()
 
@@ -337,7 +339,7 @@ def test_a_sweep_listens_at_no_port(harness, tmp_path):
 def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(harness, tmp_path):
     """Its slope is positive there, so that it damps; beyond it the sled sticks and slips."""
     arguments = ("--vary", "x_m=0.03,0.06", "--vary", "v_driver=0.02,0.04,0.08", "--measure", "unsteady", "--stop", 40)
-    assert harness("sweep", "pacejka", *arguments, "--workers", 2).returncode == 0
+    assert harness("sweep", "pacejka", *arguments, "--workers", 2, blank=True).returncode == 0
     steady = opened(folder_of(tmp_path / "results", "pacejka-x_m-v_driver"))["unsteady"].to_numpy() < 0.1
     assert steady.tolist() == [[True, False, False], [True, True, False]]
 
@@ -424,13 +426,13 @@ def test_a_damaged_line_of_a_journal_is_left_out_and_counted(tmp_path, damaged):
 
 def test_a_damaged_journal_is_told_and_the_runs_are_done_again(harness, tmp_path):
     arguments = ("sweep", "smd", "--vary", "m=1:2:4", "--workers", 1, "--name", "mine")
-    assert harness(*arguments, "--out", "whole").returncode == 0
+    assert harness(*arguments, "--out", "whole", blank=True).returncode == 0
     (tmp_path / "results/sweep").mkdir(parents=True)
     points = Points((axis("m=1:2:4", False),))
     usual = ("exchange", False), ("lenient", False), ("patience", 60.0), ("stop", None), ("tolerance", 1e-6)
     sweep = Sweep(Runs("smd", ("m",), (), (), usual), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
     sweep.journal(tmp_path / "results/sweep").path.write_bytes(b"garbage\n" + line(0, [[1.0]], {}))
-    done = harness(*arguments)
+    done = harness(*arguments, blank=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert "4 runs, 0 of them done before, 0 failed" in done.stdout
     assert "2 damaged lines" in done.stdout

@@ -16,7 +16,7 @@ from ...process.room import room
 
 ALONE = Lock()  # a start looks after all processes there are, and may take the exit code of one that is waited for
 # imported once, where processes are forked from
-PRELOAD = ["harness.running.probe", "harness.truths.linear", "scipy.integrate"]
+PRELOAD = [f"{__package__}.study", "harness.truths.linear", "scipy.integrate"]
 
 CONTEXT: Any = context(PRELOAD)
 
