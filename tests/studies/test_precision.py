@@ -1,7 +1,9 @@
 """Work-precision: what is measured, what counts as a gap, what the sentences say."""
 
 from functools import partial
+from itertools import cycle
 from math import nan
+from pathlib import Path
 from time import sleep
 
 import commands
@@ -148,7 +150,8 @@ def test_advice_is_not_given_where_the_figures_do_not_carry_it():
     assert advice.advise(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.clear) == untold
 
 
-def test_a_quick_run_does_not_take_the_place_of_a_whole_one(tmp_path):
+def test_a_quick_run_does_not_take_the_place_of_a_whole_one(place, tmp_path, monkeypatch):
+    monkeypatch.chdir(place)
     folder = tmp_path / "precision"
     folder.mkdir()
     record(folder, [], name="smd.json")
@@ -177,16 +180,15 @@ def test_stuck_points_are_those_between_a_stop_and_the_next_break_away():
     assert not laws.stuck(load("coulomb"))[1:].any()
 
 
-@pytest.mark.parametrize("path", AUTHORED, ids=lambda path: path.stem)
-def test_a_file_of_a_user_is_studied_by_its_path_as_ours_are(path):
+@pytest.mark.parametrize(("path", "ending"), [*zip(AUTHORED, cycle((".py", ".fmu")))], ids=lambda one: Path(one).name)
+def test_a_file_of_a_user_is_studied_by_its_path_or_that_of_its_fmu_as_ours_are(path, ending):
     """Every way that needs no equations but those of the file; two of its methods agree about what is true."""
-    folder = of_file(path)
-    for name in (folder / path.name, folder / f"{path.stem}.fmu"):
-        found = study(str(name), Extent((1e-6,), 5.0, 0.0), lambda share: None)
-        assert found.model == path.stem
-        assert {tool for tool, _ in found.solvers(found.cases[0])} == {FMU, FMPY, *WAYS}
-        best = {p.tool: p.largest for p in found.points if p.method == "dop853"}
-        assert best[FMU] == best[FMPY] < 1e-3
+    name = (of_file(path) / path.name).with_suffix(ending)
+    found = study(str(name), Extent((1e-6,), 5.0, 0.0), lambda share: None)
+    assert found.model == path.stem
+    assert {tool for tool, _ in found.solvers(found.cases[0])} == {FMU, FMPY, *WAYS}
+    best = {p.tool: p.largest for p in found.points if p.method == "dop853"}
+    assert best[FMU] == best[FMPY] < 1e-3
 
 
 def test_an_unknown_model_is_one_sentence(place, tmp_path):
