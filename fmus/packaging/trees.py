@@ -21,34 +21,33 @@ def tree(text: str) -> ast.Module:
 
 
 def walked(root: ast.AST) -> list[ast.AST]:
-    """A tree and all that is in it, in the order of ast.walk."""
+    """A tree and all that is in it, in the order of ast.walk; not whether something is read or written."""
     found = [root]
     for node in found:  # which grows on the way
         for name in node._fields:
             value = getattr(node, name, None)
-            if isinstance(value, ast.AST):
-                found.append(value)
-            elif isinstance(value, list):
+            if isinstance(value, list):
                 found += [one for one in value if isinstance(one, ast.AST)]
+            elif isinstance(value, ast.AST) and name != "ctx":
+                found.append(value)
     return found
 
 
 def copied(node: Node, down: int = 0) -> Node:
     """A tree of its own, its lines moved down by some: what copy.deepcopy makes in ten times the time."""
-    if not node._fields:  # a plus, a minus: one for all in Python's parser, too
-        return node
     made = node.__new__(type(node))
-    vars(made).update({name: _part(name, value, down) for name, value in vars(node).items()})
+    its = vars(made)
+    its.update(vars(node))
+    for name in node._fields:
+        value = its.get(name)
+        if isinstance(value, list):
+            its[name] = [copied(one, down) if isinstance(one, ast.AST) else one for one in value]
+        elif isinstance(value, ast.AST) and name != "ctx":
+            its[name] = copied(value, down)
+    for name in ("lineno", "end_lineno") if down else ():
+        if its.get(name) is not None:
+            its[name] += down
     return made
-
-
-def _part(name: str, value: Any, down: int) -> Any:
-    """A child, a row of such, the number of a line, or anything else."""
-    if isinstance(value, ast.AST):
-        return copied(value, down)
-    if isinstance(value, list):
-        return [copied(one, down) if isinstance(one, ast.AST) else one for one in value]
-    return value + down if down and value is not None and name in ("lineno", "end_lineno") else value
 
 
 def same(a: Any, b: Any) -> bool:
