@@ -65,7 +65,7 @@ def test_threads_do_not_feel_each_other(paths):
 @SOME
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_children_carry_on_what_they_were_given_and_begin_anew(folder, name, method):
-    assert host("in_processes", str(folder / f"{name}.fmu"), method) == {"same": True, "codes": [0] * 4}
+    assert host("in_processes", str(folder / f"{name}.fmu"), method) == {"same": True, "codes": [0, 0]}
 
 
 def test_a_host_that_holds_the_sources_and_a_pythonfmu_changes_nothing(paths):

@@ -150,7 +150,7 @@ def in_processes(path, method):
     context = multiprocessing.get_context(method)
     answers = context.Queue()
     children = [
-        context.Process(target=carried_on, args=(life if method == "fork" else None, folder, answers)) for _ in range(4)
+        context.Process(target=carried_on, args=(life if method == "fork" else None, folder, answers)) for _ in range(2)
     ]
     for child in children:
         child.start()
