@@ -29,7 +29,7 @@ OFFERED = """\
 | model exchange: indicators, time events, nominals | | yes | yes |
 | directional derivatives | | yes | yes, adjoint too |
 | rates of outputs (derivatives of order 1) | | yes | yes |
-| derivatives of inputs up to order 8: a force that is a polynomial, exact through stick and slip | | yes | |
+| derivatives of inputs up to order 8: polynomials, which the method exact follows through stick and slip | | yes | |
 | event mode, early return at stick and slip | | | yes |
 | intermediate update after every internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |

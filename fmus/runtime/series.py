@@ -7,7 +7,7 @@ f + f' d - M d^2/2 for d to come: who goes where that comes to zero passes no ze
 from math import fabs, sqrt
 
 TERMS = 20  # of a motion, where the largest rate times the stretch is 1
-MOST_LOOKS = 100
+MOST_HALVINGS, MOST_LOOKS = 200, 100
 
 
 class Series:
@@ -19,15 +19,20 @@ class Series:
 
     def first_zero(self, side):
         """How far it keeps the sign of `side`, as a share of the stretch, and whether it ends there; it may begin with
-        zero, and then it has the sign that comes first."""
+        zero, and then it has the sign that comes first.  No further is looked than where its first two terms count."""
         first = 0
         while first < TERMS and self.c[first] == 0.0:
             first += 1
-        if self.c[first] == 0.0:
+        if first == TERMS:
             return 1.0, False
-        u = most = 0.0
-        for k in range(first + 2, TERMS + 1):
-            most += (k - first) * (k - first - 1) * fabs(self.c[k])
+        reach = 1.0
+        rest, most = self.bounds(first, reach)
+        for _ in range(MOST_HALVINGS):
+            if rest <= fabs(self.c[first]) + fabs(self.c[first + 1]) * reach:
+                break
+            reach *= 0.5
+            rest, most = self.bounds(first, reach)
+        u = 0.0
         for _ in range(MOST_LOOKS):
             value = slope = 0.0
             for i in range(TERMS + 1 - first):
@@ -36,10 +41,19 @@ class Series:
             if value <= 0.0:
                 return u, True
             fall = sqrt(slope * slope + 2.0 * most * value) - slope
-            if not 2.0 * value < (1.0 - u) * fall:
-                return 1.0, False
+            if not 2.0 * value < (reach - u) * fall:
+                return reach, False
             ahead = u + 2.0 * value / fall
             if ahead == u:
                 return u, True
             u = ahead
         return u, False
+
+    def bounds(self, first, reach):
+        """Of f/u^first up to there: of all terms but the first two, and of the second derivative."""
+        rest = most = 0.0
+        for i in range(TERMS - 1 - first):
+            n = TERMS - first - i
+            rest = fabs(self.c[first + n]) + rest * reach
+            most = n * (n - 1) * fabs(self.c[first + n]) + most * reach
+        return rest * reach * reach, most

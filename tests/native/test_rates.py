@@ -197,6 +197,21 @@ def test_a_load_of_just_the_limit_goes_the_way_of_its_first_derivative_that_is_n
         assert fmu.get("events.t_last") == 0.0
 
 
+@pytest.mark.parametrize("name", LIMITS)
+def test_derivatives_that_grow_with_their_order_cost_no_more_steps(launch, name):
+    """Those of a load that swings at 50 Hz, below what is held and above it, told every millisecond."""
+    values, limit = LIMITS[name]
+    for size in 0.9 * limit, 2.0 * limit:
+        fmu = launch(name, values, stop=None)
+        for n in range(60):
+            fmu.set({push(name)[0]: size * sin(0.1 * pi * n)})
+            for k in range(1, 9):
+                fmu.ramp(push(name)[0], size * (100.0 * pi) ** k * sin(0.1 * pi * n + 0.5 * pi * k), k)
+            fmu.step(n * 1e-3, 1e-3)
+        assert fmu.get("solver.steps") < 60 * 6
+        assert (fmu.get("events.count") > 0) == (size > limit)
+
+
 ORDERS = {"ode23": 3, "ode45": 5, "dop853": 8, "rodas": 4, "exact": 6}  # of the last any
 
 

@@ -49,7 +49,7 @@ TOLD = {  # by what a model description says it, where an attribute is not false
     "model exchange: indicators, time events, nominals": ("ModelExchange", "modelIdentifier"),
     "directional derivatives": ("CoSimulation", "providesDirectional"),
     "rates of outputs (derivatives of order 1)": ("CoSimulation", "maxOutputDerivativeOrder"),
-    "derivatives of inputs up to order 8: a force that is a polynomial, exact through stick and slip": (
+    "derivatives of inputs up to order 8: polynomials, which the method exact follows through stick and slip": (
         "CoSimulation",
         "canInterpolateInputs",
     ),
