@@ -7,7 +7,7 @@
     tangent.py       a model differentiated along a direction
     interface.py     the declared variables and the sentences, as C tables
     numerics.h, text.h               written by hand: Python's arithmetic, Python's numbers as text
-    instance.h, fmi2.c, fmi3.c       what an instance is; FMI 2.0 and 3.0
+    instance.h, calls.h, fmi2.c, fmi3.c    what an instance is; FMI 2.0 and 3.0, first what they have in common
     sources.py       the folder sources/ of an FMU, which any tool can compile
     compiler.py, universal.py        the binaries
     fmu.py           the file

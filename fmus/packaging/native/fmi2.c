@@ -43,12 +43,8 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
 {
     static const fmi2CallbackFunctions silent = {0};
     (void)fmuResourceLocation, (void)visible;
-    if (!functions) functions = &silent;
-    const char *name = instanceName ? instanceName : "";
     int running = fmuType == fmi2ModelExchange ? EXCHANGING : STEPPING;
-    Instance *it = instantiate(name, functions, running, loggingOn, __func__);
-    if (it && (!fmuGUID || strcmp(fmuGUID, MODEL_GUID))) return dismissed(it, WRONG_TOKEN, __func__, MODEL_GUID);
-    return it;
+    return instantiate(instanceName, fmuGUID, functions ? functions : &silent, running, loggingOn, __func__);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDefined, fmi2Real tolerance,

@@ -35,14 +35,6 @@ static void log_to(const Host *host, const char *name, const char *sentence)
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
-static Instance *instance_for(const char *name, const char *token, Host host, int running, bool logging,
-                              const char *function)
-{
-    Instance *it = instantiate(name ? name : "", &host, running, logging, function);
-    if (it && (!token || strcmp(token, MODEL_GUID))) return dismissed(it, WRONG_TOKEN, function, MODEL_GUID);
-    return it;
-}
-
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
                                           fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
                                           fmi3InstanceEnvironment instanceEnvironment,
@@ -50,7 +42,7 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
 {
     Host host = {.environment = instanceEnvironment, .log = logMessage, .handles = true};
     (void)resourcePath, (void)visible;
-    return instance_for(instanceName, instantiationToken, host, EXCHANGING, loggingOn, __func__);
+    return instantiate(instanceName, instantiationToken, &host, EXCHANGING, loggingOn, __func__);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
@@ -66,7 +58,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     (void)resourcePath, (void)visible;
     (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables; /* all can be read then */
     int running = STEPPING | (intermediateUpdate ? 1 << INTERMEDIATE : 0) | (eventModeUsed ? 1 << EVENT : 0);
-    return instance_for(instanceName, instantiationToken, host, running, loggingOn, __func__);
+    return instantiate(instanceName, instantiationToken, &host, running, loggingOn, __func__);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -78,7 +70,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
 {
     Host host = {.environment = instanceEnvironment, .log = logMessage};
     (void)resourcePath, (void)visible, (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
-    Instance *it = instance_for(instanceName, instantiationToken, host, STEPPING, loggingOn, __func__);
+    Instance *it = instantiate(instanceName, instantiationToken, &host, STEPPING, loggingOn, __func__);
     return it ? dismissed(it, NOT_OFFERED, __func__, "") : NULL;
 }
 

@@ -260,10 +260,20 @@ static void fresh(Instance *it)
     if (it->possible & 1 << CONTINUOUS) exchange_take_over(&it->state.run, &fault);
 }
 
-/* A new instance, whose runs are in some phases; NULL with a sentence if there is no memory. */
-static Instance *instantiate(const char *name, const Host *host, int running, bool logging, const char *function)
+/* None: such an instance cannot be. */
+static Instance *dismissed(Instance *it, int64_t reason, const char *function, const char *word)
+{
+    refuse(it, reason, function, word);
+    free(it);
+    return NULL;
+}
+
+/* A new instance, whose runs are in some phases; NULL with a sentence for another FMU's token, or without memory. */
+static Instance *instantiate(const char *name, const char *token, const Host *host, int running, bool logging,
+                             const char *function)
 {
     Text why = {0};
+    if (!name) name = "";
     Instance *it = calloc(1, sizeof *it + 4 * strlen(name) + 1);
     if (!it) {
         tell_call(&why, NO_MEMORY, &(Call){.function = function});
@@ -275,15 +285,7 @@ static Instance *instantiate(const char *name, const Host *host, int running, bo
     it->logging = logging;
     it->possible = AROUND | running;
     fresh(it);
-    return it;
-}
-
-/* None: such an instance cannot be. */
-static Instance *dismissed(Instance *it, int64_t reason, const char *function, const char *word)
-{
-    refuse(it, reason, function, word);
-    free(it);
-    return NULL;
+    return token && !strcmp(token, MODEL_GUID) ? it : dismissed(it, WRONG_TOKEN, function, MODEL_GUID);
 }
 
 /* Every message is of the category logStatusError. */
