@@ -21,10 +21,10 @@ class Series:
         """How far it keeps the sign of `side`, as a share of the stretch, and whether it ends there; it may begin with
         zero, and then it has the sign that comes first.  No further is looked than where its first two terms count."""
         first = 0
-        while first < TERMS and self.c[first] == 0.0:
+        while self.c[first] == 0.0:
             first += 1
-        if first == TERMS:
-            return 1.0, False
+            if first == TERMS:
+                return 1.0, False
         reach = 1.0
         rest, most = self.bounds(first, reach)
         for _ in range(MOST_HALVINGS):

@@ -251,9 +251,10 @@ def test_a_long_path_of_temporary_files_is_no_hindrance(tmp_path):
     assert (done.stdout, done.stderr) == ("5\n", "")
 
 
-@pytest.mark.parametrize("name", ["rotor_brake", "sleds"])
+@pytest.mark.parametrize("name", ["rotor_brake", "sleds", "belt"])
 def test_a_file_of_a_user_meets_the_usual_scenes_by_its_path(tmp_path, name):
-    """Its values, its tolerances and what is no number, by every method; what binds two values may refuse them."""
+    """Its values, its tolerances and what is no number, by every method; what binds two values may refuse them, and a
+    belt puts energy in."""
     (path,) = (path for path in (*AUTHORED, *LARGER) if path.stem == name)
     file = of_file(path) / f"{name}.fmu"
     few = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")

@@ -14,6 +14,7 @@ FILE = Path(__file__).with_name("stability.toml")
 RTOL = 1e-6
 POINTS = 200
 LOOSE = 3e-2  # error at RTOL of any model, which may carry it on from one slip to the next
+DRIVING = ("F_ext", "T_ext", "v_driver")  # what puts energy into one of ours
 OWN = ("start", "stop", "rtol", "calls")  # what `each` may vary besides a value
 
 
@@ -35,6 +36,7 @@ class Trial:
     events: str = "all"  # which methods must find every event: all, exact or none
     region: float | None = None  # where the scene stands on the axis of the region figure
     either: bool = False  # a sentence will do, whatever it says
+    driven: bool = False  # energy may come in
     place: int = 0  # in the table
 
     @property
@@ -50,12 +52,6 @@ class Trial:
     def rtol(self) -> float:
         return self.setting.values["solver.rtol"]
 
-    @property
-    def free(self) -> bool:
-        """Whether nothing puts energy in."""
-        values = self.setting.values
-        return not self.changes and not any(values.get(name) for name in ("F_ext", "T_ext", "v_driver"))
-
 
 def scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
     """Every scene with one model and one value, and the largest errors allowed where a scene says nothing."""
@@ -66,7 +62,7 @@ def scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
 def usual(model: str, card: Card, settled: bool) -> list[dict[str, Any]]:
     """Scenes for a model of somebody's: every number a tenth of what it is, and ten times; tolerances; few steps; what
     is no number.  `settled`: whether its events can be told."""
-    of_all = {"model": model, "either": True, "events": "all" if settled else "none"}
+    of_all = {"model": model, "either": True, "driven": True, "events": "all" if settled else "none"}
     numbers = {n: x for n, x in card.defaults.items() if x and n not in card.choices and not n.startswith("solver.")}
     found: list[dict[str, Any]] = [{"title": "as it comes"}, {"title": "one communication step", "points": 1}]
     found += [{"title": f"rtol = {rtol:g}", "rtol": rtol, "finish": {}} for rtol in (1e-3, 1e-9)]
@@ -136,6 +132,7 @@ def case(scene: dict[str, Any], card: Card, method: str, finish: float) -> Trial
         events=scene.get("events", "all"),
         region=scene["varied"] if scene.get("region") else None,
         either=scene.get("either", False),
+        driven=scene.get("driven", False) or bool(changes) or any(values.get(name) for name in DRIVING),
     )
 
 

@@ -151,7 +151,7 @@ def finished(case: Trial, motion: Motion, answer: Truth) -> Ending:
     assert case.finish is not None
     error = answer.error(motion.x, motion.v)
     rise = math.nan
-    free, energy = case.free and motion.energy is not None, motion.energy
+    free, energy = not case.driven and motion.energy is not None, motion.energy
     if free and energy is not None:
         rise = float((energy - np.minimum.accumulate(energy)).max() / (energy.max() or 1.0))
     wrong = []
