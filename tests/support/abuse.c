@@ -316,10 +316,11 @@ static void calls(uint64_t seed, int turns)
         settings(references, reals, integers, count);
         double *places = draw(20) ? reals : NULL, slopes[FEW];
         size_t rows = draw(9) ? STATES : draw(FEW), limits = draw(9) ? INDICATORS : draw(FEW);
-        const fmi2Integer orders[FEW] = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 2};
+        const fmi2Integer orders[2 * FEW] = {1, 1, 1, 1, 1, 1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 0, 8, 2};
+        int call = (int)draw(41);
         fmi2EventInfo event;
         fmi2Boolean flag;
-        switch (draw(41)) {
+        switch (call) {
         case 0:
             fmi2FreeInstance(it);
             crowd[i] = NULL;
@@ -371,12 +372,15 @@ static void calls(uint64_t seed, int turns)
         case 37:
         case 38:
             references[0] = push;
-            status = fmi2SetRealInputDerivatives(it, references, draw(9) ? 1 : count, draw(50) ? orders : NULL, reals);
+            status = fmi2SetRealInputDerivatives(it, references, draw(9) ? 1 : count,
+                                                 draw(50) ? orders + draw(FEW) : NULL, reals);
             break;
         case 39: status = fmi2GetRealOutputDerivatives(it, draw(9) ? references : NULL, count, orders, slopes); break;
         default: status = fmi2DeSerializeFMUstate(it, bytes[i], draw(9) ? BYTES : draw(BYTES), &states[k]); break;
         }
         HOLDS(status == fmi2OK || status == fmi2Error);
+        if (it && 31 <= call && call <= 34 && !exchanges(&it->state)) HOLDS(status == fmi2Error);
+        if (it && 37 <= call && call <= 38 && exchanges(&it->state)) HOLDS(status == fmi2Error);
     }
     for (int i = 0; i < CROWD; i++) {
         Instance *it = crowd[i] ? crowd[i] : instance("heir");
