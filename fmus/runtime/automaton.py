@@ -68,8 +68,7 @@ class DryFriction(Oscillator):
             return FORWARD
         if y[slip[i]] < 0.0:
             return BACKWARD
-        load, rate, limit = self.hold(t, y, i)
-        slack = NEAR * (self.terms(t, y, i) + limit)
+        load, rate, limit, slack = self.held(t, y, i)
         if rate > 0.0 and load >= limit - slack:
             return FORWARD
         if rate < 0.0 and load <= slack - limit:
@@ -79,6 +78,11 @@ class DryFriction(Oscillator):
         if fabs(load) <= limit + slack:
             return STUCK
         return FORWARD if load > 0.0 else BACKWARD
+
+    def held(self, t, y: States, i: Contact):
+        """The load on a contact at rest, its rate, the holding limit, and what rounding may add to that."""
+        load, rate, limit = self.hold(t, y, i)
+        return load, rate, limit, NEAR * (self.terms(t, y, i) + limit)
 
     def touches(self, t, y: States, modes: Contacts, near, i: Contact):
         """Whether a slide whose speed comes to zero here only touches it: friction lets go so soon that a speed which
@@ -113,8 +117,7 @@ class DryFriction(Oscillator):
         forward, backward = self.slip_rate(t, y, modes, i), self.slip_rate(t, y, back, i)
         if modes[i] * backward <= 0.0:
             return True  # nor does it stay: it moves the other way
-        load, _, limit = self.hold(t, y, i)
-        slack = NEAR * (self.terms(t, y, i) + limit)  # as settle has it
+        load, _, _, slack = self.held(t, y, i)
         if fabs(load) <= slack:
             return True
         # late in a run a load is the difference of large numbers

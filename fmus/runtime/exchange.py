@@ -185,8 +185,7 @@ def indicators(model):
                 if march.modes[i] != STUCK:
                     to_rest[i] = march.modes[i] * march.y[slip[i]] + LEAST
                 else:
-                    load, _, limit = model.hold(march.t, march.y, i)
-                    slack = NEAR * (model.terms(march.t, march.y, i) + limit)  # what is held, as settle has it
+                    load, _, limit, slack = model.held(march.t, march.y, i)
                     to_break_away[i] = limit + slack + BEYOND * limit + LEAST - fabs(load)
     for i in contacts:
         exchange.indicators[i] = to_rest[i]
