@@ -41,6 +41,13 @@ enum { READABLE = ANY | 1 << INTERMEDIATE, AROUND = ANY & ~BEGUN }; /* what come
 
 /* ---- saying what is wrong */
 
+/* Out of the way of what is asked all the time. */
+#if defined(__GNUC__)
+#define RARE __attribute__((cold, noinline))
+#else
+#define RARE
+#endif
+
 static void log_to(const Host *host, const char *name, const char *sentence);
 
 static void say(const Host *host, const char *name, bool logging, const Text *text)
@@ -52,7 +59,7 @@ static void say(const Host *host, const char *name, bool logging, const Text *te
 static void say_of(const Instance *it, const Text *text) { say(&it->host, it->name, it->logging, text); }
 
 /* A mistake of the importer, which leaves the motion as it is. */
-static Status refuse_call(const Instance *it, int64_t reason, const Call *call)
+static RARE Status refuse_call(const Instance *it, int64_t reason, const Call *call)
 {
     Text text = {0};
     tell_call(&text, reason, call);
@@ -60,12 +67,12 @@ static Status refuse_call(const Instance *it, int64_t reason, const Call *call)
     return REFUSED;
 }
 
-static Status refuse(const Instance *it, int64_t reason, const char *function, const char *word)
+static RARE Status refuse(const Instance *it, int64_t reason, const char *function, const char *word)
 {
     return refuse_call(it, reason, &(Call){.function = function, .word = word});
 }
 
-static Status refuse_order(const Instance *it, int allowed, const char *function)
+static RARE Status refuse_order(const Instance *it, int allowed, const char *function)
 {
     Text words = {0};
     if (!it) return REFUSED;
@@ -118,7 +125,7 @@ static const Refusal *refused(const State *state)
 }
 
 /* Fail for the reason that the rules give, in a communication step of h from t. */
-static Status give_up(Instance *it, int64_t status, double t, double h)
+static RARE Status give_up(Instance *it, int64_t status, double t, double h)
 {
     State *state = &it->state;
     Text text = {0};
