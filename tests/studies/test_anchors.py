@@ -19,8 +19,11 @@ def table():
     return list(anchors.analyse())
 
 
-def rows(problem, solver):
-    return [row for row in table() if (row.problem, row.solver) == (problem, solver)]
+@pytest.fixture
+def rows(place, monkeypatch):
+    """rows(problem, solver): those of the table, which is made where there are FMUs."""
+    monkeypatch.chdir(place)
+    return lambda problem, solver: [row for row in table() if (row.problem, row.solver) == (problem, solver)]
 
 
 def test_the_true_end_of_the_block_is_the_published_one():
@@ -35,7 +38,7 @@ def test_the_true_end_of_the_block_is_that_of_two_methods():
 
 
 @pytest.mark.parametrize("method", ["ode23", "ode45", "dop853", "rodas"])
-def test_every_method_of_the_runtime_brings_the_block_to_its_end(method):
+def test_every_method_of_the_runtime_brings_the_block_to_its_end(rows, method):
     assert method in offered(anchors.block())
     row = next(row for row in rows("block on a belt", anchors.RUNTIME) if row.method == method)
     assert row.error < 200 * row.rtol
@@ -50,7 +53,7 @@ def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
     assert [t for t, _ in found] == pytest.approx([t for t, _ in truth], abs=1e-8)
 
 
-def test_smoothing_is_four_digits_worse_at_more_cost_than_locating_events():
+def test_smoothing_is_four_digits_worse_at_more_cost_than_locating_events(rows):
     smooth = next(row for row in rows("block on a belt", "scipy, arctan(1e6 v)") if row.method == "LSODA")
     located = next(row for row in rows("block on a belt", anchors.RUNTIME) if row.method == "ode45")
     assert smooth.error > 1e4 * located.error
@@ -58,13 +61,13 @@ def test_smoothing_is_four_digits_worse_at_more_cost_than_locating_events():
 
 
 @pytest.mark.parametrize("method", offered(model_class("coulomb")))
-def test_every_method_of_the_runtime_stops_the_classic_once_and_for_good(method):
+def test_every_method_of_the_runtime_stops_the_classic_once_and_for_good(rows, method):
     row = next(row for row in rows("chattering classic", anchors.RUNTIME) if row.method == method)
     assert row.error < 10 * row.rtol
     assert row.evaluations < 200
 
 
-def test_no_peer_comes_to_an_end_with_plain_sign():
+def test_no_peer_comes_to_an_end_with_plain_sign(rows):
     plain = rows("chattering classic", "scipy, plain sign(v)")
     assert [row.method for row in plain] == ["RK23", "RK45", "LSODA", "Radau"]
     assert all(row.failure and row.evaluations is None and np.isnan(row.error) for row in plain)
