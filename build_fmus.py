@@ -6,6 +6,7 @@ from pathlib import Path
 if Path(sys.path[0]) != Path(__file__).parent:  # by -m: a model where one is may be called math.py, or fmus.py
     sys.path += [str(Path(__file__).parent), sys.path.pop(0)]
 
+from contextlib import AbstractContextManager
 from hashlib import sha256
 
 import click
@@ -60,13 +61,16 @@ def main(
     if web:
         ours = any(model in names() for model in wanted)
         place = out or (FMUS if ours else next(iter(wanted.values())).path.parent) / "web"
-        tell(page(list(wanted.values()), place, methods, laws))
+        with working("writing the page"):
+            path = page(list(wanted.values()), place, methods, laws)
+        tell(path)
         return
     for model, source in wanted.items():
         folder = out or (FMUS if model in names() else source.path.parent) / kind
         try:
             if compiled:
-                path = native(source.path, folder, methods, laws, platforms, fmi)
+                with working(f"{source.name}: compiling; the first time the compiler makes C libraries, too: minutes"):
+                    path = native(source.path, folder, methods, laws, platforms, fmi)
                 weight = ""
             else:
                 path = build(source.path, folder, methods, laws, platforms)
@@ -74,6 +78,13 @@ def main(
         except BuildError as error:
             raise click.ClickException(str(error)) from error
         tell(path, weight)
+
+
+def working(what: str) -> AbstractContextManager[object]:
+    """Say at the terminal, as long as it takes, what is being done."""
+    from rich.console import Console
+
+    return Console(stderr=True).status(what)
 
 
 def tell(path: Path, weight: str = "") -> None:

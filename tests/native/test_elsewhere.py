@@ -38,18 +38,19 @@ STEADY = [case for case in CASES if is_steady(case)]
 @pytest.fixture(scope="module", params=MACHINES)
 def machine(request):
     """A platform, the command that starts a host there, by its source, and the environment for it."""
-    emulator, *options = MACHINES[request.param]
-    if not shutil.which(emulator) or (options and not os.path.isdir(ARM)):
+    emulator, *words = MACHINES[request.param]
+    if not shutil.which(emulator) or (words and not os.path.isdir(ARM)):
         pytest.skip(f"{emulator} is not here: apt-get install wine64 wine qemu-user libc6-arm64-cross")
     needed()
     (target,) = PLATFORMS[request.param].targets.values()
 
     def program(source):
         def make(folder):
-            command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", f"-I{HEADERS}"]
+            options = ("-O1", "-s")  # as our libraries: with symbols the compiler makes its C runtime anew, in a minute
+            command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, f"-I{HEADERS}"]
             subprocess.run([*command, str(source), "-o", str(folder / "host.exe")], check=True)
 
-        return [emulator, *options, str(builds.made(f"{source.stem}-{request.param}", make) / "host.exe")]
+        return [emulator, *words, str(builds.made(f"{source.stem}-{request.param}", make) / "host.exe")]
 
     with windows() if emulator == "wine" else nullcontext({}) as environment:
         yield request.param, program, os.environ | environment
@@ -125,6 +126,14 @@ def tables(answers):
     """The rows of every case, column by column."""
     rows = [[float.fromhex(word) for word in line.split()[1:]] for line in answers if line.count(" ") > 2]
     return [list(zip(*rows[k : k + ROWS], strict=True)) for k in range(0, len(rows), ROWS)]
+
+
+def test_the_library_is_that_of_an_fmu_built_for_the_machine(machine):
+    platform, *_ = machine
+    told = [word for each in PLATFORMS for word in ("--platform", each)]
+    whole = unpacked(builds.once("everywhere", "smd", "--native", *told) / "smd.fmu")
+    (there,) = (whole / "binaries" / platform).iterdir()
+    assert there.read_bytes() == library(built() / "smd.fmu", "2", platform).read_bytes()
 
 
 @pytest.mark.parametrize("name", MODELS)
