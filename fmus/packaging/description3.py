@@ -47,7 +47,9 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime) -> by
         attributes = description.part_of_all(variable, meaning, reference) | description.part_of_type(variable, meaning)
         if meaning.causality in ("input", "output") and meaning.variability == "continuous":
             attributes["intermediateUpdate"] = "true"
-        SubElement(elements, TYPES[meaning.type], attributes)
+        element = SubElement(elements, TYPES[meaning.type], attributes)
+        if meaning.alias:
+            SubElement(element, "Alias", name=meaning.alias, description=meaning.text)
     description.tell_states(list(elements), thing, rates, first=0)
     _structure(root, model, thing, declared, rates)
     return description.closed(root, "instantiationToken", code, date)

@@ -34,9 +34,10 @@ class Declared:
         above: float = -inf,
         below: float = inf,
         display: str = "",
+        alias: str = "",
     ) -> None:
         self.name = ""
-        self.unit, self.text, self.display = unit, text, display
+        self.unit, self.text, self.display, self.alias = unit, text, display, alias
         self.low, self.high, self.above, self.below = low, high, above, below
 
     def __set_name__(self, owner: object, name: str) -> None:

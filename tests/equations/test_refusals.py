@@ -136,6 +136,16 @@ WRONG = {
         16,
         "a uses a variable without a name, which is not declared in Mine",
     ),
+    "an alias of what is calculated": (
+        RATE.replace("rate_of=v", 'rate_of=v, alias="b"'),
+        16,
+        "a has the alias b: only a Parameter, Fixed or Input may have one",
+    ),
+    "an alias that is a name": (
+        RATE + '    q = Parameter(1.0, "kg", "mass", alias="m")\n',
+        17,
+        "q has the alias 'm': it must be a name that nothing else has",
+    ),
     "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is refused: it must be above zero"),
     "a broken rule": (
         RATE + '    rules = Rule(k + k > k, "k = {k!r} is too much")\n',

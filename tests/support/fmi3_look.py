@@ -40,12 +40,13 @@ def write(fmu, variable, value):
 
 
 def variables(path):
-    """Every variable as it reads before and after it is set."""
+    """Every variable, under its own name, as it reads before and after it is set."""
     with instance(path) as (fmu, description, _):
         starts, after = {}, {}
-        for variable in description.modelVariables:
+        declared = [variable for variable in description.modelVariables if variable.alias is None]
+        for variable in declared:
             starts[variable.name] = repr(read(fmu, variable))
-        for variable in description.modelVariables:
+        for variable in declared:
             if variable.causality in ("parameter", "input"):
                 value = read(fmu, variable)
                 write(fmu, variable, value if variable.type == "Enumeration" else 0.5 * value + 0.0625)

@@ -126,6 +126,7 @@ class Anatomy:
                         word = leaf.name or "a variable without a name"
                         raise Mistake(f"{e.name} uses {word}, which is not declared in {self.name}", e.place)
             self._judge_declared(e)
+            self._judge_alias(e)
         for mode in self.modes:
             owners = [c for c in self.contacts if c.mode is mode]
             if len(owners) != 1:
@@ -162,7 +163,7 @@ class Anatomy:
     @staticmethod
     def _judge_declared(e: Variable) -> None:
         """That words are words, numbers are numbers, and a start value is allowed."""
-        if not all(isinstance(one, str) for one in (e.unit, e.text, e.display)) or not e.text:
+        if not all(isinstance(one, str) for one in (e.unit, e.text, e.display, e.alias)) or not e.text:
             raise Mistake(f"{e.name}: the unit and what it is are texts", e.place)
         Anatomy._judge_words(e.name, e.place, e.text, *(sentence for _, _, sentence in e.items))
         for one in (e.start, e.low, e.high, e.above, e.below):
@@ -170,6 +171,14 @@ class Anatomy:
                 raise Mistake(f"{e.name}: start value and bounds are numbers", e.place)
         if isinstance(e, (Parameter, Fixed, Input)) and not e.accepts(e.start):
             raise Mistake(f"{e.name} starts at {e.start!r}, and must be {e.allowed}", e.place)
+
+    def _judge_alias(self, e: Variable) -> None:
+        """That another name is one, and that what is calculated has none: some validators take it for an error."""
+        if e.alias and not isinstance(e, (Parameter, Fixed, Input)):
+            raise Mistake(f"{e.name} has the alias {e.alias}: only a Parameter, Fixed or Input may have one", e.place)
+        known = [word for each in self.declared for word in (each.name, each.alias)]
+        if e.alias and (not e.alias.isidentifier() or known.count(e.alias) > 1 or e.alias in RESERVED):
+            raise Mistake(f"{e.name} has the alias {e.alias!r}: it must be a name that nothing else has", e.place)
 
     @staticmethod
     def _judge_words(name: str, place: tuple[str, int], *words: str) -> None:

@@ -20,7 +20,8 @@ class Parameter(Variable, declare.Parameter):
     """Set by the user, tunable at every communication point.
 
     Parameter(start, unit, text): the start value in `unit`, which is SI, and what it is in a few words.  A range is
-    given by `low`, `high` (at least, at most), `above`, `below`; a unit that people rather read by `display`.
+    given by `low`, `high` (at least, at most), `above`, `below`; a unit that people rather read by `display`; the name
+    that it has elsewhere, and in FMI 3.0 here too, by `alias`.
     """
 
 

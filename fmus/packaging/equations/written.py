@@ -114,7 +114,7 @@ def described(e: Variable) -> str:
     """Unit, words and range."""
     bounds = [(key, getattr(e, key)) for key in ("low", "high", "above", "below")]
     more = [f"{key}={float(bound)!r}" for key, bound in bounds if isfinite(bound)]
-    more += [f"display={quoted(e.display)}"] if e.display else []
+    more += [f"{key}={quoted(getattr(e, key))}" for key in ("display", "alias") if getattr(e, key)]
     return ", ".join([quoted(e.unit), quoted(e.text), *more])
 
 

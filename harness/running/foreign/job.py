@@ -175,7 +175,13 @@ def result(
                 columns[name] = np.array(texts)[column] if variable.type == "String" else column
                 units[name], descriptions[name] = unit(variable), variable.description or name
     parameters: Values = {}
+    chosen_values = {identity(variables[name]): value for name, value in values.items()}
     for name, one in variables.items():
         if one.causality in SETTABLE or name in values:
-            parameters[name], units[name] = in_force(one, values.get(name, one.start)), unit(one)
+            parameters[name], units[name] = in_force(one, chosen_values.get(identity(one), one.start)), unit(one)
     return Run(replace(wanted, outputs=tuple(columns)), rows.time, columns, units, descriptions, parameters)
+
+
+def identity(variable: Any) -> tuple[str, int]:
+    """What variables share that are one under several names."""
+    return "Integer" if variable.type == "Enumeration" else variable.type, variable.valueReference
