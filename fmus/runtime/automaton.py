@@ -197,12 +197,12 @@ class DryFriction(Oscillator):
                 if kept == -1:
                     ahead *= 0.5
                 kept = -1
-        step.looked += looks
+        step.interpolant.looked += looks
         return high
 
     def dip(self, step, low, high, i: Contact):
         """When the guard is found not positive where it falls at first and rises at last; else inf."""
-        step.looked += MOST_THIRDS
+        step.interpolant.looked += MOST_THIRDS
         for _ in range(MOST_THIRDS):
             third = (high - low) / 3.0
             left = self.guard(step, low + third, i)

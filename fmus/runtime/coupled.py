@@ -92,7 +92,7 @@ class CoupledFriction(DryFriction):
         here = self.guards(step.t0, step.y0, step.modes0)
         last = self.guards(step.t1, step.y1, step.modes0)
         if self.may_dip(step, here, last):
-            step.looked += LOOKS
+            step.interpolant.looked += LOOKS
             t_before = t_here = step.t0
             for part in range(1, LOOKS + 1):
                 t, ahead = step.t1, last

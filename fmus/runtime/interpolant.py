@@ -27,6 +27,7 @@ class Interpolant:
         self.ready = False
         self.span = 0.0
         self.degree = 3
+        self.looked = 0  # how often somebody looked for what may end inside a step
         self.c0 = self.c1 = self.c2 = self.c3 = self.c4 = self.c5 = self.c6 = self.c7 = 0.0
 
     def meet(self, step):

@@ -21,7 +21,7 @@ def aim(run, model, t, h):
     if not exchange.end >= march.t:
         return BAD_STEP
     exchange.leaps = 0
-    exchange.most = step.called + step.looked + MOST_CALLS
+    exchange.most = step.called + step.interpolant.looked + MOST_CALLS
     exchange.struck = run.observed = False
     if march.t >= step.t1:
         march.arrive()
@@ -41,7 +41,7 @@ def leap(run, model, waits):
     if status != OK:
         return status
     exchange.leaps += 1
-    if exchange.leaps > MOST_STEPS or step.called + step.looked > exchange.most:
+    if exchange.leaps > MOST_STEPS or step.called + step.interpolant.looked > exchange.most:
         return ENDLESS
     status = march.advance(model, exchange.end if exchange.end < step.t1 else step.t1)
     if model.dry:

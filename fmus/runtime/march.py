@@ -154,13 +154,13 @@ class March(Declaring):
     def cover(self, model, t):
         """Take internal steps until one of them covers t."""
         step = self.step
-        most = step.called + step.looked + MOST_CALLS
+        most = step.called + step.interpolant.looked + MOST_CALLS
         for _ in range(ROUNDS):
             for _ in range(ROUND):
                 status = step.take(model)
                 if status != OK or step.t1 >= t:
                     return status
-            if step.called + step.looked > most:
+            if step.called + step.interpolant.looked > most:
                 break
         return ENDLESS
 

@@ -88,7 +88,7 @@ class Step:
         self.interpolant = Interpolant()
         self.series = Series()  # of a load, where inputs bend
         # counts up to t1, and the size to try next; the same at t0
-        self.taken = self.refused = self.called = self.looked = 0
+        self.taken = self.refused = self.called = 0
         self.size = 0.0
         self.before = Before()
         self.lost = Lost()
