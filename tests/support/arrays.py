@@ -7,7 +7,7 @@ from on_arrays import on_arrays
 
 from fmus.runtime import vectors
 
-COUNTS = ("taken", "refused", "called", "looked")
+COUNTS = ("taken", "refused", "called")
 
 
 def begun(model, values, stop):
@@ -62,7 +62,7 @@ def array_steps(model, values, stop, most):
 
 
 def counts(step):
-    return [getattr(step, name, 0) for name in COUNTS]
+    return [*(getattr(step, name, 0) for name in COUNTS), getattr(step.interpolant, "looked", 0)]
 
 
 def steps(model, row, stop, most):
