@@ -17,12 +17,19 @@ from models import CASES, HYBRID, MODELS, RODAS, declared, label, model_class, o
 from native_fmus import built, needed
 from native_host import HEADERS, SOURCE, SOURCE3, begin, guid, host, lives, play, references, unpacked
 
-from fmus.packaging.native.compiler import PLATFORMS, binaries
+from fmus.packaging import native
+from fmus.packaging.native.compiler import PLATFORMS, binaries, compiler
 from fmus.packaging.native.sources import COMPILED
 
 ROWS = 50
 ARM = "/usr/aarch64-linux-gnu"  # where Debian puts the C library
 MACHINES = {"win64": ["wine"], "aarch64-linux": ["qemu-aarch64", "-L", ARM]}  # and what runs their programs
+PROGRAM = {  # the source that a program needs beside those of a library, and options
+    "win64": (
+        [SOURCE.with_name("windows.c")],
+        ["-Wl,-e,mainCRTStartup", *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("runtime", "time", "utility"))],
+    )
+}
 CLOSE = dict.fromkeys(MODELS, 1e-11) | {"pacejka": 1e-9}  # of an output's largest value; break-aways amplify
 
 
@@ -46,9 +53,11 @@ def machine(request):
 
     def program(source):
         def make(folder):
-            options = ("-O1", "-s")  # as our libraries: with symbols the compiler makes its C runtime anew, in a minute
-            command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *options, f"-I{HEADERS}"]
-            subprocess.run([*command, str(source), "-o", str(folder / "host.exe")], check=True)
+            chosen, (more, options) = PLATFORMS[request.param], PROGRAM.get(request.param, ((), ()))
+            options = [*options, *(option.format(compiler=compiler()) for option in chosen.options)]
+            sources = [source, *more, *(Path(native.__file__).with_name(file) for file in chosen.sources)]
+            command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", "-s", *options, f"-I{HEADERS}"]
+            subprocess.run([*command, *map(str, sources), "-o", str(folder / "host.exe")], check=True)
 
         return [emulator, *words, str(builds.made(f"{source.stem}-{request.param}", make) / "host.exe")]
 

@@ -154,6 +154,8 @@ def test_every_binary_exports_fmi_and_nothing_else_needs_only_the_system(binary)
         assert needed == SYSTEM[platform]
         exported = {function.name.lstrip("_") for function in library.exported_functions}
         assert exported - {"mh_dylib_header", "dso_handle"} == functions()
+        imported = {function.name.lstrip("_") for function in library.imported_functions}
+        assert {"sin", "cos", "exp"} <= imported  # the system's, as Python has them, and not the compiler's
 
 
 def functions():

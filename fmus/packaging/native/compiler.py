@@ -28,22 +28,29 @@ LIBRARY = ("-shared", "-fPIC", "-fvisibility=hidden")
 @dataclass(frozen=True)
 class Platform:
     """The suffix of its libraries; for each processor that it serves the folder of FMI 3.0 (of FMI 2.0 there is one for
-    all, under our name), and the compiler's name."""
+    all, under our name), and the compiler's name; options and sources of its own."""
 
     suffix: str
     targets: dict[str, str]
-    options: tuple[str, ...] = ()
+    options: tuple[str, ...]
+    sources: tuple[str, ...] = ()
 
 
+# The C runtime of Windows 10 and later as it is, and the headers that the compiler has for it.
+UCRT = (
+    *("-nostdlib", "-isystem", "{compiler}/lib/libc/include/any-windows-any", "-D__USE_MINGW_ANSI_STDIO=0"),
+    *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("convert", "heap", "math", "private", "stdio", "string")),
+    "-lkernel32",
+)
 PLATFORMS = {
-    "linux64": Platform(".so", {"x86_64-linux": "x86_64-linux-gnu.2.17"}),
-    "win64": Platform(".dll", {"x86_64-windows": "x86_64-windows-gnu"}),
+    "linux64": Platform(".so", {"x86_64-linux": "x86_64-linux-gnu.2.17"}, ("-lm",)),
+    "win64": Platform(".dll", {"x86_64-windows": "x86_64-windows-gnu"}, UCRT, ("windows.c",)),
     "darwin64": Platform(
         ".dylib",
         {"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"},
-        ("-Wl,-install_name,@rpath/{name}.dylib",),
+        ("-Wl,-install_name,@rpath/{name}.dylib", "-lm"),
     ),
-    "aarch64-linux": Platform(".so", {"aarch64-linux": "aarch64-linux-gnu.2.17"}),
+    "aarch64-linux": Platform(".so", {"aarch64-linux": "aarch64-linux-gnu.2.17"}, ("-lm",)),
 }
 USUAL = ("linux64", "win64", "darwin64")
 
@@ -59,21 +66,29 @@ def binaries(name: str, files: Mapping[str, str], main: str, platform: str, fmi:
 
 def compiled(name: str, files: Mapping[str, str], main: str, platform: str) -> dict[str, bytes]:
     """The libraries from the source `main`, which depend on nothing else, by the folders of FMI 3.0."""
-    chosen = PLATFORMS[platform]
-    options, out = [option.format(name=name) for option in chosen.options], f"{name}{chosen.suffix}"
-    return {place: linked(files, main, target, out, (*LIBRARY, *options)) for place, target in chosen.targets.items()}
+    chosen, out = PLATFORMS[platform], f"{name}{PLATFORMS[platform].suffix}"
+    own = {source: Path(__file__).with_name(source).read_text(encoding="utf-8") for source in chosen.sources}
+    options = (*LIBRARY, *own, *(option.format(name=name, compiler=compiler()) for option in chosen.options))
+    return {place: linked({**files, **own}, main, target, out, options) for place, target in chosen.targets.items()}
+
+
+def compiler() -> Path:
+    """The folder of the package ziglang."""
+    found = find_spec("ziglang")
+    if found is None or not found.submodule_search_locations:
+        raise BuildError("Native FMUs need the compiler in the package ziglang: try pip install -e '.[native]'.")
+    return Path(found.submodule_search_locations[0])
 
 
 def linked(files: Mapping[str, str], main: str, target: str, out: str, options: Iterable[str]) -> bytes:
     """What the compiler makes of the source `main` for a target; `out` is a name without a folder, so that none gets
     in."""
-    if find_spec("ziglang") is None:
-        raise BuildError("Native FMUs need the compiler in the package ziglang: try pip install -e '.[native]'.")
+    compiler()
     with TemporaryDirectory() as folder:
         for file, text in files.items():
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
         command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
-        command += [main, "-o", out, "-lm"]
+        command += [main, "-o", out]
         home = {"HOME": gettempdir()} | os.environ  # the compiler keeps a store there, and services have none
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=home)
         if done.returncode:
