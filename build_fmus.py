@@ -69,7 +69,7 @@ def main(
         folder = out or (FMUS if model in names() else source.path.parent) / kind
         try:
             if compiled:
-                with working(f"{source.name}: compiling; the first time the compiler makes C libraries, too: minutes"):
+                with working(f"{source.name}: compiling; the first time with the C libraries, half a minute"):
                     path = native(source.path, folder, methods, laws, platforms, fmi)
                 weight = ""
             else:

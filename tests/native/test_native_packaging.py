@@ -202,7 +202,7 @@ def check_signature(library, place):
 
 
 def test_builds_are_the_same_from_another_folder_with_another_cache(tmp_path, smd):
-    """Of all that is ours; what the compiler brings, as the C runtime of Windows, takes minutes."""
+    """Of all that is ours; what the compiler brings, as the stubs of the C libraries, takes half a minute."""
     source = tmp_path / "another place"
     shutil.copytree(ROOT / "fmus", source / "fmus", ignore=shutil.ignore_patterns("*.fmu", "__pycache__"))
     for part in ("build_fmus.py", "LICENSE"):

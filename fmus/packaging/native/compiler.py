@@ -40,7 +40,7 @@ class Platform:
 UCRT = (
     *("-nostdlib", "-isystem", "{compiler}/lib/libc/include/any-windows-any", "-D__USE_MINGW_ANSI_STDIO=0"),
     *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("convert", "heap", "math", "private", "stdio", "string")),
-    "-lkernel32",
+    *("-lkernel32", "-Wl,-e,DllMainCRTStartup"),
 )
 PLATFORMS = {
     "linux64": Platform(".so", {"x86_64-linux": "x86_64-linux-gnu.2.17"}, ("-lm",)),
