@@ -54,7 +54,7 @@ def machine(request):
     def program(source):
         def make(folder):
             chosen, (more, options) = PLATFORMS[request.param], PROGRAM.get(request.param, ((), ()))
-            options = [*options, *(option.format(compiler=compiler()) for option in chosen.options)]
+            options = [*(option.format(compiler=compiler()) for option in chosen.options), *options]
             sources = [source, *more, *(Path(native.__file__).with_name(file) for file in chosen.sources)]
             command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", "-s", *options, f"-I{HEADERS}"]
             subprocess.run([*command, *map(str, sources), "-o", str(folder / "host.exe")], check=True)
