@@ -31,7 +31,7 @@ def run(
     """Run a SCENE, an FMU of any origin, or once more what made a folder of results.
 
     SCENE is a shipped name (see list), the path of a TOML file, a folder of results, or a model that has no scene, by
-    its name or the path of its file.
+    its name or the path of its file; or an FMU, as with --fmu.
 
     An FMU that does not show its solver's steps is run with ever shorter communication steps, until halving them
     changes no output by more than the tolerance.
@@ -49,11 +49,11 @@ def run(
     scenes = [file.stem for file in shipped()]
     if fmu is None and scene and (scene.endswith(".py") or (scene in known() - {*scenes} and not Path(scene).exists())):
         fmu, scene = fmu_of(scene), None
+    if fmu is None and scene and scene.endswith(".fmu"):
+        fmu, scene = Path(scene), None
     if fmu is not None and scene is None:
         run_any(fmu, values, how, terminal)
         return
-    if scene and scene.endswith(".fmu"):
-        raise click.UsageError(f"an FMU is run by --fmu {scene}")
     if scene is None or fmu is not None or values or how["stop"] is not None:
         raise click.UsageError("name one SCENE, or --fmu PATH; --set and --stop go with --fmu")
     from ..results.provenance import trusted

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import SceneError, shown, unknown
+from ..scenes.assigned import Written
 from ..scenes.schema import is_number
 
 REALS = ("Real", "Float64", "Float32")
@@ -47,7 +48,7 @@ def accepted(variable: Any, value: Any, shape: tuple[int, ...] = ()) -> Any:
 def element(text: str) -> float | str:
     """A number as it is written, or the text if it is none."""
     try:
-        return float(text)
+        return Written(text)
     except ValueError:
         return text
 
@@ -56,24 +57,26 @@ def number_of(variable: Any, value: Any) -> float | int:
     """A number, within the bounds of its variable and of its type."""
     whole = variable.type not in REALS
     low, high = bound(variable, "min"), bound(variable, "max")
-    inside = is_number(value) and (low is None or low <= value) and (high is None or value <= high)
-    if inside and whole:
+    if whole:
         kind = np.iinfo({"Integer": "int32"}.get(variable.type, variable.type.lower()))
-        inside = float(value).is_integer() and kind.min <= value <= kind.max
-    if not inside:
+        low, high = max(kind.min if low is None else low, kind.min), min(kind.max if high is None else high, kind.max)
+        text = getattr(value, "text", "")
+        value = int(text) if text.lstrip("+-").isdecimal() else value  # of which a float holds 53 bits
+    inside = is_number(value) and (low is None or low <= value) and (high is None or value <= high)
+    if not inside or (whole and not float(value).is_integer()):
         words = [f"{word} {limit!r}" for word, limit in (("at least", low), ("at most", high)) if limit is not None]
         allowed = " and ".join(words) + (f" {unit(variable)}" if unit(variable) else "")
         if whole or not words:
             allowed = ", ".join([f"any {'whole' if whole else 'finite'} number", *([allowed] if words else [])])
         raise SceneError(f"{variable.name} = {shown(value)} is outside its range; allowed: {allowed}")
-    text = getattr(value, "text", "")
-    return float(value) if not whole else int(text) if text.lstrip("+-").isdigit() else int(value)
+    return int(value) if whole else float(value)
 
 
-def bound(variable: Any, which: str) -> float | None:
+def bound(variable: Any, which: str) -> float | int | None:
     """A bound from the XML, if there is one, of the variable or of its type."""
     text = getattr(variable, which) or getattr(variable.declaredType, which, None)
-    return None if text is None else float(text)
+    whole = variable.type not in REALS and str(text).lstrip("+-").isdecimal()
+    return None if text is None else int(text) if whole else float(text)
 
 
 def in_force(variable: Any, value: Any) -> Any:

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 from fmpy.model_description import Dimension, ModelVariable
 
-from harness.errors import HarnessError
+from harness.errors import HarnessError, SceneError
 from harness.running.foreign.agreement import agreed
 from harness.running.foreign.job import recording, shape
 from harness.running.foreign.passes import Pass
 from harness.running.foreign.request import Request
 from harness.running.foreign.rows import Recorder, Rows
+from harness.running.values import accepted
+from harness.scenes.assigned import Written
 
 
 @pytest.fixture(scope="module")
@@ -190,7 +192,7 @@ def test_an_fmu_that_ends_itself_is_told_by_its_status_and_keeps_what_it_compute
 @pytest.mark.parametrize(
     ("kind", "told"),
     [
-        (1, "a call of it has not come back after 1.5 s; --patience waits longer, after t = 0.5 s"),
+        (1, "a call of it has not come back within 1.5 s (--patience waits longer), after t = 0.5 s"),
         (2, "its binary has crashed (Segmentation fault), after t = 0.5 s"),
         (3, "fmi2DoStep answered Fatal at t = 0.5 s: "),
         (5, "x is nan at t = 0.515625 s"),
@@ -249,7 +251,7 @@ def test_what_breaks_the_standard_is_told_in_full_and_runs_where_one_is_lenient(
         ("Midpoint", ["--exchange"], 1, "offers co-simulation; model exchange is not among them"),
         ("Switching", ["--set", "enabled=5"], 2, "enabled = 5.0 is no truth; allowed: true, false"),
         ("Switching", ["--set", "most=1.5"], 2, "most = 1.5 is outside its range; allowed: any whole number"),
-        ("Switching", ["--set", "most=3000000000"], 2, "most = 3000000000.0 is outside its range"),
+        ("Switching", ["--set", "most=3000000000"], 2, "any whole number, at least -2147483648 and at most 2147483647"),
         ("Arrays", ["--set", "begin=1,2,3"], 2, "begin = '1,2,3' has 3 elements, not 2"),
         ("Arrays", ["--set", "begin=1,x"], 2, "begin = 'x' is outside its range; allowed: any finite number"),
         ("Arrays", ["--set", "sense=up"], 2, "unknown value of sense 'up'; allowed: left, right"),
@@ -356,3 +358,17 @@ def test_an_array_is_as_large_as_its_structural_parameters_say():
     assert shape(y, {"n": 5}) == (5, 2)
     with pytest.raises(HarnessError, match="n = -1 is outside its range; allowed: any whole number"):
         shape(y, {"n": -1})
+
+
+@pytest.mark.parametrize("kind", ["Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"])
+def test_a_whole_number_of_any_width_is_taken_to_its_last_digit_and_refused_beyond(kind):
+    width = int(kind.lstrip("UInt"))
+    least, most = (0, 2**width - 1) if kind[0] == "U" else (-(2 ** (width - 1)), 2 ** (width - 1) - 1)
+    n, several = ModelVariable("n", type=kind), f"{least}, {most}"
+    assert [accepted(n, Written(str(number))) for number in (least, most)] == [least, most]
+    assert accepted(n, several, (2,)) == [least, most]
+    for beyond in (least - 1, most + 1):
+        with pytest.raises(
+            SceneError, match=f"n = {beyond} is .* any whole number, at least {least} and at most {most}$"
+        ):
+            accepted(n, Written(str(beyond)))

@@ -144,7 +144,7 @@ def asked(request: Request, place: Path, report: Callable[[float], None]) -> Ans
     if (place / ANSWER).is_file():
         return Answer(**json.loads((place / ANSWER).read_text(encoding="utf-8")))
     if lines(place / HUNG):
-        sentence = f"a call of it has not come back after {request.patience:g} s; --patience waits longer"
+        sentence = f"a call of it has not come back within {request.patience:g} s (--patience waits longer)"
     elif done.returncode < 0:
         sentence = f"its binary has crashed ({signal.strsignal(-done.returncode)})"
     else:
