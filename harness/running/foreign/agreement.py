@@ -29,10 +29,10 @@ def agreed(asked: Request, found: Any, run: Run) -> Answer:
     span = asked.stop - asked.start
     if asked.exchange:
         return by_tolerance(asked, asked.grid or span / (asked.coarsest * ceil(POINTS / asked.coarsest)), run)
-    own = found.coSimulation.fixedInternalStepSize
-    if own:
-        one = run(float(own) * ceil(span / float(own) / FINEST), told(asked))
-        return taken(one, f"its own step is fixed, at {float(own):g} s as it declares, its error unknown")
+    own = float(found.coSimulation.fixedInternalStepSize or 0.0)
+    if own > 0.0:
+        one = run(own * ceil(span / own / FINEST), told(asked))
+        return taken(one, f"its own step is fixed, at {own:g} s as it declares, its error unknown")
     if asked.grid:
         one = run(asked.grid, told(asked))
         return taken(one, f"communication step {asked.grid:g} s, as asked, its error unknown")

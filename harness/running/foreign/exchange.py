@@ -106,6 +106,8 @@ def settled(update: Callable[[], tuple[bool, bool, bool, bool, bool, float]], t:
         again, ended, _, _, defined, upcoming = update()
         if ended:
             raise Ended(t, "it answered terminateSimulation to an event")
-        if not again:
+        if defined and not upcoming >= t:
+            raise HarnessError(f"it tells its next event for {upcoming:.9g} s, at t = {t:.9g} s")
+        if not again and not (defined and upcoming == t):
             return upcoming if defined else inf
     raise HarnessError(f"its discrete states do not settle at t = {t:.9g} s")

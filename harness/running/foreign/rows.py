@@ -4,11 +4,13 @@ import json
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fmpy.fmi3 import fmi3String, fmi3ValueReference
 
 from ...errors import HarnessError
 from ..values import REALS
@@ -66,6 +68,8 @@ class Recorder:
         self.reads = []
         for kind, group in grouped(chosen).items():
             getter = getattr(fmu, "get" + {"Enumeration": "Integer" if version == "2.0" else "Int64"}.get(kind, kind))
+            if kind == "String" and version != "2.0":
+                getter = partial(texts3, fmu)
             references = [variable.valueReference for variable, _ in group]
             count = sum(len(elements("", shape)) for _, shape in group)
             self.reads.append((kind, getter, (references,) if version == "2.0" else (references, count)))
@@ -79,6 +83,15 @@ class Recorder:
             if not isfinite(value):
                 raise HarnessError(f"{name} is {value} at t = {t:.9g} s")
         self.file.write(self.row.pack(t, *row))
+
+
+def texts3(fmu: Any, references: list[int], count: int) -> list[bytes | None]:
+    """fmi3GetString as it answers: FMU3.getString wants UTF-8, and no null pointer."""
+    values = (fmi3String * count)()
+    fmu.fmi3GetString(
+        fmu.component, (fmi3ValueReference * len(references))(*references), len(references), values, count
+    )
+    return list(values)
 
 
 class Texts:

@@ -1,0 +1,81 @@
+"""What an FMU of anyone answers that cannot be is refused in a sentence, and no number comes of it."""
+
+import re
+from types import SimpleNamespace
+
+import pytest
+from fmpy.model_description import ModelVariable
+
+from harness.errors import HarnessError
+from harness.running.foreign.agreement import agreed
+from harness.running.foreign.cosimulation import cosimulate
+from harness.running.foreign.exchange import settled
+from harness.running.foreign.passes import Ended, Pass, Span
+from harness.running.foreign.request import Request
+from harness.running.foreign.rows import Recorder, Rows, Texts, read
+
+NAN, HUGE = float("nan"), 1e300
+
+
+def stepped(answer):
+    """The times that are sampled of an FMU whose fmi3DoStep answers so, and what was raised."""
+    times = []
+    with pytest.raises((Ended, HarnessError)) as caught:
+        cosimulate(SimpleNamespace(doStep=answer), "3.0", Span(0.0, 1.0, 0.25), times.append, lambda share: None)
+    return times, str(caught.value)
+
+
+def test_a_step_that_ends_early_without_leave_is_none():
+    times, said = stepped(lambda t, h: (False, False, t > 0.3, t + h / 2))
+    assert times == [0.0, 0.25, 0.5]
+    assert said == "fmi3DoStep returned early, which it was not allowed"
+
+
+@pytest.mark.parametrize(
+    ("told", "last"), [(0.6, 0.6), (0.75, 0.75), (0.5, 0.5), (0.1, 0.5), (-1.0, 0.5), (NAN, 0.5), (HUGE, 0.5)]
+)
+def test_the_time_at_which_it_ends_itself_lies_within_the_step(told, last):
+    times, said = stepped(lambda t, h: (False, t == 0.5, t == 0.5, told))
+    assert (times[-1], times) == (last, sorted(times))
+    assert said == "it ends itself: fmi3DoStep answered terminateSimulation"
+
+
+@pytest.mark.parametrize("told", [NAN, 1.9, -HUGE])
+def test_an_event_that_comes_in_the_past_or_never_is_refused(told):
+    with pytest.raises(HarnessError, match=re.escape(f"tells its next event for {told:.9g} s, at t = 2 s")):
+        settled(lambda: (False, False, False, False, True, told), 2.0)
+
+
+def test_an_event_at_once_is_handled_at_once_and_not_for_ever():
+    answers = iter([(False, False, False, False, True, 2.0), (False, False, False, False, True, 3.0)])
+    assert settled(lambda: next(answers), 2.0) == 3.0
+    with pytest.raises(HarnessError, match="do not settle at t = 2 s"):
+        settled(lambda: (False, False, False, False, True, 2.0), 2.0)
+
+
+@pytest.mark.parametrize("declared", ["0", "-1"])
+def test_a_step_that_cannot_be_is_as_if_it_were_not_declared(declared):
+    steps = []
+
+    def run(h, tolerance):
+        steps.append(h)
+        return Pass(len(steps), Rows([0.0], {}), "no")
+
+    found = SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=declared), defaultExperiment=None)
+    agreed(Request("", "", False, 0.0, 1.0, tolerance=1e-6, patience=1.0), found, run)
+    assert min(steps) > 0.0
+
+
+@pytest.mark.parametrize(("bytes_", "text"), [(None, '""'), (b"\xff bad", '"\\ufffd bad"'), (b"good", '"good"')])
+def test_a_text_that_is_none_or_no_utf_8_is_recorded(tmp_path, bytes_, text):
+    def answer(component, references, count, values, size):
+        values[0] = bytes_
+
+    variable = ModelVariable("said", valueReference=7, type="String")
+    fmu = SimpleNamespace(fmi3GetString=answer, component=None, getString=None)
+    texts = Texts(tmp_path / "texts")
+    recorder = Recorder(fmu, "3.0", [(variable, ())], tmp_path / "rows", texts)
+    recorder.sample(0.0)
+    recorder.file.close(), texts.file.close()
+    assert read(tmp_path / "rows", [(variable, ())]).columns["said"].tolist() == [0]
+    assert (tmp_path / "texts").read_text() == text + "\n"
