@@ -4,24 +4,34 @@ import itertools
 import json
 import os
 import select
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import pytest
+from forked import Process, pipe
 
 PATIENCE = 120.0  # s, for one request
 
 
-def host(script, function, *arguments, folder=None, timeout=300):
+def host(script, function, *arguments, **how):
     """What a function of a script here answers, in a process that must end well and say nothing."""
-    script, asked = Path(__file__).with_name(script), json.dumps(arguments, default=str)
-    call = [sys.executable, "-I", str(script), function, asked]
-    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, timeout=timeout)
-    assert done.returncode == 0, f"exit status {done.returncode}: {done.stderr}"
-    assert done.stderr == ""
-    return json.loads(done.stdout)
+    answer, said = heard(script, function, *arguments, **how)
+    assert said == ""
+    return answer
+
+
+def heard(script, function, *arguments, folder=None, timeout=300):
+    """The same, and what it says on standard error."""
+    words = [Path(__file__).with_name(script), function, json.dumps(arguments, default=str)]
+    with open(os.devnull) as nothing, tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
+        process = Process(words, nothing, out, err, folder)
+        try:
+            status = process.wait(timeout)
+        finally:
+            process.kill()
+        answer, said = (file.seek(0) or file.read() for file in (out, err))
+    assert status == 0, f"exit status {status}: {said}"
+    return json.loads(answer), said
 
 
 class Refused(Exception):
@@ -39,10 +49,9 @@ class Worker:
 
     def __init__(self):
         self.noise = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - lives as long as the process
-        command = [sys.executable, "-I", Path(__file__).with_name(self.script)]
-        self.process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.noise, cwd=tempfile.gettempdir()
-        )
+        script, (asked, self.asking), (self.answers, answering) = Path(__file__).with_name(self.script), pipe(), pipe()
+        with asked, answering:
+            self.process = Process([script], asked, answering, self.noise, tempfile.gettempdir())
         self.heard, self.pending = 0, b""
 
     @property
@@ -52,8 +61,7 @@ class Worker:
     def call(self, instance, function, *arguments):
         """The value of one request; Refused when an FMI call fails, AssertionError when anything else does."""
         try:
-            self.process.stdin.write(json.dumps([instance, function, arguments]).encode() + b"\n")
-            self.process.stdin.flush()
+            self.asking.write(json.dumps([instance, function, arguments]).encode() + b"\n")
             answer = json.loads(self._line(function))
         except BrokenPipeError:
             raise AssertionError(self._obituary(function)) from None
@@ -63,7 +71,7 @@ class Worker:
         return answer["value"]
 
     def _line(self, function):
-        out = self.process.stdout.fileno()
+        out = self.answers.fileno()
         while b"\n" not in self.pending:
             if not select.select([out], [], [], PATIENCE)[0]:
                 self.process.kill()
@@ -97,9 +105,9 @@ class Worker:
 
     def close(self):
         """End the process; the exit code."""
-        self.process.stdin.close()
+        self.asking.close()
         code = self.process.wait(30)
-        self.process.stdout.close()
+        self.answers.close()
         self.noise.close()
         return code
 
