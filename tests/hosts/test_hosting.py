@@ -73,10 +73,10 @@ def test_instances_side_by_side_do_not_feel_each_other(launch):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_fifty_lives_in_one_process_end_alike_and_end_well(fresh, fmus, name):
+def test_twenty_lives_in_one_process_end_alike_and_end_well(fresh, fmus, name):
     """Created, run, reset, run again, failed and freed."""
     first, names = None, outputs(name) + counts(name)
-    for _ in range(50):
+    for _ in range(20):
         fmu = fresh.instantiate(fmus / f"{name}.fmu").begin(stop=0.3)
         rows = fmu.run([0.0, 0.1, 0.2, 0.3], names)
         first = first or rows

@@ -2,11 +2,11 @@
 
 import json
 import subprocess
-import sys
 import zipfile
 
 import pytest
 from builds import SUPPORT
+from driver import heard
 from interrupted import HANDLERS
 
 from tests.hosts.test_hosting import PYTHONS, interpreter
@@ -17,34 +17,25 @@ def fmu(fmus):
     return fmus / "smd.fmu"
 
 
-def host(function, *arguments):
-    """What it prints, and the lines on standard error."""
-    script = SUPPORT / "interrupted.py"
-    call = [sys.executable, "-I", script, function, json.dumps(arguments, default=str)]
-    done = subprocess.run(call, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout), done.stderr.splitlines()
-
-
 @pytest.mark.parametrize("handler", HANDLERS)
 def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
     """As the very exception that the handler of the host has raised, once, and no later than the call is over."""
-    answer, said = host("long", fmu, handler)
+    answer, said = heard("interrupted.py", "long", fmu, handler)
     arguments = {"KeyboardInterrupt": [], "SystemExit": [143], "Stop": ["enough", 3]}
     assert answer["reached"] == [handler, arguments[handler]]
     ((status, category, sentence),) = answer["log"]
     assert (status, category) == (3, "logStatusError")
     assert sentence == "the run was interrupted after t = 0.0 s; reset the FMU to run again"
-    assert said == [f"Smd (interrupted): {sentence}"]
+    assert said == f"Smd (interrupted): {sentence}\n"
     assert answer["x"]
     assert answer["recovers"]
 
 
 def test_an_interrupt_at_any_moment_of_any_call_reaches_the_host(fmu):
     """Also where it is handled as a function of the FMU is entered, before its first line."""
-    answer, said = host("short", fmu, 300)
-    assert answer == [["KeyboardInterrupt"], 300]
-    assert all("was interrupted" in line for line in said)
+    answer, said = heard("interrupted.py", "short", fmu, 150)
+    assert answer == [["KeyboardInterrupt"], 150]
+    assert all("was interrupted" in line for line in said.splitlines())
 
 
 @pytest.mark.parametrize("version", PYTHONS)

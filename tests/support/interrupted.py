@@ -77,7 +77,7 @@ def short(path, times):
     for i in range(times):
         t = 0.0
         try:
-            signal.setitimer(signal.ITIMER_REAL, 0.001 + 1.37e-5 * i)
+            signal.setitimer(signal.ITIMER_REAL, 0.001 + 2.74e-5 * i)
             while True:
                 fmu.step(t, 1e-5)
                 t += 1e-5
