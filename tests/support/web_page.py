@@ -3,16 +3,24 @@
 import json
 
 import builds
+import commands
 import pytest
 
 READY = "new Promise(done => { const wait = () => globalThis.bench?.desk.runs.one && Object.values(bench.desk.runs)"
 READY += ".every(run => run.done) ? requestAnimationFrame(() => done(true)) : setTimeout(wait, 5); wait() })"
+FOLLOWED = "new Promise(done => { const { runs } = bench.desk; location.hash = HASH;"
+FOLLOWED += "const look = () => bench.desk.runs === runs ? setTimeout(look, 1) : done(true); look() })"
 
 
 def built(name, *words):
     """The page of a room of its own."""
     pytest.importorskip("ziglang", reason="the page is compiled by the package ziglang: pip install -e '.[native]'")
-    return builds.once(name, "--web", *words, timeout=600) / "index.html"
+
+    def make(folder):
+        done = commands.build("--web", *words, "--out", folder)
+        assert done.returncode == 0, done.stderr
+
+    return builds.made(name, make) / "index.html"
 
 
 class Page:
@@ -21,9 +29,15 @@ class Page:
     def __init__(self, browser, file):
         self.browser, self.file = browser, file
 
-    def open(self, hash=""):
-        """Load it anew, with this behind the #; wait until all runs are done."""
-        self.browser.open(f"{self.file.as_uri()}#{hash}")
+    def open(self, hash="", anew=False):
+        """Go where a link with this behind the # leads: in the page that is open, by which whatever was set before is
+        gone, or by loading it anew; wait until all runs are done."""
+        there = self.run("globalThis.bench && location.href")
+        link = f"{self.file.as_uri()}#{hash}"
+        if anew or not there or there.split("#")[0] != self.file.as_uri() or there == link:
+            self.browser.open(link)
+        else:
+            self.run(FOLLOWED.replace("HASH", json.dumps(hash)))
         return self.run(READY)
 
     def run(self, script):

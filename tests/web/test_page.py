@@ -44,7 +44,7 @@ def test_five_models_take_less_than_600_kb_and_may_load_nothing(page):
     assert len(text.encode()) < 600_000
     assert "default-src 'none'" in text
     assert not re.findall(r"(?:src|href)\s*=\s*[\"'](?!data:)", text)
-    page.open()
+    page.open(anew=True)
     refused = "fetch('data:text/plain,x').then(() => 'came', () => 'refused')"
     assert page.run(refused) == "refused"
     assert page.browser.said.pop()  # the policy says so
@@ -111,6 +111,9 @@ def test_every_parameter_has_a_slider_and_a_field_that_show_its_start_and_its_un
             unit.replace("2", "²").replace(".", "·")
         )
         assert page.run(f"{field}.closest('.field').querySelector('input[type=range]').max") == "400"
+        if meaning.display:
+            page.put(variable, "10.0")
+            assert page.run(f"bench.state().values[{variable!r}]") == pytest.approx(10.0 / factor)
 
 
 # ---- what is done
@@ -165,7 +168,7 @@ def test_until_the_first_picture_one_model_is_compiled(page):
     count = "const { instantiate } = WebAssembly; globalThis.compiled = 0;"
     count += "WebAssembly.instantiate = (...all) => (compiled++, instantiate(...all))"
     script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=count)
-    page.open()
+    page.open(anew=True)
     page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
     assert page.run("compiled") == 1
     assert page.run("bench.plots.get('x').plot.paints") > 0
@@ -314,7 +317,7 @@ def test_a_link_carries_everything(page):
     page.wait("location.hash.includes('v_driver')")
     hash, state = page.run("location.hash.slice(1)"), page.run("bench.state()")
     end = page.run("Object.values(bench.desk.runs).map(run => run.columns.x.at(-1))")
-    page.open(hash)
+    page.open(hash, anew=True)
     assert page.run("bench.state()") == state
     assert page.run("Object.values(bench.desk.runs).map(run => run.columns.x.at(-1))") == end
     page.open(".preset=pacejka-0.001")
@@ -329,6 +332,13 @@ def test_a_link_carries_everything(page):
     page.run("Object.defineProperty(navigator, 'clipboard', { value: undefined })")
     page.click("#link")
     page.wait(f"{told}.includes('The link is in the address bar')")
+
+
+def test_a_link_followed_while_the_address_is_written_is_not_lost(page):
+    page.open(".model=smd")
+    page.wait("location.hash.includes('stop')")
+    page.run("(own => { location.hash = '.model=coulomb'; history.replaceState(null, '', own) })(location.href)")
+    page.wait("bench.state().model === 'coulomb'")
 
 
 def test_within_another_page_it_runs_and_has_no_address_to_carry(page, tmp_path):
@@ -389,13 +399,13 @@ def test_every_published_case_measures_what_the_terminal_does(page):
     assert sorted(names) == sorted(scenes)
     for name, scene in scenes.items():
         page.choose("preset", name)
+        native = native_fmus.built() / f"{scene.model}.fmu"  # which runs while the page waits for more to be done
+        run = simulate(replace(of_scene(scene), fmu=native, repeat=1))
         page.wait(
             f"bench.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
             "bench.desk.presets.get(bench.state().preset).title"
         )
         rows = iter(page.table(scene.title).values())
-        native = native_fmus.built() / f"{scene.model}.fmu"
-        run = simulate(replace(of_scene(scene), fmu=native, repeat=1))
         quantities = {each.name: each for kind in scene.analyses for each in ANALYSE[kind](run, scene).quantities}
         for figure, published in scene.published.items():
             if figure == "source":

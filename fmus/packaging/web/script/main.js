@@ -264,7 +264,10 @@ async function copyLink() {
   $$("status").textContent = `The link is in the ${place}: it carries all that is set.`;
 }
 
-addEventListener("hashchange", () => { if (location.hash !== written(page.state)) follow(location.hash); });
+addEventListener("hashchange", ({ newURL }) => { // the address may by now be that of the state again
+  const { hash } = new URL(newURL);
+  if (hash !== written(page.state)) follow(hash);
+});
 addEventListener("keydown", (event) => {
   if (event.key !== " " || event.target.closest("button, input, select, summary, a")) return;
   event.preventDefault();
