@@ -59,7 +59,8 @@ def written_out(source: Authored, offered: Offer) -> Files:
 def expanded(source: Authored, spec: Spec) -> Files:
     """The lines with the names of `spec`."""
     file = f"{source.name}.py"
-    texts = runtime() | {file: source.text}
+    left = {f"runtime/{label}.py" for label in spec.gone}  # methods that are not offered
+    texts = {path: text for path, text in runtime().items() if path not in left} | {file: source.text}
     declared = declarations()
     if name := declared.clash(spec):
         raise BuildError(f"The name {name} means something else in the numerics; take another.")
