@@ -12,6 +12,7 @@ from contextlib import ExitStack, contextmanager, redirect_stderr, suppress
 from ctypes import byref, c_double, c_int, c_uint, c_void_p
 from dataclasses import dataclass, field, replace
 from functools import cache
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -112,10 +113,17 @@ def described(wanted: Specification) -> Any:
 def instance(wanted: Specification) -> Iterator[tuple[Any, Any, Heard]]:
     """The description and a fresh instance of the FMU, and what it says; its files and its library are gone
     afterwards."""
+    found = described(wanted)
+    with unpacked(wanted.fmu) as folder, loaded(wanted, found, folder) as (fmu, heard):
+        yield found, fmu, heard
+
+
+@contextmanager
+def loaded(wanted: Specification, found: Any, folder: Path) -> Iterator[tuple[Any, Heard]]:
+    """The same of an FMU so described, whose files are in a folder and stay there."""
     functions, messages = callbacks()
     messages.clear()
-    found = described(wanted)
-    with overheard() as spoken, unpacked(wanted.fmu) as folder:
+    with overheard() as spoken:
         try:
             fmu = fmi2.FMU2Slave(
                 guid=found.guid,
@@ -127,7 +135,7 @@ def instance(wanted: Specification) -> Iterator[tuple[Any, Any, Heard]]:
         except Exception as error:  # fmpy raises bare Exceptions
             raise HarnessError(f"{wanted.fmu.name} cannot be loaded: {reason(error)}") from None
         try:
-            yield found, fmu, Heard(messages, spoken)
+            yield fmu, Heard(messages, spoken)
         finally:
             fmu.freeInstance()
 

@@ -3,11 +3,14 @@
 Values go to the FMU as they are, unchecked: what it makes of NaN is the question.
 """
 
+import atexit
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import product
 from math import inf, isnan, nan
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -15,14 +18,17 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ..errors import HarnessError
-from ..scenes.fmus import fmu_of
+from ..scenes.fmus import check_built, fmu_of
 from ..scenes.roles import roles
-from .fmu import Heard, begin, described, instance, put
+from .fmu import Heard, begin, described, loaded, put
 from .specification import Specification
+from .unpacked import unpacked
 from .values import labels
 
 Calls = list[tuple[float, float]]  # communication steps: from, size in s
 Changes = dict[float, dict[str, float]]  # values by the time from which they hold, in s
+HELD = ExitStack()  # files of FMUs
+atexit.register(HELD.close)
 
 
 @dataclass(frozen=True)
@@ -146,8 +152,17 @@ class Probe:
 @contextmanager
 def probe(model: str) -> Iterator[Probe]:
     """A fresh instance of a model's FMU, whose words are kept from the terminal."""
-    with instance(Specification(fmu_of(model))) as (description, fmu, heard):
-        yield Probe(description, fmu, heard)
+    file = fmu_of(model)
+    check_built(file)
+    found, folder = kept(file.absolute(), file.stat().st_mtime_ns)
+    with loaded(Specification(file), found, folder) as (fmu, heard):
+        yield Probe(found, fmu, heard)
+
+
+@cache
+def kept(file: Path, changed: int) -> tuple[Any, Path]:
+    """The description of an FMU, and the folder of its files; both last as long as the process."""
+    return described(Specification(file)), HELD.enter_context(unpacked(file))
 
 
 def run(setting: Setting, calls: Calls, changes: Changes) -> Motion | Refusal:

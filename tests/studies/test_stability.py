@@ -2,6 +2,7 @@
 
 import csv
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -144,6 +145,16 @@ def test_a_crash_is_a_sentence():
 def test_what_is_raised_comes_through():
     with pytest.raises(ValueError, match="invalid literal"):
         bounded(30.0, int, "x")
+
+
+def test_a_process_is_asked_again_and_a_new_one_the_same_where_what_came_before_kills_it(tmp_path, monkeypatch):
+    """Each call is made where it is asked."""
+    first = bounded(30.0, os.getpid)
+    monkeypatch.chdir(tmp_path)
+    assert (bounded(30.0, os.getpid), bounded(30.0, os.getcwd)) == (first, str(tmp_path))
+    bounded(30.0, signal.setitimer, signal.ITIMER_REAL, 0.05)
+    bounded(30.0, time.sleep, 0.5)
+    assert bounded(30.0, os.getpid) != first
 
 
 # ---- the judgement

@@ -1,7 +1,7 @@
 """Stiff and extreme scenes: each ends within its error, or is refused with its sentence; never a hang.
 
 The scenes and what is expected of them stand in stability.toml, the answers come by a second route (truth.py), and
-every run has a process of its own with a time limit (bounded.py).
+every run has a time limit, in a process that may crash (bounded.py).
 """
 
 import math
