@@ -2,8 +2,9 @@
 own, in a folder of his.
 
 The process is forked from one that has loaded both and their libraries, for to load them takes a second, and there are
-hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).  Figures,
-which take most of a run, are left `blank` where nobody looks at them.
+hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).  So is
+forked what a command asks of a module of the project in a process of its own.  Figures, which take most of a run, are
+left `blank` where nobody looks at them.
 """
 
 import atexit
@@ -17,16 +18,19 @@ import subprocess
 import sys
 import tempfile
 import threading
+import traceback
 from contextlib import contextmanager, suppress
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
+from types import SimpleNamespace
 
 SUPPORT = Path(__file__).parent
 ROOT = SUPPORT.parents[1]
 PATIENCE = 300.0  # s
 LATE = ("dask.array", "fmpy.validation", "rich.progress", "scipy.io", "xarray")  # imported where they are used
+ASKED = ("build_fmus", "harness.running.", "harness.studies.coupled.")  # modules that answer in processes of their own
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg"><style></style></svg>'
 
 
@@ -91,8 +95,10 @@ def serve():
             if not name.endswith("__main__"):
                 import_module(name)
     import_module("fmus.packaging.written").written("smd")  # reads what every model is written out from
+    from harness.process import child as asking
     from harness.results import style
 
+    asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": Forked})
     with style.sheet(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
         figure.subplots().set_title("a title")
     gc.freeze()  # else whoever is forked copies all that there is, to count who refers to it
@@ -114,6 +120,30 @@ def unseen(kind, path, width, height, layout=None):
     """In the place of a sheet: what is plotted is neither laid out nor drawn."""
     yield kind((width, height))
     path.write_text(BLANK)
+
+
+class Forked(subprocess.Popen):
+    """In the place of Popen: a module of ours is run by a fork of whoever asks it, who has loaded it."""
+
+    def __init__(self, command, env, **how):
+        def answer():
+            os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # until then Popen waits
+            atexit._clear()  # nor is what the asking process holds tidied up
+            for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
+                signal.signal(number, usual)
+            sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))
+            try:
+                become(words, os.getcwd(), env, ())
+                sys.modules.pop(module, None)
+                run(module)
+            except BaseException:
+                traceback.print_exc()
+            sys.stderr.flush()
+            os._exit(1)
+
+        module, words = command[2] if command[1:2] == ["-m"] else "", command[3:]
+        ours = module.startswith(ASKED)
+        super().__init__(command, env=env, preexec_fn=answer if ours else None, **how)
 
 
 def become(words, folder, environment, files):
