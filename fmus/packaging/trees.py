@@ -5,6 +5,9 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 Node = TypeVar("Node", bound=ast.AST)
+WORDS = {"ctx", "id", "attr", "arg", "name", "asname", "module", "level", "kind", "type_comment"}
+KINDS = [one for one in vars(ast).values() if isinstance(one, type) and issubclass(one, ast.AST)]
+BRANCHES = {kind: [name for name in kind._fields if name not in WORDS] for kind in KINDS} | {ast.Constant: []}
 
 
 @lru_cache(200)
@@ -20,16 +23,23 @@ def tree(text: str) -> ast.Module:
     return found
 
 
+def inside(node: ast.AST) -> list[ast.AST]:
+    """The nodes one level down; not whether something is read or written."""
+    found: list[ast.AST] = []
+    for name in BRANCHES[type(node)]:
+        value = getattr(node, name, None)
+        if isinstance(value, list):
+            found += [one for one in value if isinstance(one, ast.AST)]
+        elif isinstance(value, ast.AST):
+            found.append(value)
+    return found
+
+
 def walked(root: ast.AST) -> list[ast.AST]:
-    """A tree and all that is in it, in the order of ast.walk; not whether something is read or written."""
+    """A tree and all that is in it, in the order of ast.walk."""
     found = [root]
     for node in found:  # which grows on the way
-        for name in node._fields:
-            value = getattr(node, name, None)
-            if isinstance(value, list):
-                found += [one for one in value if isinstance(one, ast.AST)]
-            elif isinstance(value, ast.AST) and name != "ctx":
-                found.append(value)
+        found += inside(node)
     return found
 
 
@@ -38,11 +48,11 @@ def copied(node: Node, down: int = 0) -> Node:
     made = node.__new__(type(node))
     its = vars(made)
     its.update(vars(node))
-    for name in node._fields:
+    for name in BRANCHES[type(node)]:
         value = its.get(name)
         if isinstance(value, list):
             its[name] = [copied(one, down) if isinstance(one, ast.AST) else one for one in value]
-        elif isinstance(value, ast.AST) and name != "ctx":
+        elif isinstance(value, ast.AST):
             its[name] = copied(value, down)
     for name in ("lineno", "end_lineno") if down else ():
         if its.get(name) is not None:

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..trees import nodes, tree, walked
+from ..trees import inside, nodes, tree, walked
 from .declarations import is_own
 from .text import Line
 
@@ -25,14 +25,8 @@ Part = ast.ClassDef | ast.FunctionDef | ast.Assign
 
 def pruned(files: Files, model: str, names: Iterable[str]) -> Files:
     """The files without what nobody needs; `model` is that of the model, and `names` are read by others."""
-    found = {path: readers(path, lines) for path, lines in files.items()}
-    while True:
-        wanted = live([one for part in found.values() for one in part], set(names))
-        left = {path: without(path, lines, wanted, path == model) for path, lines in files.items()}
-        changed = [path for path, lines in left.items() if lines != files[path]]
-        if not changed:
-            return files
-        files, found = left, found | {path: readers(path, left[path]) for path in changed}
+    wanted = live([one for path, lines in files.items() for one in readers(path, lines, path == model)], set(names))
+    return {path: without(path, lines, wanted, path == model) for path, lines in files.items()}
 
 
 def parsed(lines: list[Line]) -> ast.Module:
@@ -42,52 +36,65 @@ def parsed(lines: list[Line]) -> ast.Module:
 
 @dataclass
 class Reader:
-    """What a function reads: .attribute, name; and by which names it is called, or none if it always may be."""
+    """What a piece of code reads: .attribute, name; it runs if of each of its `needs` one is wanted."""
 
-    called: set[str]
+    needs: list[set[str]]
     reads: set[str]
 
 
-def readers(path: str, lines: list[Line]) -> list[Reader]:
-    """The functions of a file, each with what it reads; what stands outside of them is always read."""
-    outside = Reader(set(), set())
-    found = [outside]
+def readers(path: str, lines: list[Line], is_model: bool) -> list[Reader]:
+    """The functions of a file, and in them what only sets attributes, each with what it reads; of a model each class is
+    needed."""
+    if path in CALLED_BY_NAME:
+        return reading(parsed(lines), [], True)
+    found: list[Reader] = []
     for part in parsed(lines).body:
-        for node in part.body if isinstance(part, ast.ClassDef) else [part]:
-            if not isinstance(node, ast.FunctionDef) or node.name.startswith("__") or path in CALLED_BY_NAME:
-                outside.reads |= read(node)
-            else:
-                found.append(Reader(called(node), read(node)))
+        needs: list[set[str]] = []
+        pieces: list[ast.AST] = [part]
         if isinstance(part, ast.ClassDef):
-            outside.reads |= set().union(*map(read, [*part.bases, *part.decorator_list]))
+            needs = [] if is_model else [{part.name, "." + part.name}]
+            pieces = [*part.bases, *part.decorator_list, *part.body]
+        for node in pieces:
+            names = [called(node)] if isinstance(node, ast.FunctionDef) and not node.name.startswith("__") else []
+            found += reading(node, needs + names, is_model)
     return found
 
 
 def live(found: list[Reader], names: set[str]) -> set[str]:
     """All that is read by what can be reached."""
     while True:
-        reached = [one for one in found if not one.called or one.called & names]
+        reached = [one for one in found if all(names & need for need in one.needs)]
         more = names.union(*(one.reads for one in reached))
         if more == names:
             return names
         names = more
 
 
-def read(part: ast.AST) -> set[str]:
-    """What is read somewhere, and every word of a dotted name in a text, as an attribute."""
-    found: set[str] = set()
-    for node in walked(part):
+def reading(part: ast.AST, needs: list[set[str]], whole: bool) -> list[Reader]:
+    """What a piece of code reads, of a dotted name in a text every word as an attribute; on its own, where it is not
+    kept `whole`, what an assignment reads that only sets attributes."""
+    mine = Reader(needs, set())
+    found, waiting = [mine], [part]
+    for node in waiting:  # which grows on the way
         match node:
             case ast.Name(id=name, ctx=ast.Load()):
-                found.add(name)
+                mine.reads.add(name)
             case ast.Attribute(attr=name, ctx=ast.Load()):
-                found.add("." + name)
+                mine.reads.add("." + name)
             case ast.Constant(value=str(text)) if DOTTED.fullmatch(text):
-                found |= {"." + word for word in text.split(".")}
+                mine.reads |= {"." + word for word in text.split(".")}
             case ast.Assign():
-                found |= {"." + name for name in kept_by(node)}
+                mine.reads |= {"." + name for name in kept_by(node)}
+                for targets, value in [] if whole else paired(node):
+                    if all(idle(one, value, set()) for one in targets):
+                        found += reading(value, [*needs, {"." + one.attr for one in targets if is_own(one)}], True)
+                    else:
+                        waiting += [*targets, value]
+                if not whole:
+                    continue
             case ast.AugAssign(target=ast.Attribute(attr=name)):
-                found.add("." + name)
+                mine.reads.add("." + name)
+        waiting += inside(node)
     return found
 
 

@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 
 from .. import BuildError
-from ..trees import copied, walked
+from ..trees import copied, same, walked
 from .declarations import Declarations, annotated
 from .elimination import factored, solved
 from .settled import Settled
@@ -306,10 +306,12 @@ class Numbers(Settled):
                     self.zeros.add(self.name(to, to.id, kind, i))
                 else:
                     pairs.append((self.part(to, i) if kind else self.visit(copied(to)), number))
-        pairs = [(to, number) for to, number in pairs if ast.unparse(to) != ast.unparse(number)]
-        later = [set().union(*(uses(number) for _, number in pairs[n + 1 :])) for n in range(len(pairs))]
-        if any(ast.unparse(to) in later[n] for n, (to, _) in enumerate(pairs)):
-            return [ast.Assign([row([to for to, _ in pairs])], row([number for _, number in pairs]))]
+        pairs = [(to, number) for to, number in pairs if not same(to, number)]
+        changed: set[str] = set()
+        for to, number in pairs:
+            if changed and changed & uses(number):
+                return [ast.Assign([row([to for to, _ in pairs])], row([number for _, number in pairs]))]
+            changed.add(spelled(to))
         return [ast.Assign([to], number) for to, number in pairs]
 
     def unpack(self, node: ast.Assign, left: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
