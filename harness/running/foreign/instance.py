@@ -1,5 +1,6 @@
 """An instance of somebody's FMU: FMI 2.0 or 3.0, for co-simulation or for model exchange."""
 
+import os
 from typing import Any
 
 from fmpy.fmi2 import FMU2Model, FMU2Slave
@@ -24,7 +25,7 @@ def instantiated(found: Any, folder: str, exchange: bool) -> Any:
         fmu.instantiate(loggingOn=True, **({"callbacks": callbacks()[0]} if old else {"logMessage": keep}))
     except Exception as error:  # fmpy raises bare Exceptions
         tool = "; it needs the tool that made it (needsExecutionTool)" if interface.needsExecutionTool else ""
-        raise HarnessError(f"{reason(error)}{tool}") from None
+        raise HarnessError(f"{reason(error).replace(f'{folder}{os.sep}', '')}{tool}") from None
     return fmu
 
 
