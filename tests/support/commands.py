@@ -131,7 +131,7 @@ class Forked(subprocess.Popen):
             atexit._clear()  # nor is what the asking process holds tidied up
             for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
                 signal.signal(number, usual)
-            sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115 - to the end of the process
+            sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
             try:
                 become(words, os.getcwd(), env, ())
                 sys.modules.pop(module, None)
