@@ -6,7 +6,7 @@ import fmi3_hosts
 import pytest
 from models import MODELS
 
-from harness.studies.importers.checks import IMPORTERS, absent, play, subject
+from harness.studies.importers.checks import IMPORTERS, absent, play, prepare, subject
 
 ECOS = next(importer for importer in IMPORTERS if importer.name == "Ecos")
 
@@ -17,6 +17,7 @@ def test_ecos_runs_it_in_co_simulation_as_it_runs_that_of_fmi_2(name, fmus):
     """The same value references, the same grid; only the stop time, which never arrives, may move an internal step."""
     older = subject(fmus / f"{name}.fmu").basis
     newer = replace(older, fmu=str(fmi3_hosts.built() / f"{name}.fmu"))
+    prepare(ECOS, [older, newer])
     found, expected = play(ECOS, newer).answer, play(ECOS, older).answer
     assert len(found.rows) == len(expected.rows) > 100
     for mine, theirs in zip(found.rows, expected.rows, strict=True):

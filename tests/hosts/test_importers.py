@@ -3,7 +3,11 @@
 Tools that are not installed are skipped with the reason; they are in the extra `importers`.
 """
 
+import json
 import pickle
+from dataclasses import asdict
+from itertools import takewhile
+from subprocess import CompletedProcess
 
 import fmi3_hosts
 import native_fmus
@@ -12,8 +16,10 @@ from builds import made, of_file
 from models import AUTHORED, LARGER, MODELS
 
 from harness.errors import HarnessError
-from harness.studies.importers import table
-from harness.studies.importers.checks import CHECKS, ELSEWHERE, IMPORTERS
+from harness.process.child import Hangs
+from harness.studies.importers import checks, table
+from harness.studies.importers.checks import CHECKS, ELSEWHERE, IMPORTERS, Wrong
+from harness.studies.importers.request import END, Reply, Request
 
 # What is a model's own is the same, to the last bit, in both kinds (native/test_agreement.py), and what is a kind's own
 # in all models: each model is asked about in one kind, the driven sled in both.
@@ -65,6 +71,41 @@ def test_an_fmu_that_the_checks_cannot_be_made_with_is_left_out_with_the_reason(
     (tmp_path / "belt.fmu").symlink_to(of_file(path) / "belt.fmu")
     first, *_ = table.rows(tmp_path, print)
     assert (first.importer, first.reason.split(",")[0]) == ("rotor_brake.fmu", "the checks want a mass m")
+
+
+def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
+    """Whatever follows is asked in another process; a process that ends badly takes the last of its answers with it."""
+    asked = []
+
+    def process(module, text, patience):
+        asked.append([json.loads(line)["instances"][0] for line in text.splitlines()])
+        if "hang" in asked[-1]:
+            raise Hangs
+        answered = [*takewhile(lambda name: name != "crash", asked[-1])]
+        ends = {"crash": -11, "leak": -6}.get(asked[-1][-1] if answered == asked[-1] else "crash", 0)
+        replies = "\n".join(json.dumps(asdict(Reply(name, [], [], 0))) for name in answered)
+        said = "".join(f"{name} speaks{END}" for name in answered) + "a reason\n" * bool(ends)
+        return CompletedProcess([], ends, replies, said)
+
+    monkeypatch.setattr(checks, "ask_module", process)
+    monkeypatch.setattr(checks, "ANSWERS", {})
+    tool, *_ = (importer for importer in IMPORTERS if importer.name == "Ecos")
+    names = ["one", "crash", "two", "hang", "three", "leak"]
+    requests = [Request("a.fmu", {}, 1.0, 1, [], instances=[name]) for name in names]
+    checks.prepare(tool, requests[:3])
+    checks.prepare(tool, requests)
+    told = {}
+    for name, request in zip(names, requests, strict=True):
+        try:
+            played = checks.play(tool, request)
+            told[name] = played.answer.version, played.said
+        except Wrong as wrong:
+            told[name] = str(wrong)
+    assert told == {
+        **{name: (name, f"{name} speaks") for name in ("one", "two", "three")},
+        **{"crash": "exit status -11: a reason", "hang": "hangs for 300 s", "leak": "exit status -6: a reason"},
+    }
+    assert asked == [names[:3], ["two"], names[3:], ["hang"], names[4:]]
 
 
 def test_a_tool_that_is_not_asked_is_named_with_the_reason():

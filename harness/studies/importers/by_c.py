@@ -3,21 +3,32 @@
 No player of its own stands between: it would compile the program for each request.
 """
 
+import json
 import re
 import subprocess
+from dataclasses import asdict
 from functools import cache
 from pathlib import Path
+from threading import Lock
 
 from ...process.child import ask
 from ...running.in_c import built, compiler
-from .request import Reply, Request
+from .request import END, Reply, Request
+
+BUILDING = Lock()  # else two threads compile the program at once
 
 
-def ran(request: Request, patience: float) -> subprocess.CompletedProcess[str]:
-    """The C program, ended, which has played the request; its log went to standard error.  Hangs after `patience` s."""
-    calls, library = life(request) * request.lives or runs(request), built(Path(request.fmu))
-    text = "".join(f"{call}\n" for call in [*calls, "0 unload"])
-    return ask(library.command, text, library.environment, patience)
+def ran(text: str, patience: float) -> subprocess.CompletedProcess[str]:
+    """The C program, ended, which has carried out a request, as if it were a player.  Hangs after `patience` s."""
+    request = Request(**json.loads(text))
+    with BUILDING:
+        library = built(Path(request.fmu))
+        command = library.command
+    calls = life(request) * request.lives or runs(request)
+    done = ask(command, "".join(f"{call}\n" for call in [*calls, "0 unload"]), library.environment, patience)
+    if not done.returncode:
+        done.stdout, done.stderr = json.dumps(asdict(reply(request, done.stdout))), done.stderr + END
+    return done
 
 
 def reply(request: Request, text: str) -> Reply:

@@ -5,25 +5,23 @@ its own way, and a change in mid-run that comes an instant later makes other int
 """
 
 import json
-import os
-import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite, isnan, nan
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 from ...errors import HarnessError
-from ...process.child import Hangs, ask
+from ...process.child import Hangs, ask_module
 from ...running.description import description
 from ...running.in_c import COMPILER, EMBEDDED
 from . import by_c
-from .request import Reply, Request
+from .request import END, Reply, Request
 
 AGREE = 1e-6
-PATIENCE = 300  # s, for one request
+PATIENCE = 300  # s, for a process
 LIVES = 100
 POINTS = 200  # communication steps of a run
 DIVERGED = "the motion leaves the range of numbers"
@@ -76,6 +74,9 @@ class Wrong(Exception):
     """A check that failed, in a few words."""
 
 
+ANSWERS: dict[tuple[str, str], Played | Wrong] = {}  # of each player to each request, in JSON
+
+
 def absent(importer: Importer, fmu: Path | None = None) -> str:
     """Why an importer cannot be asked here, of an FMU if one is named, or nothing."""
     for package in importer.packages:
@@ -101,25 +102,39 @@ def exports(fmu: Path, function: str) -> bool:
 
 
 def play(importer: Importer, request: Request) -> Played:
-    """The answer of an importer, from a process of its own; Wrong if that crashes or hangs."""
-    return asked(importer.player, json.dumps(asdict(request)))
+    """The answer of an importer, from another process than this; Wrong if that crashes or hangs."""
+    prepare(importer, [request])
+    answer = ANSWERS[importer.player, json.dumps(asdict(request))]
+    if isinstance(answer, Wrong):
+        raise answer
+    return answer
 
 
-@cache
-def asked(player: str, request: str) -> Played:
-    """The same, asked once."""
-    command = [sys.executable, "-m", f"{__package__}.{player}"]
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])}
-    in_c = Request(**json.loads(request)) if player == "by_c" else None
+def prepare(importer: Importer, requests: list[Request]) -> None:
+    """Ask an importer what it was not asked yet: a process all, and where it crashes or hangs, another one the rest."""
+    texts = [json.dumps(asdict(request)) for request in requests]
+    texts = [text for text in dict.fromkeys(texts) if (importer.player, text) not in ANSWERS]
+    while texts:
+        answers = asked(importer.player, texts[:1] if importer.player == "by_c" else texts)
+        ANSWERS.update(((importer.player, text), answer) for text, answer in zip(texts, answers, strict=False))
+        texts = texts[len(answers) :]
+
+
+def asked(player: str, texts: list[str]) -> list[Played | Wrong]:
+    """The answers to as many of these requests as a process carries out, and of the next one how it crashed or hung."""
+    text = "\n".join(texts)
     try:
-        done = by_c.ran(in_c, PATIENCE) if in_c else ask(command, request, environment, PATIENCE)
+        in_c = player == "by_c"
+        done = by_c.ran(text, PATIENCE) if in_c else ask_module(f"{__package__}.{player}", text, patience=PATIENCE)
     except Hangs:
-        raise Wrong(f"hangs for {PATIENCE} s") from None
-    if done.returncode:
-        last = done.stderr.strip().splitlines()[-1:] or ["nothing said"]
-        raise Wrong(f"exit status {done.returncode}: {last[0]}")
-    reply = by_c.reply(in_c, done.stdout) if in_c else Reply(**json.loads(done.stdout))
-    return Played(reply, done.stderr)
+        return asked(player, texts[:1]) if len(texts) > 1 else [Wrong(f"hangs for {PATIENCE} s")]
+    *said, rest = done.stderr.split(END)
+    replies = [Reply(**json.loads(line)) for line in done.stdout.splitlines()]
+    found: list[Played | Wrong] = [Played(*each) for each in zip(replies, said, strict=False)]
+    if done.returncode or rest or len(found) < len(texts):
+        last = rest.strip().splitlines()[-1:] or ["nothing said"]
+        found[len(texts) - 1 :] = [Wrong(f"exit status {done.returncode}: {last[0]}")]
+    return found
 
 
 @dataclass(frozen=True)
@@ -185,11 +200,11 @@ def difference(rows: list[list[float]], expected: list[list[float]]) -> float:
     return worst
 
 
-def failure(importer: Importer, request: Request, sentence: str) -> str:
+def failure(importer: Importer, request: Request) -> str:
     """A run that fails: said once on standard error and in the log, no number afterwards, all well after a reset."""
-    asked = replace(request, steps=10, again=True)
+    sentence = refusal(request)
     try:
-        played = play(importer, asked)
+        played = play(importer, request)
     except Wrong as wrong:
         if importer.ends and request.values and sentence in str(wrong):
             return "told, ends"
@@ -203,20 +218,30 @@ def failure(importer: Importer, request: Request, sentence: str) -> str:
     if importer.logs and len(lines) != 2:
         raise Wrong("the log says nothing")
     rows, accepted = played.answer.rows, played.answer.accepted
-    if importer.heeds and accepted == asked.steps:
+    if importer.heeds and accepted == request.steps:
         raise Wrong("every step is accepted")
     if not (all(isnan(value) for value in rows[-1]) or (importer.heeds and rows[-1] == rows[accepted])):
         raise Wrong(f"answers {rows[-1][0]!r} after it failed")
-    fresh = play(IMPORTERS[0], replace(asked, values={}, change={}, instances=["a"], again=False)).answer.rows
+    fresh = play(IMPORTERS[0], replace(request, values={}, change={}, instances=["a"], again=False)).answer.rows
     difference(played.answer.again, fresh)
     return "told"
 
 
-def lives(importer: Importer, subject: Subject) -> str:
+def refusal(request: Request) -> str:
+    """What is to be said of its values: of several, that the motion diverges."""
+    (name, value), *more = [*request.values.items(), *request.change.items()]
+    return DIVERGED if more else f"{name} = {value!r}"
+
+
+def failing(subject: Subject, **changes: Any) -> Request:
+    """A request that fails, and then one that does not."""
+    return replace(subject.basis, steps=10, again=True, **changes)
+
+
+def lives(importer: Importer, request: Request) -> str:
     """Runs, saves, runs on, restores, runs on, resets, runs and frees, in one process; then unloads the library."""
     if importer.player != "by_c":
         return "-"
-    request = replace(subject.basis, steps=10, lives=LIVES)
     rows = play(importer, request).answer.rows
     if len(rows) != 3 * LIVES or any(row != rows[0] for row in rows):
         raise Wrong("the lives differ")
@@ -224,15 +249,14 @@ def lives(importer: Importer, subject: Subject) -> str:
     return "alike"
 
 
-CHECKS: dict[str, Callable[[Importer, Subject], str]] = {  # each returns what the table shows, or raises Wrong
-    "default run": lambda tool, its: agreement(tool, its.basis),
-    "tunable changed": lambda tool, its: agreement(tool, replace(its.basis, change=its.change)),
-    "two connected": lambda tool, its: agreement(tool, replace(its.basis, instances=["a", "b"], connect=its.wire)),
-    "100 lives": lives,
-    "bad parameter": lambda tool, its: failure(tool, replace(its.basis, values=NEGATIVE), "m = -1.0"),
-    "bad input": lambda tool, its: failure(tool, replace(its.basis, change={its.wire[1]: nan}), f"{its.wire[1]} = nan"),
-    "diverging run": lambda tool, its: failure(tool, replace(its.basis, change={**TINY, its.wire[1]: 1e308}), DIVERGED),
-    "% in a name": lambda tool, its: failure(
-        tool, replace(its.basis, instances=["100%s%n"], values=NEGATIVE), "m = -1.0"
-    ),
+Judge = Callable[[Importer, Request], str]  # returns what the table shows, or raises Wrong
+CHECKS: dict[str, tuple[Judge, Callable[[Subject], Request]]] = {
+    "default run": (agreement, lambda its: its.basis),
+    "tunable changed": (agreement, lambda its: replace(its.basis, change=its.change)),
+    "two connected": (agreement, lambda its: replace(its.basis, instances=["a", "b"], connect=its.wire)),
+    "100 lives": (lives, lambda its: replace(its.basis, steps=10, lives=LIVES)),
+    "bad parameter": (failure, lambda its: failing(its, values=NEGATIVE)),
+    "bad input": (failure, lambda its: failing(its, change={its.wire[1]: nan})),
+    "diverging run": (failure, lambda its: failing(its, change={**TINY, its.wire[1]: 1e308})),
+    "% in a name": (failure, lambda its: failing(its, instances=["100%s%n"], values=NEGATIVE)),
 }

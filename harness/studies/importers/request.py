@@ -1,4 +1,4 @@
-"""What a player is asked, and how it answers: JSON over standard input and output.
+"""What a player is asked, and how it answers: JSON over standard input and output, one request after another.
 
 A player prints the FMU's log to standard error, if the tool hands it on, and what is returned here to standard output.
 """
@@ -8,7 +8,8 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
-from typing import Any
+
+END = "\0"  # on standard error, of what is said while a request is carried out
 
 
 @dataclass(frozen=True)
@@ -40,10 +41,9 @@ class Reply:
 
 
 def serve(play: Callable[[Request], Reply]) -> None:
-    """Answer the one request on standard input; what a tool prints goes to standard error."""
+    """Answer the requests on standard input, a line each; what a tool prints goes to standard error."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
-    wanted: dict[str, Any] = json.load(sys.stdin)
-    answer = play(Request(**wanted))
-    json.dump(asdict(answer), answers)
-    answers.close()
+    for line in sys.stdin:
+        print(json.dumps(asdict(play(Request(**json.loads(line))))), file=answers, flush=True)
+        print(END, end="", file=sys.stderr, flush=True)

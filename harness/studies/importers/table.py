@@ -13,7 +13,8 @@ from ...results.files import write_rows
 from ...results.folder import replacing
 from ...results.provenance import named, of_each, record
 from ...running.description import parameters
-from .checks import CHECKS, ELSEWHERE, IMPORTERS, Importer, Subject, Unfit, Wrong, absent, play, subject
+from .checks import CHECKS, ELSEWHERE, IMPORTERS, Importer, Judge, Subject, Unfit, Wrong, absent, play, prepare, subject
+from .request import Request
 
 WORKERS = 2
 FOLDER, FILES = "importers", ("importers.csv",)
@@ -57,13 +58,16 @@ def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
             if reason := absent(importer, subjects[0].fmu):
                 found.append(Checked(importer.name, "", reason=reason))
                 continue
+            columns: list[list[str]] = []
+            report(importer.name, 0.0)
+            for column in workers.map(partial(ask, importer), subjects):
+                columns.append(column)
+                report(importer.name, len(columns) / len(subjects))
             name = f"{importer.name} {play(importer, subjects[0].basis).answer.version}"
             names = tuple(each.fmu.stem for each in subjects)
-            for done, check in enumerate(CHECKS):
-                report(name, done / len(CHECKS))
-                cells = tuple(workers.map(partial(ask, importer, check), subjects))
+            for check, *cells in zip(CHECKS, *columns, strict=True):
                 failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
-                found.append(Checked(name, check, cells, failed, fmus=names))
+                found.append(Checked(name, check, tuple(cells), failed, fmus=names))
     return found + [Checked(name, "", reason=reason) for name, reason in ELSEWHERE.items()]
 
 
@@ -75,10 +79,17 @@ def fmus(folder: Path) -> list[Path]:
     return found
 
 
-def ask(importer: Importer, check: str, subject: Subject) -> str:
-    """What a check gives."""
+def ask(importer: Importer, subject: Subject) -> list[str]:
+    """What every check gives."""
+    checks = [(judge, request(subject)) for judge, request in CHECKS.values()]
+    prepare(importer, [request for _, request in checks if not request.lives])
+    return [cell(judge, importer, request) for judge, request in checks]
+
+
+def cell(judge: Judge, importer: Importer, request: Request) -> str:
+    """What one gives."""
     try:
-        return CHECKS[check](importer, subject)
+        return judge(importer, request)
     except Wrong as wrong:
         return f"FAILED: {wrong}"
 
