@@ -7,28 +7,23 @@ import sys
 
 import fmi3_hosts
 import pytest
-from models import MODELS, declared
+from models import MODELS
 from native_fmus import built
-from native_host import SOURCE, compiler, folder, sanitized, unpacked
+from native_host import SANITIZERS, TELLING, sanitized
 
-from fmus.packaging.native.compiler import STRICT
-
-SANITIZERS = "address,undefined,float-cast-overflow"
-STATES = 100_000  # damaged ones, over all models
+STATES = 75_000  # damaged ones, over all models
 SENTENCE = (
     "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
     "save a state anew and pass it on unchanged"
 )
 
 
-def program(source, fmu, sanitizers, *options):
+def program(source, fmu, sanitizers=SANITIZERS):
     """What runs a program over the sources in an FMU: it must end well, and tells what went to its outputs."""
-    sources, out = unpacked(fmu) / "sources", folder(f"{source} {sanitizers} {fmu.stem}") / "program"
-    command = [compiler(), *STRICT, "-g1", *sanitized(sanitizers), f"-I{sources}", *options]
-    subprocess.run([*command, str(SOURCE.with_name(source)), "-o", str(out), "-lm", "-lpthread"], check=True)
+    out = sanitized(source, fmu, sanitizers=sanitizers)
 
     def run(*words, **options):
-        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": TELLING} | options
         done = subprocess.run([str(out), *map(str, words)], timeout=120, **streams)
         assert done.returncode == 0, f"{done.returncode}: {done.stdout[-300:]} {(done.stderr or b'')[-3000:]}"
         return done.stdout, done.stderr
@@ -38,13 +33,12 @@ def program(source, fmu, sanitizers, *options):
 
 @pytest.fixture(scope="module", params=MODELS)
 def abuse(request):
-    dry = ["-DDRY"] if "mode" in declared(request.param) else []
-    return program("abuse.c", built() / f"{request.param}.fmu", SANITIZERS, *dry)
+    return program("abuse.c", built() / f"{request.param}.fmu")
 
 
 @pytest.fixture(scope="module", params=MODELS)
 def walk(request):
-    return program("walk.c", fmi3_hosts.built() / f"{request.param}.fmu", SANITIZERS)
+    return program("walk.c", fmi3_hosts.built() / f"{request.param}.fmu")
 
 
 def test_a_state_with_any_bit_flipped_cut_extended_or_exchanged_is_refused_and_nobody_changes(abuse):
@@ -58,17 +52,17 @@ def test_a_state_that_cannot_be_is_refused_though_its_checksum_is_right(abuse):
 
 
 def test_calls_in_any_order_with_anything_in_them_end_in_a_status_and_leave_other_instances_alone(abuse):
-    abuse("calls", 1, 50_000)
+    abuse("calls", 1, 20_000)
 
 
 def test_every_function_of_fmi_3_is_answered_in_every_state_as_the_standard_has_it_and_no_life_leaves_memory(walk):
     """With null pointers and wrong lengths, in every kind of instance; the address sanitizer looks for what is left."""
-    told, _ = walk("states", 4)
-    assert int(told) > 10_000
+    told, _ = walk("states", 1)
+    assert int(told) > 2_500
 
 
 def test_calls_of_fmi_3_in_any_order_end_in_a_status_and_leave_other_instances_alone(walk):
-    walk("calls", 1, 50_000)
+    walk("calls", 1, 20_000)
 
 
 def test_instances_of_fmi_3_share_nothing_between_threads():
@@ -83,7 +77,7 @@ NAMES = [
 
 def test_any_name_reaches_the_log_as_utf_8_and_never_as_a_format(abuse):
     """Each name twice: of an instance, and of one that is refused."""
-    told, noise = abuse("names", env={**os.environ, "ALOUD": "1"})
+    told, noise = abuse("names", env=TELLING | {"ALOUD": "1"})
     assert [line.split(b"|")[0] for line in told.splitlines()] == [name for name in NAMES for _ in range(2)]
     assert all(b"(" + name + b"): fmi2" in noise for name in NAMES)
     told.decode()

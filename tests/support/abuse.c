@@ -142,7 +142,7 @@ static void flips(void)
         for (size_t size = 0; size < BYTES + 64; size += 1 + draw(60)) {
             if (size != BYTES) refuses(it, longer, size), tried++;
         }
-        for (int turn = 0; turn < 1600; turn++) {
+        for (int turn = 0; turn < 600; turn++) {
             size_t a = draw(BYTES), b = draw(BYTES), size = draw(64);
             memcpy(again, bytes, BYTES);
             if (turn % 3 == 0) again[a] = bytes[b], again[b] = bytes[a];

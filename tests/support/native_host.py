@@ -1,4 +1,4 @@
-"""The C host of tests/support, compiled by the system's compiler, and scripts for it."""
+"""The C programs of tests/support, each compiled once a run by the system's compiler, and scripts for the host."""
 
 import os
 import shutil
@@ -8,16 +8,18 @@ from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import fromstring
 
+import builds
 import fmpy
 import pytest
 from models import declared, model_class, outputs
-from native_fmus import room
 
-from fmus.packaging.native.compiler import LIBRARY, SAME_BITS, STRICT
+from fmus.packaging.native.compiler import STRICT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 SOURCE = Path(__file__).with_name("host.c")
 SOURCE3 = SOURCE.with_name("fmi3_host.c")
+SANITIZERS = "address,undefined,float-cast-overflow"
+TELLING = os.environ | {"ASAN_OPTIONS": "handle_sigill=1"}  # the line of what was undefined, which ends in a trap
 
 
 def compiler():
@@ -27,34 +29,42 @@ def compiler():
 
 
 @cache
-def folder(kind):
-    """A folder for binaries of one kind."""
-    path = Path(room().name) / (kind or "plain")
-    path.mkdir()
-    return path
+def compiled(name, *words, sanitizers=""):
+    """The file that the compiler makes of these words; to optimise what is sanitized takes longer than to run it."""
+    words = [*words, "-ldl", "-lpthread", "-lm"]
+    if sanitizers:
+        words = [f"-fsanitize={sanitizers}", "-fsanitize-undefined-trap-on-error", "-O0", *words]
+
+    def make(folder):
+        command = [compiler(), *STRICT, "-g1", *map(str, words), "-o", str(folder / "made")]
+        subprocess.run(command, check=True)
+
+    return builds.made(f"{name} {sanitizers}".strip(), make) / "made"
 
 
-@cache
-def host(sanitizer="", source=SOURCE):
+def host(sanitizers="", source=SOURCE):
     """The host, as a program."""
-    out = folder(f"{sanitizer} {source.stem}") / "host"
-    command = [compiler(), *STRICT, "-g1", *sanitized(sanitizer), f"-I{HEADERS}", str(source), "-o", str(out)]
-    subprocess.run([*command, "-ldl", "-lpthread", "-lm"], check=True)
-    return out
+    return compiled(source.stem, f"-I{HEADERS}", source, sanitizers=sanitizers)
 
 
-def sanitized(kind):
-    """Options for sanitizers, if any; nobody compares the bits of these, and to optimise takes longer than to run."""
-    return [f"-fsanitize={kind}", "-fno-sanitize-recover=all", "-O0"] if kind else []
+def sanitized(source, fmu, *how, sanitizers=SANITIZERS):
+    """The program `source` of tests/support over the sources in an FMU, which it includes, linked `how` it is told."""
+    name, sources = f"{source} {fmu.stem}", unpacked(fmu) / "sources"
+    dry = ["-DDRY"] if "mode" in declared(fmu.stem) else []
+    words = ["-c", "-fPIC", "-fvisibility=hidden", *dry, f"-I{sources}", SOURCE.with_name(source)]
+    whole = compiled(name, *words, sanitizers=sanitizers)
+    return compiled(" ".join([name, "linked", *how]), *how, whole, sanitizers=sanitizers)
 
 
 @cache
 def unpacked(fmu):
     """The folder of an extracted FMU."""
-    out = folder("unpacked") / fmu.parent.name / fmu.stem
-    with zipfile.ZipFile(fmu) as archive:
-        archive.extractall(out)
-    return out
+
+    def make(folder):
+        with zipfile.ZipFile(fmu) as archive:
+            archive.extractall(folder)
+
+    return builds.made(f"{fmu.parent.name} {fmu.stem}", make)
 
 
 def guid(fmu):
@@ -76,20 +86,13 @@ def lives(program, fmu, library, number, steps, **options):
     ], done.stderr.splitlines()
 
 
-@cache
-def compiled_here(fmu, sanitizer=""):
-    """The library from the sources in the FMU, by the system's compiler."""
-    out = folder(sanitizer) / f"{fmu.stem}.so"
-    command = [compiler(), *STRICT, *SAME_BITS, *LIBRARY, "-g1", *sanitized(sanitizer), "fmi2.c", "-o", str(out), "-lm"]
-    subprocess.run(command, cwd=unpacked(fmu) / "sources", check=True)
-    return out
-
-
-def play(fmu, script, threads=1, sanitizer="", shipped=True):
-    """What the script answers, line by line, and what went to standard error."""
-    library = unpacked(fmu) / "binaries" / "linux64" / f"{fmu.stem}.so" if shipped else compiled_here(fmu, sanitizer)
-    command = [str(host(sanitizer)), str(library), guid(fmu), str(threads)]
-    done = subprocess.run(command, input="\n".join(script), capture_output=True, text=True, timeout=120)
+def play(fmu, script, threads=1, sanitizers=""):
+    """What the script answers, line by line, and what went to standard error; under sanitizers of the sources."""
+    library = unpacked(fmu) / "binaries" / "linux64" / f"{fmu.stem}.so"
+    if sanitizers:
+        library = sanitized("abuse.c", fmu, "-shared", sanitizers=sanitizers)
+    command = [str(host(sanitizers)), str(library), guid(fmu), str(threads)]
+    done = subprocess.run(command, input="\n".join(script), capture_output=True, text=True, timeout=120, env=TELLING)
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout.splitlines(), done.stderr
 
