@@ -44,47 +44,40 @@ class Draw:
     def block(self, depth, indent, loop=False):
         lines = [line for _ in range(self.draw.randint(1, 4)) for line in self.statement(depth)]
         if loop:
-            lines += self.draw.choice(
-                [[], [f"if {self.truth(1)}:", "    break"], [f"if {self.truth(1)}:", "    continue", "x = y"]]
-            )
+            test = f"if {self.truth(1)}:"
+            lines += self.draw.choice([[], [test, "    break"], [test, "    continue", "x = y"]])
         return [" " * indent + line for line in lines]
 
     def statement(self, depth):
         place = self.draw.choice(["x", "y", "z", "self.a", "self.b", "self.right.total", "self.row[0]"])
         other = self.draw.choice([p for p in ("x", "y", "z", "self.a", "self.b") if p != place])
         simple = [
-            f"{place} = {self.number(2)}",
-            f"{place} {self.draw.choice(['+=', '-=', '*='])} {self.number(1)}",
-            f"{place}, {other} = {self.number(1)}, {self.number(1)}",
-            f"{place} = {other} = {self.number(2)}",
-            f"{place} = self.left.take({self.number(1)})",
-            f"{place}, {other} = self.arithmetic_pair({self.number(1)}, {self.number(1)})",
-            f"self.on = {self.truth(1)}",
-            f"self.n = {self.integer()}",
+            lambda: f"{place} = {self.number(2)}",
+            lambda: f"{place} {self.draw.choice(['+=', '-=', '*='])} {self.number(1)}",
+            lambda: f"{place}, {other} = {self.number(1)}, {self.number(1)}",
+            lambda: f"{place} = {other} = {self.number(2)}",
+            lambda: f"{place} = self.left.take({self.number(1)})",
+            lambda: f"{place}, {other} = self.arithmetic_pair({self.number(1)}, {self.number(1)})",
+            lambda: f"self.on = {self.truth(1)}",
+            lambda: f"self.n = {self.integer()}",
         ]
         if depth == 0 or self.draw.random() < 0.6:
-            return [self.draw.choice(simple)]
+            return [self.draw.choice(simple)()]
         self.loops += 1
-        left = f"left{self.loops}"
-        return self.draw.choice(
-            [
-                [f"if {self.truth(2)}:", *self.block(depth - 1, 4), "else:", *self.block(depth - 1, 4)],
-                [
-                    f"if {self.truth(1)}:",
-                    *self.block(depth - 1, 4),
-                    f"elif {self.truth(1)}:",
-                    *self.block(depth - 1, 4),
-                ],
-                [f"if {self.truth(1)}:", *self.block(depth - 1, 4), f"    return {self.number(1)}, i"],
-                [f"for i in range({self.draw.randint(1, 3)}):", *self.block(depth - 1, 4, loop=True), "i = 1"],
-                [
-                    f"{left} = 3",
-                    f"while {left} > 0 and {self.truth(1)}:",
-                    f"    {left} -= 1",
-                    *self.block(depth - 1, 4, True),
-                ],
-            ]
-        )
+        left, inner = f"left{self.loops}", depth - 1
+        compound = [
+            lambda: [f"if {self.truth(2)}:", *self.block(inner, 4), "else:", *self.block(inner, 4)],
+            lambda: [f"if {self.truth(1)}:", *self.block(inner, 4), f"elif {self.truth(1)}:", *self.block(inner, 4)],
+            lambda: [f"if {self.truth(1)}:", *self.block(inner, 4), f"    return {self.number(1)}, i"],
+            lambda: [f"for i in range({self.draw.randint(1, 3)}):", *self.block(inner, 4, True), "i = 1"],
+            lambda: [
+                f"{left} = 3",
+                f"while {left} > 0 and {self.truth(1)}:",
+                f"    {left} -= 1",
+                *self.block(inner, 4, True),
+            ],
+        ]
+        return self.draw.choice(compound)()
 
     def method(self, name):
         body = ["        z, i = 0.25, 2", *self.block(3, 8), *self.block(2, 8)]
@@ -92,7 +85,7 @@ class Draw:
 
 
 def test_random_programs_do_what_python_does(tmp_path):
-    names = [f"random_{seed}" for seed in range(40)]
+    names = [f"random_{seed}" for seed in range(48)]
     text = "import math\n"
     text += "from tests.native.test_constructs import THIRD, Allowed, half\n\n\nclass Random(Allowed):\n"
     (tmp_path / "random_programs.py").write_text(text + "\n".join(Draw(name).method(name) for name in names))
