@@ -1,7 +1,6 @@
 """What a built FMI 3.0 FMU carries, what it says about itself, and that both are true and the same everywhere."""
 
 import json
-from functools import partial
 from html.parser import HTMLParser
 from io import BytesIO
 from math import inf
@@ -44,7 +43,14 @@ def fmu():
     return lambda name: fmi3_hosts.built() / f"{name}.fmu"
 
 
-look = partial(driver.host, "fmi3_look.py", timeout=120)  # where the FMU is all there is to see
+@pytest.fixture(scope="module")
+def look(fmu, tmp_path_factory):
+    """look(function, name, ...): what is seen where the FMU is all there is to see; one process looks for all tests."""
+    asked = [("variables", name) for name in names()]
+    asked += [("factors", name, PARAMETERS.get(name, {})) for name in names()] + [("nominals", "pacejka", "x_m", 1e-5)]
+    calls = [(function, fmu(name), *more) for function, name, *more in asked]
+    answers = driver.host("fmi3_look.py", "each", calls, folder=tmp_path_factory.mktemp("look"))
+    return lambda *call: answers[asked.index(call)]
 
 
 def beside(name):
@@ -159,18 +165,18 @@ def test_nominal_values_are_the_sizes_that_our_own_solver_takes(fmu, name):
     assert nominals == sizes == [float(rate.derivative.nominal) for rate in rates]
 
 
-def test_a_finer_creep_makes_the_nominal_speed_smaller_and_the_event_tells(fmu, tmp_path):
+def test_a_finer_creep_makes_the_nominal_speed_smaller_and_the_event_tells(look):
     usual, fine = [1e-3, 1e-3, 1e-3], [1e-3, 1e-5, 1e-3]
-    told = look("nominals", fmu("pacejka"), "x_m", 1e-5, folder=tmp_path)
+    told = look("nominals", "pacejka", "x_m", 1e-5)
     assert told == [[False, usual], [True, fine], [False, fine]]
 
 
 @EVERY_MODEL
-def test_what_follows_from_what_is_true(fmu, name, tmp_path):
+def test_what_follows_from_what_is_true(fmu, look, name):
     """A nudge shows in nothing that is not said to follow; all that rates and indicators follow from shows, too."""
     root = described(fmu(name))
     told = {kind: structure(root, kind) for kind in ("Output", "ContinuousStateDerivative", "EventIndicator")}
-    seen = look("factors", fmu(name), PARAMETERS.get(name, {}), folder=tmp_path)
+    seen = look("factors", name, PARAMETERS.get(name, {}))
     seen = {int(unknown): {int(known): f for known, f in row.items()} for unknown, row in seen.items()}
     for reference, knowns, _ in [row for rows in told.values() for row in rows]:
         assert set(seen.get(reference, {})) <= set(knowns)
@@ -183,11 +189,11 @@ def test_what_follows_from_what_is_true(fmu, name, tmp_path):
 
 
 @EVERY_MODEL
-def test_factors_are_told_where_they_are_known_and_are_the_same_at_every_point(fmu, name, tmp_path):
+def test_factors_are_told_where_they_are_known_and_are_the_same_at_every_point(fmu, look, name):
     rates = structure(described(fmu(name)), "ContinuousStateDerivative")
     expected = {"smd": ["constant", "tunable tunable tunable"], "pacejka": ["constant", None, None]}
     assert [kinds for _, _, kinds in rates] == expected.get(name, [None] * len(rates))
-    seen = look("factors", fmu(name), {}, folder=tmp_path) if name in expected else {}
+    seen = look("factors", name, {}) if name in expected else {}
     for reference, knowns, kinds in rates:
         for known, kind in zip(knowns, (kinds or "").split(), strict=bool(kinds)):
             factors = seen[str(reference)][str(known)]
@@ -195,8 +201,8 @@ def test_factors_are_told_where_they_are_known_and_are_the_same_at_every_point(f
 
 
 @EVERY_MODEL
-def test_an_instance_starts_with_the_values_of_the_xml_and_takes_others(fmu, name, tmp_path):
-    told = look("variables", fmu(name), folder=tmp_path)
+def test_an_instance_starts_with_the_values_of_the_xml_and_takes_others(fmu, look, name):
+    told = look("variables", name)
     elements = described(fmu(name)).find("ModelVariables")
     starts = {e.get("name"): e.get("start") for e in elements if e.get("start") is not None}
     assert set(told["starts"]) == {e.get("name") for e in elements}

@@ -1,6 +1,6 @@
-"""Look into built FMI 3.0 FMUs, in a process that never saw their sources: a test names a function here.
+"""Look into built FMI 3.0 FMUs, in a process that never saw their sources: tests name functions here.
 
-python fmi3_look.py FUNCTION '[ARGUMENTS]'
+python fmi3_look.py each '[[[FUNCTION, ARGUMENT, ...], ...]]'
 """
 
 import json
@@ -134,6 +134,11 @@ def answers(fmu, smooth, push, point):
     """What the unknowns read there."""
     put(fmu, push, point)
     return [read(fmu, variable) for variable in smooth]
+
+
+def each(asked):
+    """The answers of these functions to these arguments, one after another."""
+    return [globals()[function](*arguments) for function, *arguments in asked]
 
 
 if __name__ == "__main__":
