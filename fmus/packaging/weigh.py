@@ -6,7 +6,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from zipfile import ZipFile
 
-TRIES = 3
+TRIES = 2
 CLOCK = """
 import sys, time
 sys.path.insert(0, sys.argv[1])
@@ -17,7 +17,7 @@ print(time.perf_counter() - begin)
 
 
 def import_time(fmu: Path) -> float:
-    """Seconds, the best of a few; the standard library's part included, nothing compiled before."""
+    """Seconds, the better of two; the standard library's part included, nothing compiled before."""
     with TemporaryDirectory() as folder:
         with ZipFile(fmu) as archive:
             archive.extractall(folder, [path for path in archive.namelist() if path.startswith("resources/")])
