@@ -129,15 +129,14 @@ def study(
         runs.append(np.array(rows(MAIN, request(asked, archive, step))))
         report((i + 1) / (len(asked.steps) + len(ENGINES)))
     finest = runs[-1]
-    errors, truths = [], []
-    for step, x in zip(asked.steps, runs, strict=True):
-        time = np.arange(len(x)) * step
-        if truth:
-            truths.append(truth(time))
-        else:
-            at = np.arange(len(finest)) * asked.steps[-1]
-            truths.append(np.column_stack([np.interp(time, at, column) for column in finest.T]))
-        errors.append(float(np.abs(x - truths[-1]).max()))
+    times = [np.arange(len(x)) * step for step, x in zip(asked.steps, runs, strict=True)]
+    everywhere = np.unique(np.concatenate(times))
+    if truth:
+        reference = truth(everywhere)
+    else:
+        reference = np.column_stack([np.interp(everywhere, times[-1], column) for column in finest.T])
+    truths = [reference[np.searchsorted(everywhere, each)] for each in times]
+    errors = [float(np.abs(x - its).max()) for x, its in zip(runs, truths, strict=True)]
     if not truth:  # the finest is its own
         errors = errors[:-1]
     others = {}
@@ -148,7 +147,7 @@ def study(
             others[engine] = tuple(x[-1].tolist()), float(np.abs(x - truths[-1][late:]).max()), ""
         except HarnessError as error:
             others[engine] = (), float("nan"), str(error)
-    return replace(asked, time=time, x=finest, truth=truths[-1], errors=tuple(errors), engines=others)
+    return replace(asked, time=times[-1], x=finest, truth=truths[-1], errors=tuple(errors), engines=others)
 
 
 def request(asked: Convergence, archive: Path, step: float) -> Request:
