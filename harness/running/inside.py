@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib import import_module
 from operator import attrgetter
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import HarnessError
+from ..scenes.fmus import check_built
 from .answer import Answer
 from .unpacked import LAYER, unpacked
 
@@ -20,6 +22,13 @@ OK = 0  # status of the march
 
 def embedded(fmu: Path) -> type:
     """The model class inside an FMU; its package bears a name of its own, so that several live side by side."""
+    check_built(fmu)
+    return carried(fmu.absolute(), fmu.stat().st_mtime_ns)
+
+
+@cache
+def carried(fmu: Path, changed: int) -> type:
+    """The same, as long as the file is not changed."""
     with unpacked(fmu) as folder:
         resources = folder / "resources"
         package = (resources / LAYER).read_text(encoding="utf-8").removesuffix("_fmu")
