@@ -245,6 +245,16 @@ def test_the_interval_beside_what_cannot_be_negative_either_holds_it_in_95_perce
         assert np.mean(high) < 0.5 * np.mean(alone[:, 1])
 
 
+@pytest.mark.parametrize("rho", [0.0, 0.5, -0.98])
+def test_an_interval_hangs_on_no_last_digit_of_a_correlation(rho):
+    """On which the signs of its axes may hang, and of equal ones the axes themselves."""
+    correlation = np.array([[1.0, rho, 0.0], [rho, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    intervals = []
+    for last in np.random.default_rng(1).uniform(-4e-16, 4e-16, (8, 3, 3)):
+        intervals.append(bounded(np.array([0.5, 1.0, 0.3]), correlation + last + last.T))
+    assert np.ptp(intervals, axis=0).max() < 1e-9
+
+
 def test_students_t_is_that_of_scipy():
     freedom = range(1, 200)
     assert [student(n) for n in freedom] == pytest.approx(student_t.ppf(0.975, list(freedom)), rel=3e-4)

@@ -26,12 +26,12 @@ def bounded(z: np.ndarray, correlation: np.ndarray) -> tuple[float, float]:
     cone = Cone(correlation)
     likeliest, least = cone.nearest(z)
     squares, axes = np.linalg.eigh(correlation)
-    draws = normal(len(z)) @ (axes * np.sqrt(np.maximum(squares, 0.0))).T
+    draws = axes * np.sqrt(np.maximum(squares, 0.0)) @ axes.T @ normal(len(z))  # the same whatever signs axes have
 
     def beyond(m: float) -> float:
         """How much farther z is from the means with that m than 95 % of their draws."""
         means, square = cone.nearest(z, m)
-        drawn = means + draws
+        drawn = means[:, None] + draws
         farther = cone.squares(drawn, m) - cone.squares(drawn)
         limit = np.partition(farther, int(0.95 * DRAWS))[int(0.95 * DRAWS)]
         return float(np.sqrt(max(square - least, 0.0)) - np.sqrt(max(limit, 0.0)))
@@ -50,42 +50,42 @@ class Cone:
         for held in (list(some) for size in range(k + 1) for some in combinations(range(k), size)):
             free = [i for i in range(k) if i not in held]
             weight = np.linalg.pinv(correlation[np.ix_(held, held)])
-            self.faces.append((held, free, weight, weight @ correlation[np.ix_(held, free)]))
+            self.faces.append((held, free, weight, correlation[np.ix_(free, held)] @ weight))
 
     def nearest(self, z: np.ndarray, first: float | None = None) -> tuple[np.ndarray, float]:
         """The means (k,) nearest to the point z (k,), those with that `first` one if it is given, and the square of
         their distance: of all faces on whose own side the nearest point lies the best."""
-        free, moved, squares = min(self.sides(z[None], first), key=lambda side: float(side[2][0]))
+        free, moved, squares = min(self.sides(z[:, None], first), key=lambda side: float(side[2][0]))
         means = np.zeros_like(z)
-        means[free] = moved[0]
+        means[free] = moved[:, 0]
         if first is not None:
             means[0] = first
         return means, float(squares[0])
 
     def squares(self, z: np.ndarray, first: float | None = None) -> np.ndarray:
-        """The squares (n,) of such distances of points z (n, k)."""
+        """The squares (n,) of such distances of points z (k, n)."""
         return np.min([squares for _, _, squares in self.sides(z, first)], axis=0)
 
     def sides(self, z: np.ndarray, first: float | None) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
-        """Of each face the means that it leaves free, these nearest to the points z (n, k), and the squares of the
+        """Of each face the means that it leaves free, these nearest to the points z (k, n), and the squares of the
         distances (n,), infinite where the nearest point does not lie on its own side."""
         if first is not None:
-            z = z - first * (np.arange(z.shape[1]) == 0)
+            z = np.concatenate([z[:1] - first, z[1:]])
         for held, free, weight, slope in self.faces:
             if first is None or 0 in held:
-                off = z[:, held]
-                moved = z[:, free] - off @ slope
-                yield free, moved, np.where((moved >= 0).all(axis=1), np.sum(off @ weight * off, axis=1), np.inf)
+                off = z[held]
+                moved = z[free] - slope @ off
+                yield free, moved, np.where((moved >= 0).all(axis=0), np.sum(weight @ off * off, axis=0), np.inf)
 
 
 @cache
 def normal(k: int) -> np.ndarray:
-    """Draws (DRAWS, k) of independent normal numbers, evenly spread (M. Roberts, The unreasonable effectiveness of
+    """Draws (k, DRAWS) of independent normal numbers, evenly spread (M. Roberts, The unreasonable effectiveness of
     quasirandom sequences (2018)), so that nothing here is left to chance."""
     ratio = 2.0
     for _ in range(50):
         ratio = (1 + ratio) ** (1 / (k + 1))
-    even = (0.5 + np.outer(np.arange(1, DRAWS + 1), ratio ** -np.arange(1.0, k + 1))) % 1
+    even = (0.5 + np.outer(ratio ** -np.arange(1.0, k + 1), np.arange(1, DRAWS + 1))) % 1
     return np.array([NormalDist().inv_cdf(share) for share in even.ravel().tolist()]).reshape(even.shape)
 
 
