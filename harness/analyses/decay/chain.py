@@ -13,8 +13,8 @@ import numpy as np
 from .halves import Halves, halves, slopes
 from .law import at_rest
 
-NODES, NODES_SINE, NODES_WIDE = 32, 40, 80  # of a spring, a pendulum, and one beyond WIDE rad
-WIDE = 2.0
+STRAIGHT, NODES, NODES_SINE, NODES_WIDE = 2, 32, 40, 80  # of a spring without drag, with it, a pendulum, beyond WIDE
+WIDE = 2.0  # rad
 MOST = 1_000_000  # half swings
 
 
@@ -48,26 +48,27 @@ def chain(laws: np.ndarray, sine: bool, floor: float, most: int = MOST, until: f
     """
     first, zeta, r, b = laws.T
     low = at_rest(r, sine)
-    count = NODES if not sine else NODES_WIDE if first.max() > WIDE else NODES_SINE
+    plain, curved = (NODES_SINE, NODES_WIDE) if sine else (STRAIGHT, NODES)
+    count = curved if (first.max() > WIDE if sine else b.any()) else plain
     order = np.arange(float(count))
     angle = np.pi * (order + 0.5) / count
-    nodes = low[:, None] + (first - low)[:, None] * (np.cos(angle) + 1) / 2
+    scale = 2 / (first - low)
+    nodes = low[:, None] + (np.cos(angle) + 1) / scale[:, None]
     swings = halves(nodes.ravel(), np.repeat(zeta, count), np.repeat(r, count), np.repeat(b, count), sine)
-    table = np.stack([-swings.end, swings.duration], axis=1).reshape(len(laws), count, 2)
+    next_share = (-swings.end.reshape(-1, count) - low[:, None]) * scale[:, None] - 1  # as shares, from -1 to 1
     weights = np.cos(np.outer(order, angle)) * 2 / count
     weights[0] /= 2
-    coefficients = np.matmul(weights, table)
-    amplitudes, durations, looks, scale = [first], [np.zeros(len(laws))], [], 2 / (first - low)
-    at = 0.0
-    for _ in range(most):
-        a = amplitudes[-1]
-        if not (a[0] > low[0] + floor and at <= until):
-            break
-        share = np.minimum(np.maximum((a - low) * scale - 1, -1), 1)
-        looks.append(np.cos(np.arccos(share)[:, None] * order))
-        looked_up = np.matmul(looks[-1][:, None], coefficients)[:, 0]
-        amplitudes.append(looked_up[:, 0])
-        durations.append(looked_up[:, 1])
-        at += float(looked_up[0, 1])
+    coefficients = np.stack([next_share, swings.duration.reshape(-1, count)]) @ weights.T
+    ones = np.ones(len(laws))
+    shares, durations, least, at = [ones], [np.zeros(len(laws))], floor * scale[0] - 1, 0.0
+    looks: list[np.ndarray] = []
+    while len(looks) < most and shares[-1][0] > least and at <= until:
+        angle = np.arccos(np.minimum(np.maximum(shares[-1], -ones), ones))
+        looks.append(np.cos(np.multiply.outer(angle, order)))
+        share, duration = np.vecdot(looks[-1], coefficients)
+        shares.append(share)
+        durations.append(duration)
+        at += float(duration[0])
     found = np.array(looks).reshape(len(looks), len(laws), count).transpose(1, 0, 2)
-    return Chain(np.array(amplitudes), np.cumsum(durations, axis=0), np.matmul(found, weights), swings)
+    amplitudes = low + (np.array(shares) + 1) / scale
+    return Chain(amplitudes, np.cumsum(durations, axis=0), np.matmul(found, weights), swings)

@@ -12,7 +12,7 @@ from itertools import permutations
 import numpy as np
 
 from .energy import losses
-from .law import TERMS, ZETA, Terms, in_words, laws_of, unknowns_of
+from .law import TERMS, ZETA, Terms, in_words, laws_of
 from .problem import Fitted, Problem
 
 ROUNDS = 2
@@ -62,7 +62,7 @@ def all_laws(
         without, start = full[0].copy(), full[0].copy()
         without[[ZETA + TERMS.index(term) for term in absent]] = 0.0
         start[ZETA:] = losses(amplitudes, law, problem.model.sine)
-        fits[law] = problem.fit(min(without, start, key=lambda p: squares(problem, p)), law)
+        fits[law] = problem.fit(min(without, start, key=lambda p: float(np.sum(problem.off(p, law)[0] ** 2))), law)
     for _ in range(ROUNDS):
         for less, more in permutations(laws, 2):
             if set(less) < set(more) and fits[more][1] > fits[less][1] * (1 + 1e-9) + 1e-30:
@@ -73,9 +73,3 @@ def all_laws(
         return float(n * np.log(max(fits[law][1] / n, problem.exact**2)) + len(problem.unknowns(law)) * np.log(n))
 
     return tuple(sorted((Law(law, *fits[law], bic(law)) for law in laws), key=lambda law: law.bic))
-
-
-def squares(problem: Problem, p: np.ndarray) -> float:
-    """What the values p leave."""
-    signal, _ = problem.model(p, unknowns_of((), problem.drift), problem.t)
-    return float(np.sum((signal - problem.x) ** 2))

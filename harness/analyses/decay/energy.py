@@ -10,6 +10,8 @@ J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998) (decrements) and Journal 
 (energy balance); the division by the mean slope, which weighs all half swings alike, is ours.
 """
 
+from functools import cache
+
 import numpy as np
 
 from .law import TERMS, Terms, laws_of
@@ -21,7 +23,7 @@ def losses(a: np.ndarray, terms: Terms, sine: bool) -> np.ndarray:
     """zeta, r and b (3,), none negative and those not in `terms` zero, from successive amplitudes a (n,)."""
     mean = (a[:-1] + a[1:]) / 2
     if sine:
-        nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+        nodes, weights = gauss()
         phi, weights = (nodes + 1) * np.pi / 4, weights * np.pi / 4
         k = np.sin(mean / 2)[:, None]
         speed = 2 * k * np.cos(phi)
@@ -33,6 +35,12 @@ def losses(a: np.ndarray, terms: Terms, sine: bool) -> np.ndarray:
         lost, slope = mean * (a[:-1] - a[1:]), mean
     columns = np.stack([2 * squared, 2 * mean, cubed], axis=1) / slope[:, None]
     return not_negative(columns, lost / slope, terms)
+
+
+@cache
+def gauss() -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights (POINTS,) of Gauss's rule."""
+    return np.polynomial.legendre.leggauss(POINTS)
 
 
 def not_negative(columns: np.ndarray, right: np.ndarray, terms: Terms) -> np.ndarray:

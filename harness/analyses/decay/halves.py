@@ -1,11 +1,10 @@
 """Half swings side by side: from a turning point down to the next, by Taylor series in theta.
 
-On the way down s = -1, and the law is smooth:
+On the way down s = -1, and the law is smooth: with the speed w = y', G = -g(y) and g(y) = y or sin y,
 
-    y'' = -g(y) - 2 zeta y' + b y'^2 + r,            g(y) = y or sin y
+    w' = G + w d + r,    d = b w - 2 zeta,    G' = -w;    of a pendulum G' = -w C, C' = w G, where C = cos y
 
-With w = y' the coefficients of y = sum c_k h^k follow from each other, (k + 1)(k + 2) c_(k+2) being the k-th
-coefficient of the right-hand side, and those of S = sin y, C = cos y from S' = w C, C' = -w S (A. Jorba, M. Zou,
+The k-th coefficients of these products give the (k + 1)-th of w, G and C, divided by k + 1 (A. Jorba, M. Zou,
 Experimental Mathematics 14 (2005), section 3).  A half swing that goes up is the mirror image of one that goes down.
 """
 
@@ -30,35 +29,29 @@ class Halves:
     series: np.ndarray
 
 
-def product(one: np.ndarray, two: np.ndarray, k: int) -> np.ndarray:
-    """The k-th coefficients (..., L) of the products of series (K, L) and others (..., K, L)."""
-    return np.einsum("ij,...ij->...j", one[: k + 1], two[..., k::-1, :])
-
-
 def taylor(y: np.ndarray, w: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: bool) -> np.ndarray:
     """The series (ORDER + 1, L) about the states y, w (L,) on the way down."""
     order = ORDER[sine]
-    c, speed = np.empty((order + 1, len(y))), np.empty((order, len(y)))
-    c[0], c[1], speed[0] = y, w, w
-    restoring = c
+    speed, pull = np.empty((2, order, len(y)))
+    factors = np.empty((3 if sine else 1, order, len(y)))  # of the speed: d, and of a pendulum C and G
+    damping = factors[0]
+    speed[0], damping[0] = w, b * w - 2 * zeta
     if sine:
-        both = restoring, cosine = np.empty((2, *speed.shape))
-        restoring[0], cosine[0] = np.sin(y), np.cos(y)
-    drag, twice = bool(b.any()), 2 * zeta
+        pull, cosine = factors[:0:-1]
+        cosine[0] = np.cos(y)
+    pull[0] = -np.sin(y) if sine else -y
     for k in range(order - 1):
-        force = twice * speed[k]
-        force += restoring[k]
+        products = np.einsum("ij,...ij->...j", speed[: k + 1], factors[:, k::-1])
+        force = products[0]
+        force += pull[k]
         if k == 0:
-            force -= r
-        if drag:
-            force -= b * product(speed, speed, k)
+            force += r
+        np.divide(force, k + 1, out=speed[k + 1])
+        np.multiply(b, speed[k + 1], out=damping[k + 1])
+        np.divide(products[1] if sine else speed[k], -(k + 1), out=pull[k + 1])
         if sine:
-            fall, rise = product(speed, both, k)
-            np.divide(rise, k + 1, out=restoring[k + 1])
-            np.divide(fall, -(k + 1), out=cosine[k + 1])
-        np.divide(force, -(k + 1) * (k + 2), out=c[k + 2])
-        np.multiply(c[k + 2], k + 2, out=speed[k + 1])
-    return c
+            np.divide(products[2], k + 1, out=cosine[k + 1])
+    return np.concatenate([y[None], speed / np.arange(1, order + 1)[:, None]])
 
 
 def slopes(series: np.ndarray) -> np.ndarray:
@@ -67,20 +60,20 @@ def slopes(series: np.ndarray) -> np.ndarray:
     return series[1:] * powers
 
 
-def with_slopes(series: np.ndarray) -> np.ndarray:
-    """Series (K, L), and beside them their derivatives (K, 2, L)."""
-    both = np.zeros((len(series), 2, series.shape[1]))
-    both[:, 0], both[:-1, 1] = series, slopes(series)
-    return both
+def powers(h: np.ndarray, count: int) -> np.ndarray:
+    """h (L,) to the powers below `count` (count, L)."""
+    found = np.empty((count, len(h)))
+    found[0], found[1], known = 1.0, h, 2
+    while known < count:
+        more = min(known - 1, count - known)
+        np.multiply(found[known - 1], found[1 : more + 1], out=found[known : known + more])
+        known += more
+    return found
 
 
-def value(series: np.ndarray, h: np.ndarray | float) -> np.ndarray:
-    """Series at h, by Horner's rule."""
-    total = series[-1].copy()
-    for term in series[-2::-1]:
-        total *= h
-        total += term
-    return total
+def value(series: np.ndarray, powers: np.ndarray) -> np.ndarray:
+    """Series (K, L) at the places h (L,) of these powers (K or more, L)."""
+    return np.asarray(np.einsum("ij,ij->j", series, powers[: len(series)]))
 
 
 def halves(a: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: bool) -> Halves:
@@ -96,12 +89,12 @@ def halves(a: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: 
         h = reach(c, SMALL[sine])
         begins.append(at)
         series.append(c)
-        both = with_slopes(c)
-        y, w = value(both, h)
+        speed, at_end = slopes(c), h ** np.arange(len(c))
+        y, w = at_end @ c, at_end[:-1] @ speed
         ends = np.flatnonzero(np.isnan(end) & (w >= 0))
         if len(ends):
-            root = standstill(both[:-1, 1, ends], h)
-            duration[ends], end[ends] = at + root, value(c[:, ends], root)
+            root = standstill(speed[:, ends], h)
+            duration[ends], end[ends] = at + root, value(c[:, ends], powers(root, len(c)))
         if not np.isnan(end).any() or not np.isfinite(y).all():
             break
         at += h
@@ -117,11 +110,11 @@ def reach(c: np.ndarray, small: float) -> float:
 
 def standstill(speed: np.ndarray, h: float) -> np.ndarray:
     """Where in (0, h] series of speeds, negative before and not at h, are zero: Newton's method from h."""
-    both, root = with_slopes(speed), np.full(speed.shape[1], h)
+    slope, root = slopes(speed), np.full(speed.shape[1], h)
     for _ in range(12):
-        w, slope = value(both, root)
-        step = w / np.where(slope > 1e-300, slope, 1e-300)
-        root = np.clip(root - step, 0, h)
+        at = powers(root, len(speed))
+        step = value(speed, at) / np.maximum(value(slope, at), 1e-300)
+        root = np.minimum(np.maximum(root - step, 0.0), h)
         if np.abs(step).max() < 1e-8:
             break  # the next one would be as small as the square of it
     return root
