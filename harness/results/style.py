@@ -17,7 +17,7 @@ from .files import heading
 artist.kwdoc = lambda artist: ""  # the lists of properties in all docstrings, a third of what is still to be imported
 
 from matplotlib.axes import Axes as Axes  # noqa: E402
-from matplotlib.axis import Tick  # noqa: E402
+from matplotlib.axis import Axis  # noqa: E402
 from matplotlib.collections import QuadMesh  # noqa: E402
 from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
@@ -103,8 +103,9 @@ def sheet(
             place = part.get_window_extent()
             for text in within:
                 fold(text, place.height if text.get_rotation() == 90 else place.width)
-        for crowd in figure.findobj(crowded):
-            crowd.set_rasterized(True)
+        for axes in figure.axes:
+            for crowd in filter(crowded, (*axes.lines, *axes.collections)):
+                crowd.set_rasterized(True)
         if engine := figure.get_layout_engine():
             engine.execute(figure)
             figure.set_layout_engine(None)  # with one, all is drawn twice
@@ -126,7 +127,9 @@ def texts(within: artist.Artist) -> Iterator[Text]:
     for child in within.get_children():
         if isinstance(child, Text):
             yield child
-        elif not isinstance(child, Tick):
+        elif isinstance(child, Axis):
+            yield from (child.label, child.offsetText)  # to ask for all of its children makes its ticks, each time anew
+        else:
             yield from texts(child)
 
 
