@@ -4,8 +4,6 @@ import csv
 import html
 import json
 import re
-import subprocess
-import sys
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -13,7 +11,6 @@ from pathlib import Path
 import commands as processes
 import numpy as np
 import pytest
-from builds import ROOT
 from rich.console import Console
 
 from harness.commands import commands
@@ -164,8 +161,7 @@ def test_the_versions_are_told(tmp_path):
     own = f"friction-fmus {version('friction-fmus')}"
     said = harness(tmp_path, "--version").stdout
     assert said.startswith(f"{own}, fmpy {version('fmpy')}, ")
-    command = [sys.executable, ROOT / "build_fmus.py", "--version"]
-    assert subprocess.run(command, capture_output=True, text=True, cwd=tmp_path).stdout == f"{own}\n"
+    assert processes.build("--version", folder=tmp_path).stdout == f"{own}\n"
     assert list(tmp_path.iterdir()) == []
 
 
