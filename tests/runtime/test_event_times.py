@@ -20,7 +20,16 @@ def close(t, true):
     return abs(mpf(t) - true) <= PLACES * ulp(t)
 
 
-@pytest.mark.parametrize(("f", "values"), [(1e-6, {}), (1e-7, {}), (1e-7, {"m": 0.7, "k": 1233.1})], ids=str)
+LITTLE, LESS, OTHER = 1e-6, 1e-7, {"m": 0.7, "k": 1233.1}
+SWINGS = [  # every two of friction, values and kind meet in one
+    (LITTLE, {}, "native"),
+    (LITTLE, OTHER, "python"),
+    (LESS, {}, "python"),
+    (LESS, OTHER, "native"),
+]
+
+
+@pytest.mark.parametrize(("f", "values", "kind"), SWINGS, indirect=["kind"], ids=str)
 def test_half_swings_of_a_mass_with_little_friction(worker, kind, f, values):
     """Each lasts half a period and loses 2 f/k."""
     with workdps(DIGITS):

@@ -10,7 +10,6 @@ from operator import methodcaller
 
 import evidence
 import pytest
-from driver import Worker
 from evidence import Trajectory
 from models import DOP853, EXACT, ODE23, ODE45, RODAS
 from native_fmus import built
@@ -54,13 +53,10 @@ def case(name, seed):
     return values, start, start + (12.0 if name == "stickslip" else 5.0)
 
 
-@pytest.fixture(scope="module")
-def pair(fmus):
-    """A process with the folder of its FMUs, for both kinds."""
-    workers = [(Worker(), fmus), (Worker(), built())]
-    yield workers
-    for worker, _ in workers:
-        worker.close()
+@pytest.fixture
+def pair(worker, fmus):
+    """The process that runs them, with the folder of the FMUs of each kind."""
+    return [(worker, fmus), (worker, built())]
 
 
 def answers(pair, name, values, start, stop, read):
@@ -99,12 +95,17 @@ def test_every_tie_ends_as_the_closed_form_says(pair, name, seed):
         assert max(abs(row[i] - true[i]) for row, true in zip(rows, truth, strict=True)) < PLACES * scale
 
 
+METHODS = (EXACT, ODE23, ODE45, DOP853, RODAS)
 FRICTIONLESS = ({"g": 0.0}, {"mu_s": 0.0, "mu_d": 0.0}, {"mu_s": 0.6}, {"mu_d": 0.9})
 
 
-@pytest.mark.parametrize("method", [EXACT, ODE23, ODE45, DOP853, RODAS])
-@pytest.mark.parametrize("values", FRICTIONLESS, ids=str)
-@pytest.mark.parametrize("start", [0.0, -77.7, 1e5])
+STARTS = (0.0, -77.7, 1e5)
+TOUCHES = [  # every two of method, values and start meet in one
+    (method, values, STARTS[(i + j) % 3]) for i, method in enumerate(METHODS) for j, values in enumerate(FRICTIONLESS)
+]
+
+
+@pytest.mark.parametrize(("method", "values", "start"), TOUCHES, ids=str)
 def test_a_speed_that_only_touches_zero_is_no_rest_and_no_event(pair, method, values, start):
     stop = start + 30.0
     values = {**values, "solver.method": method, "solver.rtol": 1e-5}
@@ -147,7 +148,7 @@ def test_a_slide_that_only_touches_zero_sticks_where_static_friction_is_larger(p
         assert answers(pair, "stickslip", values, 0.0, 10.0 / w, ends) == [[1, 0], [1, 0], [0, 1]]
 
 
-@pytest.mark.parametrize("method", [EXACT, ODE23, ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("direction", [-1, 1])
 def test_a_slip_that_ends_at_the_other_limit_sticks_as_the_load_moves_inward(pair, method, direction):
     values = {"mu_d": 0.0, "v_driver": 0.034 * direction, "solver.method": method, "solver.rtol": 1e-7}
@@ -157,14 +158,14 @@ def test_a_slip_that_ends_at_the_other_limit_sticks_as_the_load_moves_inward(pai
     assert rows[-1][0] == pytest.approx(float(motion.at(32.0)[0]), rel=1e-12 if method == EXACT else 1e-5)
 
 
-@pytest.mark.parametrize("method", [EXACT, ODE23, ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("method", METHODS)
 def test_a_start_beyond_the_limit_slides_however_loose_the_method(pair, method):
     """What is given has no error; a slide that came there would have."""
     values = {"x0": 1.001 * 0.9 * 12.5 * 9.81 / 742.5, "solver.method": method, "solver.rtol": 1e-3}
     assert answers(pair, "stickslip", values, 0.0, 1.0, methodcaller("get", "mode")) == -1
 
 
-@pytest.mark.parametrize("method", [EXACT, ODE23, ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_mass_that_only_a_damper_slows_down_never_stops(pair, method, seed):
     draw = random.Random(seed)
