@@ -123,7 +123,7 @@ def test_any_states_and_contacts_are_derived(source):
     move."""
     anatomy = find(source).anatomy
     model = find(source).model()
-    for values, t, at, _ in situations(anatomy, model, 30):
+    for values, t, at, _ in situations(anatomy, model, 12):
         for modes in product((-1, 0, 1), repeat=len(anatomy.modes)):
             known = values | at | driven(anatomy, model, t)
             known |= {m.name: mode for m, mode in zip(anatomy.modes, modes, strict=True)}

@@ -120,14 +120,14 @@ def test_a_load_that_peaks_inside_a_step_is_found(mine, method, rtol):
     model = mine(hold, *free, *held, *contact("2", "v2", "0.9 * most", "most"), a, b)
     model.k = 100.0
     inside = 0
-    for i in range(100):
-        model.most = 10.0 * (1.0 - max(10.0 ** -(1.0 + 3.0 * i / 100), 3.0 * rtol))
+    for i in range(40):
+        model.most = 10.0 * (1.0 - max(10.0 ** -(1.0 + 3.0 * i / 40), 3.0 * rtol))
         found, rows = events(model, method, rtol, 1.0)
         assert found, model.most
         assert abs(found[0][0] - asin(model.most / 10.0) / 10.0) < max(30.0 * rtol, 1e-8) ** 0.5
         before = [t for t, _, _ in rows if t < found[0][0]]
         inside += model.solver.step.methods.stages > 0 and (before[-1] if before else 0.0) < found[0][0] - 1e-3
-    assert inside > 50
+    assert inside > 20
 
 
 GAUSS = np.polynomial.legendre.leggauss(8)

@@ -43,7 +43,7 @@ def test_a_system_is_solved_or_refused_and_never_half_solved(bodies):
     spec, draw, refused = Spec(BODIES[bodies], {}), np.random.default_rng(4), 0
     n, g = len(spec.states), 0.25
     M = np.eye(n)
-    for turn in range(1500):
+    for turn in range(600):
         h = 10.0 ** draw.uniform(-4.0, 1.0)
         J = draw.normal(0.0, 1.0, (n, n)) * 10.0 ** draw.uniform(-3.0, 5.0, (n, 1))
         first = spec.own[0]
@@ -62,4 +62,4 @@ def test_a_system_is_solved_or_refused_and_never_half_solved(bodies):
             continue
         terms = np.abs(k) + np.abs(g * h * J) @ np.abs(k) + np.abs(g * r)
         assert np.all(np.abs(k - g * h * (J @ k) - g * r) <= 1e-8 * terms.max())
-    assert 0 < refused < 1200
+    assert 0 < refused < 480
