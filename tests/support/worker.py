@@ -194,6 +194,10 @@ class Worker:
     def directory(self, path):
         return str(self.fmus[path][0])
 
+    def several(self, requests):
+        """The answers to requests none of which is refused."""
+        return [self.answer(*request) for request in requests]
+
     def answer(self, number, function, arguments):
         return getattr(self if number is None else self.instances[number], function)(*arguments)
 
