@@ -57,8 +57,9 @@ class Life:
         except Refused as refusal:
             value = refusal.function  # the layer of a Python FMU knows Discard only
         # fmpy's logger calls back the newest instance, whichever speaks
-        heard = [instance.messages() for instance in self.instances], self.worker.complaints()
-        return json.dumps([value, heard, self.instances[0].get(*self.names)])  # where NaN is NaN, and no digit is lost
+        asked = [[instance.number, "messages", []] for instance in self.instances]
+        seen = self.worker.call(None, "several", [*asked, [self.instances[0].number, "get", [self.names]]])
+        return json.dumps([value, seen, self.worker.complaints()])  # where NaN is NaN, and no digit is lost
 
     def begin(self, values, start, stop, tolerance):
         fmu = self.instances[0]

@@ -66,20 +66,22 @@ class Calls(RuleBasedStateMachine):
                 answers.append(getattr(instance, function)(*own, *arguments))
             except driver.Refused:
                 answers.append(driver.Refused)
-        said = [self.heard(place) for place in BOTH]
-        assert said[0] == said[1], (function, arguments)
+        looks = [self.look(place) for place in BOTH]
+        assert looks[0] == looks[1], (function, arguments)
         refused = [answer is driver.Refused for answer in answers]
         if function not in ("exit", "ask"):  # which a Python FMU for FMI 2.0 cannot refuse
-            assert refused[0] == refused[1], (function, arguments, said)
-        values = [json.dumps(pair.get(*self.seen)) for pair in self.pairs[0]]  # where NaN is NaN
-        said = [self.heard(place) for place in BOTH]
-        assert (values[0], said[0]) == (values[1], said[1]), (function, arguments)
+            assert refused[0] == refused[1], (function, arguments, looks)
         return answers
 
-    def heard(self, place):
-        """What one kind said: in the log, where the newest instance hears all, and on standard error."""
-        log = [text.replace("%%", "%") for pair in self.pairs for _, _, text in pair[place].messages()]
-        return log, self.workers[place].complaints()
+    def look(self, place):
+        """What can be seen of one kind: its values; what was said before and while they were read in the log, where the
+        newest instance hears all; and on standard error."""
+        numbers = [pair[place].number for pair in self.pairs]
+        log = [[number, "messages", []] for number in numbers]
+        asked = [*log, [numbers[0], "get", [self.seen]], *log]
+        *before, values, one, other = self.workers[place].call(None, "several", asked)
+        said = [[text.replace("%%", "%") for lines in heard for *_, text in lines] for heard in (before, [one, other])]
+        return json.dumps(values), said, self.workers[place].complaints()  # where NaN is NaN
 
     # ---- from instantiation to the end
 
