@@ -6,6 +6,8 @@ from functools import cache
 import builds
 import pytest
 
+from fmus.packaging.native.compiler import PLATFORMS
+
 
 @cache
 def room():
@@ -19,9 +21,14 @@ def needed():
 
 
 @cache
-def built(*platforms):
-    """The folder of the native FMUs for Linux, or for these platforms."""
+def built():
+    """The folder of the native FMUs for Linux."""
     needed()
-    platforms = platforms or ("linux64",)
-    words = [word for platform in platforms for word in ("--platform", platform)]
-    return builds.once("-".join(platforms), "--native", *words, timeout=600)
+    return builds.once("linux64", "--native", "--platform", "linux64")
+
+
+@cache
+def everywhere():
+    """The folder with the native FMU of smd for every platform."""
+    needed()
+    return builds.once("everywhere", "smd", "--native", *(word for each in PLATFORMS for word in ("--platform", each)))
