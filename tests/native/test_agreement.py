@@ -17,7 +17,7 @@ from models import HYBRID, MODELS, declared, label, meeting, model_class, parame
 from native_fmus import built
 
 LIVES, EVENTS = 2, 30  # of every model, law and method; in a life
-BREAKDOWNS = 6  # of every model, law and method
+BREAKDOWNS = 3  # of every model, law and method
 CASES = [(name, values, 0.0) for name in MODELS for values in meeting(name)]
 
 
