@@ -477,9 +477,10 @@ def test_what_moves_in_any_model_is_read_from_its_declaration():
 
 def test_models_of_users_run_in_a_page_of_their_own(browser):
     files = [ROOT / "tests" / "authored" / name for name in ("rotor_brake.py", "larger/blocks.py")]
-    page = web_page.Page(browser, web_page.built("users", *map(str, files)))
+    page = web_page.Page(browser, web_page.built("users", *map(str, files), "--method", "ode45"))
     for path, count in zip(files, (1, 2), strict=True):
         page.open(f".model={path.stem}")
+        assert page.run("[...document.getElementById('method').options].map(each => each.text)") == ["ode45"]
         assert page.run("bench.desk.runs.one.failure") == ""
         assert page.run("bench.desk.runs.one.events.length") > 2
         assert page.run("document.querySelectorAll('#mechanism .body').length") == count
