@@ -10,6 +10,7 @@ left `blank` where nobody looks at them.
 import atexit
 import gc
 import json
+import multiprocessing
 import os
 import runpy
 import select
@@ -22,6 +23,7 @@ import traceback
 from contextlib import contextmanager, suppress
 from functools import cache, partial
 from importlib import import_module
+from multiprocessing import resource_tracker
 from pathlib import Path
 from pkgutil import walk_packages
 from types import SimpleNamespace
@@ -89,6 +91,9 @@ class Server:
 
 def serve():
     """Load all that can be; then fork for every line that is read, and answer with the exit status."""
+    crew = import_module("harness.process.crew")
+    crew.context = lambda preload: multiprocessing.get_context("fork")  # no server has to load it all once more
+    resource_tracker.ensure_running()  # nor has each command to start one
     packages = [(import_module(name).__path__, f"{name}.") for name in ("harness", "fmus.packaging")]
     for name in (*(module.name for package in packages for module in walk_packages(*package)), *LATE):
         with suppress(ImportError):  # an extra that is not installed
@@ -129,6 +134,7 @@ class Forked(subprocess.Popen):
         def answer():
             os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # until then Popen waits
             atexit._clear()  # nor is what the asking process holds tidied up
+            resource_tracker._resource_tracker._fd = None
             for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
                 signal.signal(number, usual)
             sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
