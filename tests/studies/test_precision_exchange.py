@@ -118,46 +118,45 @@ def harness(folder, *arguments, blank=False):
     return commands.harness(folder, *arguments, base={}, blank=blank, PATH="", COLUMNS="100")
 
 
-def test_the_command_shows_both_ways_beside_the_others_and_error_against_tolerance(both, tmp_path):
-    done = harness(both, "precision", "stickslip", "--quick", "--out", tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "  FMI 3.0 CS: exact  " in done.stdout
-    assert "  FMI 3.0 ME: fmpy's CVode  " in done.stdout
-    with (tmp_path / "precision/stickslip.csv").open(newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["tool"] in (CS, ME)]
+@pytest.fixture(scope="module")
+def twice(both, fmus, tmp_path_factory):
+    """A study of the smd and the page of all results, where its FMU for FMI 3.0 is built and then where it is not, the
+    second beside results on another model: what each study said, the second as JSON, the files of the first, the pages,
+    and the folder of the second."""
+    (out, without), said, pages, files = map(tmp_path_factory.mktemp, ("out", "without")), [], [], {}
+    (without / "fmus").symlink_to(fmus)
+    for folder, words in ((both, ("precision",)), (without, ("--json", "precision"))):  # --json before any command
+        done = harness(folder, *words, "smd", "--quick", "--out", out, blank=folder == without)
+        assert (done.returncode, done.stderr) == (0, "")
+        said.append(done.stdout)
+        files = files or {file.name: file.read_text() for file in (out / "precision").glob("*.csv")}
+        assert harness(folder, "report", "--quiet", "--out", out).returncode == 0
+        pages.append(unescape((out / "report.html").read_text(encoding="utf-8")))
+        (out / "precision/pendulum.txt").write_text("older")
+    return said, files, pages, out / "precision"
+
+
+def test_the_command_shows_both_ways_beside_the_others_and_error_against_tolerance(twice):
+    (said, _), files, *_ = twice
+    assert "  FMI 3.0 CS: exact  " in said
+    assert "  FMI 3.0 ME: fmpy's CVode  " in said
+    rows = [row for row in csv.DictReader(files["smd.csv"].splitlines()) if row["tool"] in (CS, ME)]
     assert [(row["case"], row["tool"], row["rtol [1]"]) for row in rows] == [
-        ("stickslip", CS, ""),
-        *(("stickslip", ME, rtol) for rtol in ("0.001", "1e-06", "1e-09")),
+        ("smd", CS, ""),
+        *(("smd", ME, rtol) for rtol in ("0.001", "1e-06", "1e-09")),
     ]
     for row in rows:  # on a busy machine the tightest may outlast what --quick waits, and says so
         assert "run time" in row["failure"] if row["failure"] else float(row["seconds [s]"]) > 0
-    with (tmp_path / "precision/stickslip-exchange.csv").open(newline="") as file:
-        heads, *table = csv.reader(file)
-    assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "stickslip [1]"]
+    heads, *table = csv.reader(files["smd-exchange.csv"].splitlines())
+    assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "smd [1]"]
     assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
-    printed = done.stdout.partition("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol")[2]
+    printed = said.partition("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol")[2]
     told = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
     assert told == [[advice.power(float(number)) if number else "-" for number in row] for row in table]
 
 
-@pytest.fixture(scope="module")
-def twice(both, fmus, tmp_path_factory):
-    """A study of the smd and the page of all results, where its FMU for FMI 3.0 is built and then where it is not, the
-    second beside results on another model: what each study said, the pages, and the folder of the second."""
-    (out, without), said, pages = map(tmp_path_factory.mktemp, ("out", "without")), [], []
-    (without / "fmus").symlink_to(fmus)
-    for folder, words in ((both, ("--json", "precision")), (without, ("precision",))):  # --json before any command
-        done = harness(folder, *words, "smd", "--quick", "--out", out, blank=True)
-        assert (done.returncode, done.stderr) == (0, "")
-        said.append(done.stdout)
-        assert harness(folder, "report", "--quiet", "--out", out).returncode == 0
-        pages.append(unescape((out / "report.html").read_text(encoding="utf-8")))
-        (out / "precision/pendulum.txt").write_text("older")
-    return said, pages, out / "precision"
-
-
 def test_json_holds_all_of_it(twice):
-    found = json.loads(twice[0][0])
+    found = json.loads(twice[0][1])
     assert {point["method"] for point in found["points"]["smd"]} >= {"exact", "dop853", "Radau"}
     assert found["advice"][0].startswith("smd: use exact")
 
@@ -165,7 +164,7 @@ def test_json_holds_all_of_it(twice):
 def test_the_page_has_error_against_tolerance_or_names_the_commands_that_make_it(twice):
     head = "model exchange by fmpy's CVode: largest error at rtol"
     commands = "python build_fmus.py smd --fmi 3 && python -m harness precision smd"
-    whole, lacking = twice[1]
+    whole, lacking = twice[2]
     assert head in whole
     assert commands not in whole
     assert head not in lacking  # what was there of another build is gone
@@ -173,7 +172,7 @@ def test_the_page_has_error_against_tolerance_or_names_the_commands_that_make_it
 
 
 def test_the_command_writes_every_point_and_says_what_to_use_and_results_on_other_models_stay(twice):
-    (_, said), _, folder = twice
+    (said, lacking), _, _, folder = twice
     assert "smd: use exact: " in said
     made = {"smd.csv", "smd.json", "smd.svg", "smd.txt", "anchors.csv"}
     assert {path.name for path in folder.iterdir()} == made | {"pendulum.txt"}
@@ -184,7 +183,7 @@ def test_the_command_writes_every_point_and_says_what_to_use_and_results_on_othe
     assert {row["tool"] for row in rows} == tools
     unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
     assert [row["failure"] for row in rows if row["tool"] in WAYS] == [unbuilt, unbuilt]
-    assert said.count(unbuilt) == 1
+    assert [told for told in json.loads(lacking)["missing"] if unbuilt in told] == [unbuilt]
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
     assert len(inside) == 1 + 4 * len(QUICK.tolerances)
     assert float(inside[0]["largest [1]"]) < 1e-13
