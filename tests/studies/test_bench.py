@@ -13,7 +13,7 @@ from native_fmus import built as native_built
 
 from harness.errors import HarnessError
 from harness.results.provenance import load
-from harness.running import in_c
+from harness.running import in_c, loops
 from harness.running.clock import best
 from harness.studies.bench import exchange, native
 from harness.studies.bench import speed as bench_speed
@@ -46,6 +46,7 @@ def both_kinds(fmus, tmp_path, monkeypatch):
     (tmp_path / "fmus" / "native" / "fmi3").symlink_to(fmi3_hosts.built())
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(native, "REPEAT", 3)
+    monkeypatch.setattr(loops, "REPEAT", 5)
     forget()
     return tmp_path / "fmus"
 
@@ -83,7 +84,8 @@ def test_the_fmus_own_code_is_faster_than_python_peers(all_measures):
         assert 0.0 < measure.value < measure.beside[0].value
 
 
-def test_a_communication_step_is_measured_beside_that_of_an_empty_fmu_with_the_same_outputs(all_measures):
+def test_a_communication_step_is_measured_beside_that_of_an_empty_fmu_with_the_same_outputs(all_measures, monkeypatch):
+    monkeypatch.setattr(loops, "REPEAT", 2)
     measure = of(all_measures, communication_step)[2]()
     usual, empty, lean, lean_empty = (beside.value for beside in measure.beside)
     assert measure.value == usual / empty
