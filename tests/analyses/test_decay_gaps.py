@@ -20,7 +20,7 @@ OMEGA = sqrt((pi / HALF) ** 2 + RATE**2)
 
 def paused(begin, share, noise=0.0):
     """The record of a decay without the samples of a `share` of a half cycle from `begin` in s on."""
-    t = 0.002 * np.arange(2000)
+    t = 0.004 * np.arange(1000)
     t = t[(t <= begin) | (t >= begin + share * HALF)]
     x = 0.1 * np.exp(-RATE * t) * np.cos(pi * t / HALF)
     return Record("paused", t, x + noise * np.random.default_rng(1).standard_normal(len(t)))
@@ -34,7 +34,8 @@ SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
     [(s, b, (0.0, 1e-4)[(i + j) % 2]) for i, s in enumerate(SHARES) for j, b in enumerate(BEGINS)],
 )
 def test_a_pause_of_any_length_leaves_the_answer_right(begin, share, noise):
-    found = {each.name: each for each in identify(paused(begin, share, noise), Known()).estimates}
+    """Without the laws with drag, which take most of a fit and come after a pause; below are some with them."""
+    found = {each.name: each for each in identify(paused(begin, share, noise), Known(), drag=False).estimates}
     for name, truth in {"omega": OMEGA, "zeta": RATE / OMEGA}.items():
         assert abs(found[name].value - truth) < 1e-7 * truth + 5 * found[name].error
     assert found["omega"].error < 1e-3 * OMEGA
