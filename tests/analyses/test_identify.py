@@ -531,9 +531,8 @@ def harness(folder, *arguments, text="", blank=True):
 
 def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_path):
     """fmpy's command line simulates the FMU and writes the file."""
-    command = [sys.executable, "-m", "fmpy", "simulate", fmus / "coulomb.fmu", "--output-file", "run.csv"]
-    command += ["--start-values", "c", "0.3", "f", "0.4", "--output-interval", "0.005"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    words = ["simulate", fmus / "coulomb.fmu", "--output-file", "run.csv", "--output-interval", "0.005"]
+    done = commands.harness(tmp_path, *words, "--start-values", "c", "0.3", "f", "0.4", module="fmpy")
     assert (tmp_path / "run.csv").exists(), done.stderr
     done = harness(tmp_path, "decay", "run.csv", "--unit", "m", "--k", "157.9", "--json")
     assert (done.returncode, done.stderr) == (0, "")
