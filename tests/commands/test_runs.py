@@ -238,15 +238,16 @@ def test_what_a_scene_gets_wrong_is_one_sentence_and_leaves_the_older_result(sce
     assert [path.name for path in results.parent.iterdir()] == ["mine"]
 
 
-def test_a_failing_case_does_not_lose_the_others(place, tmp_path):
+def test_a_failing_case_does_not_lose_the_others(fmus, tmp_path):
+    (tmp_path / "fmus").symlink_to(fmus)
     published = "\n[published]\nsource = 'me'\nrun_time = 1\n"
     for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
         (tmp_path / f"{name}.toml").write_text(BASE + extra + published)
-    code = (
+    (tmp_path / "shipped.py").write_text(
         "from pathlib import Path; import harness.scenes.scene as scene; from harness.__main__ import main\n"
         f"scene.SHIPPED = Path({str(tmp_path)!r}); main()"
     )
-    done = python(place, "-c", code, "--out", tmp_path / "out")
+    done = harness(tmp_path, "--out", tmp_path / "out", module="shipped")
     assert done.returncode == 1
     assert done.stderr.startswith("Error: scene bad: mu_d is 0.95")
     assert done.stderr.count("\n") == 1
@@ -274,7 +275,7 @@ PAIR = (
     [
         ["list"],
         ["run", "nosuch"],
-        ["run", "stickslip", "--json"],
+        ["run", "mine.toml", "--json"],
         ["decay", "coulomb", "--json"],
         ["couple", "pair.toml", "--json"],
         ["report", "--help"],
@@ -283,9 +284,10 @@ PAIR = (
 def test_a_process_that_is_forked_answers_as_a_fresh_one(fmus, tmp_path, arguments):
     def done(fresh):
         shutil.rmtree(tmp_path / "results", ignore_errors=True)  # else the second says that it is the same again
-        return harness(tmp_path, *arguments, fresh=fresh, blank=False)
+        return harness(tmp_path, *arguments, fresh=fresh)
 
     (tmp_path / "fmus").symlink_to(fmus)
+    (tmp_path / "mine.toml").write_text(BASE + "analyses = ['slip']\nplots = []")
     (tmp_path / "pair.toml").write_text(PAIR)
     fresh, forked = done(True), done(False)
     assert (forked.returncode, forked.stderr) == (fresh.returncode, fresh.stderr)
