@@ -1,5 +1,6 @@
 """What an FMU says of itself."""
 
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -20,6 +21,12 @@ def description(path: Path, lenient: bool = False) -> Any:
     """What an FMU says of itself; HarnessError if it cannot be read, is of a version that nobody here runs, or, unless
     one is lenient, breaks the standard."""
     check_built(path, SceneError)
+    return read(path.absolute(), path.stat().st_mtime_ns, lenient)
+
+
+@lru_cache(maxsize=8)
+def read(path: Path, changed: int, lenient: bool) -> Any:
+    """The same, as long as the file is not changed: a run asks for it two or three times."""
     try:
         old = version(path)
         found = None if old.startswith("1.") else fmpy.read_model_description(path, validate=not lenient)

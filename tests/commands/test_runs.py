@@ -150,7 +150,7 @@ def test_a_scene_without_a_grid_is_dense_enough_to_draw_and_has_the_steps_of_its
     assert len(table(results / "trajectory.csv")[1][0]) == len(steps[0]) + 1
 
 
-SLIP = 'model = "stickslip"\noutputs = ["x", "v", "a"]\nanalyses = ["slip"]\n'
+SLIP = 'model = "stickslip"\nplots = []\noutputs = ["x", "v", "a"]\nanalyses = ["slip"]\n'
 SWING = 'model = "smd"\noutputs = ["x", "v"]\nanalyses = ["decay"]\n'
 END = 'plots = []\n[decay]\ngives = "zeta"\n'
 

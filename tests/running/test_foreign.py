@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 from math import cos, exp, sin, sqrt
 from types import SimpleNamespace
 from zipfile import ZipFile
@@ -13,6 +14,7 @@ import pytest
 from fmpy.model_description import Dimension, ModelVariable
 
 from harness.errors import HarnessError, SceneError
+from harness.running.description import description
 from harness.running.foreign.agreement import agreed
 from harness.running.foreign.job import recording, shape
 from harness.running.foreign.passes import Pass
@@ -310,6 +312,14 @@ def test_a_damaged_file_is_one_sentence(run, theirs, tmp_path, name, changes, se
     done, _ = run("damaged.fmu")
     assert done.returncode in (1, 2)
     refused(done, done.returncode, "damaged.fmu", sentence)
+
+
+def test_a_file_that_changes_is_read_anew(theirs, tmp_path):
+    fmu = foreign.edited(theirs / "Midpoint.fmu", tmp_path / "mine.fmu", {})
+    assert "x" in [variable.name for variable in description(fmu).modelVariables]
+    foreign.edited(theirs / "Midpoint.fmu", fmu, described(lambda text: text.replace('name="x"', 'name="y"')))
+    os.utime(fmu, ns=(0, 1))  # however coarse the clock of the files is
+    assert "y" in [variable.name for variable in description(fmu).modelVariables]
 
 
 def test_names_beyond_ascii_and_no_units_are_as_good_as_others(run, theirs, tmp_path):
