@@ -132,7 +132,7 @@ class Forked(subprocess.Popen):
 
     def __init__(self, command, env, **how):
         def answer():
-            os.closerange(3, os.sysconf("SC_OPEN_MAX"))  # until then Popen waits
+            os.closerange(3, 1024)  # until then Popen waits; a system may allow a thousand million of them
             atexit._clear()  # nor is what the asking process holds tidied up
             resource_tracker._resource_tracker._fd = None
             for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
