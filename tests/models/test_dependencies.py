@@ -17,7 +17,7 @@ from fmus.packaging.written import written
 from fmus.runtime.declare import variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
-SITUATIONS = 800
+SITUATIONS = 300
 LADDER = (1e-7, 1e-3, 1.0)  # of what starts at zero, in its unit or in what overcomes friction
 LOADS = (-1.1, -1.0, -0.9, 0.9, 1.0, 1.1)  # of a body at rest, in holding limits
 

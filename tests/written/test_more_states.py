@@ -1,25 +1,16 @@
 """Three states, and two contacts on bodies of their own: numerics of more than our five need, by independent routes."""
 
-import ctypes
-import subprocess
 from functools import cache
 from math import exp, fabs
-from pathlib import Path
 
 import numpy as np
 import pytest
 from arrays import array_steps, begun, bits, spelled, start, written_steps
 from by_hand import BY_HAND, followed
 from models import DOP853, LARGER, ODE23, ODE45, RODAS
-from native_fmus import room
-from native_host import compiler
 from scipy.integrate import solve_ivp
 
-import fmus.packaging.native as native
 from fmus.packaging.catalogue import find
-from fmus.packaging.native.compiler import SAME_BITS, STRICT
-from fmus.packaging.native.kinds import FLOAT
-from fmus.packaging.native.program import Program
 from fmus.packaging.written import written
 
 FILES = {path.stem: path for path in LARGER}
@@ -100,76 +91,3 @@ def test_a_stuck_sled_stands_on_its_speed_of_zero_while_the_other_moves():
                 assert bits([getattr(step, f"{speed}_0"), getattr(step, f"{speed}_1")]) == bits([0.0, 0.0])
                 seen += 1
     assert seen > 10
-
-
-def begin_2(model, t_end, tolerance):
-    a, b = model.initial(0.0)
-    model.solver.start(model, 0.0, a, b, t_end, tolerance)
-
-
-def begin_3(model, t_end, tolerance):
-    a, b, c = model.initial(0.0)
-    model.solver.start(model, 0.0, a, b, c, t_end, tolerance)
-
-
-def begin_4(model, t_end, tolerance):
-    a, b, c, d = model.initial(0.0)
-    model.solver.start(model, 0.0, a, b, c, d, t_end, tolerance)
-
-
-def take(model):
-    return model.solver.step.take(model)
-
-
-def ready(name, method):
-    return begun(written(FILES[name])(), {"solver.method": method, "solver.rtol": 1e-5}, STOPS[name])
-
-
-@cache
-def frozen(name):
-    """The library of a model, ready to run by any method."""
-    one, folder = ready(name, DOP853), Path(room().name)
-    program = Program(one)
-    program.entry("begin", {2: begin_2, 3: begin_3, 4: begin_4}[len(one.states)], FLOAT, FLOAT)
-    program.entry("take", take)
-    names = [f"{state}_1" if state[-1].isdigit() else f"{state}1" for state in one.states]
-    told = "".join(f"    *out++ = it.solver.step.{name};\n" for name in ("t1", *names))
-    text = f"""#include "numerics.h"
-{program.text()}
-static const struct {type(one).__name__} images[] = {{
-    {", ".join(program.layout.image(ready(name, method)) for method in RTOL)}
-}};
-static struct {type(one).__name__} it;
-int begun(int place, double stop)
-{{
-    bool fault = false;
-    it = images[place];
-    begin(&it, stop, 1e-6, &fault);
-    return fault;
-}}
-int taken(double *out)
-{{
-    bool fault = false;
-    int64_t status = take(&it, &fault);
-{told}    return fault || status;
-}}
-"""
-    (folder / f"{name}.c").write_text(text)
-    command = [compiler(), *STRICT, *SAME_BITS, "-Wno-unused-function", "-shared", "-fPIC"]
-    command.append(f"-I{Path(native.__file__).parent}")
-    subprocess.run([*command, f"{name}.c", "-o", f"{name}.so", "-lm"], cwd=folder, check=True)
-    return ctypes.CDLL(str(folder / f"{name}.so"))
-
-
-@EVERY_METHOD
-@pytest.mark.parametrize("name", STOPS)
-def test_c_does_what_the_scalars_do_to_the_last_bit(name, method):
-    library, one, stop = frozen(name), ready(name, method), STOPS[name]
-    out = (ctypes.c_double * (1 + len(one.states)))()
-    assert library.begun([*RTOL].index(method), ctypes.c_double(stop)) == 0
-    start(one, one.initial(0.0), stop)
-    step = one.solver.step
-    while step.t1 < stop:
-        assert step.take(one) == 0
-        assert library.taken(out) == 0
-        assert bits(out) == bits([step.t1, *spelled(step, one.states)])
