@@ -229,7 +229,7 @@ class Duffing(Model):
     v = State("1/s", "speed", rate_of=x)
     phase = State("rad", "phase of the force", rate=w)
     a = Output("1/s2", "acceleration", u * (u * (x - x * x * x + 0.5 * cos(phase)) - 0.3 * v), rate_of=v)
-    stop_time, method = 400.0, "dop853"
+    stop_time, method = 250.0, "dop853"
 '''
 
 
