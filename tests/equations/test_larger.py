@@ -4,7 +4,7 @@ import commands
 import numpy as np
 import pytest
 from builds import of_file
-from by_hand import BY_HAND, followed
+from by_hand import BY_HAND, truth
 from compare import identical
 from driver import Refused
 from fmpy import read_model_description
@@ -89,7 +89,7 @@ def test_contacts_stick_and_slip_when_equations_written_by_hand_say(worker, name
     """On a belt, in a clutch, each on its own body or both on one: every event, and the state at the end; also where
     a belt is set to another speed, and a clutch opened, on the way."""
     physics = BY_HAND[name]()
-    true, end = followed(physics, changes)
+    true, end = truth(name, changes)
     fmu = worker.instantiate(built(name, ""))
     fmu.begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=physics.stop)
     events, found = run(fmu, physics, changes)

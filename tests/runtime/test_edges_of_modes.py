@@ -35,7 +35,7 @@ def test_a_break_away_without_a_jump_is_one_event_and_starts_in_its_direction(la
     """mu_s = mu_d: v = v_driver (1 - cos(omega t)) from the break-away on, which rounding must not turn back."""
     name, choices, _ = case
     draw = random.Random(3).uniform
-    for _ in range(40):
+    for _ in range(20):
         m, k, mu, g, v_driver = draw(0.5, 50.0), draw(50.0, 5000.0), draw(0.1, 1.2), draw(1.0, 12.0), draw(0.01, 0.5)
         values = {**choices, "m": m, "k": k, "mu_s": mu, "mu_d": mu, "g": g, "v_driver": v_driver}
         omega, away = sqrt(k / m), mu * m * g / (k * v_driver)
@@ -56,7 +56,7 @@ def test_a_reversal_shorter_than_a_step_is_found_where_it_begins(launch, case):
     name, choices, _ = case
     m, k, g, mu_d, v_driver = 4.0, 100.0, 10.0, 0.3, 0.1
     omega, draw = sqrt(k / m), random.Random(5)
-    for _ in range(40):
+    for _ in range(20):
         swing = v_driver * (1.0 + 10.0 ** draw.uniform(-4.0, -1.0))
         phase = draw.uniform(0.0, 0.9 * pi)  # where the run begins: v = v_driver + swing cos(phase + omega t)
         values = {"m": m, "k": k, "g": g, "mu_s": 0.9, "mu_d": mu_d, "v_driver": v_driver, "solver.rtol": 1e-8}

@@ -6,7 +6,7 @@ from math import exp, fabs
 import numpy as np
 import pytest
 from arrays import array_steps, begun, bits, spelled, start, written_steps
-from by_hand import BY_HAND, followed
+from by_hand import BY_HAND, truth
 from models import DOP853, LARGER, ODE23, ODE45, RODAS
 from scipy.integrate import solve_ivp
 
@@ -60,11 +60,6 @@ def test_bristles_move_as_an_independent_solver_says(method):
     truth = bristles()
     found, _ = run("lugre", method)
     assert np.abs(np.array(found) - truth).max() < max(2e3 * RTOL[method] * np.abs(truth).max(), 1e-11)
-
-
-@cache
-def truth(name):
-    return followed(BY_HAND[name]())
 
 
 @EVERY_METHOD
