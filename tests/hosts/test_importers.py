@@ -116,3 +116,4 @@ def test_a_tool_that_is_not_asked_is_named_with_the_reason():
 def test_fmus_of_another_version_of_fmi_are_refused_in_one_sentence():
     with pytest.raises(HarnessError, match=r"\.fmu is of FMI 3\.0; the importers are asked with FMUs of FMI 2\.0"):
         table.rows(fmi3_hosts.built(), lambda name, share: None)
+    assert [table.titled(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]

@@ -63,12 +63,20 @@ def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
             for column in workers.map(partial(ask, importer), subjects):
                 columns.append(column)
                 report(importer.name, len(columns) / len(subjects))
-            name = f"{importer.name} {play(importer, subjects[0].basis).answer.version}"
+            name = titled(importer, subjects[0].basis)
             names = tuple(each.fmu.stem for each in subjects)
             for check, *cells in zip(CHECKS, *columns, strict=True):
                 failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
                 found.append(Checked(name, check, tuple(cells), failed, fmus=names))
     return found + [Checked(name, "", reason=reason) for name, reason in ELSEWHERE.items()]
+
+
+def titled(importer: Importer, request: Request) -> str:
+    """Its name, and its version if it lives to tell it."""
+    try:
+        return f"{importer.name} {play(importer, request).answer.version}"
+    except Wrong:
+        return importer.name
 
 
 def fmus(folder: Path) -> list[Path]:
