@@ -106,6 +106,7 @@ def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
         **{"crash": "exit status -11: a reason", "hang": "hangs for 300 s", "leak": "exit status -6: a reason"},
     }
     assert asked == [names[:3], ["two"], names[3:], ["hang"], names[4:]]
+    assert [table.titled(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]
 
 
 def test_a_tool_that_is_not_asked_is_named_with_the_reason():
@@ -116,4 +117,3 @@ def test_a_tool_that_is_not_asked_is_named_with_the_reason():
 def test_fmus_of_another_version_of_fmi_are_refused_in_one_sentence():
     with pytest.raises(HarnessError, match=r"\.fmu is of FMI 3\.0; the importers are asked with FMUs of FMI 2\.0"):
         table.rows(fmi3_hosts.built(), lambda name, share: None)
-    assert [table.titled(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]
