@@ -292,15 +292,17 @@ def test_the_files_of_c_travel_with_the_package():
     assert all((Path(native.__file__).parent / file).is_file() for file in (*WRITTEN, *COMPILED.values()))
 
 
-def test_the_compiler_has_a_home_where_a_service_has_none(monkeypatch):
+def test_the_compiler_has_a_home_where_a_service_has_none_and_keeps_nothing_of_ours_there(monkeypatch):
     told = {}
 
     def run(command, **options):
         told.update(options["env"])
         return subprocess.CompletedProcess(command, 1, "", "")
 
-    monkeypatch.delenv("HOME", raising=False)
+    for name in ("HOME", "ZIG_LOCAL_CACHE_DIR"):
+        monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("fmus.packaging.native.compiler.subprocess.run", run)
     with pytest.raises(BuildError, match=r"a.so does not compile"):
         linked({}, "a.c", "x86_64-linux-gnu.2.17", "a.so", ())
     assert Path(told["HOME"]).is_dir()
+    assert not Path(told["ZIG_LOCAL_CACHE_DIR"]).parent.exists()

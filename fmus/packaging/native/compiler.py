@@ -89,8 +89,9 @@ def linked(files: Mapping[str, str], main: str, target: str, out: str, options: 
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
         command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
         command += [main, "-o", out]
-        home = {"HOME": gettempdir()} | os.environ  # the compiler keeps a store there, and services have none
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=home)
+        # The compiler keeps a store at home, which services have not; what it makes of ours stays out, or it would grow.
+        stores = {"HOME": gettempdir(), "ZIG_LOCAL_CACHE_DIR": f"{folder}/store"} | os.environ
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=stores)
         if done.returncode:
             raise BuildError(f"{out} does not compile for {target}:\n{done.stderr.strip()}")
         return (Path(folder) / out).read_bytes()
