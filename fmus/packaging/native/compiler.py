@@ -89,7 +89,7 @@ def linked(files: Mapping[str, str], main: str, target: str, out: str, options: 
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
         command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
         command += [main, "-o", out]
-        # The compiler keeps a store at home, which services have not; what it makes of ours stays out, or it would grow.
+        # It keeps a store at home, which services have not; what it makes of ours stays out, or the store would grow.
         stores = {"HOME": gettempdir(), "ZIG_LOCAL_CACHE_DIR": f"{folder}/store"} | os.environ
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=stores)
         if done.returncode:
