@@ -79,7 +79,7 @@ class March(Declaring):
         """
         step = self.step
         if self.t > step.t0:
-            step.before.length = step.t1 - step.t0
+            step.before.length = self.told_end() - step.t0
             if model.dry and step.event and self.t >= step.t1:
                 step.note_event()
                 self.modes = step.modes1  # if the event still waited to be handled, it has been now

@@ -139,7 +139,8 @@ class Step:
             self.note_event()
             self.event = False
         before = self.before
-        before.length = self.t1 - self.t0
+        if self.t1 > self.t0:
+            before.length = self.t1 - self.t0
         self.keep_counts()
         self.t0, self.y0 = self.t1, self.y1
         self.f0, self.modes0 = self.f1, self.modes1

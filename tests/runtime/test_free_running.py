@@ -1,7 +1,7 @@
 """The solver runs free: communication points, looks ahead and repeated settings leave no trace in the solution."""
 
 import random
-from math import cos, nextafter, sin
+from math import cos, inf, nextafter, sin
 
 import pytest
 from compare import close, identical
@@ -75,6 +75,21 @@ def test_a_change_at_the_end_of_an_internal_step_forgets_what_was_looked_at_beyo
         fmu.set({force: size})
         runs.append(fmu.run([t, t + 0.001, t + 0.05 * (stop - t)], names))
     identical(runs[1], runs[0], names)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_the_step_in_force_is_finite_and_the_same_after_a_look_ahead_and_a_setting(launch, case):
+    name, values, stop = case
+    force, size = push(name)
+    for share in (0.0, 0.3, 0.7):
+        fmu, t = launch(name, values), share * stop
+        fmu.run([0.0, t][: 1 + (t > 0.0)], [])
+        told = fmu.get("solver.h")
+        assert 0.0 <= told < inf
+        assert (told > 0.0) == (t > 0.0)
+        fmu.set({force: size})
+        found = [fmu.get("solver.h"), fmu.get("solver.t_next", "solver.h")[1], fmu.get("solver.h")]
+        assert found == [told] * 3
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
