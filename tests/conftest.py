@@ -1,5 +1,6 @@
 """Fixtures: the FMUs built once, and a process that runs them."""
 
+import gc
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,6 +22,12 @@ def pytest_configure(config):
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         builds.room = Path(folder.name)
+
+
+def pytest_collection_finish():
+    """What is there now stays to the end; to look through it again and again for what is not in use takes seconds."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist
