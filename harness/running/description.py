@@ -1,6 +1,5 @@
 """What an FMU says of itself."""
 
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -12,6 +11,7 @@ from fmpy.model_description import ValidationError
 from ..errors import HarnessError, SceneError, reason
 from ..scenes.fmus import check_built
 from .specification import Specification
+from .unchanged import once
 from .values import in_force, unit
 
 MOST = 50  # faults that are told
@@ -21,12 +21,12 @@ def description(path: Path, lenient: bool = False) -> Any:
     """What an FMU says of itself; HarnessError if it cannot be read, is of a version that nobody here runs, or, unless
     one is lenient, breaks the standard."""
     check_built(path, SceneError)
-    return read(path.absolute(), path.stat().st_mtime_ns, lenient)
+    return read(path, lenient)
 
 
-@lru_cache(maxsize=8)
-def read(path: Path, changed: int, lenient: bool) -> Any:
-    """The same, as long as the file is not changed: a run asks for it two or three times."""
+@once
+def read(path: Path, lenient: bool) -> Any:
+    """The same, of a file that is there."""
     try:
         old = version(path)
         found = None if old.startswith("1.") else fmpy.read_model_description(path, validate=not lenient)

@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from importlib import import_module
 from operator import attrgetter
 from pathlib import Path
@@ -15,6 +14,7 @@ import numpy as np
 from ..errors import HarnessError
 from ..scenes.fmus import check_built
 from .answer import Answer
+from .unchanged import once
 from .unpacked import LAYER, unpacked
 
 OK = 0  # status of the march
@@ -23,12 +23,12 @@ OK = 0  # status of the march
 def embedded(fmu: Path) -> type:
     """The model class inside an FMU; its package bears a name of its own, so that several live side by side."""
     check_built(fmu)
-    return carried(fmu.absolute(), fmu.stat().st_mtime_ns)
+    return carried(fmu)
 
 
-@cache
-def carried(fmu: Path, changed: int) -> type:
-    """The same, as long as the file is not changed."""
+@once
+def carried(fmu: Path) -> type:
+    """The same, of a file that is there."""
     with unpacked(fmu) as folder:
         resources = folder / "resources"
         package = (resources / LAYER).read_text(encoding="utf-8").removesuffix("_fmu")

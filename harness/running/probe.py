@@ -7,7 +7,6 @@ import atexit
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import product
 from math import inf, isnan, nan
 from pathlib import Path
@@ -18,10 +17,11 @@ import numpy as np
 from fmpy.fmi1 import FMICallException
 
 from ..errors import HarnessError
-from ..scenes.fmus import check_built, fmu_of
+from ..scenes.fmus import fmu_of
 from ..scenes.roles import roles
 from .fmu import Heard, begin, described, loaded, put
 from .specification import Specification
+from .unchanged import once
 from .unpacked import unpacked
 from .values import labels
 
@@ -152,17 +152,16 @@ class Probe:
 @contextmanager
 def probe(model: str) -> Iterator[Probe]:
     """A fresh instance of a model's FMU, whose words are kept from the terminal."""
-    file = fmu_of(model)
-    check_built(file)
-    found, folder = kept(file.absolute(), file.stat().st_mtime_ns)
-    with loaded(Specification(file), found, folder) as (fmu, heard):
+    wanted = Specification(fmu_of(model))
+    found = described(wanted)
+    with loaded(wanted, found, kept(wanted.fmu)) as (fmu, heard):
         yield Probe(found, fmu, heard)
 
 
-@cache
-def kept(file: Path, changed: int) -> tuple[Any, Path]:
-    """The description of an FMU, and the folder of its files; both last as long as the process."""
-    return described(Specification(file)), HELD.enter_context(unpacked(file))
+@once
+def kept(fmu: Path) -> Path:
+    """The folder of its files, which lasts as long as the process."""
+    return HELD.enter_context(unpacked(fmu))
 
 
 def run(setting: Setting, calls: Calls, changes: Changes) -> Motion | Refusal:
