@@ -68,7 +68,7 @@ def compiled(name: str, files: Mapping[str, str], main: str, platform: str) -> d
     """The libraries from the source `main`, which depend on nothing else, by the folders of FMI 3.0."""
     chosen, out = PLATFORMS[platform], f"{name}{PLATFORMS[platform].suffix}"
     own = {source: Path(__file__).with_name(source).read_text(encoding="utf-8") for source in chosen.sources}
-    options = (*LIBRARY, *own, *(option.format(name=name, compiler=compiler()) for option in chosen.options))
+    options = (*LIBRARY, *own, *chosen.options)
     return {place: linked({**files, **own}, main, target, out, options) for place, target in chosen.targets.items()}
 
 
@@ -82,8 +82,8 @@ def compiler() -> Path:
 
 def linked(files: Mapping[str, str], main: str, target: str, out: str, options: Iterable[str]) -> bytes:
     """What the compiler makes of the source `main` for a target; `out` is a name without a folder, so that none gets
-    in."""
-    compiler()
+    in, and an option may name the compiler's folder."""
+    options = [option.format(name=Path(out).stem, compiler=compiler()) for option in options]
     with TemporaryDirectory() as folder:
         for file, text in files.items():
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")

@@ -21,7 +21,7 @@ from .wasm import packed
 FILE = "index.html"
 HERE = Path(__file__).parent
 MODULES = (
-    *("wasm", "fmu", "run", "state", "edit", "measure", "desk", "plot", "mechanism", "hand", "controls"),
+    *("libc", "wasm", "fmu", "run", "state", "edit", "measure", "desk", "plot", "mechanism", "hand", "controls"),
     *("panels", "diagrams", "form", "tables", "take", "main"),
 )
 

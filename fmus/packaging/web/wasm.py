@@ -9,11 +9,14 @@ from ..native.sources import COMPILED
 
 TARGET = "wasm32-wasi"
 CALLED = (  # by script/fmu.js
-    *("malloc", "fmi2Instantiate", "fmi2Reset", "fmi2SetupExperiment"),
+    *("fmi2Instantiate", "fmi2Reset", "fmi2SetupExperiment"),
     *("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2DoStep"),
     *("fmi2GetReal", "fmi2GetInteger", "fmi2SetReal", "fmi2SetInteger"),
 )
-OPTIONS = ("-mexec-model=reactor", "-fvisibility=hidden", *(f"-Wl,--export={name}" for name in CALLED))
+# The headers of a C library without the library, which the compiler would first have to make: script/libc.js is one.
+HEADERS = (f"-isystem{{compiler}}/lib/libc/include/{kind}-musl" for kind in ("wasm-wasi", "generic"))
+IMPORTING = ("-nostdlib", *HEADERS, "-Wl,--no-entry", "-Wl,--import-symbols")
+OPTIONS = (*IMPORTING, "-fvisibility=hidden", *(f"-Wl,--export={name}" for name in CALLED))
 
 
 def packed(name: str, files: Mapping[str, str]) -> str:

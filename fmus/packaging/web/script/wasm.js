@@ -1,6 +1,6 @@
-// A model's WebAssembly out of the page, and the three calls by which C speaks on standard error.
+// A model's WebAssembly out of the page, with the library that its C calls.
 
-const STDERR_CALLS = "wasi_snapshot_preview1";
+import { libc } from "./libc.js";
 
 // The exports of a module that is packed in letters; `said()` gives what it has said since it was last asked.
 export async function load(letters) {
@@ -10,27 +10,13 @@ export async function load(letters) {
   const decoder = new TextDecoder();
   let text = "";
 
-  function fd_write(file, pieces, count, written) {
-    const memory = new DataView(exports.memory.buffer);
-    let total = 0;
-    for (let i = 0; i < count; i++) {
-      const start = memory.getUint32(pieces + 8 * i, true);
-      const length = memory.getUint32(pieces + 8 * i + 4, true);
-      text += decoder.decode(new Uint8Array(exports.memory.buffer, start, length), { stream: true });
-      total += length;
-    }
-    memory.setUint32(written, total, true);
-    return 0;
-  }
-
-  const calls = { fd_write, fd_close: () => 0, fd_seek: () => 0 };
-  const { instance } = await WebAssembly.instantiate(bytes, { [STDERR_CALLS]: calls });
-  const exports = instance.exports;
-  exports._initialize();
+  const memory = () => instance.exports.memory;
+  const env = libc(memory, (words) => (text += decoder.decode(words)) && words.length);
+  const { instance } = await WebAssembly.instantiate(bytes, { env });
   function said() {
     const told = text;
     text = "";
     return told;
   }
-  return { exports, said };
+  return { exports: { ...instance.exports, malloc: env.malloc }, said };
 }
