@@ -24,11 +24,16 @@ from fmus.packaging.native.sources import COMPILED
 ROWS = 50
 ARM = "/usr/aarch64-linux-gnu"  # where Debian puts the C library
 MACHINES = {"win64": ["wine"], "aarch64-linux": ["qemu-aarch64", "-L", ARM]}  # and what runs their programs
-PROGRAM = {  # the source that a program needs beside those of a library, and options
+PROGRAM = {  # the source that a program needs beside those of a library, and options; none of the compiler's libraries
     "win64": (
         [SOURCE.with_name("windows.c")],
-        ["-Wl,-e,mainCRTStartup", *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("runtime", "time", "utility"))],
-    )
+        [
+            "-nostdlib",
+            "-Wl,-e,mainCRTStartup",
+            *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("runtime", "time", "utility")),
+        ],
+    ),
+    "aarch64-linux": ([], ["-rtlib=none"]),
 }
 CLOSE = dict.fromkeys(MODELS, 1e-11) | {"pacejka": 1e-9}  # of an output's largest value; break-aways amplify
 
@@ -53,7 +58,7 @@ def machine(request):
 
     def program(source):
         def make(folder):
-            chosen, (more, options) = PLATFORMS[request.param], PROGRAM.get(request.param, ((), ()))
+            chosen, (more, options) = PLATFORMS[request.param], PROGRAM[request.param]
             options = [*(option.format(compiler=compiler()) for option in chosen.options), *options]
             sources = [source, *more, *(Path(native.__file__).with_name(file) for file in chosen.sources)]
             command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", "-s", *options, f"-I{HEADERS}"]

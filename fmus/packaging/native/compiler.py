@@ -22,7 +22,8 @@ SAME_BITS = ("-O2", "-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LI
 LEFT_OUT = ("-Wno-unused-parameter", "-Wno-unused-but-set-variable")  # by a branch of the numerics that is not needed
 THEIRS = ("-Wno-strict-prototypes",)  # in the headers of FMI 3.0
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *LEFT_OUT, *THEIRS)
-LIBRARY = ("-shared", "-fPIC", "-fvisibility=hidden")
+# Of libraries those that are named alone: the compiler's own, which nothing of ours calls, takes it longer than ours.
+LIBRARY = ("-shared", "-fPIC", "-fvisibility=hidden", "-nostdlib", "-Wl,-z,defs")
 
 
 @dataclass(frozen=True)
@@ -38,19 +39,19 @@ class Platform:
 
 # The C runtime of Windows 10 and later as it is, and the headers that the compiler has for it.
 UCRT = (
-    *("-nostdlib", "-isystem", "{compiler}/lib/libc/include/any-windows-any", "-D__USE_MINGW_ANSI_STDIO=0"),
+    *("-isystem", "{compiler}/lib/libc/include/any-windows-any", "-D__USE_MINGW_ANSI_STDIO=0"),
     *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("convert", "heap", "math", "private", "stdio", "string")),
     *("-lkernel32", "-Wl,-e,DllMainCRTStartup"),
 )
 PLATFORMS = {
-    "linux64": Platform(".so", {"x86_64-linux": "x86_64-linux-gnu.2.17"}, ("-lm",)),
+    "linux64": Platform(".so", {"x86_64-linux": "x86_64-linux-gnu.2.17"}, ("-lc", "-lm")),
     "win64": Platform(".dll", {"x86_64-windows": "x86_64-windows-gnu"}, UCRT, ("windows.c",)),
     "darwin64": Platform(
         ".dylib",
         {"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"},
-        ("-Wl,-install_name,@rpath/{name}.dylib", "-lm"),
+        ("-Wl,-install_name,@rpath/{name}.dylib", "-lc", "-lm"),
     ),
-    "aarch64-linux": Platform(".so", {"aarch64-linux": "aarch64-linux-gnu.2.17"}, ("-lm",)),
+    "aarch64-linux": Platform(".so", {"aarch64-linux": "aarch64-linux-gnu.2.17"}, ("-lc", "-lm")),
 }
 USUAL = ("linux64", "win64", "darwin64")
 
