@@ -106,6 +106,7 @@ def serve():
     asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": Forked})
     with style.sheet(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
         figure.subplots().set_title("a title")
+    drawing = [each for each in sys.modules.values() if getattr(each, "sheet", None) is style.sheet]
     gc.freeze()  # else whoever is forked copies all that there is, to count who refers to it
     for line in sys.stdin:
         child = os.fork()
@@ -113,7 +114,7 @@ def serve():
             module, blank, asked = json.loads(line)
             become(**asked)
             if blank:
-                for each in [each for each in sys.modules.values() if getattr(each, "sheet", None) is style.sheet]:
+                for each in drawing:
                     each.sheet = partial(unseen, style.Figure)
             run(module)
             return
