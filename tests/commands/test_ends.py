@@ -7,18 +7,21 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from functools import partial
-from itertools import product
+from itertools import count, product
 from pathlib import Path
 
 import pytest
 from builds import ROOT
 
+import harness.process.wait
 from harness.commands.terminal import progress
 from harness.process import interrupt
 from harness.process.child import Hangs, ask
 from harness.process.interrupt import Interrupted, check, interruptible, later
+from harness.process.wait import ended
 
 SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
 COMMANDS = {  # and a file or folder that is there once it is under way
@@ -136,6 +139,39 @@ def test_a_signal_in_a_beginning_waits_for_its_end(monkeypatch):
     finally:
         signal.signal(signal.SIGTERM, before)
     assert begun == ["whole"]
+
+
+def test_a_signal_while_the_command_waits_leaves_no_lock_held(monkeypatch):
+    """At whatever line of the waiting it comes, of ours or of the library's: else what is awaited could never end."""
+    monkeypatch.setattr(harness.process.wait, "OFTEN", 1e-4)
+    before, trace = signal.signal(signal.SIGINT, interrupt.hear), sys.gettrace()
+
+    def interrupted(line):
+        """Whether the waiting has so many lines; it is interrupted at the last."""
+        monkeypatch.setattr(interrupt, "HEARD", [])
+        pending, lines = Future(), iter(range(line))
+
+        def look(frame, event, _):
+            if event == "line" and not interrupt.HEARD and next(lines, None) is None:
+                signal.raise_signal(signal.SIGINT)
+            return look
+
+        with suppress(KeyboardInterrupt):
+            sys.settrace(look)
+            ended([pending])
+            sys.settrace(trace)  # before suppress, which is Python, too, goes on
+        sys.settrace(trace)
+        other = threading.Thread(target=pending.cancel, daemon=True)
+        other.start()
+        other.join(timeout=10)
+        assert not other.is_alive()
+        return bool(interrupt.HEARD)
+
+    try:
+        assert next(line for line in count() if not interrupted(line)) > 100
+    finally:
+        sys.settrace(trace)
+        signal.signal(signal.SIGINT, before)
 
 
 def test_a_program_that_hangs_ends_with_all_that_it_started(tmp_path):

@@ -1,7 +1,6 @@
 """The importer table: importers by checks by FMUs."""
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -9,6 +8,7 @@ from pathlib import Path
 from rich.table import Table
 
 from ...errors import HarnessError
+from ...process.wait import each
 from ...results.files import write_rows
 from ...results.folder import replacing
 from ...results.provenance import named, of_each, record
@@ -53,21 +53,20 @@ def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
             found.append(Checked(fmu.name, "", reason=str(unfit)))
     if not subjects:
         raise HarnessError(f"no FMU in {folder} is asked about: {found[0].reason}; name another folder")
-    with ThreadPoolExecutor(WORKERS) as workers:
-        for importer in IMPORTERS:
-            if reason := absent(importer, subjects[0].fmu):
-                found.append(Checked(importer.name, "", reason=reason))
-                continue
-            columns: list[list[str]] = []
-            report(importer.name, 0.0)
-            for column in workers.map(partial(ask, importer), subjects):
-                columns.append(column)
-                report(importer.name, len(columns) / len(subjects))
-            name = titled(importer, subjects[0].basis)
-            names = tuple(each.fmu.stem for each in subjects)
-            for check, *cells in zip(CHECKS, *columns, strict=True):
-                failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
-                found.append(Checked(name, check, tuple(cells), failed, fmus=names))
+    for importer in IMPORTERS:
+        if reason := absent(importer, subjects[0].fmu):
+            found.append(Checked(importer.name, "", reason=reason))
+            continue
+        columns: list[list[str]] = []
+        report(importer.name, 0.0)
+        for column in each(WORKERS, partial(ask, importer), subjects):
+            columns.append(column)
+            report(importer.name, len(columns) / len(subjects))
+        name = titled(importer, subjects[0].basis)
+        names = tuple(asked.fmu.stem for asked in subjects)
+        for check, *cells in zip(CHECKS, *columns, strict=True):
+            failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
+            found.append(Checked(name, check, tuple(cells), failed, fmus=names))
     return found + [Checked(name, "", reason=reason) for name, reason in ELSEWHERE.items()]
 
 

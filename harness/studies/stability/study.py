@@ -6,7 +6,6 @@ every run has a time limit, in a process that may crash (bounded.py).
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import HarnessError
+from ...process.wait import each
 from ...results.files import write_rows
 from ...results.folder import replacing
 from ...results.provenance import of_each, record
@@ -62,8 +62,7 @@ def table(report: Callable[[str, float], None], chosen: list[list[Trial]]) -> li
             report(row.case.label, 1.0)
         return found
 
-    with ThreadPoolExecutor(WORKERS) as pool:
-        found = [row for found in pool.map(rows, chosen) for row in found]
+    found = [row for found in each(WORKERS, rows, chosen) for row in found]
     return sorted(found, key=lambda row: row.case.place)
 
 

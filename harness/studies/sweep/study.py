@@ -7,7 +7,7 @@ is held in memory than a worker has under way.  A run during which its worker di
 
 import json
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -18,10 +18,10 @@ from time import perf_counter
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.child import OFTEN
 from ...process.crew import Crew
 from ...process.interrupt import HEARD, Interrupted, check
 from ...process.room import room
+from ...process.wait import ended
 from .cluster import Cluster, cluster
 from .hands import Work, unload, work
 from .journal import Block, Journal
@@ -113,7 +113,7 @@ class Shift:
         while self.left or self.suspects or self.busy:
             check()
             self.deal()
-            for future in wait(self.busy, timeout=OFTEN, return_when=FIRST_COMPLETED).done:
+            for future in ended(self.busy):
                 if future in self.busy:
                     yield from self.answered(future, self.busy.pop(future))
 
