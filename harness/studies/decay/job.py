@@ -40,10 +40,10 @@ def perform(
     """Identify the decay of a record's file or of a scene; results go to out/decay/<name>."""
     record, force, told = load_record(source, columns, known, report)
     scene = told.pop("scene", {}) | vars(columns) | vars(known) | {"drag": drag, "drift": drift}
-    found = identify(record, force, drag, drift, report)
     folder = out / FOLDER / record.name
     named = provenance.named(source)
-    with replacing(folder, FILES, named) as fresh:
+    with replacing(folder, FILES, named) as fresh:  # before the fit: what is in the way is told at once
+        found = identify(record, force, drag, drift, report)
         save(found, fresh)
         provenance.record(fresh, **told, scene=scene, source=named)
     return found, folder
