@@ -6,6 +6,7 @@ import shlex
 import sys
 from collections.abc import Iterable, Mapping
 from datetime import datetime
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -65,6 +66,7 @@ def versions() -> dict[str, str]:
     return {package: installed(package) for package in PACKAGES} | {"python": platform.python_version()}
 
 
+@cache
 def installed(package: str) -> str:
     try:
         return version(package)

@@ -4,7 +4,7 @@ own, in a folder of his.
 The process is forked from one that has loaded both and their libraries, for to load them takes a second, and there are
 hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).  So is
 forked what a command asks of a module of the project in a process of its own.  Figures, which take most of a run, are
-left `blank` where nobody looks at them.
+left `blank` where nobody looks at them; "unplotted", where it is told elsewhere that they can be plotted.
 """
 
 import atexit
@@ -33,6 +33,7 @@ ROOT = SUPPORT.parents[1]
 PATIENCE = 300.0  # s
 LATE = ("dask.array", "fmpy.validation", "rich.progress", "scipy.io", "xarray")  # imported where they are used
 ASKED = ("build_fmus", "harness.running.", "harness.studies.coupled.")  # modules that answer in processes of their own
+UNPLOTTED = "unplotted"
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg"><style></style></svg>'
 
 
@@ -101,8 +102,9 @@ def serve():
                 import_module(name)
     import_module("fmus.packaging.written").written("smd")  # reads what every model is written out from
     from harness.process import child as asking
-    from harness.results import style
+    from harness.results import provenance, style
 
+    provenance.versions()  # are looked up once
     asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": Forked})
     with style.sheet(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
         figure.subplots().set_title("a title")
@@ -115,16 +117,24 @@ def serve():
             become(**asked)
             if blank:
                 for each in drawing:
-                    each.sheet = partial(unseen, style.Figure)
+                    each.sheet = partial(unseen, None if blank == UNPLOTTED else style.Figure)
             run(module)
             return
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 
 
+class Unplotted(Exception):
+    """The end of what is done to a figure of no kind."""
+
+    def __getattr__(self, name):
+        raise self
+
+
 @contextmanager
 def unseen(kind, path, width, height, layout=None):
-    """In the place of a sheet: what is plotted is neither laid out nor drawn."""
-    yield kind((width, height))
+    """In the place of a sheet: what is plotted is neither laid out nor drawn; without a `kind`, it is not plotted."""
+    with suppress(Unplotted):
+        yield kind((width, height)) if kind else Unplotted()
     path.write_text(BLANK)
 
 
