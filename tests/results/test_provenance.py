@@ -11,6 +11,7 @@ import commands
 import numpy as np
 import pytest
 from builds import published
+from commands import UNPLOTTED
 from fmpy import read_model_description
 from models import MODELS
 
@@ -20,11 +21,11 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "run": (("run", "coulomb"), "coulomb"),
     "run --fmu": (("run", "--fmu", "fmus/coulomb.fmu", "--set", "f=0.25"), "coulomb"),
     "compare": (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), "compare/coulomb-smd"),
-    "decay": (("decay", "coulomb"), "decay/coulomb"),
+    "decay": (("decay", "coulomb", "--no-drag", "--until", "2"), "decay/coulomb"),
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
 }
 DRAWN = "decay/coulomb"  # the others are not, for the same drawing is the same file (test_figures.py)
-harness = partial(commands.harness, blank=True)
+harness = partial(commands.harness, blank=UNPLOTTED)  # each of these is plotted by a test of its study
 
 
 @pytest.fixture
@@ -39,7 +40,7 @@ def made(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""
     here, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]
     (here / "fmus").symlink_to(fmus)
-    done = commands.harness(here, *arguments, blank=folder != DRAWN)
+    done = commands.harness(here, *arguments, blank=folder != DRAWN and UNPLOTTED)
     assert (done.returncode, done.stderr) == (0, "")
     return here, arguments, here / "results" / folder
 
@@ -115,13 +116,15 @@ def test_the_report_shows_whatever_was_run(here):
     assert "mine: the plots that its scene names" in page
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{}", '{"files": 1}', '{"files": {}, "versions": {}}'])
-def test_a_damaged_account_is_told_in_the_page(here, swung, content):
-    shutil.copytree(swung / "results/smd", here / "results/smd")
-    (here / "results/smd/provenance.json").write_text(content)
+def test_a_damaged_account_is_told_in_the_page(here, swung):
+    damaged = ("", "[]", "{}", '{"files": 1}', '{"files": {}, "versions": {}}')
+    for model, content in zip(MODELS, damaged, strict=True):
+        shutil.copytree(swung / "results/smd", here / "results" / model)
+        (here / "results" / model / "provenance.json").write_text(content)
     done = harness(here, "report")
     assert (done.returncode, done.stderr) == (0, "")
-    assert "smd cannot be shown" in (here / "results/report.html").read_text()
+    page = (here / "results/report.html").read_text()
+    assert [model for model in MODELS if f"results/{model} cannot be shown" not in page] == []
 
 
 def files(folder):
@@ -134,7 +137,7 @@ def files(folder):
 def test_a_result_is_made_again_by_its_folder_and_to_the_last_bit(made):
     here, (command, *_), folder = made
     before, account = files(folder), told(folder)
-    done = commands.harness(here, "run", folder.relative_to(here), blank=not folder.match(DRAWN))
+    done = commands.harness(here, "run", folder.relative_to(here), blank=not folder.match(DRAWN) and UNPLOTTED)
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == before
     for key in ("files", "parameters", "scene", "source"):
@@ -150,7 +153,7 @@ def test_every_shipped_scene_is_run_again_to_the_last_bit(here, scene):
     assert "the same, bit for bit" in harness(here, "run", f"results/{scene}").stdout
 
 
-MINE = 'title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = []\nstop = 1.0\n[values]\nc = 3.0\n'
+MINE = 'title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = []\nstop = 1.0\ngrid = 0.1\n[values]\nc = 3.0\n'
 
 
 def test_a_result_is_made_again_though_its_scene_is_gone_and_goes_where_it_is_wanted(here):
@@ -179,6 +182,13 @@ def test_a_result_whose_fmu_has_changed_or_gone_is_not_made_again_as_if_it_were_
     assert files(here / "results/mine") == before
 
 
+def swinging(file):
+    """Write a record of a decay."""
+    t = np.linspace(0, 2, 60)
+    rows = np.column_stack([t, np.exp(-t) * np.cos(12 * t)])
+    np.savetxt(file, rows, header="t [s],x [m]", delimiter=",", comments="")
+
+
 ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
 
 
@@ -189,7 +199,7 @@ ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
         (("run", "--fmu", "fmus/coulomb.fmu"), ("run", "coulomb"), "coulomb"),
         (("run", "a/mine.toml"), ("run", "b/mine.toml"), "mine"),
         (("run", "--fmu", "fmus/smd.fmu"), ("run", "--fmu", "a/smd.fmu"), "smd"),
-        (("decay", "coulomb"), ("decay", "a/coulomb.csv"), "decay/coulomb"),
+        (("decay", "coulomb", "--no-drag"), ("decay", "a/coulomb.csv", "--no-drag"), "decay/coulomb"),
         (("compare", "smd", "a/smd.fmu"), ("compare", "smd", "b/a/smd.fmu"), "compare/scene-smd-a-smd"),
         (("sweep", "a/smd.fmu", *ONCE), ("sweep", "b/smd.fmu", *ONCE), "sweep/c"),
     ],
@@ -199,9 +209,7 @@ def test_a_result_of_something_else_is_replaced_only_by_the_word_for_it(here, fm
         (here / place).mkdir()
         (here / place / "mine.toml").write_text(MINE)
         shutil.copy(fmus / "smd.fmu", here / place)
-    t = np.linspace(0, 4, 400)
-    rows = np.column_stack([t, np.exp(-t) * np.cos(12 * t)])
-    np.savetxt(here / "a/coulomb.csv", rows, header="t [s],x [m]", delimiter=",", comments="")
+    swinging(here / "a/coulomb.csv")
     assert harness(here, *first).returncode == 0
     before = files(here / "results" / folder)
     done = harness(here, *second)
@@ -228,27 +236,29 @@ def test_a_result_of_other_values_is_not_replaced_in_silence(here):
     ("arguments", "older", "newer", "had"),
     [
         (("run", "--fmu", "fmus/coulomb.fmu"), ("--set", "f=0.25"), ("--set", "f=0.5"), "f = 0.25 N"),
-        (("decay", "coulomb"), (), ("--no-drag", "--until", "3"), "drag, no end"),
+        (("decay", "swing.csv"), (), ("--no-drag", "--until", "1.5"), "drag, no end"),
         (("compare", "fmus/coulomb.fmu", "smd"), ("--stop", "2"), (), "stop = 2.0"),
         (("sweep", "smd", *ONCE), ("--set", "m=2"), (), "m = 2.0 kg"),
     ],
 )
 def test_a_result_of_other_options_is_not_replaced_in_silence(here, arguments, older, newer, had):
+    swinging(here / "swing.csv")
     assert harness(here, *arguments, *older).returncode == 0
     done = harness(here, *arguments, *newer, COLUMNS="200")
     assert (done.returncode, done.stderr) == (0, "")
     assert re.search(rf"It takes the place of the result of [-\dT:+]+, which had {had}\b", done.stdout)
 
 
-@pytest.mark.parametrize("content", ["", "[]", "{}", '{"command": 1}', None])
-def test_a_folder_that_does_not_say_what_made_it_is_not_run(here, swung, content):
+def test_a_folder_that_does_not_say_what_made_it_is_not_run(here, swung):
+    account = here / "results/smd/provenance.json"
     shutil.copytree(swung / "results/smd", here / "results/smd")
-    if content is None:
-        (here / "results/smd/provenance.json").unlink()
-    else:
-        (here / "results/smd/provenance.json").write_text(content)
-    done = harness(here, "run", "results/smd")
-    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    assert "results/smd holds no result that tells what made it" in done.stderr
-    if content is None or content == "":
-        assert harness(here, "run", "smd").returncode == 0
+    for content in ("[]", "{}", '{"command": 1}', "", None):
+        if content is None:
+            account.unlink()
+        else:
+            account.write_text(content)
+        done = harness(here, "run", "results/smd")
+        assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+        assert "results/smd holds no result that tells what made it" in done.stderr
+        if not content:
+            assert harness(here, "run", "smd").returncode == 0
