@@ -1,7 +1,8 @@
-"""Trees of Python, of which most are looked at again and again: read once, and copied quickly."""
+"""Trees of Python, of which most are looked at again and again: read once, and shared where they do not change."""
 
 import ast
 from functools import lru_cache
+from operator import is_
 from typing import Any, TypeVar
 
 Node = TypeVar("Node", bound=ast.AST)
@@ -60,8 +61,40 @@ def copied(node: Node, down: int = 0) -> Node:
     return made
 
 
+class Changer:
+    """What becomes of a tree: visit_Name(node) and its like say it of a kind of nodes, and tell it of the node itself
+    where nothing does.  No tree is changed: what is new holds those parts of the old that stay."""
+
+    def visit(self, node: ast.AST) -> Any:
+        return getattr(self, f"visit_{type(node).__name__}", self.generic_visit)(node)
+
+    def generic_visit(self, node: Node) -> Node:
+        found = {}
+        for name in BRANCHES[type(node)]:
+            value = getattr(node, name, None)
+            if isinstance(value, list):
+                found[name] = [self.visit(one) if isinstance(one, ast.AST) else one for one in value]
+            elif isinstance(value, ast.AST):
+                found[name] = self.visit(value)
+        return altered(node, **found) if found else node
+
+
+def altered(node: Node, **parts: Any) -> Node:
+    """A node with these parts in place of its own; the node itself, if they are its own."""
+    its = vars(node)
+    for name, part in parts.items():
+        old = its[name]
+        if part is not old and not (isinstance(old, list) and len(part) == len(old) and all(map(is_, part, old))):
+            made = node.__new__(type(node))
+            vars(made).update(its | parts)
+            return made
+    return node
+
+
 def same(a: Any, b: Any) -> bool:
     """Whether two trees say the same, wherever they stand."""
+    if a is b:
+        return True
     if type(a) is not type(b):
         return False
     if isinstance(a, ast.AST):

@@ -6,7 +6,8 @@ from models import DOP853, LARGER, RODAS
 
 from fmus.packaging.catalogue import find
 from fmus.packaging.native.interface import header
-from fmus.packaging.written import beside, written
+from fmus.packaging.written import LAWS, METHODS, beside, offer, written
+from fmus.runtime.declare import variables
 
 BELT = '''"""A model."""
 from fmus import Contact, Mode, Model, Output, Parameter, State
@@ -32,6 +33,7 @@ NAMES = {
     SLED: [("y", "v", "e", "modes"), ("x", "x1", "x0", "x_1")],
     BELT: [("h", "size", "end", "i"), ("HUGE", "d_x", "to", "near")],
 }
+CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
 
 
 def numbers(path, model, names):
@@ -62,6 +64,22 @@ def test_a_name_that_the_numerics_have_for_something_else_changes_nothing(tmp_pa
         path.write_text(changed)
         assert numbers(path, written(path)(), names) == expected, names
     assert text == SLED or "typedef struct Mine Model;" in header(written(path), "3")  # with a slope of d_x
+
+
+def test_a_choice_of_an_author_keeps_what_is_called_like_a_method_or_a_law_that_is_not_offered(tmp_path):
+    path, labels = tmp_path / "mine.py", [*METHODS, *LAWS]
+    items, cases = (", ".join(each.format(*pair) for pair in zip(labels, "12345678", strict=True)) for each in CHOSEN)
+    text = SLED.replace("import Contact", "import Choice, Contact").replace("- F)", f"* kind.choose({cases}) - F)")
+    path.write_text(text.replace("    m =", f'    kind = Choice("kind", {items})\n    m ='))
+    source = find(path)
+    model = written(source, offer(source, ["ode45"], ["hybrid"]))()
+    offered = {name: [label for label, _, _ in meaning.items] for name, meaning in variables(model) if meaning.items}
+    assert offered == {"kind": labels, "friction": ["hybrid"], "solver.method": ["ode45"]}
+    rates = set()
+    for model.kind in range(1, 9):
+        assert model.prepare() == 0
+        rates.add(model.rates(0.0, 0.1, 0.0, 1))
+    assert len(rates) == 8
 
 
 def test_a_name_of_the_system_that_loads_solve_changes_nothing(tmp_path):

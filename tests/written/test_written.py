@@ -87,7 +87,7 @@ def test_what_cannot_be_written_out_is_refused_by_file_line_and_remedy(body):
     text = HEAD + body + "\n"
     spec = Spec({"x": "v", "v": "a"}, {"mode": "v"})
     with pytest.raises(Refused, match=re.escape(BODIES[body])) as caught:
-        Writer(spec, Declarations([ast.parse(text)]), "runtime/some.py", text, True)
+        Writer(spec, Declarations([text]), "runtime/some.py", text, True)
     assert re.match(r"runtime/some\.py:[234]: ", str(caught.value))
 
 

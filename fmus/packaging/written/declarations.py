@@ -4,16 +4,16 @@ import ast
 from collections.abc import Iterable
 from typing import Any, TypeGuard
 
-from ..trees import walked
+from ..trees import nodes, tree, walked
 from .spec import CONTACTS, STATES, STEM, Spec
 
 KINDS = {"States": STATES, "Rates": STATES, "Contacts": CONTACTS}
 
 
-class Declarations(ast.NodeVisitor):
+class Declarations:
     """Of the files of the numerics."""
 
-    def __init__(self, trees: Iterable[ast.Module]) -> None:
+    def __init__(self, texts: Iterable[str]) -> None:
         self.attributes: dict[str, str] = {}
         self.stored: set[str] = set()
         self.constants: dict[str, Any] = {}
@@ -33,22 +33,26 @@ class Declarations(ast.NodeVisitor):
             "per_state": [STATES],
             "per_contact": [CONTACTS],
         }
-        for tree in trees:
-            self.visit(tree)
+        for text in texts:
+            self.read_file(tree(text))
+            for node in nodes(text):
+                self.read(node)
 
-    def visit_AnnAssign(self, node: ast.AnnAssign) -> None:
-        if isinstance(node.target, ast.Name) and (kind := annotated(node)):
-            self.attributes[node.target.id] = kind
-
-    def visit_Attribute(self, node: ast.Attribute) -> None:
-        self.generic_visit(node)
-        if isinstance(node.ctx, ast.Store):
-            self.stored.add(node.attr)
-
-    def visit_ClassDef(self, node: ast.ClassDef) -> None:
-        self.generic_visit(node)
-        names = {getattr(one.targets[0], "id", "") for one in node.body if isinstance(one, ast.Assign)}
-        self.classes.append(names | {one.attr for one in walked(node) if is_own(one)})
+    def read(self, node: ast.AST) -> None:
+        """What one node says."""
+        match node:
+            case ast.AnnAssign(target=ast.Name(id=name)) if kind := annotated(node):
+                self.attributes[name] = kind
+            case ast.Attribute(attr=name, ctx=ast.Store()):
+                self.stored.add(name)
+            case ast.ClassDef():
+                names = {getattr(one.targets[0], "id", "") for one in node.body if isinstance(one, ast.Assign)}
+                self.classes.append(names | {one.attr for one in walked(node) if is_own(one)})
+            case ast.FunctionDef(name=name):
+                if kinds := returned(node):
+                    self.results[name] = kinds
+                if any(isinstance(one, ast.Name) and one.id == "each" for one in node.decorator_list):
+                    self.each.add(name)
 
     def clash(self, spec: Spec) -> str:
         """A name of the model that means something else in the numerics, if there is one."""
@@ -59,7 +63,8 @@ class Declarations(ast.NodeVisitor):
             found |= names & {spec.number(v, kind, i) for v, kind in kinds for i in range(len(spec.parts(kind)))}
         return min(found, default="")
 
-    def visit_Module(self, node: ast.Module) -> None:
+    def read_file(self, node: ast.Module) -> None:
+        """What a file calls its own."""
         for statement in node.body:
             if isinstance(statement, (ast.FunctionDef, ast.ClassDef)):
                 self.words.add(statement.name)
@@ -74,14 +79,6 @@ class Declarations(ast.NodeVisitor):
                     if isinstance(one, ast.Name):
                         self.words.add(one.id)
                         self.constants[one.id] = label(what) or getattr(what, "value", None)
-        self.generic_visit(node)
-
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
-        self.generic_visit(node)
-        if kinds := returned(node):
-            self.results[node.name] = kinds
-        if any(isinstance(one, ast.Name) and one.id == "each" for one in node.decorator_list):
-            self.each.add(node.name)
 
     def attribute(self, name: str) -> str | None:
         """What an attribute runs over; None for a number."""

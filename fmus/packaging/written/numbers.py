@@ -5,7 +5,7 @@ import re
 from collections.abc import Sequence
 
 from .. import BuildError
-from ..trees import copied, same, walked
+from ..trees import altered, same, walked
 from .declarations import Declarations, annotated
 from .elimination import factored, solved
 from .settled import Settled
@@ -101,13 +101,13 @@ class Numbers(Settled):
         """One number of a vector; a number as it is."""
         kind = self.kind(node)
         if kind is None:
-            return self.visit(copied(node))
+            return self.visit(node)
         match node:
             case ast.Name(id=vector):
                 name = self.name(node, vector, kind, place)
                 return ast.Constant(0.0) if name in self.zeros else ast.Name(name, ast.Load())
             case ast.Attribute(value=owner, attr=vector):
-                return ast.Attribute(self.visit(copied(owner)), self.spec.number(vector, kind, place), ast.Load())
+                return ast.Attribute(self.visit(owner), self.spec.number(vector, kind, place), ast.Load())
             case ast.BinOp(left=left, op=op, right=right):
                 return without_zero(self.part(left, place), op, self.part(right, place))
             case ast.UnaryOp(op=op, operand=one):
@@ -128,7 +128,7 @@ class Numbers(Settled):
     def terms(self, node: ast.expr) -> list[ast.expr]:
         """All the numbers of an argument, a target or a result that are its own."""
         kind = self.kind(node)
-        return [self.part(node, i) for i in self.places(node, kind)] if kind else [self.visit(copied(node))]
+        return [self.part(node, i) for i in self.places(node, kind)] if kind else [self.visit(node)]
 
     def all_terms(self, node: ast.expr) -> list[ast.expr]:
         """All the numbers of a vector, those that it borrows as well."""
@@ -146,7 +146,7 @@ class Numbers(Settled):
 
     def at_method(self, item: ast.expr, target: ast.expr, label: str) -> ast.expr:
         self.stands_for(target, label)
-        found = self.visit(copied(item))
+        found = self.visit(item)
         self.named = {}
         return found
 
@@ -166,13 +166,13 @@ class Numbers(Settled):
         return self.part(node.value, self.known(node.slice)) if self.kind(node.value) else self.generic_visit(node)
 
     def known(self, index: ast.expr) -> int:
-        found = self.visit(copied(index))
+        found = self.visit(index)
         if not (isinstance(found, ast.Constant) and isinstance(found.value, int)):
             raise self.refused(index, "is an index that is not known; loop over contacts or places")
         return found.value
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        self.generic_visit(node)
+        node = self.generic_visit(node)
         match node:
             case ast.BinOp(left=ast.Constant(value=int(a)), op=ast.Add(), right=ast.Constant(value=int(b))):
                 return ast.Constant(a + b)
@@ -214,17 +214,17 @@ class Numbers(Settled):
                     text = f"{term} if {' and '.join(f'{term} {CHOSEN[name]} {one}' for one in behind)} else {text}"
                     behind.insert(0, term)
                 return expression(text)
+        function = node.func
         contacts = [one.id for one in node.args if isinstance(one, ast.Name) and one.id in self.index]
         if contacts:
-            if isinstance(node.func, ast.Attribute):
-                node.func.attr += self.spec.tail(self.index[contacts[0]])
-            elif isinstance(node.func, ast.Name):
-                node.func.id += self.spec.tail(self.index[contacts[0]])
-        node.func = self.visit(node.func)
+            tail = self.spec.tail(self.index[contacts[0]])
+            if isinstance(function, ast.Attribute):
+                function = altered(function, attr=function.attr + tail)
+            elif isinstance(function, ast.Name):
+                function = altered(function, id=function.id + tail)
         kept = [one for one in node.args if not (isinstance(one, ast.Name) and one.id in self.index)]
-        node.args = [term for one in kept for term in self.terms(one)]
-        node.keywords = [self.visit(one) for one in node.keywords]
-        return node
+        args = [term for one in kept for term in self.terms(one)]
+        return altered(node, func=self.visit(function), args=args, keywords=[self.visit(one) for one in node.keywords])
 
     # ---- simple statements
 
@@ -301,11 +301,11 @@ class Numbers(Settled):
         pairs: list[tuple[ast.expr, ast.expr]] = []
         for to, one, kind in zip(left, right, kinds, strict=True):
             for i in self.places(to, kind) if kind else [-1]:
-                number = self.part(one, i) if kind else self.visit(copied(one))
+                number = self.part(one, i) if kind else self.visit(one)
                 if isinstance(to, ast.Name) and kind and isinstance(number, ast.Constant) and number.value == 0.0:
                     self.zeros.add(self.name(to, to.id, kind, i))
                 else:
-                    pairs.append((self.part(to, i) if kind else self.visit(copied(to)), number))
+                    pairs.append((self.part(to, i) if kind else self.visit(to), number))
         pairs = [(to, number) for to, number in pairs if not same(to, number)]
         changed: set[str] = set()
         for to, number in pairs:

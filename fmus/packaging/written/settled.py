@@ -3,10 +3,11 @@
 import ast
 from typing import Any
 
+from ..trees import Changer, altered
 from .spec import Spec
 
 
-class Settled(ast.NodeTransformer):
+class Settled(Changer):
     """An expression in which what is fixed stands as True, False or a number."""
 
     def __init__(self, spec: Spec, constants: dict[str, Any]) -> None:
@@ -14,7 +15,7 @@ class Settled(ast.NodeTransformer):
         self.choices = dict(spec.choices)  # those of local names as well
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        self.generic_visit(node)
+        node = self.generic_visit(node)
         known = self.spec.flags.get(node.attr)
         return node if known is None or not isinstance(node.ctx, ast.Load) else ast.Constant(known)
 
@@ -28,26 +29,24 @@ class Settled(ast.NodeTransformer):
         return self.generic_visit(node)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
-        self.generic_visit(node)
+        node = self.generic_visit(node)
         decides = isinstance(node.op, ast.Or)
         if any(truth(one) is decides for one in node.values):
             return ast.Constant(decides)
-        node.values = [one for one in node.values if truth(one) is None]
-        return node if len(node.values) > 1 else node.values[0] if node.values else ast.Constant(not decides)
+        values = [one for one in node.values if truth(one) is None]
+        return altered(node, values=values) if len(values) > 1 else values[0] if values else ast.Constant(not decides)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
-        self.generic_visit(node)
+        node = self.generic_visit(node)
         known = truth(node.operand)
         if isinstance(node.op, ast.Not) and known is not None:
             return ast.Constant(not known)
         return node
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        node.test = self.visit(node.test)
-        known = truth(node.test)
-        if known is None:
-            node.body, node.orelse = self.visit(node.body), self.visit(node.orelse)
-            return node
+        test = self.visit(node.test)
+        if (known := truth(test)) is None:
+            return altered(node, test=test, body=self.visit(node.body), orelse=self.visit(node.orelse))
         return self.visit(node.body if known else node.orelse)
 
 

@@ -7,7 +7,6 @@ from typing import Any
 from ...runtime.declare import variables
 from .. import BuildError, __version__
 from ..equations.authored import Authored
-from ..trees import tree
 from .declarations import Declarations
 from .needed import pruned
 from .offer import EXACT, Offer
@@ -30,7 +29,7 @@ def runtime() -> dict[str, str]:
 @cache
 def declarations() -> Declarations:
     """What they say, for any model."""
-    return Declarations(map(tree, runtime().values()))
+    return Declarations(runtime().values())
 
 
 def spec_of(model: Any, offered: Offer, called: str) -> Spec:

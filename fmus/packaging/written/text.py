@@ -3,7 +3,7 @@
 import ast
 import re
 
-from ..trees import copied, same, tree, walked
+from ..trees import altered, same, tree
 from .declarations import Declarations, annotated, label, returned
 from .numbers import METHODS, RANGES, Numbers
 from .settled import truth
@@ -128,7 +128,7 @@ class Writer:
         for n, name in enumerate(self.spec.methods, 1):
             self.numbers.stands_for(node.target, name)
             if many > 1:
-                asked = f"{'if' if n == 1 else 'elif'} {ast.unparse(self.numbers.visit(copied(test.test)))}:"
+                asked = f"{'if' if n == 1 else 'elif'} {ast.unparse(self.numbers.visit(test.test))}:"
                 self.write(" " * depth + (asked if n < many else "else:"), test)
             self.after = self.first(test.body[0])
             leaves = self.block(test.body, depth + (4 if many > 1 else 0)) and leaves
@@ -146,7 +146,7 @@ class Writer:
             case ast.Import() | ast.ImportFrom():
                 new = [node]
             case _:
-                new = self.numbers.statements(self.offered(copied(node)))
+                new = self.numbers.statements(self.offered(node))
         if len(new) == 1 and same(new[0], node):
             self.copy(node.end_lineno or 0, node.col_offset - depth)
             return
@@ -160,7 +160,7 @@ class Writer:
         """The first line of a compound statement; copied unless its test has changed."""
         body = self.first(node.body[0])  # type: ignore[attr-defined]
         if isinstance(node, ast.While):
-            word, test = "while", self.numbers.visit(copied(node.test))
+            word, test = "while", self.numbers.visit(node.test)
         if test is None or self.stands(node, word, test):
             self.copy(body, node.col_offset - depth)
         else:
@@ -206,7 +206,7 @@ class Writer:
         self.numbers = outer
 
     def branch(self, node: ast.If, depth: int, word: str) -> bool:
-        test = self.numbers.visit(copied(node.test))
+        test = self.numbers.visit(node.test)
         if truth(test) is not None:
             chosen = node.body if truth(test) else node.orelse
             if not chosen:
@@ -223,7 +223,7 @@ class Writer:
         other, mark = node.orelse[0], len(self.lines)
         if isinstance(other, ast.If) and len(node.orelse) == 1 and other.col_offset == node.col_offset:
             self.after = self.first(other)
-            if truth(self.numbers.visit(copied(other.test))) is None:
+            if truth(self.numbers.visit(other.test)) is None:
                 return self.branch(other, depth, "elif") and leaves
             self.write(" " * depth + "else:", other)
         else:
@@ -235,22 +235,19 @@ class Writer:
         return leaves
 
     def offered(self, node: ast.stmt) -> ast.stmt:
-        """An assignment without the items that are not offered; a choice that starts with one starts with the first
-        that is."""
-        if not isinstance(node, ast.Assign):
-            return node
-        for part in walked(node.value):
-            if isinstance(part, ast.Tuple):
-                part.elts = [one for one in part.elts if not self.is_gone(one)]
+        """A choice of methods or laws without the items that are not offered; one that starts with such an item starts
+        with the first that is offered."""
         match node:
             case ast.Assign(
                 targets=[ast.Name(id=name)],
-                value=ast.Call(func=ast.Name(id="Choice"), args=[start, *_]) as choice,
-            ):
-                possible = self.spec.choices.get(name)
+                value=ast.Call(func=ast.Name(id="Choice"), args=[start, text, items]) as choice,
+            ) if possible := self.spec.choices.get(name):
                 kept = ast.unparse(start).removesuffix(".NUMBER") in self.spec.methods
-                if possible and not kept and self.declared.constants.get(getattr(start, "id", "")) not in possible:
-                    choice.args[0] = ast.Constant(possible[0])
+                if not kept and self.declared.constants.get(getattr(start, "id", "")) not in possible:
+                    start = ast.Constant(possible[0])
+                if isinstance(items, ast.Tuple):
+                    items = altered(items, elts=[one for one in items.elts if not self.is_gone(one)])
+                return altered(node, value=altered(choice, args=[start, text, items]))
         return node
 
     def is_gone(self, node: ast.expr) -> bool:
