@@ -44,23 +44,6 @@ def walked(root: ast.AST) -> list[ast.AST]:
     return found
 
 
-def copied(node: Node, down: int = 0) -> Node:
-    """A tree of its own, its lines moved down by some: what copy.deepcopy makes in ten times the time."""
-    made = node.__new__(type(node))
-    its = vars(made)
-    its.update(vars(node))
-    for name in BRANCHES[type(node)]:
-        value = its.get(name)
-        if isinstance(value, list):
-            its[name] = [copied(one, down) if isinstance(one, ast.AST) else one for one in value]
-        elif isinstance(value, ast.AST):
-            its[name] = copied(value, down)
-    for name in ("lineno", "end_lineno") if down else ():
-        if its.get(name) is not None:
-            its[name] += down
-    return made
-
-
 class Changer:
     """What becomes of a tree: visit_Name(node) and its like say it of a kind of nodes, and tell it of the node itself
     where nothing does.  No tree is changed: what is new holds those parts of the old that stay."""

@@ -12,13 +12,13 @@ class Refused(BuildError):
     """A construct outside the subset: file, line, what is wrong and what to write instead."""
 
 
-def place(function: FunctionType, line: int = 1) -> str:
-    """File and line of a function, or of the given line of its source; the same on every machine."""
+def place(function: FunctionType, line: int = 0) -> str:
+    """File and line of a function, or the given line of its file; the same on every machine."""
     file = inspect.getsourcefile(function) or "?"
     path = file.removeprefix(f"{FMUS.parent}/") if file.startswith(str(FMUS)) else file.rsplit("/", 1)[-1]
-    return f"{path}:{function.__code__.co_firstlineno + line - 1}"
+    return f"{path}:{line or function.__code__.co_firstlineno}"
 
 
 def refused(function: FunctionType, node: ast.AST, why: str, instead: str) -> Refused:
     """The refusal of a node of the source of a function."""
-    return Refused(f"{place(function, getattr(node, 'lineno', 1))}: '{ast.unparse(node)[:60]}' {why}; {instead}.")
+    return Refused(f"{place(function, getattr(node, 'lineno', 0))}: '{ast.unparse(node)[:60]}' {why}; {instead}.")

@@ -17,7 +17,6 @@ from ...runtime.declare import Declaring
 from ..equations.expressions import FUNCTIONS, Expression, Term
 from ..equations.scribe import Scribe
 from ..further import Variables
-from ..trees import copied
 from ..written import definition
 from ..written.live import TREE, number_of
 
@@ -81,6 +80,7 @@ class Writer:
         self.counts = set(thing.contacts)  # and those that have none
 
     def block(self, statements: list[ast.stmt]) -> list[ast.stmt]:
+        """They share with those of `observe` what stays."""
         found: list[ast.stmt] = []
         for node in statements:
             match node:
@@ -154,7 +154,7 @@ def read(text: str) -> ast.expr:
 
 
 def told(e: ast.expr | None) -> str:
-    return "0.0" if e is None else ast.unparse(ast.fix_missing_locations(copied(e)))
+    return "0.0" if e is None else ast.unparse(e)
 
 
 def plus(a: ast.expr | None, b: ast.expr | None) -> ast.expr | None:

@@ -17,7 +17,7 @@ from ...runtime.declare import Declaring
 from ..catalogue import FMUS, find
 from ..equations.authored import Authored
 from ..modules import digest
-from ..trees import copied, walked
+from ..trees import walked
 from .offer import Offer, offer
 from .sources import APART, PLAIN, Files, written_out
 
@@ -91,13 +91,13 @@ def number_of(thing: Any, name: str) -> str:
 
 
 def definition(function: FunctionType) -> ast.FunctionDef:
-    """The tree of a function, whose lines count from that of its head in the source: as written out, if it is."""
+    """The tree of a function, with the lines of its source: as written out, if it is."""
     if TREE not in function.__globals__:
         found = ast.parse(dedent(inspect.getsource(function))).body[0]
+        ast.increment_lineno(found, function.__code__.co_firstlineno - 1)
     else:
         found = function.__globals__[TREE]
         for name in function.__qualname__.split("."):
             found = next(one for one in reversed(found.body) if getattr(one, "name", "") == name)
-        found = copied(found, 1 - function.__code__.co_firstlineno)
     assert isinstance(found, ast.FunctionDef)
     return found
