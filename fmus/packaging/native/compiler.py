@@ -3,7 +3,6 @@
 import math
 import os
 import subprocess
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -88,7 +87,7 @@ def linked(files: Mapping[str, str], main: str, target: str, out: str, options: 
     with TemporaryDirectory() as folder:
         for file, text in files.items():
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
-        command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
+        command = [str(compiler() / "zig"), "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
         command += [main, "-o", out]
         # It keeps a store at home, which services have not; what it makes of ours stays out, or the store would grow.
         stores = {"HOME": gettempdir(), "ZIG_LOCAL_CACHE_DIR": f"{folder}/store"} | os.environ
