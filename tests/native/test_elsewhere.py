@@ -14,7 +14,7 @@ import builds
 import fmi3_hosts
 import pytest
 from models import CASES, HYBRID, MODELS, RODAS, declared, label, model_class, outputs
-from native_fmus import built, everywhere, needed
+from native_fmus import built, needed
 from native_host import HEADERS, SOURCE, SOURCE3, begin, guid, host, lives, play, references, unpacked
 
 from fmus.packaging import native
@@ -90,11 +90,7 @@ def windows():
 
 
 def library(fmu, version, platform):
-    """The library for a platform, as the build command makes it of the sources that are in the FMU for any; that of the
-    FMU for every platform, where there is one."""
-    whole = everywhere() / fmu.name
-    if version == "2" and whole.is_file():
-        return unpacked(whole) / "binaries" / platform / f"{fmu.stem}{PLATFORMS[platform].suffix}"
+    """The library for a platform, as the build command makes it of the sources that are in the FMU for any."""
 
     def make(folder):
         sources = {path.name: path.read_text() for path in (unpacked(fmu) / "sources").iterdir()}

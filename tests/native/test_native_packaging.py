@@ -1,7 +1,6 @@
 """Native FMUs in the file: what they hold, that it is the same everywhere, and that other tools can compile it."""
 
 import os
-import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -35,18 +34,9 @@ SYSTEM = {
 }
 
 
-def run(*arguments, cwd=ROOT, **environment):
-    if cwd == ROOT:
-        return build(*arguments, **environment)
-    command = [sys.executable, "build_fmus.py", *map(str, arguments)]
-    return subprocess.run(
-        command, cwd=cwd, capture_output=True, text=True, timeout=600, env={**os.environ, **environment}
-    )
-
-
 @pytest.fixture(scope="module")
 def smd():
-    """smd for every platform, and what was printed."""
+    """smd, with one method, for every platform, and what was printed."""
     out = everywhere()
     return out / "smd.fmu", out.with_suffix(".txt").read_text()
 
@@ -116,7 +106,7 @@ def test_methods_and_laws_can_be_chosen_as_for_the_python_fmu(tmp_path):
     built()
     chosen = ("stickslip", "--method", "exact", "--law", "hybrid", "--platform", "linux64")
     for folder, kind in (("python", ()), ("native", ("--native",))):
-        done = run(*chosen, *kind, "--out", tmp_path / folder)
+        done = build(*chosen, *kind, "--out", tmp_path / folder)
         assert done.returncode == 0, done.stderr
     lean = entries(tmp_path / "native" / "stickslip.fmu")
     text = lean["sources/model.h"].decode()
@@ -198,25 +188,6 @@ def check_signature(library, place):
 # ---- builds
 
 
-def test_builds_are_the_same_from_another_folder_with_another_cache_and_at_a_date_but_for_the_date(tmp_path, smd):
-    """Of all that is ours; what the compiler brings, as the stubs of the C libraries, takes half a minute.  The date
-    reaches the description and the zip only."""
-    source = tmp_path / "another place"
-    shutil.copytree(ROOT / "fmus", source / "fmus", ignore=shutil.ignore_patterns("*.fmu", "__pycache__"))
-    for part in ("build_fmus.py", "LICENSE"):
-        shutil.copy(ROOT / part, source)
-    others = {"ZIG_LOCAL_CACHE_DIR": str(tmp_path / "local"), "SOURCE_DATE_EPOCH": "1700000000"}
-    done = run("--native", "smd", "--out", "out", cwd=source, **others)
-    assert done.returncode == 0, done.stderr
-    expected = entries(smd[0])
-    again = entries(source / "out" / "smd.fmu")
-    assert {f"binaries/{platform}/smd{PLATFORMS[platform].suffix}" for platform in USUAL} <= set(again)
-    dated = again["modelDescription.xml"]
-    undated = dated.replace(b"2023-11-14T22:13:20Z", b"1980-01-01T00:00:00Z")
-    assert dated != undated
-    assert again | {"modelDescription.xml": undated} == {name: expected[name] for name in again}
-
-
 def test_without_a_platform_it_is_built_for_the_usual_three():
     assert USUAL == ("linux64", "win64", "darwin64")
 
@@ -274,7 +245,7 @@ def test_a_mistake_is_told_in_one_sentence():
         (("--native", "--platform", "amiga"), "There is no platform 'amiga'; known are linux64, win64, darwin64"),
         (("--native", "unheard"), "There is no model 'unheard'"),
     ):
-        done = run(*arguments)
+        done = build(*arguments)
         assert done.returncode != 0
         assert words in done.stderr
         assert "Traceback" not in done.stderr

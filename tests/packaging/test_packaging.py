@@ -2,9 +2,7 @@
 
 import ast
 import json
-import os
 import re
-import shutil
 import subprocess
 import sys
 from datetime import UTC, datetime
@@ -18,7 +16,7 @@ from zipfile import ZipFile
 
 import pytest
 from builds import ROOT
-from commands import build
+from commands import build as command
 from fmpy.validation import validate_fmu
 
 from fmus.packaging import BuildError
@@ -56,29 +54,12 @@ print(json.dumps(told))
 """
 
 
-def command(*arguments, root=ROOT, **environment):
-    """The build command; from another checkout it begins with nothing."""
-    if root == ROOT:
-        return build(*arguments, **environment)
-    call = [sys.executable, str(root / "build_fmus.py"), *map(str, arguments)]
-    return subprocess.run(call, capture_output=True, text=True, env=os.environ | environment, timeout=120)
-
-
 def probe(*fmus, folder):
     """What instances of the FMUs, made one after another in one clean process, tell about themselves."""
     call = [sys.executable, "-c", PROBE, *map(str, fmus)]
     run = subprocess.run(call, capture_output=True, text=True, cwd=folder, timeout=120)
     assert run.returncode == 0, run.stderr
     return json.loads(run.stdout)
-
-
-def other_checkout(folder):
-    """A copy of the project in another place."""
-    ignored = shutil.ignore_patterns("*.fmu", "__pycache__")
-    shutil.copytree(ROOT / "fmus", folder / "fmus", ignore=ignored)
-    for file in ("build_fmus.py", "LICENSE"):
-        shutil.copy(ROOT / file, folder)
-    return folder
 
 
 def entries(fmu):
@@ -246,17 +227,6 @@ def test_both_licences_travel(fmu, name):
     content = entries(fmu(name))
     assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
     assert b"NTNU" in content["documentation/licenses/pythonfmu.txt"]
-
-
-def test_two_builds_in_different_folders_are_byte_identical(building, tmp_path):
-    checkout = other_checkout(tmp_path)
-    for path in checkout.rglob("*"):
-        os.utime(path, (1.0e9, 1.0e9))
-    some = ("pacejka", "stickslip")  # without a contact and with one
-    run = command(*some, "--out", tmp_path / "out", root=checkout, PYTHONHASHSEED="7", TZ="Pacific/Auckland")
-    assert run.returncode == 0, run.stderr
-    for name in some:
-        assert (tmp_path / f"out/{name}.fmu").read_bytes() == (building[0] / f"{name}.fmu").read_bytes()
 
 
 def test_the_source_date_changes_the_date_and_nothing_else(fmu, tmp_path):
