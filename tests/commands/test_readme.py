@@ -15,7 +15,7 @@ import foreign
 import numpy as np
 import pytest
 from builds import ROOT, published
-from commands import build, harness
+from commands import UNPLOTTED, build, harness
 from decays import swung
 from fmpy.validation import validate_fmu
 
@@ -100,7 +100,7 @@ def typed(line, folder, **environment):
     """What a command says; it must end well, with nothing on standard error."""
     words = shlex.split(line)
     if words[:3] == ["python", "-m", "harness"]:
-        done = harness(folder, *words[3:], blank=True, **environment)
+        done = harness(folder, *words[3:], blank=UNPLOTTED, **environment)
     elif words[:2] == ["python", "build_fmus.py"]:
         done = build(*words[2:], folder=folder)
     else:

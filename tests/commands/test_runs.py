@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from functools import partial
+from math import cos, exp
 from types import SimpleNamespace
 
 import commands
@@ -21,7 +22,7 @@ BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 ENVIRONMENT = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
 TIME = r'"name": "run_time",\s+"value": [^,]+'
 NUMBER = r"-?\b\d+\.?\d*(?:e[-+]\d+)?"
-harness = partial(commands.harness, base=ENVIRONMENT, blank=True)
+harness = partial(commands.harness, base=ENVIRONMENT, blank=commands.UNPLOTTED)  # what is published is drawn
 
 
 def python(folder, *arguments):
@@ -276,7 +277,7 @@ PAIR = (
         ["list"],
         ["run", "nosuch"],
         ["run", "mine.toml", "--json"],
-        ["decay", "coulomb", "--json"],
+        ["decay", "swing.csv", "--no-drag", "--json"],
         ["couple", "pair.toml", "--json"],
         ["report", "--help"],
     ],
@@ -289,6 +290,8 @@ def test_a_process_that_is_forked_answers_as_a_fresh_one(fmus, tmp_path, argumen
     (tmp_path / "fmus").symlink_to(fmus)
     (tmp_path / "mine.toml").write_text(BASE + "analyses = ['slip']\nplots = []")
     (tmp_path / "pair.toml").write_text(PAIR)
+    rows = [f"{0.04 * i},{exp(-0.04 * i) * cos(0.48 * i)}" for i in range(50)]
+    (tmp_path / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
     fresh, forked = done(True), done(False)
     assert (forked.returncode, forked.stderr) == (fresh.returncode, fresh.stderr)
     told = [re.sub(TIME, "", done.stdout) for done in (forked, fresh)]
@@ -317,27 +320,23 @@ def test_list_shows_every_scene(place):
         assert path.stem in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("extra", "loaded"),
-    [
-        ("plots = []", set()),
-        ("plots = ['position']", {"matplotlib"}),
-        ("outputs = ['x', 'v']\nplots = []\nanalyses = ['slip']", {"harness.analyses.slip"}),
-    ],
-)
-def test_a_scene_imports_only_what_it_names(place, tmp_path, extra, loaded):
-    base = BASE.replace('outputs = ["x", "v"]', "") if "outputs" in extra else BASE
-    (tmp_path / "mine.toml").write_text(base + extra)
-    optional = {"matplotlib", "harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps"}
+def test_a_scene_imports_only_what_it_names(place, tmp_path):
+    """Scenes that name more and more, one after the other in one process."""
+    optional = ["harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps", "matplotlib"]
+    extras = ("plots = []", "plots = []\nanalyses = ['slip']", "plots = ['position']")
     code = (
         "import sys; from pathlib import Path; from harness.studies.run.job import perform\n"
         "from harness.scenes.scene import load\n"
-        f"perform(load({str(tmp_path / 'mine.toml')!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
-        f"print(sorted({optional!r} & set(sys.modules)))"
     )
+    for number, extra in enumerate(extras):
+        (tmp_path / f"{number}.toml").write_text(BASE + extra)
+        code += (
+            f"perform(load({str(tmp_path / f'{number}.toml')!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
+            f"print([name for name in {optional} if name in sys.modules])\n"
+        )
     done = python(place, "-c", code)
     assert done.stderr == ""
-    assert done.stdout == f"{sorted(loaded)}\n"
+    assert done.stdout == f"[]\n{optional[:1]}\n{[optional[0], optional[3]]}\n"
 
 
 @pytest.mark.parametrize(("extra", "status"), [("grid = 1", 0), ("[values]\nmu_d = 0.95", 1)])

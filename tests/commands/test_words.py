@@ -28,7 +28,7 @@ from harness.truths.models import CASES, MODELS
 
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
-harness = partial(processes.harness, blank=True)
+harness = partial(processes.harness, blank=processes.UNPLOTTED)
 
 
 @pytest.fixture
@@ -150,7 +150,7 @@ def test_why_an_fmu_of_either_kind_fails_is_said_once(kind, tmp_path, arguments)
 
 def test_an_fmu_in_the_place_of_a_scene_is_run(here, tmp_path):
     told = [
-        harness(here, "run", *way, "fmus/smd.fmu", "--set", "k=50", "--out", tmp_path / str(len(way)), blank=True)
+        harness(here, "run", *way, "fmus/smd.fmu", "--set", "k=50", "--out", tmp_path / str(len(way)))
         for way in ((), ("--fmu",))
     ]
     assert [done.returncode for done in told] == [0, 0]

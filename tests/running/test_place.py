@@ -7,7 +7,7 @@ from zipfile import ZipFile
 
 import pytest
 from builds import ROOT
-from commands import harness
+from commands import UNPLOTTED, harness
 
 from harness.errors import HarnessError
 from harness.process import room as rooms
@@ -41,7 +41,7 @@ def test_any_letter_may_stand_in_the_path_of_temporary_files_of_fmus_and_of_resu
     temporary.mkdir()
     scene = (ROOT / "harness/scenes/coupled/two-masses.toml").read_text()
     (odd / "pair.toml").write_text(re.sub("(?m)^steps = .*$", "steps = [0.01]", scene))
-    done = harness(odd, *command, "--out", odd / "out", "--quiet", blank=True, TMPDIR=str(temporary))
+    done = harness(odd, *command, "--out", odd / "out", "--quiet", blank=UNPLOTTED, TMPDIR=str(temporary))
     assert (done.returncode, done.stderr) == (0, "")
     assert list(temporary.iterdir()) == []
     assert any((odd / "out").rglob("*.svg")) or any((odd / "out").rglob("*.csv"))
