@@ -1,0 +1,107 @@
+"""The file of a sweep, the scales of its map, and the boundaries in it."""
+
+import tracemalloc
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+from models import MODELS
+from sweeps import opened, xarray
+
+from harness.errors import HarnessError
+from harness.results.netcdf import NetCDF, Variable
+from harness.running.description import description
+from harness.studies.sweep import figure
+from harness.studies.sweep import file as writing
+from harness.studies.sweep.boundaries import known
+from harness.studies.sweep.journal import Block
+from harness.studies.sweep.rerun import Runs
+from harness.studies.sweep.space import Points, axis
+from harness.studies.sweep.study import Sweep
+
+
+def test_what_is_held_in_memory_does_not_grow_with_the_runs(monkeypatch, tmp_path):
+    """The parts of a sweep that touch every run, on ten times as many of them."""
+    monkeypatch.setattr(figure, "draw", lambda *arguments: None)
+    peaks = []
+    for many in (20, 200):
+        axes = axis(f"a=0:1:{many}", False), axis("b=0:1:100", False)
+        sweep = Sweep(Runs("many", ("a", "b"), (), ()), Points(axes), b"", 1)
+        labels = dict.fromkeys(("a", "b"), ("m", ""))
+        about = writing.About(labels, (writing.Column("c", "s", "some"),), {}, 1.0, ())
+        folder = tmp_path / str(many)
+        folder.mkdir()
+        tracemalloc.start()
+        kept = sweep.journal(folder)
+        with kept.open():
+            for first in range(0, len(sweep.points), 200):
+                kept.add(Block(first, sweep.points.between(first, first + 200)[:, :1], {3: f"failed at {first}"}))
+        (failure,) = writing.save(sweep, kept, about, folder)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        assert failure.runs == len(sweep.points) // 200
+        data = opened(folder)
+        assert (data["c"] == data["a"]).all()
+        assert (data["error"] != "").sum() == failure.runs
+    assert peaks[1] < 1.5 * peaks[0]
+
+
+def test_a_netcdf_file_written_piece_by_piece_is_read_as_it_was_meant(tmp_path):
+    values = np.arange(12.0).reshape(3, 4) / 7
+    texts = np.array(["", "a", "four", "\u00e9\u00e9", "b"])
+    with (tmp_path / "a.nc").open("wb") as stream:
+        said = {"units": "m/s2", "size": 0.1}
+        text = Variable("text", ("n", "letters"), {"_Encoding": "utf-8"}, 4)
+        sizes = {"y": 3, "x": 4, "n": 5, "letters": 4}
+        whole = NetCDF(stream, sizes, [Variable("a", ("y", "x"), said), text], {"b": "c"})
+        for first in (8, 0, 4):
+            whole.put("a", first, values.ravel()[first : first + 4])
+        whole.put("text", 0, np.char.encode(texts))
+    with xarray.open_dataset(tmp_path / "a.nc") as data:
+        assert data["a"].dims == ("y", "x")
+        assert (data["a"].to_numpy() == values).all()
+        assert data["a"].attrs == said
+        assert data.attrs == {"b": "c"}
+        assert (data["text"].to_numpy() == texts).all()
+
+
+@pytest.mark.parametrize(
+    ("values", "spread", "kind"),
+    [
+        ((0.001, 0.01, 0.1), "linear", "log"),
+        ((1.0, 2.0, 4.0), "log", "log"),
+        ((1.0, 50.0, 99.0), "linear", "linear"),
+        ((0.0, 1.0, 1000.0), "linear", "linear"),
+        ((np.nan, 1.0, 1000.0), "linear", "log"),
+        ((np.nan, np.nan), "linear", "linear"),
+    ],
+)
+def test_an_axis_is_logarithmic_where_its_values_lie_over_decades(values, spread, kind):
+    data = xarray.Dataset({"a": ("n", np.array(values), {"scale": spread})})
+    assert figure.scale(data, "a") == kind
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_known_boundaries_travel_in_the_fmu_and_depend_on_its_parameters(fmus, name):
+    """At its own values each quantity is a number; what it depends on is declared."""
+    values = {
+        variable.name: float(variable.start)
+        for variable in description(fmus / f"{name}.fmu").modelVariables
+        if variable.causality == "parameter" and variable.type == "Real"
+    }
+    found = known(fmus / f"{name}.fmu", tuple(values), {})
+    assert found
+    for each in found:
+        assert each.parameters <= set(values)
+        assert np.isfinite(each.at(values, 1.0))
+
+
+@pytest.mark.parametrize(
+    "quantity", ["m.real", "__import__('os')", "9**9**9", "(lambda: m)()", "m[0]", "'m'", "(", "abs(x=m)"]
+)
+def test_a_boundary_that_is_more_than_arithmetic_is_refused(tmp_path, quantity):
+    with ZipFile(tmp_path / "odd.fmu", "w") as archive:
+        table = f'[[boundaries]]\ntext = "a"\nbelow = "b"\nquantity = "{quantity}"\n'
+        archive.writestr("documentation/boundaries.toml", table)
+    with pytest.raises(HarnessError, match=r"odd\.fmu: documentation/boundaries\.toml is not understood"):
+        known(tmp_path / "odd.fmu", ("m",), {})

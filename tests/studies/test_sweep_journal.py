@@ -1,0 +1,81 @@
+"""The journal of a sweep: whose it is, and what of it can be read."""
+
+from dataclasses import replace
+from functools import partial
+
+import commands
+import numpy as np
+import pytest
+
+from harness.errors import HarnessError
+from harness.studies.sweep.journal import Block, Journal
+from harness.studies.sweep.rerun import Runs
+from harness.studies.sweep.space import Axis, Points, axis
+from harness.studies.sweep.study import Sweep
+
+
+@pytest.fixture
+def harness(fmus, tmp_path):
+    """harness(argument, ...): the finished process, in a folder with the built FMUs."""
+    (tmp_path / "fmus").symlink_to(fmus)
+
+    return partial(commands.harness, tmp_path)
+
+
+def test_the_fmu_belongs_to_what_tells_a_sweep_from_any_other():
+    runs = Runs("smd", ("m",), (), ("final",))
+    one, two = (Sweep(runs, Points((Axis("m", (1.0, 2.0)),)), fmu, 2) for fmu in (b"a", b"b"))
+    assert one.key != two.key
+    assert one.key == replace(two, fmu=b"a").key
+
+
+def line(first, values, sentences):
+    return Block(first, np.array(values), sentences).line()
+
+
+GOOD = line(3, [[0.5, np.nan], [1.0, 2.0]], {0: "failed"})
+DAMAGED = (
+    *(b"", b"7", b"null", b"[]", b"00000000 []", b"\xff\xfe", b"\0", b"[" * 5000, b"9" * 5000),
+    *(GOOD[:-1].replace(b"failed", b"fooled"), GOOD[:-4], GOOD[1:-1]),
+    *(line(9, [[0.5, 1.5]] * 2, {})[:-1], line(-1, [[0.5, 1.5]], {})[:-1]),  # runs that there are not
+    line(2, [[0.5, 1.5]] * 2, {})[:-1],  # one of them a second time
+    line(0, [[0.5]], {})[:-1],  # of another number of columns
+)
+
+
+@pytest.mark.parametrize("damaged", DAMAGED)
+def test_a_damaged_line_of_a_journal_is_left_out_and_counted(tmp_path, damaged):
+    file = tmp_path / "journal"
+    file.write_bytes(GOOD + damaged + b"\n" + line(7, [[3.0, 4.0]], {}))
+    kept = Journal(file, 10, 2)
+    assert (kept.done, kept.damaged, kept.left) == (3, 1, [(0, 3), (5, 7), (8, 10)])
+    with kept.open():
+        kept.add(Block(0, np.zeros((3, 2)), {}))
+    again = Journal(file, 10, 2)
+    assert (again.done, again.damaged) == (6, 1)
+    assert [(block.first, block.sentences) for block in again.blocks()] == [(0, {}), (3, {0: "failed"}), (7, {})]
+    file.write_bytes(GOOD + line(7, [[3.0, 4.0]], {})[:-5])
+    kept = Journal(file, 10, 2)
+    assert (kept.done, kept.damaged) == (2, 0)  # a kill cut it off
+
+
+def test_a_damaged_journal_is_told_and_the_runs_are_done_again(harness, tmp_path):
+    arguments = ("sweep", "smd", "--vary", "m=1:2:4", "--workers", 1, "--name", "mine")
+    assert harness(*arguments, "--out", "whole", blank=True).returncode == 0
+    (tmp_path / "results/sweep").mkdir(parents=True)
+    points = Points((axis("m=1:2:4", False),))
+    usual = ("exchange", False), ("lenient", False), ("patience", 60.0), ("stop", None), ("tolerance", 1e-6)
+    sweep = Sweep(Runs("smd", ("m",), (), (), usual), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
+    sweep.journal(tmp_path / "results/sweep").path.write_bytes(b"garbage\n" + line(0, [[1.0]], {}))
+    done = harness(*arguments, blank=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "4 runs, 0 of them done before, 0 failed" in done.stdout
+    assert "2 damaged lines" in done.stdout
+    name = "sweep/mine/sweep.csv"
+    assert (tmp_path / "results" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+
+def test_a_journal_that_cannot_be_used_is_told(tmp_path):
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(HarnessError, match=r"journal .*folder cannot be used: Is a directory"):
+        Journal(tmp_path / "folder", 1, 1)
