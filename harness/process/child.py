@@ -7,20 +7,17 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from math import inf
 from pathlib import Path
+from tempfile import TemporaryFile
 from time import monotonic
 from typing import Any, TypeVar
 
-from ..errors import HarnessError
 from .interrupt import check, later
 from .room import room
 
 HOME = Path(__file__).parents[2]  # of the harness, and of what builds FMUs
 Asked = TypeVar("Asked")
 OFTEN = 0.1  # s between two looks at whether a signal has come: a thread that waits does not hear it
-
-
-class Hangs(HarnessError):
-    """It has not ended in time."""
+HANGS = 1000  # exit status of what has not ended in time
 
 
 def ask(
@@ -30,17 +27,19 @@ def ask(
     patience: float = inf,
     meanwhile: Callable[[], object] = check,
 ) -> subprocess.CompletedProcess[str]:
-    """The ended process, what it answered to the text on its standard input, and what it said; Hangs after `patience`
-    s.  Its temporary files are where every compiler and library can read their path.  What is done `meanwhile` checks
-    whether a signal has come."""
+    """The ended process, what it answered to the text on its standard input, and what it said; its exit status is HANGS
+    if it was ended after `patience` s.  Its temporary files are where every compiler and library can read their path.
+    What is done `meanwhile` checks whether a signal has come."""
     late = monotonic() + patience
     process = None
-    with room("child-") as folder:
+    with room("child-") as folder, TemporaryFile("w+", encoding="utf-8") as asked:
+        asked.write(text)  # all at once: what a pipe has no room for, a second communicate would not write
+        asked.seek(0)
         try:
             with later():
                 process = subprocess.Popen(
                     command,
-                    stdin=subprocess.PIPE,
+                    stdin=asked,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE,
                     encoding="utf-8",
@@ -50,13 +49,12 @@ def ask(
                 )
             while True:
                 try:
-                    answered, said = process.communicate(text, timeout=OFTEN)
+                    answered, said = process.communicate(timeout=OFTEN)
                     return subprocess.CompletedProcess(command, process.returncode, answered, said)
                 except subprocess.TimeoutExpired:
-                    text = ""  # it is under way
-                meanwhile()
+                    meanwhile()
                 if monotonic() > late:
-                    raise Hangs(f"no answer after {patience:g} s")
+                    return subprocess.CompletedProcess(command, HANGS, *end(process))
         except BaseException:
             if process:
                 end(process)
@@ -78,10 +76,10 @@ def serve(request: Callable[..., Asked], answer: Callable[[Asked], Any]) -> None
     answers.close()
 
 
-def end(process: subprocess.Popen[str]) -> None:
-    """Kill a process and, where there are groups of them, those that it started."""
+def end(process: subprocess.Popen[str]) -> tuple[str, str]:
+    """Kill a process and, where there are groups of them, those that it started; what it answered and said."""
     if os.name == "posix":
         os.killpg(process.pid, 9)
     else:
         process.kill()
-    process.communicate()
+    return process.communicate()

@@ -5,9 +5,10 @@
  *     I new NAME [quiet [exchange]]                  I begin [T]             I step T H
  *     I setr REFERENCE VALUE                         I calls STATES INDICATORS TURNS
  *     I getr REFERENCE...    I pass REFERENCE J TO   I save                  I restore             I reset
- *     I free                 0 unload                I time REPEAT STOP STEPS WORD...
+ *     I free                 I time REPEAT STOP STEPS WORD...                0 end                   0 unload
  *
- * I and J are numbers of instances.  step answers its status, getr the values; whatever else fails ends the host.
+ * I and J are numbers of instances.  step answers its status, getr the values; whatever else fails ends the host.  end
+ * writes a NUL to both streams: so far goes what is asked.
  *
  * time runs from t = 0 to STOP in so many equal communication steps, several times.  The word R=VALUE sets the Real of
  * value reference R before each run; the word R has that Real read at every point.  It answers the seconds of the
@@ -218,6 +219,8 @@ int main(int argc, char **argv)
         if (count < 2) die("line", "an instance and a command are needed");
         if (!strcmp(words[1], "unload")) {
             if (dlclose(library)) die("dlclose", dlerror());
+        } else if (!strcmp(words[1], "end")) {
+            if (putchar('\0') || fflush(stdout) || fputc('\0', stderr)) die("end", "cannot be told");
         } else {
             play(words[1], atoi(words[0]), words + 2, count - 2, argv);
         }

@@ -1,6 +1,6 @@
-"""A request carried out by a C program (running/host.c), for which Python is a library at most.
+"""Requests of one FMU carried out by a C program (running/host.c), for which Python is a library at most.
 
-No player of its own stands between: it would compile the program for each request.
+No player of its own stands between: it would compile the program for each FMU.
 """
 
 import json
@@ -9,25 +9,20 @@ import subprocess
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
-from threading import Lock
 
 from ...process.child import ask
 from ...running.in_c import built, compiler
 from .request import END, Reply, Request
 
-BUILDING = Lock()  # else two threads compile the program at once
-
 
 def ran(text: str, patience: float) -> subprocess.CompletedProcess[str]:
-    """The C program, ended, which has carried out a request, as if it were a player.  Hangs after `patience` s."""
-    request = Request(**json.loads(text))
-    with BUILDING:
-        library = built(Path(request.fmu))
-        command = library.command
-    calls = life(request) * request.lives or runs(request)
-    done = ask(command, "".join(f"{call}\n" for call in [*calls, "0 unload"]), library.environment, patience)
-    if not done.returncode:
-        done.stdout, done.stderr = json.dumps(asdict(reply(request, done.stdout))), done.stderr + END
+    """The C program, ended, which has carried out requests, as if it were a player."""
+    requests = [Request(**json.loads(line)) for line in text.splitlines()]
+    library = built(Path(requests[0].fmu))
+    calls = [call for each in requests for call in [*(life(each) * each.lives or runs(each)), "0 end"]]
+    done = ask(library.command, "".join(f"{call}\n" for call in [*calls, "0 unload"]), library.environment, patience)
+    replies = map(reply, requests, done.stdout.split(END)[:-1])
+    done.stdout = "\n".join(json.dumps(asdict(each)) for each in replies)
     return done
 
 
