@@ -3,7 +3,7 @@
 Between two lines of concurrent.futures it would: whoever wants the lock next, and the command with it, waits for ever.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Generator, Iterable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import TypeVar
 
@@ -20,7 +20,7 @@ def ended(futures: Collection[Future[Result]]) -> set[Future[Result]]:
         return wait(futures, timeout=OFTEN, return_when=FIRST_COMPLETED).done
 
 
-def each(workers: int, function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+def each(workers: int, function: Callable[[Item], Result], items: Iterable[Item]) -> Generator[Result, None, None]:
     """function(item) of all items in their order, from so many threads."""
     with ThreadPoolExecutor(workers) as pool:
         with later():

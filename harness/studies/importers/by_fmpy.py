@@ -11,24 +11,32 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 
+from ...running.description import description
+from ...running.in_c import HELD
+from ...running.unchanged import once
 from ...running.unpacked import unpacked
 from .request import Reply, Request, serve
 
 
 def play(request: Request, logged: tuple[str, ...] = ("",)) -> Reply:
     """The answer; of the log what begins so."""
-    description = fmpy.read_model_description(request.fmu)
+    found = description(Path(request.fmu))
     callbacks = logging(logged)
-    with unpacked(Path(request.fmu)) as folder:
-        about = {
-            "guid": description.guid,
-            "modelIdentifier": description.coSimulation.modelIdentifier,
-            "unzipDirectory": str(folder),
-        }
-        instances = [fmi2.FMU2Slave(instanceName=name, **about) for name in request.instances]
-        for instance in instances:
-            instance.instantiate(callbacks=callbacks, loggingOn=True)
-        return played(request, instances, fmpy.__version__)
+    about = {
+        "guid": found.guid,
+        "modelIdentifier": found.coSimulation.modelIdentifier,
+        "unzipDirectory": str(files(Path(request.fmu))),
+    }
+    instances = [fmi2.FMU2Slave(instanceName=name, **about) for name in request.instances]
+    for instance in instances:
+        instance.instantiate(callbacks=callbacks, loggingOn=True)
+    return played(request, instances, fmpy.__version__)
+
+
+@once
+def files(fmu: Path) -> Path:
+    """The folder of an FMU's files, for as long as the process lasts."""
+    return HELD.enter_context(unpacked(fmu))
 
 
 def played(request: Request, instances: list[Any], version: str) -> Reply:

@@ -11,45 +11,50 @@ from importlib.metadata import version
 from io import StringIO
 from pathlib import Path
 from shutil import copy
+from typing import Any
 
 from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer
 
 from ...process.room import room
 from ...running.description import description
+from ...running.in_c import HELD
+from ...running.unchanged import once
 from . import by_fmpy
 from .request import Reply, Request, serve
 
 
 def play(request: Request) -> Reply:
-    with room("container-") as folder:
-        fmu = built(request, folder)
-        names = {variable.name: variable.valueReference for variable in description(fmu).modelVariables}
-        inside = replace(
-            request,
-            fmu=str(fmu),
-            references=names,
-            read=[f"{name}_{i}" for i in range(len(request.instances)) for name in request.read],
-            instances=request.instances[:1],
-            connect=[],
-        )
-        return replace(by_fmpy.play(inside, ("0.fmu: ", "1.fmu: ")), version=version("fmu-manipulation-toolbox"))
-
-
-def built(request: Request, folder: Path) -> Path:
-    """The container: every value that is set is its input, every one that is read its output."""
-    files = [f"{i}.fmu" for i in range(len(request.instances))]
-    for file in files:
-        copy(request.fmu, folder / file)
-    set_there = dict.fromkeys([*request.values, *request.change])
-    told = {
+    path, files = Path(request.fmu), tuple(f"{i}.fmu" for i in range(len(request.instances)))
+    reals = [variable for variable in description(path).modelVariables if variable.type == "Real"]
+    settable = [each.name for each in reals if each.causality == "input" or each.variability == "tunable"]
+    entries = dict.fromkeys([*settable, *request.values, *request.change])  # for most requests the same
+    told: dict[str, Any] = {
         "name": "container.fmu",
         "fmu": files,
         "step_size": request.step,
-        "input": [[name, files[0], name] for name in set_there],
+        "input": [[name, files[0], name] for name in entries],
         "output": [[file, name, f"{name}_{i}"] for i, file in enumerate(files) for name in request.read],
         "link": [[files[0], request.connect[0], files[1], request.connect[1]]] if request.connect else [],
     }
-    (folder / "container.json").write_text(json.dumps(told), encoding="utf-8")
+    fmu = built(path, files, json.dumps(told))
+    inside = replace(
+        request,
+        fmu=str(fmu),
+        references={variable.name: variable.valueReference for variable in description(fmu).modelVariables},
+        read=[name for _, _, name in told["output"]],
+        instances=request.instances[:1],
+        connect=[],
+    )
+    return replace(by_fmpy.play(inside, ("0.fmu: ", "1.fmu: ")), version=version("fmu-manipulation-toolbox"))
+
+
+@once
+def built(fmu: Path, files: tuple[str, ...], told: str) -> Path:
+    """The container as it is told, of copies of an FMU."""
+    folder = HELD.enter_context(room("container-"))
+    for file in files:
+        copy(fmu, folder / file)
+    (folder / "container.json").write_text(told, encoding="utf-8")
     options = ["-no-auto-input", "-no-auto-output", "-no-auto-link", "-fmu-directory", str(folder)]
     sys.argv[1:] = ["-container", "container.json", *options]
     with redirect_stdout(StringIO()):

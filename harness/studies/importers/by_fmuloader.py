@@ -12,8 +12,7 @@ from fmuloader.fmi2 import Fmi2Error, Fmi2Slave, Fmi2Status, Fmi2Type
 
 from ...running.description import description
 from ...running.fmu import FMICallException
-from ...running.unpacked import unpacked
-from .by_fmpy import played
+from .by_fmpy import files, played
 from .request import Reply, Request, serve
 
 
@@ -53,8 +52,8 @@ def hear(environment: Any, name: bytes, status: int, category: bytes, text: byte
 
 def play(request: Request) -> Reply:
     found = description(Path(request.fmu))
-    with unpacked(Path(request.fmu)) as folder:
-        return played(request, [Instance(folder, found, name) for name in request.instances], version("fmuloader"))
+    instances = [Instance(files(Path(request.fmu)), found, name) for name in request.instances]
+    return played(request, instances, version("fmuloader"))
 
 
 if __name__ == "__main__":

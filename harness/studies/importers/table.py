@@ -1,7 +1,8 @@
 """The importer table: importers by checks by FMUs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -53,20 +54,23 @@ def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
             found.append(Checked(fmu.name, "", reason=str(unfit)))
     if not subjects:
         raise HarnessError(f"no FMU in {folder} is asked about: {found[0].reason}; name another folder")
-    for importer in IMPORTERS:
-        if reason := absent(importer, subjects[0].fmu):
-            found.append(Checked(importer.name, "", reason=reason))
-            continue
-        columns: list[list[str]] = []
-        report(importer.name, 0.0)
-        for column in each(WORKERS, partial(ask, importer), subjects):
-            columns.append(column)
-            report(importer.name, len(columns) / len(subjects))
-        name = titled(importer, subjects[0].basis)
-        names = tuple(asked.fmu.stem for asked in subjects)
-        for check, *cells in zip(CHECKS, *columns, strict=True):
-            failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
-            found.append(Checked(name, check, tuple(cells), failed, fmus=names))
+    names = tuple(subject.fmu.stem for subject in subjects)
+    reasons = [absent(importer, subjects[0].fmu) for importer in IMPORTERS]
+    present = [importer for importer, reason in zip(IMPORTERS, reasons, strict=True) if not reason]
+    # fmpy first, whose answers the others are set beside
+    with closing(each(WORKERS, partial(ask, subjects), present)) as asked:
+        for importer, reason in zip(IMPORTERS, reasons, strict=True):
+            if reason:
+                found.append(Checked(importer.name, "", reason=reason))
+                continue
+            report(importer.name, 0.0)
+            next(asked)
+            columns = [judged(importer, subject) for subject in subjects]
+            report(importer.name, 1.0)
+            name = titled(importer, subjects[0].basis)
+            for check, *cells in zip(CHECKS, *columns, strict=True):
+                failed = tuple(f"{m}: {cell}" for m, cell in zip(names, cells, strict=True) if "FAILED" in cell)
+                found.append(Checked(name, check, tuple(cells), failed, fmus=names))
     return found + [Checked(name, "", reason=reason) for name, reason in ELSEWHERE.items()]
 
 
@@ -86,11 +90,18 @@ def fmus(folder: Path) -> list[Path]:
     return found
 
 
-def ask(importer: Importer, subject: Subject) -> list[str]:
+def ask(subjects: list[Subject], importer: Importer) -> None:
+    """Ask an importer all that is judged: one process about all FMUs, in C one about each."""
+    asked = [[request(subject) for _, request in CHECKS.values()] for subject in subjects]
+    if importer.player != "by_c":  # one life, of which fmpy's is what those in C are set beside
+        asked = [[replace(request, lives=0) for requests in asked for request in requests]]
+    for requests in asked:
+        prepare(importer, requests)
+
+
+def judged(importer: Importer, subject: Subject) -> list[str]:
     """What every check gives."""
-    checks = [(judge, request(subject)) for judge, request in CHECKS.values()]
-    prepare(importer, [request for _, request in checks if not request.lives])
-    return [cell(judge, importer, request) for judge, request in checks]
+    return [cell(judge, importer, request(subject)) for judge, request in CHECKS.values()]
 
 
 def cell(judge: Judge, importer: Importer, request: Request) -> str:
