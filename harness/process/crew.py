@@ -1,20 +1,34 @@
 """Worker processes of this machine, asked again and again: they end with the command that started them, also when it is
-killed, hear no Ctrl-C, and what they print goes nowhere."""
+killed, hear no Ctrl-C, and what they print goes nowhere.
+
+Each is asked through a pipe of its own, and only while it waits there: no thread stands between, which could wait for
+ever for one that was killed.
+"""
 
 import multiprocessing
 import os
 import tempfile
-from collections.abc import Callable, Sequence
-from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from collections import deque
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import contextmanager
+from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from shutil import rmtree
 from signal import SIG_IGN, SIGINT, signal
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any
 
+from ..errors import HarnessError
+from .child import OFTEN
 from .interrupt import deaf_children
 
 LONGEST = 70  # bytes, of the path of temporary files: below it is a socket, whose path may have 107 (unix(7))
+ALONE = Lock()  # a start looks after all processes there are, and may take the exit code of one that is waited for
+
+
+class Died(HarnessError):
+    """The process has crashed."""
 
 
 def context(preload: Sequence[str]) -> Any:
@@ -28,36 +42,119 @@ def context(preload: Sequence[str]) -> Any:
     return made
 
 
-class Crew:
-    """So many processes, with temporary files in `folder`; `died` is what a task raises during which one of them did.
+class Hand:
+    """A process that does one thing after the other, with its temporary files in a folder."""
 
-    Then all its tasks are lost, and it wants to be renewed.
+    def __init__(self, context: Any, folder: Path) -> None:
+        self.here, there = context.Pipe()
+        self.process = context.Process(target=work, args=(there, str(folder)), daemon=True)
+        with ALONE, deaf_children():
+            self.process.start()
+        there.close()
+
+    def ask(self, function: Callable[..., Any], *arguments: Any) -> None:
+        """Have function(*arguments) done, in the folder where this process is."""
+        with self.alive():
+            self.here.send((Path.cwd(), function, arguments))
+
+    def answers(self, patience: float) -> bool:
+        """Whether there is an answer within so many seconds."""
+        with self.alive():
+            return self.here.poll(patience)
+
+    def answer(self) -> Any:
+        """What the function returned, or the exception that it raised."""
+        with self.alive():
+            return self.here.recv()
+
+    @contextmanager
+    def alive(self) -> Iterator[None]:
+        """Died, if it has crashed."""
+        try:
+            yield
+        except (EOFError, OSError):
+            self.end()
+            raise Died(f"the process died with exit code {self.process.exitcode}") from None
+
+    def end(self) -> None:
+        """Kill it, whatever it does."""
+        with ALONE:
+            self.process.kill()
+            self.process.join()
+        self.here.close()
+
+
+class Crew:
+    """Up to so many of them, with temporary files in `folder`.
+
+    `died` is what a task raises during which its process died; another one takes its place.
     """
 
-    died: tuple[type[Exception], ...] = (BrokenExecutor,)
+    died: tuple[type[Exception], ...] = (Died,)
 
     def __init__(self, size: int, folder: Path, preload: Sequence[str]) -> None:
         self.size, self.folder, self.context = size, folder, context(preload)
-        self.pool = self.started()
-
-    def started(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self.size, self.context, begin, (str(self.folder),))
+        self.idle: list[Hand] = []
+        self.busy: dict[Connection, tuple[Hand, Future[Any]]] = {}
+        self.left: deque[tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]] = deque()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """What function(*arguments) will return, from one of them."""
-        with deaf_children():
-            return self.pool.submit(function, *arguments)
+        future: Future[Any] = Future()
+        self.left.append((future, function, arguments))
+        self.deal()
+        return future
 
-    def renew(self) -> None:
-        """Begin again with new processes."""
-        self.end()
-        self.pool = self.started()
+    def deal(self) -> None:
+        """Ask those that have nothing to do."""
+        while self.left and len(self.busy) < self.size:
+            future, function, arguments = self.left.popleft()
+            hand = self.idle.pop() if self.idle else Hand(self.context, self.folder)
+            try:
+                hand.ask(function, *arguments)
+            except Died as died:
+                future.set_exception(died)
+            else:
+                self.busy[hand.here] = hand, future
+
+    def ended(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
+        """Those that have ended once one has, or after OFTEN s."""
+        ready = wait([*self.busy], OFTEN)
+        for here in [each for each in self.busy if each in ready]:
+            hand, future = self.busy.pop(here)
+            try:
+                found = hand.answer()
+                self.idle.append(hand)
+            except Died as died:
+                found = died
+            if isinstance(found, BaseException):
+                future.set_exception(found)
+            else:
+                future.set_result(found)
+        self.deal()
+        return {future for future in futures if future.done()}
 
     def end(self) -> None:
         """Kill them, whatever they do."""
         for process in multiprocessing.active_children():
             process.kill()
-        self.pool.shutdown(cancel_futures=True)
+            process.join()
+
+
+def work(there: Connection, folder: str) -> None:
+    """Send what comes of each call."""
+    begin(folder)
+    while True:
+        try:
+            place, function, arguments = there.recv()
+        except EOFError:  # who asks is gone
+            follow(folder)
+        os.chdir(place)
+        try:
+            found = function(*arguments)
+        except Exception as error:
+            found = error
+        there.send(found)
 
 
 def begin(folder: str) -> None:

@@ -10,7 +10,6 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
-from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from signal import SIG_DFL, SIGINT, SIGTERM, default_int_handler
 from threading import current_thread, main_thread
@@ -108,7 +107,7 @@ def interruptible() -> Iterator[None]:
         yield
         check()
     except BaseException as error:  # what a signal made fail may say anything
-        if isinstance(error, (OSError, EOFError, BrokenExecutor)):
+        if isinstance(error, (OSError, EOFError)):
             sleep(MEANWHILE)
         if isinstance(error, KeyboardInterrupt) or (HEARD and not isinstance(error, Interrupted)):
             clear_frames(error.__traceback__)  # which hold a context that was entered and not yet begun: it is left

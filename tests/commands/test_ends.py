@@ -20,6 +20,7 @@ import harness.process.wait
 from harness.commands.terminal import progress
 from harness.process import interrupt
 from harness.process.child import HANGS, ask
+from harness.process.crew import Crew, Died
 from harness.process.interrupt import Interrupted, check, interruptible, later
 from harness.process.wait import ended
 
@@ -206,6 +207,26 @@ def test_a_program_that_a_thread_waits_for_ends_with_the_command(tmp_path, monke
     interrupt.HEARD.append(signal.SIGINT)
     thread.join(timeout=30)
     assert ended == ["here"]
+
+
+def test_a_worker_that_is_killed_while_it_is_told_much_is_replaced(tmp_path):
+    crew = Crew(1, tmp_path, [])
+    try:
+        pid = result(crew, os.getpid)
+        os.kill(pid, signal.SIGSTOP)  # it reads no more
+        threading.Timer(0.2, os.kill, [pid, signal.SIGKILL]).start()
+        with pytest.raises(Died, match="exit code -9"):
+            result(crew, len, bytes(10_000_000))
+        assert result(crew, len, bytes(10_000_000)) == 10_000_000
+    finally:
+        crew.end()
+
+
+def result(crew, function, *arguments):
+    future = crew.submit(function, *arguments)
+    while not crew.ended([future]):
+        pass
+    return future.result()
 
 
 def test_a_sentence_about_the_interrupt_survives_the_clean_up(monkeypatch):

@@ -1,13 +1,14 @@
 """Workers on other machines: an existing Dask cluster, asked as the processes of this one are."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from time import monotonic
 from typing import Any
 
 from ...errors import HarnessError, reason
+from ...process.wait import ended
 
 PATIENCE = 60.0  # s without a worker
 EXTRA = "python -m pip install 'friction-fmus[sweep]'"
@@ -38,8 +39,9 @@ class Cluster:
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         return self.pool.submit(function, *arguments)
 
-    def renew(self) -> None:
-        """Dask goes on."""
+    def ended(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
+        """Those that have ended once one has, or after a while."""
+        return ended(futures)
 
 
 @contextmanager

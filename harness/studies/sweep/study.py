@@ -21,7 +21,6 @@ from ...errors import HarnessError
 from ...process.crew import Crew
 from ...process.interrupt import HEARD, Interrupted, check
 from ...process.room import room
-from ...process.wait import ended
 from .cluster import Cluster, cluster
 from .hands import Work, unload, work
 from .journal import Block, Journal
@@ -113,9 +112,8 @@ class Shift:
         while self.left or self.suspects or self.busy:
             check()
             self.deal()
-            for future in ended(self.busy):
-                if future in self.busy:
-                    yield from self.answered(future, self.busy.pop(future))
+            for future in self.hands.ended(self.busy):
+                yield from self.answered(future, self.busy.pop(future))
 
     def deal(self) -> None:
         """Give the workers what they can do, and one block more each."""
@@ -139,12 +137,7 @@ class Shift:
 
     def ask(self, span: Span, fmu: bytes = b"") -> None:
         sweep = self.sweep
-        try:
-            future = self.hands.submit(work, sweep.points.between(*span), sweep.runs, sweep.digest, fmu)
-        except self.hands.died:
-            self.bury([span])
-        else:
-            self.busy[future] = span
+        self.busy[self.hands.submit(work, sweep.points.between(*span), sweep.runs, sweep.digest, fmu)] = span
 
     def answered(self, future: "Future[Work | None]", span: Span) -> Iterator[Block]:
         """What has become of a block."""
@@ -172,12 +165,8 @@ class Shift:
             yield Block(first, found.values, found.sentences)
 
     def bury(self, spans: list[Span]) -> None:
-        """A worker has died: what it and, on this machine, the others had under way is to be done again."""
+        """A worker has died: what it had under way is to be done again."""
         self.alone, self.deaths = False, self.deaths + 1
         if self.deaths > MOST_DEATHS:
             raise HarnessError(f"workers died {self.deaths} times; the same command goes on where this one ends")
-        if isinstance(self.hands, Crew):
-            spans = [*spans, *self.busy.values()]
-            self.busy.clear()
-            self.hands.renew()
         self.suspects += spans
