@@ -9,7 +9,7 @@ likeliest value, knows what the others cannot be, and holds the truth also where
 """
 
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, reduce
 from itertools import combinations
 from statistics import NormalDist
 
@@ -64,7 +64,7 @@ class Cone:
 
     def squares(self, z: np.ndarray, first: float | None = None) -> np.ndarray:
         """The squares (n,) of such distances of points z (k, n)."""
-        return np.min([squares for _, _, squares in self.sides(z, first)], axis=0)
+        return reduce(np.minimum, (squares for _, _, squares in self.sides(z, first)))
 
     def sides(self, z: np.ndarray, first: float | None) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
         """Of each face the means that it leaves free, these nearest to the points z (k, n), and the squares of the
@@ -75,7 +75,7 @@ class Cone:
             if first is None or 0 in held:
                 off = z[held]
                 moved = z[free] - slope @ off
-                yield free, moved, np.where((moved >= 0).all(axis=0), np.sum(weight @ off * off, axis=0), np.inf)
+                yield free, moved, np.where((moved >= 0).all(axis=0), (weight @ off * off).sum(axis=0), np.inf)
 
 
 @cache

@@ -7,6 +7,7 @@ The series of the motion itself are smooth in the amplitude too, and are looked 
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from .law import at_rest
 STRAIGHT, NODES, NODES_SINE, NODES_WIDE = 2, 32, 40, 80  # of a spring without drag, with it, a pendulum, beyond WIDE
 WIDE = 2.0  # rad
 MOST = 1_000_000  # half swings
+RECENT = 4  # tables kept: a fit that has arrived asks for the same ones again, and so does who judges it
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ def chain(laws: np.ndarray, sine: bool, floor: float, most: int = MOST, until: f
     The first law decides how many there are: no more than `most`, none that begins after `until` in theta, none from an
     amplitude that friction holds or that is below `floor`.
     """
-    first, zeta, r, b = laws.T
+    first, _, r, b = laws.T
     low = at_rest(r, sine)
     plain, curved = (NODES_SINE, NODES_WIDE) if sine else (STRAIGHT, NODES)
     count = curved if (first.max() > WIDE if sine else b.any()) else plain
@@ -54,7 +56,7 @@ def chain(laws: np.ndarray, sine: bool, floor: float, most: int = MOST, until: f
     angle = np.pi * (order + 0.5) / count
     scale = 2 / (first - low)
     nodes = low[:, None] + (np.cos(angle) + 1) / scale[:, None]
-    swings = halves(nodes.ravel(), np.repeat(zeta, count), np.repeat(r, count), np.repeat(b, count), sine)
+    swings = table(nodes.tobytes(), laws.tobytes(), sine)
     next_share = (-swings.end.reshape(-1, count) - low[:, None]) * scale[:, None] - 1  # as shares, from -1 to 1
     weights = np.cos(np.outer(order, angle)) * 2 / count
     weights[0] /= 2
@@ -72,3 +74,11 @@ def chain(laws: np.ndarray, sine: bool, floor: float, most: int = MOST, until: f
     found = np.array(looks).reshape(len(looks), len(laws), count).transpose(1, 0, 2)
     amplitudes = low + (np.array(shares) + 1) / scale
     return Chain(amplitudes, np.cumsum(durations, axis=0), np.matmul(found, weights), swings)
+
+
+@lru_cache(RECENT)
+def table(nodes: bytes, laws: bytes, sine: bool) -> Halves:
+    """The half swings from the nodes (P, M) of the laws (P, 4)."""
+    a, rows = np.frombuffer(nodes), np.frombuffer(laws).reshape(-1, 4)
+    _, zeta, r, b = np.repeat(rows.T, len(a) // len(rows), axis=1)
+    return halves(a, zeta, r, b, sine)

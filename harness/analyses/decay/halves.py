@@ -16,6 +16,8 @@ ORDER = {False: 20, True: 22}  # the series of the pendulum has poles at complex
 SMALL = {False: 1e-13, True: 1e-11}  # share of the series that its last terms may be
 LONGEST = 1.7  # of a series, in theta
 MOST = 100  # series in a half swing
+NUMBERS = np.arange(1.0, 1.0 + max(ORDER.values()))[:, None]  # by an array numpy divides sooner than by a number
+TURNED = np.stack([-NUMBERS, NUMBERS], axis=1)
 
 
 @dataclass(frozen=True)
@@ -31,27 +33,34 @@ class Halves:
 
 def taylor(y: np.ndarray, w: np.ndarray, zeta: np.ndarray, r: np.ndarray, b: np.ndarray, sine: bool) -> np.ndarray:
     """The series (ORDER + 1, L) about the states y, w (L,) on the way down."""
-    order = ORDER[sine]
-    speed, pull = np.empty((2, order, len(y)))
-    factors = np.empty((3 if sine else 1, order, len(y)))  # of the speed: d, and of a pendulum C and G
-    damping = factors[0]
-    speed[0], damping[0] = w, b * w - 2 * zeta
+    order, dragged, d = ORDER[sine], bool(b.any()), b * w - 2 * zeta
+    series, speed = np.empty((order + 1, len(y))), np.empty((order, len(y)))
+    factors = np.empty((2 * sine + dragged, order, len(y)))  # of the speed: of a pendulum C and G; d that drag changes
+    series[0], speed[0] = y, w
     if sine:
-        pull, cosine = factors[:0:-1]
-        cosine[0] = np.cos(y)
-    pull[0] = -np.sin(y) if sine else -y
+        factors[:2, 0] = np.cos(y), -np.sin(y)
+    if dragged:
+        damping = factors[-1]
+        damping[0] = d
     for k in range(order - 1):
-        products = np.einsum("ij,...ij->...j", speed[: k + 1], factors[:, k::-1])
-        force = products[0]
-        force += pull[k]
+        n, at = NUMBERS[k], k + 1
+        if sine:
+            products = np.einsum("ij,kij->kj", speed[:at], factors[:, k::-1])
+            np.divide(products[:2], TURNED[k], out=factors[1::-1, at])
+            force = products[2] if dragged else speed[k] * d
+            force += factors[1, k]
+        else:
+            force = np.einsum("ij,ij->j", speed[:at], damping[k::-1]) if dragged else speed[k] * d
+            force -= series[k]
+            np.divide(speed[k], n, out=series[at])
         if k == 0:
             force += r
-        np.divide(force, k + 1, out=speed[k + 1])
-        np.multiply(b, speed[k + 1], out=damping[k + 1])
-        np.divide(products[1] if sine else speed[k], -(k + 1), out=pull[k + 1])
-        if sine:
-            np.divide(products[2], k + 1, out=cosine[k + 1])
-    return np.concatenate([y[None], speed / np.arange(1, order + 1)[:, None]])
+        np.divide(force, n, out=speed[at])
+        if dragged:
+            np.multiply(b, speed[at], out=damping[at])
+    left = 0 if sine else order - 1
+    np.divide(speed[left:], NUMBERS[left:order], out=series[left + 1 :])
+    return series
 
 
 def slopes(series: np.ndarray) -> np.ndarray:
