@@ -7,6 +7,7 @@ travels inside as `<package>/pythonfmu`, so the FMU never meets the pythonfmu of
 import ast
 import sys
 from collections.abc import Iterator, Mapping
+from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path, PurePosixPath
@@ -29,6 +30,7 @@ from .runtime.slave import slave_for
 '''
 
 
+@cache
 def installed(package: str) -> Path:
     """Where a package is installed of which an FMU carries a part; it is found without being imported."""
     spec = find_spec(package)
