@@ -8,7 +8,9 @@ import pytest
 from arrays import begun, spelled, start
 from models import DOP853, LARGER, ODE23, ODE45, RODAS, SIGN, THRESHOLD
 
+from fmus.packaging.catalogue import find
 from fmus.packaging.written import written
+from fmus.packaging.written.offer import offer
 
 FILES = {path.stem: path for path in LARGER}
 HEAD = '''"""A model."""
@@ -25,12 +27,14 @@ class Mine(Model):
 
 @pytest.fixture(scope="module")
 def mine(tmp_path_factory):
-    """mine(body): a model whose class goes on with these lines, written out; of the same lines once."""
+    """mine(body): a model whose class goes on with these lines, written out with some methods, or all; of the same
+    lines once."""
     path = tmp_path_factory.mktemp("mine") / "mine.py"
 
-    def make(*body):
+    def make(*body, methods=()):
         path.write_text(HEAD + "".join(f"    {line}\n" for line in body))
-        return written(path)()
+        source = find(path)
+        return written(source, offer(source, methods))()
 
     return make
 
@@ -70,7 +74,7 @@ def test_what_happens_twice_at_one_time_is_one_event(mine):
     """Two equal sleds on two equal springs, pulled alike, have the same bits."""
     (one, a), (two, b) = body("1", "k * (p - x1) - F1", 12.5), body("2", "k * (p - x2) - F2", 12.5)
     both = contact("1", "v1", 20.0, 30.0) + contact("2", "v2", 20.0, 30.0)
-    found, rows = events(mine(*one, *two, DRIVER, *both, a, b), DOP853, 1e-10, 8.0)
+    found, rows = events(mine(*one, *two, DRIVER, *both, a, b, methods=["dop853"]), DOP853, 1e-10, 8.0)
     assert len(found) > 5
     assert all(first == second for _, first, second in found)
     assert all(x1 == x2 and v1 == v2 for _, (x1, v1, x2, v2), _ in rows)
@@ -80,7 +84,7 @@ def test_two_riders_on_one_carrier_let_go_and_stop_together(mine):
     (carrier, a), (one, b) = body("0", "F1 + F2 - 3.0 * k * x0", 3.0), body("1", "k * (p - x1) - F1", 1.3)
     two, c = body("2", "k * (p - x2) - F2", 1.3)
     both = contact("1", "v1 - v0", 7.0, 10.0) + contact("2", "v2 - v0", 7.0, 10.0)
-    found, rows = events(mine(*carrier, *one, *two, DRIVER, *both, a, b, c), DOP853, 1e-10, 8.0)
+    found, rows = events(mine(*carrier, *one, *two, DRIVER, *both, a, b, c, methods=["dop853"]), DOP853, 1e-10, 8.0)
     assert len(found) > 5
     assert all(first == second for _, first, second in found)
     assert max(abs(y[2] - y[4]) for _, y, _ in rows) < 1e-12
@@ -189,7 +193,7 @@ def test_several_drivers_pull_each_at_its_own_speed(mine):
     """A mass between two of them; the second starts elsewhere, and its speed is an expression."""
     another = 'q = State("m", "another", start=0.3, rate=0.5 * u)'
     (one, a) = body("1", "k * (p - x1) + k * (q - x1)", 1.0)
-    model = mine(*one, DRIVER, another, a)
+    model = mine(*one, DRIVER, another, a, methods=["dop853"])
     _, rows = events(model, DOP853, 1e-11, 2.0)
     w = 600.0**0.5
     for t, (x, v, q), _ in rows:
@@ -216,7 +220,7 @@ def test_laws_without_modes_look_at_each_slip(mine, law):
     (one, a), (two, b) = body("1", "F2 - F1 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
     both = [line.replace("hold=", f"{words}, hold=") for line in contact("1", "v1", 9.0, 12.0)]
     both += [line.replace("hold=", f"{words}, hold=") for line in contact("2", "v2 - v1", 6.0, 8.0)]
-    model, draw, clipped = mine(*one, *two, DRIVER, *both, a, b), np.random.default_rng(2), 0
+    model, draw, clipped = mine(*one, *two, DRIVER, *both, a, b, methods=["ode23"]), np.random.default_rng(2), 0
     assert model.prepare() == 0
     for _ in range(200):
         y = draw.uniform(-0.05, 0.05, 4) * [1.0, draw.choice([0.0, 0.1, 1.0]), 1.0, draw.choice([0.1, 1.0])]
@@ -251,7 +255,7 @@ def test_the_jacobian_under_the_threshold_law_is_that_of_the_load_as_it_is_limit
     declared = ['f = Parameter(6.0, "N", "friction")', 'w = Parameter(40.0, "N/m", "how it grows")', DRIVER, *one]
     lines = [line.replace("hold=", f"{LAWS[THRESHOLD][0]}, hold=") for line in both]
     lines = [*declared, *two, *lines, a, b] if bodies == 2 else [*declared, *lines[:2], a]
-    model, draw, many = mine(*lines), np.random.default_rng(3), 2 * bodies
+    model, draw, many = mine(*lines, methods=["rodas"]), np.random.default_rng(3), 2 * bodies
     assert model.prepare() == 0
     model.friction, limited = THRESHOLD, 0
     for _ in range(200):
