@@ -17,6 +17,9 @@ from .gallery import Sketch, gallery
 from .sections import Published, Section, sections
 
 FILE = "report.html"
+TEMPLATE = Environment(
+    loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+).get_template("page.html")
 LIVE = Path("fmus/web/index.html")  # the page that runs, where it has been built
 ADVICE = (
     "Dry friction that must hold: the law hybrid. Stick and slip are modes, what is stuck does not creep, and every "
@@ -54,12 +57,9 @@ def write(results: Path, scenes: Sequence[Published]) -> Page:
 
 def page(found: list[Section], sketches: tuple[Sketch, ...], results: Path) -> str:
     """The HTML text of a page that lies in the folder of the results."""
-    environment = Environment(
-        loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    environment.filters["beside"] = lambda file: quote(os.fsencode(Path(os.path.relpath(file, results)).as_posix()))
     measured = [part.sentences for section in found if section.name == "precision" for part in section.parts]
-    return environment.get_template("page.html").render(
+    return TEMPLATE.render(
+        beside=lambda file: quote(os.fsencode(Path(os.path.relpath(file, results)).as_posix())),
         sections=found,
         sketches=sketches,
         advice=ADVICE,
