@@ -5,9 +5,18 @@ import numpy as np
 from harness.analyses.decay.law import LAWS, TERMS, unknowns_of
 from harness.analyses.decay.model import Model
 from harness.records.record import Record
+from harness.studies.decay.table import sentences
 
 T = np.linspace(0.0, 4.0, 1000)
 OMEGA = 12.566
+
+
+def values(estimates):
+    return {each.name: each.value for each in estimates}
+
+
+def said(found):
+    return " ".join(sentences(found))
 
 
 def swung(

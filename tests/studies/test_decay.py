@@ -1,0 +1,149 @@
+"""The study of a decay: its table, numbers and figure, and the command."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import commands
+import numpy as np
+import pytest
+from builds import ROOT
+from decays import swung
+from matplotlib.figure import Figure
+
+from harness.analyses.decay.figures import Known
+from harness.analyses.decay.fit import identify
+from harness.analyses.decay.law import LAWS
+from harness.analyses.decay.loss import losses_seen
+from harness.studies.decay.figure import MOST, draw, extremes
+from harness.studies.decay.job import numbers
+from harness.studies.decay.table import table
+
+
+def test_the_table_has_a_row_for_every_value():
+    found = identify(swung(0.02, 0.003, noise=1e-4), Known(k=157.9))
+    assert table(found).row_count == len(found.estimates) == 8
+
+
+def test_the_numbers_keep_their_names():
+    found = numbers(identify(swung(0.02, 0.003, noise=1e-4), Known()))
+    assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(found)
+    assert {each["name"] for each in found["fit"]} == {"omega", "zeta", "r", "b", "rest"}
+    assert all({"value", "error", "low", "high", "unit"} <= set(each) for each in found["fit"])
+    assert len(found["laws"]) == 7
+    assert set(found["loss"]["laws"]) == {"+".join(law) for law in LAWS}
+
+
+def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(tmp_path, monkeypatch):
+    """Of a record whose clock counts from 1970."""
+    figures = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
+    t = np.linspace(0.0, 9.0, 3001)
+    record = swung(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
+    found = identify(replace(record, t=record.t + 1.7e9), Known(pendulum=True))
+    draw(found, losses_seen(found), tmp_path / "figure.svg")
+    signal, residuals, shares = figures[0].get_axes()
+    assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
+    assert shares.get_xlabel() == "amplitude [deg]"
+    drawn = {line.get_label(): line.get_data() for line in signal.lines}
+    assert np.degrees(1.0) == pytest.approx(np.max(drawn["record"][1]), rel=5e-3)
+    assert len(drawn.get("left out", [[]])[0]) == len(record.t) - len(found.t)
+    assert found.record.at(1.7e9 + 0.0125) == "1700000000.0125"
+
+
+@pytest.mark.parametrize("count", [3000, 120_000])
+def test_of_many_samples_those_are_drawn_that_show_how_far_they_reach(count):
+    x = np.sin(np.arange(count)) + np.random.default_rng(1).standard_normal(count)
+    some, wide = extremes(x), -(-2 * count // MOST)
+    assert len(some) <= min(count, 3 * MOST // 2)
+    for begin in range(0, count, 100 * wide):
+        those = x[some[(some >= begin) & (some < begin + 10 * wide)]]
+        assert (those.min(), those.max()) == (x[begin : begin + 10 * wide].min(), x[begin : begin + 10 * wide].max())
+
+
+def harness(folder, *arguments, text=""):
+    """The finished process of the harness in `folder`."""
+    return commands.harness(folder, *arguments, text=text, blank=True, COLUMNS="120")
+
+
+def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_path):
+    """fmpy's command line simulates the FMU and writes the file."""
+    words = ["simulate", fmus / "coulomb.fmu", "--output-file", "run.csv", "--output-interval", "0.005"]
+    done = commands.harness(tmp_path, *words, "--start-values", "c", "0.3", "f", "0.4", module="fmpy")
+    assert (tmp_path / "run.csv").exists(), done.stderr
+    done = harness(tmp_path, "decay", "run.csv", "--unit", "m", "--k", "157.9", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    found = {each["name"]: each["value"] for each in json.loads(done.stdout)["fit"]}
+    assert found["f"] == pytest.approx(0.4, rel=1e-9)
+    assert found["c"] == pytest.approx(0.3, rel=1e-9)
+
+
+def test_a_scene_leaves_numbers_turning_points_fit_and_figure(fmus, tmp_path):
+    (tmp_path / "fmus").symlink_to(fmus)
+    done = harness(tmp_path, "decay", "coulomb")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Best described by dry friction" in done.stdout
+    folder = tmp_path / "results/decay/coulomb"
+    files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json"}
+    assert {file.name for file in folder.iterdir()} == files
+    found = {each["name"]: each for each in json.loads((folder / "decay.json").read_text())["fit"]}
+    assert found["f"]["value"] == pytest.approx(0.5, rel=1e-9)
+    with (folder / "fit.csv").open() as file:
+        assert next(csv.reader(file)) == ["t [s]", "x [m]", "fit [m]", "residual [m]"]
+
+
+def test_standard_input_is_a_record_too(tmp_path):
+    record = swung(0.02, noise=1e-4)
+    text = "t [s],x [m]\n" + "\n".join(f"{t:.9g},{x:.9g}" for t, x in zip(record.t, record.x, strict=True))
+    done = harness(tmp_path, "decay", "-", "--json", text=text)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["record"] == "stdin"
+
+
+def test_a_record_waits_for_nothing_that_it_does_not_need(tmp_path):
+    """Nothing that runs FMUs is imported; the figure is drawn once."""
+    program = """
+import sys
+from matplotlib.figure import Figure
+from pathlib import Path
+from decays import swung
+from harness.analyses.decay.figures import Known
+from harness.analyses.decay.fit import identify
+from harness.studies.decay.job import save
+
+draws, draw = [], Figure.draw
+Figure.draw = lambda *arguments: draws.append(draw(*arguments))
+save(identify(swung(0.02), Known()), Path.cwd())
+print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harness.scenes") if name in sys.modules])
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests/support")])},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (done.stdout.split(maxsplit=1), done.stderr) == (["1", "[]\n"], "")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "sentence"),
+    [
+        (["decay", "stickslip"], 1, "not a free decay of one oscillator"),
+        (["decay", "nosuch"], 2, "unknown scene 'nosuch'"),
+        (["decay", "nosuch.csv"], 2, "cannot read nosuch.csv"),
+        (["decay", "x.csv", "--k", "1", "--m", "1"], 2, "--k and --m"),
+        (["decay", "x.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: one column is fitted"),
+    ],
+)
+def test_what_the_command_line_gets_wrong_is_one_sentence(fmus, tmp_path, arguments, status, sentence):
+    (tmp_path / "fmus").symlink_to(fmus)
+    done = harness(tmp_path, *arguments)
+    assert done.returncode == status
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "results/decay").exists() or not list((tmp_path / "results/decay").iterdir())
