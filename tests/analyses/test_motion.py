@@ -60,6 +60,13 @@ def test_the_jacobian_is_that_of_differences(order, sine):
         assert np.mean(np.abs(slope - column) < 1e-5 * np.abs(column).max()) > 0.95
 
 
+@pytest.mark.parametrize(("sine", "r"), [(False, 0.51), (True, 0.49)])
+def test_what_friction_holds_does_not_move(sine, r):
+    """Of a pendulum neither from an angle of less than arcsin r, which is more than r."""
+    model, p = Model(1.0, 0, sine, 0.0, 1e-9), np.array([0, 0.5, 0, 0, 1.0, 0.0, r, 0])
+    assert set(model(p, unknowns_of(TERMS, False), np.linspace(-1.0, 10.0, 20))[0]) == {0.5}
+
+
 @pytest.mark.parametrize("sine", [False, True])
 @pytest.mark.parametrize("b", [0.0026, 0.0051, 0.0116])
 def test_the_motion_has_no_step_in_its_drag(b, sine):

@@ -64,7 +64,7 @@ def chain(laws: np.ndarray, sine: bool, floor: float, most: int = MOST, until: f
     ones = np.ones(len(laws))
     shares, durations, least, at = [ones], [np.zeros(len(laws))], floor * scale[0] - 1, 0.0
     looks: list[np.ndarray] = []
-    while len(looks) < most and shares[-1][0] > least and at <= until:
+    while first[0] > low[0] and len(looks) < most and shares[-1][0] > least and at <= until:
         angle = np.arccos(np.minimum(np.maximum(shares[-1], -ones), ones))
         looks.append(np.cos(np.multiply.outer(angle, order)))
         share, duration = np.vecdot(looks[-1], coefficients)
