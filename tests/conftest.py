@@ -5,13 +5,13 @@ import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as a command has it: before what follows loads numpy
+
 import builds
 import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
 from driver import Worker, processes
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is loaded: as a command has it
 
 
 def pytest_configure(config):
