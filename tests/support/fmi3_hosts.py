@@ -6,6 +6,7 @@ A test module takes them over by assignment: `fmus, worker, _workers = fmi3_host
 from functools import cache
 
 import builds
+import commands
 import driver
 import pytest
 from native_fmus import needed
@@ -41,6 +42,23 @@ def built():
     """The folder of the FMI 3.0 FMUs."""
     needed()
     return builds.once("fmi3", "--fmi", "3", "--platform", "linux64", timeout=600)
+
+
+LEAN = {"stickslip": ("ode23", "hybrid"), "coulomb": ("rodas", "sign")}
+
+
+@cache
+def lean(name):
+    """The FMI 3.0 FMU of a model with one method and one law."""
+    needed()
+
+    def make(folder):
+        method, law = LEAN[name]
+        chosen = ("--method", method, "--law", law, "--platform", "linux64")
+        done = commands.build("--fmi", "3", name, *chosen, "--out", folder)
+        assert done.returncode == 0, done.stderr
+
+    return builds.made(f"lean fmi3 {name}", make) / f"{name}.fmu"
 
 
 @pytest.fixture(scope="module")
