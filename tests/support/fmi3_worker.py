@@ -5,7 +5,6 @@ FMI 2.0 FMUs are welcome beside them.
 
 import os
 import sys
-import tempfile
 from ctypes import c_double
 from unittest.mock import patch
 
@@ -153,12 +152,8 @@ class Worker(worker.Worker):
         return self._new(path, name, ModelExchange)
 
     def _new(self, path, name, kind):
-        if path not in self.fmus:
-            folder = fmpy.extract(path, tempfile.mkdtemp(dir=self.room))
-            self.fmus[path] = folder, fmpy.read_model_description(path)
-        if self.fmus[path][1].fmiVersion == "2.0":
-            kind = worker.Instance
-        self.instances.append(kind(self.fmus[path], name))
+        fmu = self.unpacked(path)
+        self.instances.append((worker.Instance if fmu[1].fmiVersion == "2.0" else kind)(fmu, name))
         return len(self.instances) - 1
 
     def simulate(self, path, options):
@@ -170,7 +165,8 @@ class Worker(worker.Worker):
             names, rows = options["input"]
             rows = [tuple(row) for row in rows]
             options["input"] = np.array(rows, dtype=[(name, float) for name in ("time", *names)])
-        plain, count = FMU3Model.getContinuousStateDerivatives, [0]
+        (folder, options["model_description"]), count = self.unpacked(path), [0]
+        plain = FMU3Model.getContinuousStateDerivatives
 
         def counted(*arguments):
             count[0] += 1
@@ -178,7 +174,7 @@ class Worker(worker.Worker):
 
         try:
             with patch.object(FMU3Model, "getContinuousStateDerivatives", counted):
-                table = fmpy.simulate_fmu(path, **options)
+                table = fmpy.simulate_fmu(folder, **options)
         except Exception as error:
             return {"error": str(error)}
         return {"columns": {name: table[name].tolist() for name in table.dtype.names}, "evaluations": count[0]}

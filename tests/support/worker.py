@@ -180,11 +180,15 @@ class Worker:
         self.room, self.fmus, self.instances = room, {}, []
 
     def instantiate(self, path, name):
+        self.instances.append(Instance(self.unpacked(path), name))
+        return len(self.instances) - 1
+
+    def unpacked(self, path):
+        """The folder of an FMU and its description."""
         if path not in self.fmus:
             directory = extract(path, tempfile.mkdtemp(dir=self.room))
             self.fmus[path] = directory, read_model_description(path)
-        self.instances.append(Instance(self.fmus[path], name))
-        return len(self.instances) - 1
+        return self.fmus[path]
 
     def modules(self):
         """The file of every loaded module that has one."""
