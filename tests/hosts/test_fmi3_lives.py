@@ -40,7 +40,7 @@ def test_lives_one_after_another_leave_little_behind(each, record_property):
 
 def test_instances_of_both_kinds_and_both_versions_live_side_by_side(each, older):
     """All alive at once and stepped in turns: every instance of an FMU gives the same run."""
-    assert host("side_by_side", each + older, 6)["runs"] == 1
+    assert host("side_by_side", each + older, 1)["runs"] == 1
 
 
 def test_an_fmu_unpacked_anew_for_every_run_is_let_go(each, record_property):
@@ -55,21 +55,21 @@ def test_an_fmu_unpacked_anew_for_every_run_is_let_go(each, record_property):
 
 def test_threads_do_not_feel_each_other(each, older):
     paths = each + older
-    assert host("in_threads", paths, 6, 2) == {"runs": [1] * len(paths), "errors": []}
+    assert host("in_threads", paths, 4, 2) == {"runs": [1] * len(paths), "errors": []}
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_children_carry_on_what_they_were_given_and_begin_anew(method):
     """In co-simulation the sled, in model exchange the pendulum."""
     paths = [fmi3_hosts.built() / f"{name}.fmu" for name in ("stickslip", "pendulum")]
-    assert host("in_processes", paths, method) == {"same": True, "codes": [0, 0]}
+    told = host("in_processes", paths, method)
+    assert (told["same"], {*told["codes"]}) == (True, {0})
 
 
 def test_a_host_that_holds_the_sources_and_a_pythonfmu_changes_nothing(each):
-    """Co-simulation of every model: a folder for model exchange stands between two of them."""
     told = host("beside_sources", str(ROOT), each)
     assert told["foreign"] == []
-    assert told["rows"][::2] == [host("in_folder", path, None) for path in each[::2]]
+    assert told["rows"] == host("one_by_one", each)
 
 
 def test_a_folder_may_have_any_name(each, tmp_path):

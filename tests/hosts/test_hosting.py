@@ -5,7 +5,7 @@ import re
 import shutil
 import subprocess
 import zipfile
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 
 import commands
@@ -57,16 +57,17 @@ def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, 
         fmu.free()
 
 
-def test_instances_side_by_side_do_not_feel_each_other(launch):
+def test_instances_side_by_side_do_not_feel_each_other(launch, worker):
     """All models, laws and methods at once, stepped in turns."""
     times = [0.02 * i for i in range(50)]
     alone = [launch(name, values, stop=stop).run(times, outputs(name)) for name, values, stop in CASES]
     fleet = [(launch(name, values, stop=stop), outputs(name)) for name, values, stop in CASES]
     rows = [[fmu.get(*names)] for fmu, names in fleet]
     for t, ahead in pairwise(times):
-        for (fmu, names), mine in zip(fleet, rows, strict=True):
-            fmu.step(t, ahead - t)
-            mine.append(fmu.get(*names))
+        turns = [[[fmu.number, "step", [t, ahead - t]], [fmu.number, "get", [names]]] for fmu, names in fleet]
+        told = worker.call(None, "several", [*chain(*turns)])
+        for mine, row in zip(rows, told[1::2], strict=True):
+            mine.append(row)
     for (_, names), mine, expected in zip(fleet, rows, alone, strict=True):
         identical(mine, expected, names)
 

@@ -157,7 +157,7 @@ def in_child(answers, *given):
 
 
 def in_processes(paths, method):
-    """Instances carried into forked children, or none into spawned ones; the children against the parent."""
+    """Instances carried into two forked children, or none into a spawned one; the children against the parent."""
     folders = [extract(path) for path in paths]
     given = [Life(folder).begin() for folder in folders]
     for life in given:
@@ -166,7 +166,7 @@ def in_processes(paths, method):
         given = []
     context = multiprocessing.get_context(method)
     answers = context.Queue()
-    children = [context.Process(target=in_child, args=(answers, given, folders)) for _ in range(2)]
+    children = [context.Process(target=in_child, args=(answers, given, folders)) for _ in range(2 if given else 1)]
     for child in children:
         child.start()
     told = [answers.get(timeout=60) for _ in children]
@@ -186,11 +186,7 @@ def beside_sources(root, paths):
     assert fmus.runtime.slave.Fmi2Slave is pythonfmu.fmi2slave.Fmi2Slave
     pythonfmu.fmi2slave.Fmi2Slave.do_step = None  # whoever leaned on it would notice
     mine = set(sys.modules)
-    rows = []
-    for path in paths:
-        life = Life(extract(path))
-        rows.append(life.begin().run())
-        life.end()
+    rows = one_by_one(paths)
     new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - mine}
     places = (os.path.join(root, "fmus", ""), os.path.join(os.path.dirname(pythonfmu.__file__), ""))
     return {"rows": rows, "foreign": [file for file in new if file and file.startswith(places)]}
@@ -202,6 +198,11 @@ def in_folder(path, folder):
     rows = life.begin().run()
     life.end()
     return rows
+
+
+def one_by_one(paths):
+    """A run of each FMU."""
+    return [in_folder(path, None) for path in paths]
 
 
 if __name__ == "__main__":
