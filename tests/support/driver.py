@@ -135,11 +135,12 @@ class Instance:
 
     def through(self, times, names, changes):
         """As run; at the times in `changes` the values given there are set, after the row was read."""
-        rows, turns = [], [times[0], *sorted(changes), times[-1]]
-        for t, end in itertools.pairwise(turns):
-            self.set(changes.get(t, {}))
-            rows += self.run([s for s in times if t <= s <= end], names)[bool(rows) :]
-        return rows
+        asked = []
+        for t, end in itertools.pairwise([times[0], *sorted(changes), times[-1]]):
+            asked.append([self.number, "set", [changes.get(t, {})]])
+            asked.append([self.number, "run", [[s for s in times if t <= s <= end], names]])
+        first, *others = self.worker.call(None, "several", asked)[1::2]
+        return first + [row for rows in others for row in rows[1:]]
 
     def free(self):
         self.freed = True
