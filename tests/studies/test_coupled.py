@@ -4,13 +4,13 @@ import csv
 import json
 import re
 import zipfile
-from functools import cache
 from importlib.util import find_spec
 from math import cos, sqrt
 
 import commands
 import numpy as np
 import pytest
+from builds import made
 from fmpy.ssp.ssd import read_ssd
 
 from harness.errors import SceneError
@@ -87,15 +87,17 @@ def test_two_equal_masses_swing_against_each_other_as_their_closed_form_says(cou
     assert table[:, 4] == pytest.approx([-x for x in expected], abs=1e-9)
 
 
-@pytest.fixture(scope="module")
-def run(place):
+@pytest.fixture
+def run(fmus):
     """run(scene): the folder of a shipped scene's results; each is run once."""
 
-    @cache
     def run(scene):
-        done = commands.harness(place, "couple", scene, blank=scene != SCENES[0])
-        assert (done.returncode, done.stderr) == (0, "")
-        return place / "results/coupled" / scene
+        def make(folder):
+            (folder / "fmus").symlink_to(fmus)
+            done = commands.harness(folder, "couple", scene, blank=scene != SCENES[0])
+            assert (done.returncode, done.stderr) == (0, "")
+
+        return made(f"coupled-{scene}", make) / "results/coupled" / scene
 
     return run
 
