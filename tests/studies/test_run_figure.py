@@ -8,7 +8,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from builds import ROOT
+from builds import ROOT, made
 
 SCENES = {path.stem: tomllib.loads(path.read_text()) for path in sorted((ROOT / "harness/scenes").glob("*.toml"))}
 SCENES.pop("pacejka-0.001")
@@ -55,17 +55,21 @@ print(json.dumps(told))
 
 
 @pytest.fixture(scope="module")
-def drawn(place):
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *SCENES],
-        cwd=place,
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+def drawn(fmus):
+    def make(folder):
+        (folder / "fmus").symlink_to(fmus)
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM, *SCENES],
+            cwd=folder,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.returncode == 0, done.stderr
+        (folder / "told.json").write_text(done.stdout)
+
+    return json.loads((made("drawn", make) / "told.json").read_text())
 
 
 def curves(scene):
