@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(not here, reason="the extras 'coupled' and 'impo
 PAIR = """
 title = "a title"
 stop = 1.0
-steps = [0.004, 0.002, 0.001]
+steps = [0.004, 0.002]
 parts.a = { model = "smd", values = { c = 0.0 } }
 parts.b = { model = "smd", values = { c = 0.0, x0 = -0.1 } }
 springs = [{ between = ["a", "b"], k = 40.0 }]
