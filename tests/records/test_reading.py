@@ -178,13 +178,25 @@ def xlsx(*sheets):
     return file.getvalue()
 
 
+FOUND = {}
+
+
+def found_in(record, pendulum):
+    """What a record says; of those that are the same to eight digits only the first is fitted."""
+    numbers = [np.round(each, 8).tobytes() for each in (record.t, record.x)]
+    key = (*numbers, record.unit, record.base, record.order, record.notes, pendulum)
+    if key not in FOUND:
+        FOUND[key] = identify(record, Known(pendulum=pendulum), drag=False)  # whose laws take most of a fit
+    return FOUND[key]
+
+
 @pytest.mark.parametrize("name", FILES)
 def test_a_file_as_people_have_it_gives_its_answer(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(FILES[name]())
     record = read(str(path), Columns(**ASKED.get(name, {})), path.stem)
     assert record.quantity == QUANTITIES.get(name, "position")
-    found = identify(record, Known(pendulum=name in PENDULUMS), drag=False)  # whose laws take most of a fit
+    found = found_in(record, name in PENDULUMS)
     values = {each.name: each for each in found.estimates}
     for symbol, truth in TRUTH.items():
         assert values[symbol].value == pytest.approx(truth, rel=2e-3)
