@@ -104,7 +104,7 @@ def serve():
     from harness.process import child as asking
     from harness.results import provenance, style
 
-    provenance.versions()  # are looked up once
+    provenance.record(Path(), ())  # what packages and the system are is looked up once
     asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": Forked})
     with style.sheet(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
         figure.subplots().set_title("a title")
