@@ -5,6 +5,7 @@ function, status]} when an FMI call does not return OK, or {"failed": traceback}
 """
 
 import ctypes
+import inspect
 import itertools
 import json
 import os
@@ -23,6 +24,17 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 from fmpy.logging import addLoggerProxy
+
+
+def signature(thing, told=inspect.signature, known={}, **how):  # noqa: B006 - is kept
+    """What fmpy asks about each method of every new instance, which takes longer than all else that makes one."""
+    function = getattr(thing, "__func__", None)
+    if function is None or how:
+        return told(thing, **how)
+    return known.get(function) or known.setdefault(function, told(thing))
+
+
+inspect.signature = signature
 
 
 class Instance:
