@@ -11,9 +11,28 @@ CHATTER = 1e-6  # m/s: below it the threshold law calls the mass stuck
 SLED = [case for case in CASES if "x_driver" in outputs(case[0])]
 
 
+@pytest.fixture(scope="module")
+def found():
+    """What following each case has shown."""
+    return {}
+
+
+@pytest.fixture
+def following(launch, found):
+    """following(case): the ends of all internal steps, with the counts and the sizes of steps there."""
+
+    def following(case):
+        name, values, stop = case
+        if label(case) not in found:
+            found[label(case)] = launch(name, values, stop=stop).follow(0.0, stop, ["solver.steps", "solver.h"])
+        return found[label(case)]
+
+    return following
+
+
 @pytest.mark.parametrize("pushed", [False, True], ids=["free", "pushed"])
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_any_two_communication_grids_agree(launch, case, pushed):
+def test_any_two_communication_grids_agree(launch, following, case, pushed):
     name, values, stop = case
     names, draw = outputs(name) + counts(name), random.Random(label(case))
     shared = [0.0, *sorted(draw.uniform(0.0, stop) for _ in range(25)), stop]
@@ -28,8 +47,7 @@ def test_any_two_communication_grids_agree(launch, case, pushed):
         return [row for t, row in zip(times, rows, strict=True) if t in set(shared)]
 
     expected = solve()
-    fmu = launch(name, values, stop=stop)
-    internal, _ = fmu.follow(0.0, stop, [])
+    internal, _ = following(case)
     straddling = [t + d for t in internal[1:-1:5] for d in (-1e-9, 1e-9)] + [
         nextafter(t, stop) for t in internal[1:-1:7]
     ]
@@ -61,10 +79,10 @@ def test_reading_changes_nothing_at_any_time(worker, fmus, case):
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_a_change_at_the_end_of_an_internal_step_forgets_what_was_looked_at_beyond(launch, case):
+def test_a_change_at_the_end_of_an_internal_step_forgets_what_was_looked_at_beyond(launch, following, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
-    internal, _ = launch(name, values, stop=stop).follow(0.0, stop, [])
+    internal, _ = following(case)
     t, (force, size) = internal[len(internal) // 3], push(name)
     runs = []
     for look in (False, True):
@@ -104,10 +122,9 @@ def test_setting_a_value_to_what_it_is_changes_nothing(launch, case):
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_following_t_next_shows_every_internal_step(launch, case):
-    name, values, stop = case
-    times, rows = launch(name, values, stop=stop).follow(0.0, stop, ["solver.steps", "solver.h"])
-    assert times[-1] == stop
+def test_following_t_next_shows_every_internal_step(following, case):
+    times, rows = following(case)
+    assert times[-1] == case[-1]
     assert [steps for steps, _ in rows] == list(range(len(times)))
     assert all(h == b - a for a, b, (_, h) in zip(times[:-1], times[1:], rows[1:], strict=True))
 
