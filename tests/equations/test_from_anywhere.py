@@ -33,8 +33,10 @@ def command(*arguments, cwd):
 
 
 def built(path, kind):
-    """The FMU, beside a copy of the file in a folder outside the project."""
-    return of_file(path, *KINDS[kind]) / kind / f"{path.stem}.fmu"
+    """The FMU, beside a copy of the file in a folder outside the project; of FMI 3.0, whose numerics are those of the
+    native FMU, with its usual method."""
+    usual = ["--method", find(path).anatomy.method] if kind == "native/fmi3" else []
+    return of_file(path, *KINDS[kind], *usual) / kind / f"{path.stem}.fmu"
 
 
 @EVERY_FILE
