@@ -24,9 +24,9 @@ def test_a_drift_is_told_and_fitted_where_it_is_asked_for():
 
 def test_noise_that_is_not_independent_is_told_and_widens_the_intervals():
     record = swung(0.01, 0.001, noise=1e-3)
-    white = identify(record, Known())
+    white = identify(record, Known(), drag=False)
     noise = np.convolve(np.random.default_rng(3).standard_normal(1019), np.ones(20), "valid") * 2e-4
-    alike = identify(Record("alike", record.t, swung(0.01, 0.001).x + noise), Known())
+    alike = identify(Record("alike", record.t, swung(0.01, 0.001).x + noise), Known(), drag=False)
     assert "not independent" in said(alike)
     zeta = [next(each for each in found.estimates if each.name == "zeta") for found in (white, alike)]
     assert zeta[1].low < 0.01 < zeta[1].high
@@ -37,7 +37,7 @@ def test_noise_that_is_not_independent_is_told_and_widens_the_intervals():
 def test_a_loss_that_keeps_time_with_the_steps_of_the_sensor_is_told(r, alike):
     """Of 1 mm, at which a half swing takes 2 r."""
     side = 1.0 if r > 1.9995e-3 else -1.0
-    found = identify(swung(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), Known())
+    found = identify(swung(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), Known(), drag=False)
     assert ("rounds all turning points alike" in said(found)) == alike
 
 
