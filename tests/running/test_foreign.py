@@ -32,9 +32,10 @@ def theirs():
 
 @pytest.fixture
 def run(theirs, tmp_path):
-    """run(name, ...): the finished `run --fmu`, and the rows of its result by the names of the columns."""
+    """run(name, ...): the finished `run --fmu`, and the rows of its result by the names of the columns; each FMU is
+    plotted once in this file."""
 
-    def run(name, *arguments, blank=True):
+    def run(name, *arguments, blank=commands.UNPLOTTED):
         fmu = name if name.endswith(".fmu") else theirs / f"{name}.fmu"
         done = commands.harness(tmp_path, "run", "--fmu", fmu, *arguments, COLUMNS="120", blank=blank)
         assert "Traceback" not in done.stderr
@@ -71,7 +72,7 @@ def refused(done, status, *sentences):
 @pytest.mark.parametrize("name", ["Midpoint", "Third", "Exchange"])
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
 def test_an_fmu_that_hides_its_steps_is_run_until_two_results_agree(run, name, tolerance):
-    done, rows = run(name, "--set", "k=50", "--tolerance", tolerance)
+    done, rows = run(name, "--set", "k=50", "--tolerance", tolerance, blank=tolerance > 1e-4 or commands.UNPLOTTED)
     fine(done)
     assert "changes no output by more than" in done.stdout
     time, position, *_ = rows.values()
@@ -82,7 +83,7 @@ def test_an_fmu_that_hides_its_steps_is_run_until_two_results_agree(run, name, t
 def test_a_state_that_jumps_at_events_is_exchanged_as_its_closed_form_says(run):
     """FMI 2.0: after bounce n the ball rises with e^n of the speed of its first fall."""
     e, g = 0.8, 9.81
-    done, rows = run("Bouncing", "--set", f"e={e}")
+    done, rows = run("Bouncing", "--set", f"e={e}", blank=True)
     fine(done)
     fall = sqrt(2 / g)
     bounces = fall + 2 * fall * np.cumsum([0, *(e**n for n in (1, 2))])
@@ -95,7 +96,7 @@ def test_a_state_that_jumps_at_events_is_exchanged_as_its_closed_form_says(run):
 
 
 def test_an_fmu_whose_own_step_is_fixed_is_told_as_such(run):
-    done, rows = run("FixedStep")
+    done, rows = run("FixedStep", blank=True)
     fine(done)
     assert "its own step is fixed, at 0.1 s, its error unknown" in done.stdout
     assert rows["x"][-1] == pytest.approx(0.9**100)  # 41 % off
@@ -163,7 +164,8 @@ def test_a_scene_may_be_of_any_fmu(theirs, tmp_path, name, outputs, more, column
     assert (tmp_path / "results/mine/figure.svg").is_file()
     assert "error unknown" in done.stdout or "changes no output by more than" in done.stdout
     assert (
-        "the same, bit for bit" in commands.harness(tmp_path, "run", "results/mine", blank=True, COLUMNS="120").stdout
+        "the same, bit for bit"
+        in commands.harness(tmp_path, "run", "results/mine", blank=commands.UNPLOTTED, COLUMNS="120").stdout
     )
 
 
@@ -185,7 +187,7 @@ def test_a_scene_may_be_of_any_fmu(theirs, tmp_path, name, outputs, more, column
     ],
 )
 def test_an_fmu_that_ends_itself_is_told_by_its_status_and_keeps_what_it_computed(run, name, arguments, end, told):
-    done, rows = run(name, *arguments)
+    done, rows = run(name, *arguments, blank=True)
     refused(done, 1, f"{name}.fmu: it ends itself: ", told, f"until then is in results/{name}")
     assert rows["t [s]"][-1] == pytest.approx(end, abs=1e-3)
     assert len(rows["t [s]"]) > 60
@@ -202,7 +204,7 @@ def test_an_fmu_that_ends_itself_is_told_by_its_status_and_keeps_what_it_compute
     ],
 )
 def test_what_hangs_crashes_raises_or_is_lost_is_one_sentence_and_keeps_what_it_computed(run, kind, told):
-    done, rows = run("Trouble", "--set", f"kind={kind}", "--patience", "1.5")
+    done, rows = run("Trouble", "--set", f"kind={kind}", "--patience", "1.5", blank=True)
     refused(done, 1, f"Trouble.fmu: {told}")
     assert done.stderr.count("\n") == 1
     assert rows["t [s]"][-1] == 0.5
@@ -328,7 +330,7 @@ def test_names_beyond_ascii_and_no_units_are_as_good_as_others(run, theirs, tmp_
         tmp_path / "\u03c9.fmu",
         described(lambda text: text.replace('name="x"', 'name="\u03c6, \u3042"')),
     )
-    done, _ = run("\u03c9.fmu", "--tolerance", "1e-3")
+    done, _ = run("\u03c9.fmu", "--tolerance", "1e-3", blank=True)
     fine(done)
     assert "\u03c6, \u3042: from 1 to 0.99" in done.stdout
 
