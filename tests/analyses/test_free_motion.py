@@ -42,11 +42,12 @@ def test_a_hand_that_stops_the_motion_is_left_out_and_said():
     assert "follows the law until t = " in said(found)
 
 
-def test_samples_that_a_logger_repeats_before_and_after_the_motion_are_left_out():
+@pytest.mark.parametrize("drag", [True, False])
+def test_samples_that_a_logger_repeats_before_and_after_the_motion_are_left_out(drag):
     """They are longer than the motion, and stop it in mid-swing."""
     record = swung(0.01, 0.001, turn=0.0, noise=1e-4)
     x = np.concatenate([np.full(900, record.x[0]), record.x, np.full(1200, record.x[-1])])
-    found = identify(Record("padded", 0.004 * np.arange(len(x)), x), Known())
+    found = identify(Record("padded", 0.004 * np.arange(len(x)), x), Known(), drag)
     each = {one.name: one for one in found.estimates}
     assert abs(each["zeta"].value - 0.01) < 4 * each["zeta"].error < 0.002
     assert abs(each["r"].value - 0.001) < 4 * each["r"].error < 1e-4

@@ -40,9 +40,7 @@ class Window:
 
 def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drift: bool) -> Window:
     """The free motion of a record, from the values that its turning points agree with."""
-    problem, seed = prepare(record, turns, pendulum, drift)
-    for place in (UNKNOWNS.index(term) for term in TERMS if term not in terms):
-        seed[place] = 0.0
+    problem, seed = begun(record, turns, terms, pendulum, drift)
     notes = []
     if turns.start > record.t[0]:
         notes.append(
@@ -76,6 +74,13 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
     noise, _ = scatter(used.t, used.x)  # without what was held or stuck
     used = replace(used, noise=max(noise, LEAST_NOISE))
     return Window(used, p, squares, tuple(notes))
+
+
+def begun(record: Record, turns: Turns, terms: Terms, pendulum: bool, drift: bool) -> tuple[Problem, np.ndarray]:
+    """The problem, and the values of a law of these terms with which its turning points agree."""
+    problem, seed = prepare(record, turns, pendulum, drift)
+    seed[[UNKNOWNS.index(term) for term in TERMS if term not in terms]] = 0.0
+    return problem, seed
 
 
 def fitted(problem: Problem, p: np.ndarray, terms: Terms) -> Fitted:
@@ -148,7 +153,7 @@ def until_disturbed(record: Record, turns: Turns, used: Problem, squares: float,
         if count < LEAST:
             return None
         first = replace(turns, t=turns.t[:count], x=turns.x[:count])
-        problem, p = prepare(record, first, used.model.sine, used.drift)
+        problem, p = begun(record, first, terms, used.model.sine, used.drift)
         problem = problem.only(problem.t >= begin - problem.origin)
         early, last = problem, float(first.t[-1] - problem.origin)
         if np.searchsorted(problem.t, last, "right") < FEWEST:
