@@ -1,13 +1,18 @@
 """Fixtures: the FMUs built once, and a process that runs them."""
 
+import atexit
 import gc
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # The last of all, being the first to be told: to take down a worker that has told its results takes seconds.
+    atexit.register(os._exit, 0)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as a command has it: before what follows loads numpy
 
 import builds
+import forked
 import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
@@ -22,12 +27,18 @@ def pytest_configure(config):
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
         builds.room = Path(folder.name)
+    forked.room = builds.room
 
 
 def pytest_collection_finish():
     """What is there now stays to the end; to look through it again and again for what is not in use takes seconds."""
     gc.collect()
     gc.freeze()
+
+
+def pytest_unconfigure():
+    """Nor is what is there in the end to be looked through five times for what raises when it goes; once is enough."""
+    pytest_collection_finish()
 
 
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist

@@ -6,11 +6,11 @@ import sys
 import xml.etree.ElementTree as ET
 import zipfile
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from struct import unpack_from
 
 import fmi3_hosts
-import lief
 import pytest
 from commands import build
 from fmpy import read_model_description, simulate_fmu
@@ -121,8 +121,14 @@ def test_methods_and_laws_can_be_chosen_as_for_the_python_fmu(tmp_path):
 # ---- binaries
 
 
+@pytest.fixture(scope="module")
+def lief():
+    """The package that reads libraries, which takes half a second to load."""
+    return import_module("lief")
+
+
 @pytest.fixture(params=PLATFORMS)
-def binary(request, smd):
+def binary(request, smd, lief):
     """A platform, the bytes of its binary, and every library in it, parsed."""
     fmu, _ = smd
     content = entries(fmu)[f"binaries/{request.param}/smd{PLATFORMS[request.param].suffix}"]
@@ -157,7 +163,7 @@ def test_no_binary_tells_where_it_was_built(binary):
         assert place.encode() not in content
 
 
-def test_macos_libraries_are_for_both_processors_and_the_signature_of_the_one_that_needs_it_holds(smd):
+def test_macos_libraries_are_for_both_processors_and_the_signature_of_the_one_that_needs_it_holds(smd, lief):
     content = entries(smd[0])["binaries/darwin64/smd.dylib"]
     magic, count = unpack_from(">II", content)
     assert (magic, count) == (0xCAFEBABE, 2)

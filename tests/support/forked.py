@@ -20,6 +20,7 @@ from types import ModuleType
 
 LOADED = ("fmpy.fmi2", "fmpy.fmi3", "fmpy.logging", "multiprocessing.queues", "scipy.integrate")
 LONGEST = 1 << 17  # bytes of what is asked
+room = None  # the folder of their temporary files, which somebody else removes: many are ended from outside
 
 
 class Process:
@@ -27,7 +28,8 @@ class Process:
 
     def __init__(self, words, stdin, stdout, stderr, cwd=None):
         self.link, theirs = pair()
-        asked = json.dumps([[*map(str, words)], str(cwd or os.getcwd()), {**os.environ}]).encode()
+        environment = os.environ | {"TMPDIR": str(room or tempfile.gettempdir())}
+        asked = json.dumps([[*map(str, words)], str(cwd or os.getcwd()), environment]).encode()
         with theirs:
             socket.send_fds(_server(), [asked], [file.fileno() for file in (theirs, stdin, stdout, stderr)])
         self.pid, self.returncode = int(self.link.recv(99)), None
@@ -79,7 +81,7 @@ def serve(line):
     while True:
         asked, (*files,), *_ = socket.recv_fds(line, LONGEST, 4)
         if not asked:
-            sys.exit()
+            os._exit(0)
         if not os.fork():
             break
         for file in files:
