@@ -11,13 +11,21 @@ from tempfile import TemporaryFile
 from time import monotonic
 from typing import Any, TypeVar
 
+from ..errors import HarnessError
 from .interrupt import check, later
 from .room import room
 
 HOME = Path(__file__).parents[2]  # of the harness, and of what builds FMUs
 Asked = TypeVar("Asked")
 OFTEN = 0.1  # s between two looks at whether a signal has come: a thread that waits does not hear it
-HANGS = 1000  # exit status of what has not ended in time
+
+
+class Hangs(HarnessError):
+    """It has not ended in time; `done` is the process with what it had answered and said until it was ended."""
+
+    def __init__(self, patience: float, done: subprocess.CompletedProcess[str]) -> None:
+        super().__init__(f"no answer after {patience:g} s")
+        self.done = done
 
 
 def ask(
@@ -27,9 +35,9 @@ def ask(
     patience: float = inf,
     meanwhile: Callable[[], object] = check,
 ) -> subprocess.CompletedProcess[str]:
-    """The ended process, what it answered to the text on its standard input, and what it said; its exit status is HANGS
-    if it was ended after `patience` s.  Its temporary files are where every compiler and library can read their path.
-    What is done `meanwhile` checks whether a signal has come."""
+    """The ended process, what it answered to the text on its standard input, and what it said; Hangs after `patience`
+    s.  Its temporary files are where every compiler and library can read their path.  What is done `meanwhile` checks
+    whether a signal has come."""
     late = monotonic() + patience
     process = None
     with room("child-") as folder, TemporaryFile("w+", encoding="utf-8") as asked:
@@ -47,18 +55,18 @@ def ask(
                     env={**environment, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))},
                     start_new_session=True,  # a Ctrl-C is for this process alone, which then ends that one
                 )
-            while True:
+            while monotonic() <= late:
                 try:
                     answered, said = process.communicate(timeout=OFTEN)
                     return subprocess.CompletedProcess(command, process.returncode, answered, said)
                 except subprocess.TimeoutExpired:
                     meanwhile()
-                if monotonic() > late:
-                    return subprocess.CompletedProcess(command, HANGS, *end(process))
         except BaseException:
             if process:
                 end(process)
             raise
+        answered, said = end(process)
+        raise Hangs(patience, subprocess.CompletedProcess(command, process.returncode, answered, said))
 
 
 def ask_module(module: str, text: str, *arguments: str, **how: Any) -> subprocess.CompletedProcess[str]:

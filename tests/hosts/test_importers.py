@@ -16,7 +16,7 @@ from builds import made, of_file
 from models import AUTHORED, LARGER, MODELS
 
 from harness.errors import HarnessError
-from harness.process.child import HANGS
+from harness.process.child import Hangs
 from harness.studies.importers import checks, table
 from harness.studies.importers.checks import CHECKS, ELSEWHERE, IMPORTERS, Wrong
 from harness.studies.importers.request import END, Reply, Request
@@ -81,10 +81,13 @@ def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
         asked.append([json.loads(line)["instances"][0] for line in text.splitlines()])
         answered = [*takewhile(lambda name: name not in ("crash", "hang"), asked[-1])]
         last = asked[-1][: len(answered) + 1][-1]  # that it was about
-        ends = {"crash": -11, "hang": HANGS, "leak": -6}.get(last, 0)
+        ends = {"crash": -11, "hang": -9, "leak": -6}.get(last, 0)
         replies = "\n".join(json.dumps(asdict(Reply(name, [], [], 0))) for name in answered)
         said = "".join(f"{name} speaks{END}" for name in answered) + "a reason\n" * bool(ends)
-        return CompletedProcess([], ends, replies, said)
+        done = CompletedProcess([], ends, replies, said)
+        if last == "hang":
+            raise Hangs(patience, done)
+        return done
 
     monkeypatch.setattr(checks, "ask_module", process)
     monkeypatch.setattr(checks, "ANSWERS", {})

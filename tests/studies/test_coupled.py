@@ -13,9 +13,9 @@ import pytest
 from builds import made
 from fmpy.ssp.ssd import read_ssd
 
-from harness.errors import SceneError
+from harness.errors import HarnessError, SceneError
 from harness.scenes.coupled.scene import shipped
-from harness.studies.coupled import study
+from harness.studies.coupled import engine, study
 from harness.studies.coupled.engine import ENGINES
 from harness.truths.monolith import Bodies, solve
 
@@ -197,3 +197,12 @@ def test_a_scene_is_read_before_any_fmu_is(monkeypatch, tmp_path):
     monkeypatch.setattr(study, "starts", lambda fmu: pytest.fail("an FMU was read"))
     with pytest.raises(SceneError, match="unknown coupled scene 'two-mases'"):
         study.perform("two-mases", tmp_path, None, lambda share: None)
+
+
+def test_an_engine_that_hangs_is_told_by_its_name(monkeypatch, tmp_path):
+    (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(100)\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setitem(ENGINES, "Sleeper", "sleeps")
+    monkeypatch.setattr(engine, "PATIENCE", 0.3)
+    with pytest.raises(HarnessError, match=r"Sleeper could not run pair\.ssp: no answer after 0\.3 s"):
+        engine.rows("Sleeper", engine.Request("pair.ssp", 0.1, 1, []))

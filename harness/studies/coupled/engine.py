@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ...errors import HarnessError
-from ...process.child import ask_module
+from ...process.child import Hangs, ask_module
 
 PATIENCE = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
@@ -32,10 +32,14 @@ class Request:
 def rows(engine: str, asked: Request) -> list[list[float]]:
     """A row for each communication point, without the start where an engine does not show it; HarnessError with the
     last words of the engine if it gives none."""
-    done = ask_module(ENGINES[engine], json.dumps(asdict(asked)), patience=PATIENCE)
+    failed = f"{engine} could not run {Path(asked.archive).name}"
+    try:
+        done = ask_module(ENGINES[engine], json.dumps(asdict(asked)), patience=PATIENCE)
+    except Hangs as late:
+        raise HarnessError(f"{failed}: {late}") from None
     if done.returncode or not done.stdout:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
         hint = f"; {EXTRA}" if "ModuleNotFoundError" in last else ""
-        raise HarnessError(f"{engine} could not run {Path(asked.archive).name}: {last}{hint}")
+        raise HarnessError(f"{failed}: {last}{hint}")
     found: list[list[float]] = json.loads(done.stdout)
     return found

@@ -10,17 +10,26 @@ from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
-from ...process.child import ask
+from ...process.child import Hangs, ask
 from ...running.in_c import built, compiler
 from .request import END, Reply, Request
 
 
 def ran(text: str, patience: float) -> subprocess.CompletedProcess[str]:
-    """The C program, ended, which has carried out requests, as if it were a player."""
+    """The C program, ended, which has carried out requests, as if it were a player; Hangs after `patience` s."""
     requests = [Request(**json.loads(line)) for line in text.splitlines()]
     library = built(Path(requests[0].fmu))
     calls = [call for each in requests for call in [*(life(each) * each.lives or runs(each)), "0 end"]]
-    done = ask(library.command, "".join(f"{call}\n" for call in [*calls, "0 unload"]), library.environment, patience)
+    asked = "".join(f"{call}\n" for call in [*calls, "0 unload"])
+    try:
+        return answered(requests, ask(library.command, asked, library.environment, patience))
+    except Hangs as late:
+        answered(requests, late.done)
+        raise
+
+
+def answered(requests: list[Request], done: subprocess.CompletedProcess[str]) -> subprocess.CompletedProcess[str]:
+    """The process with its answers in the words of a player."""
     replies = map(reply, requests, done.stdout.split(END)[:-1])
     done.stdout = "\n".join(json.dumps(asdict(each)) for each in replies)
     return done

@@ -14,7 +14,7 @@ from typing import Any
 from zipfile import ZipFile
 
 from ...errors import HarnessError
-from ...process.child import HANGS, ask_module
+from ...process.child import Hangs, ask_module
 from ...running.description import description
 from ...running.in_c import COMPILER, EMBEDDED
 from . import by_c
@@ -122,15 +122,18 @@ def prepare(importer: Importer, requests: list[Request]) -> None:
 
 def asked(player: str, texts: list[str]) -> list[Played | Wrong]:
     """The answers to as many of these requests as a process carries out, and of the next one how it crashed or hung."""
-    text, in_c = "\n".join(texts), player == "by_c"
-    done = by_c.ran(text, PATIENCE) if in_c else ask_module(f"{__package__}.{player}", text, patience=PATIENCE)
+    text, hung = "\n".join(texts), ""
+    try:
+        in_c = player == "by_c"
+        done = by_c.ran(text, PATIENCE) if in_c else ask_module(f"{__package__}.{player}", text, patience=PATIENCE)
+    except Hangs as late:
+        done, hung = late.done, f"hangs for {PATIENCE} s"
     *said, rest = done.stderr.split(END)
     replies = [Reply(**json.loads(line)) for line in done.stdout.splitlines()]
     found: list[Played | Wrong] = [Played(*each) for each in zip(replies, said, strict=False)]
     if done.returncode or rest or len(found) < len(texts):
         last = rest.strip().splitlines()[-1:] or ["nothing said"]
-        ended = f"hangs for {PATIENCE} s" if done.returncode == HANGS else f"exit status {done.returncode}: {last[0]}"
-        found[len(texts) - 1 :] = [Wrong(ended)]
+        found[len(texts) - 1 :] = [Wrong(hung or f"exit status {done.returncode}: {last[0]}")]
     return found
 
 
