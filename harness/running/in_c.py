@@ -1,11 +1,9 @@
 """FMUs in a host in C (host.c), which the system's compiler makes on the spot."""
 
-import atexit
 import os
 import shutil
 import sysconfig
 from collections.abc import Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -16,13 +14,11 @@ import fmpy
 from ..errors import HarnessError
 from ..process.child import ask
 from ..process.room import room
-from .unpacked import in_python, unpacked
+from .unpacked import HELD, in_python, unpacked
 
 COMPILER = shutil.which("cc") or shutil.which("gcc")
 EMBEDDED = Path(sysconfig.get_config_var("LIBDIR") or "", sysconfig.get_config_var("INSTSONAME") or "none")
 HEADERS = Path(fmpy.__file__).parent / "c-code"
-HELD = ExitStack()  # folders that last as long as the process
-atexit.register(HELD.close)
 
 
 class NotHereError(HarnessError):

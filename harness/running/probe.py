@@ -3,13 +3,11 @@
 Values go to the FMU as they are, unchecked: what it makes of NaN is the question.
 """
 
-import atexit
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf, isnan, nan
-from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -21,14 +19,11 @@ from ..scenes.fmus import fmu_of
 from ..scenes.roles import roles
 from .fmu import Heard, begin, described, loaded, put
 from .specification import Specification
-from .unchanged import once
-from .unpacked import unpacked
+from .unpacked import kept
 from .values import labels
 
 Calls = list[tuple[float, float]]  # communication steps: from, size in s
 Changes = dict[float, dict[str, float]]  # values by the time from which they hold, in s
-HELD = ExitStack()  # files of FMUs
-atexit.register(HELD.close)
 
 
 @dataclass(frozen=True)
@@ -156,12 +151,6 @@ def probe(model: str) -> Iterator[Probe]:
     found = described(wanted)
     with loaded(wanted, found, kept(wanted.fmu)) as (fmu, heard):
         yield Probe(found, fmu, heard)
-
-
-@once
-def kept(fmu: Path) -> Path:
-    """The folder of its files, which lasts as long as the process."""
-    return HELD.enter_context(unpacked(fmu))
 
 
 def run(setting: Setting, calls: Calls, changes: Changes) -> Motion | Refusal:

@@ -5,8 +5,9 @@ nothing else: any other escape, and a missing folder, ends in a crash or a hang 
 lie where the URI needs no escape, and an FMU in Python that lacks what its library would look for is refused.
 """
 
+import atexit
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from shutil import disk_usage
 from zipfile import ZipFile
@@ -16,8 +17,11 @@ import fmpy
 from ..errors import HarnessError, reason
 from ..process.room import plain, room
 from ..scenes.fmus import check_built
+from .unchanged import once
 
 LAYER = "slavemodule.txt"  # the file that names an FMU's script; the libraries of both packages hold its name
+HELD = ExitStack()  # folders that last as long as the process
+atexit.register(HELD.close)
 
 
 @contextmanager
@@ -36,6 +40,12 @@ def unpacked(fmu: Path) -> Iterator[Path]:
         if in_python(folder):
             check(fmu, folder)
         yield folder
+
+
+@once
+def kept(fmu: Path) -> Path:
+    """The same of a file that is there, for as long as the process lasts."""
+    return HELD.enter_context(unpacked(fmu))
 
 
 def in_python(folder: Path) -> bool:

@@ -12,9 +12,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 
 from ...running.description import description
-from ...running.in_c import HELD
-from ...running.unchanged import once
-from ...running.unpacked import unpacked
+from ...running.unpacked import kept
 from .request import Reply, Request, serve
 
 
@@ -25,18 +23,12 @@ def play(request: Request, logged: tuple[str, ...] = ("",)) -> Reply:
     about = {
         "guid": found.guid,
         "modelIdentifier": found.coSimulation.modelIdentifier,
-        "unzipDirectory": str(files(Path(request.fmu))),
+        "unzipDirectory": str(kept(Path(request.fmu))),
     }
     instances = [fmi2.FMU2Slave(instanceName=name, **about) for name in request.instances]
     for instance in instances:
         instance.instantiate(callbacks=callbacks, loggingOn=True)
     return played(request, instances, fmpy.__version__)
-
-
-@once
-def files(fmu: Path) -> Path:
-    """The folder of an FMU's files, for as long as the process lasts."""
-    return HELD.enter_context(unpacked(fmu))
 
 
 def played(request: Request, instances: list[Any], version: str) -> Reply:

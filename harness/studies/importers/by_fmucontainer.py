@@ -17,8 +17,8 @@ from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer
 
 from ...process.room import room
 from ...running.description import description
-from ...running.in_c import HELD
 from ...running.unchanged import once
+from ...running.unpacked import HELD
 from . import by_fmpy
 from .request import Reply, Request, serve
 

@@ -12,7 +12,8 @@ from fmuloader.fmi2 import Fmi2Error, Fmi2Slave, Fmi2Status, Fmi2Type
 
 from ...running.description import description
 from ...running.fmu import FMICallException
-from .by_fmpy import files, played
+from ...running.unpacked import kept
+from .by_fmpy import played
 from .request import Reply, Request, serve
 
 
@@ -52,7 +53,7 @@ def hear(environment: Any, name: bytes, status: int, category: bytes, text: byte
 
 def play(request: Request) -> Reply:
     found = description(Path(request.fmu))
-    instances = [Instance(files(Path(request.fmu)), found, name) for name in request.instances]
+    instances = [Instance(kept(Path(request.fmu)), found, name) for name in request.instances]
     return played(request, instances, version("fmuloader"))
 
 
