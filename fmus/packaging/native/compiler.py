@@ -83,11 +83,12 @@ def compiler() -> Path:
 def linked(files: Mapping[str, str], main: str, target: str, out: str, options: Iterable[str]) -> bytes:
     """What the compiler makes of the source `main` for a target; `out` is a name without a folder, so that none gets
     in, and an option may name the compiler's folder."""
-    options = [option.format(name=Path(out).stem, compiler=compiler()) for option in options]
+    package = compiler()
+    options = [option.format(name=Path(out).stem, compiler=package) for option in options]
     with TemporaryDirectory() as folder:
         for file, text in files.items():
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
-        command = [str(compiler() / "zig"), "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
+        command = [str(package / "zig"), "cc", "-target", target, *STRICT, *SAME_BITS, *options, "-s"]
         command += [main, "-o", out]
         # It keeps a store at home, which services have not; what it makes of ours stays out, or the store would grow.
         stores = {"HOME": gettempdir(), "ZIG_LOCAL_CACHE_DIR": f"{folder}/store"} | os.environ

@@ -14,9 +14,9 @@ CALLED = (  # by script/fmu.js
     *("fmi2GetReal", "fmi2GetInteger", "fmi2SetReal", "fmi2SetInteger"),
 )
 # The headers of a C library without the library, which the compiler would first have to make: script/libc.js is one.
-HEADERS = (f"-isystem{{compiler}}/lib/libc/include/{kind}-musl" for kind in ("wasm-wasi", "generic"))
-IMPORTING = ("-nostdlib", *HEADERS, "-Wl,--no-entry", "-Wl,--import-symbols")
-OPTIONS = (*IMPORTING, "-fvisibility=hidden", *(f"-Wl,--export={name}" for name in CALLED))
+HEADERS = [f"-isystem{{compiler}}/lib/libc/include/{kind}-musl" for kind in ("wasm-wasi", "generic")]
+LINKED = ("-Wl,--no-entry", "-Wl,--import-symbols", *(f"-Wl,--export={name}" for name in CALLED))
+OPTIONS = ("-nostdlib", *HEADERS, *LINKED, "-fvisibility=hidden")
 
 
 def packed(name: str, files: Mapping[str, str]) -> str:
