@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterator
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,10 +63,10 @@ def sweep(
     """
     if name is not None and (name.startswith(".") or Path(name).name != name):
         raise click.UsageError(f"--name {name[:LONGEST]}: the name of one folder, without dots before it")
-    try:
-        from ..studies.sweep import file as sweep_file
-    except ImportError as error:
-        raise HarnessError(f"a sweep needs {error.name}: python -m pip install 'friction-fmus[sweep]'") from None
+    if find_spec("xarray") is None:  # of which the figure is made, when all runs are done
+        raise HarnessError("a sweep needs xarray: python -m pip install 'friction-fmus[sweep]'")
+    from ..studies.sweep import file as sweep_file
+
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
     asked = sweep_file.Asked(model, vary, values, random, seed, measures, name, options)
     with terminal.progress(1) as report:

@@ -3,14 +3,19 @@
 import csv
 import html
 import json
+import os
 import re
+import subprocess
+import sys
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
+from zipfile import ZipFile
 
 import commands as processes
 import numpy as np
 import pytest
+from builds import ROOT
 from rich.console import Console
 
 from harness.commands import commands
@@ -146,6 +151,31 @@ def test_why_an_fmu_of_either_kind_fails_is_said_once(kind, tmp_path, arguments)
     done = harness(tmp_path, *arguments, kind / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")
     assert done.returncode == 1
     assert re.fullmatch(r"Error: .*the motion leaves the range of numbers after t = 0.0 s.*\n", done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("package", "extra", "status", "arguments"),
+    [
+        ("xarray", "sweep", 1, ("sweep", "smd", "--vary", "c=1,2")),
+        ("pyssp_standard", "coupled", 1, ("couple", "two-masses")),
+        ("python_calamine", "records", 2, ("decay", "mine.xlsx")),
+        ("h5py", "records", 2, ("decay", "mine.mat")),
+    ],
+)
+def test_a_package_of_an_extra_that_is_not_here_is_named_before_anything_is_run(
+    here, package, extra, status, arguments
+):
+    with ZipFile(here / "mine.xlsx", "w") as archive:
+        archive.writestr("xl/workbook.xml", "")
+    (here / "mine.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n")
+    (here / "sitecustomize.py").write_text(f"import sys; sys.modules[{package!r}] = None")
+    command = [sys.executable, "-m", "harness", *arguments]
+    path = os.pathsep.join([str(here), str(ROOT)])
+    done = subprocess.run(command, cwd=here, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (status, "", 1), done.stderr
+    assert package in done.stderr
+    assert f"pip install 'friction-fmus[{extra}]'" in done.stderr
+    assert not (here / "results").exists()
 
 
 def test_an_fmu_in_the_place_of_a_scene_is_run(here, tmp_path):
