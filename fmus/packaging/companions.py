@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from ..runtime.declare import Declaring
+from ..runtime.variable_declarations import VariableOwner
 from .further import Variables
 from .page import page
 from .reference import files, reference
 
 
 def companions(
-    model: type[Declaring], path: Path, declared: Variables, icon: str = "model.png", use: str = ""
+    model: type[VariableOwner], path: Path, declared: Variables, icon: str = "model.png", use: str = ""
 ) -> dict[str, bytes]:
     """Their content, by their paths in the FMU; a model has an icon, known boundaries (harness/studies/sweep)
     and a certified result if they lie beside its file at `path`, under the same name.  The icon goes to `icon`;

@@ -5,8 +5,8 @@ The mode of a contact follows from its slip and, where it may stick, from its lo
 rates of both, which decide ties; of contacts that share bodies from those of all.
 """
 
-from ..runtime.declare import Declaring
-from ..runtime.values import SETTABLE
+from ..runtime.variable_access import SETTABLE_CAUSALITIES
+from ..runtime.variable_declarations import VariableOwner
 from .equations.algebra import derivative, leaves, put
 from .equations.anatomy import TIME, Anatomy
 from .equations.declared import HYBRID, SIGN, THRESHOLD, Contact
@@ -14,7 +14,7 @@ from .equations.expressions import Expression, Operand
 from .further import Variables
 
 
-def at_start(model: type[Declaring], declared: Variables) -> dict[str, list[str]]:
+def at_start(model: type[VariableOwner], declared: Variables) -> dict[str, list[str]]:
     """For every output the parameters and inputs that it follows from while the model is initialised."""
     outputs = [name for name, meaning in declared if meaning.causality == "output"]
     if not outputs:
@@ -43,5 +43,5 @@ def at_start(model: type[Declaring], declared: Variables) -> dict[str, list[str]
         return names | {"friction"} if touched and laws[1:] else names
 
     equations = {e.name: follows(e) for e in an.declared if e.name in outputs}
-    known = [name for name, meaning in declared if meaning.causality in SETTABLE]
+    known = [name for name, meaning in declared if meaning.causality in SETTABLE_CAUSALITIES]
     return {output: [name for name in known if name in equations[output]] for output in outputs}

@@ -10,8 +10,8 @@ from typing import Any, cast
 from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
-from ..runtime.declare import Declared, Declaring, Output, variables
-from ..runtime.values import SETTABLE
+from ..runtime.variable_access import SETTABLE_CAUSALITIES
+from ..runtime.variable_declarations import Output, VariableDeclaration, VariableOwner, variables
 from . import __version__
 from .dependencies import at_start
 from .document import document
@@ -44,7 +44,7 @@ LOG_CATEGORIES = {
 }
 
 
-def describe(model: type[Declaring], name: str, code: str, date: datetime, exchanging: bool = False) -> bytes:
+def describe(model: type[VariableOwner], name: str, code: str, date: datetime, exchanging: bool = False) -> bytes:
     """The model description of the FMU `name`, also for model exchange if wanted, as XML.
 
     `code` is the digest of the source that travels inside.  The guid follows from it and from all of the
@@ -57,7 +57,7 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime, excha
         declared = [one for one in all_variables(thing) if one[0] != TIME]
         root.set("numberOfEventIndicators", str(len(indicators_of(declared))))
         SubElement(root, "ModelExchange", EXCHANGE, modelIdentifier=name)
-    stepping = CAPABILITIES | (SLOPES | RATES if exchanging else {}) | (RAMPS if thing.ramps else {})
+    stepping = CAPABILITIES | (SLOPES | RATES if exchanging else {}) | (RAMPS if thing.has_input_derivatives else {})
     SubElement(root, "CoSimulation", stepping, modelIdentifier=name)
     define_units(root, declared)
     _define_types(root, declared)
@@ -75,7 +75,7 @@ def describe(model: type[Declaring], name: str, code: str, date: datetime, excha
     return closed(root, "guid", code, date)
 
 
-def opened(model: type[Declaring], name: str, version: str, key: str) -> Element:
+def opened(model: type[VariableOwner], name: str, version: str, key: str) -> Element:
     """The root; the attribute `key` is the last to be known."""
     root = Element("fmiModelDescription", {"fmiVersion": version, "modelName": name, key: ""})
     root.set("description", (model.__doc__ or "").strip().splitlines()[0])
@@ -91,7 +91,7 @@ def closed(root: Element, key: str, code: str, date: datetime) -> bytes:
     return document(root)
 
 
-def log_and_experiment(root: Element, model: type[Declaring], fmi: str) -> None:
+def log_and_experiment(root: Element, model: type[VariableOwner], fmi: str) -> None:
     """LogCategories, with the prefix of the status names, and DefaultExperiment."""
     categories = SubElement(root, "LogCategories")
     for category, text in LOG_CATEGORIES.items():
@@ -101,7 +101,7 @@ def log_and_experiment(root: Element, model: type[Declaring], fmi: str) -> None:
         experiment.set(key, repr(float(getattr(model, attribute))))
 
 
-def declared_by(model: type[Declaring]) -> Variables:
+def declared_by(model: type[VariableOwner]) -> Variables:
     """Name and declaration of every variable of a model."""
     return variables(model())
 
@@ -141,7 +141,7 @@ def units_of(declared: Variables) -> list[tuple[str, Unit]]:
     return [(symbol, used[symbol]) for symbol in dict.fromkeys((*UNITS, *used)) if symbol in used]
 
 
-def add_items(element: Element, meaning: Declared) -> None:
+def add_items(element: Element, meaning: VariableDeclaration) -> None:
     """The items of an enumeration."""
     for label, value, text in meaning.items:
         SubElement(element, "Item", name=label, value=str(value), description=text)
@@ -152,14 +152,14 @@ def type_name(variable: str) -> str:
     return "".join(word.capitalize() for word in variable.replace(".", "_").split("_"))
 
 
-def part_of_all(name: str, meaning: Declared, reference: int) -> dict[str, str]:
+def part_of_all(name: str, meaning: VariableDeclaration, reference: int) -> dict[str, str]:
     """The attributes that a variable of any type has."""
     attributes = {"name": name, "valueReference": str(reference), "description": meaning.text}
     attributes |= {"causality": meaning.causality, "variability": meaning.variability}
     return attributes | ({"initial": meaning.initial} if meaning.initial else {})
 
 
-def part_of_type(name: str, meaning: Declared) -> dict[str, str]:
+def part_of_type(name: str, meaning: VariableDeclaration) -> dict[str, str]:
     """The others.  FMI has no open bounds, so a value `above` or `below` a bound gets that bound."""
     attributes: dict[str, str] = {}
     if meaning.items:
@@ -173,7 +173,7 @@ def part_of_type(name: str, meaning: Declared) -> dict[str, str]:
     for key, bound in ("min", max(meaning.low, meaning.above)), ("max", min(meaning.high, meaning.below)):
         if isfinite(bound):
             attributes[key] = repr(number(bound))
-    if meaning.causality in SETTABLE:
+    if meaning.causality in SETTABLE_CAUSALITIES:
         attributes["start"] = repr(number(meaning.start))
     return attributes
 
@@ -183,7 +183,7 @@ def tell_states(elements: list[Element], thing: Any, rates: dict[int, int], firs
     speed may be put to zero at an event."""
     if not rates:
         return
-    for (rate, state), size in zip(rates.items(), thing.exchange.nominals, strict=True):
+    for (rate, state), size in zip(rates.items(), thing.model_exchange.nominals, strict=True):
         elements[rate].set("derivative", str(state + first))
         elements[state].set("nominal", repr(size))
     slips = [slip for slip in thing.contacts.values() if slip]
@@ -211,7 +211,7 @@ def depends(declared: Variables, rates: dict[int, int], place: int) -> list[int]
 Followed = dict[int, list[int]]  # the place of a variable -> those of what it follows from
 
 
-def followed(model: type[Declaring], declared: Variables, rates: dict[int, int]) -> list[Followed]:
+def followed(model: type[VariableOwner], declared: Variables, rates: dict[int, int]) -> list[Followed]:
     """What outputs and what derivatives follow from between events, and what both follow from at the start.
 
     Without the latter an importer must assume that it is everything, and sees loops where there are none.
@@ -224,7 +224,7 @@ def followed(model: type[Declaring], declared: Variables, rates: dict[int, int])
     return [*between, at_first]
 
 
-def _structure(root: Element, model: type[Declaring], declared: Variables, rates: dict[int, int]) -> None:
+def _structure(root: Element, model: type[VariableOwner], declared: Variables, rates: dict[int, int]) -> None:
     """ModelStructure: what follows an input or a state at once, and from what each follows at the start."""
     structure = SubElement(root, "ModelStructure")
     outputs, derivatives, at_first = followed(model, declared, rates)

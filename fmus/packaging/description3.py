@@ -7,7 +7,7 @@ from datetime import datetime
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from ..runtime.declare import Declaring
+from ..runtime.variable_declarations import VariableOwner
 from . import description
 from .further import TO_REST, Variables, all_variables, exchanged, indicators_of, rates_of
 
@@ -31,7 +31,7 @@ STEPPING = {
 }
 
 
-def describe(model: type[Declaring], name: str, code: str, date: datetime) -> bytes:
+def describe(model: type[VariableOwner], name: str, code: str, date: datetime) -> bytes:
     """The model description of the FMU `name` as XML; the instantiation token is to it what the guid is in FMI 2.0."""
     root = description.opened(model, name, "3.0", "instantiationToken")
     for interface, abilities in ("ModelExchange", EXCHANGE), ("CoSimulation", STEPPING):
@@ -66,7 +66,9 @@ def _define_types(root: Element, declared: Variables) -> None:
             description.add_items(SubElement(types, "EnumerationType", words), meaning)
 
 
-def _structure(root: Element, model: type[Declaring], thing: Any, declared: Variables, rates: dict[int, int]) -> None:
+def _structure(
+    root: Element, model: type[VariableOwner], thing: Any, declared: Variables, rates: dict[int, int]
+) -> None:
     """ModelStructure: what follows from which states and inputs, and at the start from which parameters.
 
     Of a smooth model some factors are known: one, and those that parameters make.
@@ -76,14 +78,16 @@ def _structure(root: Element, model: type[Declaring], thing: Any, declared: Vari
     for place, known in outputs.items():
         _unknown(structure, "Output", place, known)
     for place, known in derivatives.items():
-        steady = "" if thing.dry else "constant" if place in states else "tunable" if thing.linear else ""
+        steady = (
+            "" if thing.has_dry_friction else "constant" if place in states else "tunable" if thing.is_linear else ""
+        )
         _unknown(structure, "ContinuousStateDerivative", place, known, steady)
     for place, known in at_first.items():
         _unknown(structure, "InitialUnknown", place, known)
     places = {name: place for place, (name, _) in enumerate(declared)}
     inputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "input"]
     slips = [[places[slip]] if slip else states for slip in thing.contacts.values()]
-    at_rest = [state for state in states if not thing.waits or [state] not in slips]
+    at_rest = [state for state in states if not thing.rests_when_stuck or [state] not in slips]
     for place, slip in zip(indicators_of(declared), slips * 2, strict=True):
         rests = declared[place][0].startswith(TO_REST)
         _unknown(structure, "EventIndicator", place, slip if rests else at_rest + inputs)

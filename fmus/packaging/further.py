@@ -5,15 +5,15 @@ They stand behind the declared variables, whose value references stay.
 
 from typing import Any
 
-from ..runtime.declare import Declared, Declaring, Local, variables
+from ..runtime.variable_declarations import Local, VariableDeclaration, VariableOwner, variables
 from .written import beside
 
 TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
 DERIVATIVE = "der({})"  # of a state that a driver is
-Variables = list[tuple[str, Declared]]
+Variables = list[tuple[str, VariableDeclaration]]
 
 
-class Time(Declared):
+class Time(VariableDeclaration):
     """The independent variable."""
 
     causality, variability = "independent", "continuous"
@@ -25,11 +25,11 @@ class Smooth(Local):
     variability = "continuous"
 
 
-def exchanged(model: type[Declaring]) -> Any:
+def exchanged(model: type[VariableOwner]) -> Any:
     """An object of a model, as written out, that an importer's solver may lead."""
-    exchange = beside(model, "runtime.exchange")
-    thing = type(model.__name__, (exchange.Exchanging, model), {})()
-    exchange.nominals(thing)
+    exchange = beside(model, "runtime.model_exchange")
+    thing = type(model.__name__, (exchange.ModelExchangeMixin, model), {})()
+    exchange.update_nominals(thing)
     return thing
 
 
@@ -38,8 +38,8 @@ def place(name: str) -> str:
     if name == TIME:
         return "solver.t"
     if name.startswith((TO_REST, TO_BREAK_AWAY)):
-        return name.replace("events", "exchange", 1)
-    return "exchange.driver" if name.startswith(DERIVATIVE[:4]) else name
+        return name.replace("events", "model_exchange", 1)
+    return "model_exchange.driver_rate" if name.startswith(DERIVATIVE[:4]) else name
 
 
 def integrated(declared: Variables) -> Variables:

@@ -24,9 +24,9 @@ INIT = '''\
 
 from .{name} import {model} as Model
 from .guard import lend
-from .runtime.slave import slave_for
+from .runtime.slave import make_slave_class
 
-{model} = slave_for(Model)
+{model} = make_slave_class(Model)
 '''
 
 

@@ -5,8 +5,8 @@ from html import escape
 from inspect import cleandoc
 from pathlib import Path
 
-from ..runtime.declare import Declared, Declaring
-from ..runtime.values import SETTABLE
+from ..runtime.variable_access import SETTABLE_CAUSALITIES
+from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
 from . import __version__
 from .chart import chart
 from .further import Variables, integrated
@@ -34,10 +34,12 @@ OFFERED = """\
 | intermediate update after every internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |
 """  # by each kind of FMU, as the README has it
-FREE = Declared("", "").allowed  # in words, where every finite number is
+FREE = VariableDeclaration("", "").allowed  # in words, where every finite number is
 
 
-def page(model: type[Declaring], name: str, declared: Variables, found: Reference | None, icon: str, use: str) -> bytes:
+def page(
+    model: type[VariableOwner], name: str, declared: Variables, found: Reference | None, icon: str, use: str
+) -> bytes:
     """The page of the FMU `name`, as HTML that needs nothing but the icon beside it, or nothing where that is ""; `use`
     says how it can be run."""
     first, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
@@ -105,7 +107,7 @@ def _figure(found: Reference, declared: Variables) -> list[str]:
     return [*parts, f"<figcaption>{escape(found.told)}</figcaption></figure>"]
 
 
-def _choice(variable: str, meaning: Declared) -> str:
+def _choice(variable: str, meaning: VariableDeclaration) -> str:
     """The items of an enumeration."""
     title = meaning.text[0].upper() + meaning.text[1:]
     rows = "".join(
@@ -122,7 +124,7 @@ def _table(chosen: Variables) -> str:
     rows = []
     for variable, meaning in chosen:
         unit = readable(meaning.unit)
-        settable = meaning.causality in SETTABLE
+        settable = meaning.causality in SETTABLE_CAUSALITIES
         value = f"{meaning.start:.10g}" if settable else ""
         if settable and meaning.display:
             value = (
@@ -134,7 +136,7 @@ def _table(chosen: Variables) -> str:
         text = escape(meaning.text) + (f" <small>({escape('; '.join(notes))})</small>" if notes else "")
         cells = (f"<code>{escape(variable)}</code>", f"{value} {escape(unit)}".strip(), text)
         rows.append("<tr><td>{}</td><td class='number'>{}</td><td>{}</td></tr>".format(*cells))
-    set_ = [meaning.causality in SETTABLE for _, meaning in chosen]
+    set_ = [meaning.causality in SETTABLE_CAUSALITIES for _, meaning in chosen]
     value = "default" if all(set_) else "default, unit" if any(set_) else "unit"
     head = f"<thead><tr><th>name</th><th>{value}</th><th>what it is</th></tr></thead>"
     return f"<table>{head}{''.join(rows)}</table>"
@@ -149,7 +151,7 @@ def _offered() -> str:
     return f"<table class='offered'><thead><tr>{titles}</tr></thead>{lines}</table>"
 
 
-def _footer(model: type[Declaring], found: Reference | None) -> str:
+def _footer(model: type[VariableOwner], found: Reference | None) -> str:
     """The default experiment, licences and version."""
     run = f"Default run: 0 to {model.stop_time:g} s, tolerance {model.tolerance:g}."  # type: ignore[attr-defined]
     certified = f" Certified result: <a href='../{INSIDE}/'>{INSIDE}</a>." if found else ""

@@ -9,12 +9,20 @@ EVENT, CONTINUOUS, INTERMEDIATE = 4, 5, 6  # further ones, where the importer ha
 CO_SIMULATION, MODEL_EXCHANGE = 1, 2  # what an importer has it for
 
 # Statuses: of the motion; of a run that failed before; of what an importer asks for
-OK, DIVERGED, STALLED, ENDLESS = 0, 1, 2, 3
+OK, DIVERGED, STALLED, TOO_MANY_STEPS = 0, 1, 2, 3
 FAILED = 4
 BAD_STEP, BAD_START, BAD_STOP, BAD_VALUE = 5, 6, 7, 8
 CALCULATED, FIXED, OUT_OF_RANGE = 10, 11, 12  # why a value is bad
-NO_VARIABLE, FOREIGN_STATE, INTERRUPTED = 13, 14, 15
-OUT_OF_ORDER, NO_ADDRESS, NO_MEMORY, NOT_OFFERED, TOO_SHORT, WRONG_TOKEN, WRONG_LENGTH = 16, 17, 18, 19, 20, 21, 22
-NO_DERIVATIVE, NO_RATE, NO_COURSE = 23, 24, 25
-HIGHEST = 8  # order of a derivative of an input: that of dop853, to which one beyond it says nothing
-RULES = 100  # and the number of the rule of the model that the values break
+UNKNOWN_REFERENCE, INVALID_STATE, INTERRUPTED = 13, 14, 15
+OUT_OF_ORDER, NULL_POINTER, NO_MEMORY, NOT_SUPPORTED, BUFFER_TOO_SMALL, WRONG_TOKEN, WRONG_LENGTH = (
+    16,
+    17,
+    18,
+    19,
+    20,
+    21,
+    22,
+)
+NO_PARTIAL_DERIVATIVE, NO_OUTPUT_DERIVATIVE, NO_INPUT_DERIVATIVE = 23, 24, 25
+MAX_INPUT_ORDER = 8  # order of a derivative of an input: that of dop853, to which one beyond it says nothing
+FIRST_RULE = 100  # and the number of the rule of the model that the values break

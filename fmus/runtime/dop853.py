@@ -6,7 +6,7 @@ DOP853 that goes with it: its numbers, to the last bit of a double, under its na
 
 from math import sqrt
 
-from .vectors import Contacts, Rates, States, each
+from .vectors import ContactVector, RateVector, StateVector, elementwise
 
 NUMBER, TEXT = 4, "Dormand-Prince 8(5,3); for tight tolerances"
 STAGES = 12  # right-hand sides a step; the last is the first of the next step
@@ -64,7 +64,9 @@ class Dop853:
     def __init__(self):
         self.f6 = self.f7 = self.f8 = self.f9 = self.f10 = self.f11 = self.f12 = 0.0
 
-    def propose(self, model, modes: Contacts, t, y: States, f: Rates, h) -> tuple[States, Rates, States]:
+    def propose(
+        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+    ) -> tuple[StateVector, RateVector, StateVector]:
         """The new state, its rates, and the rates e of the error: the estimates are h e."""
         y2 = y + h * (A21 * f)
         f2 = model.rates(t + C2 * h, y2, modes)
@@ -98,10 +100,10 @@ class Dop853:
         e = combined(e5, e3)
         return y1, f1, e
 
-    def expand(self, model, step):
+    def build_interpolant(self, model, step):
         """The interpolant of the step just taken."""
         inside = step.interpolant
-        h, modes, t, y, f, y1, f1 = step.span, step.modes0, step.t0, step.y0, step.f0, step.y1, step.f1  # noqa: F841
+        h, modes, t, y, f, y1, f1 = step.h_full, step.modes0, step.t0, step.y0, step.f0, step.y1, step.f1  # noqa: F841
         f6, f7, f8, f9, f10, f11, f12 = self.f6, self.f7, self.f8, self.f9, self.f10, self.f11, self.f12
         u = A141 * f + A147 * f7 + A148 * f8 + A149 * f9
         y14 = y + h * (u + A1410 * f10 + A1411 * f11 + A1412 * f12 + A1413 * f1)
@@ -112,7 +114,7 @@ class Dop853:
         u = A161 * f + A166 * f6 + A167 * f7 + A168 * f8
         y16 = y + h * (u + A169 * f9 + A1613 * f1 + A1614 * f14 + A1615 * f15)
         f16 = model.rates(t + C16 * h, y16, modes)
-        inside.meet(step)
+        inside.set_hermite_cubic(step)
         inside.degree = 7
         u = D41 * f + D46 * f6 + D47 * f7 + D48 * f8 + D49 * f9 + D410 * f10
         inside.c4 = h * (u + D411 * f11 + D412 * f12 + D413 * f1 + D414 * f14 + D415 * f15 + D416 * f16)
@@ -124,7 +126,7 @@ class Dop853:
         inside.c7 = h * (u + D711 * f11 + D712 * f12 + D713 * f1 + D714 * f14 + D715 * f15 + D716 * f16)
 
 
-@each
+@elementwise
 def combined(fifth, third):
     """The rate of the error from the two embedded formulas, of order 5 and of order 3."""
     size = fifth * fifth + 0.01 * third * third

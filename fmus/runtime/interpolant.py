@@ -8,40 +8,40 @@ so that the ends are met whatever c2 ... c7 are.  c0 ... c3 are the cubic of Her
 inside of its step goes beyond (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.6).
 """
 
-from .vectors import States
+from .vectors import StateVector
 
 
 class Interpolant:
     """The coefficients for a step of the length `span`, once they are worked out."""
 
-    c0: States
-    c1: States
-    c2: States
-    c3: States
-    c4: States
-    c5: States
-    c6: States
-    c7: States
+    c0: StateVector
+    c1: StateVector
+    c2: StateVector
+    c3: StateVector
+    c4: StateVector
+    c5: StateVector
+    c6: StateVector
+    c7: StateVector
 
     def __init__(self):
         self.ready = False
-        self.span = 0.0
+        self.h = 0.0
         self.degree = 3
-        self.looked = 0  # how often somebody looked for what may end inside a step
+        self.n_event_evals = 0  # how often somebody looked for what may end inside a step
         self.c0 = self.c1 = self.c2 = self.c3 = self.c4 = self.c5 = self.c6 = self.c7 = 0.0
 
-    def meet(self, step):
+    def set_hermite_cubic(self, step):
         """The cubic with the values and slopes of both ends of a step."""
-        h = step.span
-        self.ready, self.span, self.degree = True, h, 3
+        h = step.h_full
+        self.ready, self.h, self.degree = True, h, 3
         c1 = step.y1 - step.y0
         self.c0, self.c1 = step.y0, c1
         self.c2 = h * step.f0 - c1
         self.c3 = 2.0 * c1 - h * (step.f0 + step.f1)
 
-    def at(self, elapsed) -> States:
+    def evaluate(self, elapsed) -> StateVector:
         """The state, `elapsed` seconds after the step began."""
-        s = elapsed / self.span
+        s = elapsed / self.h
         r = 1.0 - s
         c = self.c3
         if self.degree > 3:

@@ -4,7 +4,7 @@ P. Bogacki, L. F. Shampine, A 3(2) pair of Runge-Kutta formulas, Appl. Math. Let
 L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22.
 """
 
-from .vectors import Contacts, Rates, States
+from .vectors import ContactVector, RateVector, StateVector
 
 NUMBER, TEXT = 2, "Bogacki-Shampine 3(2), with the step control of MATLAB's program; for loose tolerances"
 STAGES = 3  # right-hand sides a step; the last is the first of the next step
@@ -15,7 +15,9 @@ POWER, SAFETY, SHRINK, GROW = 1.0 / 3.0, 0.8, 0.5, 5.0
 class Ode23:
     """One step, and the cubic through values and slopes of both its ends."""
 
-    def propose(self, model, modes: Contacts, t, y: States, f: Rates, h) -> tuple[States, Rates, States]:
+    def propose(
+        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+    ) -> tuple[StateVector, RateVector, StateVector]:
         """The new state, its rates, and the rates e of the error: the estimates are h e."""
         y2 = y + 0.5 * h * f
         f2 = model.rates(t + 0.5 * h, y2, modes)
@@ -26,6 +28,6 @@ class Ode23:
         e = (-5.0 * f + 6.0 * f2 + 8.0 * f3 - 9.0 * f1) / 72.0
         return y1, f1, e
 
-    def expand(self, model, step):
+    def build_interpolant(self, model, step):
         """The interpolant of the step just taken."""
-        step.interpolant.meet(step)
+        step.interpolant.set_hermite_cubic(step)

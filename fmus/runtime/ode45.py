@@ -5,7 +5,7 @@ L. F. Shampine, Some practical Runge-Kutta formulas, Math. Comp. 46 (1986) 135-1
 E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.6.
 """
 
-from .vectors import Contacts, Rates, States
+from .vectors import ContactVector, RateVector, StateVector
 
 NUMBER, TEXT = 3, "Dormand-Prince 5(4), with the step control of MATLAB's program; for moderate tolerances"
 STAGES = 6  # right-hand sides a step; the last is the first of the next step
@@ -31,7 +31,9 @@ class Ode45:
     def __init__(self):
         self.f3 = self.f4 = self.f5 = self.f6 = 0.0
 
-    def propose(self, model, modes: Contacts, t, y: States, f: Rates, h) -> tuple[States, Rates, States]:
+    def propose(
+        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+    ) -> tuple[StateVector, RateVector, StateVector]:
         """The new state, its rates, and the rates e of the error: the estimates are h e."""
         y2 = y + h * A21 * f
         f2 = model.rates(t + C2 * h, y2, modes)
@@ -49,10 +51,10 @@ class Ode45:
         e = E1 * f + E3 * f3 + E4 * f4 + E5 * f5 + E6 * f6 + E7 * f1
         return y1, f1, e
 
-    def expand(self, model, step):
+    def build_interpolant(self, model, step):
         """The interpolant of the step just taken: the cubic of ode23 and D s^2 (1 - s)^2."""
         inside = step.interpolant
-        inside.meet(step)
+        inside.set_hermite_cubic(step)
         inside.degree = 4
         c4 = D1 * step.f0 + D3 * self.f3 + D4 * self.f4 + D5 * self.f5 + D6 * self.f6 + D7 * step.f1
-        inside.c4 = step.span * c4
+        inside.c4 = step.h_full * c4

@@ -13,7 +13,7 @@ method RODASP, in: Progress in Differential-Algebraic Equations II, Springer 202
 
 from math import fabs, nan  # noqa: F401  of a system that cannot be solved
 
-from .vectors import Contacts, Rates, States, factored, kinematic, solved
+from .vectors import ContactVector, RateVector, StateVector, factorize, select_kinematic, solve_factored
 
 NUMBER, TEXT = 5, "Rosenbrock 4(3), L-stable; for stiff friction curves"
 STAGES = 6  # right-hand sides a step, and one Jacobian; the last is the first of the next step
@@ -47,62 +47,64 @@ H34, H35 = 18.104410789349338, -3.516963011559032
 class Rodas:
     """One step, and between its ends a cubic: Hermite's for a state whose rate is a state, else as the stages say."""
 
-    k1: States
-    k2: States
-    k3: States
-    k4: States
-    k5: States
+    k1: StateVector
+    k2: StateVector
+    k3: StateVector
+    k4: StateVector
+    k5: StateVector
 
     def __init__(self):
         self.k1 = self.k2 = self.k3 = self.k4 = self.k5 = 0.0
 
-    def propose(self, model, modes: Contacts, t, y: States, f: Rates, h) -> tuple[States, Rates, States]:
+    def propose(
+        self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
+    ) -> tuple[StateVector, RateVector, StateVector]:
         """The new state, its rates, and the rates e of the error: the estimates are h e."""
         f_t, J = model.jacobian(t, y, modes)
         drift = h * f_t
-        s = factored(GAMMA, h, J)
+        s = factorize(GAMMA, h, J)
 
         r = f + D1 * drift
-        k1 = solved(s, r)
+        k1 = solve_factored(s, r)
 
         y2 = y + h * A21 * k1
         f2 = model.rates(t + C2 * h, y2, modes)
         r = f2 + G21 * k1 + D2 * drift
-        k2 = solved(s, r)
+        k2 = solve_factored(s, r)
 
         y3 = y + h * (A31 * k1 + A32 * k2)
         f3 = model.rates(t + C3 * h, y3, modes)
         r = f3 + G31 * k1 + G32 * k2 + D3 * drift
-        k3 = solved(s, r)
+        k3 = solve_factored(s, r)
 
         y4 = y + h * (A41 * k1 + A42 * k2 + A43 * k3)
         f4 = model.rates(t + C4 * h, y4, modes)
         r = f4 + G41 * k1 + G42 * k2 + G43 * k3 + D4 * drift
-        k4 = solved(s, r)
+        k4 = solve_factored(s, r)
 
         y5 = y + h * (A51 * k1 + A52 * k2 + A53 * k3 + A54 * k4)
         f5 = model.rates(t + h, y5, modes)
         r = f5 + G51 * k1 + G52 * k2 + G53 * k3 + G54 * k4
-        k5 = solved(s, r)
+        k5 = solve_factored(s, r)
 
         y6 = y5 + h * k5
         f6 = model.rates(t + h, y6, modes)
         r = f6 + G61 * k1 + G62 * k2 + G63 * k3 + G64 * k4 + G65 * k5
-        e = solved(s, r)
+        e = solve_factored(s, r)
 
         y1 = y6 + h * e
         f1 = model.rates(t + h, y1, modes)
         self.k1, self.k2, self.k3, self.k4, self.k5 = k1, k2, k3, k4, k5
         return y1, f1, e
 
-    def expand(self, model, step):
+    def build_interpolant(self, model, step):
         """The interpolant of the step just taken; slopes are of no use where the curve is stiff."""
         inside = step.interpolant
-        inside.meet(step)
-        h = step.span
-        inside.c2 = kinematic(
+        inside.set_hermite_cubic(step)
+        h = step.h_full
+        inside.c2 = select_kinematic(
             inside.c2, h * (H21 * self.k1 + H22 * self.k2 + H23 * self.k3 + H24 * self.k4 + H25 * self.k5)
         )
-        inside.c3 = kinematic(
+        inside.c3 = select_kinematic(
             inside.c3, h * (H31 * self.k1 + H32 * self.k2 + H33 * self.k3 + H34 * self.k4 + H35 * self.k5)
         )

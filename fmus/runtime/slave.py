@@ -7,37 +7,37 @@ from typing import Any
 
 from pythonfmu.fmi2slave import Fmi2Slave, Fmi2Status
 
-from . import rules
-from .boundary import guarded
-from .declare import Declaring
-from .hosted import Hosted, hosting
-from .values import getter, setter
+from . import call_sequence
+from .fmu_instance import FmuInstance, make_fmu_class
+from .pythonfmu_workarounds import signal_safe
+from .variable_access import make_getter, make_setter
+from .variable_declarations import VariableOwner
 
 
-def slave_for(model: type[Declaring]) -> Any:
+def make_slave_class(model: type[VariableOwner]) -> Any:
     """The slave of a model class, under its name."""
-    return hosting(Slave, model)
+    return make_fmu_class(Slave, model)
 
 
-class Slave(Hosted, Fmi2Slave):
+class Slave(FmuInstance, Fmi2Slave):
     """One instance of a model as pythonfmu's native layer calls it."""
 
-    @guarded
+    @signal_safe
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
         try:
             stop_time, tolerance = inf if stop_time is None else stop_time, tolerance or 0.0
-            rules.setup(self.run, start_time, stop_time, tolerance)
+            call_sequence.set_experiment(self.run, start_time, stop_time, tolerance)
         except BaseException as error:  # as in hosted.py
-            self.rescue(error)
+            self.handle_exception(error)
 
     # No variable is a Boolean or a String; a host that asks all the same is told so, and not crashed.
 
-    get_real, set_real = getter("Real", nan), setter("Real")
-    get_integer, set_integer = getter("Integer", 0), setter("Integer")
-    get_boolean, set_boolean = getter("Boolean", False), setter("Boolean")
-    get_string, set_string = getter("String", ""), setter("String")
+    get_real, set_real = make_getter("Real", nan), make_setter("Real")
+    get_integer, set_integer = make_getter("Integer", 0), make_setter("Integer")
+    get_boolean, set_boolean = make_getter("Boolean", False), make_setter("Boolean")
+    get_string, set_string = make_getter("String", ""), make_setter("String")
 
     def log(self, msg: object, status: int = Fmi2Status.ok, category: str | None = None, debug: Any = None) -> None:
         """The native layer takes the message for a printf format."""

@@ -11,57 +11,57 @@ import numpy as np
 import numpy.typing as npt
 
 # What an annotation says that a name runs over, or counts.
-States = npt.NDArray[np.float64]
-Rates = npt.NDArray[np.float64]
-Contacts = npt.NDArray[np.int64]
-Contact = int
+StateVector = npt.NDArray[np.float64]
+RateVector = npt.NDArray[np.float64]
+ContactVector = npt.NDArray[np.int64]
+ContactIndex = int
 
 # Of the model at hand: every state, every state that is the rate of another, every contact; for each contact the place
 # of its slip among the states, and that of the state whose rate the slip is.
-places: list[int] = []
-speeds: list[int] = []
-contacts: list[int] = []
-slip: list[int] = []
-place: list[int] = []
-own: list[bool] = []  # for each state whether its rate is calculated, and is no state
-rate: list[int] = []  # the place of that rate, where it is a state
+state_indices: list[int] = []
+velocity_indices: list[int] = []
+contact_indices: list[int] = []
+slip_index: list[int] = []
+position_index: list[int] = []
+is_dynamic: list[bool] = []  # for each state whether its rate is calculated, and is no state
+rate_index: list[int] = []  # the place of that rate, where it is a state
 
 SMALL = 1e-6  # a pivot over what it shall eliminate
 
 
-def per_state():
+def state_vector():
     """A vector to be filled."""
-    return np.zeros(len(places))
+    return np.zeros(len(state_indices))
 
 
-def per_contact():
+def contact_vector():
     """Another, over the contacts."""
-    return np.zeros(len(contacts))
+    return np.zeros(len(contact_indices))
 
 
 def magnitude(a):
     return np.where(a > 0.0, a, -a)
 
 
-def greater(a, b):
+def elementwise_max(a, b):
     return np.where(a > b, a, b)
 
 
-def largest(a):
+def max_of(a):
     found = a[0]
     for one in a[1:]:
         found = found if found > one else one
     return found
 
 
-def first(a):
+def min_of(a):
     found = a[0]
     for one in a[1:]:
         found = found if found < one else one
     return found
 
 
-def total(*vectors):
+def sum_of(*vectors):
     """The sum, term by term."""
     terms = [one for vector in vectors for one in vector]
     found = terms[0]
@@ -70,25 +70,25 @@ def total(*vectors):
     return found
 
 
-def every(a):
+def all_of(a):
     return bool(np.all(a))
 
 
-def some(a):
+def any_of(a):
     return bool(np.any(a))
 
 
-def kinematic(a, b):
+def select_kinematic(a, b):
     """`a` for the states whose rate is a state, `b` for the others."""
-    return np.where(own, b, a)
+    return np.where(is_dynamic, b, a)
 
 
-def speeds_of(y):
+def kinematic_rates(y):
     """The rates that are states, each at the place of the state whose rate it is."""
-    return np.array([y[i] for i in rate])
+    return np.array([y[i] for i in rate_index])
 
 
-def each(function):
+def elementwise(function):
     """A function of numbers, taken number by number."""
 
     @wraps(function)
@@ -98,18 +98,18 @@ def each(function):
     return over
 
 
-def factored(g, h, J):
+def factorize(g, h, J):
     """1 - g h J, ready to be solved with: see packaging/written/elimination.py, which does the same in scalars."""
     w, inverse = np.zeros(J.shape), np.full(len(J), np.nan)
-    calculated = [i for i in places if own[i]]
+    calculated = [i for i in state_indices if is_dynamic[i]]
     for i in calculated:
-        for p in places:
-            if not own[p]:
+        for p in state_indices:
+            if not is_dynamic[p]:
                 w[i, p] = g * h * J[i, p]
         for j in calculated:
             entry = J[i, j]
-            for p in places:
-                if not own[p] and rate[p] == j:
+            for p in state_indices:
+                if not is_dynamic[p] and rate_index[p] == j:
                     entry = entry + w[i, p]
             w[i, j] = 1.0 - g * h * entry if i == j else -g * h * entry
     for n, k in enumerate(calculated):
@@ -124,14 +124,14 @@ def factored(g, h, J):
     return g, h, w, inverse
 
 
-def solved(system, r):
+def solve_factored(system, r):
     """The k of (1 - g h J) k = g r."""
     g, h, w, inverse = system
-    calculated, k = [i for i in places if own[i]], np.zeros(len(r))
+    calculated, k = [i for i in state_indices if is_dynamic[i]], np.zeros(len(r))
     for n, i in enumerate(calculated):
         k[i] = r[i]
-        for p in places:
-            if not own[p]:
+        for p in state_indices:
+            if not is_dynamic[p]:
                 k[i] = k[i] + w[i, p] * r[p]
         for j in calculated[:n]:
             k[i] = k[i] - w[i, j] * k[j]
@@ -139,7 +139,7 @@ def solved(system, r):
         for j in calculated[n + 1 :]:
             k[i] = k[i] - w[i, j] * k[j]
         k[i] = k[i] * inverse[i]
-    for p in places:
-        if not own[p]:
-            k[p] = g * (r[p] + h * k[rate[p]])
+    for p in state_indices:
+        if not is_dynamic[p]:
+            k[p] = g * (r[p] + h * k[rate_index[p]])
     return k

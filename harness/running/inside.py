@@ -17,7 +17,7 @@ from .answer import Answer
 from .unchanged import once
 from .unpacked import LAYER, unpacked
 
-OK = 0  # status of the march
+OK = 0  # status of the solver
 
 
 def embedded(fmu: Path) -> type:
@@ -67,7 +67,7 @@ class Inside:
         return cls(new)
 
     def begin(self, stop: float) -> None:
-        first = self.model.initial(0.0)  # a number, of a model of one state
+        first = self.model.initial_state(0.0)  # a number, of a model of one state
         first = first if isinstance(first, tuple) else (first,)
         self.model.solver.start(self.model, 0.0, *first, stop, self.model.tolerance)
 
@@ -75,7 +75,7 @@ class Inside:
     def read(self) -> Callable[[Any], tuple[float, ...]]:
         """What tells the states at the present point of the solver; of a body, position and speed."""
         names = [self.number(name) for name in self.model.states]
-        return attrgetter(*names) if len(names) > 1 else lambda march: (getattr(march, names[0]),)
+        return attrgetter(*names) if len(names) > 1 else lambda solver: (getattr(solver, names[0]),)
 
     def number(self, name: str) -> str:
         """What the solver calls a state or a mode: its_h_ where h means something else to it."""
@@ -83,20 +83,20 @@ class Inside:
 
     def motion(self, times: list[float], patience: float | None = None) -> list[tuple[float, ...]]:
         """The states at the times, from 0 s on; HarnessError if the run fails or outlasts `patience` s."""
-        model, march = self.model, self.model.solver
+        model, solver = self.model, self.model.solver
         self.begin(times[-1])
         read = self.read
-        found = [read(march)]
+        found = [read(solver)]
         late = perf_counter() + patience if patience else None
         try:
             for t in times[1:]:
-                if march.advance(model, t) != OK:
-                    raise HarnessError(f"the solver gave up at t = {march.step.t0:.6g} s")
-                found.append(read(march))
+                if solver.advance(model, t) != OK:
+                    raise HarnessError(f"the solver gave up at t = {solver.step.t0:.6g} s")
+                found.append(read(solver))
                 if late and perf_counter() > late:
                     raise HarnessError(f"at t = {t:.3g} s after {patience:g} s of run time")
         except (ArithmeticError, ValueError):
-            raise HarnessError(f"the motion left the range of numbers after t = {march.step.t0:.6g} s") from None
+            raise HarnessError(f"the motion left the range of numbers after t = {solver.step.t0:.6g} s") from None
         return found
 
     def answer(self, times: list[float], patience: float | None = None) -> Answer:
@@ -105,7 +105,7 @@ class Inside:
         model = self.model
         model.solver.report(model.events)
         evaluations = model.solver.evaluations
-        sticks = len(model.contacts) == 1 and model.solver.step.sticks
+        sticks = len(model.contacts) == 1 and model.solver.step.is_hybrid
         return Answer(motion, self.events(times[-1]) if sticks else None, evaluations)
 
     def events(self, stop: float) -> list[tuple[float, int]]:
@@ -114,13 +114,13 @@ class Inside:
 
     def modes(self, stop: float) -> list[tuple[float, int]]:
         """The same after the mode at the start."""
-        model, march, (mode,) = self.model, self.model.solver, map(self.number, self.model.contacts)
+        model, solver, (mode,) = self.model, self.model.solver, map(self.number, self.model.contacts)
         self.begin(stop)
-        found: list[tuple[float, int]] = [(0.0, getattr(march, mode))]
-        while march.t < stop:
-            march.look_ahead(model)
-            march.advance(model, march.t_next)
-            march.report(model.events)
+        found: list[tuple[float, int]] = [(0.0, getattr(solver, mode))]
+        while solver.t < stop:
+            solver.update_t_next(model)
+            solver.advance(model, solver.t_next)
+            solver.report(model.events)
             if model.events.count >= len(found):
-                found.append((march.t, getattr(march, mode)))
+                found.append((solver.t, getattr(solver, mode)))
         return found

@@ -89,18 +89,18 @@ def test_what_is_written_out_has_the_bits_of_the_equations_as_they_stand(source)
         equations = Evaluated(anatomy, values, math)
         for c in anatomy.contacts:
             values[c.name] = mode * equations.of(c.slide)
-        model.observe(t, *at.values(), *[mode] * len(modes))
+        model.compute_outputs(t, *at.values(), *[mode] * len(modes))
         for e in (*anatomy.outputs, *anatomy.contacts):
             assert same_bits(getattr(model, e.name) + 0.0, equations.of(e) + 0.0), e.name
         rate = model.rates(t, *at.values(), *[mode] * len(modes))
         assert same_bits(rate + 0.0, equations.of(anatomy.law[anatomy.own[0]]) + 0.0)
         for c in anatomy.contacts:
             at[c.slip.name] = values[c.slip.name] = 0.0
-            values[c.name], _, limit = model.hold(t, *at.values())
+            values[c.name], _, limit = model.stick_load(t, *at.values())
             size = sum(abs(equations.of(e)) for e in anatomy.outputs) + abs(values[c.name])
             assert abs(equations.of(anatomy.law[c.slip])) < 1e-13 * size
             assert limit >= 0.0
-            model.observe(t, *at.values(), 0)
+            model.compute_outputs(t, *at.values(), 0)
             assert getattr(model, anatomy.law[c.slip].name) == 0.0
         tried += 1
     assert tried > 100

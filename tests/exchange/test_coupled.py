@@ -16,31 +16,35 @@ FILES = {path.stem: path for path in LARGER}
 def integrated(name, stop):
     """Time and modes of each event, and the last state, by scipy with the indicators for events."""
     cls = written(FILES[name])
-    model, exchange, run = exchanged(cls), beside(cls, "runtime.exchange"), beside(cls, "runtime.rules").Run(1e-10)
+    model, exchange, run = (
+        exchanged(cls),
+        beside(cls, "runtime.model_exchange"),
+        beside(cls, "runtime.call_sequence").RunState(1e-10),
+    )
     begun(model, {"solver.method": DOP853, "solver.rtol": 1e-10}, stop)
-    start(model, model.initial(0.0), stop)
-    march = model.solver
+    start(model, model.initial_state(0.0), stop)
+    solver = model.solver
     exchange.begin(model)
 
     def at(t, y):
-        exchange.move_to(run, model, t)
-        model.exchange.states[:] = map(float, y)
-        exchange.put(run, model)
+        exchange.set_time(run, model, t)
+        model.model_exchange.states[:] = map(float, y)
+        exchange.set_continuous_states(run, model)
 
     def rates(t, y):
         at(t, y)
-        exchange.rates(model)
-        return list(model.exchange.rates)
+        exchange.update_rates(model)
+        return list(model.model_exchange.rates)
 
     def states():
-        exchange.states(model)
-        return list(model.exchange.states)
+        exchange.update_states(model)
+        return list(model.model_exchange.states)
 
     def indicator(i):
         def left(t, y):
             at(t, y)
-            exchange.indicators(model)
-            return model.exchange.indicators[i]
+            exchange.update_indicators(model)
+            return model.model_exchange.indicators[i]
 
         left.terminal, left.direction = True, -1
         return left
@@ -56,11 +60,11 @@ def integrated(name, stop):
         beyond = 1e-12 * (1.0 + t)  # where an importer's solver ends a step: the root lies behind it
         t, y = t + beyond, y + beyond * np.array(rates(t, y))
         at(t, y)
-        before = [getattr(march, mode) for mode in model.contacts]
-        exchange.update(model, march)
-        assert not exchange.update(model, march)
+        before = [getattr(solver, mode) for mode in model.contacts]
+        exchange.update_modes(model, solver)
+        assert not exchange.update_modes(model, solver)
         y = states()
-        modes = [getattr(march, mode) for mode in model.contacts]
+        modes = [getattr(solver, mode) for mode in model.contacts]
         if modes != before:
             events.append((t, *modes))
 
@@ -78,15 +82,19 @@ def test_modes_follow_at_the_events_that_an_importer_finds(name):
 def test_where_no_modes_fit_no_state_is_a_number(tmp_path):
     """A sled whose sliding friction is above the static one, when the driver has pulled far enough."""
     cls = written(growing(tmp_path))
-    model, exchange, run = exchanged(cls), beside(cls, "runtime.exchange"), beside(cls, "runtime.rules").Run(1e-10)
+    model, exchange, run = (
+        exchanged(cls),
+        beside(cls, "runtime.model_exchange"),
+        beside(cls, "runtime.call_sequence").RunState(1e-10),
+    )
     begun(model, {"slide1": 200.0}, 8.0)
-    start(model, model.initial(0.0), 8.0)
+    start(model, model.initial_state(0.0), 8.0)
     exchange.begin(model)
-    exchange.move_to(run, model, 4.0)
+    exchange.set_time(run, model, 4.0)
     model.x_base = 0.034 * 4.0
-    assert not exchange.update(model, model.solver)
-    exchange.move_to(run, model, 5.0)
+    assert not exchange.update_modes(model, model.solver)
+    exchange.set_time(run, model, 5.0)
     model.x_base = 0.034 * 5.0
-    exchange.update(model, model.solver)
-    exchange.states(model)
-    assert np.isnan(model.exchange.states[:4]).all()
+    exchange.update_modes(model, model.solver)
+    exchange.update_states(model)
+    assert np.isnan(model.model_exchange.states[:4]).all()

@@ -7,7 +7,7 @@ from models import DOP853, LARGER, MODELS, ODE45, RODAS, declared
 
 from fmus.packaging.further import exchanged
 from fmus.packaging.written import beside, written
-from fmus.runtime.automaton import UNSETTLED
+from fmus.runtime.stick_slip import NO_CONSISTENT_MODES
 
 FILES = {path.stem: path for path in LARGER}
 ULP = 2.0**-52
@@ -34,10 +34,10 @@ class Slider(Model):
 def test_a_steady_load_breaks_away_when_the_limit_has_come_down_to_it(method):
     """A sled under a force, lifted by its driver: when mu_s (m g - lift u t) is the force."""
     model = begun(written(FILES["lift"])(), {"solver.method": method, "k": 0.0, "F_ext": 60.0}, 16.0)
-    start(model, model.initial(0.0), 16.0)
+    start(model, model.initial_state(0.0), 16.0)
     step = model.solver.step
-    while not step.event:
-        assert step.take(model) == 0
+    while not step.event_at_end:
+        assert step.compute_next(model) == 0
         assert step.t1 < 16.0
     assert step.t1 == pytest.approx((12.5 * 9.81 - 60.0 / 0.9) / (300.0 * 0.034), rel=1e-9)
     assert spelled(step, model.contacts) == [1]
@@ -46,9 +46,13 @@ def test_a_steady_load_breaks_away_when_the_limit_has_come_down_to_it(method):
 def led(source, values):
     """A model that an importer's solver leads, its exchange, and its run."""
     cls = written(source)
-    model, exchange, run = exchanged(cls), beside(cls, "runtime.exchange"), beside(cls, "runtime.rules").Run(1e-6)
+    model, exchange, run = (
+        exchanged(cls),
+        beside(cls, "runtime.model_exchange"),
+        beside(cls, "runtime.call_sequence").RunState(1e-6),
+    )
     begun(model, {"solver.method": DOP853, "solver.rtol": 1e-6} | values, 1.0)
-    start(model, model.initial(0.0), 1.0)
+    start(model, model.initial_state(0.0), 1.0)
     exchange.begin(model)
     return model, exchange, run
 
@@ -64,20 +68,20 @@ def test_no_contact_is_held_whose_indicator_says_that_it_breaks_away(source):
     model, exchange, _ = led(source, rest)
     entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
     many, tried = len(model.contacts), 0
-    march = model.solver
-    start_states, start_modes = ([getattr(march, n) for n in names] for names in (model.states, model.contacts))
+    solver = model.solver
+    start_states, start_modes = ([getattr(solver, n) for n in names] for names in (model.states, model.contacts))
 
     def push(force):
         """The indicators before and after the event, with modes as at the start."""
         for names, numbers in (model.states, start_states), (model.contacts, start_modes):
             for name, number in zip(names, numbers, strict=True):
-                setattr(march, name, number)
+                setattr(solver, name, number)
         setattr(model, entry, force)
-        exchange.indicators(model)
-        before = min(model.exchange.indicators[many : 2 * many])
-        exchange.update(model, march)
-        exchange.indicators(model)
-        return before, min(model.exchange.indicators[many : 2 * many])
+        exchange.update_indicators(model)
+        before = min(model.model_exchange.indicators[many : 2 * many])
+        exchange.update_modes(model, solver)
+        exchange.update_indicators(model)
+        return before, min(model.model_exchange.indicators[many : 2 * many])
 
     low, high = getattr(model, entry), 1e4
     assert push(low)[0] > 0.0 >= push(high)[0]
@@ -102,13 +106,13 @@ def test_what_comes_to_slide_with_more_than_it_holds_is_told_and_leads_nowhere(s
     methods = [value for _, value, _ in declared(slider)["solver.method"].items]
     for method in methods:
         model = begun(written(slider)(), {"solver.method": method, "press": 5.0, "F_ext": 4.5}, 1.0)
-        start(model, model.initial(0.0), 1.0)
-        assert model.solver.step.take(model) == UNSETTLED
+        start(model, model.initial_state(0.0), 1.0)
+        assert model.solver.step.compute_next(model) == NO_CONSISTENT_MODES
     model, exchange, _ = led(slider, {"press": 5.0})
     model.F_ext = 4.5
-    exchange.update(model, model.solver)
+    exchange.update_modes(model, model.solver)
     assert np.isnan([model.solver.x, model.solver.v]).all()
     model, exchange, _ = led(slider, {"press": 3.9})
     model.F_ext = 4.5
-    exchange.update(model, model.solver)
+    exchange.update_modes(model, model.solver)
     assert (model.solver.x, model.solver.v, model.solver.mode) == (0.0, 0.0, 1)

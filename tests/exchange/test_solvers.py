@@ -23,7 +23,7 @@ from fmi3_hosts import Failed
 from models import MODELS, SIGN, declared, model_class, outputs
 
 from fmus.runtime.codes import OUT_OF_RANGE
-from fmus.runtime.sentences import of_value
+from fmus.runtime.messages import value_message
 from harness.truths.models import CASES
 from harness.truths.reference import POINTS, late, load, relative
 from tests.runtime.test_changes import spans
@@ -316,7 +316,7 @@ def test_a_bad_parameter_ends_the_run_before_it_begins(worker, fmus):
         with pytest.raises(Failed, match="fmi3ExitInitializationMode failed with status 3"):
             exchange(worker, fmus / f"{name}.fmu", name, start_values={"m": -1.0})
         (line,) = worker.complaints().splitlines()
-        assert of_value(OUT_OF_RANGE, "m", declared(name)["m"], -1.0) in line
+        assert value_message(OUT_OF_RANGE, "m", declared(name)["m"], -1.0) in line
 
 
 @pytest.mark.parametrize("name", CERTIFIED)

@@ -26,7 +26,7 @@ REFUSAL = (
 
 def running(name):
     """The class of slaves of a model, and one of them in mid-run."""
-    made = runtime(name, "slave").slave_for(model_class(name))
+    made = runtime(name, "slave").make_slave_class(model_class(name))
     one = made(instance_name="saved")
     one.exit_initialization_mode()
     assert one.do_step(0.0, 0.3)
@@ -54,7 +54,7 @@ def taken(made, content):
     """Whether the bytes are taken for a state."""
     try:
         made._fmu_state_from_bytes(content)
-    except beside(made.Model, "runtime.state").Foreign:
+    except beside(made.Model, "runtime.saved_state").InvalidStateError:
         return False
     return True
 
@@ -88,10 +88,10 @@ def test_own_bytes_are_taken_and_the_same_again(name):
     heir = made(instance_name="heir")
     for spoil in ([], ["set"], ["set", "step"]):  # healthy, with a value that cannot be used, failed
         if spoil == ["set"]:
-            one.refuse("m", "m = nan kg is refused: a sentence with a · and brackets [{")
+            one.set_invalid("m", "m = nan kg is refused: a sentence with a · and brackets [{")
         if "step" in spoil:
             one.do_step(0.3, 0.1)
-            assert one.run.failed
+            assert one.run.has_failed
         heir._set_fmu_state(made._fmu_state_from_bytes(own(made, one)))
         assert own(made, heir) == own(made, one)
 
@@ -132,7 +132,7 @@ def test_every_member_must_be_there_under_its_name_with_its_type_and_length(name
             thing["__class__"] = thing.pop(last)
 
         def add(state, path=path):
-            at(state, path)[0]["observe"] = 1.0
+            at(state, path)[0]["compute_outputs"] = 1.0
 
         changes, kind = [drop, rename, add], (type(value), type(value) is list and len(value))
         wrong = [other for other in others if not alike(other, value)]
@@ -171,8 +171,16 @@ SENTENCES = {
     "with half a letter": {"m": "\ud800"},
     "with an end in C": {"m": "a\0b"},
 }
-SETTINGS = {"origin": "elsewhere", "refused": [["m", "a"]], "run": {}}
-RUN = {"phase": 7, "interface": 3, "start_time": 1, "tolerance": 1.0, "refused": 1, "changed": 0, "observed": True}
+SETTINGS = {"origin": "elsewhere", "invalid_values": [["m", "a"]], "run": {}}
+RUN = {
+    "phase": 7,
+    "interface": 3,
+    "start_time": 1,
+    "tolerance": 1.0,
+    "n_invalid_values": 1,
+    "has_pending_changes": 0,
+    "outputs_current": True,
+}
 SPELLINGS = {
     "a space more": lambda text: text + b" ",
     "no spaces": lambda text: text.replace(b" ", b""),
@@ -183,7 +191,9 @@ SPELLINGS = {
     "a number of a million digits": lambda text: text.replace(b'{"phase": ', b'{"phase": ' + b"9" * 1_000_000, 1),
     "nested without end": lambda text: b"[" * 200_000,
     "nested objects": lambda text: b'{"a":' * 200_000,
-    "nested in a member": lambda text: text.replace(b'"refused": {}', b'"refused": ' + b"[" * 300 + b"]" * 300),
+    "nested in a member": lambda text: text.replace(
+        b'"invalid_values": {}', b'"invalid_values": ' + b"[" * 300 + b"]" * 300
+    ),
     "very long": lambda text: text.replace(b'"origin": "', b'"origin": "' + b"a" * 2_000_000),
     "a list": lambda text: b"[]",
     "a number": lambda text: b"NaN",
@@ -193,7 +203,7 @@ SPELLINGS = {
 }
 FORGERIES = {
     **{
-        f"sentence {what}": lambda content, s=s: forged(content, lambda state: state.update(refused=s))
+        f"sentence {what}": lambda content, s=s: forged(content, lambda state: state.update(invalid_values=s))
         for what, s in SENTENCES.items()
     },
     **{
@@ -207,7 +217,7 @@ FORGERIES = {
     **{what: lambda content, spell=spell: sealed(spell(content[8:])) for what, spell in SPELLINGS.items()},
     "mass of -5": lambda content: forged(content, lambda state: state["model"].update(m=-5.0)),
     "a class": lambda content: forged(content, lambda state: state["model"].update(__class__={"rules": ["a"]})),
-    "rules": lambda content: forged(content, lambda state: state["model"].update(rules=["a"], observe=1.0)),
+    "rules": lambda content: forged(content, lambda state: state["model"].update(rules=["a"], compute_outputs=1.0)),
     "no bytes": lambda content: b"",
     "a checksum alone": lambda content: sealed(b"")[:8],
 }

@@ -26,7 +26,7 @@ from models import (
     tunable,
 )
 
-from fmus.runtime.declare import Choice
+from fmus.runtime.variable_declarations import Choice
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 FOLDERS = ("binaries", "documentation", "extra", "resources", "sources")  # FMI 2.0.4, section 2.3
@@ -135,7 +135,7 @@ def physics(monkeypatch):
         model.solver.method = ODE23
         t, x, v = (Quantity.of(0.7, unit) for unit in ("s", *(declared(name)[v].unit for v in outputs(name)[:2])))
         assert model.prepare() == 0
-        model.initial(t)
+        model.initial_state(t)
         model.rebase(t)
         return model, t, x, v
 
@@ -155,25 +155,25 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
     """Position, speed and acceleration, loads, derivatives and outputs, in every mode: the very code that runs."""
     model, t, x, v = physics(name, values)
     for mode in (-1, 0, 1):
-        modes = [mode] if model.dry else []
+        modes = [mode] if model.has_dry_friction else []
         a = model.rates(t, x, v, *modes)
         assert has(a, Quantity.of(1.0, declared(name)[outputs(name)[2]].unit))
         assert has(a, v / t)
         assert has(v, x / t)
         for slope, by in zip(model.jacobian(t, x, v, *modes), (t, x, v), strict=True):
             assert has(slope, a / by)
-        if model.linear:
-            assert has(model.push(t, *modes), a)
-        if model.waits:
-            load, rate, limit = model.hold(t, x, v)
+        if model.is_linear:
+            assert has(model.applied_acceleration(t, *modes), a)
+        if model.rests_when_stuck:
+            load, rate, limit = model.stick_load(t, x, v)
             assert has(rate, load / t)
             assert has(limit, load)
-            assert has(model.terms(t, x, v), load)
-            assert has(model.departure(t, x, v, 1), a)
+            assert has(model.load_magnitude(t, x, v), load)
+            assert has(model.breakaway_acceleration(t, x, v, 1), a)
         with suppress(
             *[DimensionError] * ("energy" not in outputs(name))
         ):  # without one it adds up all that may overflow
-            model.observe(t, x, v, *modes)
+            model.compute_outputs(t, x, v, *modes)
         for output in outputs(name):
             if declared(name)[output].type == "Real":
                 assert has(getattr(model, output), Quantity.of(1.0, declared(name)[output].unit)), output
@@ -183,29 +183,29 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
 def test_the_methods_keep_the_dimensions(physics, name):
     """One step of each method, its error estimates, and its interpolant; the closed form too."""
     model, t, x, v = physics(name, {})
-    modes = [1] if model.dry else []
+    modes = [1] if model.has_dry_friction else []
     a, h = model.rates(t, x, v, *modes), Quantity(1e-4, 0, 0, 1)
     for file in ("ode23", "ode45", "dop853", "rodas"):
         method = getattr(runtime(name, file), file.capitalize())()
         x1, v1, a1, e_x, e_v = method.propose(model, *modes, t, x, v, a, h)
         assert [has(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [True] * 5
-        step = runtime(name, "step").Step()
+        step = runtime(name, "step_control").InternalStep()
         names = [*model.states, list(model.states.values())[-1]]
         for end, values in ("0", (x, v, a)), ("1", (x1, v1, a1)):
             for known, value in zip(names, values, strict=True):
                 setattr(step, known + end, value)
-        step.t0, step.mode0, step.span = t, 1, h
-        method.expand(model, step)
-        assert [has(*pair) for pair in zip(step.interpolant.at(0.3 * h), (x, v), strict=True)] == [True] * 2
-    if model.linear:
-        exact = runtime(name, "exact").Exact()
-        exact.prepare(*model.piece())
-        exact.begin(x, v, a, model.push(t, *modes), x)
-        assert [has(*pair) for pair in zip(exact.at(h), (x, v), strict=True)] == [True] * 2
-        if model.dry:
-            exact.begin(x, v, -a, model.push(t, *modes), x)
-            assert has(exact.standstill(1), t)
-            assert [has(*pair) for pair in zip(exact.end(h), (x, v, x), strict=True)] == [True] * 3
+        step.t0, step.mode0, step.h_full = t, 1, h
+        method.build_interpolant(model, step)
+        assert [has(*pair) for pair in zip(step.interpolant.evaluate(0.3 * h), (x, v), strict=True)] == [True] * 2
+    if model.is_linear:
+        exact = runtime(name, "linear_closed_form").LinearClosedForm()
+        exact.prepare(*model.linear_coefficients())
+        exact.start_segment(x, v, a, model.applied_acceleration(t, *modes), x)
+        assert [has(*pair) for pair in zip(exact.evaluate(h), (x, v), strict=True)] == [True] * 2
+        if model.has_dry_friction:
+            exact.start_segment(x, v, -a, model.applied_acceleration(t, *modes), x)
+            assert has(exact.next_standstill(1), t)
+            assert [has(*pair) for pair in zip(exact.state_at_standstill(h), (x, v, x), strict=True)] == [True] * 3
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -217,7 +217,7 @@ def test_a_wrong_unit_would_be_noticed(physics, name):
 
         def move(model=model, t=t, x=x, v=v):
             model.prepare()
-            a = [model.rates(t, x, v, *modes) for modes in (((1,), (0,)) if model.dry else ((),))]
+            a = [model.rates(t, x, v, *modes) for modes in (((1,), (0,)) if model.has_dry_friction else ((),))]
             assert all(has(value, v / t) for value in a)
 
         if variable == "eps":

@@ -7,8 +7,8 @@ from fmpy import read_model_description
 from models import MODELS, Choice, Input, Output, Parameter, declared, model_class
 
 from fmus.runtime.codes import OUT_OF_RANGE
-from fmus.runtime.declare import Count, Declaring, Fixed, Local
-from fmus.runtime.sentences import of_value
+from fmus.runtime.messages import value_message
+from fmus.runtime.variable_declarations import Count, Fixed, Local, VariableOwner
 from harness.scenes.roles import roles
 
 POUND, INCH = 0.45359237, 0.0254
@@ -120,14 +120,14 @@ def test_masses_are_above_zero_and_nothing_else_starts_out_of_range(name):
 
 
 def test_a_declaration_says_what_it_allows():
-    class Sample(Declaring):
+    class Sample(VariableOwner):
         free = Parameter(1.0, "1", "a number")
         mass = Parameter(1.0, "kg", "mass", above=0.0)
         share = Parameter(0.5, "1", "share", low=0.0, below=1.0)
         kind = Choice(2, "kind", (("one", 1, "first"), ("two", 2, "second")))
 
     assert vars(Sample()) == {"free": 1.0, "mass": 1.0, "share": 0.5, "kind": 2}
-    told = of_value(OUT_OF_RANGE, "mass", Sample.mass, -2.0)
+    told = value_message(OUT_OF_RANGE, "mass", Sample.mass, -2.0)
     assert told == "mass = -2.0 kg is refused: mass must be above 0.0 kg"
     assert Sample.share.allowed == "at least 0.0 and below 1.0"
     assert Sample.kind.allowed == "one of 1 (one), 2 (two)"

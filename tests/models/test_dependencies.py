@@ -14,7 +14,7 @@ from models import MODELS, ROOT, declared, model_class, outputs, push
 
 from fmus.packaging.dependencies import at_start
 from fmus.packaging.written import written
-from fmus.runtime.declare import variables
+from fmus.runtime.variable_declarations import variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 SITUATIONS = 300
@@ -61,12 +61,12 @@ def situation(name, known, draw):
     """A value for each of the known; half of them of a body at rest that is about to break away, or just has."""
     values = {v: some(name, v, draw) for v in known}
     model, (x, v, *_), (entry, _) = model_class(name)(), outputs(name), push(name)
-    if model.waits and f"{v}0" in values and draw.random() < 0.5:
+    if model.rests_when_stuck and f"{v}0" in values and draw.random() < 0.5:
         values[f"{v}0"] = 0.0
         for variable in (each for each in values if "." not in each):
             setattr(model, variable, values[variable])
         model.prepare()
-        load, _, limit = model.hold(0.0, values[f"{x}0"], 0.0)
+        load, _, limit = model.stick_load(0.0, values[f"{x}0"], 0.0)
         values[entry] += draw.choice(LOADS) * limit - load
     return values
 
@@ -106,7 +106,7 @@ def test_fmi_3_says_the_same_and_of_the_driver_that_it_follows_its_speed(at_the_
     expected = {names.index(v): known for v, known in at_the_start(name).items()}
     beside = {place: known for place, known in told.items() if place not in expected}
     assert told == expected | beside
-    assert list(beside.values()) == [{"v_driver"}] * model_class(name).driven
+    assert list(beside.values()) == [{"v_driver"}] * model_class(name).has_driver
 
 
 def test_what_shows_in_few_situations_only_is_told_too(tmp_path):

@@ -24,7 +24,7 @@ def is_free(name):
     return (
         name in BODIES
         and f"{outputs(name)[1]}0" in declared(name)
-        and model.rates(0.0, 0.1, 1.0, *[1] * model.dry) == 0
+        and model.rates(0.0, 0.1, 1.0, *[1] * model.has_dry_friction) == 0
     )
 
 

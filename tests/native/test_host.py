@@ -8,7 +8,7 @@ from models import MODELS, declared, model_class, outputs, parameters, push
 from native_fmus import built
 from native_host import SANITIZERS, begin, play, references
 
-from fmus.runtime.march import MOST_CALLS, MOST_STEPS
+from fmus.runtime.integrator import MAX_EVALUATIONS, MAX_STEPS
 
 OK, DISCARD, ERROR = "0", "2", "3"
 CROWD = 200
@@ -245,5 +245,5 @@ def test_a_step_with_too_many_internal_steps_ends_with_a_sentence():
         f"0 getr {ref['x']}",
     ]
     answers, _ = play(fmu, script)
-    assert f"more than {MOST_STEPS} internal steps or {MOST_CALLS} right-hand sides within one" in answers[-3]
+    assert f"more than {MAX_STEPS} internal steps or {MAX_EVALUATIONS} right-hand sides within one" in answers[-3]
     assert answers[-2:] == [ERROR, "0 nan"]

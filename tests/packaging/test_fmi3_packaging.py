@@ -20,7 +20,7 @@ from PIL import Image
 from fmus.packaging.catalogue import find, names
 from fmus.packaging.further import exchanged
 from fmus.packaging.native.sources import FMI_HEADERS, WRITTEN
-from fmus.runtime.declare import variables
+from fmus.runtime.variable_declarations import variables
 from tests.packaging.test_packaging import (  # noqa: F401
     EVERY_MODEL,
     command,
@@ -30,8 +30,8 @@ from tests.packaging.test_packaging import (  # noqa: F401
 )
 
 SCHEMA = Path(fmpy.__file__).parent / "schema/fmi3"
-DRY = {name for name in names() if find(name).model.dry}
-DRIVEN = {name for name in names() if find(name).model.driven}
+DRY = {name for name in names() if find(name).model.has_dry_friction}
+DRIVEN = {name for name in names() if find(name).model.has_driver}
 TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
 STRUCTURE = ("Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator")
 # Nothing is without effect, and friction often holds.
@@ -155,9 +155,9 @@ def test_only_the_speed_may_jump_and_only_where_friction_is_dry(fmu, name):
 @EVERY_MODEL
 def test_nominal_values_are_the_sizes_that_our_own_solver_takes(fmu, name):
     model = exchanged(model_class(name))
-    nominals = model.exchange.nominals
+    nominals = model.model_exchange.nominals
     model.prepare()
-    model.solver.start(model, 0.0, *model.initial(0.0), inf, model.tolerance)
+    model.solver.start(model, 0.0, *model.initial_state(0.0), inf, model.tolerance)
     step = model.solver.step
     position, speed = (getattr(step, f"least_{state}") for state in model.states)
     sizes = [position, speed, position][: len(nominals)]

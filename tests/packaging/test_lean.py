@@ -56,8 +56,8 @@ def test_a_lean_fmu_offers_one_method_carries_its_code_alone_and_runs_alike(lean
         page = archive.read("documentation/index.html").decode()
     shown = {label for label in (*METHODS, *LAWS) if f"<b>{label}</b>" in page}
     assert shown == set(options.values())
-    methods = {"exact.py", "ode23.py", "ode45.py", "dop853.py", "rodas.py"}
-    assert files & methods == {f"{options['--method']}.py"}
+    methods = {"linear_closed_form.py", "ode23.py", "ode45.py", "dop853.py", "rodas.py"}
+    assert files & methods == {f"{options['--method']}.py".replace("exact", "linear_closed_form")}
     times = [stop * i / 40 for i in range(41)]
     names = outputs(name) + counts(name)
     fmu = worker.instantiate(path).begin({v: x for v, x in values.items() if v not in LABELS}, stop=stop)

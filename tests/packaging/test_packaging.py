@@ -24,7 +24,7 @@ from fmus.packaging.archive import write
 from fmus.packaging.catalogue import find, names
 from fmus.packaging.description import describe
 from fmus.packaging.modules import installed, travelling
-from fmus.runtime.declare import Declaring, Fixed, Output, Parameter, variables
+from fmus.runtime.variable_declarations import Fixed, Output, Parameter, VariableOwner, variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", names())
 
@@ -200,9 +200,9 @@ def test_what_travels_needs_the_standard_library_only(fmu, name):
 
 
 def test_a_model_carries_no_method_or_mode_that_it_does_not_offer(fmu):
-    assert "runtime/automaton.py" not in modules_of(fmu("smd")) | modules_of(fmu("pacejka"))
-    assert "runtime/exact.py" not in modules_of(fmu("pacejka")) | modules_of(fmu("pendulum"))
-    assert modules_of(fmu("stickslip")) >= {"stickslip.py", "runtime/automaton.py", "runtime/exact.py"}
+    assert "runtime/stick_slip.py" not in modules_of(fmu("smd")) | modules_of(fmu("pacejka"))
+    assert "runtime/linear_closed_form.py" not in modules_of(fmu("pacejka")) | modules_of(fmu("pendulum"))
+    assert modules_of(fmu("stickslip")) >= {"stickslip.py", "runtime/stick_slip.py", "runtime/linear_closed_form.py"}
 
 
 @EVERY_MODEL
@@ -305,7 +305,7 @@ ODD = SimpleNamespace(name="odd", title="Odd")
     ("line", "sentence"),
     [
         ("import numpy", "imports numpy; inside an FMU only the standard library"),
-        ("from fmus.runtime import declare", "imports fmus; inside an FMU only the standard library"),
+        ("from fmus.runtime import codes", "imports fmus; inside an FMU only the standard library"),
         ("import pythonfmu.enums", "imports pythonfmu.enums; inside an FMU only"),
         ("from pythonfmu import Fmi2Slave", "imports Fmi2Slave from pythonfmu, which no FMU carries"),
         ("from . import __version__", "imports __version__ from the package itself, which no FMU carries"),
@@ -342,7 +342,7 @@ def test_imports_are_followed_through_packages_and_line_ends_do_not_matter(tmp_p
     assert "\r" not in "".join(found.values())
 
 
-class Sketch(Declaring):
+class Sketch(VariableOwner):
     """A model for the description alone.
 
     x' = -x

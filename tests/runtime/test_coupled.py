@@ -60,12 +60,12 @@ DRIVER = 'p = State("m", "driver", rate=u)'
 def events(model, method, rtol, stop):
     """Time and modes at the end of each step that an event ends, and all ends of steps with their states and modes."""
     begun(model, {"solver.method": method, "solver.rtol": rtol, "solver.atol": 1e-3 * rtol}, stop)
-    start(model, model.initial(0.0), stop)
+    start(model, model.initial_state(0.0), stop)
     step, found, rows = model.solver.step, [], []
     while step.t1 < stop:
-        assert step.take(model) == 0
+        assert step.compute_next(model) == 0
         rows.append((step.t1, spelled(step, model.states), spelled(step, model.contacts)))
-        if step.event:
+        if step.event_at_end:
             found.append((step.t1, *rows[-1][2]))
     return found, rows
 
@@ -130,7 +130,7 @@ def test_a_load_that_peaks_inside_a_step_is_found(mine, method, rtol):
         assert found, model.most
         assert abs(found[0][0] - asin(model.most / 10.0) / 10.0) < max(30.0 * rtol, 1e-8) ** 0.5
         before = [t for t, _, _ in rows if t < found[0][0]]
-        inside += model.solver.step.methods.stages > 0 and (before[-1] if before else 0.0) < found[0][0] - 1e-3
+        inside += model.solver.step.active_method.stages > 0 and (before[-1] if before else 0.0) < found[0][0] - 1e-3
     assert inside > 20
 
 
@@ -140,16 +140,16 @@ GAUSS = np.polynomial.legendre.leggauss(8)
 def integrated(model, power, stop):
     """The integral of what `power` makes of each state and the forces there, over all steps of a run."""
     begun(model, {"solver.method": DOP853, "solver.rtol": 1e-12, "solver.atol": 1e-15, "solver.h_max": 0.02}, stop)
-    start(model, model.initial(0.0), stop)
+    start(model, model.initial_state(0.0), stop)
     step, total = model.solver.step, 0.0
     modes = [mode + ("_" if mode[-1].isdigit() else "") + "0" for mode in model.contacts]
     while step.t1 < stop:
-        assert step.take(model) == 0
+        assert step.compute_next(model) == 0
         h = step.t1 - step.t0
         for place, weight in zip(*GAUSS, strict=True):
             t = step.t0 + 0.5 * h * (1.0 + place)
-            y = step.at(model, t)
-            forces = model.forces(t, *y, *(getattr(step, mode) for mode in modes))[: len(modes)]
+            y = step.state_at(model, t)
+            forces = model.contact_forces(t, *y, *(getattr(step, mode) for mode in modes))[: len(modes)]
             total += 0.5 * h * weight * np.array(power(t, y, forces))
     return total, spelled(step, model.states)
 
@@ -183,7 +183,7 @@ def test_what_is_stuck_stays_where_it_is():
         _, rows = events(model, DOP853, 1e-9, model.stop_time)
         held = 0
         for t, y, modes in rows:
-            slips = np.ravel(model.slips(t, *y))
+            slips = np.ravel(model.slip_velocities(t, *y))
             assert all(slip == 0.0 for slip, mode in zip(slips, modes, strict=True) if mode == 0)
             held += 0 in modes
         assert held > 5
@@ -200,7 +200,7 @@ def test_several_drivers_pull_each_at_its_own_speed(mine):
         assert q == pytest.approx(0.3 + 0.1 * t, abs=1e-14)
         assert x == pytest.approx(0.15 * (1.0 + t - np.cos(w * t) - np.sin(w * t) / w), abs=1e-9)
         assert v == pytest.approx(0.15 * (1.0 + w * np.sin(w * t) - np.cos(w * t)), abs=1e-8)
-    model.observe(0.0, 0.0, 0.0, 0.3)
+    model.compute_outputs(0.0, 0.0, 0.0, 0.3)
     assert model.q_rate == 0.1
 
 
@@ -225,9 +225,9 @@ def test_laws_without_modes_look_at_each_slip(mine, law):
     for _ in range(200):
         y = draw.uniform(-0.05, 0.05, 4) * [1.0, draw.choice([0.0, 0.1, 1.0]), 1.0, draw.choice([0.1, 1.0])]
         model.friction = 1
-        slips = np.array(model.slips(0.0, *y))
+        slips = np.array(model.slip_velocities(0.0, *y))
         modes = [int(told(slip)) for slip in slips]
-        forces = np.array(model.forces(0.0, *y, *modes)[:2])
+        forces = np.array(model.contact_forces(0.0, *y, *modes)[:2])
         if law == SIGN:
             forces = np.sign(slips) * [9.0, 6.0]
         limit = np.where(np.array(modes) == 0, [12.0, 8.0], np.inf)
@@ -236,15 +236,15 @@ def test_laws_without_modes_look_at_each_slip(mine, law):
         model.friction = law
         expected = (forces[1] - forces[0] - 300.0 * y[0]) / 4.0, (-300.0 * y[2] - forces[1]) / 2.0
         assert model.rates(0.0, *y, 0, 0) == pytest.approx(expected, abs=1e-11)
-        model.observe(0.0, *y, 0, 0)
+        model.compute_outputs(0.0, *y, 0, 0)
         assert (model.mode1, model.mode2) == tuple(modes)
         assert pytest.approx(forces, abs=1e-11) == (model.F1, model.F2)
     assert clipped == 0 or law == THRESHOLD
     begun(model, {"solver.method": ODE23, "solver.rtol": 1e-3, "solver.atol": 1e-5, "u": 1.0}, 0.3)
-    start(model, model.initial(0.0), 0.3)
+    start(model, model.initial_state(0.0), 0.3)
     while model.solver.step.t1 < 0.3:
-        assert model.solver.step.take(model) == 0
-        assert not model.solver.step.event
+        assert model.solver.step.compute_next(model) == 0
+        assert not model.solver.step.event_at_end
 
 
 @pytest.mark.parametrize("bodies", [1, 2])

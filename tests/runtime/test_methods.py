@@ -8,7 +8,7 @@ import pytest
 import scipy.integrate
 from models import MODELS, ROOT, combinations, model_class, runtime
 
-from fmus.runtime import found
+from fmus.runtime import method_registry
 
 # the order of a method, the order of its interpolant, and a step in the range where halving shows them
 METHODS = {"ode23": (3, 3, 0.05), "ode45": (5, 4, 0.1), "dop853": (8, 7, 0.25), "rodas": (4, 3, 0.05)}
@@ -63,10 +63,10 @@ class Solver:
         """New x, v and acceleration, and the rates of the error; the interpolant is ready."""
         a = model.rates(t, x, v)
         new = self.method.propose(model, t, x, v, a, h)
-        step = runtime(TWO_STATES, "step").Step()
-        step.t0, step.x0, step.v0, step.a0, step.span = t, x, v, a, h
+        step = runtime(TWO_STATES, "step_control").InternalStep()
+        step.t0, step.x0, step.v0, step.a0, step.h_full = t, x, v, a, h
         step.x1, step.v1, step.a1 = new[:3]
-        self.method.expand(model, step)
+        self.method.build_interpolant(model, step)
         self.inside = step.interpolant
         return new
 
@@ -91,9 +91,9 @@ def test_every_method_of_the_runtime_is_tested_here():
 
 
 def test_a_number_that_another_method_has_is_refused(monkeypatch):
-    monkeypatch.setattr(found.methods[1][1], "NUMBER", found.methods[0][1].NUMBER)
+    monkeypatch.setattr(method_registry.methods[1][1], "NUMBER", method_registry.methods[0][1].NUMBER)
     with pytest.raises(ValueError, match=r"^ode23\.py: the number 2 is taken; the next is 6$"):
-        found.found()
+        method_registry.find_methods()
 
 
 @every_method
@@ -120,7 +120,7 @@ def test_the_error_inside_a_step_falls_with_the_order_of_the_interpolant(solver)
         for t in (0.2, 1.4, 3.1):
             solver.step(motion, t, *motion.at(t), h)
             fractions = [0.1 * i for i in range(1, 10)]
-            worst = max(worst, *(distance(solver.inside.at(s * h), motion.at(t + s * h)) for s in fractions))
+            worst = max(worst, *(distance(solver.inside.evaluate(s * h), motion.at(t + s * h)) for s in fractions))
         return worst
 
     assert falls_with(solver.inner + 1, error, solver.h)
@@ -140,8 +140,8 @@ def test_the_estimated_error_falls_as_the_step_control_assumes(solver):
 @every_method
 def test_the_interpolant_meets_both_ends(solver):
     x, v, *_ = solver.step(Motion(), 0.2, 0.4, -1.7, solver.h)
-    assert solver.inside.at(0.0) == (0.4, -1.7)
-    assert solver.inside.at(solver.h) == pytest.approx((x, v), abs=1e-14)
+    assert solver.inside.evaluate(0.0) == (0.4, -1.7)
+    assert solver.inside.evaluate(solver.h) == pytest.approx((x, v), abs=1e-14)
 
 
 @every_method
@@ -173,7 +173,7 @@ def test_a_motion_that_is_a_polynomial_of_the_methods_degree_is_exact(solver):
         x, v, *_ = solver.step(Linear(1.0, n), 0.0, 0.0, 0.0, 1.0)
         assert (x, v) == pytest.approx(truth(n, 1.0), abs=1e-13)
         if n < solver.inner - 1:
-            assert solver.inside.at(0.4) == pytest.approx(truth(n, 0.4), abs=1e-13)
+            assert solver.inside.evaluate(0.4) == pytest.approx(truth(n, 0.4), abs=1e-13)
 
 
 @every_method
@@ -211,7 +211,7 @@ def test_a_step_its_inside_and_its_estimated_error_are_those_of_scipy(solver, na
         error = peer.K.T @ peer.E
     assert np.abs((e_x, e_v)) == pytest.approx(np.abs(error), rel=1e-7, abs=0.0)
     for t in (0.04, 0.2, 0.32):
-        assert solver.inside.at(t) == pytest.approx(tuple(peer.dense_output()(0.3 + t)), abs=1e-13)
+        assert solver.inside.evaluate(t) == pytest.approx(tuple(peer.dense_output()(0.3 + t)), abs=1e-13)
 
 
 # ---- rodas: what a stiff method must have on top

@@ -10,17 +10,19 @@ from models import CASES, MODELS, ROOT, SIGN, declared, label, model_class, outp
 
 from fmus.packaging.catalogue import find
 from fmus.packaging.written import files_of
-from fmus.runtime.declare import variables
+from fmus.runtime.variable_declarations import variables
 from harness.running.inside import embedded
 
 FMI_SIDE = [
-    *("__init__", "boundary", "declare", "failure", "found", "hosted"),
-    *("sentences", "slave", "state", "values", "vectors"),
+    *("__init__", "failure_handling", "fmu_instance", "messages", "method_registry", "pythonfmu_workarounds"),
+    *("saved_state", "slave", "variable_access", "variable_declarations", "vectors"),
 ]
 NUMERICS = {
     path.stem: path.read_text() for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.stem not in FMI_SIDE
 } | {name: find(name).text for name in MODELS}
-NUMERICS["methods"] = files_of("smd")["runtime/methods.py"]  # which loops over the methods that it is written out for
+NUMERICS["active_method"] = files_of("smd")[
+    "runtime/active_method.py"
+]  # which loops over the methods that it is written out for
 LIBM = "acos asin atan atan2 copysign cos cosh exp expm1 fabs fmod log log1p pow sin sinh sqrt tan tanh"
 MATH = {*LIBM.split(), "floor", "ceil", "isfinite", "isinf", "isnan", "inf", "nan", "pi", "radians"}
 BANNED = (
@@ -85,7 +87,7 @@ def test_no_while_relies_on_its_condition_alone(name):
 
 def slave(name, values=None, stop=4.0):
     """A slave in this process, past initialisation."""
-    made = runtime(name, "slave").slave_for(model_class(name))(instance_name="inside")
+    made = runtime(name, "slave").make_slave_class(model_class(name))(instance_name="inside")
     for reference, (variable, declaration) in enumerate(variables(made.model)):
         if variable in (values or {}):
             write = made.set_real if declaration.type == "Real" else made.set_integer
@@ -142,9 +144,9 @@ def test_turning_points_are_located_to_the_last_bit(case):
     step, t = made.model.solver.step, 0.0
     while t < stop:
         (ahead,) = read(made, "solver.t_next")
-        mode, waiting, event = step.mode0, step.waiting, step.event
+        mode, waiting, event = step.mode0, step.is_stuck, step.event_at_end
         if event and not waiting:
-            before, after = (step.at(made.model, s)[1] for s in (nextafter(ahead, 0.0), ahead))
+            before, after = (step.state_at(made.model, s)[1] for s in (nextafter(ahead, 0.0), ahead))
             assert mode * before > 0.0
             assert mode * after <= 0.0 or values["solver.method"] == 1  # the closed form knows its own last bit
             turns += 1
@@ -165,7 +167,7 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
     def broken(*_):
         raise RuntimeError("100 % broken")
 
-    monkeypatch.setattr(type(made.model), "observe", broken)
+    monkeypatch.setattr(type(made.model), "compute_outputs", broken)
     monkeypatch.setattr(type(made.model), "prepare", broken)
     made.set_real([list(declared(name)).index("m")], [2.0])
     assert made.do_step(0.1, 0.1) is False
@@ -198,7 +200,7 @@ def test_lists_of_references_that_never_come_again_take_no_memory():
         for _ in range(times):
             asked = draw.choices(reals, k=8)
             assert len(made.get_real(asked)) == 8
-        assert len(made.readers) <= runtime("stickslip", "values").MOST_READERS
+        assert len(made.readers) <= runtime("stickslip", "variable_access").MAX_READERS
 
     ask(200)
     tracemalloc.start()
@@ -211,7 +213,7 @@ def test_lists_of_references_that_never_come_again_take_no_memory():
 
 
 def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
-    monkeypatch.setattr(runtime("pacejka", "march"), "ROUNDS", 2)
+    monkeypatch.setattr(runtime("pacejka", "integrator"), "MAX_BATCHES", 2)
     made = slave("pacejka", {"solver.method": 2}, stop=16.0)
     assert made.do_step(0.0, 16.0) is False
     assert "internal steps" in capfd.readouterr().err
@@ -220,14 +222,14 @@ def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
 
 def test_what_many_events_cost_is_bounded_too(monkeypatch, capfd):
     """A swing of the pendulum takes as many looks for its events as right-hand sides."""
-    march = runtime("pendulum", "march")
-    monkeypatch.setattr(march, "MOST_CALLS", 20 * march.ROUND)
+    integrator = runtime("pendulum", "integrator")
+    monkeypatch.setattr(integrator, "MAX_EVALUATIONS", 20 * integrator.BATCH_STEPS)
     made = slave("pendulum", {"mu": 0.0}, stop=1e7)
     assert made.do_step(0.0, 1e7) is False
     assert "right-hand sides" in capfd.readouterr().err
     step = made.model.solver.step
-    assert step.taken == 1 + 2 * march.ROUND  # of twelve right-hand sides and some looks each
-    assert step.interpolant.looked > 0
+    assert step.n_accepted == 1 + 2 * integrator.BATCH_STEPS  # of twelve right-hand sides and some looks each
+    assert step.interpolant.n_event_evals > 0
 
 
 def test_a_solver_that_makes_no_headway_is_stopped_with_a_sentence(capfd):
@@ -241,6 +243,6 @@ def test_a_solver_that_makes_no_headway_is_stopped_with_a_sentence(capfd):
 @pytest.mark.parametrize("name", MODELS)
 def test_what_runs_all_the_time_has_fewer_attributes_than_cpython_keeps_at_hand(name, fmus):
     """Thirty of them, and a step takes a tenth longer (3.11)."""
-    march = embedded(fmus / f"{name}.fmu")().solver
-    sizes = {type(each).__name__: len(vars(each)) for each in (march, march.step, march.step.interpolant)}
+    solver = embedded(fmus / f"{name}.fmu")().solver
+    sizes = {type(each).__name__: len(vars(each)) for each in (solver, solver.step, solver.step.interpolant)}
     assert max(sizes.values()) < 30, sizes

@@ -5,10 +5,10 @@ from itertools import permutations, product
 import numpy as np
 import pytest
 
-from fmus.runtime import coupled, vectors
+from fmus.runtime import contact_lcp, vectors
 from fmus.runtime.codes import STUCK
-from fmus.runtime.coupled import RESTING, CoupledFriction
-from fmus.runtime.rounding import NEAR
+from fmus.runtime.contact_lcp import AT_REST, CoupledFriction
+from fmus.runtime.rounding import ROUNDOFF_MARGIN
 
 
 class Chain(CoupledFriction):
@@ -34,18 +34,18 @@ class Chain(CoupledFriction):
         slides = np.array(modes) != STUCK
         return np.linalg.solve(np.where(slides[:, None], np.eye(self.n), self.A), np.where(slides, modes * slide, b))
 
-    def forces(self, t, y, modes):
+    def contact_forces(self, t, y, modes):
         return self.solved(modes, self.b, self.slide), self.limit, np.abs(self.b)
 
-    def changes(self, t, y, modes):
+    def contact_rates(self, t, y, modes):
         force, rate = self.solved(modes, self.b, self.slide), self.solved(modes, self.b_rate, 0.0)
         pulls = [(b - self.A @ f) / np.diag(self.A) for b, f in ((self.b, force), (self.b_rate, rate))]
         return rate, np.zeros(self.n), *pulls
 
     def answer(self):
         """The modes, beginning with all contacts stuck, and whether they fit."""
-        vectors.contacts[:] = range(self.n)
-        modes, fits = self.settled(0.0, None, np.zeros(self.n), np.full(self.n, RESTING), NEAR)
+        vectors.contact_indices[:] = range(self.n)
+        modes, fits = self.solve_modes(0.0, None, np.zeros(self.n), np.full(self.n, AT_REST), ROUNDOFF_MARGIN)
         return tuple(map(int, modes)), fits
 
     def fits(self, modes):
@@ -79,9 +79,9 @@ def test_one_contact_after_the_other_comes_to_the_same_end(monkeypatch):
     draw, found = np.random.default_rng(7), 0
     for _ in range(100):
         chain = Chain(draw, 4, 1.0, True)
-        monkeypatch.setattr(coupled, "TOGETHER", 60)
+        monkeypatch.setattr(contact_lcp, "MAX_JOINT_ITERATIONS", 60)
         modes = chain.answer()
-        monkeypatch.setattr(coupled, "TOGETHER", 0)
+        monkeypatch.setattr(contact_lcp, "MAX_JOINT_ITERATIONS", 0)
         assert chain.answer() == modes
         found += modes != ((0, 0, 0, 0), True)
     assert found > 50

@@ -183,7 +183,7 @@ static void refuses_forged(Instance *it, const State *forged, bool good)
 static void refuse_in(State *state, fmi2ValueReference reference, int64_t reason, double value)
 {
     state->refused[reference] = (Refusal){reason, value, ++state->turns};
-    state->run.refused++;
+    state->run.n_invalid_values++;
 }
 
 #define FORGED(change)                     \
@@ -199,16 +199,16 @@ static void forged(void)
     for (int i = 0; i < LIVES; i++) {
         Instance *it = life(i);
         State good = it->state;
-        good.run.observed = false; /* as it is saved */
+        good.run.outputs_current = false; /* as it is saved */
         refuses_forged(it, &good, true);
         FORGED(state.run.phase = CONTINUOUS);
         FORGED(state.run.phase = INTERMEDIATE);
         FORGED(state.run.phase = -1);
         FORGED(state.run.interface = 0);
         FORGED(state.run.interface = MODEL_EXCHANGE);
-        FORGED(state.run.refused++);
-        FORGED(state.run.refused = -1);
-        FORGED(state.run.observed = true);
+        FORGED(state.run.n_invalid_values++);
+        FORGED(state.run.n_invalid_values = -1);
+        FORGED(state.run.outputs_current = true);
         FORGED(state.run.tolerance = NAN);
         FORGED(state.turns = -1);
         FORGED(refuse_in(&state, 1, 99, 1.0));
@@ -228,7 +228,7 @@ static void forged(void)
 #ifdef DRY
             FORGED(state.model.solver.step.mode0 = 5);
 #endif
-            FORGED(state.model.solver.step.methods.chosen++);
+            FORGED(state.model.solver.step.active_method.method_number++);
         }
         fmi2FreeInstance(it);
     }

@@ -7,7 +7,7 @@ from on_arrays import on_arrays
 
 from fmus.runtime import vectors
 
-COUNTS = ("taken", "refused", "called")
+COUNTS = ("n_accepted", "n_rejected", "n_rhs")
 
 
 def begun(model, values, stop):
@@ -37,12 +37,12 @@ def written_steps(model, values, stop, most):
     """For each internal step its end, the state, its own rates, the modes, the size to try next, the counts, and the
     state in its middle."""
     begun(model, values, stop)
-    start(model, model.initial(0.0), stop)
+    start(model, model.initial_state(0.0), stop)
     rates = [rate for rate in model.states.values() if rate not in model.states]
 
     def row(step):
         numbers = spelled(step, [*model.states, *rates, *model.contacts])
-        return [step.t1, *numbers, step.size, *counts(step), *step.at(model, 0.5 * (step.t0 + step.t1))]
+        return [step.t1, *numbers, step.h_next, *counts(step), *step.state_at(model, 0.5 * (step.t0 + step.t1))]
 
     return list(steps(model, row, stop, most))
 
@@ -51,23 +51,23 @@ def array_steps(model, values, stop, most):
     """The same of the sources."""
     begun(model, values, stop)
     model = on_arrays(model)
-    start(model, [model.initial(0.0)], stop)
+    start(model, [model.initial_state(0.0)], stop)
 
     def row(step):
-        middle = step.at(model, 0.5 * (step.t0 + step.t1))
-        return [step.t1, *step.y1, *step.f1[vectors.own], *step.modes1, step.size, *counts(step), *middle]
+        middle = step.state_at(model, 0.5 * (step.t0 + step.t1))
+        return [step.t1, *step.y1, *step.f1[vectors.is_dynamic], *step.modes1, step.h_next, *counts(step), *middle]
 
     with np.errstate(all="ignore"):
         return list(steps(model, row, stop, most))
 
 
 def counts(step):
-    return [*(getattr(step, name, 0) for name in COUNTS), getattr(step.interpolant, "looked", 0)]
+    return [*(getattr(step, name, 0) for name in COUNTS), getattr(step.interpolant, "n_event_evals", 0)]
 
 
 def steps(model, row, stop, most):
     step = model.solver.step
     while step.t1 < stop and most:
-        assert step.take(model) == 0
+        assert step.compute_next(model) == 0
         yield bits(row(step))
         most -= 1

@@ -9,7 +9,7 @@ from builds import ROOT
 
 from fmus.packaging.catalogue import find
 from fmus.packaging.written import beside, written
-from fmus.runtime.declare import Choice, Input, Output, Parameter, variables
+from fmus.runtime.variable_declarations import Choice, Input, Output, Parameter, variables
 
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
 BODIES = [name for name in MODELS if len(find(name).model().states) == 2]  # position and speed are all their states

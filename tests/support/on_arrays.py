@@ -3,7 +3,16 @@
 import numpy as np
 
 from fmus.packaging.written.spec import STEM
-from fmus.runtime.vectors import contacts, own, per_state, place, places, rate, slip, speeds
+from fmus.runtime.vectors import (
+    contact_indices,
+    is_dynamic,
+    position_index,
+    rate_index,
+    slip_index,
+    state_indices,
+    state_vector,
+    velocity_indices,
+)
 
 
 def on_arrays(model):
@@ -13,22 +22,31 @@ def on_arrays(model):
     """
     states, modes = list(model.states), list(model.contacts)
     rates, slips = list(model.states.values()), list(model.contacts.values())
-    places[:], contacts[:] = range(len(states)), range(len(modes))
-    speeds[:] = [states.index(name) for name in states if name in rates]
-    slip[:] = [states.index(name) if name in states else -1 for name in slips]
-    place[:] = [rates.index(name) if name in rates else -1 for name in slips]
-    own[:] = [name not in states for name in rates]
-    rate[:] = [states.index(name) if name in states else -1 for name in rates]
+    state_indices[:], contact_indices[:] = range(len(states)), range(len(modes))
+    velocity_indices[:] = [states.index(name) for name in states if name in rates]
+    slip_index[:] = [states.index(name) if name in states else -1 for name in slips]
+    position_index[:] = [rates.index(name) if name in rates else -1 for name in slips]
+    is_dynamic[:] = [name not in states for name in rates]
+    rate_index[:] = [states.index(name) if name in states else -1 for name in rates]
     fill(model.solver)
-    if model.linear:
-        methods = model.solver.step.methods
+    if model.is_linear:
+        methods = model.solver.step.active_method
         methods.exact = exact_on_arrays(methods.exact)
     cls = type(model)
-    alone, all_of_them = ("hold", "terms", "departure"), ("slips", "slip_terms", "forces", "changes", "struck")
+    alone, all_of_them = (
+        ("stick_load", "load_magnitude", "breakaway_acceleration"),
+        ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses"),
+    )
     about = {}
-    for name in ("rates", "jacobian", "push", "observe", *(all_of_them if cls.coupled else ())):
+    for name in (
+        "rates",
+        "jacobian",
+        "applied_acceleration",
+        "compute_outputs",
+        *(all_of_them if cls.is_coupled else ()),
+    ):
         about[name] = called_with_numbers(cls, name)
-    for name in alone if modes and not cls.coupled else ():
+    for name in alone if modes and not cls.is_coupled else ():
         if not getattr(cls, name).__module__.startswith("fmus.runtime"):
             about[name] = called_of_a_contact(cls, name)
     model.__class__ = type(cls.__name__, (cls,), about)
@@ -42,7 +60,7 @@ def fill(thing):
 
     def assign(self, name, value):
         if name in said or STEM.fullmatch(name):
-            long = len(contacts) if name in over_contacts or name.startswith("modes") else len(places)
+            long = len(contact_indices) if name in over_contacts or name.startswith("modes") else len(state_indices)
             value = np.full(long, value) if np.ndim(value) == 0 else np.array(value)
         object.__setattr__(self, name, value)
 
@@ -60,16 +78,16 @@ def called_with_numbers(cls, name):
         found = getattr(cls, name)(self, t, *numbers(vectors))
         if name == "rates":
             y, found = vectors[0], iter(found if isinstance(found, tuple) else (found,))
-            return np.array([next(found) if own[i] else y[rate[i]] for i in places])
+            return np.array([next(found) if is_dynamic[i] else y[rate_index[i]] for i in state_indices])
         if name == "jacobian":
-            found, f_t, J = iter(found), per_state(), np.zeros((len(places), len(places)))
-            for i in places:
-                if own[i]:
-                    f_t[i], J[i] = next(found), [next(found) for _ in places]
+            found, f_t, J = iter(found), state_vector(), np.zeros((len(state_indices), len(state_indices)))
+            for i in state_indices:
+                if is_dynamic[i]:
+                    f_t[i], J[i] = next(found), [next(found) for _ in state_indices]
             return f_t, J
-        if name in ("slips", "slip_terms", "forces", "changes", "struck"):
+        if name in ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses"):
             found = np.array(found if isinstance(found, tuple) else (found,))
-            parts = len(found) // (len(places) if name == "struck" else len(contacts))
+            parts = len(found) // (len(state_indices) if name == "apply_impulses" else len(contact_indices))
             return found if parts == 1 else np.split(found, parts)
         return found
 
@@ -96,14 +114,14 @@ def exact_on_arrays(exact):
     cls = type(exact)
 
     class Exact(cls):
-        def begin(self, y, f, p, lost):
-            cls.begin(self, *y.tolist(), float(f[1]), p, lost)
+        def start_segment(self, y, f, p, lost):
+            cls.start_segment(self, *y.tolist(), float(f[1]), p, lost)
 
-        def standstill(self, modes):
-            return cls.standstill(self, int(modes[0]))
+        def next_standstill(self, modes):
+            return cls.next_standstill(self, int(modes[0]))
 
-        def end(self, t):
-            x, v, lost = cls.end(self, t)
+        def state_at_standstill(self, t):
+            x, v, lost = cls.state_at_standstill(self, t)
             return (x, v), lost
 
     return Exact()

@@ -29,11 +29,11 @@ def in_scalars(spec, g, h, J, r):
 
 def on_arrays(spec, g, h, J, r):
     names, rates = list(spec.states), list(spec.states.values())
-    vectors.places[:] = range(len(names))
-    vectors.own[:] = [i in spec.own for i in range(len(names))]
-    vectors.rate[:] = [-1 if i in spec.own else names.index(rate) for i, rate in enumerate(rates)]
+    vectors.state_indices[:] = range(len(names))
+    vectors.is_dynamic[:] = [i in spec.own for i in range(len(names))]
+    vectors.rate_index[:] = [-1 if i in spec.own else names.index(rate) for i, rate in enumerate(rates)]
     with np.errstate(all="ignore"):
-        return vectors.solved(vectors.factored(g, h, J), np.array(r))
+        return vectors.solve_factored(vectors.factorize(g, h, J), np.array(r))
 
 
 @pytest.mark.parametrize("bodies", BODIES)

@@ -34,11 +34,11 @@ def run(name, method):
     """A run of the written-out model: the state at the stop, and time and modes of every event."""
     one, stop = written(FILES[name])(), STOPS[name]
     begun(one, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]}, stop)
-    start(one, one.initial(0.0), stop)
+    start(one, one.initial_state(0.0), stop)
     step, events = one.solver.step, []
     while step.t1 < stop:
-        assert step.take(one) == 0
-        if step.event:
+        assert step.compute_next(one) == 0
+        if step.event_at_end:
             events.append((step.t1, *spelled(step, one.contacts)))
     return spelled(step, one.states), events
 
@@ -77,10 +77,10 @@ def test_contacts_stick_and_slip_when_an_independent_solver_says(name, method):
 def test_a_stuck_sled_stands_on_its_speed_of_zero_while_the_other_moves():
     one = written(FILES["sleds"])()
     begun(one, {"solver.method": DOP853, "solver.rtol": 1e-9}, 16.0)
-    start(one, one.initial(0.0), 16.0)
+    start(one, one.initial_state(0.0), 16.0)
     step, seen = one.solver.step, 0
     while step.t1 < 16.0:
-        assert step.take(one) == 0
+        assert step.compute_next(one) == 0
         for mode, speed in ("mode1", "v1"), ("mode2", "v2"):
             if getattr(step, f"{mode}_0") == 0:
                 assert bits([getattr(step, f"{speed}_0"), getattr(step, f"{speed}_1")]) == bits([0.0, 0.0])

@@ -7,7 +7,7 @@ from models import DOP853, LARGER, RODAS
 from fmus.packaging.catalogue import find
 from fmus.packaging.native.interface import header
 from fmus.packaging.written import LAWS, METHODS, beside, offer, written
-from fmus.runtime.declare import variables
+from fmus.runtime.variable_declarations import variables
 
 BELT = '''"""A model."""
 from fmus import Contact, Mode, Model, Output, Parameter, State
@@ -31,23 +31,23 @@ SLED = BELT.replace(" - 0.5 * u", "")
 # Of position, speed, rate and mode: local names, attributes, constants, stages of each other, what the C has.
 NAMES = {
     SLED: [("y", "v", "e", "modes"), ("x", "x1", "x0", "x_1")],
-    BELT: [("h", "size", "end", "i"), ("HUGE", "d_x", "to", "near")],
+    BELT: [("h", "size", "end", "i"), ("OVERFLOW_LIMIT", "d_x", "to", "tie_tolerance")],
 }
 CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
 
 
 def numbers(path, model, names):
     """Ends of steps, and what these names are there, by two methods."""
-    found, rules = [], beside(written(path), "runtime.rules")
+    found, rules = [], beside(written(path), "runtime.call_sequence")
     for method in DOP853, RODAS:
         begun(model, {"solver.method": method, "solver.rtol": 1e-6}, 2.0)
-        start(model, model.initial(0.0), 2.0)
-        march = model.solver
-        while march.t < 1.5:
-            march.look_ahead(model)
-            assert march.advance(model, march.t_next) == 0
-            rules.show(rules.Run(1e-6), model)
-            found.append((march.t, *(getattr(model, name) for name in names)))
+        start(model, model.initial_state(0.0), 2.0)
+        solver = model.solver
+        while solver.t < 1.5:
+            solver.update_t_next(model)
+            assert solver.advance(model, solver.t_next) == 0
+            rules.set_outputs(rules.RunState(1e-6), model)
+            found.append((solver.t, *(getattr(model, name) for name in names)))
     return found
 
 

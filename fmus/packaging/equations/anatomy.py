@@ -10,7 +10,7 @@ from math import inf, isfinite
 from sys import float_info
 from typing import Any
 
-from ...runtime.methods import EXACT_ITEM, ITEMS
+from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
 from ..words import OF_C
 from .algebra import degree, depends, derivative, is_sum, jumps, leaves, made, negative, occurrences, put, same, undone
 from .declared import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
@@ -18,7 +18,7 @@ from .expressions import COMPARISONS, Expression, Mistake, Operand, Term
 from .names import RESERVED, RESERVED_WHERE_COUPLED
 
 MOST = float_info.max
-METHODS = [label for label, _, _ in (EXACT_ITEM, *ITEMS)]
+METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
 TIME = Expression()
 TIME.name = "t"
 
@@ -247,7 +247,7 @@ class Anatomy:
         """What stands for the rate of an input; None where the names for it are taken, or it could leave its range."""
         rate = Parameter(0.0, f"{e.unit}/s", f"rate of {e.name}")
         rate.name = f"{e.name}_rate"
-        is_taken = any(one.name in (rate.name, f"{e.name}_course") for one in self.declared)
+        is_taken = any(one.name in (rate.name, f"{e.name}_polynomial") for one in self.declared)
         return None if is_taken or any(map(isfinite, (e.low, e.high, e.above, e.below))) else rate
 
     def _stays_closed(self, e: Input) -> bool:

@@ -14,7 +14,7 @@ from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
-from ...runtime.declare import Declaring
+from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
 from .anatomy import Anatomy
 from .declared import Model
@@ -63,7 +63,7 @@ class Authored:
             raise self._told(mistake) from mistake
 
     @cached_property
-    def model(self) -> type[Declaring]:
+    def model(self) -> type[VariableOwner]:
         """The class of the model as it travels, in this process; `inspect` and tracebacks find its text."""
         digest = sha256(self.text.encode()).hexdigest()[:12]
         file = f"written-{digest}/{self.name}.py"
@@ -80,9 +80,9 @@ class Authored:
         """Refuse start values that go nowhere: nobody could run the model as it is."""
         try:
             rule = thing.prepare()
-            begins = thing.initial(0.0)
+            begins = thing.initial_state(0.0)
             states = begins if isinstance(begins, tuple) else (begins,)  # of one state a number
-            thing.observe(0.0, *states, *(0 for _ in self.anatomy.contacts))
+            thing.compute_outputs(0.0, *states, *(0 for _ in self.anatomy.contacts))
         except (ArithmeticError, ValueError) as error:
             mistake = Mistake(f"the start values lead out of the range of numbers: {error}", self.anatomy.model.place)
             raise self._told(mistake) from error

@@ -35,7 +35,7 @@ def coupled(f: Frame) -> list[str]:
         return []
     slips = [c.slip for c in f.an.contacts]
     return [
-        method("slips", ["t", *f.states], f.returning(f.scribe(), slips)),
+        method("slip_velocities", ["t", *f.states], f.returning(f.scribe(), slips)),
         slip_terms(f),
         forces(f),
         changes(f),
@@ -146,7 +146,7 @@ def slip_terms(f: Frame) -> str:
     s = f.scribe()
     sizes = place_sizes(f, s, [size(c.slip) for c in f.an.contacts])
     f.place_drive(s, sizes)
-    return method("slip_terms", ["t", *f.states], returned(s, sizes))
+    return method("slip_magnitudes", ["t", *f.states], returned(s, sizes))
 
 
 def forces(f: Frame) -> str:
@@ -158,7 +158,7 @@ def forces(f: Frame) -> str:
     s.count(*u.terms, *limits, *sizes)
     solve(f, s, [u])
     sizes = place_sizes(f, s, sizes)
-    return method("forces", f.point, returned(s, [*an.contacts, *limits, *sizes]))
+    return method("contact_forces", f.point, returned(s, [*an.contacts, *limits, *sizes]))
 
 
 def changes(f: Frame) -> str:
@@ -179,7 +179,7 @@ def changes(f: Frame) -> str:
     s.count(*u.terms, *rate.terms, *targets)
     solve(f, s, [u])
     solve(f, s, [rate])
-    return method("changes", f.point, returned(s, targets))
+    return method("contact_rates", f.point, returned(s, targets))
 
 
 def struck(f: Frame) -> str:
@@ -201,4 +201,4 @@ def struck(f: Frame) -> str:
         with s.block(f"if {c.mode.name} == 0:"):
             s.say(f"{state.name} = {s.text(value)}")
     s.say(f"return {', '.join(f.states)}")
-    return method("struck", f.point, s.lines)
+    return method("apply_impulses", f.point, s.lines)

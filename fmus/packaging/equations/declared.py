@@ -3,20 +3,20 @@
 from collections.abc import MutableMapping
 from typing import Any
 
-from ...runtime import declare
+from ...runtime import variable_declarations
 from .expressions import Expression, Mistake, Operand, Term, operand, written_at
 
 HYBRID, SIGN, THRESHOLD = "hybrid", "sign", "threshold"
 
 
-class Variable(Expression, declare.Declared):
+class Variable(Expression, variable_declarations.VariableDeclaration):
     """What has a name, a unit, words and a range."""
 
     def __set_name__(self, owner: object, name: str) -> None:
         """It has its name since it was first assigned: D = mu_s does not change that."""
 
 
-class Parameter(Variable, declare.Parameter):
+class Parameter(Variable, variable_declarations.Parameter):
     """Set by the user, tunable at every communication point.
 
     Parameter(start, unit, text): the start value in `unit`, which is SI, and what it is in a few words.  A range is
@@ -25,15 +25,15 @@ class Parameter(Variable, declare.Parameter):
     """
 
 
-class Fixed(Variable, declare.Fixed):
+class Fixed(Variable, variable_declarations.Fixed):
     """As Parameter, but set before initialisation ends: where a state starts, for example."""
 
 
-class Input(Variable, declare.Input):
+class Input(Variable, variable_declarations.Input):
     """As Parameter, but set by the importer while it runs."""
 
 
-class Choice(Variable, declare.Choice):
+class Choice(Variable, variable_declarations.Choice):
     """An enumeration, label=sentence for each item: numbered from 1, and the first is the default."""
 
     def __init__(self, text: str, **items: str) -> None:
@@ -52,7 +52,7 @@ class Choice(Variable, declare.Choice):
         return value
 
 
-class State(Variable, declare.Output):
+class State(Variable, variable_declarations.Output):
     """A continuous state.
 
     `start`: a number or an expression of parameters.  `rate_of`: the state that this one is the rate of, as a speed is
@@ -75,7 +75,7 @@ class State(Variable, declare.Output):
         self.steady: Operand = None if rate is None else operand(rate)
 
 
-class Output(Variable, declare.Output):
+class Output(Variable, variable_declarations.Output):
     """What is calculated: unit, words, expression.  `rate_of`: the state whose rate it is."""
 
     def __init__(self, unit: str, text: str, means: Operand, rate_of: State | None = None, **more: Any) -> None:
@@ -83,14 +83,14 @@ class Output(Variable, declare.Output):
         self.means, self.whose = operand(means), rate_of
 
 
-class Mode(Variable, declare.Mode):
+class Mode(Variable, variable_declarations.Mode):
     """The direction of sliding: -1, 0 while stuck, or 1."""
 
     def __init__(self, text: str = "-1 sliding backward, 0 stuck, 1 sliding forward") -> None:
         super().__init__(text)
 
 
-class Contact(Variable, declare.Output):
+class Contact(Variable, variable_declarations.Output):
     """The force of dry friction in a contact, an unknown of the equations; positive where it opposes a positive slip.
 
     mode: its declared Mode.  slip: the relative speed, a state or an expression of such, as v - v_belt; several of them

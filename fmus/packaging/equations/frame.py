@@ -60,13 +60,13 @@ class Frame:
     def place_drive(self, s: Scribe, targets: Sequence[Operand]) -> None:
         """Where the driver is, and what an input that has a rate is, if that is needed."""
         for e, rate in self.an.ramps.items():
-            course = f"self.{e.name}_course"
+            course = f"self.{e.name}_polynomial"
             if e not in s.given and any(depends(one, (e,)) for one in targets):
                 s.given[e] = e.name
-                s.say(f"{e.name} = {course}.now(t - self.t_base)")
+                s.say(f"{e.name} = {course}.value_at(t - self.t_base)")
             if rate not in s.given and any(depends(one, (rate,)) for one in targets):
                 s.given[rate] = rate.name
-                s.say(f"{rate.name} = {course}.rate(t - self.t_base)")
+                s.say(f"{rate.name} = {course}.rate_at(t - self.t_base)")
         if self.drive is not None and any(depends(e, (self.drive,)) for e in targets):
             s.given[self.drive] = self.drive.name
             s.say(f"{self.drive.name} = self.x_base + self.{self.drive.steady.name} * (t - self.t_base)")
@@ -77,7 +77,7 @@ class Frame:
         n = s.fresh("n")
         for e, rate in self.an.ramps.items():
             s.given[rate] = rate.name
-            s.say(f"{rate.name} = self.{e.name}_course.at(t - self.t_base, {n})")
+            s.say(f"{rate.name} = self.{e.name}_polynomial.derivative_at(t - self.t_base, {n})")
         return method(name, [*arguments, n], self.returning(s, targets))
 
     @property

@@ -17,13 +17,13 @@ def hold(f: Frame, c: Contact) -> str:
     """The load on the body at rest, its rate, and the most that is held."""
     an = f.an
     wanted = [an.load[c], put(derivative(an.load[c], an.coasting), {c.slip: 0.0}), an.hold[c]]
-    return method("hold", ["t", *f.states], f.returning(f.scribe(), wanted))
+    return method("stick_load", ["t", *f.states], f.returning(f.scribe(), wanted))
 
 
 def load_rate(f: Frame, c: Contact) -> list[str]:
     """The n-th derivative of that load, as far as inputs make it."""
     ramps = f.an.ramps
-    return [f.of_order("load_rate", ["t", *f.states], [derivative(f.an.load[c], ramps)])] if ramps else []
+    return [f.of_order("load_derivative", ["t", *f.states], [derivative(f.an.load[c], ramps)])] if ramps else []
 
 
 def terms(f: Frame, c: Contact) -> str:
@@ -33,7 +33,7 @@ def terms(f: Frame, c: Contact) -> str:
     f.place_drive(s, [sizes])
     s.count(sizes)
     s.say(f"return {s.text(sizes)}")
-    return method("terms", ["t", *f.states], s.lines)
+    return method("load_magnitude", ["t", *f.states], s.lines)
 
 
 def departure(f: Frame, c: Contact) -> list[str]:
@@ -42,7 +42,7 @@ def departure(f: Frame, c: Contact) -> list[str]:
         return []
     less = Term("neg", Term("*", c.mode, Term("-", c.hold, c.slide)))
     jump = derivative(f.an.law[c.slip].means, {c: less})
-    return [method("departure", f.point, f.returning(f.scribe(), [jump]))]
+    return [method("breakaway_acceleration", f.point, f.returning(f.scribe(), [jump]))]
 
 
 def under_the_law(f: Frame, s: Scribe, c: Contact) -> None:

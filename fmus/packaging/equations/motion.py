@@ -94,11 +94,12 @@ def push(f: Frame) -> list[str]:
     targets = [law.means for law in f.laws]
     targets = targets if f.alone is None else sliding_now(f.alone, targets)
     at_zero = dict.fromkeys(f.an.states, 0.0)
-    piece = method("piece", (), f.returning(f.scribe(), f.an.closed_form))
+    piece = method("linear_coefficients", (), f.returning(f.scribe(), f.an.closed_form))
     return [
         piece,
-        *[f.of_order("push_rate", ["t"], [derivative(f.laws[0].means, f.an.ramps)])] * bool(f.an.ramps),
-        method("push", ["t", *f.modes], f.returning(f.scribe(), [put(e, at_zero) for e in targets])),
+        *[f.of_order("applied_acceleration_derivative", ["t"], [derivative(f.laws[0].means, f.an.ramps)])]
+        * bool(f.an.ramps),
+        method("applied_acceleration", ["t", *f.modes], f.returning(f.scribe(), [put(e, at_zero) for e in targets])),
     ]
 
 

@@ -1,28 +1,29 @@
 """The names that a written-out model takes for itself; an author's are others."""
 
-from ...runtime.automaton import DryFriction
-from ...runtime.coupled import CoupledFriction
-from ...runtime.found import methods
+from ...runtime.contact_lcp import CoupledFriction
+from ...runtime.method_registry import methods
+from ...runtime.stick_slip import DryFriction
 from .expressions import FUNCTIONS
 
 MATH = ("copysign", "inf", "pi", *FUNCTIONS)
 IMPORTS = {  # module -> what may be needed of it
     "": tuple(label for label, _, _ in methods),
-    "automaton": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
+    "stick_slip": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
     "codes": ("EXACT", "HYBRID"),
-    "course": ("Course",),
-    "coupled": ("CoupledFriction",),
-    "declare": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
-    "march": ("March",),
-    "methods": ("EXACT_ITEM", "ITEMS"),
+    "input_polynomial": ("InputPolynomial",),
+    "contact_lcp": ("CoupledFriction",),
+    "variable_declarations": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
+    "integrator": ("Integrator",),
+    "active_method": ("EXACT_ITEM", "METHOD_ITEMS"),
     "oscillator": ("Oscillator",),
 }
-ATTRIBUTES = ("friction", "solver", "events", "exact", "exchange", "x_base", "t_base", "time", "method")
+ATTRIBUTES = ("friction", "solver", "events", "exact", "model_exchange", "x_base", "t_base", "time", "method")
 METHODS = (  # beside those inherited
-    *("initial", "rates", "jacobian", "push", "piece", "hold", "terms", "observe"),
-    *("push_rate", "load_rate", "input_rates", "bends"),
+    *("initial_state", "rates", "jacobian", "applied_acceleration", "linear_coefficients"),
+    *("stick_load", "load_magnitude", "compute_outputs"),
+    *("applied_acceleration_derivative", "load_derivative", "set_input_rates", "has_higher_order"),
 )
-COUPLED_METHODS = ("slips", "slip_terms", "forces", "changes", "struck")
+COUPLED_METHODS = ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses")
 CLASSES = ("Solver", "Model", "Fmi3Slave")
 RESERVED = {
     *("self", "t", *MATH, *ATTRIBUTES, *METHODS, *CLASSES),

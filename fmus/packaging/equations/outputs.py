@@ -22,4 +22,4 @@ def observe(f: Frame) -> str:
         s.say(f"self.{e.name} = {s.text(e)}")
     sizes = (s.text(e) if e.low >= 0.0 else f"fabs({s.text(e)})" for e in an.first_to_overflow)
     s.say(f"return {' + '.join(sizes)} < inf")
-    return method("observe", f.point, s.lines)
+    return method("compute_outputs", f.point, s.lines)

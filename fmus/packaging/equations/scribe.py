@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from math import pi
 from typing import Any
 
-from ...runtime.declare import Declared
+from ...runtime.variable_declarations import VariableDeclaration
 from .algebra import inside
 from .declared import Choice, Fixed, Input, Output, Parameter
 from .expressions import Expression, Mistake, Operand, Term
@@ -77,7 +77,7 @@ class Scribe:
         self._alive.append(e)
         if isinstance(e, Expression):
             self._of[id(e)] = found
-            if e.name and (isinstance(e, Declared) or found not in self.names):
+            if e.name and (isinstance(e, VariableDeclaration) or found not in self.names):
                 self.names[found] = e.name
         return found
 

@@ -1,6 +1,6 @@
 """The methods of a written-out model about its values: at its birth, at the start, when they have changed."""
 
-from ...runtime.automaton import DryFriction
+from ...runtime.stick_slip import DryFriction
 from .algebra import Memo, parts
 from .expressions import Term
 from .frame import Frame, method
@@ -18,7 +18,7 @@ def init(f: Frame) -> str:
     if f.drive is not None:
         lines.append("self.t_base = self.x_base = 0.0")
     for e, rate in f.an.ramps.items():
-        lines.append(f"self.{e.name}_course = Course()")
+        lines.append(f"self.{e.name}_polynomial = InputPolynomial()")
         lines.append(f"self.t_base = self.{rate.name} = 0.0")
     if f.constants:
         lines.append(" = ".join(f"self.{e.name}" for e in f.constants) + " = 0.0")
@@ -32,7 +32,7 @@ def initial(f: Frame) -> str:
         s.say("self.t_base, self.x_base = t, 0.0")
     elif f.an.ramps:
         s.say("self.t_base = t")
-    return method("initial", ["t"], f.returning(s, [state.begins for state in f.an.states]))
+    return method("initial_state", ["t"], f.returning(s, [state.begins for state in f.an.states]))
 
 
 def prepare(f: Frame) -> str:
@@ -41,7 +41,7 @@ def prepare(f: Frame) -> str:
     done: list[Term] = []
     s.kept = done
     for e in f.an.ramps:
-        s.say(f"self.{e.name}_course.begin(self.{e.name})")
+        s.say(f"self.{e.name}_polynomial.set_value(self.{e.name})")
     s.count(*f.constants, *(rule.broken for rule in f.an.rules))
 
     def calculate(needed: Memo | None = None) -> None:
@@ -62,12 +62,12 @@ def prepare(f: Frame) -> str:
 def finest(f: Frame) -> list[str]:
     """The speed that a tolerance must resolve."""
     wanted = [state.finest for state in f.an.states if state.finest is not None]
-    return [method("finest", (), f.returning(f.scribe(), wanted))] if wanted else []
+    return [method("nominal_velocity", (), f.returning(f.scribe(), wanted))] if wanted else []
 
 
 def drive(f: Frame) -> list[str]:
     """The speed of the driver."""
-    return [] if f.drive is None else [method("drive", (), f.returning(f.scribe(), [f.drive.steady]))]
+    return [] if f.drive is None else [method("driver_velocity", (), f.returning(f.scribe(), [f.drive.steady]))]
 
 
 def courses(f: Frame) -> list[str]:
@@ -77,11 +77,11 @@ def courses(f: Frame) -> list[str]:
         return []
     base, rates = f.scribe(), f.scribe()
     for e, rate in f.an.ramps.items():
-        base.say(f"self.{e.name} = self.{e.name}_course.move(t - self.t_base)")
-        rates.say(f"self.{rate.name} = self.{e.name}_course.rate(t - self.t_base)")
+        base.say(f"self.{e.name} = self.{e.name}_polynomial.shift_to(t - self.t_base)")
+        rates.say(f"self.{rate.name} = self.{e.name}_polynomial.rate_at(t - self.t_base)")
     base.say("super().rebase(t)")
     base.say("self.t_base = t")
     bends = f.scribe()
-    bends.say("return " + " or ".join(f"self.{e.name}_course.order > 1" for e in f.an.ramps))
-    scribes = {"rebase": base, "input_rates": rates, "bends": bends}
-    return [method(name, ["t"] * (name != "bends"), s.lines) for name, s in scribes.items()]
+    bends.say("return " + " or ".join(f"self.{e.name}_polynomial.order > 1" for e in f.an.ramps))
+    scribes = {"rebase": base, "set_input_rates": rates, "has_higher_order": bends}
+    return [method(name, ["t"] * (name != "has_higher_order"), s.lines) for name, s in scribes.items()]

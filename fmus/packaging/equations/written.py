@@ -5,7 +5,7 @@ from inspect import cleandoc
 from math import isfinite
 from textwrap import indent, wrap
 
-from ...runtime.methods import EXACT_ITEM
+from ...runtime.active_method import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
 from ..words import quoted
 from .anatomy import Anatomy
@@ -27,7 +27,7 @@ Written out from the equations in {file}: change those, not this.
 {imports}
 
 
-class Solver(March):
+class Solver(Integrator):
     method = Choice({method}, "integration method", {items})
 
 
@@ -55,7 +55,7 @@ def written(an: Anatomy, file: str) -> str:
         file=file,
         imports=HERE,
         method="EXACT" if an.method == EXACT_ITEM[0] else f"{an.method}.NUMBER",
-        items="(EXACT_ITEM, *ITEMS)" if an.closed_form else "ITEMS",
+        items="(EXACT_ITEM, *METHOD_ITEMS)" if an.closed_form else "METHOD_ITEMS",
         name=an.name,
         base=base(an),
         about=about.rstrip(" ") + (INDENT if rest else ""),
@@ -127,7 +127,11 @@ def facts(an: Anatomy) -> list[str]:
         lines.append(f"contacts = {{{slips}}}")
     lines += [
         f"{word} = True"
-        for word, holds in (("linear", an.closed_form), ("driven", an.drives), ("ramps", an.ramps))
+        for word, holds in (
+            ("is_linear", an.closed_form),
+            ("has_driver", an.drives),
+            ("has_input_derivatives", an.ramps),
+        )
         if holds
     ]
     for word in RUN:

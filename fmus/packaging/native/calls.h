@@ -59,7 +59,7 @@ Status FMI(SetTime)(Handle instance, double time)
     ENTER(instance, EXCHANGING);
     EXCHANGE_ONLY;
     bool fault = false;
-    exchange_move_to(&it->state.run, &it->state.model, time, &fault);
+    model_exchange_set_time(&it->state.run, &it->state.model, time, &fault);
     return DONE;
 }
 
@@ -69,8 +69,8 @@ Status FMI(SetContinuousStates)(Handle instance, const double states[], size_t n
     bool fault = false;
     if (n != STATES) return refuse(it, WRONG_LENGTH, __func__, "the number of states");
     NEED(states);
-    memcpy(it->state.model.exchange.states, states, STATES * sizeof *states);
-    exchange_put(&it->state.run, &it->state.model, &fault);
+    memcpy(it->state.model.model_exchange.states, states, STATES * sizeof *states);
+    model_exchange_set_continuous_states(&it->state.run, &it->state.model, &fault);
     return DONE;
 }
 
@@ -84,11 +84,11 @@ Status FMI(SetContinuousStates)(Handle instance, const double states[], size_t n
         State *state = &it->state;                                                                               \
         bool fault = false;                                                                                      \
         if (n != (COUNT)) return refuse(it, WRONG_LENGTH, __func__, "the number of values");                     \
-        if (n && !values) return refuse(it, NO_ADDRESS, __func__, "the address of the values");                  \
-        int64_t status = exchange_ready(&state->run, &state->model, &fault);                                     \
-        if (status == OK && !fault) exchange_##found(&state->model, &fault);                                     \
+        if (n && !values) return refuse(it, NULL_POINTER, __func__, "the address of the values");                  \
+        int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);                                     \
+        if (status == OK && !fault) model_exchange_update_##found(&state->model, &fault);                                     \
         bool is_there = status == OK && !fault;                                                                  \
-        for (size_t i = 0; i < n; i++) values[i] = is_there ? state->model.exchange.found[i] : NAN;              \
+        for (size_t i = 0; i < n; i++) values[i] = is_there ? state->model.model_exchange.found[i] : NAN;              \
         return status == OK || state->run.phase < RUNNING ? DONE : give_up(it, status, NAN, NAN);                \
     }
 
@@ -102,7 +102,7 @@ Status OF_STATE(Get, )(Handle instance, Saved *state)
 {
     ENTER(instance, ANY);
     NEED(state);
-    it->state.run.observed = false; /* here and there, outputs are calculated anew */
+    it->state.run.outputs_current = false; /* here and there, outputs are calculated anew */
     return keep(it, &it->state, state, __func__);
 }
 
@@ -139,7 +139,7 @@ Status OF_STATE(Serialize, )(Handle instance, Saved state, Byte serializedState[
     ENTER(instance, ANY);
     NEED(serializedState);
     if (!own_state(it, state)) return refuse_state(it);
-    if (size < sizeof(Sealed)) return refuse(it, TOO_SHORT, __func__, "");
+    if (size < sizeof(Sealed)) return refuse(it, BUFFER_TOO_SMALL, __func__, "");
     memset(serializedState, 0, size);
     memcpy(serializedState, state, sizeof(Sealed));
     return DONE;
@@ -166,7 +166,7 @@ Status DESERIALIZE(Handle instance, const Byte serializedState[], size_t size, S
     Status FMI(NAME)(__VA_ARGS__)                     \
     {                                                 \
         ENTER(instance, ANY);                           \
-        return refuse(it, NOT_OFFERED, __func__, ""); \
+        return refuse(it, NOT_SUPPORTED, __func__, ""); \
     }
 
 #endif

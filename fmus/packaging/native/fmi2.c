@@ -52,7 +52,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDef
 {
     ENTER(component, NEW);
     bool fault = false;
-    rules_setup(&it->state.run, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0,
+    call_sequence_set_experiment(&it->state.run, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0,
                 &fault);
     return fmi2OK;
 }
@@ -157,23 +157,23 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
 {
     ENTER(component, NEW | 1 << INITIALISING | STEPPING);
     State *state = &it->state;
-    if (exchanges(state)) return refuse(it, NOT_OFFERED, __func__, "");
+    if (exchanges(state)) return refuse(it, NOT_SUPPORTED, __func__, "");
     bool fault = false;
-    if (nvr && (!vr || !order || !value)) return refuse(it, NO_ADDRESS, __func__, "vr, order or value");
+    if (nvr && (!vr || !order || !value)) return refuse(it, NULL_POINTER, __func__, "vr, order or value");
     for (size_t i = 0; i < nvr; i++) {
         bool has_any = vr[i] < VARIABLES && variables[vr[i]].order != NO_SLOPE;
-        if (has_any && 1 <= order[i] && order[i] <= HIGHEST && isfinite(value[i])) continue;
-        return refuse_call(it, NO_COURSE, &(Call){.function = __func__, .reference = vr[i]});
+        if (has_any && 1 <= order[i] && order[i] <= MAX_INPUT_ORDER && isfinite(value[i])) continue;
+        return refuse_call(it, NO_INPUT_DERIVATIVE, &(Call){.function = __func__, .reference = vr[i]});
     }
     for (size_t i = 0; i < nvr && !fault; i++) {
         const Variable *variable = &variables[vr[i]];
         int64_t *highest = order_of(state, variable);
         double *derivative = (double *)((char *)&state->model + variable->derivatives) + order[i];
         if (*derivative == value[i] && *highest <= order[i]) continue; /* it stays what it is */
-        rules_change(&state->run, &state->model, &fault);
+        call_sequence_note_change(&state->run, &state->model, &fault);
         *derivative = value[i];
         if (*highest < order[i]) *highest = order[i];
-        state->run.observed = false;
+        state->run.outputs_current = false;
     }
     return judged_by(it, OK, fault, NAN, NAN);
 }
@@ -199,12 +199,12 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component component, fmi2EventInfo *eventIn
     ENTER(component, 1 << EVENT);
     NEED(eventInfo);
     fmi2Status status = handle(it);
-    const struct Exchange *exchange = &it->state.model.exchange;
+    const struct ModelExchange *exchange = &it->state.model.model_exchange;
     *eventInfo = (fmi2EventInfo){.terminateSimulation = status != fmi2OK,
-                                 .nominalsOfContinuousStatesChanged = exchange->rescaled,
-                                 .valuesOfContinuousStatesChanged = exchange->jumped,
-                                 .nextEventTimeDefined = exchange->due < INFINITY,
-                                 .nextEventTime = exchange->due};
+                                 .nominalsOfContinuousStatesChanged = exchange->nominals_changed,
+                                 .valuesOfContinuousStatesChanged = exchange->states_changed,
+                                 .nextEventTimeDefined = exchange->t_next_event < INFINITY,
+                                 .nextEventTime = exchange->t_next_event};
     return status;
 }
 

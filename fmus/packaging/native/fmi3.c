@@ -71,7 +71,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     Host host = {.environment = instanceEnvironment, .log = logMessage};
     (void)resourcePath, (void)visible, (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
     Instance *it = instantiate(instanceName, instantiationToken, &host, STEPPING, loggingOn, __func__);
-    return it ? dismissed(it, NOT_OFFERED, __func__, "") : NULL;
+    return it ? dismissed(it, NOT_SUPPORTED, __func__, "") : NULL;
 }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
@@ -79,7 +79,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 {
     ENTER(instance, NEW);
     bool fault = false;
-    rules_setup(&it->state.run, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0,
+    call_sequence_set_experiment(&it->state.run, startTime, stopTimeDefined ? stopTime : INFINITY, toleranceDefined ? tolerance : 0.0,
                 &fault);
     it->state.run.phase = INITIALISING;
     return fmi3OK;
@@ -199,8 +199,8 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
     ENTER(instance, BEGUN);
     bool fault = false;
-    if (!it->host.handles) return refuse(it, NOT_OFFERED, __func__, "");
-    if (!exchanges(&it->state)) leaps_handle(&it->state.run, &it->state.model, &fault);
+    if (!it->host.handles) return refuse(it, NOT_SUPPORTED, __func__, "");
+    if (!exchanges(&it->state)) early_return_complete_event(&it->state.run, &it->state.model, &fault);
     it->state.run.phase = EVENT;
     return fmi3OK;
 }
@@ -225,13 +225,13 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     NEED(nextEventTimeDefined);
     NEED(nextEventTime);
     fmi3Status status = handle(it);
-    const struct Exchange *exchange = &it->state.model.exchange;
+    const struct ModelExchange *exchange = &it->state.model.model_exchange;
     *discreteStatesNeedUpdate = false;
     *terminateSimulation = status != fmi3OK;
-    *nominalsOfContinuousStatesChanged = exchange->rescaled;
-    *valuesOfContinuousStatesChanged = exchange->jumped;
-    *nextEventTimeDefined = exchange->due < INFINITY;
-    *nextEventTime = exchange->due;
+    *nominalsOfContinuousStatesChanged = exchange->nominals_changed;
+    *valuesOfContinuousStatesChanged = exchange->states_changed;
+    *nextEventTimeDefined = exchange->t_next_event < INFINITY;
+    *nextEventTime = exchange->t_next_event;
     return status;
 }
 
@@ -240,7 +240,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
     ENTER(instance, 1 << EVENT);
-    if (exchanges(&it->state)) return refuse(it, NOT_OFFERED, __func__, "");
+    if (exchanges(&it->state)) return refuse(it, NOT_SUPPORTED, __func__, "");
     it->state.run.phase = RUNNING;
     return fmi3OK;
 }
@@ -249,16 +249,16 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
  * where it wants to stop. */
 static void show(Instance *it, bool finished)
 {
-    struct Exchange *exchange = &it->state.model.exchange;
+    struct ModelExchange *exchange = &it->state.model.model_exchange;
     double now = it->state.model.solver.t, wanted = now;
     bool wants = false;
     if (!it->host.look) return;
     it->state.run.phase = INTERMEDIATE;
     it->host.look(it->host.environment, now, true, true, finished, it->host.returns, &wants, &wanted);
     it->state.run.phase = RUNNING;
-    if (!it->host.returns || !wants || !(wanted < exchange->end)) return;
-    if (wanted > now) exchange->end = wanted;
-    else if (finished) exchange->end = now;
+    if (!it->host.returns || !wants || !(wanted < exchange->step_end)) return;
+    if (wanted > now) exchange->step_end = wanted;
+    else if (finished) exchange->step_end = now;
 }
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
@@ -281,19 +281,19 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         *lastSuccessfulTime = *now;
         return status;
     }
-    struct Exchange *exchange = &state->model.exchange;
-    int64_t status = leaps_aim(&state->run, &state->model, t, h, &fault);
-    double end = exchange->end;
+    struct ModelExchange *exchange = &state->model.model_exchange;
+    int64_t status = early_return_begin_step(&state->run, &state->model, t, h, &fault);
+    double end = exchange->step_end;
     if (status == OK && !fault) show(it, false);
-    while (status == OK && !fault && *now < exchange->end) {
-        status = leaps_leap(&state->run, &state->model, it->host.handles, &fault);
+    while (status == OK && !fault && *now < exchange->step_end) {
+        status = early_return_next_internal_step(&state->run, &state->model, it->host.handles, &fault);
         if (status != OK || fault) break;
         show(it, true);
-        if (exchange->struck && it->host.returns) break;
+        if (exchange->event_reached && it->host.returns) break;
     }
     *lastSuccessfulTime = *now;
     if (status == OK && !fault) {
-        *eventHandlingNeeded = it->host.handles && exchange->struck;
+        *eventHandlingNeeded = it->host.handles && exchange->event_reached;
         *earlyReturn = *now < end;
     }
     return judged_by(it, status, fault, t, h);

@@ -14,7 +14,7 @@ from datetime import datetime
 from pathlib import Path
 from xml.etree.ElementTree import SubElement, fromstring
 
-from ...runtime.declare import Declaring
+from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
 from ..archive import build_date, licenses, write, zipped
 from ..catalogue import find
@@ -72,7 +72,7 @@ def build(
     return write(folder / f"{name}.fmu", zipped(entries, date))
 
 
-def frozen(model: type[Declaring], name: str, date: datetime, fmi: str) -> tuple[dict[str, str], bytes]:
+def frozen(model: type[VariableOwner], name: str, date: datetime, fmi: str) -> tuple[dict[str, str], bytes]:
     """The C sources of a model, and the description that goes with them."""
     files = sources(model, fmi)
     if fmi == "3":

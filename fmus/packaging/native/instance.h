@@ -1,6 +1,6 @@
 /* An instance of the model in model.h in the hands of an importer, whatever the version of FMI.
  *
- * Every call does what it does in the Python FMU of the same model, by the same rules (rules_... in model.h) and with
+ * Every call does what it does in the Python FMU of the same model, by the same rules (call_sequence_... in model.h) and with
  * the same sentences: a value that cannot be used is remembered and told by the next step; a run that cannot begin or
  * go on answers Error, and every calculated Real reads NaN from then on.  On top, calls out of order, wrong references
  * and missing addresses are refused: such a call changes nothing.
@@ -87,7 +87,7 @@ static RARE Status refuse_order(const Instance *it, int allowed, const char *fun
 
 static Status refuse_reference(const Instance *it, uint32_t reference, const char *type)
 {
-    return refuse_call(it, NO_VARIABLE, &(Call){.word = type, .reference = reference});
+    return refuse_call(it, UNKNOWN_REFERENCE, &(Call){.word = type, .reference = reference});
 }
 
 /* The instance, if the call is allowed in its phase. */
@@ -97,11 +97,11 @@ static Status refuse_reference(const Instance *it, uint32_t reference, const cha
 
 /* A call that co-simulation does not have, where its states do not tell. */
 #define EXCHANGE_ONLY \
-    if (!exchanges(&it->state)) return refuse(it, NOT_OFFERED, __func__, "")
+    if (!exchanges(&it->state)) return refuse(it, NOT_SUPPORTED, __func__, "")
 
 /* An address that the call cannot do without. */
 #define NEED(address) \
-    if (!(address)) return refuse(it, NO_ADDRESS, __func__, #address)
+    if (!(address)) return refuse(it, NULL_POINTER, __func__, #address)
 
 /* ---- failure */
 
@@ -136,8 +136,8 @@ static RARE Status give_up(Instance *it, int64_t status, double t, double h)
     } else {
         tell_status(&text, status, &state->run, &state->model, t, h);
     }
-    state->run.failed = true;
-    state->run.observed = false;
+    state->run.has_failed = true;
+    state->run.outputs_current = false;
     silence(&state->model);
     say_of(it, &text);
     return REFUSED;
@@ -160,7 +160,7 @@ static bool is_one(uint32_t reference, const Type *type)
 static Status check(const Instance *it, const Type *type, const uint32_t vr[], size_t n, const void *value,
                     const char *function)
 {
-    if (n && (!vr || !value)) return refuse(it, NO_ADDRESS, function, "vr or value");
+    if (n && (!vr || !value)) return refuse(it, NULL_POINTER, function, "vr or value");
     for (size_t i = 0; i < n; i++) {
         if (!is_one(vr[i], type)) return refuse_reference(it, vr[i], type->name);
     }
@@ -180,13 +180,13 @@ static Status ready(Instance *it, const Type *type, const uint32_t vr[], size_t 
         ahead |= vr[i] == T_NEXT;
         shown |= vr[i] >= DECLARED;
     }
-    if (!state->run.observed && !state->run.failed) {
-        int64_t status = rules_observe(&state->run, &state->model, &fault);
+    if (!state->run.outputs_current && !state->run.has_failed) {
+        int64_t status = call_sequence_update_outputs(&state->run, &state->model, &fault);
         if (status == DIVERGED) fault = true;
         else if (status != OK) silence(&state->model);
     }
-    if (reported && state->run.observed && !fault) rules_report(&state->model, ahead, &fault);
-    if (shown && state->run.observed && !fault) exchange_show(&state->model, &fault);
+    if (reported && state->run.outputs_current && !fault) call_sequence_update_statistics(&state->model, ahead, &fault);
+    if (shown && state->run.outputs_current && !fault) model_exchange_update_variables(&state->model, &fault);
     if (!fault) return DONE;
     if (exchanges(state)) { /* a state that the importer's solver only tries may be anything */
         silence(&state->model);
@@ -211,16 +211,16 @@ static bool write_one(Instance *it, uint32_t reference, double value)
     bool allowed = accepts(variable, value), fault = false;
     bool stays = variable->order == NO_SLOPE || *order_of(state, variable) == 0;
     if (stays && value == value_of(&state->model, variable) && refusal->reason == OK) return true;
-    state->run.observed = false;
-    state->run.refused -= refusal->reason != OK;
-    refusal->reason = rules_reason(&state->run, variable->is_calculated, variable->is_fixed, allowed, &fault);
+    state->run.outputs_current = false;
+    state->run.n_invalid_values -= refusal->reason != OK;
+    refusal->reason = call_sequence_rejection_reason(&state->run, variable->is_calculated, variable->is_fixed, allowed, &fault);
     if (refusal->reason != OK) {
-        state->run.refused++;
+        state->run.n_invalid_values++;
         refusal->value = value;
         refusal->turn = ++state->turns;
         return true;
     }
-    rules_change(&state->run, &state->model, &fault);
+    call_sequence_note_change(&state->run, &state->model, &fault);
     if (fault) {
         give_up(it, DIVERGED, NAN, NAN);
         return false;
@@ -264,7 +264,7 @@ static void fresh(Instance *it)
 {
     bool fault = false;
     memcpy(&it->state, &initial, sizeof initial);
-    if (it->possible & 1 << CONTINUOUS) exchange_take_over(&it->state.run, &fault);
+    if (it->possible & 1 << CONTINUOUS) model_exchange_enable(&it->state.run, &fault);
 }
 
 /* None: such an instance cannot be. */
@@ -311,8 +311,8 @@ static Status begin(Instance *it, bool handles)
 {
     State *state = &it->state;
     bool fault = false;
-    int64_t status = rules_begin(&state->run, &state->model, &fault);
-    if (status == OK && !fault && exchanges(state)) exchange_begin(&state->model, &fault);
+    int64_t status = call_sequence_exit_initialization(&state->run, &state->model, &fault);
+    if (status == OK && !fault && exchanges(state)) model_exchange_begin(&state->model, &fault);
     if (handles) state->run.phase = EVENT;
     return judged_by(it, status, fault, NAN, NAN);
 }
@@ -320,7 +320,7 @@ static Status begin(Instance *it, bool handles)
 static Status step_by(Instance *it, double t, double h)
 {
     bool fault = false;
-    int64_t status = rules_step(&it->state.run, &it->state.model, t, h, &fault);
+    int64_t status = call_sequence_do_step(&it->state.run, &it->state.model, t, h, &fault);
     return judged_by(it, status, fault, t, h);
 }
 
@@ -331,7 +331,7 @@ static Status handle(Instance *it)
 {
     State *state = &it->state;
     bool fault = false;
-    int64_t status = exchange_handle(&state->run, &state->model, &fault);
+    int64_t status = model_exchange_handle_event(&state->run, &state->model, &fault);
     return judged_by(it, status, fault, NAN, NAN);
 }
 
@@ -347,13 +347,13 @@ static Status check_slopes(const Instance *it, const uint32_t unknowns[], size_t
                            const double *seed, const double *sensitivity, const char *function)
 {
     if ((n && !unknowns) || (m && !knowns) || !seed || !sensitivity) {
-        return refuse(it, NO_ADDRESS, function, "one of unknowns, knowns, seed and sensitivity");
+        return refuse(it, NULL_POINTER, function, "one of unknowns, knowns, seed and sensitivity");
     }
     for (size_t i = 0; i < n + m; i++) {
         uint32_t reference = i < n ? unknowns[i] : knowns[i - n];
         const Variable *variable = reference < VARIABLES ? &variables[reference] : NULL;
         if (!variable || variable->slope == NO_SLOPE || !(i < n ? variable->is_calculated : variable->moves)) {
-            return refuse_call(it, NO_DERIVATIVE, &(Call){.function = function, .reference = reference});
+            return refuse_call(it, NO_PARTIAL_DERIVATIVE, &(Call){.function = function, .reference = reference});
         }
     }
     return DONE;
@@ -364,7 +364,7 @@ static Status follow(Instance *it, struct Tangent *to)
 {
     State *state = &it->state;
     bool fault = false;
-    int64_t status = exchange_ready(&state->run, &state->model, &fault);
+    int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);
     if (status != OK && state->run.phase >= RUNNING) return give_up(it, status, NAN, NAN);
     if (status == OK && !fault) along(&state->model, to, &fault);
     return status == OK && !fault ? DONE : DISCARDED;
@@ -377,16 +377,16 @@ static Status read_rates(Instance *it, const uint32_t vr[], size_t n, const int3
     State *state = &it->state;
     struct Tangent to = {0};
     bool fault = false;
-    if (n && (!vr || !order || !value)) return refuse(it, NO_ADDRESS, function, "vr, order or value");
+    if (n && (!vr || !order || !value)) return refuse(it, NULL_POINTER, function, "vr, order or value");
     for (size_t i = 0; i < n; i++) {
         bool has_one = vr[i] < VARIABLES && variables[vr[i]].slope != NO_SLOPE && variables[vr[i]].is_calculated;
         if (has_one && order[i] == 1) continue;
-        return refuse_call(it, NO_RATE, &(Call){.function = function, .reference = vr[i]});
+        return refuse_call(it, NO_OUTPUT_DERIVATIVE, &(Call){.function = function, .reference = vr[i]});
     }
-    int64_t status = exchange_ready(&state->run, &state->model, &fault);
-    if (status == OK && !fault) exchange_rates(&state->model, &fault);
-    if (status == OK && !fault) exchange_input_rates(&state->model, &fault);
-    const double *rate = state->model.exchange.rates;
+    int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);
+    if (status == OK && !fault) model_exchange_update_rates(&state->model, &fault);
+    if (status == OK && !fault) model_exchange_update_input_rates(&state->model, &fault);
+    const double *rate = state->model.model_exchange.rates;
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
         if (!variable->moves) continue;
         double *seed = slope_of(&to, (uint32_t)(variable - variables));
@@ -411,7 +411,7 @@ static Status directional(Instance *it, const uint32_t unknowns[], size_t n, con
 
 /* ---- state */
 
-static Status refuse_state(const Instance *it) { return refuse(it, FOREIGN_STATE, "", ""); }
+static Status refuse_state(const Instance *it) { return refuse(it, INVALID_STATE, "", ""); }
 
 /* The state under a seal; NULL if it is broken, or that of an instance for something else. */
 static const State *own_state(const Instance *it, Sealed *sealed)

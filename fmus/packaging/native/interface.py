@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from string import Formatter
 
 from ...runtime import codes
-from ...runtime.codes import INTERRUPTED, RULES
-from ...runtime.declare import Declared, Declaring, variables
-from ...runtime.failure import ANSWERS
-from ...runtime.sentences import CALLS, PHASES, RUN, VALUES
-from ...runtime.values import SETTABLE
+from ...runtime.codes import FIRST_RULE, INTERRUPTED
+from ...runtime.failure_handling import CALCULATED_CAUSALITIES
+from ...runtime.messages import CALL_MESSAGES, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
+from ...runtime.variable_access import SETTABLE_CAUSALITIES
+from ...runtime.variable_declarations import VariableDeclaration, VariableOwner, variables
 from ..further import all_variables, exchanged, indicators_of, place, rates_of
 from ..words import quoted
 from ..written import beside
@@ -49,7 +49,7 @@ static const Variable variables[VARIABLES] = {{
 /* What of an instance makes its run. */
 typedef struct {{
     Model model;
-    struct Run run;
+    struct RunState run;
     int64_t turns; /* how many values were refused so far */
     Refusal refused[VARIABLES];
 }} State;
@@ -65,7 +65,7 @@ static const Member members[MEMBERS] = {{
 {members}}};
 
 /* Why the run cannot go on, in a communication step of h from t. */
-static void tell_status(Text *text, int64_t status, const struct Run *run, const Model *model, double t, double h)
+static void tell_status(Text *text, int64_t status, const struct RunState *run, const Model *model, double t, double h)
 {{
     switch (status) {{
 {statuses}    }}
@@ -101,13 +101,13 @@ PLACES = {  # field of a sentence -> what adds it to the text
     "reference": "add_integer(text, call->reference)",
 }
 ELSEWHERE = (INTERRUPTED,)  # statuses of other kinds
-COURSE = ("rate", "course.order", "course.derivatives")  # of an input that has derivatives
+DERIVATIVE_ATTRIBUTES = ("rate", "polynomial.order", "polynomial.derivatives")  # of an input that has derivatives
 
 
-def header(model: type[Declaring], fmi: str) -> str:
+def header(model: type[VariableOwner], fmi: str) -> str:
     """The text of model.h, for a version of FMI."""
     thing = exchanged(model)
-    run = beside(model, "runtime.rules").Run(thing.tolerance)
+    run = beside(model, "runtime.call_sequence").RunState(thing.tolerance)
     declared = all_variables(thing)
     to, along = tangent(model, thing, declared)
     program = Program(thing, run, to)
@@ -119,8 +119,8 @@ def header(model: type[Declaring], fmi: str) -> str:
     numbers = [("run", type(run)), ("model", type(thing))]
     members = [(path, kind) for prefix, cls in numbers for path, kind in layout.scalars(cls, f"{prefix}.")]
     members = [(path, kind) for path, kind in members if kind in (INT, BOOL)]
-    statuses = {status: sentence for status, sentence in RUN.items() if status not in ELSEWHERE}
-    broken = dict(enumerate(thing.rules, RULES + 1))
+    statuses = {status: sentence for status, sentence in RUN_MESSAGES.items() if status not in ELSEWHERE}
+    broken = dict(enumerate(thing.rules, FIRST_RULE + 1))
     own = {
         name: f"{'add_real' if kind is FLOAT else 'add_integer'}(text, model->{name})"
         for name, kind in layout.fields[type(thing)].items()
@@ -145,14 +145,14 @@ def header(model: type[Declaring], fmi: str) -> str:
             _line(name, meaning, slots(declared), hasattr(thing, f"{name}_rate")) for name, meaning in declared
         ),
         statuses=_cases(statuses, PLACES) + _cases(broken, own),
-        values=_cases(VALUES, PLACES),
-        calls=_cases(CALLS, PLACES),
-        phases=", ".join(quoted(PHASES[phase]) for phase in range(len(PHASES))),
-        count_of_phases=len(PHASES),
+        values=_cases(VALUE_MESSAGES, PLACES),
+        calls=_cases(CALL_MESSAGES, PLACES),
+        phases=", ".join(quoted(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
+        count_of_phases=len(PHASE_NAMES),
     )
 
 
-def _items(name: str, meaning: Declared) -> str:
+def _items(name: str, meaning: VariableDeclaration) -> str:
     values = ", ".join(str(value) for _, value, _ in meaning.items)
     return f"static const int64_t {_of(name)}[] = {{{values}}};\n"
 
@@ -161,14 +161,14 @@ def _of(name: str) -> str:
     return f"items_of_{name.replace('.', '_')}"
 
 
-def _line(name: str, meaning: Declared, slots: dict[str, str], ramps: bool) -> str:
+def _line(name: str, meaning: VariableDeclaration, slots: dict[str, str], ramps: bool) -> str:
     """One variable in the table."""
-    words = (name, meaning.text, meaning.suffix, meaning.allowed)
+    words = (name, meaning.text, meaning.unit_suffix, meaning.allowed)
     flags = (
         meaning.type == "Real",
-        meaning.causality not in SETTABLE,
+        meaning.causality not in SETTABLE_CAUSALITIES,
         meaning.variability == "fixed",
-        meaning.causality in ANSWERS,
+        meaning.causality in CALCULATED_CAUSALITIES,
         "." in name,
         meaning.role == "state" or meaning.causality == "input",
     )
@@ -179,7 +179,7 @@ def _line(name: str, meaning: Declared, slots: dict[str, str], ramps: bool) -> s
         f"offsetof(Model, {place(name)})",
         f"offsetof(struct Tangent, {slots[name]})" if name in slots else "NO_SLOPE",
         *map(literal, flags),
-        ", ".join(f"offsetof(Model, {name}_{part})" if ramps else "NO_SLOPE" for part in COURSE),
+        ", ".join(f"offsetof(Model, {name}_{part})" if ramps else "NO_SLOPE" for part in DERIVATIVE_ATTRIBUTES),
         *(literal(float(bound)) for bound in bounds),
         items,
     ]

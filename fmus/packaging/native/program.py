@@ -55,7 +55,7 @@ class Program:
         return Compiled(name, body.result, body.pure, body.faults)
 
     def _name(self, function: FunctionType) -> str:
-        """March_take; automaton_sign for a function of a module."""
+        """InternalStep_compute_next; stick_slip_sign for a function of a module."""
         base = function.__qualname__.replace(".", "_")
         if base == function.__name__:
             base = f"{function.__module__.rsplit('.', 1)[-1]}_{base}"

@@ -3,7 +3,7 @@
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from ...runtime.declare import Declaring
+from ...runtime.variable_declarations import VariableOwner
 from ..document import document
 from ..modules import installed
 from .interface import header
@@ -16,7 +16,7 @@ FMI_HEADERS = {  # 2-clause BSD, as they say
 }
 
 
-def sources(model: type[Declaring], fmi: str) -> dict[str, str]:
+def sources(model: type[VariableOwner], fmi: str) -> dict[str, str]:
     """Name and text of every file but guid.h, which follows from these."""
     here = Path(__file__).parent
     written = {name: (here / name).read_text(encoding="utf-8") for name in (COMPILED[fmi], *WRITTEN)}

@@ -40,7 +40,7 @@ static bool accepts(const Variable *variable, double value)
         return false;
     }
     bool fault = false;
-    return rules_within(value, variable->low, variable->high, variable->above, variable->below, &fault);
+    return call_sequence_is_in_range(value, variable->low, variable->high, variable->above, variable->below, &fault);
 }
 
 /* ---- the seal */
@@ -113,14 +113,14 @@ static bool are_refusals_sound(const State *state)
         if (!variables[i].is_real && !(fabs(refusal->value) <= 2147483648.0)) return false; /* an fmi2Integer */
         refusals++;
     }
-    return refusals == state->run.refused;
+    return refusals == state->run.n_invalid_values;
 }
 
 static bool is_sound(State *state)
 {
     bool fault = false;
-    return are_members_sound(state) && !state->run.observed && are_values_sound(&state->model) && are_refusals_sound(state) &&
-           rules_is_sound(&state->run, &state->model, state->run.interface == MODEL_EXCHANGE, &fault) && !fault;
+    return are_members_sound(state) && !state->run.outputs_current && are_values_sound(&state->model) && are_refusals_sound(state) &&
+           call_sequence_is_valid_state(&state->run, &state->model, state->run.interface == MODEL_EXCHANGE, &fault) && !fault;
 }
 
 /* The state under the seal; NULL if it is broken in any way. */

@@ -1,7 +1,8 @@
-"""The derivative of a model along a direction: its `observe`, differentiated statement by statement (forward mode).
+"""The derivative of a model along a direction: compute_outputs,
+differentiated statement by statement (forward mode).
 
 Every calculated number z gets a second one, _d_z, which is its change if states, driver and inputs change as told.  The
-branches are those that `observe` takes; where friction sticks, its force is the load, and so are their changes.
+branches are those that `compute_outputs` takes; where friction sticks, its force is the load, and so are their changes.
 
 A. Griewank, A. Walther, Evaluating Derivatives, chapter 3.
 """
@@ -13,7 +14,7 @@ from math import fabs
 from types import FunctionType
 from typing import Any
 
-from ...runtime.declare import Declaring
+from ...runtime.variable_declarations import VariableOwner
 from ..equations.expressions import FUNCTIONS, Expression, Term
 from ..equations.scribe import Scribe
 from ..further import Variables
@@ -39,13 +40,13 @@ def is_smooth(meaning: Any) -> bool:
     return meaning.type == "Real" and meaning.causality in ("input", "output")
 
 
-def tangent(model: type[Declaring], thing: Any, declared: Variables) -> tuple[Tangent, FunctionType]:
+def tangent(model: type[VariableOwner], thing: Any, declared: Variables) -> tuple[Tangent, FunctionType]:
     """An empty direction, and the function that follows it: along(self, _to), where self is `thing`, a model that an
     importer's solver may lead."""
     to = Tangent()
     for slot in slots(declared).values():
         setattr(to, slot, 0.0)
-    observe: Any = model.__dict__["observe"]
+    observe: Any = model.__dict__["compute_outputs"]
     tree = definition(observe)
     writer = Writer(thing, declared)
     known = {"t": "t"} | {name: number_of(thing, name) for name in (*thing.states, *thing.contacts)}
@@ -68,19 +69,19 @@ def head(body: list[ast.stmt]) -> ast.FunctionDef:
 
 
 class Writer:
-    """The statements of `observe`, each after that of its change."""
+    """The statements of `compute_outputs`, each after that of its change."""
 
     def __init__(self, thing: Any, declared: Variables) -> None:
         inputs = [name for name, meaning in declared if meaning.causality == "input"]
         drivers = [name for name, meaning in declared if meaning.rate]
-        self.seeds = {attribute: name for name in inputs for attribute in (name, f"{name}_course")}
+        self.seeds = {attribute: name for name in inputs for attribute in (name, f"{name}_polynomial")}
         self.seeds |= dict(zip(["x_base"] * len(drivers), drivers, strict=True))
         self.outputs = {name for name, meaning in declared if is_smooth(meaning)}
         self.floats = set(thing.states)  # local names that have a change
         self.counts = set(thing.contacts)  # and those that have none
 
     def block(self, statements: list[ast.stmt]) -> list[ast.stmt]:
-        """They share with those of `observe` what stays."""
+        """They share with those of `compute_outputs` what stays."""
         found: list[ast.stmt] = []
         for node in statements:
             match node:

@@ -5,7 +5,7 @@ from inspect import cleandoc
 from math import isfinite
 from typing import Any
 
-from ...runtime.declare import Declared, Declaring
+from ...runtime.variable_declarations import VariableDeclaration, VariableOwner
 from ..description import declared_by
 from ..equations.algebra import depends, derivative, leaves, same
 from ..equations.anatomy import Anatomy
@@ -19,7 +19,7 @@ FORCES = ("N", "N.m")
 Portrait = dict[str, Any]  # as it stands in the page, in JSON
 
 
-def portrait(source: Authored, model: type[Declaring]) -> Portrait:
+def portrait(source: Authored, model: type[VariableOwner]) -> Portrait:
     """The model of an author's file, as it is written out: words, default run, variables and bodies."""
     title, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
     return {
@@ -33,7 +33,7 @@ def portrait(source: Authored, model: type[Declaring]) -> Portrait:
     }
 
 
-def variable(name: str, meaning: Declared) -> Portrait:
+def variable(name: str, meaning: VariableDeclaration) -> Portrait:
     """A declared variable; its value in the unit `shown` is `factor` times that in SI."""
     unit = unit_of(name, meaning.unit or "1")
     shown = {

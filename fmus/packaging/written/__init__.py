@@ -10,7 +10,7 @@
     needed.py          what nobody needs is left out
     live.py            the model in this process, as it will travel
 
-A vector is declared by its annotation, `e: States`, at a parameter, at a result or in the body of a class; what is
+A vector is declared by its annotation, `e: StateVector`, at a parameter, at a result or in the body of a class; what is
 calculated from vectors is one; y, f and modes, with a number or without, are vectors as attributes.  Their numbers are
 
     y, y2, step.y0           the states' own: x, v;  x2, v2;  step.x0, step.v0
@@ -18,8 +18,9 @@ calculated from vectors is one; y, f and modes, with a number or without, are ve
     modes, step.modes0       the contacts' own: mode;  step.mode0
     e, k3, self.c2           any other: e_x, e_v;  k3_x, k3_v;  self.c2_x, self.c2_v
 
-A loop over contacts, places or speeds is unrolled; a function with a parameter `i: Contact` is written once for each
-contact.  A loop over the methods is unrolled for those that are offered; one that tests each of them becomes a chain.
+A loop over contact_indices, state_indices or velocity_indices is unrolled; a function with a parameter
+`i: ContactIndex` is written once for each contact.  A loop over the methods is unrolled for those that
+are offered; one that tests each of them becomes a chain.
 The guard of all this is that arrays, scalars and C give the same bits (tests/written/test_written.py).
 """
 

@@ -7,7 +7,7 @@ from typing import Any, TypeGuard
 from ..trees import nodes, tree, walked
 from .spec import CONTACTS, STATES, STEM, Spec
 
-KINDS = {"States": STATES, "Rates": STATES, "Contacts": CONTACTS}
+KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CONTACTS}
 
 
 class Declarations:
@@ -21,17 +21,17 @@ class Declarations:
         self.words: set[str] = set()  # what files call their own: constants, functions, classes
         self.classes: list[set[str]] = []  # the attributes of each class
         self.results: dict[str, list[str | None]] = {
-            "initial": [STATES],
+            "initial_state": [STATES],
             "rates": [STATES],
-            "speeds_of": [STATES],
-            "struck": [STATES],
-            "slips": [CONTACTS],
-            "slip_terms": [CONTACTS],
-            "forces": [CONTACTS] * 3,
-            "changes": [CONTACTS] * 4,
-            "solved": [STATES],
-            "per_state": [STATES],
-            "per_contact": [CONTACTS],
+            "kinematic_rates": [STATES],
+            "apply_impulses": [STATES],
+            "slip_velocities": [CONTACTS],
+            "slip_magnitudes": [CONTACTS],
+            "contact_forces": [CONTACTS] * 3,
+            "contact_rates": [CONTACTS] * 4,
+            "solve_factored": [STATES],
+            "state_vector": [STATES],
+            "contact_vector": [CONTACTS],
         }
         for text in texts:
             self.read_file(tree(text))
@@ -51,7 +51,7 @@ class Declarations:
             case ast.FunctionDef(name=name):
                 if kinds := returned(node):
                     self.results[name] = kinds
-                if any(isinstance(one, ast.Name) and one.id == "each" for one in node.decorator_list):
+                if any(isinstance(one, ast.Name) and one.id == "elementwise" for one in node.decorator_list):
                     self.each.add(name)
 
     def clash(self, spec: Spec) -> str:

@@ -12,8 +12,8 @@ from textwrap import dedent
 from types import FunctionType, ModuleType
 from typing import Any
 
-from ...runtime import declare
-from ...runtime.declare import Declaring
+from ...runtime import variable_declarations
+from ...runtime.variable_declarations import VariableOwner
 from ..catalogue import FMUS, find
 from ..equations.authored import Authored
 from ..modules import digest
@@ -35,20 +35,22 @@ def files_of(source: str | Path | Authored, offered: Offer | None = None) -> dic
     return {path: "\n".join(lines) for path, lines in written_out(*asked(source, offered)).items()}
 
 
-def written(source: str | Path | Authored, offered: Offer | None = None) -> type[Declaring]:
+def written(source: str | Path | Authored, offered: Offer | None = None) -> type[VariableOwner]:
     """The class of a model as it will travel, with what the runtime is for it; the same each time."""
     return brought_in(*asked(source, offered))
 
 
 @cache
-def brought_in(source: Authored, offered: Offer) -> type[Declaring]:
+def brought_in(source: Authored, offered: Offer) -> type[VariableOwner]:
     """The model class out of a package of its files, imported under a name of its own."""
     files, name, model = written_out(source, offered), source.name, source.model
     package = f"written_{name}_{digest(files_of(source, offered))[:12]}"
     for parent in package, f"{package}.runtime":
         sys.modules[parent] = ModuleType(parent)
         sys.modules[parent].__path__ = []
-    sys.modules[f"{package}.runtime.declare"] = declare  # what is declared is what it is to everybody else
+    sys.modules[f"{package}.runtime.variable_declarations"] = (
+        variable_declarations  # what is declared is what it is to everybody else
+    )
     sys.meta_path.insert(0, Finder(package, files, {f"{name}.py": sys.modules[model.__module__].__file__ or "?"}))
     found = vars(import_module(f"{package}.{name}"))[model.__name__]
     found.anatomy = source.anatomy  # for whoever describes it
@@ -80,8 +82,8 @@ class Finder(MetaPathFinder, Loader):
         exec(compile(tree, module.__file__, "exec"), vars(module))
 
 
-def beside(model: type[Declaring], path: str) -> Any:
-    """A module of the package of a written-out model, as `runtime.rules`."""
+def beside(model: type[VariableOwner], path: str) -> Any:
+    """A module of the package of a written-out model, as `runtime.call_sequence`."""
     return import_module(f"{model.__module__.split('.', 1)[0]}.{path}")
 
 

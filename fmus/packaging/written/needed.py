@@ -15,8 +15,8 @@ from .text import Line
 
 DOTTED = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
 HOSTS = (
-    *("boundary", "declare", "exchange", "failure", "hosted", "leaps"),
-    *("rules", "sentences", "slave", "state", "values"),
+    *("call_sequence", "early_return", "failure_handling", "fmu_instance", "messages", "model_exchange"),
+    *("pythonfmu_workarounds", "saved_state", "slave", "variable_access", "variable_declarations"),
 )
 CALLED_BY_NAME = {f"runtime/{name}.py" for name in HOSTS}  # by a layer of FMI
 Files = dict[str, list[Line]]

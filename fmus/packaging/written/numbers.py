@@ -11,12 +11,12 @@ from .elimination import factored, solved
 from .settled import Settled
 from .spec import STATES, STEM, Spec
 
-EACH = {"magnitude": "{0} if {0} > 0.0 else -{0}", "greater": "{0} if {0} > {1} else {1}"}  # number by number
-CHOSEN = {"largest": ">", "first": "<"}  # one of the numbers
-BLANK = ("per_state", "per_contact")
-RANGES = ("places", "speeds", "contacts")  # what a loop may run over
+EACH = {"magnitude": "{0} if {0} > 0.0 else -{0}", "elementwise_max": "{0} if {0} > {1} else {1}"}  # number by number
+CHOSEN = {"max_of": ">", "min_of": "<"}  # one of the numbers
+BLANK = ("state_vector", "contact_vector")
+RANGES = ("state_indices", "velocity_indices", "contact_indices")  # what a loop may run over
 METHODS = "methods"  # or (label, file, class) of every one
-LOOKED_UP = ("slip", "place")
+LOOKED_UP = {"slip_index": "slip", "position_index": "place"}
 
 
 class Refused(BuildError):
@@ -60,7 +60,7 @@ class Numbers(Settled):
             case ast.BinOp(left=left, right=right) | ast.Compare(left=left, comparators=[right]):
                 found = {self.kind(left), self.kind(right)} - {None}
                 if len(found) > 1:
-                    raise self.refused(node, "has a vector of states and one of contacts; loop over contacts")
+                    raise self.refused(node, "has a vector of states and one of contacts; loop over contact_indices")
                 return found.pop() if found else None
             case ast.UnaryOp(op=ast.USub(), operand=one):
                 return self.kind(one)
@@ -68,7 +68,7 @@ class Numbers(Settled):
 
     def by_number(self, node: ast.AST) -> bool:
         """Whether a call works on vectors number by number."""
-        names = {*EACH, *self.declared.each, "kinematic"}
+        names = {*EACH, *self.declared.each, "select_kinematic"}
         return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names
 
     def returned(self, call: ast.Call) -> list[str | None]:
@@ -114,7 +114,7 @@ class Numbers(Settled):
                 return ast.UnaryOp(op, self.part(one, place))
             case ast.Compare(left=left, ops=ops, comparators=[right]):
                 return ast.Compare(self.part(left, place), ops, [self.part(right, place)])
-            case ast.Call(func=ast.Name(id="kinematic"), args=[moved, other]):
+            case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
                 return self.part(other if place in self.spec.own else moved, place)
             case ast.Call(func=ast.Name(id=name), args=args) if name in EACH:
                 if not all(isinstance(one, (ast.Name, ast.Attribute)) for one in args):
@@ -160,7 +160,7 @@ class Numbers(Settled):
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         match node:
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Name(id=i)) if name in LOOKED_UP:
-                return ast.Constant(getattr(self.spec, name)(self.index[i]))
+                return ast.Constant(getattr(self.spec, LOOKED_UP[name])(self.index[i]))
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Tuple(elts=[row, column])) if name in self.slopes:
                 return ast.Name(self.spec.slope(self.known(row), self.known(column)), ast.Load())
         return self.part(node.value, self.known(node.slice)) if self.kind(node.value) else self.generic_visit(node)
@@ -168,7 +168,7 @@ class Numbers(Settled):
     def known(self, index: ast.expr) -> int:
         found = self.visit(index)
         if not (isinstance(found, ast.Constant) and isinstance(found.value, int)):
-            raise self.refused(index, "is an index that is not known; loop over contacts or places")
+            raise self.refused(index, "is an index that is not known; loop over contact_indices or state_indices")
         return found.value
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
@@ -201,12 +201,12 @@ class Numbers(Settled):
                     return ast.Tuple([self.at_method(item, each.target, label) for label in self.spec.methods])
             case ast.Call(func=ast.Name(id="len"), args=[one]) if kind := self.kind(one):
                 return ast.Constant(len(self.spec.parts(kind)))
-            case ast.Call(func=ast.Name(id="total"), args=args):
+            case ast.Call(func=ast.Name(id="sum_of"), args=args):
                 terms = [ast.unparse(term) for one in args for term in self.all_terms(one)]
                 return expression(" + ".join(f"({term})" for term in terms))
-            case ast.Call(func=ast.Name(id="every" | "some" as name), args=[one]):
+            case ast.Call(func=ast.Name(id="all_of" | "any_of" as name), args=[one]):
                 tests = self.all_terms(one)
-                return Settled.visit_BoolOp(self, ast.BoolOp(ast.And() if name == "every" else ast.Or(), tests))
+                return Settled.visit_BoolOp(self, ast.BoolOp(ast.And() if name == "all_of" else ast.Or(), tests))
             case ast.Call(func=ast.Name(id=name), args=[ast.Name() as one]) if name in CHOSEN:
                 *terms, text = [ast.unparse(term) for term in self.all_terms(one)] or ["inf"]
                 behind = [text]
@@ -248,10 +248,12 @@ class Numbers(Settled):
                 value=ast.Call(func=ast.Attribute(attr="jacobian")) as call,
             ):
                 return self.jacobian(f_t, J, call)
-            case ast.Assign(targets=[ast.Name(id=s)], value=ast.Call(func=ast.Name(id="factored"), args=[g, h, _])):
+            case ast.Assign(targets=[ast.Name(id=s)], value=ast.Call(func=ast.Name(id="factorize"), args=[g, h, _])):
                 self.systems[s] = ast.unparse(g), ast.unparse(h)
                 return ast.parse("\n".join(factored(s, *self.systems[s], self.spec))).body
-            case ast.Assign(targets=[ast.Name(id=k) as to], value=ast.Call(func=ast.Name(id="solved"), args=[s, r])):
+            case ast.Assign(
+                targets=[ast.Name(id=k) as to], value=ast.Call(func=ast.Name(id="solve_factored"), args=[s, r])
+            ):
                 self.learn([to], [STATES])
                 system, right = ast.unparse(s), ast.unparse(r)
                 return ast.parse("\n".join(solved(k, system, right, *self.systems[system], self.spec))).body

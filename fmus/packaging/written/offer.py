@@ -6,13 +6,13 @@ What is not offered is settled like what a model fixes, so that its branches, it
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...runtime.automaton import HYBRID_LAW, SIGN_LAW, THRESHOLD_LAW
-from ...runtime.found import methods
-from ...runtime.methods import EXACT_ITEM, ITEMS
+from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
+from ...runtime.method_registry import methods
+from ...runtime.stick_slip import HYBRID_LAW, SIGN_LAW, THRESHOLD_LAW
 from .. import BuildError
 from ..equations.authored import Authored
 
-METHODS: dict[str, int] = {label: value for label, value, _ in (EXACT_ITEM, *ITEMS)}
+METHODS: dict[str, int] = {label: value for label, value, _ in (EXACT_ITEM, *METHOD_ITEMS)}
 LAWS: dict[str, int] = {label: value for label, value, _ in (HYBRID_LAW, SIGN_LAW, THRESHOLD_LAW)}
 EXACT, HYBRID = EXACT_ITEM[0], HYBRID_LAW[0]
 
@@ -29,7 +29,7 @@ class Offer:
         """Every attribute that tells a choice, with the values that it can have."""
         methods = tuple(METHODS[label] for label in self.methods)
         laws = tuple(LAWS[label] for label in self.laws)
-        return {"method": methods, "chosen": methods} | ({"friction": laws} if laws else {})
+        return {"method": methods, "method_number": methods} | ({"friction": laws} if laws else {})
 
     @property
     def gone(self) -> frozenset[str]:

@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ...runtime.declare import variables
+from ...runtime.variable_declarations import variables
 from .. import BuildError, __version__
 from ..equations.authored import Authored
 from .declarations import Declarations
@@ -14,7 +14,7 @@ from .spec import Spec
 from .text import Line, Writer
 
 FMUS = Path(__file__).resolve().parents[2]
-AT_HOME = ("vectors.py", "found.py")  # never travel
+AT_HOME = ("vectors.py", "method_registry.py")  # never travel
 PLAIN, APART = "{}", "its_{}_"  # what the numerics call a state: so where its name means something else to them
 Files = dict[str, list[Line]]
 
@@ -34,8 +34,11 @@ def declarations() -> Declarations:
 
 def spec_of(model: Any, offered: Offer, called: str) -> Spec:
     """What a model and an offer fix; `called`: as its states, rates and modes are."""
-    flags = {flag: getattr(model, flag) for flag in ("dry", "waits", "coupled", "driven", "ramps")}
-    flags["linear"] = EXACT in offered.methods
+    flags = {
+        flag: getattr(model, flag)
+        for flag in ("has_dry_friction", "rests_when_stuck", "is_coupled", "has_driver", "has_input_derivatives")
+    }
+    flags["is_linear"] = EXACT in offered.methods
     states, contacts = (
         {called.format(name): other and called.format(other) for name, other in pairs.items()}
         for pairs in (model.states, model.contacts)
@@ -58,7 +61,9 @@ def written_out(source: Authored, offered: Offer) -> Files:
 def expanded(source: Authored, spec: Spec) -> Files:
     """The lines with the names of `spec`."""
     file = f"{source.name}.py"
-    left = {f"runtime/{label}.py" for label in spec.gone}  # methods that are not offered
+    left = {
+        f"runtime/{'linear_closed_form' if label == EXACT else label}.py" for label in spec.gone
+    }  # methods that are not offered
     texts = {path: text for path, text in runtime().items() if path not in left} | {file: source.text}
     declared = declarations()
     if name := declared.clash(spec):

@@ -105,7 +105,7 @@ class Writer:
 
     def unrolled(self, node: ast.For, name: str, over: str, depth: int) -> None:
         """A loop over states or contacts, once for each."""
-        many = {"contacts": range(len(self.spec.contacts)), "places": range(len(self.spec.states))}
+        many = {"contact_indices": range(len(self.spec.contacts)), "state_indices": range(len(self.spec.states))}
         for i in many.get(over, self.spec.speeds):
             self.numbers.index[name] = i
             self.after = self.first(node.body[0])
@@ -138,7 +138,7 @@ class Writer:
     def simple(self, node: ast.stmt, depth: int) -> None:
         new: list[ast.stmt]
         match node:
-            case ast.ImportFrom(module="found"):
+            case ast.ImportFrom(module="method_registry"):
                 names = [ast.alias(name) for name in sorted(self.spec.methods)]
                 new = [ast.ImportFrom(None, names, 1)] if names else []
             case ast.ImportFrom() if stays_at_home(node):
@@ -183,7 +183,7 @@ class Writer:
             elif one.arg not in counted:
                 arguments.append(one.arg)
         body = self.first(node.body[0])
-        if any(isinstance(one, ast.Name) and one.id == "each" for one in node.decorator_list):
+        if any(isinstance(one, ast.Name) and one.id == "elementwise" for one in node.decorator_list):
             self.after = node.lineno - 1
         if arguments == [one.arg for one in node.args.args] and not (
             returned(node) or any(map(annotated, node.args.args))
@@ -257,11 +257,11 @@ class Writer:
 
 def stays_at_home(node: ast.ImportFrom) -> bool:
     """Whether this imports what does not travel: the vectors, and the methods that are found."""
-    return (node.module or "").rsplit(".", 1)[-1] in ("vectors", "found")
+    return (node.module or "").rsplit(".", 1)[-1] in ("vectors", "method_registry")
 
 
 def is_contact(argument: ast.arg) -> bool:
-    return isinstance(argument.annotation, ast.Name) and argument.annotation.id == "Contact"
+    return isinstance(argument.annotation, ast.Name) and argument.annotation.id == "ContactIndex"
 
 
 def bare(node: ast.stmt, text: str) -> str:

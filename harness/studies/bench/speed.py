@@ -112,15 +112,15 @@ def communication_step(model: str) -> Measure:
 def many_runs(carried: type) -> Measure:
     """10 000 runs of the sled with as many speeds of the driver: final state and number of events."""
     model = carried()
-    march = model.solver
+    solver = model.solver
 
     def one(v_driver: float) -> tuple[float, float, int]:
         model.v_driver = v_driver
         model.prepare()
-        march.start(model, 0.0, *model.initial(0.0), model.stop_time, model.tolerance)
-        march.advance(model, model.stop_time)
-        march.report(model.events)
-        return march.x, march.v, model.events.count
+        solver.start(model, 0.0, *model.initial_state(0.0), model.stop_time, model.tolerance)
+        solver.advance(model, model.stop_time)
+        solver.report(model.events)
+        return solver.x, solver.v, model.events.count
 
     seconds = timed(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
     problem = Stickslip()

@@ -10,28 +10,33 @@ from __future__ import annotations
 from typing import Any
 from weakref import WeakSet
 
-from . import rules
-from .boundary import guarded
+from . import call_sequence
 from .codes import OK
-from .declare import Declaring, variables
-from .state import Saved, shape
+from .pythonfmu_workarounds import signal_safe
+from .saved_state import SavedStateAccess, attribute_tree
+from .variable_declarations import VariableOwner, variables
 
 
-def hosting(slave: type[Hosted], model: type[Declaring]) -> Any:
+def make_fmu_class(slave: type[FmuInstance], model: type[VariableOwner]) -> Any:
     """The class of slaves of a model class, under its name.
 
     A spare instance says what there is: CPython 3.11 reads the attributes of an object whose __dict__ has been
     looked at twice as slowly, so nobody looks at that of an instance which runs.
     """
     spare = model()
-    about = {"Model": model, "variables": variables(spare), "shape": shape(spare), "__module__": __name__}
-    about["living"] = WeakSet()
+    about = {
+        "Model": model,
+        "variables": variables(spare),
+        "attribute_tree": attribute_tree(spare),
+        "__module__": __name__,
+    }
+    about["instances"] = WeakSet()
     made: Any = type(model.__name__, (slave,), about)
-    made.bare = made  # an entry script may derive from it
+    made.plain_class = made  # an entry script may derive from it
     return made
 
 
-class Hosted(Saved):
+class FmuInstance(SavedStateAccess):
     """One instance of the model `Model`.
 
     A base class after this one has `instance_name` and log(sentence, status).
@@ -39,43 +44,43 @@ class Hosted(Saved):
 
     Model: type  # of the subclass that hosting() makes
 
-    @guarded
+    @signal_safe
     def __init__(self, **kwargs: Any) -> None:
         try:
-            self.begin(**kwargs)
+            self.initialize(**kwargs)
         except Exception:
             raise
         except BaseException as error:  # the layer that resets an instance needs the new one
-            self.begin(**kwargs)
-            self.rescue(error)
+            self.initialize(**kwargs)
+            self.handle_exception(error)
 
-    def begin(self, **kwargs: Any) -> None:
+    def initialize(self, **kwargs: Any) -> None:
         """As after instantiation."""
         super().__init__(**kwargs)
-        self.living.add(self)
+        self.instances.add(self)
         self.model = self.Model()
-        self.run = rules.Run(self.model.tolerance)
-        self.give_access()
+        self.run = call_sequence.RunState(self.model.tolerance)
+        self.initialize_access()
 
-    @guarded
+    @signal_safe
     def exit_initialization_mode(self) -> None:
         try:
-            status = rules.begin(self.run, self.model)
+            status = call_sequence.exit_initialization(self.run, self.model)
             if status != OK:
-                self.give_up(status)
+                self.fail_with_status(status)
         except BaseException as error:  # an exception that left Python would crash the host
-            self.rescue(error)
+            self.handle_exception(error)
 
-    @guarded
+    @signal_safe
     def do_step(self, current_time: float, step_size: float) -> Any:
         try:
             run, model = self.run, self.model
-            seen = run.observed
-            status = rules.step(run, model, current_time, step_size)
+            seen = run.outputs_current
+            status = call_sequence.do_step(run, model, current_time, step_size)
             if status != OK:
-                return self.give_up(status, current_time, step_size)
+                return self.fail_with_status(status, current_time, step_size)
             if seen:  # who has read the last point will read this one too, and this way is shorter
-                rules.show(run, model)
+                call_sequence.set_outputs(run, model)
             return True
         except BaseException as error:  # as above
-            return self.rescue(error)
+            return self.handle_exception(error)

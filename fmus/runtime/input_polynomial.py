@@ -1,17 +1,17 @@
 """An input that changes while nobody sets it: a polynomial in time, known by its derivatives."""
 
-from .codes import HIGHEST
+from .codes import MAX_INPUT_ORDER
 
 
-class Course:
+class InputPolynomial:
     """Its derivatives at one time, from order 0 on; s is how many seconds have passed since."""
 
     def __init__(self):
         self.order = 0  # of the highest that is not zero; where one has been set, a higher one until begin()
-        self.derivatives = [0.0] * (HIGHEST + 1)
-        self.c = [0.0] * (HIGHEST + 1)  # the coefficients of the powers of s
+        self.derivatives = [0.0] * (MAX_INPUT_ORDER + 1)
+        self.c = [0.0] * (MAX_INPUT_ORDER + 1)  # the coefficients of the powers of s
 
-    def begin(self, value):
+    def set_value(self, value):
         """The value is this one; some derivatives may have been set."""
         self.derivatives[0] = self.c[0] = value
         highest, self.order = self.order, 0
@@ -22,20 +22,24 @@ class Course:
             if self.derivatives[n] != 0.0:
                 self.order = n
 
-    def now(self, s):
+    def value_at(self, s):
         """The value; without loops and faults, for every right-hand side wants it."""
-        return self.c[0] if self.order == 0 else self.c[0] + s * (self.c[1] if self.order == 1 else self.bent(s))
+        return (
+            self.c[0]
+            if self.order == 0
+            else self.c[0] + s * (self.c[1] if self.order == 1 else self.higher_order_change(s))
+        )
 
-    def bent(self, s):
+    def higher_order_change(self, s):
         """What it has changed by since then, over s."""
         c = self.c[4] + s * (self.c[5] + s * (self.c[6] + s * (self.c[7] + s * self.c[8])))
         return self.c[1] + s * (self.c[2] + s * (self.c[3] + s * c))
 
-    def rate(self, s):
+    def rate_at(self, s):
         """The first derivative."""
-        return self.c[1] if self.order < 2 else self.at(s, 1)
+        return self.c[1] if self.order < 2 else self.derivative_at(s, 1)
 
-    def at(self, s, n):
+    def derivative_at(self, s, n):
         """The n-th derivative."""
         total = 0.0
         for i in range(self.order + 1 - n):
@@ -43,9 +47,9 @@ class Course:
             total = self.derivatives[k] + total * s / (k + 1 - n)
         return total
 
-    def move(self, s):
+    def shift_to(self, s):
         """Tell all derivatives as they are now, and the value."""
         if self.order > 0:
             for n in range(self.order):
-                self.derivatives[n] = self.at(s, n)
+                self.derivatives[n] = self.derivative_at(s, n)
         return self.derivatives[0]

@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 
 
-def found() -> list[tuple[str, ModuleType, type]]:
+def find_methods() -> list[tuple[str, ModuleType, type]]:
     """Label, file and class of each, in the order of their numbers."""
     paths = Path(__file__).parent.glob("*.py")
     labels = [path.stem for path in paths if "\nSTAGES" in path.read_text(encoding="utf-8")]
@@ -21,4 +21,4 @@ def found() -> list[tuple[str, ModuleType, type]]:
     return sorted(rows, key=lambda row: row[1].NUMBER)
 
 
-methods = found()
+methods = find_methods()

@@ -9,10 +9,10 @@ from __future__ import annotations
 from math import inf, isfinite
 from typing import Any
 
-from .rules import within
+from .call_sequence import is_in_range
 
 
-class Declared:
+class VariableDeclaration:
     """What a variable is: unit, description and range; an enumeration has `items` (label, value, sentence)."""
 
     type = "Real"
@@ -44,7 +44,7 @@ class Declared:
         self.name = name
 
     @property
-    def suffix(self) -> str:
+    def unit_suffix(self) -> str:
         """The unit, as it stands behind a number."""
         return "" if self.unit in ("", "1") else f" {self.unit}"
 
@@ -53,18 +53,23 @@ class Declared:
         """The range in words."""
         if self.items:
             return "one of " + ", ".join(f"{value} ({label})" for label, value, _ in self.items)
-        bounds = (("at least", self.low), ("above", self.above), ("at most", self.high), ("below", self.below))
-        words = [f"{word} {bound!r}{self.suffix}" for word, bound in bounds if isfinite(bound)]
+        coefficient_bounds = (
+            ("at least", self.low),
+            ("above", self.above),
+            ("at most", self.high),
+            ("below", self.below),
+        )
+        words = [f"{word} {bound!r}{self.unit_suffix}" for word, bound in coefficient_bounds if isfinite(bound)]
         return " and ".join(words) or "a finite number"
 
     def accepts(self, value: float) -> bool:
         """Whether `value` lies in the range; NaN and infinities never do."""
         if self.items:
             return value in [number for _, number, _ in self.items]
-        return within(value, self.low, self.high, self.above, self.below)
+        return is_in_range(value, self.low, self.high, self.above, self.below)
 
 
-class Parameter(Declared):
+class Parameter(VariableDeclaration):
     """Set by the user; tunable at every communication point."""
 
     causality, variability, initial = "parameter", "tunable", "exact"
@@ -96,7 +101,7 @@ class Input(Parameter):
     causality, variability, initial = "input", "continuous", ""
 
 
-class Output(Declared):
+class Output(VariableDeclaration):
     """Calculated; `direct`: it follows a changed input at once, without a step in between."""
 
     causality, variability, initial = "output", "continuous", "calculated"
@@ -134,7 +139,7 @@ class Mode(Output):
         super().__init__("", text, direct=True, low=-1, high=1)
 
 
-class Local(Declared):
+class Local(VariableDeclaration):
     """Calculated; read on request, not recorded by default."""
 
     causality, variability, initial = "local", "discrete", "calculated"
@@ -149,7 +154,7 @@ class Count(Local):
         super().__init__("", text, low=0)
 
 
-class Declaring:
+class VariableOwner:
     """An instance starts with the start value of every declared variable, as plain attributes."""
 
     def __init__(self) -> None:
@@ -157,20 +162,20 @@ class Declaring:
             setattr(self, declared.name, declared.start)
 
 
-def declarations(cls: type) -> list[Declared]:
+def declarations(cls: type) -> list[VariableDeclaration]:
     """The declared variables of a class, its own before those of its bases; a class may declare one anew."""
-    found: dict[str, Declared] = {}
+    found: dict[str, VariableDeclaration] = {}
     for base in cls.__mro__:
         for name, value in vars(base).items():
-            if isinstance(value, Declared):
+            if isinstance(value, VariableDeclaration):
                 found.setdefault(name, value)
     return list(found.values())
 
 
-def variables(thing: Declaring, prefix: str = "") -> list[tuple[str, Declared]]:
+def variables(thing: VariableOwner, prefix: str = "") -> list[tuple[str, VariableDeclaration]]:
     """Dotted name and declaration of every variable of an object and of the objects it owns, in order."""
     found = [(prefix + declared.name, declared) for declared in declarations(type(thing))]
     for name, part in vars(thing).items():
-        if isinstance(part, Declaring):
+        if isinstance(part, VariableOwner):
             found += variables(part, f"{prefix}{name}.")
     return found

@@ -15,31 +15,31 @@ from .codes import (
     CONTINUOUS,
     DIVERGED,
     FAILED,
+    FIRST_RULE,
     FIXED,
     INSTANTIATED,
     MODEL_EXCHANGE,
     OK,
     OUT_OF_RANGE,
-    RULES,
     RUNNING,
 )
-from .vectors import contacts
+from .vectors import contact_indices
 
 
-class Run:
+class RunState:
     """What makes the run of an instance, but for the numbers of its model."""
 
     def __init__(self, tolerance):
         self.phase, self.interface = INSTANTIATED, CO_SIMULATION
         self.start_time, self.stop_time, self.tolerance = 0.0, inf, tolerance
-        self.refused = 0  # how many values were set that cannot be used
-        self.changed = False  # values were set that are not yet in force
-        self.renewed = False  # and such that came into force since the last event
-        self.observed = False  # the outputs are those of the present point
-        self.failed = False
+        self.n_invalid_values = 0  # how many values were set that cannot be used
+        self.has_pending_changes = False  # values were set that are not yet in force
+        self.values_changed = False  # and such that came into force since the last event
+        self.outputs_current = False  # the outputs are those of the present point
+        self.has_failed = False
 
 
-def is_sound(run, model, exchanges):
+def is_valid_state(run, model, exchanges):
     """Whether an instance, for model exchange or not, can be in this state; the motion of one that cannot may have no
     end."""
     if not (INSTANTIATED <= run.phase <= CONTINUOUS and 0.0 < run.tolerance < 1.0):
@@ -48,25 +48,25 @@ def is_sound(run, model, exchanges):
         return False
     if run.phase == (RUNNING if exchanges else CONTINUOUS):
         return False
-    if run.phase < RUNNING or run.failed or exchanges:
+    if run.phase < RUNNING or run.has_failed or exchanges:
         return True
-    march = model.solver
-    step = march.step
-    sound = step.t0 <= march.t <= step.t1 <= step.t_end and step.methods.chosen == march.method
-    for i in contacts:
-        sound = sound and -1 <= march.modes[i] <= 1 and -1 <= step.modes0[i] <= 1 and -1 <= step.modes1[i] <= 1
+    solver = model.solver
+    step = solver.step
+    sound = step.t0 <= solver.t <= step.t1 <= step.t_end and step.active_method.method_number == solver.method
+    for i in contact_indices:
+        sound = sound and -1 <= solver.modes[i] <= 1 and -1 <= step.modes0[i] <= 1 and -1 <= step.modes1[i] <= 1
     return sound
 
 
 # ---- values
 
 
-def within(value, low, high, above, below):
+def is_in_range(value, low, high, above, below):
     """Whether a value is in a range; NaN and infinities never are."""
     return isfinite(value) and low <= value <= high and above < value < below
 
 
-def reason(run, calculated, fixed, allowed):
+def rejection_reason(run, calculated, fixed, allowed):
     """Why a variable cannot be set to a value."""
     if calculated:
         return CALCULATED
@@ -75,97 +75,97 @@ def reason(run, calculated, fixed, allowed):
     return OK if allowed else OUT_OF_RANGE
 
 
-def change(run, model):
+def note_change(run, model):
     """A value is about to change: what has been integrated in closed form ends at the present point."""
-    if not run.changed and run.phase >= RUNNING:
+    if not run.has_pending_changes and run.phase >= RUNNING:
         model.rebase(model.solver.t)
-    run.changed = True
+    run.has_pending_changes = True
 
 
-def setup(run, start, stop, tolerance):
+def set_experiment(run, start, stop, tolerance):
     """The experiment; inf and 0 where no stop time and no tolerance is given."""
     run.start_time, run.stop_time = start, stop
     if 0.0 < tolerance < 1.0:
         run.tolerance = tolerance
-    run.changed, run.observed = True, False
+    run.has_pending_changes, run.outputs_current = True, False
 
 
-def objection(run, model):
+def check_values(run, model):
     """Status of the values as they stand."""
-    if run.refused > 0:
+    if run.n_invalid_values > 0:
         return BAD_VALUE
     if not isfinite(run.start_time):
         return BAD_START
     if not run.stop_time > run.start_time:
         return BAD_STOP
     rule = model.prepare()
-    if rule == model.own_solver and run.interface != CO_SIMULATION:
+    if rule == model.own_solver_rule and run.interface != CO_SIMULATION:
         return OK  # another solver solves
-    return RULES + rule if rule > 0 else OK
+    return FIRST_RULE + rule if rule > 0 else OK
 
 
 # ---- the run
 
 
-def renew(run, model, beginning):
+def apply_changes(run, model, beginning):
     """Take over what was set: the motion begins, or goes on from the present point.  Status."""
-    status = objection(run, model)
+    status = check_values(run, model)
     if status == OK:
-        march = model.solver
+        solver = model.solver
         if beginning:
-            y = model.initial(run.start_time)
-            march.start(model, run.start_time, y, run.stop_time, run.tolerance)
+            y = model.initial_state(run.start_time)
+            solver.start(model, run.start_time, y, run.stop_time, run.tolerance)
         elif run.interface != MODEL_EXCHANGE:  # where nothing starts anew: the mode follows at the next event
-            march.restart(model)
-        run.changed = run.observed = False
-        run.renewed = not beginning
+            solver.restart(model)
+        run.has_pending_changes = run.outputs_current = False
+        run.values_changed = not beginning
     return status
 
 
-def begin(run, model):
+def exit_initialization(run, model):
     """Initialisation ends.  Status."""
     beginning = run.phase < RUNNING  # an importer may end it twice
     run.phase = RUNNING
-    if run.failed:
+    if run.has_failed:
         return FAILED
-    return renew(run, model, beginning)
+    return apply_changes(run, model, beginning)
 
 
-def ready(run, model):
+def prepare_to_step(run, model):
     """Status of a run that shall go on; values that were set are judged first."""
-    if run.failed:
+    if run.has_failed:
         return FAILED
     if run.phase < RUNNING:
-        return begin(run, model)
-    if run.changed or run.refused > 0:
-        return renew(run, model, False)
+        return exit_initialization(run, model)
+    if run.has_pending_changes or run.n_invalid_values > 0:
+        return apply_changes(run, model, False)
     return OK
 
 
-def step(run, model, t, h):
+def do_step(run, model, t, h):
     """A communication step of h from t.  Status."""
-    if not (run.observed and run.phase >= RUNNING):  # something was set since the last point was read
-        status = ready(run, model)
+    if not (run.outputs_current and run.phase >= RUNNING):  # something was set since the last point was read
+        status = prepare_to_step(run, model)
         if status != OK:
             return status
-    march = model.solver
-    end = end_of_step(run, march, t, h)
-    if not end >= march.t:
+    solver = model.solver
+    end = communication_step_end(run, solver, t, h)
+    if not end >= solver.t:
         return BAD_STEP
-    if end == march.t:
+    if end == solver.t:
         return OK
-    run.observed = False
-    return march.advance(model, end)
+    run.outputs_current = False
+    return solver.advance(model, end)
 
 
-def end_of_step(run, march, t, h):
+def communication_step_end(run, solver, t, h):
     """Where a communication step of h from t ends, NaN where it is refused.
 
     It begins at the present point and ends by the stop time.  An importer's times are sums at the size of the start, so
     that near zero they may be off by more than the last place of the time itself.
     """
-    step = march.step
-    start, now, stop, end = run.start_time, march.t, step.t_end, t + h
+    step = solver.step
+    start, now, stop, end = run.start_time, solver.t, step.t_end, t + h
     if 0.0 <= start <= t == now < end < stop and not (1.0 - 1e-14) * step.t1 <= end <= (1.0 + 1e-14) * step.t1:
         return end  # as what follows would have it: nearly every step
     size = fabs(start) if fabs(start) > fabs(now) else fabs(now)
@@ -182,24 +182,24 @@ def end_of_step(run, march, t, h):
 # ---- outputs
 
 
-def observe(run, model):
+def update_outputs(run, model):
     """Bring the outputs to the present point.  Status: DIVERGED, or that of values which cannot be used yet."""
-    if run.changed or run.refused > 0 or run.phase < RUNNING:
-        status = renew(run, model, run.phase < RUNNING)
+    if run.has_pending_changes or run.n_invalid_values > 0 or run.phase < RUNNING:
+        status = apply_changes(run, model, run.phase < RUNNING)
         if status != OK:
             return status
-    show(run, model)
-    return OK if run.observed else DIVERGED
+    set_outputs(run, model)
+    return OK if run.outputs_current else DIVERGED
 
 
-def show(run, model):
+def set_outputs(run, model):
     """Set the outputs."""
-    march = model.solver
-    run.observed = model.observe(march.t, march.y, march.modes)
+    solver = model.solver
+    run.outputs_current = model.compute_outputs(solver.t, solver.y, solver.modes)
 
 
-def report(model, ahead):
+def update_statistics(model, ahead):
     """Bring what is told of solver and events to the present point; `ahead`: also where the next step ends."""
     model.solver.report(model.events)
     if ahead:
-        model.solver.look_ahead(model)
+        model.solver.update_t_next(model)

@@ -15,7 +15,7 @@ from typing import Any
 from weakref import ref
 
 
-def guarded(function: Any) -> Any:
+def signal_safe(function: Any) -> Any:
     """The function, all of which is one try statement, such that this holds from its first instruction on.
 
     Since Python 3.11 a signal that has come meanwhile is handled when a function is entered: before the first line of
@@ -25,14 +25,14 @@ def guarded(function: Any) -> Any:
     """
     table = getattr(function.__code__, "co_exceptiontable", b"")
     if table:
-        start, at = _number(table, 0)
-        length, at = _number(table, at)
-        covered = bytes([0x80]) + _written(start + length)
+        start, at = _read_varint(table, 0)
+        length, at = _read_varint(table, at)
+        covered = bytes([0x80]) + _write_varint(start + length)
         function.__code__ = function.__code__.replace(co_exceptiontable=covered + table[at:])
     return function
 
 
-def _number(table: bytes, at: int) -> tuple[int, int]:
+def _read_varint(table: bytes, at: int) -> tuple[int, int]:
     number = table[at] & 63
     while table[at] & 64:
         at += 1
@@ -40,7 +40,7 @@ def _number(table: bytes, at: int) -> tuple[int, int]:
     return number, at + 1
 
 
-def _written(number: int) -> bytes:
+def _write_varint(number: int) -> bytes:
     digits = [number & 63]
     while number > 63:
         number >>= 6
@@ -48,7 +48,7 @@ def _written(number: int) -> bytes:
     return bytes(reversed(digits))
 
 
-def pass_on(error: BaseException, message: object) -> object:
+def reraise_later(error: BaseException, message: object) -> object:
     """Raise the exception in this thread again as soon as the message is gone.
 
     The layer hands the messages to the host, who may run Python for it, and drops them when the call has no more to do:
@@ -61,18 +61,18 @@ def pass_on(error: BaseException, message: object) -> object:
     return ref(message, partial(raise_in, get_ident(), again))
 
 
-def pay(*things: object) -> None:
+def add_references(*things: object) -> None:
     """Take the references that the layer will give back once too often."""
     for thing in things:
         pythonapi["Py_IncRef"](py_object(thing))
 
 
-def printable(text: str) -> str:
+def sanitize(text: str) -> str:
     """A text that can be handed over as UTF-8, and ends where it ends in C."""
     return text.replace("\0", "").encode("utf-8", "backslashreplace").decode()
 
 
-def announce(line: str) -> None:
+def write_to_stderr(line: str) -> None:
     """On standard error, whatever has become of it.
 
     Past its buffer, where there is one: what cannot be written would wait there, and Python end with status 120.

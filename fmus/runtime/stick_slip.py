@@ -8,19 +8,19 @@ based on the synchronous data flow principle, CACSD 1999).
 
 from math import fabs, inf
 
-from .codes import BACKWARD, EXACT, FORWARD, HIGHEST, HYBRID, RULES, SIGN, STUCK, THRESHOLD
+from .codes import BACKWARD, EXACT, FIRST_RULE, FORWARD, HYBRID, MAX_INPUT_ORDER, SIGN, STUCK, THRESHOLD
 from .oscillator import Oscillator
-from .rounding import NEAR
-from .vectors import Contact, Contacts, States, per_contact, place, slip
+from .rounding import ROUNDOFF_MARGIN
+from .vectors import ContactIndex, ContactVector, StateVector, contact_vector, position_index, slip_index
 
 HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes, every change of mode is located as an event")
 SIGN_LAW = ("sign", SIGN, "sliding force times sign(v) as it stands: no event, no stick; chatters")
 THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but below a small speed friction balances the spring; chatters")
 
-UNSETTLED = RULES + 2  # status: no modes fit the forces, as the second rule has it
-BACKWARDS = 1e-9  # of the force of friction: less than that is the last bits
-MOST_HALVINGS = 200
-MOST_THIRDS = 25
+NO_CONSISTENT_MODES = FIRST_RULE + 2  # status: no modes fit the forces, as the second rule has it
+WRONG_WAY_TOLERANCE = 1e-9  # of the force of friction: less than that is the last bits
+MAX_BISECTIONS = 200
+MAX_TERNARY_STEPS = 25
 
 
 def sign(v):
@@ -46,103 +46,103 @@ class DryFriction(Oscillator):
     """
 
     contacts: dict[str, str] = {"mode": "v"}
-    dry = waits = True
+    has_dry_friction = rests_when_stuck = True
     rules: tuple[str, ...] = (
         "friction = {friction} with solver.method = 1 (exact): the closed form holds for the hybrid law only; "
         "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
         "the contacts can neither hold nor slip: one of them slides with a larger force than it holds; let no sliding "
         "force be above the holding force",
     )
-    own_solver = 1
+    own_solver_rule = 1
 
     def prepare(self):
         return 1 if self.friction != HYBRID and self.solver.method == EXACT else 0
 
-    def settle(self, t, y: States, near, i: Contact):
+    def resolve_mode(self, t, y: StateVector, tie_tolerance, i: ContactIndex):
         """The mode that holds from here on.
 
         A load of the limit is a tie, which its rate decides: outward it lets go, inward or without a rate it is held.
         The load is known but for the rounding of its terms, and, where it moves inward, the share `near` of the limit.
         """
-        if y[slip[i]] > 0.0:
+        if y[slip_index[i]] > 0.0:
             return FORWARD
-        if y[slip[i]] < 0.0:
+        if y[slip_index[i]] < 0.0:
             return BACKWARD
-        load, rate, limit, slack = self.held(t, y, i)
+        load, rate, limit, slack = self.stick_balance(t, y, i)
         if rate > 0.0 and load >= limit - slack:
             return FORWARD
         if rate < 0.0 and load <= slack - limit:
             return BACKWARD
         if rate != 0.0:
-            slack += near * limit
+            slack += tie_tolerance * limit
         if fabs(load) <= limit + slack:
             return STUCK
         return FORWARD if load > 0.0 else BACKWARD
 
-    def held(self, t, y: States, i: Contact):
+    def stick_balance(self, t, y: StateVector, i: ContactIndex):
         """The load on a contact at rest, its rate, the holding limit, and what rounding may add to that."""
-        load, rate, limit = self.hold(t, y, i)
-        return load, rate, limit, NEAR * (self.terms(t, y, i) + limit)
+        load, rate, limit = self.stick_load(t, y, i)
+        return load, rate, limit, ROUNDOFF_MARGIN * (self.load_magnitude(t, y, i) + limit)
 
-    def touches(self, t, y: States, modes: Contacts, near, i: Contact):
+    def is_grazing(self, t, y: StateVector, modes: ContactVector, tie_tolerance, i: ContactIndex):
         """Whether a slide whose speed comes to zero here only touches it: friction lets go so soon that a speed which
         is off by the share `near` would not have come to zero.
 
         After the wait s the speed grows as v = u (1 - cos(w s)), with the load's rate m w^2 u.
         """
-        load, rate, limit = self.hold(t, y, i)
+        load, rate, limit = self.stick_load(t, y, i)
         if rate == 0.0:
             return load == 0.0 and limit == 0.0  # nothing stops it: what is left of the speed is the method's error
         if modes[i] * rate < 0.0:
             return False
         wait = (limit - modes[i] * load) / fabs(rate)
         _, J = self.jacobian(t, y, modes)
-        stiffness = J[slip[i], place[i]]
-        return (stiffness < 0.0 or wait == 0.0) and -0.5 * stiffness * wait * wait < near
+        stiffness = J[slip_index[i], position_index[i]]
+        return (stiffness < 0.0 or wait == 0.0) and -0.5 * stiffness * wait * wait < tie_tolerance
 
-    def departure(self, t, y: States, modes: Contacts, i: Contact):
+    def breakaway_acceleration(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
         """The rate of a slip at a break-away, where the load is just the limit."""
-        return self.slip_rate(t, y, modes, i)
+        return self.slip_acceleration(t, y, modes, i)
 
-    def slip_rate(self, t, y: States, modes: Contacts, i: Contact):
+    def slip_acceleration(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
         """The rate of a slip."""
         f = self.rates(t, y, modes)
-        return f[slip[i]]
+        return f[slip_index[i]]
 
-    def goes_its_way(self, t, y: States, modes: Contacts, i: Contact):
+    def is_consistent(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
         """Whether a body at rest that has been let go starts in the direction of its mode, but for the last bits: one
         that slides with more than it holds does not."""
-        back = per_contact()
+        back = contact_vector()
         back[i] = -modes[i]
-        forward, backward = self.slip_rate(t, y, modes, i), self.slip_rate(t, y, back, i)
+        forward, backward = self.slip_acceleration(t, y, modes, i), self.slip_acceleration(t, y, back, i)
         if modes[i] * backward <= 0.0:
             return True  # nor does it stay: it moves the other way
-        load, _, _, slack = self.held(t, y, i)
+        load, _, _, slack = self.stick_balance(t, y, i)
         if fabs(load) <= slack:
             return True
         # late in a run a load is the difference of large numbers
-        last_bits = BACKWARDS * fabs(forward - backward) + slack / fabs(load) * fabs(forward + backward)
+        last_bits = WRONG_WAY_TOLERANCE * fabs(forward - backward) + slack / fabs(load) * fabs(forward + backward)
         return modes[i] * forward >= -last_bits
 
-    def release(self, t, y: States, i: Contact):
+    def breakaway_time(self, t, y: StateVector, i: ContactIndex):
         """When a contact breaks away if nothing moves, and in which direction; inf if it never does."""
-        load, rate, limit = self.hold(t, y, i)
-        if self.ramps and self.bends():
-            return self.bent_release(t, y, load, rate, limit, i)
+        load, rate, limit = self.stick_load(t, y, i)
+        if self.has_input_derivatives and self.has_higher_order():
+            return self.breakaway_time_by_series(t, y, load, rate, limit, i)
         if rate == 0.0:
             return inf, STUCK
         direction = FORWARD if rate > 0.0 else BACKWARD
         wait = (limit - direction * load) / fabs(rate)
         return t + (wait if wait > 0.0 else 0.0), direction
 
-    def bent_release(self, t, y: States, load, rate, limit, i: Contact):
+    def breakaway_time_by_series(self, t, y: StateVector, load, rate, limit, i: ContactIndex):
         """The same where inputs bend; in no direction where it is to be looked for again from there on."""
-        series = self.solver.step.series
-        span = scale = self.solver.step.longest
+        series = self.solver.step.load_series
+        span = scale = self.solver.step.h_max
         series.c[1] = rate * span
-        for n in range(2, HIGHEST + 1):
+        for n in range(2, MAX_INPUT_ORDER + 1):
             scale *= span / n
-            series.c[n] = self.load_rate(t, y, n, i) * scale
+            series.c[n] = self.load_derivative(t, y, n, i) * scale
         series.c[0] = load - limit if load < limit else 0.0
         up, forward = series.first_zero(BACKWARD)
         series.c[0] = load + limit if load > -limit else 0.0
@@ -153,31 +153,31 @@ class DryFriction(Oscillator):
             return t + down * span, BACKWARD
         return t + (up if up < down else down) * span, STUCK
 
-    def guard(self, step, t, i: Contact):
+    def guard(self, step, t, i: ContactIndex):
         """Positive while the mode lasts: the speed, in the direction of the mode."""
-        y = step.at(self, t)
-        return step.modes0[i] * y[slip[i]]
+        y = step.state_at(self, t)
+        return step.modes0[i] * y[slip_index[i]]
 
-    def reversal(self, step, i: Contact):
+    def find_slip_reversal(self, step, i: ContactIndex):
         """When the slip speed leaves the direction of the mode within the step, to the last bit; inf if it does not."""
         mode = step.modes0[i]
-        ahead, behind = mode * step.y0[slip[i]], mode * step.y1[slip[i]]
+        ahead, behind = mode * step.y0[slip_index[i]], mode * step.y1[slip_index[i]]
         high = step.t1
         if behind > 0.0:
-            if mode * step.f0[slip[i]] >= 0.0 or mode * step.f1[slip[i]] <= 0.0:
+            if mode * step.f0[slip_index[i]] >= 0.0 or mode * step.f1[slip_index[i]] <= 0.0:
                 return inf
-            high = self.dip(step, step.t0, step.t1, i)
+            high = self.find_minimum(step, step.t0, step.t1, i)
             if not high < inf:
                 return inf
             behind = self.guard(step, high, i)
-        return self.located(step, step.t0, high, ahead, behind, i)
+        return self.find_root(step, step.t0, high, ahead, behind, i)
 
-    def located(self, step, low, high, ahead, behind, i: Contact):
+    def find_root(self, step, low, high, ahead, behind, i: ContactIndex):
         """The first instant at which the guard is not positive; at `low` it is `ahead`, at `high` `behind`, which is
         not."""
         kept = 0  # the end of the bracket that the last secant left where it was
         looks = 0
-        for _ in range(MOST_HALVINGS):
+        for _ in range(MAX_BISECTIONS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
@@ -197,13 +197,13 @@ class DryFriction(Oscillator):
                 if kept == -1:
                     ahead *= 0.5
                 kept = -1
-        step.interpolant.looked += looks
+        step.interpolant.n_event_evals += looks
         return high
 
-    def dip(self, step, low, high, i: Contact):
+    def find_minimum(self, step, low, high, i: ContactIndex):
         """When the guard is found not positive where it falls at first and rises at last; else inf."""
-        step.interpolant.looked += MOST_THIRDS
-        for _ in range(MOST_THIRDS):
+        step.interpolant.n_event_evals += MAX_TERNARY_STEPS
+        for _ in range(MAX_TERNARY_STEPS):
             third = (high - low) / 3.0
             left = self.guard(step, low + third, i)
             right = self.guard(step, high - third, i)

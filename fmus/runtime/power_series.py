@@ -7,14 +7,14 @@ f + f' d - M d^2/2 for d to come: who goes where that comes to zero passes no ze
 from math import fabs, sqrt
 
 TERMS = 20  # of a motion, where the largest rate times the stretch is 1
-MOST_HALVINGS, MOST_LOOKS = 200, 100
+MAX_BISECTIONS, MAX_ITERATIONS = 200, 100
 
 
-class Series:
+class PowerSeries:
     """The coefficients, and how many seconds the stretch takes."""
 
     def __init__(self):
-        self.span = 0.0
+        self.duration = 0.0
         self.c = [0.0] * (TERMS + 1)
 
     def first_zero(self, side):
@@ -26,14 +26,14 @@ class Series:
             if first == TERMS:
                 return 1.0, False
         reach = 1.0
-        rest, most = self.bounds(first, reach)
-        for _ in range(MOST_HALVINGS):
+        rest, most = self.coefficient_bounds(first, reach)
+        for _ in range(MAX_BISECTIONS):
             if rest <= fabs(self.c[first]) + fabs(self.c[first + 1]) * reach:
                 break
             reach *= 0.5
-            rest, most = self.bounds(first, reach)
+            rest, most = self.coefficient_bounds(first, reach)
         u = 0.0
-        for _ in range(MOST_LOOKS):
+        for _ in range(MAX_ITERATIONS):
             value = slope = 0.0
             for i in range(TERMS + 1 - first):
                 slope = value + slope * u
@@ -49,7 +49,7 @@ class Series:
             u = ahead
         return u, False
 
-    def bounds(self, first, reach):
+    def coefficient_bounds(self, first, reach):
         """Of f/u^first up to there: of all terms but the first two, and of the second derivative."""
         rest = most = 0.0
         for i in range(TERMS - 1 - first):
