@@ -14,10 +14,10 @@ import click
 
 from fmus.packaging import BuildError, __version__
 from fmus.packaging.archive import build
-from fmus.packaging.catalogue import find, names
-from fmus.packaging.equations.authored import Authored
-from fmus.packaging.weigh import import_time
-from fmus.packaging.written import LAWS, METHODS
+from fmus.packaging.equations.model_file import ModelFile
+from fmus.packaging.import_time import measure_import_time
+from fmus.packaging.lowering import LAWS, METHODS
+from fmus.packaging.model_lookup import find_model, model_names
 
 HERE = Path(__file__).parent
 SCENES = HERE / "harness" / "scenes"
@@ -50,52 +50,52 @@ def main(
     """
     gc.disable()  # what a build makes stays to its end; to look through it again and again is a tenth of its time
     if web and (compiled or platforms or fmi == "3"):
-        raise Mistake("--web makes a page and no FMU: leave out --native, --platform and --fmi 3.")
+        raise CommandLineError("--web makes a page and no FMU: leave out --native, --platform and --fmi 3.")
     compiled, kind = compiled or fmi == "3", "native/fmi3" if fmi == "3" else "native" if compiled else ""
     try:
-        wanted = {model: find(model) for model in models or names()}
+        wanted = {model: find_model(model) for model in models or model_names()}
     except BuildError as error:
-        raise Mistake(str(error)) from error
+        raise CommandLineError(str(error)) from error
     for source in wanted.values():
         alike = sorted({str(other.path.resolve()) for other in wanted.values() if other.name == source.name})
         if (out or web) and len(alike) > 1:
-            raise Mistake(f"{' and '.join(alike)} have one name: build them into folders of their own.")
+            raise CommandLineError(f"{' and '.join(alike)} have one name: build them into folders of their own.")
     if web:
-        ours = any(model in names() for model in wanted)
+        ours = any(model in model_names() for model in wanted)
         place = out or (FMUS if ours else next(iter(wanted.values())).path.parent) / "web"
-        with working("writing the page"):
-            path = page(list(wanted.values()), place, methods, laws)
-        tell(path)
+        with show_progress("writing the page"):
+            path = build_page(list(wanted.values()), place, methods, laws)
+        print_summary(path)
         return
     for model, source in wanted.items():
-        folder = out or (FMUS if model in names() else source.path.parent) / kind
+        folder = out or (FMUS if model in model_names() else source.path.parent) / kind
         try:
             if compiled:
-                with working(f"{source.name}: compiling; the first time with the C libraries, half a minute"):
-                    path = native(source.path, folder, methods, laws, platforms, fmi)
+                with show_progress(f"{source.name}: compiling; the first time with the C libraries, half a minute"):
+                    path = build_native(source.path, folder, methods, laws, platforms, fmi)
                 weight = ""
             else:
                 path = build(source.path, folder, methods, laws, platforms)
-                weight = f"  {1000 * import_time(path):3.0f} ms"
+                weight = f"  {1000 * measure_import_time(path):3.0f} ms"
         except BuildError as error:
             raise click.ClickException(str(error)) from error
-        tell(path, weight)
+        print_summary(path, weight)
 
 
-def working(what: str) -> AbstractContextManager[object]:
+def show_progress(what: str) -> AbstractContextManager[object]:
     """Say at the terminal, as long as it takes, what is being done."""
     from rich.console import Console
 
     return Console(stderr=True).status(what)
 
 
-def tell(path: Path, weight: str = "") -> None:
+def print_summary(path: Path, weight: str = "") -> None:
     """One line about a file that was built."""
     content = path.read_bytes()
     click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB{weight}  {sha256(content).hexdigest()[:16]}")
 
 
-def native(
+def build_native(
     model: Path, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...], fmi: str
 ) -> Path:
     """The native FMU; what builds it needs more than the others do."""
@@ -104,7 +104,7 @@ def native(
     return build(model, folder, methods, laws, platforms, fmi)
 
 
-def page(models: list[Authored], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...]) -> Path:
+def build_page(models: list[ModelFile], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...]) -> Path:
     """The page that runs them."""
     from fmus.packaging.web import build
 
@@ -114,7 +114,7 @@ def page(models: list[Authored], folder: Path, methods: tuple[str, ...], laws: t
         raise click.ClickException(str(error)) from error
 
 
-class Mistake(click.ClickException):
+class CommandLineError(click.ClickException):
     """A mistake in the command line, told in one sentence without the usage lines."""
 
     exit_code = 2

@@ -6,21 +6,6 @@ their names.  `python build_fmus.py path/to/file.py` makes an FMU of it.
 
 from math import pi
 
-from .packaging.equations.declared import (
-    HYBRID,
-    SIGN,
-    THRESHOLD,
-    Choice,
-    Contact,
-    Fixed,
-    Input,
-    Mode,
-    Model,
-    Output,
-    Parameter,
-    Rule,
-    State,
-)
 from .packaging.equations.expressions import (
     acos,
     asin,
@@ -36,6 +21,21 @@ from .packaging.equations.expressions import (
     sqrt,
     tan,
     tanh,
+)
+from .packaging.equations.model_declaration import (
+    HYBRID,
+    SIGN,
+    THRESHOLD,
+    Choice,
+    Contact,
+    Fixed,
+    Input,
+    Mode,
+    Model,
+    Output,
+    Parameter,
+    Rule,
+    State,
 )
 
 __all__ = [

@@ -27,7 +27,7 @@ class Pacejka(Model):
     F_ext = Input(0.0, "N", "outer force on the sled")
 
     x = State("m", "position of the sled", start=x0)
-    v = State("m/s", "speed of the sled", start=v0, rate_of=x, finest=x_m)
+    v = State("m/s", "speed of the sled", start=v0, rate_of=x, nominal_velocity=x_m)
     x_driver = State("m", "position of the driver, zero at the start", rate=v_driver)
 
     D = mu_s

@@ -22,23 +22,23 @@ from stat import S_IFREG
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from . import BuildError
-from .catalogue import find
-from .companions import companions
-from .description import declared_by, describe
-from .modules import digest, installed, travelling
-from .written import files_of, offer, written
+from .embedded_modules import digest, embedded_files, installed_package
+from .extra_files import extra_files
+from .lowering import lowered_files, lowered_model, select_features
+from .model_description import declared_variables, describe
+from .model_lookup import find_model
 
-NEEDED = """\
+HOST_REQUIREMENTS = """\
 CPython 3.9 or newer, 64 bit, with its standard library and nothing else.
 
 Linux     libpython3 in the process: a host that is Python has it, any other is started with it in LD_PRELOAD.
 Windows   the folder of python3.dll in PATH.
 """
-LAYER = "pythonfmu"
-ENTRY = """\
-from {package} import {model}, lend
+PYTHONFMU = "pythonfmu"
+ENTRY_SCRIPT = """\
+from {package} import {model}, keep_reference
 
-lend(globals())
+keep_reference(globals())
 """
 EARLIEST, LATEST = datetime(1980, 1, 1, tzinfo=UTC), datetime(2107, 12, 31, tzinfo=UTC)  # that a zip can tell
 
@@ -55,22 +55,22 @@ def build(
     An older one is replaced whole or not at all.  Methods, friction laws and platforms may be chosen
     (written/offer.py); without a choice it has all there are.
     """
-    source, date = find(model), build_date()
-    name, offered = source.name, offer(source, methods, laws)
-    cls, texts = written(source, offered), files_of(source, offered)
-    sources = travelling(source, texts)
-    code = digest(sources, ENTRY)
+    source, date = find_model(model), build_date()
+    name, offered = source.name, select_features(source, methods, laws)
+    cls, texts = lowered_model(source, offered), lowered_files(source, offered)
+    sources = embedded_files(source, texts)
+    code = digest(sources, ENTRY_SCRIPT)
     package = f"{name}_{code[:12]}"
-    entries = companions(cls, source.path, declared_by(cls))
+    entries = extra_files(cls, source.path, declared_variables(cls))
     entries |= {f"resources/{package}/{path}": text.encode() for path, text in sources.items()}
     entries |= {
-        "documentation/externalDependencies.txt": NEEDED.encode(),
+        "documentation/externalDependencies.txt": HOST_REQUIREMENTS.encode(),
         "modelDescription.xml": describe(cls, name, code, date),
         "resources/slavemodule.txt": f"{package}_fmu".encode(),
-        f"resources/{package}_fmu.py": ENTRY.format(package=package, model=cls.__name__).encode(),
+        f"resources/{package}_fmu.py": ENTRY_SCRIPT.format(package=package, model=cls.__name__).encode(),
     }
-    entries |= _binaries(name, platforms) | licenses()
-    return write(folder / f"{name}.fmu", zipped(entries, date))
+    entries |= _binaries(name, platforms) | license_files()
+    return write(folder / f"{name}.fmu", zip_entries(entries, date))
 
 
 def build_date() -> datetime:
@@ -84,24 +84,26 @@ def build_date() -> datetime:
 
 def _binaries(name: str, platforms: Sequence[str]) -> dict[str, bytes]:
     """The native layer for the platforms, or for every one that it comes for."""
-    files = (installed(LAYER) / "resources" / "binaries").glob("*/*")
+    files = (installed_package(PYTHONFMU) / "resources" / "binaries").glob("*/*")
     there = {path.parent.name: path for path in sorted(files) if path.suffix in (".so", ".dll", ".dylib")}
     if not there:
-        raise BuildError(f"The installed {LAYER} has no binaries: try 'pip install --force-reinstall {LAYER}'.")
+        raise BuildError(f"The installed {PYTHONFMU} has no binaries: try 'pip install --force-reinstall {PYTHONFMU}'.")
     for platform in platforms:
         if platform not in there:
             known = ", ".join(there)
-            raise BuildError(f"{LAYER} has no binary for {platform}, only for {known}: add --native.")
+            raise BuildError(f"{PYTHONFMU} has no binary for {platform}, only for {known}: add --native.")
     chosen = [there[platform] for platform in platforms or there]
     return {f"binaries/{path.parent.name}/{name}{path.suffix}": path.read_bytes() for path in chosen}
 
 
-def licenses() -> dict[str, bytes]:
+def license_files() -> dict[str, bytes]:
     """The licence of the FMU, and that of the native layer inside it."""
     ours, kept = Path(__file__).resolve().parents[2], "{}-*.dist-info/**/LICENSE"
     return {
         "documentation/licenses/license.txt": _license(ours, kept.format("friction_fmus"), "LICENSE"),  # or of a clone
-        f"documentation/licenses/{LAYER}.txt": _license(installed(LAYER).parent, kept.format(LAYER)),
+        f"documentation/licenses/{PYTHONFMU}.txt": _license(
+            installed_package(PYTHONFMU).parent, kept.format(PYTHONFMU)
+        ),
     }
 
 
@@ -113,7 +115,7 @@ def _license(folder: Path, *patterns: str) -> bytes:
     raise BuildError(f"There is no {patterns[-1]} in {folder}, and an FMU carries it: restore it.")
 
 
-def zipped(entries: dict[str, bytes], date: datetime) -> bytes:
+def zip_entries(entries: dict[str, bytes], date: datetime) -> bytes:
     """A zip of the entries; order, time, permissions and compression do not depend on the machine."""
     buffer = BytesIO()
     with ZipFile(buffer, "w") as archive:

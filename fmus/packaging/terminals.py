@@ -3,8 +3,8 @@
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-from .document import document
-from .further import Variables
+from .fmi_variables import Variables
+from .xml_output import xml_bytes
 
 FOLDER, FILE = "terminalsAndIcons", "terminalsAndIcons.xml"
 CORNERS = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
@@ -39,4 +39,4 @@ def terminals(declared: Variables) -> dict[str, bytes]:
         kind = "inflow" if variable == force else "signal"
         SubElement(terminal, "TerminalMemberVariable", variableName=variable, memberName=member, variableKind=kind)
     SubElement(terminal, "TerminalGraphicalRepresentation", EDGE, iconBaseName=ICON.stem)
-    return {f"{FOLDER}/{FILE}": document(root), f"{FOLDER}/{ICON.name}": ICON.read_bytes()}
+    return {f"{FOLDER}/{FILE}": xml_bytes(root), f"{FOLDER}/{ICON.name}": ICON.read_bytes()}

@@ -48,16 +48,16 @@ SYMBOLS = {  # exponents of kg, m, s and rad
     **{"1": (0, 0, 0, 0), "kg": (1, 0, 0, 0), "m": (0, 1, 0, 0), "s": (0, 0, 1, 0), "rad": (0, 0, 0, 1)},
     **{"N": (1, 1, -2, 0), "J": (1, 2, -2, 0), "W": (1, 2, -3, 0), "Pa": (1, -1, -2, 0), "Hz": (0, 0, -1, 0)},
 }
-FACTOR = re.compile(r"([./])(1|[A-Za-z]+)(-?\d{1,2})?")
+FACTOR_PATTERN = re.compile(r"([./])(1|[A-Za-z]+)(-?\d{1,2})?")
 
 
-def derived(symbol: str) -> Unit | None:
+def parse_unit(symbol: str) -> Unit | None:
     """A unit that is a product or quotient, each with an exponent if need be; None for what is not.
 
     >>> derived("N.m.s/rad")
     Unit(quantity='N.m.s/rad', kg=1, m=2, s=-1, rad=-1, display='', factor=1.0)
     """
-    factors = FACTOR.findall(f".{symbol}")
+    factors = FACTOR_PATTERN.findall(f".{symbol}")
     if "".join(map("".join, factors)) != f".{symbol}" or any(part not in SYMBOLS for _, part, _ in factors):
         return None
     times = [int(power or "1") * (1 if sign == "." else -1) for sign, _, power in factors]
@@ -68,7 +68,7 @@ def derived(symbol: str) -> Unit | None:
 
 def unit_of(name: str, symbol: str, display: str = "") -> Unit:
     """The unit of the variable `name`, with the display unit that it asks for."""
-    unit = UNITS.get(symbol) or derived(symbol)
+    unit = UNITS.get(symbol) or parse_unit(symbol)
     if unit is None:
         raise BuildError(
             f"{name} has the unit {symbol!r}; known units are {', '.join(UNITS)}, and products of {', '.join(SYMBOLS)} "

@@ -10,10 +10,10 @@ import pytest
 from models import AUTHORED, LARGER, MODELS, ROOT
 
 import fmus
-from fmus.packaging.catalogue import find
 from fmus.packaging.equations.algebra import ARITHMETIC
-from fmus.packaging.equations.declared import Choice, Contact, Model, Output, Rule, Variable
 from fmus.packaging.equations.expressions import FUNCTIONS, Term
+from fmus.packaging.equations.model_declaration import Choice, Contact, Model, Output, Rule, Variable
+from fmus.packaging.model_lookup import find_model
 
 SOURCES = [*MODELS, *AUTHORED]
 EVERY_SOURCE = pytest.mark.parametrize("source", SOURCES, ids=lambda source: getattr(source, "stem", source))
@@ -24,12 +24,12 @@ DIGITS = 50
 class Evaluated:
     """The declared equations of a model, evaluated as they stand, term by term, in floats or in many digits."""
 
-    def __init__(self, anatomy, values, functions):
-        self.anatomy, self.values, self.functions = anatomy, values, functions
+    def __init__(self, analysis, values, functions):
+        self.analysis, self.values, self.functions = analysis, values, functions
 
     def of(self, e):
         if isinstance(e, Output):
-            return self.of(e.means)
+            return self.of(e.expression)
         if not isinstance(e, Term):
             return self.values[e.name] if isinstance(e, Variable) else self.number(e)
         if e.op == "choose":
@@ -48,30 +48,30 @@ class Evaluated:
         return mpmath.mpf(x) if self.functions is mpmath.mp else float(x)
 
 
-def situations(anatomy, model, count):
+def situations(analysis, model, count):
     """Values for all parameters, choices and inputs, set in the model too, and a time, states and a mode."""
-    draw = random.Random(anatomy.name)
+    draw = random.Random(analysis.name)
     for _ in range(count):
         values = {}
-        for e in (*anatomy.parameters, *anatomy.inputs):
+        for e in (*analysis.parameters, *analysis.inputs):
             size = (e.start or 0.3) * draw.uniform(0.7, 1.3)
             values[e.name] = float(size if e.accepts(size) else e.start)
-        for e in anatomy.choices:
+        for e in analysis.choices:
             values[e.name] = draw.choice(e.items)[1]
         for name, value in values.items():
             setattr(model, name, value)
         if model.prepare():
             continue
         t = draw.uniform(0.0, 10.0)
-        if anatomy.drives:
+        if analysis.drivers:
             model.t_base, model.x_base = draw.uniform(0.0, 1.0), draw.uniform(-0.01, 0.01)
-        at = {e.name: draw.uniform(-0.5, 0.5) for e in anatomy.states}
+        at = {e.name: draw.uniform(-0.5, 0.5) for e in analysis.states}
         yield values, t, at, draw.choice((-1, 1))
 
 
-def driven(anatomy, model, t):
+def driven(analysis, model, t):
     """Where a driver is."""
-    return {d.name: model.x_base + getattr(model, d.steady.name) * (t - model.t_base) for d in anatomy.drives}
+    return {d.name: model.x_base + getattr(model, d.constant_rate.name) * (t - model.t_base) for d in analysis.drivers}
 
 
 def same_bits(a, b):
@@ -81,27 +81,27 @@ def same_bits(a, b):
 @EVERY_SOURCE
 def test_what_is_written_out_has_the_bits_of_the_equations_as_they_stand(source):
     """Rates and outputs while sliding and while stuck; the load as rates that it makes zero."""
-    anatomy, model = find(source).anatomy, find(source).model()
-    modes = [m.name for m in anatomy.modes]
+    analysis, model = find_model(source).analysis, find_model(source).model()
+    modes = [m.name for m in analysis.modes]
     tried = 0
-    for values, t, at, mode in situations(anatomy, model, 300):
-        values |= at | driven(anatomy, model, t) | dict.fromkeys(modes, mode)
-        equations = Evaluated(anatomy, values, math)
-        for c in anatomy.contacts:
+    for values, t, at, mode in situations(analysis, model, 300):
+        values |= at | driven(analysis, model, t) | dict.fromkeys(modes, mode)
+        equations = Evaluated(analysis, values, math)
+        for c in analysis.contacts:
             values[c.name] = mode * equations.of(c.slide)
         model.compute_outputs(t, *at.values(), *[mode] * len(modes))
-        for e in (*anatomy.outputs, *anatomy.contacts):
+        for e in (*analysis.outputs, *analysis.contacts):
             assert same_bits(getattr(model, e.name) + 0.0, equations.of(e) + 0.0), e.name
         rate = model.rates(t, *at.values(), *[mode] * len(modes))
-        assert same_bits(rate + 0.0, equations.of(anatomy.law[anatomy.own[0]]) + 0.0)
-        for c in anatomy.contacts:
+        assert same_bits(rate + 0.0, equations.of(analysis.rate_outputs[analysis.dynamic_states[0]]) + 0.0)
+        for c in analysis.contacts:
             at[c.slip.name] = values[c.slip.name] = 0.0
             values[c.name], _, limit = model.stick_load(t, *at.values())
-            size = sum(abs(equations.of(e)) for e in anatomy.outputs) + abs(values[c.name])
-            assert abs(equations.of(anatomy.law[c.slip])) < 1e-13 * size
+            size = sum(abs(equations.of(e)) for e in analysis.outputs) + abs(values[c.name])
+            assert abs(equations.of(analysis.rate_outputs[c.slip])) < 1e-13 * size
             assert limit >= 0.0
             model.compute_outputs(t, *at.values(), 0)
-            assert getattr(model, anatomy.law[c.slip].name) == 0.0
+            assert getattr(model, analysis.rate_outputs[c.slip].name) == 0.0
         tried += 1
     assert tried > 100
 
@@ -109,10 +109,12 @@ def test_what_is_written_out_has_the_bits_of_the_equations_as_they_stand(source)
 @EVERY_SOURCE
 def test_jacobians_are_those_of_differences_in_fifty_digits(source):
     """By time and by each state, sliding either way: of the equations as they stand."""
-    anatomy, model, found = find(source).anatomy, find(source).model(), []
-    for values, t, at, mode in situations(anatomy, model, 40):
-        known = values | at | driven(anatomy, model, t) | {m.name: mode for m in anatomy.modes}
-        found += zip(model.jacobian(t, *at.values(), *[mode] * len(anatomy.modes)), slopes(anatomy, known), strict=True)
+    analysis, model, found = find_model(source).analysis, find_model(source).model(), []
+    for values, t, at, mode in situations(analysis, model, 40):
+        known = values | at | driven(analysis, model, t) | {m.name: mode for m in analysis.modes}
+        found += zip(
+            model.jacobian(t, *at.values(), *[mode] * len(analysis.modes)), slopes(analysis, known), strict=True
+        )
     size = max(abs(true) for _, true in found)
     assert all(abs(slope - true) <= 1e-12 * abs(true) + 1e-15 * size for slope, true in found)
 
@@ -121,27 +123,29 @@ def test_jacobians_are_those_of_differences_in_fifty_digits(source):
 def test_any_states_and_contacts_are_derived(source):
     """Rates and Jacobian in every mode, of three states and of two contacts; what is stuck to the ground does not
     move."""
-    anatomy = find(source).anatomy
-    model = find(source).model()
-    for values, t, at, _ in situations(anatomy, model, 12):
-        for modes in product((-1, 0, 1), repeat=len(anatomy.modes)):
-            known = values | at | driven(anatomy, model, t)
-            known |= {m.name: mode for m, mode in zip(anatomy.modes, modes, strict=True)}
+    analysis = find_model(source).analysis
+    model = find_model(source).model()
+    for values, t, at, _ in situations(analysis, model, 12):
+        for modes in product((-1, 0, 1), repeat=len(analysis.modes)):
+            known = values | at | driven(analysis, model, t)
+            known |= {m.name: mode for m, mode in zip(analysis.modes, modes, strict=True)}
             point = t, *at.values(), *modes
             rates = model.rates(*point)
-            for state, got in zip(anatomy.own, rates if len(anatomy.own) > 1 else [rates], strict=True):
-                true = settled(anatomy, anatomy.law[state], known)
+            for state, got in zip(
+                analysis.dynamic_states, rates if len(analysis.dynamic_states) > 1 else [rates], strict=True
+            ):
+                true = settled(analysis, analysis.rate_outputs[state], known)
                 assert abs(got - true) < 1e-12 * (1 + abs(true))
-                stuck = [c for c in anatomy.lonely if c.slip is state and known[c.mode.name] == 0]
+                stuck = [c for c in analysis.independent_contacts if c.slip is state and known[c.mode.name] == 0]
                 assert got == 0.0 or not stuck
-            for got, true in zip(model.jacobian(*point), slopes(anatomy, known), strict=True):
+            for got, true in zip(model.jacobian(*point), slopes(analysis, known), strict=True):
                 assert abs(got - true) < 1e-11 * (1 + abs(true))
 
 
-def slopes(anatomy, known):
+def slopes(analysis, known):
     """The derivatives of each law by time and by each state, as differences in many digits."""
-    by_time = {d.name: known[d.steady.name] for d in anatomy.drives}
-    ways = [by_time, *({s.name: 1} for s in anatomy.states)]
+    by_time = {d.name: known[d.constant_rate.name] for d in analysis.drivers}
+    ways = [by_time, *({s.name: 1} for s in analysis.states)]
     with mpmath.workdps(DIGITS):
         h = mpmath.mpf(10) ** -20
 
@@ -149,29 +153,31 @@ def slopes(anatomy, known):
             return known | {name: known[name] + step * mpmath.mpf(speed) for name, speed in way.items()}
 
         pairs = (
-            [settled(anatomy, anatomy.law[s], moved(way, d)) for d in (h, -h)] for s in anatomy.own for way in ways
+            [settled(analysis, analysis.rate_outputs[s], moved(way, d)) for d in (h, -h)]
+            for s in analysis.dynamic_states
+            for way in ways
         )
         return [(ahead - behind) / (2 * h) for ahead, behind in pairs]
 
 
 @mpmath.workdps(DIGITS)
-def settled(anatomy, law, known):
+def settled(analysis, law, known):
     """The law in many digits, with the force of each contact: that of a slide, or the one that keeps its slip.
 
     Slips are linear in the speeds, and their rates in the forces, so that differences say how they hang together.
     """
-    modes = {m.name for m in anatomy.modes}
+    modes = {m.name for m in analysis.modes}
     values = {name: value if name in modes else mpmath.mpf(value) for name, value in known.items()}
-    equations = Evaluated(anatomy, values, mpmath.mp)
-    stuck = [c for c in anatomy.contacts if values[c.mode.name] == 0]
-    for c in anatomy.contacts:
+    equations = Evaluated(analysis, values, mpmath.mp)
+    stuck = [c for c in analysis.contacts if values[c.mode.name] == 0]
+    for c in analysis.contacts:
         values[c.name] = values[c.mode.name] * equations.of(c.slide) + mpmath.mpf(0)
 
     def rates():
         h = mpmath.mpf(10) ** -15
-        flow = {s.name: h * equations.of(anatomy.rate[s]) for s in anatomy.states}
-        flow |= {d.name: h * values[d.steady.name] for d in anatomy.drives}
-        later = Evaluated(anatomy, values | {name: values[name] + way for name, way in flow.items()}, mpmath.mp)
+        flow = {s.name: h * equations.of(analysis.rate[s]) for s in analysis.states}
+        flow |= {d.name: h * values[d.constant_rate.name] for d in analysis.drivers}
+        later = Evaluated(analysis, values | {name: values[name] + way for name, way in flow.items()}, mpmath.mp)
         return [(later.of(c.slip) - equations.of(c.slip)) / h for c in stuck]
 
     if stuck:
@@ -188,7 +194,7 @@ def settled(anatomy, law, known):
 @EVERY_SOURCE
 def test_a_model_is_written_from_the_face_alone(source):
     """So that a file from anywhere is like ours."""
-    tree = ast.parse(find(source).source)
+    tree = ast.parse(find_model(source).source)
     for node in ast.walk(tree):
         assert not isinstance(node, ast.Import)
         if isinstance(node, ast.ImportFrom):
@@ -210,23 +216,23 @@ def test_the_face_is_complete():
 @EVERY_SOURCE
 def test_the_text_that_travels_is_the_same_each_time(source):
     """Builds are compared by their bytes; reading a file anew changes nothing."""
-    first = find(source)
+    first = find_model(source)
     again = type(first)(first.path, first.source)
-    anatomy = again.anatomy
-    for slope in ({e: 1.0} for e in anatomy.states):  # whoever asks before changes nothing
-        anatomy.sliding(anatomy.law[anatomy.own[0]], slope)
-    assert anatomy.first_to_overflow
-    assert again.text == first.text
-    assert f"Written out from the equations in {first.path.name}" in first.text
+    analysis = again.analysis
+    for slope in ({e: 1.0} for e in analysis.states):  # whoever asks before changes nothing
+        analysis.derivative_while_sliding(analysis.rate_outputs[analysis.dynamic_states[0]], slope)
+    assert analysis.overflow_indicators
+    assert again.generated_source == first.generated_source
+    assert f"Written out from the equations in {first.path.name}" in first.generated_source
 
 
 def test_a_file_is_read_anew_when_it_has_changed(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text((ROOT / "fmus" / "smd.py").read_text())
-    first = find(path)
-    assert find(path) is first
+    first = find_model(path)
+    assert find_model(path) is first
     path.write_text(path.read_text().replace("157.9", "158.0"))
-    assert find(path).model().k == 158.0
+    assert find_model(path).model().k == 158.0
 
 
 def test_an_author_may_derive_variables_of_a_kind(tmp_path):
@@ -236,7 +242,7 @@ def test_an_author_may_derive_variables_of_a_kind(tmp_path):
         (ROOT / "fmus" / "smd.py").read_text().replace("class Smd", "class Mass(Parameter):\n    pass\n\n\nclass Smd")
     )
     path.write_text(text.replace('m = Parameter(1.0, "kg"', 'm = Mass(1.0, "kg"'))
-    assert find(path).text == find("smd").text.replace("smd.py", "mine.py")
+    assert find_model(path).generated_source == find_model("smd").generated_source.replace("smd.py", "mine.py")
 
 
 @pytest.mark.parametrize("moved", ["x", "driver"])
@@ -262,16 +268,16 @@ class Jump(Model):
     a = Output("m/s2", "acceleration", (k * (driver - x) + choose({moved} > edge, f, -f) - F) / m, rate_of=v)
 '''
     (tmp_path / "jump.py").write_text(text)
-    anatomy = find(tmp_path / "jump.py").anatomy
-    assert anatomy.closed_form is None
-    assert anatomy.waits == (moved == "x")
+    analysis = find_model(tmp_path / "jump.py").analysis
+    assert analysis.closed_form is None
+    assert analysis.waits == (moved == "x")
     (tmp_path / "jump.py").write_text(text.replace(f"choose({moved} > edge, f, -f)", "f"))
-    assert find(tmp_path / "jump.py").anatomy.closed_form is not None
+    assert find_model(tmp_path / "jump.py").analysis.closed_form is not None
 
 
 def test_choices_and_contacts_are_walked():
     """The models of these tests have what they are to try."""
-    kinds = {type(e) for source in SOURCES for e in find(source).anatomy.declared}
+    kinds = {type(e) for source in SOURCES for e in find_model(source).analysis.declared}
     assert {Choice, Contact} <= kinds
-    functions = {name for source in SOURCES for name in FUNCTIONS if f"{name}(" in find(source).text}
+    functions = {name for source in SOURCES for name in FUNCTIONS if f"{name}(" in find_model(source).generated_source}
     assert functions == {*FUNCTIONS}

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 
 from fmus.packaging import BuildError
 from fmus.packaging.archive import build
-from fmus.packaging.catalogue import find
+from fmus.packaging.model_lookup import find_model
 
 EVERY_FILE = pytest.mark.parametrize("path", AUTHORED, ids=lambda path: path.stem)
 KINDS = {
@@ -35,7 +35,7 @@ def command(*arguments, cwd):
 def built(path, kind):
     """The FMU, beside a copy of the file in a folder outside the project; of FMI 3.0, whose numerics are those of the
     native FMU, with its usual method."""
-    usual = ["--method", find(path).anatomy.method] if kind == "native/fmi3" else []
+    usual = ["--method", find_model(path).analysis.method] if kind == "native/fmi3" else []
     return of_file(path, *KINDS[kind], *usual) / kind / f"{path.stem}.fmu"
 
 
@@ -89,7 +89,7 @@ def test_its_motion_is_that_of_its_equations_written_by_hand(law, start):
     stop = model_class(path).stop_time
     values = {"solver.rtol": 1e-11, "solver.method": 4}
     found = simulate_fmu(built(path, "native"), stop_time=stop, output_interval=stop / 100, start_values=values)
-    x, v = (s.name for s in find(path).anatomy.states)
+    x, v = (s.name for s in find_model(path).analysis.states)
     true = solve_ivp(law, (0.0, stop), start, "DOP853", t_eval=found["time"], rtol=1e-12, atol=1e-13).y
     assert np.abs(found[x] - true[0]).max() < 1e-9
     assert np.abs(found[v] - true[1]).max() < 1e-8

@@ -6,7 +6,7 @@ import pytest
 from commands import build
 
 from fmus.packaging import BuildError
-from fmus.packaging.catalogue import find
+from fmus.packaging.model_lookup import find_model
 
 HEAD = '''"""A model."""
 from fmus import *
@@ -244,7 +244,7 @@ def test_a_mistake_is_told_in_one_sentence_with_its_line(wrong, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(HEAD + body)
     with pytest.raises(BuildError, match=re.escape(f"{path}, line {line}: {sentence}")) as told:
-        find(path).model  # noqa: B018
+        find_model(path).model  # noqa: B018
     assert "\n" not in str(told.value)
 
 
@@ -254,7 +254,7 @@ def test_any_words_travel_as_they_are(tmp_path):
     path = tmp_path / "mine.py"
     text = (HEAD + RATE).replace('    """A mass on a spring.', f"    r'''{words}")
     path.write_text("\ufeff" + text.replace('- c v\n    """', "- c v\n    '''"), encoding="utf-8")
-    assert find(path).model.__doc__.startswith(words)
+    assert find_model(path).model.__doc__.startswith(words)
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_a_file_holds_one_model(text, sentence, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(text)
     with pytest.raises(BuildError, match=sentence):
-        find(path).text  # noqa: B018
+        find_model(path).generated_source  # noqa: B018
 
 
 @pytest.mark.parametrize("name", ["Solver", "March", "Größe"])
@@ -276,7 +276,7 @@ def test_a_class_has_a_name_of_its_own(name, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text((HEAD + RATE).replace("Mine", name))
     with pytest.raises(BuildError, match=f"mine.py, line 4: the name {name} is taken, or has letters that C does not"):
-        find(path).text  # noqa: B018
+        find_model(path).generated_source  # noqa: B018
 
 
 @pytest.mark.parametrize("name", ["my-model.py", "runtime.py", "1st.py", "class.py"])
@@ -284,7 +284,7 @@ def test_a_file_has_the_name_of_a_model(name, tmp_path):
     path = tmp_path / name
     path.write_text(HEAD + RATE)
     with pytest.raises(BuildError, match="a model has the name of its file, in letters, digits and _"):
-        find(path).text  # noqa: B018
+        find_model(path).generated_source  # noqa: B018
 
 
 def test_the_command_says_it_without_a_traceback(tmp_path):

@@ -7,19 +7,19 @@ from by_hand import BY_HAND, followed
 from models import DOP853, LARGER, growing
 from scipy.integrate import solve_ivp
 
-from fmus.packaging.further import exchanged
-from fmus.packaging.written import beside, written
+from fmus.packaging.fmi_variables import model_exchange_instance
+from fmus.packaging.lowering import lowered_model, sibling_module
 
 FILES = {path.stem: path for path in LARGER}
 
 
 def integrated(name, stop):
     """Time and modes of each event, and the last state, by scipy with the indicators for events."""
-    cls = written(FILES[name])
+    cls = lowered_model(FILES[name])
     model, exchange, run = (
-        exchanged(cls),
-        beside(cls, "runtime.model_exchange"),
-        beside(cls, "runtime.call_sequence").RunState(1e-10),
+        model_exchange_instance(cls),
+        sibling_module(cls, "runtime.model_exchange"),
+        sibling_module(cls, "runtime.call_sequence").RunState(1e-10),
     )
     begun(model, {"solver.method": DOP853, "solver.rtol": 1e-10}, stop)
     start(model, model.initial_state(0.0), stop)
@@ -81,11 +81,11 @@ def test_modes_follow_at_the_events_that_an_importer_finds(name):
 
 def test_where_no_modes_fit_no_state_is_a_number(tmp_path):
     """A sled whose sliding friction is above the static one, when the driver has pulled far enough."""
-    cls = written(growing(tmp_path))
+    cls = lowered_model(growing(tmp_path))
     model, exchange, run = (
-        exchanged(cls),
-        beside(cls, "runtime.model_exchange"),
-        beside(cls, "runtime.call_sequence").RunState(1e-10),
+        model_exchange_instance(cls),
+        sibling_module(cls, "runtime.model_exchange"),
+        sibling_module(cls, "runtime.call_sequence").RunState(1e-10),
     )
     begun(model, {"slide1": 200.0}, 8.0)
     start(model, model.initial_state(0.0), 8.0)

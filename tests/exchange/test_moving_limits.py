@@ -5,8 +5,8 @@ import pytest
 from arrays import begun, spelled, start
 from models import DOP853, LARGER, MODELS, ODE45, RODAS, declared
 
-from fmus.packaging.further import exchanged
-from fmus.packaging.written import beside, written
+from fmus.packaging.fmi_variables import model_exchange_instance
+from fmus.packaging.lowering import lowered_model, sibling_module
 from fmus.runtime.stick_slip import NO_CONSISTENT_MODES
 
 FILES = {path.stem: path for path in LARGER}
@@ -33,7 +33,7 @@ class Slider(Model):
 @pytest.mark.parametrize("method", [ODE45, DOP853, RODAS])
 def test_a_steady_load_breaks_away_when_the_limit_has_come_down_to_it(method):
     """A sled under a force, lifted by its driver: when mu_s (m g - lift u t) is the force."""
-    model = begun(written(FILES["lift"])(), {"solver.method": method, "k": 0.0, "F_ext": 60.0}, 16.0)
+    model = begun(lowered_model(FILES["lift"])(), {"solver.method": method, "k": 0.0, "F_ext": 60.0}, 16.0)
     start(model, model.initial_state(0.0), 16.0)
     step = model.solver.step
     while not step.event_at_end:
@@ -45,11 +45,11 @@ def test_a_steady_load_breaks_away_when_the_limit_has_come_down_to_it(method):
 
 def led(source, values):
     """A model that an importer's solver leads, its exchange, and its run."""
-    cls = written(source)
+    cls = lowered_model(source)
     model, exchange, run = (
-        exchanged(cls),
-        beside(cls, "runtime.model_exchange"),
-        beside(cls, "runtime.call_sequence").RunState(1e-6),
+        model_exchange_instance(cls),
+        sibling_module(cls, "runtime.model_exchange"),
+        sibling_module(cls, "runtime.call_sequence").RunState(1e-6),
     )
     begun(model, {"solver.method": DOP853, "solver.rtol": 1e-6} | values, 1.0)
     start(model, model.initial_state(0.0), 1.0)
@@ -105,7 +105,7 @@ def test_what_comes_to_slide_with_more_than_it_holds_is_told_and_leads_nowhere(s
     """In co-simulation by any method, in model exchange by states that are no numbers."""
     methods = [value for _, value, _ in declared(slider)["solver.method"].items]
     for method in methods:
-        model = begun(written(slider)(), {"solver.method": method, "press": 5.0, "F_ext": 4.5}, 1.0)
+        model = begun(lowered_model(slider)(), {"solver.method": method, "press": 5.0, "F_ext": 4.5}, 1.0)
         start(model, model.initial_state(0.0), 1.0)
         assert model.solver.step.compute_next(model) == NO_CONSISTENT_MODES
     model, exchange, _ = led(slider, {"press": 5.0})

@@ -14,7 +14,7 @@ from compare import identical
 from driver import Refused, Worker
 from models import MODELS, declared, model_class, outputs, runtime
 
-from fmus.packaging.written import beside
+from fmus.packaging.lowering import sibling_module
 
 TIMES = 10_000 // len(MODELS)
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
@@ -54,7 +54,7 @@ def taken(made, content):
     """Whether the bytes are taken for a state."""
     try:
         made._fmu_state_from_bytes(content)
-    except beside(made.Model, "runtime.saved_state").InvalidStateError:
+    except sibling_module(made.Model, "runtime.saved_state").InvalidStateError:
         return False
     return True
 

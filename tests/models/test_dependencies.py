@@ -12,8 +12,8 @@ import fmi3_hosts
 import pytest
 from models import MODELS, ROOT, declared, model_class, outputs, push
 
-from fmus.packaging.dependencies import at_start
-from fmus.packaging.written import written
+from fmus.packaging.initial_dependencies import initial_dependencies
+from fmus.packaging.lowering import lowered_model
 from fmus.runtime.variable_declarations import variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
@@ -114,7 +114,7 @@ def test_what_shows_in_few_situations_only_is_told_too(tmp_path):
     text = (ROOT / "tests" / "authored" / "bumper.py").read_text(encoding="utf-8")
     more = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
     (tmp_path / "bumper.py").write_text(text + more, encoding="utf-8")
-    model = written(tmp_path / "bumper.py")
-    told = at_start(model, variables(model()))
+    model = lowered_model(tmp_path / "bumper.py")
+    told = initial_dependencies(model, variables(model()))
     assert {"gap", "s"} <= set(told["a"])
     assert told["depth"] == ["gap"]

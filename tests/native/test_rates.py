@@ -15,7 +15,7 @@ from models import DOP853, EXACT, MODELS, ODE23, ODE45, RODAS, outputs, push
 from ramps import Body, followed
 from scipy.integrate import solve_ivp
 
-from fmus.packaging.catalogue import find
+from fmus.packaging.model_lookup import find_model
 
 DAMPING = {  # stiffness, damping
     "none": (157.9, 0.0),
@@ -396,5 +396,5 @@ class Block(Model):
         .replace("Block(", "Bar(")
     )
     for name, ramps in (("block", ["F_ext"]), ("bar", ["F_ext"])):
-        anatomy = replace(find(tmp_path / f"{name}.py"), ramps=True).anatomy
-        assert [e.name for e in anatomy.ramps] == ramps
+        analysis = replace(find_model(tmp_path / f"{name}.py"), ramps=True).analysis
+        assert [e.name for e in analysis.ramps] == ramps

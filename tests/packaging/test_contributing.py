@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from builds import ROOT
 
-from fmus.packaging.catalogue import names
+from fmus.packaging.model_lookup import model_names
 
 BLOCK = re.compile(r"^```(\w+) ?(\S*)\n(.*?)^```$", re.M | re.S)
 CHANGE = re.compile(r"((?:^-.*\n)+)((?:^\+.*\n)+)", re.M)
@@ -25,7 +25,7 @@ def project(tmp_path):
             shutil.copytree(ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns("*.fmu"))
         else:
             shutil.copy(ROOT / part, tmp_path)
-    for name in {*names()} - {"stickslip"}:
+    for name in {*model_names()} - {"stickslip"}:
         (tmp_path / "fmus" / f"{name}.py").unlink()
     return tmp_path
 

@@ -17,8 +17,8 @@ from lxml import etree
 from models import ROOT, model_class
 from PIL import Image
 
-from fmus.packaging.catalogue import find, names
-from fmus.packaging.further import exchanged
+from fmus.packaging.fmi_variables import model_exchange_instance
+from fmus.packaging.model_lookup import find_model, model_names
 from fmus.packaging.native.sources import FMI_HEADERS, WRITTEN
 from fmus.runtime.variable_declarations import variables
 from tests.packaging.test_packaging import (  # noqa: F401
@@ -30,8 +30,8 @@ from tests.packaging.test_packaging import (  # noqa: F401
 )
 
 SCHEMA = Path(fmpy.__file__).parent / "schema/fmi3"
-DRY = {name for name in names() if find(name).model.has_dry_friction}
-DRIVEN = {name for name in names() if find(name).model.has_driver}
+DRY = {name for name in model_names() if find_model(name).model.has_dry_friction}
+DRIVEN = {name for name in model_names() if find_model(name).model.has_driver}
 TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
 STRUCTURE = ("Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator")
 # Nothing is without effect, and friction often holds.
@@ -46,8 +46,10 @@ def fmu():
 @pytest.fixture(scope="module")
 def look(fmu, tmp_path_factory):
     """look(function, name, ...): what is seen where the FMU is all there is to see; one process looks for all tests."""
-    asked = [("variables", name) for name in names()]
-    asked += [("factors", name, PARAMETERS.get(name, {})) for name in names()] + [("nominals", "pacejka", "x_m", 1e-5)]
+    asked = [("variables", name) for name in model_names()]
+    asked += [("factors", name, PARAMETERS.get(name, {})) for name in model_names()] + [
+        ("nominals", "pacejka", "x_m", 1e-5)
+    ]
     calls = [(function, fmu(name), *more) for function, name, *more in asked]
     answers = driver.host("fmi3_look.py", "each", calls, folder=tmp_path_factory.mktemp("look"))
     return lambda *call: answers[asked.index(call)]
@@ -115,7 +117,7 @@ def test_every_number_has_a_unit_and_every_enumeration_its_items(fmu, name):
     units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
     assert {element.get("unit") for element in root.iterfind("ModelVariables/Float64")} == units
     types = {kind.get("name"): kind for kind in root.find("TypeDefinitions")}
-    for variable, meaning in variables(find(name).model()):
+    for variable, meaning in variables(find_model(name).model()):
         if meaning.items:
             element = root.find(f"ModelVariables/Enumeration[@name='{variable}']")
             items = types[element.get("declaredType")].findall("Item")
@@ -148,13 +150,15 @@ def test_the_structure_lists_all_unknowns_in_the_order_of_the_schema(fmu, name):
 @EVERY_MODEL
 def test_only_the_speed_may_jump_and_only_where_friction_is_dry(fmu, name):
     jumping = [element.get("name") for element in described(fmu(name)).findall("ModelVariables/*[@reinit='true']")]
-    _, speed, *_ = [variable for variable, meaning in variables(find(name).model()) if meaning.causality == "output"]
+    _, speed, *_ = [
+        variable for variable, meaning in variables(find_model(name).model()) if meaning.causality == "output"
+    ]
     assert jumping == ([speed] if name in DRY else [])
 
 
 @EVERY_MODEL
 def test_nominal_values_are_the_sizes_that_our_own_solver_takes(fmu, name):
-    model = exchanged(model_class(name))
+    model = model_exchange_instance(model_class(name))
     nominals = model.model_exchange.nominals
     model.prepare()
     model.solver.start(model, 0.0, *model.initial_state(0.0), inf, model.tolerance)
@@ -208,7 +212,9 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_takes_others(fmu, loo
     assert set(told["starts"]) == {e.get("name") for e in elements}
     assert starts == {variable: told["starts"][variable] for variable in starts}
     settable = {
-        variable for variable, meaning in variables(find(name).model()) if meaning.causality in ("parameter", "input")
+        variable
+        for variable, meaning in variables(find_model(name).model())
+        if meaning.causality in ("parameter", "input")
     }
     assert set(told["after"]) == settable == set(starts)
     for e in elements:
@@ -247,7 +253,7 @@ def test_the_flange_is_that_of_the_body_valid_and_drawn(fmu, name):
         tuple(map(m.get, ("variableName", "variableKind")))
         for m in etree.fromstring(content).iter("TerminalMemberVariable")
     ]
-    x, v = [variable for variable, meaning in variables(find(name).model()) if meaning.role == "state"][:2]
+    x, v = [variable for variable, meaning in variables(find_model(name).model()) if meaning.role == "state"][:2]
     assert members == [(x, "signal"), (v, "signal"), ("T_ext" if name == "pendulum" else "F_ext", "inflow")]
     (drawn,) = etree.fromstring(content).iter("TerminalGraphicalRepresentation")
     with Image.open(BytesIO(files[f"terminalsAndIcons/{drawn.get('iconBaseName')}.png"])) as icon:

@@ -9,7 +9,7 @@ from fmpy import read_model_description
 from models import MODELS, counts, declared, experiment, label, meeting, outputs
 
 from fmus.packaging import archive
-from fmus.packaging.written import LAWS, METHODS
+from fmus.packaging.lowering import LAWS, METHODS
 
 LABELS = {"solver.method": "--method", "friction": "--law"}
 

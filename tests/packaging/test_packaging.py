@@ -21,12 +21,12 @@ from fmpy.validation import validate_fmu
 
 from fmus.packaging import BuildError
 from fmus.packaging.archive import write
-from fmus.packaging.catalogue import find, names
-from fmus.packaging.description import describe
-from fmus.packaging.modules import installed, travelling
+from fmus.packaging.embedded_modules import embedded_files, installed_package
+from fmus.packaging.model_description import describe
+from fmus.packaging.model_lookup import find_model, model_names
 from fmus.runtime.variable_declarations import Fixed, Output, Parameter, VariableOwner, variables
 
-EVERY_MODEL = pytest.mark.parametrize("name", names())
+EVERY_MODEL = pytest.mark.parametrize("name", model_names())
 
 # Runs built FMUs in a process that never saw their sources, and cannot see pythonfmu.
 PROBE = """
@@ -92,11 +92,11 @@ def fmu(building):
 
 def test_the_command_prints_name_size_import_time_and_digest_of_every_model(building):
     out, printed = building
-    for name, line in zip(names(), printed.splitlines(), strict=True):
+    for name, line in zip(model_names(), printed.splitlines(), strict=True):
         content = (out / f"{name}.fmu").read_bytes()
         size, digest = f"{len(content) / 1000:.0f}", sha256(content).hexdigest()[:16]
         assert re.fullmatch(rf"{name}.fmu +{size} kB +\d+ ms  {digest}", line)
-    assert {path.name for path in out.iterdir()} == {f"{name}.fmu" for name in names()}
+    assert {path.name for path in out.iterdir()} == {f"{name}.fmu" for name in model_names()}
 
 
 @EVERY_MODEL
@@ -107,7 +107,9 @@ def test_validation_finds_nothing(fmu, name):
 @EVERY_MODEL
 def test_the_xml_says_what_is_declared(fmu, name):
     scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
-    for place, (scalar, (variable, meaning)) in enumerate(zip(scalars, variables(find(name).model()), strict=True)):
+    for place, (scalar, (variable, meaning)) in enumerate(
+        zip(scalars, variables(find_model(name).model()), strict=True)
+    ):
         value = scalar[0]
         assert (scalar.get("name"), scalar.get("valueReference"), value.tag) == (variable, str(place), meaning.type)
         assert (scalar.get("description"), scalar.get("causality")) == (meaning.text, meaning.causality)
@@ -136,7 +138,7 @@ def test_every_real_has_a_unit_every_angle_is_shown_in_degrees(fmu, name):
 def test_enumerations_list_their_items(fmu, name):
     root = described(fmu(name))
     types = {kind.get("name"): kind for kind in root.findall("TypeDefinitions/SimpleType")}
-    choices = {variable: meaning for variable, meaning in variables(find(name).model()) if meaning.items}
+    choices = {variable: meaning for variable, meaning in variables(find_model(name).model()) if meaning.items}
     assert "solver.method" in choices
     for variable, meaning in choices.items():
         value = root.find(f"ModelVariables/ScalarVariable[@name='{variable}']/Enumeration")
@@ -147,7 +149,7 @@ def test_enumerations_list_their_items(fmu, name):
 @EVERY_MODEL
 def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name):
     root = described(fmu(name))
-    meanings = [meaning for _, meaning in variables(find(name).model())]
+    meanings = [meaning for _, meaning in variables(find_model(name).model())]
     (force,) = [place for place, meaning in enumerate(meanings, 1) if meaning.causality == "input"]
     outputs = {int(u.get("index")): u.get("dependencies") for u in root.findall("ModelStructure/Outputs/Unknown")}
     assert outputs == {
@@ -161,7 +163,7 @@ def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name)
 
 @EVERY_MODEL
 def test_capabilities_and_experiment_are_those_of_the_contract(fmu, name):
-    root, model = described(fmu(name)), find(name).model
+    root, model = described(fmu(name)), find_model(name).model
     able = root.find("CoSimulation").attrib
     assert able["modelIdentifier"] == root.get("modelName") == name
     for flag in ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"):
@@ -175,7 +177,9 @@ def test_capabilities_and_experiment_are_those_of_the_contract(fmu, name):
 @pytest.fixture(scope="module")
 def probed(fmu, tmp_path_factory):
     """What each of them tells."""
-    return dict(zip(names(), probe(*map(fmu, names()), folder=tmp_path_factory.mktemp("probed")), strict=True))
+    return dict(
+        zip(model_names(), probe(*map(fmu, model_names()), folder=tmp_path_factory.mktemp("probed")), strict=True)
+    )
 
 
 @EVERY_MODEL
@@ -217,7 +221,7 @@ def test_entry_script_and_package_carry_the_digest_of_their_content(fmu, name):
 
 @EVERY_MODEL
 def test_nothing_tells_where_it_was_built(fmu, name):
-    places = [str(place).encode() for place in (ROOT, fmu(name).parents[1], installed("pythonfmu"))]
+    places = [str(place).encode() for place in (ROOT, fmu(name).parents[1], installed_package("pythonfmu"))]
     for path, content in entries(fmu(name)).items():
         assert not [place for place in places if place in content], path
 
@@ -230,7 +234,7 @@ def test_both_licences_travel(fmu, name):
 
 
 def test_the_source_date_changes_the_date_and_nothing_else(fmu, tmp_path):
-    name, moment = names()[0], datetime(2024, 2, 29, 12, 30, 14, tzinfo=UTC)
+    name, moment = model_names()[0], datetime(2024, 2, 29, 12, 30, 14, tzinfo=UTC)
     assert command(name, "--out", tmp_path, SOURCE_DATE_EPOCH=str(int(moment.timestamp()))).returncode == 0
     dated, plain = tmp_path / f"{name}.fmu", fmu(name)
     with ZipFile(dated) as archive:
@@ -244,7 +248,7 @@ def test_the_source_date_changes_the_date_and_nothing_else(fmu, tmp_path):
 def test_an_unknown_name_is_refused_with_the_known_ones_before_anything_is_built(arguments, tmp_path):
     run = command(*arguments, "--out", tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
-    known = ", ".join(names())
+    known = ", ".join(model_names())
     assert run.stderr == f"Error: There is no model 'bogus'; known are {known}, and any .py file by its path.\n"
     assert list(tmp_path.iterdir()) == []
 
@@ -298,7 +302,7 @@ def test_a_failed_write_leaves_the_older_fmu_and_nothing_else(tmp_path, monkeypa
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"smd.fmu": b"older"}
 
 
-ODD = SimpleNamespace(name="odd", title="Odd")
+ODD = SimpleNamespace(name="odd", class_name="Odd")
 
 
 @pytest.mark.parametrize(
@@ -315,7 +319,7 @@ ODD = SimpleNamespace(name="odd", title="Odd")
 )
 def test_an_import_that_no_fmu_can_serve_stops_the_build(line, sentence, tmp_path):
     with pytest.raises(BuildError, match=re.escape(f"odd.py {sentence}")):
-        travelling(ODD, {"odd.py": line}, tmp_path)
+        embedded_files(ODD, {"odd.py": line}, tmp_path)
 
 
 def test_imports_are_followed_through_packages_and_line_ends_do_not_matter(tmp_path):
@@ -331,10 +335,10 @@ def test_imports_are_followed_through_packages_and_line_ends_do_not_matter(tmp_p
     }
     for path, content in files.items():
         (tmp_path / path).write_bytes(content)
-    found = travelling(ODD, {}, tmp_path)
+    found = embedded_files(ODD, {}, tmp_path)
     assert set(found) == set(files) - {"runtime/idle.py"} | {
         "__init__.py",
-        "guard.py",
+        "pythonfmu_workarounds.py",
         "pythonfmu/__init__.py",
         "pythonfmu/logmsg.py",
     }

@@ -13,10 +13,10 @@ import pytest
 from builds import ROOT
 from models import MODELS, declared, model_class, outputs
 
-from fmus.packaging.chart import ticks
-from fmus.packaging.description import declared_by
+from fmus.packaging.documentation_page import documentation_page, typeset
+from fmus.packaging.model_description import declared_variables
 from fmus.packaging.native.fmu import USE
-from fmus.packaging.page import page, typeset
+from fmus.packaging.svg_chart import tick_values
 from tests.packaging.test_packaging import entries
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
@@ -182,7 +182,7 @@ def test_the_fmu_reproduces_the_result_that_it_carries(content, launch, name):
 
 def test_a_model_without_a_certified_result_has_a_page_all_the_same():
     model = model_class("smd")
-    reader = Reader(page(model, "sixth", declared_by(model), None, "model.png", "").decode())
+    reader = Reader(documentation_page(model, "sixth", declared_variables(model), None, "model.png", "").decode())
     assert "Default run" not in reader.headings
     assert "sixth" in reader.text
 
@@ -193,7 +193,7 @@ def test_names_are_set_as_people_write_them_and_nothing_becomes_markup():
 
 @pytest.mark.parametrize(("low", "high"), [(-1.0, 1.0), (0.0, 16.0), (-3e-7, 2e-7), (1e5, 1.2e5)])
 def test_ticks_are_round_few_and_inside(low, high):
-    found = ticks(low, high)
+    found = tick_values(low, high)
     assert 3 <= len(found) <= 7
     assert all(low <= tick <= high for tick in found)
 

@@ -8,9 +8,9 @@ import pytest
 from arrays import begun, spelled, start
 from models import DOP853, LARGER, ODE23, ODE45, RODAS, SIGN, THRESHOLD
 
-from fmus.packaging.catalogue import find
-from fmus.packaging.written import written
-from fmus.packaging.written.offer import offer
+from fmus.packaging.lowering import lowered_model
+from fmus.packaging.lowering.feature_selection import select_features
+from fmus.packaging.model_lookup import find_model
 
 FILES = {path.stem: path for path in LARGER}
 HEAD = '''"""A model."""
@@ -33,8 +33,8 @@ def mine(tmp_path_factory):
 
     def make(*body, methods=()):
         path.write_text(HEAD + "".join(f"    {line}\n" for line in body))
-        source = find(path)
-        return written(source, offer(source, methods))()
+        source = find_model(path)
+        return lowered_model(source, select_features(source, methods))()
 
     return make
 
@@ -162,7 +162,7 @@ def test_a_clutch_keeps_momentum_and_loses_what_slips():
         first, second = 20.0 - 0.05 * a, 5.0 + 0.2 * b
         return first - second, first * a - second * b - forces[0] * (a - b)
 
-    (impulse, work), (a, b) = integrated(written(FILES["clutch"])(), power, 4.0)
+    (impulse, work), (a, b) = integrated(lowered_model(FILES["clutch"])(), power, 4.0)
     assert 0.5 * a + 1.5 * b == pytest.approx(25.0 + impulse, abs=1e-10)
     assert 0.25 * a * a + 0.75 * b * b == pytest.approx(625.0 + work, abs=1e-9)
 
@@ -172,14 +172,14 @@ def test_a_block_upon_a_block_gains_what_is_pulled_and_loses_what_slips():
         _, v1, x2, v2 = y
         return 400.0 * (0.2 * t - x2) * v2 - forces[0] * v1 - forces[1] * (v2 - v1)
 
-    work, (x1, v1, _, v2) = integrated(written(FILES["blocks"])(), power, 8.0)
+    work, (x1, v1, _, v2) = integrated(lowered_model(FILES["blocks"])(), power, 8.0)
     assert 2.0 * v1 * v1 + v2 * v2 + 75.0 * x1 * x1 == pytest.approx(work, abs=1e-9)
 
 
 def test_what_is_stuck_stays_where_it_is():
     """The slip of a stuck contact is zero to the last bit at the end of every step."""
     for name in ("belt", "clutch", "sleds", "blocks"):
-        model = written(FILES[name])()
+        model = lowered_model(FILES[name])()
         _, rows = events(model, DOP853, 1e-9, model.stop_time)
         held = 0
         for t, y, modes in rows:

@@ -8,8 +8,8 @@ from math import isnan, nextafter
 import pytest
 from models import CASES, MODELS, ROOT, SIGN, declared, label, model_class, outputs, runtime
 
-from fmus.packaging.catalogue import find
-from fmus.packaging.written import files_of
+from fmus.packaging.lowering import lowered_files
+from fmus.packaging.model_lookup import find_model
 from fmus.runtime.variable_declarations import variables
 from harness.running.inside import embedded
 
@@ -19,8 +19,8 @@ FMI_SIDE = [
 ]
 NUMERICS = {
     path.stem: path.read_text() for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.stem not in FMI_SIDE
-} | {name: find(name).text for name in MODELS}
-NUMERICS["active_method"] = files_of("smd")[
+} | {name: find_model(name).generated_source for name in MODELS}
+NUMERICS["active_method"] = lowered_files("smd")[
     "runtime/active_method.py"
 ]  # which loops over the methods that it is written out for
 LIBM = "acos asin atan atan2 copysign cos cosh exp expm1 fabs fmod log log1p pow sin sinh sqrt tan tanh"

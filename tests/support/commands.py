@@ -100,7 +100,7 @@ def serve():
         with suppress(ImportError):  # an extra that is not installed
             if not name.endswith("__main__"):
                 import_module(name)
-    import_module("fmus.packaging.written").written("smd")  # reads what every model is written out from
+    import_module("fmus.packaging.lowering").lowered_model("smd")  # reads what every model is written out from
     from harness.process import child as asking
     from harness.results import provenance, style
 

@@ -7,12 +7,14 @@ from itertools import product
 import pytest
 from builds import ROOT
 
-from fmus.packaging.catalogue import find
-from fmus.packaging.written import beside, written
+from fmus.packaging.lowering import lowered_model, sibling_module
+from fmus.packaging.model_lookup import find_model
 from fmus.runtime.variable_declarations import Choice, Input, Output, Parameter, variables
 
 MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem != "__init__")
-BODIES = [name for name in MODELS if len(find(name).model().states) == 2]  # position and speed are all their states
+BODIES = [
+    name for name in MODELS if len(find_model(name).model().states) == 2
+]  # position and speed are all their states
 AUTHORED = sorted((ROOT / "tests" / "authored").glob("*.py"))  # as users write them, in files of their own
 LARGER = sorted((ROOT / "tests" / "authored" / "larger").glob("*.py"))  # of more states, or more contacts
 EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
@@ -21,18 +23,18 @@ HYBRID, SIGN, THRESHOLD = 1, 2, 3
 
 def model_class(name):
     """The class of a model as it travels: written out."""
-    return written(name)
+    return lowered_model(name)
 
 
 def runtime(name, part):
     """A file of the runtime as it is written out for a model."""
-    return beside(written(name), f"runtime.{part}")
+    return sibling_module(lowered_model(name), f"runtime.{part}")
 
 
 @cache
 def declared(name):
     """Name and declaration of every variable of a model, in the order of the XML."""
-    return dict(variables(find(name).model()))
+    return dict(variables(find_model(name).model()))
 
 
 def outputs(name):
@@ -78,7 +80,7 @@ def experiment(name, values):
     Laws that chatter run as published, at rtol 1e-3, and not for long, nor do methods that are not for a stiff model,
     but beyond its first slip: where friction should hold, they take steps without number.
     """
-    stop, method = find(name).model.stop_time, values["solver.method"]
+    stop, method = find_model(name).model.stop_time, values["solver.method"]
     if values.get("friction", HYBRID) == HYBRID:
         stiff = declared(name)["solver.method"].start == RODAS != method
         return name, values if method == EXACT else {**values, "solver.rtol": 1e-5}, 0.4 * stop if stiff else stop

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fmus.packaging.written.spec import STEM
+from fmus.packaging.lowering.layout import NAMED_VECTOR
 from fmus.runtime.vectors import (
     contact_indices,
     is_dynamic,
@@ -59,7 +59,7 @@ def fill(thing):
     over_contacts = {name for name in said if "modes" in name}
 
     def assign(self, name, value):
-        if name in said or STEM.fullmatch(name):
+        if name in said or NAMED_VECTOR.fullmatch(name):
             long = len(contact_indices) if name in over_contacts or name.startswith("modes") else len(state_indices)
             value = np.full(long, value) if np.ndim(value) == 0 else np.array(value)
         object.__setattr__(self, name, value)

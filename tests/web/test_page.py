@@ -13,7 +13,7 @@ from builds import ROOT
 from commands import build
 from models import AUTHORED, LARGER, MODELS, declared, parameters
 
-from fmus.packaging.catalogue import find
+from fmus.packaging.model_lookup import find_model
 from fmus.packaging.web.page import HERE, MODULES
 from fmus.packaging.web.portrait import bodies
 from harness.running.fmu import simulate
@@ -464,7 +464,7 @@ def test_paper_is_white_and_everything_is_on_it(page):
 
 def test_what_moves_in_any_model_is_read_from_its_declaration():
     """Of every model that users might write: what kind each body is, and what acts on it."""
-    drawn = {path.stem: bodies(find(path).anatomy) for path in (*AUTHORED, *LARGER)}
+    drawn = {path.stem: bodies(find_model(path).analysis) for path in (*AUTHORED, *LARGER)}
     kinds = {name: [body["kind"] for body in found] for name, found in drawn.items()}
     assert kinds["viscous_pendulum"] == ["pendulum"]
     assert kinds["rotor_brake"] == ["rotor"]

@@ -10,8 +10,8 @@ from by_hand import BY_HAND, truth
 from models import DOP853, LARGER, ODE23, ODE45, RODAS
 from scipy.integrate import solve_ivp
 
-from fmus.packaging.catalogue import find
-from fmus.packaging.written import written
+from fmus.packaging.lowering import lowered_model
+from fmus.packaging.model_lookup import find_model
 
 FILES = {path.stem: path for path in LARGER}
 STOPS = {"lugre": 4.0} | {name: physics.stop for name, physics in BY_HAND.items()}
@@ -25,14 +25,14 @@ STEPS = 200
 def test_arrays_and_scalars_give_the_same_bits_at_every_step(name, method):
     file, stop = FILES[name], STOPS[name]
     values = {"solver.method": method, "solver.rtol": 1e-5}
-    scalars = written_steps(written(file)(), values, stop, STEPS)
-    assert scalars == array_steps(find(file).model(), values, stop, STEPS)
+    scalars = written_steps(lowered_model(file)(), values, stop, STEPS)
+    assert scalars == array_steps(find_model(file).model(), values, stop, STEPS)
     assert len(scalars) > 15
 
 
 def run(name, method):
     """A run of the written-out model: the state at the stop, and time and modes of every event."""
-    one, stop = written(FILES[name])(), STOPS[name]
+    one, stop = lowered_model(FILES[name])(), STOPS[name]
     begun(one, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]}, stop)
     start(one, one.initial_state(0.0), stop)
     step, events = one.solver.step, []
@@ -75,7 +75,7 @@ def test_contacts_stick_and_slip_when_an_independent_solver_says(name, method):
 
 
 def test_a_stuck_sled_stands_on_its_speed_of_zero_while_the_other_moves():
-    one = written(FILES["sleds"])()
+    one = lowered_model(FILES["sleds"])()
     begun(one, {"solver.method": DOP853, "solver.rtol": 1e-9}, 16.0)
     start(one, one.initial_state(0.0), 16.0)
     step, seen = one.solver.step, 0

@@ -4,9 +4,9 @@ import pytest
 from arrays import begun, start
 from models import DOP853, LARGER, RODAS
 
-from fmus.packaging.catalogue import find
+from fmus.packaging.lowering import LAWS, METHODS, lowered_model, select_features, sibling_module
+from fmus.packaging.model_lookup import find_model
 from fmus.packaging.native.interface import header
-from fmus.packaging.written import LAWS, METHODS, beside, offer, written
 from fmus.runtime.variable_declarations import variables
 
 BELT = '''"""A model."""
@@ -38,7 +38,7 @@ CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
 
 def numbers(path, model, names):
     """Ends of steps, and what these names are there, by two methods."""
-    found, rules = [], beside(written(path), "runtime.call_sequence")
+    found, rules = [], sibling_module(lowered_model(path), "runtime.call_sequence")
     for method in DOP853, RODAS:
         begun(model, {"solver.method": method, "solver.rtol": 1e-6}, 2.0)
         start(model, model.initial_state(0.0), 2.0)
@@ -55,15 +55,15 @@ def numbers(path, model, names):
 def test_a_name_that_the_numerics_have_for_something_else_changes_nothing(tmp_path, text):
     plain, path = ("POSITION", "SPEED", "RATE", "MODE"), tmp_path / "mine.py"
     path.write_text(text)
-    expected = numbers(path, written(path)(), plain)
+    expected = numbers(path, lowered_model(path)(), plain)
     assert len(expected) > 20
     for names in NAMES[text]:
         changed = text
         for old, new in zip(plain, names, strict=True):
             changed = changed.replace(old, new)
         path.write_text(changed)
-        assert numbers(path, written(path)(), names) == expected, names
-    assert text == SLED or "typedef struct Mine Model;" in header(written(path), "3")  # with a slope of d_x
+        assert numbers(path, lowered_model(path)(), names) == expected, names
+    assert text == SLED or "typedef struct Mine Model;" in header(lowered_model(path), "3")  # with a slope of d_x
 
 
 def test_a_choice_of_an_author_keeps_what_is_called_like_a_method_or_a_law_that_is_not_offered(tmp_path):
@@ -71,8 +71,8 @@ def test_a_choice_of_an_author_keeps_what_is_called_like_a_method_or_a_law_that_
     items, cases = (", ".join(each.format(*pair) for pair in zip(labels, "12345678", strict=True)) for each in CHOSEN)
     text = SLED.replace("import Contact", "import Choice, Contact").replace("- F)", f"* kind.choose({cases}) - F)")
     path.write_text(text.replace("    m =", f'    kind = Choice("kind", {items})\n    m ='))
-    source = find(path)
-    model = written(source, offer(source, ["ode45"], ["hybrid"]))()
+    source = find_model(path)
+    model = lowered_model(source, select_features(source, ["ode45"], ["hybrid"]))()
     offered = {name: [label for label, _, _ in meaning.items] for name, meaning in variables(model) if meaning.items}
     assert offered == {"kind": labels, "friction": ["hybrid"], "solver.method": ["ode45"]}
     rates = set()
@@ -88,7 +88,7 @@ def test_a_name_of_the_system_that_loads_solve_changes_nothing(tmp_path):
     path, rates = tmp_path / "blocks.py", []
     for names in ("mode1", "mode2"), ("A_F1_F2", "A_F2_F1"):
         path.write_text(blocks.read_text().replace("mode1", names[0]).replace("mode2", names[1]))
-        model = find(path).model()
+        model = find_model(path).model()
         assert model.prepare() == 0
         rates.append([model.rates(0.3, 0.1, 0.2, -0.1, 0.1, *modes) for modes in ((0, 0), (0, 1), (1, 0), (1, -1))])
     assert rates[0] == rates[1]

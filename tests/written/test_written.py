@@ -8,11 +8,11 @@ import pytest
 from arrays import array_steps, written_steps
 from models import CASES, MODELS, ROOT, label, model_class
 
-from fmus.packaging.catalogue import find
-from fmus.packaging.written import Refused, files_of, written
-from fmus.packaging.written.declarations import Declarations
-from fmus.packaging.written.spec import Spec
-from fmus.packaging.written.text import Writer
+from fmus.packaging.lowering import LoweringError, lowered_files, lowered_model
+from fmus.packaging.lowering.emit_source import SourceEmitter
+from fmus.packaging.lowering.layout import ModelLayout
+from fmus.packaging.lowering.source_symbols import SourceSymbols
+from fmus.packaging.model_lookup import find_model
 
 NUMERICS = ("step_control.py", "stick_slip.py", "integrator.py")
 STEPS = 150  # of a run, enough for some events
@@ -23,13 +23,13 @@ EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 def test_arrays_and_scalars_give_the_same_bits_at_every_step(case):
     name, values, stop = case
     scalars = written_steps(model_class(name)(), values, stop, STEPS)
-    assert scalars == array_steps(find(name).model(), values, stop, STEPS)
+    assert scalars == array_steps(find_model(name).model(), values, stop, STEPS)
     assert scalars
 
 
 @EVERY_MODEL
 def test_what_travels_knows_no_vectors_says_where_it_comes_from_and_keeps_the_line_length(name):
-    for path, text in files_of(name).items():
+    for path, text in lowered_files(name).items():
         tree = ast.parse(text)
         names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
         assert not names & {
@@ -53,7 +53,7 @@ def test_what_travels_knows_no_vectors_says_where_it_comes_from_and_keeps_the_li
 def test_what_cannot_happen_is_gone():
     """A smooth model has no modes, one without closed forms none of theirs, and an offer no more than it says."""
     smooth, dry = (
-        "\n".join(text for path, text in files_of(name).items() if path.split("/")[-1] in NUMERICS)
+        "\n".join(text for path, text in lowered_files(name).items() if path.split("/")[-1] in NUMERICS)
         for name in ("pacejka", "coulomb")
     )
     for word in (
@@ -99,16 +99,16 @@ BODIES = {
 @pytest.mark.parametrize("body", BODIES)
 def test_what_cannot_be_written_out_is_refused_by_file_line_and_remedy(body):
     text = HEAD + body + "\n"
-    spec = Spec({"x": "v", "v": "a"}, {"mode": "v"})
-    with pytest.raises(Refused, match=re.escape(BODIES[body])) as caught:
-        Writer(spec, Declarations([text]), "runtime/some.py", text, True)
+    spec = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"})
+    with pytest.raises(LoweringError, match=re.escape(BODIES[body])) as caught:
+        SourceEmitter(spec, SourceSymbols([text]), "runtime/some.py", text, True)
     assert re.match(r"runtime/some\.py:[234]: ", str(caught.value))
 
 
 def test_names_that_meet_at_a_stage_are_refused():
     with pytest.raises(Exception, match="take another name"):
-        Spec({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, {})
+        ModelLayout({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, {})
 
 
 def test_a_model_is_written_out_once():
-    assert written("smd") is written("smd")
+    assert lowered_model("smd") is lowered_model("smd")

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Never
 
-HERE = str(Path(__file__).parent)
-HOUSE = str(Path(__file__).parents[2] / "packaging")
+EQUATIONS_FOLDER = str(Path(__file__).parent)
+PACKAGING_FOLDER = str(Path(__file__).parents[2] / "packaging")
 Operand = Any  # an expression or a number
 
 # The derivative of each function, by its argument and its value.
@@ -29,32 +29,32 @@ FUNCTIONS: dict[str, Callable[[Operand, Operand], Operand]] = {
 COMPARISONS = ("<", "<=", ">", ">=", "==")
 
 
-class Mistake(ValueError):
+class ModelError(ValueError):
     """Something that an author wrote and that cannot be: what is wrong, and in which line of which file."""
 
-    def __init__(self, sentence: str, place: "tuple[str, int] | None" = None) -> None:
+    def __init__(self, sentence: str, location: "tuple[str, int] | None" = None) -> None:
         super().__init__(sentence)
-        self.place = place or written_at()
+        self.location = location or author_location()
 
 
-def written_at() -> tuple[str, int]:
+def author_location() -> tuple[str, int]:
     """File and line, in the file of the author, of what is made just now."""
     frame = sys._getframe(1)
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(HERE):
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(EQUATIONS_FOLDER):
         frame = frame.f_back
     return frame.f_code.co_filename, frame.f_lineno
 
 
-def _both_ways(op: str) -> tuple[Any, Any]:
+def _binary_operators(op: str) -> tuple[Any, Any]:
     """The methods that make a term of an operation, self op other and other op self."""
     return (lambda self, other: Term(op, self, other)), (lambda self, other: Term(op, other, self))
 
 
-def _refusing(sentence: str) -> Callable[..., Never]:
+def _refusal(sentence: str) -> Callable[..., Never]:
     """A method that cannot be, with what it says."""
 
     def refuse(e: "Expression", *_: object) -> Never:
-        raise Mistake(sentence.format(name=e.name or "an expression"))
+        raise ModelError(sentence.format(name=e.name or "an expression"))
 
     return refuse
 
@@ -63,19 +63,19 @@ class Expression:
     """What a number is calculated from: a declared variable, or a term of such."""
 
     name = ""
-    place: tuple[str, int]
+    location: tuple[str, int]
 
     def __new__(cls, *_: object, **__: object) -> "Expression":
         made = super().__new__(cls)
-        made.place = written_at()
+        made.location = author_location()
         return made
 
-    __add__, __radd__ = _both_ways("+")
-    __sub__, __rsub__ = _both_ways("-")
-    __mul__, __rmul__ = _both_ways("*")
-    __truediv__, __rtruediv__ = _both_ways("/")
+    __add__, __radd__ = _binary_operators("+")
+    __sub__, __rsub__ = _binary_operators("-")
+    __mul__, __rmul__ = _binary_operators("*")
+    __truediv__, __rtruediv__ = _binary_operators("/")
     # Python turns a < b round to b > a by itself
-    __lt__, __le__, __gt__, __ge__ = (_both_ways(op)[0] for op in ("<", "<=", ">", ">="))
+    __lt__, __le__, __gt__, __ge__ = (_binary_operators(op)[0] for op in ("<", "<=", ">", ">="))
 
     def __neg__(self) -> "Term":
         return Term("neg", self)
@@ -88,33 +88,33 @@ class Expression:
 
     def __eq__(self, other: object) -> bool:
         """Whether this is the very same: for those who calculate with expressions; an author would get no answer."""
-        if self is not other and not sys._getframe(1).f_code.co_filename.startswith(HOUSE):
-            raise Mistake("== and != say nothing of values that are not there yet: write choose(a < b, this, that)")
+        if self is not other and not sys._getframe(1).f_code.co_filename.startswith(PACKAGING_FOLDER):
+            raise ModelError("== and != say nothing of values that are not there yet: write choose(a < b, this, that)")
         return self is other
 
     __hash__ = object.__hash__
 
-    __pow__ = __rpow__ = _refusing("** rounds in ways of its own: write a product, x * x, or exp and log")
-    __bool__ = _refusing("{name} has no value yet: write choose(condition, this, that) for an if")
-    __float__ = _refusing(
+    __pow__ = __rpow__ = _refusal("** rounds in ways of its own: write a product, x * x, or exp and log")
+    __bool__ = _refusal("{name} has no value yet: write choose(condition, this, that) for an if")
+    __float__ = _refusal(
         f"{{name}} has no value yet: functions of expressions are imported from fmus, which has {', '.join(FUNCTIONS)}"
     )
-    __iter__ = _refusing("{name} is one number: there is nothing to loop over")
-    __index__ = _refusing(
+    __iter__ = _refusal("{name} is one number: there is nothing to loop over")
+    __index__ = _refusal(
         "{name} has no value yet, and no table can be read by it: write its law as a formula, or as pieces with "
         "choose(condition, this, that)"
     )
     __array_ufunc__ = None  # numpy leaves it alone
 
 
-def operand(e: Operand) -> Operand:
+def as_operand(e: Operand) -> Operand:
     """An expression as it is, a number as a float; anything else is refused."""
     if isinstance(e, Expression):
         return e
     if isinstance(e, bool) or not isinstance(e, (int, float)):
-        raise Mistake(f"{e!r} is neither a number nor an expression: nothing can be calculated with it")
+        raise ModelError(f"{e!r} is neither a number nor an expression: nothing can be calculated with it")
     if not math.isfinite(e):
-        raise Mistake(f"{e!r} is not a finite number: nothing can be calculated with it")
+        raise ModelError(f"{e!r} is not a finite number: nothing can be calculated with it")
     return float(e)
 
 
@@ -122,7 +122,7 @@ class Term(Expression):
     """An operation or a function, and what it is done to."""
 
     def __init__(self, op: str, *args: Operand) -> None:
-        self.op, self.args = op, tuple(map(operand, args))
+        self.op, self.args = op, tuple(map(as_operand, args))
 
 
 def _function(name: str) -> Callable[[Operand], Operand]:
@@ -142,5 +142,5 @@ sqrt, fabs = map(_function, ("sqrt", "fabs"))
 def choose(condition: Operand, this: Operand, that: Operand) -> Term:
     """The expression `this` where the condition, a comparison of expressions, holds, and `that` elsewhere."""
     if not (isinstance(condition, Term) and condition.op in COMPARISONS):
-        raise Mistake("choose() begins with a comparison of expressions by <, <=, > or >=")
+        raise ModelError("choose() begins with a comparison of expressions by <, <=, > or >=")
     return Term("choose", condition, this, that)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from ...runtime.variable_declarations import VariableOwner
-from ..written import beside
+from ..lowering import sibling_module
 from .kinds import BOOL, FLOAT, Kind, Object
 
 ASKED = {  # file of the runtime -> its functions; one that others call stands before them
@@ -32,7 +32,7 @@ def entries(model: type[VariableOwner], run: Object, led: Object, fmi: str) -> d
     kinds: dict[str, Kind] = {"run": run, "model": led, **dict.fromkeys(FLAGS, BOOL)}
     found = {}
     for file in [file for file in ASKED if file != "early_return" or fmi == "3"]:
-        functions = beside(model, f"runtime.{file}")
+        functions = sibling_module(model, f"runtime.{file}")
         for name in ASKED[file]:
             code = getattr(functions, name).__code__
             taken = code.co_varnames[: code.co_argcount]

@@ -16,15 +16,15 @@ from xml.etree.ElementTree import SubElement, fromstring
 
 from ...runtime.variable_declarations import VariableOwner
 from .. import BuildError
-from ..archive import build_date, licenses, write, zipped
-from ..catalogue import find
-from ..companions import companions
-from ..description import declared_by, describe
-from ..description3 import describe as describe3
-from ..document import document
-from ..modules import digest
+from ..archive import build_date, license_files, write, zip_entries
+from ..embedded_modules import digest
+from ..extra_files import extra_files
+from ..lowering import lowered_model, select_features
+from ..model_description import declared_variables, describe
+from ..model_description_fmi3 import describe as describe3
+from ..model_lookup import find_model
 from ..terminals import terminals
-from ..written import offer, written
+from ..xml_output import xml_bytes
 from .compiler import PLATFORMS, USUAL, binaries
 from .sources import COMPILED, build_description, guid_header, sources
 
@@ -56,20 +56,20 @@ def build(
         if platform not in PLATFORMS:
             raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
     date = build_date()
-    source = replace(find(model), ramps=fmi == "2")  # FMI 3.0 has no derivatives of inputs
-    name, cls = source.name, written(source, offer(source, methods, laws))
+    source = replace(find_model(model), ramps=fmi == "2")  # FMI 3.0 has no derivatives of inputs
+    name, cls = source.name, lowered_model(source, select_features(source, methods, laws))
     files, description = frozen(cls, name, date, fmi)
-    declared = declared_by(cls)
-    entries = companions(cls, source.path, declared, ICONS[fmi], USE)
+    declared = declared_variables(cls)
+    entries = extra_files(cls, source.path, declared, ICONS[fmi], USE)
     if fmi == "3":
         entries |= terminals(declared)
-    entries |= {"modelDescription.xml": description, LICENSE: licenses()[LICENSE]}
+    entries |= {"modelDescription.xml": description, LICENSE: license_files()[LICENSE]}
     entries |= {f"sources/{file}": text.encode() for file, text in files.items()}
     entries["sources/buildDescription.xml"] = build_description(name, fmi)
     with ThreadPoolExecutor() as pool:
         for content in pool.map(lambda platform: binaries(name, files, COMPILED[fmi], platform, fmi), platforms):
             entries |= content
-    return write(folder / f"{name}.fmu", zipped(entries, date))
+    return write(folder / f"{name}.fmu", zip_entries(entries, date))
 
 
 def frozen(model: type[VariableOwner], name: str, date: datetime, fmi: str) -> tuple[dict[str, str], bytes]:
@@ -78,9 +78,9 @@ def frozen(model: type[VariableOwner], name: str, date: datetime, fmi: str) -> t
     if fmi == "3":
         root = fromstring(describe3(model, name, digest(files), date))
         files["guid.h"] = guid_header(root.attrib["instantiationToken"])
-        return files, document(root)
+        return files, xml_bytes(root)
     root = fromstring(describe(model, name, digest(files), date, exchanging=True))
     for interface in root.findall("ModelExchange") + root.findall("CoSimulation"):
         SubElement(SubElement(interface, "SourceFiles"), "File", name=COMPILED[fmi])
     files["guid.h"] = guid_header(root.attrib["guid"])
-    return files, document(root)
+    return files, xml_bytes(root)

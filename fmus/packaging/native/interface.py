@@ -10,9 +10,15 @@ from ...runtime.failure_handling import CALCULATED_CAUSALITIES
 from ...runtime.messages import CALL_MESSAGES, PHASE_NAMES, RUN_MESSAGES, VALUE_MESSAGES
 from ...runtime.variable_access import SETTABLE_CAUSALITIES
 from ...runtime.variable_declarations import VariableDeclaration, VariableOwner, variables
-from ..further import all_variables, exchanged, indicators_of, place, rates_of
-from ..words import quoted
-from ..written import beside
+from ..fmi_variables import (
+    all_variables,
+    attribute_path,
+    derivative_indices,
+    event_indicator_indices,
+    model_exchange_instance,
+)
+from ..lowering import sibling_module
+from ..reserved_names import string_literal
 from .entries import entries
 from .kinds import BOOL, FLOAT, INT, Object, literal
 from .program import Program
@@ -106,8 +112,8 @@ DERIVATIVE_ATTRIBUTES = ("rate", "polynomial.order", "polynomial.derivatives")  
 
 def header(model: type[VariableOwner], fmi: str) -> str:
     """The text of model.h, for a version of FMI."""
-    thing = exchanged(model)
-    run = beside(model, "runtime.call_sequence").RunState(thing.tolerance)
+    thing = model_exchange_instance(model)
+    run = sibling_module(model, "runtime.call_sequence").RunState(thing.tolerance)
     declared = all_variables(thing)
     to, along = tangent(model, thing, declared)
     program = Program(thing, run, to)
@@ -137,8 +143,8 @@ def header(model: type[VariableOwner], fmi: str) -> str:
         count=len(names),
         declared=len(variables(thing)),
         ahead=names.index("solver.t_next"),
-        states=len(rates_of(declared)),
-        indicators=len(indicators_of(declared)),
+        states=len(derivative_indices(declared)),
+        indicators=len(event_indicator_indices(declared)),
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {literal(kind is BOOL)}}},\n" for path, kind in members),
         table="".join(
@@ -147,7 +153,7 @@ def header(model: type[VariableOwner], fmi: str) -> str:
         statuses=_cases(statuses, PLACES) + _cases(broken, own),
         values=_cases(VALUE_MESSAGES, PLACES),
         calls=_cases(CALL_MESSAGES, PLACES),
-        phases=", ".join(quoted(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
+        phases=", ".join(string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
         count_of_phases=len(PHASE_NAMES),
     )
 
@@ -175,8 +181,8 @@ def _line(name: str, meaning: VariableDeclaration, slots: dict[str, str], ramps:
     bounds = (meaning.low, meaning.high, meaning.above, meaning.below)
     items = f"{_of(name)}, {_of(name)} + {len(meaning.items)}" if meaning.items else "NULL, NULL"
     parts = [
-        *map(quoted, words),
-        f"offsetof(Model, {place(name)})",
+        *map(string_literal, words),
+        f"offsetof(Model, {attribute_path(name)})",
         f"offsetof(struct Tangent, {slots[name]})" if name in slots else "NO_SLOPE",
         *map(literal, flags),
         ", ".join(f"offsetof(Model, {name}_{part})" if ramps else "NO_SLOPE" for part in DERIVATIVE_ATTRIBUTES),
@@ -193,7 +199,7 @@ def _cases(sentences: Mapping[int, str], places: Mapping[str, str]) -> str:
         lines.append(f"    case {case}:\n")
         for words, field, _, _ in Formatter().parse(sentence):
             if words:
-                lines.append(f"        add(text, {quoted(words)});\n")
+                lines.append(f"        add(text, {string_literal(words)});\n")
             if field:
                 lines.append(f"        {places[field]};\n")
         lines.append("        break;\n")

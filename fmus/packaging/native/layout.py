@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from ..words import OF_C
+from ..reserved_names import C_NAMES
 from .kinds import FLOAT, Kind, Object, Row, Scalar, declare, kind_of, literal
 from .refusal import Refused
 
@@ -30,7 +30,7 @@ class Layout:
         return Object(cls)
 
     def _kind(self, value: object, path: str) -> Kind:
-        if (name := path.rsplit(".", 1)[-1]) in OF_C:
+        if (name := path.rsplit(".", 1)[-1]) in C_NAMES:
             raise Refused(f"{path}: {name} is a word of C; take another name.")
         if kind := kind_of(value):
             return kind

@@ -5,7 +5,7 @@ import inspect
 from types import FunctionType
 
 from .. import BuildError
-from ..catalogue import FMUS
+from ..model_lookup import FMUS
 
 
 class Refused(BuildError):

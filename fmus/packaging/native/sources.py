@@ -4,8 +4,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ...runtime.variable_declarations import VariableOwner
-from ..document import document
-from ..modules import installed
+from ..embedded_modules import installed_package
+from ..xml_output import xml_bytes
 from .interface import header
 
 COMPILED = {"2": "fmi2.c", "3": "fmi3.c"}  # by the version of FMI: includes all the others
@@ -20,7 +20,7 @@ def sources(model: type[VariableOwner], fmi: str) -> dict[str, str]:
     """Name and text of every file but guid.h, which follows from these."""
     here = Path(__file__).parent
     written = {name: (here / name).read_text(encoding="utf-8") for name in (COMPILED[fmi], *WRITTEN)}
-    theirs = installed("fmpy") / "c-code"
+    theirs = installed_package("fmpy") / "c-code"
     headers = {name: (theirs / name).read_text(encoding="utf-8") for name in FMI_HEADERS[fmi]}
     return written | headers | {"model.h": header(model, fmi)}
 
@@ -37,4 +37,4 @@ def build_description(name: str, fmi: str) -> bytes:
     files = SubElement(configuration, "SourceFileSet", language="C99")
     SubElement(files, "SourceFile", name=COMPILED[fmi])
     SubElement(configuration, "Library", name="m", external="true", description="the C library of mathematics")
-    return document(root)
+    return xml_bytes(root)

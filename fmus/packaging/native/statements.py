@@ -9,8 +9,8 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import TYPE_CHECKING
 
-from ..words import OF_C
-from ..written import definition
+from ..lowering import function_tree
+from ..reserved_names import C_NAMES
 from .expressions import LEAVE, SIGN, Expressions, Value, group
 from .kinds import FLOAT, INT, Group, Kind, Known, Object, Scalar, declare, spell
 from .refusal import place
@@ -27,7 +27,7 @@ class Body(Expressions):
         self.result: Kind | None = None
         self.returns = False  # a return was seen, so the result is known
         self.breaks: list[list[set[str]]] = []  # for every loop around: what has a value at its breaks
-        tree = definition(function)
+        tree = function_tree(function)
         self.sentence = (ast.get_docstring(tree) or "").replace("*/", "* /").splitlines()[:1]
         self.parameters = [argument.arg for argument in tree.args.args]
         for name, kind in zip(self.parameters, kinds, strict=True):
@@ -182,7 +182,7 @@ class Body(Expressions):
 
     def name(self, node: ast.AST, name: str, kind: Kind) -> None:
         """Take a name into use; it keeps its kind for life."""
-        if name in OF_C:
+        if name in C_NAMES:
             raise self.refused(node, f"uses {name}, a word of C", "take another name")
         self.same(node, self.locals.setdefault(name, kind), kind)
 

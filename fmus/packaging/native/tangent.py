@@ -15,11 +15,11 @@ from types import FunctionType
 from typing import Any
 
 from ...runtime.variable_declarations import VariableOwner
+from ..equations.expression_printer import ExpressionPrinter
 from ..equations.expressions import FUNCTIONS, Expression, Term
-from ..equations.scribe import Scribe
-from ..further import Variables
-from ..written import definition
-from ..written.live import TREE, number_of
+from ..fmi_variables import Variables
+from ..lowering import function_tree
+from ..lowering.import_hook import TREE_NAME, scalar_name
 
 # what the second number is called; the object that holds the direction and what follows: no name of an author's
 D, TO = "_d_", "_to"
@@ -47,15 +47,15 @@ def tangent(model: type[VariableOwner], thing: Any, declared: Variables) -> tupl
     for slot in slots(declared).values():
         setattr(to, slot, 0.0)
     observe: Any = model.__dict__["compute_outputs"]
-    tree = definition(observe)
+    tree = function_tree(observe)
     writer = Writer(thing, declared)
-    known = {"t": "t"} | {name: number_of(thing, name) for name in (*thing.states, *thing.contacts)}
+    known = {"t": "t"} | {name: scalar_name(thing, name) for name in (*thing.states, *thing.contacts)}
     begin = [f"{name} = self.solver.{number}" for name, number in known.items()]
     begin += [f"{D}{name} = {TO}.{name}" for name in thing.states]
     body = [ast.parse(line).body[0] for line in begin] + writer.block(tree.body)
     text = ast.unparse(ast.fix_missing_locations(ast.Module([head(body)], [])))
     module = sys.modules[model.__module__]
-    names = vars(math) | vars(module) | {threshold_slope.__name__: threshold_slope, TREE: ast.parse(text)}
+    names = vars(math) | vars(module) | {threshold_slope.__name__: threshold_slope, TREE_NAME: ast.parse(text)}
     exec(compile(text, module.__file__ or "?", "exec"), names)
     return to, names["along"]
 
@@ -140,7 +140,7 @@ def slope(name: str, a: str) -> str:
     """The factor of the change of a in that of a function of a."""
     if name == "sqrt":
         return f"0.5 / sqrt({a})"  # not as the equations have it, where it is zero at zero
-    return Scribe({ARGUMENT: a}, (), (), 0).text(FUNCTIONS[name](ARGUMENT, Term(name, ARGUMENT)))
+    return ExpressionPrinter({ARGUMENT: a}, (), (), 0).text(FUNCTIONS[name](ARGUMENT, Term(name, ARGUMENT)))
 
 
 def threshold_slope(v, eps, load, hold, d_load, d_slide, d_hold):  # type: ignore[no-untyped-def] # it is translated

@@ -11,9 +11,9 @@ from xml.etree.ElementTree import fromstring
 
 from .. import __version__
 from ..archive import build_date, write
-from ..equations.authored import Authored
+from ..equations.model_file import ModelFile
+from ..lowering import lowered_model, select_features
 from ..native.fmu import frozen
-from ..written import offer, written
 from .portrait import Portrait, portrait
 from .presets import presets
 from .wasm import packed
@@ -27,7 +27,7 @@ MODULES = (
 
 
 def build(
-    sources: Sequence[Authored],
+    sources: Sequence[ModelFile],
     folder: Path,
     methods: Sequence[str] = (),
     laws: Sequence[str] = (),
@@ -43,9 +43,9 @@ def build(
     return write(folder / FILE, page(data).encode())
 
 
-def with_code(source: Authored, methods: Sequence[str], laws: Sequence[str]) -> Portrait:
+def with_code(source: ModelFile, methods: Sequence[str], laws: Sequence[str]) -> Portrait:
     """All that the page needs of a model."""
-    model = written(source, offer(source, methods, laws))
+    model = lowered_model(source, select_features(source, methods, laws))
     files, description = frozen(model, source.name, build_date(), "2")
     told = portrait(source, model)
     return told | {"guid": fromstring(description).attrib["guid"], "code": packed(source.name, files)}

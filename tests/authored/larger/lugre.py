@@ -25,7 +25,7 @@ class Lugre(Model):
     F_ext = Input(0.0, "N", "outer force on the sled")
 
     x = State("m", "position of the sled")
-    v = State("m/s", "speed of the sled", rate_of=x, finest=v_s)
+    v = State("m/s", "speed of the sled", rate_of=x, nominal_velocity=v_s)
     z = State("m", "deflection of the bristles")
     x_driver = State("m", "position of the driver, zero at the start", rate=v_driver)
 

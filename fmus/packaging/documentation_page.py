@@ -1,0 +1,158 @@
+"""The page inside each FMU, documentation/index.html: what the model is, read from its declaration."""
+
+import re
+from html import escape
+from inspect import cleandoc
+from pathlib import Path
+
+from ..runtime.variable_access import SETTABLE_CAUSALITIES
+from ..runtime.variable_declarations import VariableDeclaration, VariableOwner
+from . import __version__
+from .certified_result import RESULT_FOLDER, CertifiedResult
+from .fmi_variables import Variables, integrated_states
+from .svg_chart import draw_chart
+from .units import unit_of
+
+GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
+STYLE = Path(__file__).with_name("documentation_page.css")
+USAGE = """\
+<p>Parameters may be changed at every communication point, those marked <i>fixed</i> only before initialisation ends.
+The solver runs free: its steps do not depend on the communication steps. Read <code>solver.t_next</code> and step to
+it, and every internal step and every event shows.</p>
+<p>A value that cannot be used, or a run that cannot go on, is told in one sentence, in the log and on standard error;
+<code>doStep</code> fails, and every calculated Real reads NaN from then on. Reset recovers.</p>
+"""
+CAPABILITIES = """\
+| | in Python | native | native, FMI 3.0 |
+| FMI | 2.0 | 2.0 | 3.0 |
+| co-simulation; state saved and serialised | yes | yes | yes |
+| model exchange: indicators, time events, nominals | | yes | yes |
+| directional derivatives | | yes | yes, adjoint too |
+| rates of outputs (derivatives of order 1) | | yes | yes |
+| derivatives of inputs up to order 8: polynomials, which the method exact follows through stick and slip | | yes | |
+| event mode, early return at stick and slip | | | yes |
+| intermediate update after every internal step, where inputs can be set | | | yes |
+| terminal `flange`: position, speed, force | | | yes |
+"""  # by each kind of FMU, as the README has it
+UNRESTRICTED = VariableDeclaration("", "").allowed  # in words, where every finite number is
+
+
+def documentation_page(
+    model: type[VariableOwner], name: str, declared: Variables, found: CertifiedResult | None, icon: str, use: str
+) -> bytes:
+    """The page of the FMU `name`, as HTML that needs nothing but the icon beside it, or nothing where that is ""; `use`
+    says how it can be run."""
+    first, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
+    title = f"<h1>{escape(name)}</h1><p>{escape(first)}</p>"
+    picture = f"<img src='../{icon}' alt=''>" if icon else ""
+    parts = [f"<header>{picture}<div>{title}</div></header>", "<h2>Equations</h2>"]
+    parts += map(format_paragraph, blocks)
+    if found is not None:
+        parts += _result_figure(found, declared)
+    choices = [(variable, meaning) for variable, meaning in declared if meaning.items]
+    for variable, meaning in choices:
+        parts.append(_enumeration_table(variable, meaning))
+    plain = [(variable, meaning) for variable, meaning in declared if not meaning.items]
+    for title, chosen in (
+        ("Parameters", [pair for pair in plain if pair[1].causality == "parameter" and "." not in pair[0]]),
+        ("Input", [pair for pair in plain if pair[1].causality == "input"]),
+        ("Outputs", [pair for pair in plain if pair[1].causality == "output"]),
+        ("Solver and events", [pair for pair in plain if "." in pair[0]]),
+    ):
+        parts += [f"<h2>{title}</h2>", _variable_table(chosen)]
+    parts += ["<h2>Use</h2>", USAGE + use, _capabilities_table(), _footer(model, found)]
+    head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(name)}</title>"
+    style = STYLE.read_text(encoding="utf-8")
+    begin = f"<!doctype html>\n<html lang='en'><head>{head}<style>\n{style}</style></head><body>"
+    return "\n".join((begin, *parts, "</body></html>\n")).encode()
+
+
+def format_paragraph(paragraph: str) -> str:
+    """A paragraph of the docstring; what is indented there is equations, as is what says in each line what equals what
+    (a docstring of nothing else has no indentation)."""
+    if paragraph.startswith("    ") or all(" = " in line for line in paragraph.splitlines()):
+        return f"<pre>{typeset(cleandoc(paragraph))}</pre>"
+    return f"<p>{typeset(paragraph)}</p>"
+
+
+def typeset(text: str) -> str:
+    """Names with an underscore get an index, powers are raised, Greek letters are written as such.
+
+    >>> typeset("m a^2 = F_ext - mu_s m g")
+    'm a<sup>2</sup> = F<sub>ext</sub> &minus; &mu;<sub>s</sub> m g'
+    """
+    text = re.sub(rf"\b(\w|{'|'.join(GREEK)})_(\w+)", r"\1<sub>\2</sub>", escape(text, quote=False))
+    text = re.sub(r"\^(\w+)", r"<sup>\1</sup>", text).replace(" - ", " &minus; ")
+    return re.sub(rf"\b({'|'.join(GREEK)})\b", lambda word: f"&{GREEK[word[0]]};", text)
+
+
+def readable_unit(unit: str) -> str:
+    """A unit, or words with one, as people write it.
+
+    >>> readable("kg.m2")
+    'kg·m²'
+    """
+    return re.sub(r"(?<=[a-z])2", "²", re.sub(r"(?<=[A-Za-z])\.", "·", unit)) if unit != "1" else ""
+
+
+def _result_figure(found: CertifiedResult, declared: Variables) -> list[str]:
+    """The states over time."""
+    times, *columns = ([float(word) for word in column] for column in zip(*found.rows, strict=True))
+    parts = ["<h2>Default run</h2>", "<figure>"]
+    for values, (variable, meaning) in zip(columns, integrated_states(declared), strict=True):
+        shown, factor = meaning.unit, 1.0
+        if meaning.display:
+            shown, factor = meaning.display, unit_of(variable, meaning.unit).factor
+        parts.append(draw_chart(times, [factor * value for value in values], f"{variable} in {readable_unit(shown)}"))
+    return [*parts, f"<figcaption>{escape(found.caption)}</figcaption></figure>"]
+
+
+def _enumeration_table(variable: str, meaning: VariableDeclaration) -> str:
+    """The items of an enumeration."""
+    title = meaning.text[0].upper() + meaning.text[1:]
+    rows = "".join(
+        f"<tr><td><code>{value}</code></td><td><b>{escape(label)}</b>{' (default)' if value == meaning.start else ''}"
+        f"</td><td>{escape(sentence)}</td></tr>"
+        for label, value, sentence in meaning.items
+    )
+    head = "<thead><tr><th>value</th><th>name</th><th>what it is</th></tr></thead>"
+    return f"<h2>{escape(title)}: <code>{escape(variable)}</code></h2>\n<table>{head}{rows}</table>"
+
+
+def _variable_table(chosen: Variables) -> str:
+    """Name, start, unit, what it is and what is allowed, of each variable."""
+    rows = []
+    for variable, meaning in chosen:
+        unit = readable_unit(meaning.unit)
+        settable = meaning.causality in SETTABLE_CAUSALITIES
+        value = f"{meaning.start:.10g}" if settable else ""
+        if settable and meaning.display:
+            displayed = meaning.start * unit_of(variable, meaning.unit).factor
+            value = f"{displayed:.10g} {readable_unit(meaning.display)} = {value}"
+        notes = [readable_unit(meaning.allowed)] if settable and meaning.allowed != UNRESTRICTED else []
+        if meaning.variability == "fixed":
+            notes.append("fixed")
+        text = escape(meaning.text) + (f" <small>({escape('; '.join(notes))})</small>" if notes else "")
+        cells = (f"<code>{escape(variable)}</code>", f"{value} {escape(unit)}".strip(), text)
+        rows.append("<tr><td>{}</td><td class='number'>{}</td><td>{}</td></tr>".format(*cells))
+    set_ = [meaning.causality in SETTABLE_CAUSALITIES for _, meaning in chosen]
+    value = "default" if all(set_) else "default, unit" if any(set_) else "unit"
+    head = f"<thead><tr><th>name</th><th>{value}</th><th>what it is</th></tr></thead>"
+    return f"<table>{head}{''.join(rows)}</table>"
+
+
+def _capabilities_table() -> str:
+    """What every kind of FMU offers."""
+    marked = re.sub("`(.*?)`", r"<code>\1</code>", CAPABILITIES)
+    head, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in marked.splitlines())
+    titles = "".join(f"<th>{title}</th>" for title in head)
+    lines = "".join(f"<tr>{''.join(f'<td>{cell}</td>' for cell in row)}</tr>" for row in rows)
+    return f"<table class='offered'><thead><tr>{titles}</tr></thead>{lines}</table>"
+
+
+def _footer(model: type[VariableOwner], found: CertifiedResult | None) -> str:
+    """The default experiment, licences and version."""
+    run = f"Default run: 0 to {model.stop_time:g} s, tolerance {model.tolerance:g}."  # type: ignore[attr-defined]
+    certified = f" Certified result: <a href='../{RESULT_FOLDER}/'>{RESULT_FOLDER}</a>." if found else ""
+    licences = " Licences: <a href='licenses/'>licenses</a>."
+    return f"<footer>{run}{certified}{licences} friction-fmus {__version__}.</footer>"

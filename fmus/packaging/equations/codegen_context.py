@@ -1,0 +1,150 @@
+"""What the methods of a written-out model share: its parts by role, its constants, and how a method returns."""
+
+from collections.abc import Sequence
+
+from .algebra import depends_on, operands, subexpressions, substitute
+from .expression_printer import INDENT, ExpressionPrinter
+from .expressions import Expression, Operand, Term
+from .model_analysis import TIME, ModelAnalysis
+from .model_declaration import Contact
+
+MAX_RETURN_LENGTH = 100  # letters in a line
+
+
+class CodegenContext:
+    """A model of any states and contacts."""
+
+    def __init__(self, an: ModelAnalysis) -> None:
+        self.an = an
+        self.rate_expressions = [an.rate_outputs[s] for s in an.dynamic_states]  # the rates that must be calculated
+        self.driver = an.drivers[0] if an.drivers else None
+        taken = {e.name for e in an.declared}
+        for c in an.contacts:
+            for name, e in ("load", an.load.get(c)), ("slide", c.slide), ("limit", an.holding_limit[c]):
+                name += "" if an.waits else f"_{c.name}"
+                if isinstance(e, Term) and not e.name and name not in taken:
+                    e.name = name
+        for (c, d), e in an.A.items():
+            if (
+                isinstance(e, Term)
+                and not e.name
+                and not depends_on(e, an.inputs)
+                and f"A_{c.name}_{d.name}" not in taken
+            ):
+                e.name = f"A_{c.name}_{d.name}"
+        self.states = [s.name for s in an.states]
+        self.modes = [c.mode.name for c in an.contacts]
+        self.arguments = ["t", *self.states, *self.modes]
+        self.used_names = taken | {"self", *self.arguments}
+        self.constants = self._constants()
+
+    def _constants(self) -> list[Term]:
+        """Named expressions of parameters alone that the motion needs: prepare() calculates them."""
+        an, found = self.an, {}
+
+        def walk(e: Operand) -> None:
+            if isinstance(e, Term) and e.name and not depends_on(e, (*an.time_varying, *an.inputs)):
+                found[id(e)] = e
+            else:
+                for one in operands(e):
+                    walk(one)
+
+        for c in an.contacts:
+            for e in (c.slide, an.holding_limit[c], c.eps, *(an.A[c, d] for d in an.contacts if not an.waits)):
+                walk(e)
+        for e in an.outputs:
+            walk(e)
+        return list(found.values())
+
+    def printer(self, depth: int = 2) -> ExpressionPrinter:
+        """The lines of a method, or of a block in it."""
+        an = self.an
+        given = {s: s.name for s in an.states} | {m: m.name for m in an.modes} | {TIME: "t"}
+        return ExpressionPrinter(given, self.constants, self.used_names, depth)
+
+    def emit_driver(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> None:
+        """Where the driver is, and what an input that has a rate is, if that is needed."""
+        for e, rate in self.an.ramps.items():
+            course = f"self.{e.name}_polynomial"
+            if e not in s.bound_names and any(depends_on(one, (e,)) for one in targets):
+                s.bound_names[e] = e.name
+                s.emit(f"{e.name} = {course}.value_at(t - self.t_base)")
+            if rate not in s.bound_names and any(depends_on(one, (rate,)) for one in targets):
+                s.bound_names[rate] = rate.name
+                s.emit(f"{rate.name} = {course}.rate_at(t - self.t_base)")
+        if self.driver is not None and any(depends_on(e, (self.driver,)) for e in targets):
+            s.bound_names[self.driver] = self.driver.name
+            s.emit(f"{self.driver.name} = self.x_base + self.{self.driver.constant_rate.name} * (t - self.t_base)")
+
+    def nth_derivative_method(self, name: str, arguments: Sequence[str], targets: Sequence[Operand]) -> str:
+        """The text of a method that returns targets in which n-th derivatives of inputs stand for their rates."""
+        s = self.printer()
+        n = s.fresh_name("n")
+        for e, rate in self.an.ramps.items():
+            s.bound_names[rate] = rate.name
+            s.emit(f"{rate.name} = self.{e.name}_polynomial.derivative_at(t - self.t_base, {n})")
+        return method_source(name, [*arguments, n], self.return_lines(s, targets))
+
+    @property
+    def single_contact(self) -> Contact | None:
+        """The contact of a single body: nothing moves while it is stuck, and nobody asks for rates then."""
+        return self.an.contacts[0] if self.an.waits else None
+
+    def emit_sign_mode(self, s: ExpressionPrinter, c: Contact, targets: Sequence[Operand]) -> None:
+        """Where the law itself looks at the slip, that tells the direction."""
+        if len(c.laws) > 1 and any(depends_on(e, (c.mode,)) for e in targets):
+            with s.block(f"if {c.mode.name} == 0:"):
+                s.emit(f"{c.mode.name} = sign({s.text(c.slip)})")
+
+    def return_lines(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
+        """The lines that return the targets: one block for each item of a choice that they look at."""
+        test = next((found for e in targets if (found := find_choice_test(e)) is not None), None)
+        if test is None:
+            self.emit_driver(s, targets)
+            s.count_uses(*targets)
+            return emit_return(s, targets)
+        with s.block(f"if {s.text(test)}:"):
+            s.lines += self.return_lines(self.printer(s.depth), [substitute(e, {test: True}) for e in targets])
+        return s.lines + self.return_lines(self.printer(s.depth), [substitute(e, {test: False}) for e in targets])
+
+
+def emit_return(s: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
+    """The lines, of which the last return the targets."""
+    texts = list(map(s.text, targets))
+    if sum(map(len, texts)) <= MAX_RETURN_LENGTH:
+        s.emit("return " + ", ".join(texts))
+    else:
+        with s.block("return ("):
+            for text in texts:
+                s.emit(f"{text},")
+        s.emit(")")
+    return s.lines
+
+
+def emit_scales(f: CodegenContext, s: ExpressionPrinter, sizes: list[Operand]) -> list[Operand]:
+    """Sizes of what is added up, where the driver's is that of what his position is made of."""
+    drive = f.driver
+    if drive is None or not any(depends_on(e, (drive,)) for e in sizes):
+        return sizes
+    reach = Expression()
+    reach.name = drive.name if drive not in s.bound_names else s.fresh_name(f"reach_of_{drive.name}")
+    s.emit(f"{reach.name} = fabs(self.x_base) + fabs(self.{drive.constant_rate.name}) * (fabs(t) + fabs(self.t_base))")
+    s.bound_names[reach] = reach.name
+    return [
+        substitute(e, {one: reach for one in subexpressions(e).values() if is_magnitude_of(one, drive)}) for e in sizes
+    ]
+
+
+def is_magnitude_of(e: Operand, drive: Expression) -> bool:
+    """Whether this asks for the size of the position of a driver."""
+    return isinstance(e, Term) and e.op == "fabs" and e.args[0] is drive
+
+
+def method_source(name: str, arguments: Sequence[str], lines: list[str]) -> str:
+    """The text of a method."""
+    return "\n".join([f"{INDENT}def {name}({', '.join(('self', *arguments))}):", *lines])
+
+
+def find_choice_test(e: Operand) -> Term | None:
+    """A test of a choice in an expression."""
+    return next((one for one in subexpressions(e).values() if isinstance(one, Term) and one.op == "=="), None)

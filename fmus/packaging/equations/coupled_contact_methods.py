@@ -1,0 +1,217 @@
+"""The methods of a written-out model about its contacts where one may be stuck while something moves.
+
+What stuck contacts bear makes the rates of their slips zero.  A contact that acts on no other's slip has its load in
+closed form; for the others one linear system is solved, of which a sliding contact has the row F = mode slide.  Rates,
+derivatives and impulses of the forces obey systems of the same matrix.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .algebra import build_term, differentiate, is_same_expression, rounding_scale, substitute
+from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
+from .expression_printer import ExpressionPrinter
+from .expressions import Expression, Operand, Term
+from .model_declaration import SIGN, THRESHOLD, Contact, State
+
+
+@dataclass
+class ContactUnknown:
+    """A number of each contact: the expression that stands for it; what it is where the contact slides; and what
+    follows where it is stuck, its value or, of contacts that share bodies, the right-hand side."""
+
+    symbols: dict[Contact, Operand]
+    sliding_values: dict[Contact, Operand]
+    stuck_values: dict[Contact, Operand]
+
+    @property
+    def terms(self) -> list[Operand]:
+        return [*self.sliding_values.values(), *self.stuck_values.values()]
+
+
+def coupled_contact_methods(f: CodegenContext) -> list[str]:
+    """All of them."""
+    if f.single_contact is not None or not f.an.contacts:
+        return []
+    slips = [c.slip for c in f.an.contacts]
+    return [
+        method_source("slip_velocities", ["t", *f.states], f.return_lines(f.printer(), slips)),
+        slip_scale_method(f),
+        forces_method(f),
+        force_rates_method(f),
+        impulse_method(f),
+    ]
+
+
+# ---- what is solved
+
+
+def force_unknown(f: CodegenContext) -> ContactUnknown:
+    """The forces themselves."""
+    an = f.an
+    none = dict.fromkeys(an.contacts, 0.0)
+    held = {c: an.load[c] if c in an.independent_contacts else substitute(an.slip_rate[c], none) for c in an.contacts}
+    return ContactUnknown({c: c for c in an.contacts}, {c: Term("*", c.mode, c.slide) for c in an.contacts}, held)
+
+
+def derivative_unknown(f: CodegenContext, name: str, by: dict[Expression, Operand]) -> ContactUnknown:
+    """The derivatives of the forces along `by`."""
+    an, fixed = f.an, by | dict.fromkeys(f.an.contacts, 0.0)
+    slides = {c: build_term("*", c.mode, differentiate(c.slide, by)) for c in an.contacts}
+    held = {
+        c: differentiate(an.load[c], by) if c in an.independent_contacts else differentiate(an.slip_rate[c], fixed)
+        for c in an.contacts
+    }
+    zero = {
+        c: [slides[c], held[c], *([differentiate(an.holding_limit[c], by)] if THRESHOLD in c.laws else [])]
+        for c in an.contacts
+    }
+    none = {c for c in an.contacts if all(is_same_expression(e, 0.0) for e in zero[c])}
+    none = none if none.issuperset(an.interacting_contacts) else none & {*an.independent_contacts}
+    return ContactUnknown(
+        {c: 0.0 if c in none else local_symbol(f"{name}_{c.name}") for c in an.contacts}, slides, held
+    )
+
+
+def local_symbol(name: str) -> Expression:
+    """What stands for a local variable."""
+    symbol = Expression()
+    symbol.name = name
+    return symbol
+
+
+def emit_solution(
+    f: CodegenContext, s: ExpressionPrinter, unknowns: Sequence[ContactUnknown], law: bool = False
+) -> None:
+    """The lines that calculate them; with `law`, the law in force says what is stuck."""
+    shared = f.an.interacting_contacts
+    matrix = {(c, d): s.fresh_name(f"A_{c.name}_{d.name}") for c in shared for d in shared}
+    names = {
+        (n, c): c.name if e is c else s.fresh_name(e.name)
+        for n, u in enumerate(unknowns)
+        for c, e in u.symbols.items()
+        if isinstance(e, Expression)
+    }
+    for n, c in names:
+        if s.is_shared(unknowns[n].stuck_values[c]):
+            s.local_variable(unknowns[n].stuck_values[c])
+    for c in f.an.contacts:
+        own = [n for n in range(len(unknowns)) if (n, c) in names]
+        test = f"{c.mode.name} == 0" + (" and self.friction == HYBRID" if law and SIGN in c.laws else "")
+        for head, words in ((f"if {test}:", "stuck_values"), ("else:", "sliding_values")) if own else ():
+            with s.block(head):
+                for n in own:
+                    s.emit(f"{names[n, c]} = {s.text(getattr(unknowns[n], words)[c])}")
+                for d in shared if c in shared else []:
+                    s.emit(f"{matrix[c, d]} = {s.text(f.an.A[c, d] if words == 'stuck_values' else float(c is d))}")
+    sides = [{c: names[n, c] for c in shared} for n in range(len(unknowns)) if all((n, c) in names for c in shared)]
+    emit_elimination(s, shared, matrix, sides)
+    for (n, c), name in names.items():
+        s.bound_names[unknowns[n].symbols[c]] = name
+
+
+def emit_elimination(
+    s: ExpressionPrinter, rows: list[Contact], A: dict[tuple[Contact, Contact], str], sides: list[dict[Contact, str]]
+) -> None:
+    """Lines that put the solutions in the places of the right-hand sides.
+
+    No rows are exchanged: the rows of stuck contacts are those of a positive definite matrix, so no pivot is zero.
+    """
+    for n, k in enumerate(rows):
+        for i in rows[n + 1 :]:
+            s.emit(f"{A[i, k]} = {A[i, k]} / {A[k, k]}")
+            for j in rows[n + 1 :]:
+                s.emit(f"{A[i, j]} = {A[i, j]} - {A[i, k]} * {A[k, j]}")
+            for b in sides:
+                s.emit(f"{b[i]} = {b[i]} - {A[i, k]} * {b[k]}")
+    for n, k in reversed(list(enumerate(rows))):
+        for b in sides:
+            behind = "".join(f" - {A[k, j]} * {b[j]}" for j in rows[n + 1 :])
+            s.emit(f"{b[k]} = {f'({b[k]}{behind})' if behind else b[k]} / {A[k, k]}")
+
+
+# ---- the methods
+
+
+def emit_friction_forces(f: CodegenContext, s: ExpressionPrinter) -> None:
+    """The forces under the law in force, and the modes as it has them."""
+    contacts = [c for c in f.an.contacts if len(c.laws) > 1]
+    if contacts:
+        with s.block("if self.friction != HYBRID:"):
+            for c in contacts:
+                slip, near = s.text(c.slip), f" if fabs({s.text(c.slip)}) >= {s.text(c.eps)} else 0"
+                s.emit(f"{c.mode.name} = sign({slip}){near if THRESHOLD in c.laws else ''}")
+    emit_solution(f, s, [force_unknown(f)], law=True)
+    for c in contacts:
+        if THRESHOLD in c.laws:
+            with s.block(f"if {c.mode.name} == 0 and self.friction != HYBRID:"):
+                s.emit(f"{c.name} = threshold(0.0, 1.0, {c.name}, 0.0, {s.text(f.an.holding_limit[c])})")
+
+
+def slip_scale_method(f: CodegenContext) -> str:
+    s = f.printer()
+    sizes = emit_scales(f, s, [rounding_scale(c.slip) for c in f.an.contacts])
+    f.emit_driver(s, sizes)
+    return method_source("slip_magnitudes", ["t", *f.states], emit_return(s, sizes))
+
+
+def forces_method(f: CodegenContext) -> str:
+    """Forces, limits, and the sums of the sizes of what the forces are made of."""
+    an, s, u = f.an, f.printer(), force_unknown(f)
+    sizes = [
+        rounding_scale(an.load[c])
+        if c in an.independent_contacts
+        else build_term("/", rounding_scale(an.slip_rate[c]), an.A[c, c])
+        for c in an.contacts
+    ]
+    limits = [an.holding_limit[c] for c in an.contacts]
+    f.emit_driver(s, [*u.terms, *limits])
+    s.count_uses(*u.terms, *limits, *sizes)
+    emit_solution(f, s, [u])
+    sizes = emit_scales(f, s, sizes)
+    return method_source("contact_forces", f.arguments, emit_return(s, [*an.contacts, *limits, *sizes]))
+
+
+def force_rates_method(f: CodegenContext) -> str:
+    """Rates of forces and limits; what a force lacks to hold its contact, and the rate of that."""
+    an, s, u, rate = f.an, f.printer(), force_unknown(f), derivative_unknown(f, "rate", f.an.time_derivatives)
+    flow = an.time_derivatives | {c: rate.symbols[c] for c in an.contacts}
+    pulls, pull_rates = [], []
+    for c in an.contacts:
+        if c in an.independent_contacts:
+            pulls.append(build_term("-", an.load[c], c))
+            pull_rates.append(build_term("-", differentiate(an.load[c], an.time_derivatives), rate.symbols[c]))
+        else:
+            pulls.append(build_term("/", an.slip_rate[c], an.A[c, c]))
+            pull_rates.append(build_term("/", differentiate(an.slip_rate[c], flow), an.A[c, c]))
+    rates = [*rate.symbols.values(), *(differentiate(an.holding_limit[c], an.time_derivatives) for c in an.contacts)]
+    targets = [*rates, *pulls, *pull_rates]
+    f.emit_driver(s, [*u.terms, *rate.terms, *targets])
+    s.count_uses(*u.terms, *rate.terms, *targets)
+    emit_solution(f, s, [u])
+    emit_solution(f, s, [rate])
+    return method_source("contact_rates", f.arguments, emit_return(s, targets))
+
+
+def impulse_method(f: CodegenContext) -> str:
+    """The states after impulses that end the slips of stuck contacts, to the last bit where these are sums."""
+    an, s = f.an, f.printer()
+    ends = {c: c.slip if c not in an.independent_contacts else build_term("/", c.slip, an.A[c, c]) for c in an.contacts}
+    impulse = ContactUnknown(
+        {c: local_symbol(f"impulse_{c.name}") for c in an.contacts}, dict.fromkeys(an.contacts, 0.0), ends
+    )
+    after: dict[State, Operand] = {}
+    for state in an.dynamic_states:
+        for c in an.contacts:
+            acts = differentiate(an.rate_outputs[state], {c: 1.0})
+            if not is_same_expression(acts, 0.0):
+                after[state] = build_term("+", after.get(state, state), build_term("*", acts, impulse.symbols[c]))
+    f.emit_driver(s, [*impulse.terms, *after.values()])
+    s.count_uses(*impulse.terms, *after.values())
+    emit_solution(f, s, [impulse])
+    s.emit(", ".join(e.name for e in after) + " = " + ", ".join(s.text(e) for e in after.values()))
+    for c, state, value in an.stick_assignments:
+        with s.block(f"if {c.mode.name} == 0:"):
+            s.emit(f"{state.name} = {s.text(value)}")
+    s.emit(f"return {', '.join(f.states)}")
+    return method_source("apply_impulses", f.arguments, s.lines)

@@ -1,0 +1,205 @@
+"""Expressions as text, line by line: what is needed twice is calculated once, under the name that the author gave."""
+
+import ast
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from math import pi
+from typing import Any
+
+from ...runtime.variable_declarations import VariableDeclaration
+from .algebra import operands
+from .expressions import Expression, ModelError, Operand, Term
+from .model_declaration import Choice, Fixed, Input, Output, Parameter
+
+INDENT = "    "
+MAX_INLINE_LENGTH = 50  # letters: what has a name and is longer stands on a line of its own
+BINARY_OPERATORS: dict[str, ast.operator] = {"+": ast.Add(), "-": ast.Sub(), "*": ast.Mult(), "/": ast.Div()}
+COMPARISON_OPERATORS: dict[str, ast.cmpop] = {
+    "<": ast.Lt(),
+    "<=": ast.LtE(),
+    ">": ast.Gt(),
+    ">=": ast.GtE(),
+    "==": ast.Eq(),
+}
+
+
+class ExpressionPrinter:
+    """The lines of one block.
+
+    `given`: what variables are called here.  `kept`: constants, which are attributes of the model.
+    """
+
+    def __init__(
+        self, given: Mapping[Expression, str], kept: Collection[Expression], taken: Collection[str], depth: int
+    ) -> None:
+        self.bound_names, self.constants, self.used_names = dict(given), kept, set(taken)
+        self.lines: list[str] = []
+        self.depth = depth
+        self.local_names: dict[int, str] = {}  # number of an expression -> its local name
+        self.author_names: dict[int, str] = {}
+        self._use_counts: Counter[int] = Counter()
+        self._value_numbers: dict[tuple[Any, ...], int] = {}  # equal expressions have one number
+        self._number_by_id: dict[int, int] = {}
+        self._kept_alive: list[Operand] = []  # whose identity must not pass on to another
+
+    # ---- lines
+
+    def emit(self, line: str) -> None:
+        self.lines.append(INDENT * self.depth + line)
+
+    def emit_assignment(self, target: str, e: Operand) -> None:
+        if (text := self.text(e)) != target:
+            self.emit(f"{target} = {text}")
+
+    def fresh_name(self, name: str) -> str:
+        """The name, or another where it is taken: from here on it is."""
+        if name in self.used_names:
+            name = next(n for i in range(1, 1000) if (n := f"{name}_{i}") not in self.used_names)
+        self.used_names.add(name)
+        return name
+
+    @contextmanager
+    def block(self, head: str) -> Iterator[None]:
+        """The lines below a head; what is calculated there is not known behind it."""
+        self.emit(head)
+        outside, self.depth = dict(self.local_names), self.depth + 1
+        yield
+        self.local_names, self.depth = outside, self.depth - 1
+
+    # ---- expressions
+
+    def value_number(self, e: Operand) -> int:
+        if isinstance(e, Expression) and id(e) in self._number_by_id:
+            return self._number_by_id[id(e)]
+        key: tuple[Any, ...]
+        if isinstance(e, Term) and e not in self.bound_names and not self._is_constant(e):
+            key = e.op, *map(self.value_number, e.args)
+        elif isinstance(e, Output) and e not in self.bound_names:
+            key = "is", self.value_number(e.expression)
+        else:
+            key = ("leaf", id(e)) if isinstance(e, Expression) else ("number", repr(e))
+        found = self._value_numbers.setdefault(key, len(self._value_numbers)) if key[0] != "is" else key[1]
+        self._kept_alive.append(e)
+        if isinstance(e, Expression):
+            self._number_by_id[id(e)] = found
+            if e.name and (isinstance(e, VariableDeclaration) or found not in self.author_names):
+                self.author_names[found] = e.name
+        return found
+
+    def _is_constant(self, e: Operand) -> bool:
+        return isinstance(e, Expression) and any(e is one for one in self.constants)
+
+    def _is_leaf(self, e: Operand) -> bool:
+        return not isinstance(e, (Term, Output)) or e in self.bound_names or self._is_constant(e)
+
+    def count_uses(self, *targets: Operand) -> None:
+        """Note what is coming, so that what is needed twice gets a name."""
+        for e in targets:
+            if not self._is_leaf(e):
+                if isinstance(e, Output):
+                    self.value_number(e)
+                    self.count_uses(e.expression)
+                    continue
+                number = self.value_number(e)
+                self._use_counts[number] += 1
+                if self._use_counts[number] == 1:
+                    self.count_uses(*operands(e))
+
+    def is_shared(self, e: Operand) -> bool:
+        """Whether a term has been counted more than once."""
+        return isinstance(e, Term) and self._use_counts[self.value_number(e)] > 1
+
+    def text(self, e: Operand) -> str:
+        return ast.unparse(ast.fix_missing_locations(self._to_ast(e)))
+
+    def local_variable(self, e: Operand) -> str:
+        """The name of a local variable that has the value, whether or not it is needed twice."""
+        number = self.value_number(e)
+        if number not in self.local_names:
+            node = self._to_ast(e)
+            if number not in self.local_names:
+                self._store_in_local(number, node)
+        return self.local_names[number]
+
+    def _store_in_local(self, number: int, node: ast.expr) -> ast.expr:
+        name = self._choose_local_name(number)
+        self.emit(f"{name} = {ast.unparse(ast.fix_missing_locations(node))}")
+        self.local_names[number] = name
+        return ast.Name(name)
+
+    def _choose_local_name(self, number: int) -> str:
+        """A name for an expression: the author's, if it is free."""
+        name = self.author_names.get(number, "")
+        if not name or name in self.local_names.values() or name in self.bound_names.values():
+            name = next(n for i in range(1, 1000) if (n := f"{name or 'u'}{i}") not in self.used_names)
+        self.used_names.add(name)
+        return name
+
+    def _to_ast(self, e: Operand) -> ast.expr:
+        if not isinstance(e, Expression):
+            return ast.Name("pi") if e == pi else ast.parse(repr(e), mode="eval").body
+        if e in self.bound_names:
+            return ast.parse(self.bound_names[e], mode="eval").body
+        if (number := self.value_number(e)) in self.local_names:
+            return ast.Name(self.local_names[number])
+        if isinstance(e, (Parameter, Fixed, Input, Choice)) or self._is_constant(e):
+            return ast.Attribute(ast.Name("self"), e.name)
+        if isinstance(e, Output):
+            return self._to_ast(e.expression)
+        if not isinstance(e, Term):
+            raise ModelError(f"{e.name} is not known where it is needed", e.location)
+        if e.op == "choose" and not all(map(self._is_leaf, e.args[1:])):
+            return self._emit_branch(e, number)
+        node = self._build_node(e)
+        if self._use_counts[number] > 1 or (number in self.author_names and len(ast.unparse(node)) > MAX_INLINE_LENGTH):
+            return self._store_in_local(number, node)
+        return node
+
+    def _emit_branch(self, e: Term, number: int) -> ast.expr:
+        name, test = self._choose_local_name(number), self.text(e.args[0])
+        for head, case in (f"if {test}:", e.args[1]), ("else:", e.args[2]):
+            with self.block(head):
+                self.emit(f"{name} = {self.text(case)}")
+        self.local_names[number] = name
+        return ast.Name(name)
+
+    def _build_node(self, e: Term) -> ast.expr:
+        args = [self._to_ast(one) for one in e.args]
+        if e.op in BINARY_OPERATORS:
+            return binary_node(e.op, *args)
+        if e.op == "neg":
+            return negate_node(args[0])
+        if e.op in COMPARISON_OPERATORS:
+            if e.op == "==":
+                args[1] = ast.Constant(int(e.args[1]))
+            return ast.Compare(args[0], [COMPARISON_OPERATORS[e.op]], [args[1]])
+        if e.op == "choose":
+            return ast.IfExp(*args)
+        return ast.Call(ast.Name(e.op), args, [])
+
+
+def binary_node(op: str, a: ast.expr, b: ast.expr) -> ast.expr:
+    """a op b; a minus in front of a product or quotient is drawn into the sum around it, which has the same bits."""
+    other = {"+": "-", "-": "+"}
+    inner = b
+    while isinstance(inner, ast.BinOp) and isinstance(inner.op, (ast.Mult, ast.Div)):
+        inner = inner.left
+    if op in other and isinstance(inner, ast.UnaryOp):
+        return ast.BinOp(a, BINARY_OPERATORS[other[op]], drop_minus(b))
+    return ast.BinOp(a, BINARY_OPERATORS[op], b)
+
+
+def negate_node(node: ast.expr) -> ast.expr:
+    """The negative; of a product or a quotient that of its first factor, which has the same bits."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Mult, ast.Div)):
+        return ast.BinOp(negate_node(node.left), node.op, node.right)
+    return ast.UnaryOp(ast.USub(), node)
+
+
+def drop_minus(node: ast.expr) -> ast.expr:
+    """A product without the minus in front."""
+    if isinstance(node, ast.BinOp):
+        return ast.BinOp(drop_minus(node.left), node.op, node.right)
+    assert isinstance(node, ast.UnaryOp)
+    return node.operand

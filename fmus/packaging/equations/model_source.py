@@ -1,0 +1,172 @@
+"""The class of a model in plain scalars, as text: what travels inside an FMU, and what is frozen to C."""
+
+import ast
+from inspect import cleandoc
+from math import isfinite
+from textwrap import indent, wrap
+
+from ...runtime.active_method import EXACT_ITEM
+from ...runtime.oscillator import Oscillator
+from ..reserved_names import string_literal
+from .codegen_context import CodegenContext
+from .coupled_contact_methods import coupled_contact_methods
+from .expression_printer import INDENT
+from .generated_names import IMPORTS, MATH
+from .model_analysis import ModelAnalysis
+from .model_declaration import Contact, Fixed, Mode, Output, State, Variable
+from .output_method import observe_method
+from .rate_methods import rate_methods
+from .setup_methods import setup_methods
+from .single_contact_methods import single_contact_methods
+
+MODULE_TEMPLATE = '''"""{first}
+
+Written out from the equations in {file}: change those, not this.
+"""
+
+{import_lines}
+
+
+class Solver(Integrator):
+    method = Choice({method}, "integration method", {items})
+
+
+class {name}({base_class}):
+    """{about}"""
+
+{declaration_lines}
+
+{class_attribute_lines}
+
+{methods}
+'''
+IMPORTS_MARK = "\0"  # where imports go; no text of an author's has it
+WIDTH = 105
+RUN_SETTINGS = ("stop_time", "step_size", "tolerance")
+
+
+def model_source(an: ModelAnalysis, file: str) -> str:
+    """The text of the module."""
+    f = CodegenContext(an)
+    first, _, rest = escape_docstring(cleandoc(an.model.__doc__ or "")).partition("\n")
+    about = indent(f"{first}\n{rest}" + ("\n" if rest else ""), INDENT).strip(" ")
+    text = MODULE_TEMPLATE.format(
+        first=first,
+        file=file,
+        import_lines=IMPORTS_MARK,
+        method="EXACT" if an.method == EXACT_ITEM[0] else f"{an.method}.NUMBER",
+        items="(EXACT_ITEM, *METHOD_ITEMS)" if an.closed_form else "METHOD_ITEMS",
+        name=an.name,
+        base_class=base_class(an),
+        about=about.rstrip(" ") + (INDENT if rest else ""),
+        declaration_lines=indent("\n".join(declaration_lines(an)), INDENT),
+        class_attribute_lines=indent("\n".join(class_attribute_lines(an)), INDENT),
+        methods="\n\n".join(
+            [
+                *setup_methods(f),
+                *rate_methods(f),
+                *single_contact_methods(f),
+                *coupled_contact_methods(f),
+                observe_method(f),
+            ]
+        ),
+    )
+    return text.replace(IMPORTS_MARK, import_lines(text.replace(IMPORTS_MARK, "")))
+
+
+def base_class(an: ModelAnalysis) -> str:
+    """The class of the runtime that it derives from."""
+    return "DryFriction" if an.waits else "CoupledFriction" if an.contacts else "Oscillator"
+
+
+def import_lines(text: str) -> str:
+    """What the text needs."""
+    used = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+    lines = [f"from math import {', '.join(names)}\n"] if (names := sorted(used & set(MATH))) else []
+    for module, offered in IMPORTS.items():
+        if names := [name for name in offered if name in used]:
+            lines.append(f"from {f'.runtime.{module}'.rstrip('.')} import {', '.join(names)}")
+    return "\n".join(lines)
+
+
+def declaration_lines(an: ModelAnalysis) -> list[str]:
+    """The variables in the order of the description: parameters, choices, inputs, outputs."""
+    lines = [
+        f"{e.name} = {'Fixed' if isinstance(e, Fixed) else 'Parameter'}({float(e.start)!r}, {declaration_arguments(e)})"
+        for e in an.parameters
+    ]
+    if an.laws:
+        items = ", ".join(f"{law.upper()}_LAW" for law in an.laws)
+        lines.append(f'friction = Choice(HYBRID, "friction law", ({items}{"," if len(an.laws) == 1 else ""}))')
+    for e in an.choices:
+        items = ", ".join(
+            f"({string_literal(label)}, {value}, {string_literal(sentence)})" for label, value, sentence in e.items
+        )
+        lines.append(f"{e.name} = Choice({e.start}, {string_literal(e.text)}, ({items},))")
+    lines += [f"{e.name} = Input({float(e.start)!r}, {declaration_arguments(e)})" for e in an.inputs]
+    return lines + [f"{e.name} = {output_declaration(an, e)}" for e in an.ordered_outputs]
+
+
+def output_declaration(an: ModelAnalysis, e: Variable) -> str:
+    """The declaration of what is calculated."""
+    if isinstance(e, Mode):
+        return f"Mode({string_literal(e.text)})"
+    more = (
+        f", rate_of={string_literal(e.integrates.name)}"
+        if isinstance(e, (State, Output)) and e.integrates is not None
+        else ""
+    )
+    if isinstance(e, State):
+        more += f", rate={string_literal(e.constant_rate.name)}" if e in an.drivers else ""
+        return f"State({declaration_arguments(e)}{more})"
+    if isinstance(e, Contact):
+        return f"Contact({declaration_arguments(e)})"
+    return f"Output({declaration_arguments(e)}{more}{', direct=True' if an.has_direct_feedthrough(e) else ''})"
+
+
+def declaration_arguments(e: Variable) -> str:
+    """Unit, words and range."""
+    bounds = [(key, getattr(e, key)) for key in ("low", "high", "above", "below")]
+    more = [f"{key}={float(bound)!r}" for key, bound in bounds if isfinite(bound)]
+    more += [f"{key}={string_literal(getattr(e, key))}" for key in ("display", "alias") if getattr(e, key)]
+    return ", ".join([string_literal(e.unit), string_literal(e.text), *more])
+
+
+def class_attribute_lines(an: ModelAnalysis) -> list[str]:
+    """What the runtime asks of the class."""
+    states = ", ".join(f"{string_literal(s.name)}: {string_literal(an.rate[s].name)}" for s in an.states)
+    lines = [f"states = {{{states}}}"]
+    if an.contacts:
+        slips = ", ".join(
+            f"{string_literal(c.mode.name)}: {string_literal(c.slip.name if an.waits else '')}" for c in an.contacts
+        )
+        lines.append(f"contacts = {{{slips}}}")
+    lines += [
+        f"{word} = True"
+        for word, holds in (
+            ("is_linear", an.closed_form),
+            ("has_driver", an.drivers),
+            ("has_input_derivatives", an.ramps),
+        )
+        if holds
+    ]
+    for word in RUN_SETTINGS:
+        if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
+            lines.append(f"{word} = {value!r}")
+    if an.rules:
+        inherited = [f"{INDENT}*{base_class(an)}.rules,"] if an.contacts else []
+        sentences = [f"{INDENT}{string_lines(rule.sentence)}," for rule in an.rules]
+        lines += ["rules = (", *inherited, *sentences, ")"]
+    return lines
+
+
+def string_lines(text: str) -> str:
+    """A string literal over several lines, if it is long."""
+    lines = wrap(text, WIDTH, drop_whitespace=False)
+    return string_literal(text) if len(lines) == 1 else f"\n{INDENT}".join(map(string_literal, lines))
+
+
+def escape_docstring(text: str) -> str:
+    """A text as it stands between three quotes."""
+    text = text.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
+    return f'{text[:-1]}\\"' if text.endswith('"') else text

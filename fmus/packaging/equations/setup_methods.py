@@ -1,0 +1,98 @@
+"""The methods of a written-out model about its values: at its birth, at the start, when they have changed."""
+
+from ...runtime.stick_slip import DryFriction
+from .algebra import Memo, subexpressions
+from .codegen_context import CodegenContext, method_source
+from .expression_printer import INDENT
+from .expressions import Term
+
+
+def setup_methods(f: CodegenContext) -> list[str]:
+    """All of them."""
+    return [
+        init_method(f),
+        initial_method(f),
+        prepare_method(f),
+        *nominal_velocity_method(f),
+        *driver_method(f),
+        *input_polynomial_methods(f),
+    ]
+
+
+def init_method(f: CodegenContext) -> str:
+    """Every attribute is born here."""
+    lines = ["super().__init__()", "self.solver = Solver()"]
+    if f.driver is not None:
+        lines.append("self.t_base = self.x_base = 0.0")
+    for e, rate in f.an.ramps.items():
+        lines.append(f"self.{e.name}_polynomial = InputPolynomial()")
+        lines.append(f"self.t_base = self.{rate.name} = 0.0")
+    if f.constants:
+        lines.append(" = ".join(f"self.{e.name}" for e in f.constants) + " = 0.0")
+    return method_source("__init__", (), [2 * INDENT + line for line in lines])
+
+
+def initial_method(f: CodegenContext) -> str:
+    """Position and speed at the start."""
+    s = f.printer()
+    if f.driver is not None:
+        s.emit("self.t_base, self.x_base = t, 0.0")
+    elif f.an.ramps:
+        s.emit("self.t_base = t")
+    return method_source("initial_state", ["t"], f.return_lines(s, [state.start_expression for state in f.an.states]))
+
+
+def prepare_method(f: CodegenContext) -> str:
+    """Constants and rules; a rule is judged as soon as it can be: what it refuses could not be divided by."""
+    s, dry = f.printer(), bool(f.an.contacts)
+    done: list[Term] = []
+    s.constants = done
+    for e in f.an.ramps:
+        s.emit(f"self.{e.name}_polynomial.set_value(self.{e.name})")
+    s.count_uses(*f.constants, *(rule.broken for rule in f.an.rules))
+
+    def calculate(needed: Memo | None = None) -> None:
+        for e in f.constants:
+            if (needed is None or id(e) in needed) and not any(e is one for one in done):
+                s.emit_assignment(f"self.{e.name}", e)
+                done.append(e)
+
+    for number, rule in enumerate(f.an.rules, len(DryFriction.rules) + 1 if dry else 1):
+        calculate(subexpressions(rule.broken))
+        with s.block(f"if {s.text(rule.broken)}:"):
+            s.emit(f"return {number}")
+    calculate()
+    s.emit("return super().prepare()" if dry else "return 0")
+    return method_source("prepare", (), s.lines)
+
+
+def nominal_velocity_method(f: CodegenContext) -> list[str]:
+    """The speed that a tolerance must resolve."""
+    wanted = [state.nominal_velocity for state in f.an.states if state.nominal_velocity is not None]
+    return [method_source("nominal_velocity", (), f.return_lines(f.printer(), wanted))] if wanted else []
+
+
+def driver_method(f: CodegenContext) -> list[str]:
+    """The speed of the driver."""
+    return (
+        []
+        if f.driver is None
+        else [method_source("driver_velocity", (), f.return_lines(f.printer(), [f.driver.constant_rate]))]
+    )
+
+
+def input_polynomial_methods(f: CodegenContext) -> list[str]:
+    """Where inputs have derivatives: fix at time t what goes on by itself, which prepare() takes over; tell their rates
+    there; and whether any has more than a rate."""
+    if not f.an.ramps:
+        return []
+    base, rates = f.printer(), f.printer()
+    for e, rate in f.an.ramps.items():
+        base.emit(f"self.{e.name} = self.{e.name}_polynomial.shift_to(t - self.t_base)")
+        rates.emit(f"self.{rate.name} = self.{e.name}_polynomial.rate_at(t - self.t_base)")
+    base.emit("super().rebase(t)")
+    base.emit("self.t_base = t")
+    bends = f.printer()
+    bends.emit("return " + " or ".join(f"self.{e.name}_polynomial.order > 1" for e in f.an.ramps))
+    scribes = {"rebase": base, "set_input_rates": rates, "has_higher_order": bends}
+    return [method_source(name, ["t"] * (name != "has_higher_order"), s.lines) for name, s in scribes.items()]

@@ -1,0 +1,61 @@
+"""What a model or an offer fixes is settled: flags, comparisons of choices, and the tests that follow from them."""
+
+import ast
+from typing import Any
+
+from ..syntax_trees import TreeTransformer, replace_fields
+from .layout import ModelLayout
+
+
+class ConstantFolder(TreeTransformer):
+    """An expression in which what is fixed stands as True, False or a number."""
+
+    def __init__(self, spec: ModelLayout, constants: dict[str, Any]) -> None:
+        self.spec, self.constants = spec, constants
+        self.choices = dict(spec.choices)  # those of local names as well
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
+        node = self.generic_visit(node)
+        known = self.spec.flags.get(node.attr)
+        return node if known is None or not isinstance(node.ctx, ast.Load) else ast.Constant(known)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        match node:
+            case ast.Compare(ast.Attribute() | ast.Name() as left, [ast.Eq() | ast.NotEq() as op], [ast.Name(id=name)]):
+                possible = self.choices.get(left.attr if isinstance(left, ast.Attribute) else left.id)
+                value = self.constants.get(name)
+                if possible is not None and value is not None and (value not in possible or len(possible) == 1):
+                    return ast.Constant((value in possible) == isinstance(op, ast.Eq))
+        return self.generic_visit(node)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        node = self.generic_visit(node)
+        decides = isinstance(node.op, ast.Or)
+        if any(known_truth(one) is decides for one in node.values):
+            return ast.Constant(decides)
+        values = [one for one in node.values if known_truth(one) is None]
+        return (
+            replace_fields(node, values=values)
+            if len(values) > 1
+            else values[0]
+            if values
+            else ast.Constant(not decides)
+        )
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        node = self.generic_visit(node)
+        known = known_truth(node.operand)
+        if isinstance(node.op, ast.Not) and known is not None:
+            return ast.Constant(not known)
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        test = self.visit(node.test)
+        if (known := known_truth(test)) is None:
+            return replace_fields(node, test=test, body=self.visit(node.body), orelse=self.visit(node.orelse))
+        return self.visit(node.body if known else node.orelse)
+
+
+def known_truth(node: ast.AST) -> bool | None:
+    """True or False where it is known, else None."""
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, bool) else None

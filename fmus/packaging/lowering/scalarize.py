@@ -1,0 +1,418 @@
+"""The expressions and simple statements of one function, in scalars."""
+
+import ast
+import re
+from collections.abc import Sequence
+
+from .. import BuildError
+from ..syntax_trees import all_nodes, is_same_tree, replace_fields
+from .constant_folding import ConstantFolder
+from .elimination import factorization_lines, solution_lines
+from .layout import NAMED_VECTOR, STATES, ModelLayout
+from .source_symbols import SourceSymbols, annotated_kind
+
+ELEMENTWISE = {
+    "magnitude": "{0} if {0} > 0.0 else -{0}",
+    "elementwise_max": "{0} if {0} > {1} else {1}",
+}  # number by number
+REDUCTIONS = {"max_of": ">", "min_of": "<"}  # one of the numbers
+ALLOCATORS = ("state_vector", "contact_vector")
+LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices")  # what a loop may run over
+METHOD_LOOP = "methods"  # or (label, file, class) of every one
+INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place"}
+
+
+class LoweringError(BuildError):
+    """Source that cannot be written out: the line, what is wrong and what to do instead."""
+
+
+class Scalarizer(ConstantFolder):
+    """What the names of a function stand for, and its expressions by number."""
+
+    def __init__(
+        self, spec: ModelLayout, declared: SourceSymbols, path: str, vectors: bool, index: dict[str, int] | None = None
+    ) -> None:
+        super().__init__(spec, declared.constants)
+        self.declared, self.path, self.has_vectors = declared, path, vectors
+        self.vector_kinds: dict[str, str] = {}  # of names that are vectors
+        self.loop_indices = dict(index or {})  # of names that count
+        self.scalar_names: set[str] = set()  # names that are numbers
+        self.component_owner: dict[str, str] = {}  # name of a number of a vector -> the vector
+        self.known_zeros: set[str] = set()
+        self.systems: dict[str, tuple[str, str]] = {}
+        self.jacobians: set[str] = set()  # names that are a Jacobian
+        self.method_bindings: dict[str, ast.expr] = {}  # of a loop over the methods: name -> what it stands for
+
+    def error(self, node: ast.AST, why: str) -> LoweringError:
+        return LoweringError(f"{self.path}:{getattr(node, 'lineno', '?')}: '{ast.unparse(node)[:60]}' {why}.")
+
+    # ---- vectors and their numbers
+
+    def vector_kind(self, node: ast.AST) -> str | None:
+        """What an expression runs over; None for a number."""
+        if not self.has_vectors:
+            return None
+        match node:
+            case ast.Name(id=name):
+                return self.vector_kinds.get(name)
+            case ast.Attribute(attr=name):
+                return self.declared.attribute_kind(name)
+            case ast.Call():
+                kinds = self.result_kinds(node)
+                return kinds[0] if len(kinds) == 1 else None
+            case ast.BinOp(left=left, right=right) | ast.Compare(left=left, comparators=[right]):
+                found = {self.vector_kind(left), self.vector_kind(right)} - {None}
+                if len(found) > 1:
+                    raise self.error(node, "has a vector of states and one of contacts; loop over contact_indices")
+                return found.pop() if found else None
+            case ast.UnaryOp(op=ast.USub(), operand=one):
+                return self.vector_kind(one)
+        return None
+
+    def is_elementwise(self, node: ast.AST) -> bool:
+        """Whether a call works on vectors number by number."""
+        names = {*ELEMENTWISE, *self.declared.elementwise, "select_kinematic"}
+        return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names
+
+    def result_kinds(self, call: ast.Call) -> list[str | None]:
+        """What a function returns."""
+        if self.is_elementwise(call):
+            return [self.vector_kind(call.args[0])]
+        return self.declared.result_kinds.get(function_name(call), [None])
+
+    def all_indices(self, kind: str) -> range:
+        return range(len(self.spec.component_names(kind)))
+
+    def own_indices(self, node: ast.AST, kind: str) -> Sequence[int]:
+        """The places whose numbers are a vector's own: not those rates of f2 that are found in y2."""
+        name = getattr(node, "attr", getattr(node, "id", ""))
+        beside = self.declared.assigned_attributes if isinstance(node, ast.Attribute) else self.vector_kinds
+        borrows = kind == STATES and re.fullmatch(r"f\d*", name) and "y" + name[1:] in beside
+        return self.spec.dynamic_states if borrows else self.all_indices(kind)
+
+    def component_name(self, node: ast.AST, vector: str, kind: str, place: int) -> str:
+        """The name of one number of a vector that is a local name."""
+        name = self.spec.component_name(vector, kind, place)
+        borrowed = vector[0] == "f" and name in self.component_owner and self.component_owner[name] == "y" + vector[1:]
+        if not borrowed and self.component_owner.setdefault(name, vector) != vector:
+            raise self.error(
+                node, f"has numbers of the same name, {name}, as {self.component_owner[name]}; take another name"
+            )
+        return name
+
+    def component(self, node: ast.expr, place: int) -> ast.expr:
+        """One number of a vector; a number as it is."""
+        kind = self.vector_kind(node)
+        if kind is None:
+            return self.visit(node)
+        match node:
+            case ast.Name(id=vector):
+                name = self.component_name(node, vector, kind, place)
+                return ast.Constant(0.0) if name in self.known_zeros else ast.Name(name, ast.Load())
+            case ast.Attribute(value=owner, attr=vector):
+                return ast.Attribute(self.visit(owner), self.spec.component_name(vector, kind, place), ast.Load())
+            case ast.BinOp(left=left, op=op, right=right):
+                return fold_zero(self.component(left, place), op, self.component(right, place))
+            case ast.UnaryOp(op=op, operand=one):
+                return ast.UnaryOp(op, self.component(one, place))
+            case ast.Compare(left=left, ops=ops, comparators=[right]):
+                return ast.Compare(self.component(left, place), ops, [self.component(right, place)])
+            case ast.Call(func=ast.Name(id="select_kinematic"), args=[moved, other]):
+                return self.component(other if place in self.spec.dynamic_states else moved, place)
+            case ast.Call(func=ast.Name(id=name), args=args) if name in ELEMENTWISE:
+                if not all(isinstance(one, (ast.Name, ast.Attribute)) for one in args):
+                    raise self.error(node, "would work something out twice; give what is in the brackets a name")
+                return parse_expression(
+                    ELEMENTWISE[name].format(*(ast.unparse(self.component(one, place)) for one in args))
+                )
+            case ast.Call(func=function, args=args) if self.is_elementwise(node):
+                return ast.Call(function, [self.component(one, place) for one in args], [])
+            case _:
+                raise self.error(node, "is a vector inside a calculation; give it a name on a line of its own")
+
+    def own_components(self, node: ast.expr) -> list[ast.expr]:
+        """All the numbers of an argument, a target or a result that are its own."""
+        kind = self.vector_kind(node)
+        return [self.component(node, i) for i in self.own_indices(node, kind)] if kind else [self.visit(node)]
+
+    def all_components(self, node: ast.expr) -> list[ast.expr]:
+        """All the numbers of a vector, those that it borrows as well."""
+        if not (kind := self.vector_kind(node)):
+            raise self.error(node, "is a number where a vector is wanted")
+        return [self.component(node, i) for i in self.all_indices(kind)]
+
+    # ---- what is a number
+
+    def bind_method(self, target: ast.expr, label: str) -> None:
+        """What the names of a loop over the methods, label, file and class, stand for at one of them."""
+        parts = ast.Constant(label), ast.Name(label), parse_expression(f"{label}.{self.spec.methods[label]}")
+        assert isinstance(target, ast.Tuple)
+        self.method_bindings = {getattr(name, "id", ""): part for name, part in zip(target.elts, parts, strict=True)}
+
+    def visit_for_method(self, item: ast.expr, target: ast.expr, label: str) -> ast.expr:
+        self.bind_method(target, label)
+        found = self.visit(item)
+        self.method_bindings = {}
+        return found
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if node.id in self.method_bindings:
+            return self.method_bindings[node.id]
+        if self.vector_kinds.get(node.id):
+            raise self.error(node, "is a vector where a number is wanted")
+        return ast.Constant(self.loop_indices[node.id]) if node.id in self.loop_indices else node
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        match node:
+            case ast.Subscript(value=ast.Name(id=name), slice=ast.Name(id=i)) if name in INDEX_LOOKUPS:
+                return ast.Constant(getattr(self.spec, INDEX_LOOKUPS[name])(self.loop_indices[i]))
+            case ast.Subscript(value=ast.Name(id=name), slice=ast.Tuple(elts=[tuple_or_single, column])) if (
+                name in self.jacobians
+            ):
+                return ast.Name(
+                    self.spec.jacobian_entry(self.constant_index(tuple_or_single), self.constant_index(column)),
+                    ast.Load(),
+                )
+        return (
+            self.component(node.value, self.constant_index(node.slice))
+            if self.vector_kind(node.value)
+            else self.generic_visit(node)
+        )
+
+    def constant_index(self, index: ast.expr) -> int:
+        found = self.visit(index)
+        if not (isinstance(found, ast.Constant) and isinstance(found.value, int)):
+            raise self.error(index, "is an index that is not known; loop over contact_indices or state_indices")
+        return found.value
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        node = self.generic_visit(node)
+        match node:
+            case ast.BinOp(left=ast.Constant(value=int(a)), op=ast.Add(), right=ast.Constant(value=int(b))):
+                return ast.Constant(a + b)
+        return node
+
+    def visit_List(self, node: ast.List) -> ast.List:
+        return ast.List(self.expand_stars(node.elts), node.ctx)
+
+    def visit_Tuple(self, node: ast.Tuple) -> ast.Tuple:
+        return ast.Tuple(self.expand_stars(node.elts), node.ctx)
+
+    def expand_stars(self, parts: list[ast.expr]) -> list[ast.expr]:
+        """The parts of a row; *y stands for all the numbers of y."""
+        found: list[ast.expr] = []
+        for one in parts:
+            starred = isinstance(one, ast.Starred) and self.vector_kind(one.value)
+            found += self.all_components(one.value) if isinstance(one, ast.Starred) and starred else [self.visit(one)]
+        return found
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        match node:
+            case ast.Call(ast.Name(id="getattr"), [thing, ast.Name(id=name)]) if name in self.method_bindings:
+                return ast.Attribute(self.visit(thing), ast.literal_eval(self.method_bindings[name]), ast.Load())
+            case ast.Call(func=ast.Name(id="tuple"), args=[ast.GeneratorExp(elt=item, generators=[each])]):
+                if isinstance(each.iter, ast.Name) and each.iter.id == METHOD_LOOP:
+                    return ast.Tuple([self.visit_for_method(item, each.target, label) for label in self.spec.methods])
+            case ast.Call(func=ast.Name(id="len"), args=[one]) if kind := self.vector_kind(one):
+                return ast.Constant(len(self.spec.component_names(kind)))
+            case ast.Call(func=ast.Name(id="sum_of"), args=args):
+                terms = [ast.unparse(term) for one in args for term in self.all_components(one)]
+                return parse_expression(" + ".join(f"({term})" for term in terms))
+            case ast.Call(func=ast.Name(id="all_of" | "any_of" as name), args=[one]):
+                tests = self.all_components(one)
+                return ConstantFolder.visit_BoolOp(self, ast.BoolOp(ast.And() if name == "all_of" else ast.Or(), tests))
+            case ast.Call(func=ast.Name(id=name), args=[ast.Name() as one]) if name in REDUCTIONS:
+                *terms, text = [ast.unparse(term) for term in self.all_components(one)] or ["inf"]
+                behind = [text]
+                for term in reversed(terms):
+                    text = f"{term} if {' and '.join(f'{term} {REDUCTIONS[name]} {one}' for one in behind)} else {text}"
+                    behind.insert(0, term)
+                return parse_expression(text)
+        function = node.func
+        contacts = [one.id for one in node.args if isinstance(one, ast.Name) and one.id in self.loop_indices]
+        if contacts:
+            tail = self.spec.contact_suffix(self.loop_indices[contacts[0]])
+            if isinstance(function, ast.Attribute):
+                function = replace_fields(function, attr=function.attr + tail)
+            elif isinstance(function, ast.Name):
+                function = replace_fields(function, id=function.id + tail)
+        kept = [one for one in node.args if not (isinstance(one, ast.Name) and one.id in self.loop_indices)]
+        args = [term for one in kept for term in self.own_components(one)]
+        return replace_fields(
+            node, func=self.visit(function), args=args, keywords=[self.visit(one) for one in node.keywords]
+        )
+
+    # ---- simple statements
+
+    def lower_statement(self, node: ast.stmt) -> list[ast.stmt]:
+        """What a simple statement becomes."""
+        match node:
+            case ast.AnnAssign() if annotated_kind(node):
+                return []
+            case ast.AugAssign(target=target) if self.vector_kind(target):
+                raise self.error(node, "writes into a vector, which another name may share; write c = c + ...")
+            case ast.Expr(ast.Call(ast.Name(id="setattr"), [thing, ast.Name(id=name), value])) if (
+                name in self.method_bindings
+            ):
+                place = ast.Attribute(self.visit(thing), ast.literal_eval(self.method_bindings[name]), ast.Store())
+                return [ast.Assign([place], self.visit(value))]
+            case ast.Return(value=ast.Tuple(elts=parts)):
+                return [ast.Return(tuple_or_single([term for one in parts for term in self.own_components(one)]))]
+            case ast.Return(value=value) if value and self.vector_kind(value):
+                if self.is_elementwise(value) or not isinstance(value, ast.Call):
+                    return [ast.Return(tuple_or_single(self.own_components(value)))]
+            case ast.Assign(
+                targets=[ast.Tuple(elts=[ast.Name(id=f_t), ast.Name(id=J)])],
+                value=ast.Call(func=ast.Attribute(attr="jacobian")) as call,
+            ):
+                return self.lower_jacobian(f_t, J, call)
+            case ast.Assign(targets=[ast.Name(id=s)], value=ast.Call(func=ast.Name(id="factorize"), args=[g, h, _])):
+                self.systems[s] = ast.unparse(g), ast.unparse(h)
+                return ast.parse("\n".join(factorization_lines(s, *self.systems[s], self.spec))).body
+            case ast.Assign(
+                targets=[ast.Name(id=k) as to], value=ast.Call(func=ast.Name(id="solve_factored"), args=[s, r])
+            ):
+                self.record_kinds([to], [STATES])
+                system, right = ast.unparse(s), ast.unparse(r)
+                return ast.parse("\n".join(solution_lines(k, system, right, *self.systems[system], self.spec))).body
+            case ast.Assign():
+                return self.lower_assignment(node)
+        return [self.visit(node)]
+
+    def record_kinds(self, targets: Sequence[ast.expr], kinds: Sequence[str | None] = ()) -> None:
+        """What names stand for from here on; numbers, if nothing is said."""
+        for one, kind in zip(targets, kinds or [None] * len(targets), strict=True):
+            if not isinstance(one, ast.Name):
+                continue
+            if kind is None:
+                if one.id in self.vector_kinds:
+                    raise self.error(one, "is a vector elsewhere in the function; take another name")
+                self.scalar_names.add(one.id)
+                continue
+            if kind == STATES and one.id[0] == "y" and "f" + one.id[1:] in self.vector_kinds:
+                raise self.error(
+                    one, f"changes under f{one.id[1:]}, some of whose rates are read from it; take another name"
+                )
+            if self.vector_kinds.setdefault(one.id, kind) != kind:
+                raise self.error(one, "is another vector elsewhere in the function; take another name")
+
+    def lower_assignment(self, node: ast.Assign) -> list[ast.stmt]:
+        """An assignment number by number, one below the other, or side by side where one would disturb the next."""
+        value, target = node.value, node.targets[0]
+        if len(node.targets) > 1:  # self.c1 = self.c2 = 0.0
+            terms = [term for one in node.targets for term in self.own_components(one)]
+            return [ast.Assign(terms, self.visit(value))] if terms else []
+        left = target.elts if isinstance(target, ast.Tuple) else [target]
+        right = value.elts if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) else [value]
+        if len(left) == len(right) and all(
+            isinstance(one, ast.Call) and function_name(one) in ALLOCATORS for one in right
+        ):
+            self.record_kinds(left, [self.vector_kind(one) for one in right])
+            return []
+        if (
+            isinstance(value, ast.Call)
+            and not self.is_elementwise(value)
+            and (len(left) > 1 or self.vector_kind(value))
+        ):
+            return self.lower_unpacking(node, left, value)
+        if len(left) != len(right):
+            return [self.visit(node)]
+        kinds = [
+            self.vector_kind(one) or (self.vector_kind(to) if not isinstance(to, ast.Name) else None)
+            for to, one in zip(left, right, strict=True)
+        ]
+        self.record_kinds(left, kinds)
+        if not any(kinds):
+            return [self.visit(node)]
+        pairs: list[tuple[ast.expr, ast.expr]] = []
+        for to, one, kind in zip(left, right, kinds, strict=True):
+            for i in self.own_indices(to, kind) if kind else [-1]:
+                number = self.component(one, i) if kind else self.visit(one)
+                if isinstance(to, ast.Name) and kind and isinstance(number, ast.Constant) and number.value == 0.0:
+                    self.known_zeros.add(self.component_name(to, to.id, kind, i))
+                else:
+                    pairs.append((self.component(to, i) if kind else self.visit(to), number))
+        pairs = [(to, number) for to, number in pairs if not is_same_tree(to, number)]
+        changed: set[str] = set()
+        for to, number in pairs:
+            if changed and changed & names_used(number):
+                return [
+                    ast.Assign(
+                        [tuple_or_single([to for to, _ in pairs])], tuple_or_single([number for _, number in pairs])
+                    )
+                ]
+            changed.add(dotted_name(to))
+        return [ast.Assign([to], number) for to, number in pairs]
+
+    def lower_unpacking(self, node: ast.Assign, left: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
+        """What a function returns, taken apart."""
+        kinds = self.result_kinds(value)
+        if (
+            kinds == [STATES]
+            and len(left) == 1
+            and function_name(value) == "rates"
+            and not is_matching_pair(left[0], value.args[1])
+        ):
+            raise self.error(node, "must call the rates at y2 f2, and so on: those that are states are read from y2")
+        if len(kinds) != len(left):
+            kinds = [None] * len(left)  # numbers that are taken one by one
+        self.record_kinds(left, kinds)
+        terms = [term for one in left for term in self.own_components(one)]
+        return [ast.Assign([tuple_or_single(terms)], self.visit(value))] if terms else [ast.Expr(self.visit(value))]
+
+    def lower_jacobian(self, f_t: str, J: str, call: ast.Call) -> list[ast.stmt]:
+        """f_t, J = model.jacobian(...): for each rate to calculate its derivatives, that by time first."""
+        self.vector_kinds[f_t] = STATES
+        self.jacobians.add(J)
+        own = self.spec.dynamic_states
+        named = {i: self.spec.component_name(f_t, STATES, i) for i in self.all_indices(STATES)}
+        self.known_zeros |= {name for i, name in named.items() if i not in own}
+        names = [
+            name
+            for i in own
+            for name in (named[i], *(self.spec.jacobian_entry(i, j) for j in self.all_indices(STATES)))
+        ]
+        for name in names:
+            if self.component_owner.setdefault(name, J) != J:
+                raise self.error(call, f"has a slope of the name {name}, as {self.component_owner[name]} has a number")
+        self.component_owner.update(dict.fromkeys((named[i] for i in own), f_t))
+        return [ast.Assign([tuple_or_single([ast.Name(name) for name in names])], self.visit(call))]
+
+    def find_name_clash(self) -> str:
+        """A name that is both a number and a number of a vector, if there is one."""
+        return min(self.scalar_names & self.component_owner.keys(), default="")
+
+
+def function_name(call: ast.Call) -> str:
+    """The bare name of a function."""
+    return getattr(call.func, "attr", getattr(call.func, "id", ""))
+
+
+def is_matching_pair(rates: ast.expr, states: ast.expr) -> bool:
+    """f2 and y2."""
+    f, y = (getattr(one, "attr", getattr(one, "id", "")) for one in (rates, states))
+    return f[:1] == "f" and y == "y" + f[1:] and NAMED_VECTOR.fullmatch(y) is not None
+
+
+def parse_expression(text: str) -> ast.expr:
+    return ast.parse(text, mode="eval").body
+
+
+def tuple_or_single(terms: list[ast.expr]) -> ast.expr:
+    return ast.Tuple(terms, ast.Load()) if len(terms) != 1 else terms[0]
+
+
+def names_used(node: ast.AST) -> set[str]:
+    return {dotted_name(one) for one in all_nodes(node) if isinstance(one, (ast.Name, ast.Attribute))}
+
+
+def dotted_name(node: ast.expr) -> str:
+    return node.id if isinstance(node, ast.Name) else ast.unparse(node)
+
+
+def fold_zero(left: ast.expr, op: ast.operator, right: ast.expr) -> ast.expr:
+    """A calculation, shorter where a number is known to be zero."""
+    zero = [isinstance(one, ast.Constant) and one.value == 0.0 for one in (left, right)]
+    if isinstance(op, ast.Mult) and any(zero):
+        return ast.Constant(0.0)
+    return left if isinstance(op, (ast.Add, ast.Sub)) and zero[1] else ast.BinOp(left, op, right)

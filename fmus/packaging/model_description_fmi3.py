@@ -1,0 +1,106 @@
+"""The model description of FMI 3.0, for co-simulation and model exchange (FMI 3.0.1, sections 2.4, 3.3 and 4.3).
+
+The declared variables keep the value references they have in FMI 2.0.  Behind them stand those of further.py.
+"""
+
+from datetime import datetime
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement
+
+from ..runtime.variable_declarations import VariableOwner
+from . import model_description as shared
+from .fmi_variables import (
+    TO_REST,
+    Variables,
+    all_variables,
+    derivative_indices,
+    event_indicator_indices,
+    model_exchange_instance,
+)
+
+TYPE_ELEMENTS = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
+COMMON_CAPABILITIES = {
+    "needsExecutionTool": "false",
+    "canBeInstantiatedOnlyOncePerProcess": "false",
+    "canGetAndSetFMUState": "true",
+    "canSerializeFMUState": "true",
+    "providesDirectionalDerivatives": "true",
+    "providesAdjointDerivatives": "true",
+}
+EXCHANGE_CAPABILITIES = {"needsCompletedIntegratorStep": "false"}
+STEPPING_CAPABILITIES = {
+    "canHandleVariableCommunicationStepSize": "true",
+    "hasEventMode": "true",
+    "canReturnEarlyAfterIntermediateUpdate": "true",
+    "mightReturnEarlyFromDoStep": "true",
+    "providesIntermediateUpdate": "true",
+    **shared.OUTPUT_DERIVATIVES,
+}
+
+
+def describe(model: type[VariableOwner], name: str, code: str, date: datetime) -> bytes:
+    """The model description of the FMU `name` as XML; the instantiation token is to it what the guid is in FMI 2.0."""
+    root = shared.create_root(model, name, "3.0", "instantiationToken")
+    for interface, abilities in ("ModelExchange", EXCHANGE_CAPABILITIES), ("CoSimulation", STEPPING_CAPABILITIES):
+        SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
+    thing = model_exchange_instance(model)
+    declared = all_variables(thing)
+    shared.add_units(root, declared)
+    _add_types(root, declared)
+    shared.add_log_categories_and_experiment(root, model, "fmi3")
+    rates = derivative_indices(declared)
+    elements = SubElement(root, "ModelVariables")
+    for reference, (variable, meaning) in enumerate(declared):
+        attributes = shared.common_attributes(variable, meaning, reference) | shared.type_attributes(variable, meaning)
+        if meaning.causality in ("input", "output") and meaning.variability == "continuous":
+            attributes["intermediateUpdate"] = "true"
+        element = SubElement(elements, TYPE_ELEMENTS[meaning.type], attributes)
+        if meaning.alias:
+            SubElement(element, "Alias", name=meaning.alias, description=meaning.text)
+    shared.mark_states(list(elements), thing, rates, first=0)
+    _add_structure(root, model, thing, declared, rates)
+    return shared.serialize(root, "instantiationToken", code, date)
+
+
+def _add_types(root: Element, declared: Variables) -> None:
+    """TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
+    types = SubElement(root, "TypeDefinitions")
+    for quantity in shared.quantities(declared):
+        SubElement(types, "Float64Type", quantity, name=quantity["quantity"])
+    for name, meaning in declared:
+        if meaning.items:
+            words = {"name": shared.type_name(name), "description": meaning.text}
+            shared.add_enumeration_items(SubElement(types, "EnumerationType", words), meaning)
+
+
+def _add_structure(
+    root: Element, model: type[VariableOwner], thing: Any, declared: Variables, rates: dict[int, int]
+) -> None:
+    """ModelStructure: what follows from which states and inputs, and at the start from which parameters.
+
+    Of a smooth model some factors are known: one, and those that parameters make.
+    """
+    structure, states = SubElement(root, "ModelStructure"), list(rates.values())
+    outputs, derivatives, at_first = shared.dependency_tables(model, declared, rates)
+    for place, known in outputs.items():
+        _add_unknown(structure, "Output", place, known)
+    for place, known in derivatives.items():
+        steady = (
+            "" if thing.has_dry_friction else "constant" if place in states else "tunable" if thing.is_linear else ""
+        )
+        _add_unknown(structure, "ContinuousStateDerivative", place, known, steady)
+    for place, known in at_first.items():
+        _add_unknown(structure, "InitialUnknown", place, known)
+    places = {name: place for place, (name, _) in enumerate(declared)}
+    inputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "input"]
+    slips = [[places[slip]] if slip else states for slip in thing.contacts.values()]
+    at_rest = [state for state in states if not thing.rests_when_stuck or [state] not in slips]
+    for place, slip in zip(event_indicator_indices(declared), slips * 2, strict=True):
+        rests = declared[place][0].startswith(TO_REST)
+        _add_unknown(structure, "EventIndicator", place, slip if rests else at_rest + inputs)
+
+
+def _add_unknown(structure: Element, kind: str, reference: int, known: list[int], factors: str = "") -> None:
+    """What a variable follows from, and of what kind the factors are, if that is told."""
+    words = {"valueReference": str(reference), "dependencies": " ".join(map(str, known))}
+    SubElement(structure, kind, words | ({"dependenciesKind": " ".join([factors] * len(known))} if factors else {}))
