@@ -17,8 +17,8 @@ from native_fmus import built, needed
 from native_host import HEADERS, SOURCE, SOURCE3, begin, guid, host, lives, play, references, unpacked
 
 from fmus.packaging import native
-from fmus.packaging.native.compiler import PLATFORMS, binaries, compiler
-from fmus.packaging.native.sources import COMPILED
+from fmus.packaging.native.compiler import PLATFORMS, compile_binaries, find_compiler
+from fmus.packaging.native.sources import MAIN_SOURCE
 
 ROWS = 50
 ARM = "/usr/aarch64-linux-gnu"  # where Debian puts the C library
@@ -60,7 +60,7 @@ def machine(request):
     def program(source):
         def make(folder):
             chosen, (more, options) = PLATFORMS[request.param], PROGRAM[request.param]
-            options = [*(option.format(compiler=compiler()) for option in chosen.options), *options]
+            options = [*(option.format(compiler=find_compiler()) for option in chosen.options), *options]
             sources = [source, *more, *(Path(native.__file__).with_name(file) for file in chosen.sources)]
             command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", "-s", *options, f"-I{HEADERS}"]
             subprocess.run([*command, *map(str, sources), "-o", str(folder / "host.exe")], check=True)
@@ -90,7 +90,7 @@ def library(fmu, version, platform):
 
     def make(folder):
         sources = {path.name: path.read_text() for path in (unpacked(fmu) / "sources").iterdir()}
-        for path, content in binaries(fmu.stem, sources, COMPILED[version], platform, version).items():
+        for path, content in compile_binaries(fmu.stem, sources, MAIN_SOURCE[version], platform, version).items():
             (folder / Path(path).name).write_bytes(content)
 
     return builds.made(f"{fmu.stem}-{version}-{platform}", make) / f"{fmu.stem}{PLATFORMS[platform].suffix}"

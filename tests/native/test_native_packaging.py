@@ -22,8 +22,8 @@ from native_fmus import built, everywhere
 from native_host import compiler, unpacked
 
 from fmus.packaging import BuildError, native
-from fmus.packaging.native.compiler import PLATFORMS, USUAL, linked
-from fmus.packaging.native.sources import COMPILED, FMI_HEADERS, WRITTEN
+from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS, compile_and_link
+from fmus.packaging.native.sources import FMI_HEADERS, MAIN_SOURCE, OWN_HEADERS
 from tests.packaging.test_packaging import entries
 
 SYSTEM = {
@@ -84,7 +84,7 @@ def test_what_is_in_the_file(smd):
     fmu, printed = smd
     binaries = {f"binaries/{name}/smd{platform.suffix}" for name, platform in PLATFORMS.items()}
     assert {name for name in entries(fmu) if name.startswith("binaries/")} == binaries
-    sources = {f"sources/{file}" for file in (*WRITTEN, *FMI_HEADERS["2"], "fmi2.c", "model.h", "guid.h")}
+    sources = {f"sources/{file}" for file in (*OWN_HEADERS, *FMI_HEADERS["2"], "fmi2.c", "model.h", "guid.h")}
     sources.add("sources/buildDescription.xml")
     found = entries(fmu)
     told = {path for path in found if path.split("/")[0] in ("documentation", "extra", "model.png")}
@@ -195,7 +195,7 @@ def check_signature(library, place):
 
 
 def test_without_a_platform_it_is_built_for_the_usual_three():
-    assert USUAL == ("linux64", "win64", "darwin64")
+    assert DEFAULT_PLATFORMS == ("linux64", "win64", "darwin64")
 
 
 @pytest.mark.parametrize("place", ["linux64", "x86_64-linux"])
@@ -266,7 +266,7 @@ def test_without_a_compiler_it_says_what_to_install(tmp_path, monkeypatch):
 
 
 def test_the_files_of_c_travel_with_the_package():
-    assert all((Path(native.__file__).parent / file).is_file() for file in (*WRITTEN, *COMPILED.values()))
+    assert all((Path(native.__file__).parent / file).is_file() for file in (*OWN_HEADERS, *MAIN_SOURCE.values()))
 
 
 def test_the_compiler_has_a_home_where_a_service_has_none_and_keeps_nothing_of_ours_there(monkeypatch):
@@ -280,6 +280,6 @@ def test_the_compiler_has_a_home_where_a_service_has_none_and_keeps_nothing_of_o
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr("fmus.packaging.native.compiler.subprocess.run", run)
     with pytest.raises(BuildError, match=r"a.so does not compile"):
-        linked({}, "a.c", "x86_64-linux-gnu.2.17", "a.so", ())
+        compile_and_link({}, "a.c", "x86_64-linux-gnu.2.17", "a.so", ())
     assert Path(told["HOME"]).is_dir()
     assert not Path(told["ZIG_LOCAL_CACHE_DIR"]).parent.exists()

@@ -6,10 +6,10 @@ import re
 import pytest
 from models import MODELS, model_class
 
-from fmus.packaging.native.kinds import FLOAT
-from fmus.packaging.native.program import Program
-from fmus.packaging.native.refusal import Refused
-from fmus.packaging.native.sources import sources
+from fmus.packaging.native.c_types import FLOAT
+from fmus.packaging.native.call_graph import CallGraph
+from fmus.packaging.native.diagnostics import UnsupportedConstructError
+from fmus.packaging.native.sources import collect_sources
 from tests.native.test_constructs import THIRD, Allowed, Part, half
 
 
@@ -347,8 +347,8 @@ FORBIDDEN = [
 
 @pytest.mark.parametrize("function", FORBIDDEN, ids=lambda function: function.__name__)
 def test_what_is_outside_the_subset_is_refused_with_its_line_and_what_to_write_instead(function):
-    with pytest.raises(Refused) as refusal:
-        Program(Allowed()).entry("entry", function, FLOAT, FLOAT)
+    with pytest.raises(UnsupportedConstructError) as refusal:
+        CallGraph(Allowed()).add_model_entry_point("entry", function, FLOAT, FLOAT)
     place, sentence = str(refusal.value).split(": ", 1)
     file, line = place.split(":")
     assert file == "test_refused.py"
@@ -363,8 +363,8 @@ def test_a_property_is_refused():
     def use(self, x, y):
         return self.twice
 
-    with pytest.raises(Refused, match=r"'self\.twice' is no number and no method of Property"):
-        Program(Property()).entry("entry", use, FLOAT, FLOAT)
+    with pytest.raises(UnsupportedConstructError, match=r"'self\.twice' is no number and no method of Property"):
+        CallGraph(Property()).add_model_entry_point("entry", use, FLOAT, FLOAT)
 
 
 def owner(**attributes):
@@ -391,11 +391,11 @@ OTHER.extra = 1.0
     ids=lambda part: part if isinstance(part, str) else "",
 )
 def test_an_object_that_is_no_data_is_refused_by_the_name_of_its_attribute(thing, words):
-    with pytest.raises(Refused) as refusal:
-        Program(thing)
+    with pytest.raises(UnsupportedConstructError) as refusal:
+        CallGraph(thing)
     assert words in str(refusal.value)
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_every_model_is_in_the_subset(name):
-    assert "static" in sources(model_class(name), "2")["model.h"]
+    assert "static" in collect_sources(model_class(name), "2")["model.h"]

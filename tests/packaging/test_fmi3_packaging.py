@@ -19,7 +19,7 @@ from PIL import Image
 
 from fmus.packaging.fmi_variables import model_exchange_instance
 from fmus.packaging.model_lookup import find_model, model_names
-from fmus.packaging.native.sources import FMI_HEADERS, WRITTEN
+from fmus.packaging.native.sources import FMI_HEADERS, OWN_HEADERS
 from fmus.runtime.variable_declarations import variables
 from tests.packaging.test_packaging import (  # noqa: F401
     EVERY_MODEL,
@@ -227,7 +227,7 @@ def test_the_files_are_those_of_fmi_3(fmu, name):
     content = entries(fmu(name))
     assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
     certified = {"fmi-ls-manifest.xml", f"{name}_out.csv"}
-    headers = [file for files in (WRITTEN, FMI_HEADERS["3"], ("fmi3.c", "guid.h", "model.h")) for file in files]
+    headers = [file for files in (OWN_HEADERS, FMI_HEADERS["3"], ("fmi3.c", "guid.h", "model.h")) for file in files]
     assert all(b"2-Clause BSD License" in content[f"sources/{file}"] for file in FMI_HEADERS["3"])  # it travels
     assert set(content) == {
         "documentation/boundaries.toml",

@@ -15,7 +15,7 @@ from models import MODELS, declared, model_class, outputs
 
 from fmus.packaging.documentation_page import documentation_page, typeset
 from fmus.packaging.model_description import declared_variables
-from fmus.packaging.native.fmu import USE
+from fmus.packaging.native.fmu import USAGE_NOTE
 from fmus.packaging.svg_chart import tick_values
 from tests.packaging.test_packaging import entries
 
@@ -39,7 +39,7 @@ def test_a_native_fmu_tells_the_same_and_the_ways_to_run_it(content, name):
     told = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
     native = entries(native_fmus.built() / f"{name}.fmu")
     assert len(told) == 1 + (name in WITH["png"]) + 2 * (name in WITH["csv"])
-    native[PAGE] = native[PAGE].replace(USE.encode(), b"", 1)
+    native[PAGE] = native[PAGE].replace(USAGE_NOTE.encode(), b"", 1)
     assert told == {path: native.get(path) for path in told}
 
 

@@ -8,7 +8,7 @@
 
 #include "abuse.h"
 
-enum { FEW = 12, BYTES = sizeof(Sealed) };
+enum { FEW = 12, BYTES = sizeof(SavedState) };
 
 static int heard;
 
@@ -169,20 +169,20 @@ static void flips(void)
 
 static void refuses_forged(Instance *it, const State *forged, bool good)
 {
-    Sealed sealed;
+    SavedState sealed;
     State before = it->state;
-    seal(&sealed, forged);
+    write_saved_state(&sealed, forged);
     HOLDS(fmi2SetFMUstate(it, &sealed) == (good ? fmi2OK : fmi2Error));
     if (!good) HOLDS(!memcmp(&before, &it->state, sizeof before));
     strcpy(sealed.guid, "{of another}");
-    sealed.sum = sum_under(&sealed);
+    sealed.checksum = payload_checksum(&sealed);
     HOLDS(fmi2SetFMUstate(it, &sealed) == fmi2Error);
 }
 
 /* One more refused value. */
 static void refuse_in(State *state, fmi2ValueReference reference, int64_t reason, double value)
 {
-    state->refused[reference] = (Refusal){reason, value, ++state->turns};
+    state->rejected[reference] = (RejectedValue){reason, value, ++state->rejection_count};
     state->run.n_invalid_values++;
 }
 
@@ -210,18 +210,18 @@ static void forged(void)
         FORGED(state.run.n_invalid_values = -1);
         FORGED(state.run.outputs_current = true);
         FORGED(state.run.tolerance = NAN);
-        FORGED(state.turns = -1);
+        FORGED(state.rejection_count = -1);
         FORGED(refuse_in(&state, 1, 99, 1.0));
-        FORGED(refuse_in(&state, 1, FIXED, 1.0); state.turns--);
+        FORGED(refuse_in(&state, 1, FIXED, 1.0); state.rejection_count--);
         FORGED(refuse_in(&state, reference_of("solver.method"), OUT_OF_RANGE, 1e300));
         for (const Member *member = members; member < members + MEMBERS; member++) {
             FORGED(memset((char *)&state + member->offset, 0x7f, member->is_bool ? 1 : 8));
             FORGED(memset((char *)&state + member->offset, 0x80, member->is_bool ? 1 : 8));
         }
         for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
-            if (!variable->is_real) FORGED(*(int64_t *)place(&state.model, variable) = -7);
+            if (!variable->is_real) FORGED(*(int64_t *)variable_address(&state.model, variable) = -7);
             if (!variable->is_real || variable->is_calculated) continue;
-            for (int k = 0; k < 3; k++) FORGED(*(double *)place(&state.model, variable) = beyond[k]);
+            for (int k = 0; k < 3; k++) FORGED(*(double *)variable_address(&state.model, variable) = beyond[k]);
         }
         if (i >= 3 && i != 7) {
             FORGED(state.model.solver.t = 1e9);
@@ -240,10 +240,10 @@ static void fuzzed(int turns)
     for (int turn = 0; turn < turns; turn++) {
         Instance *it = life((int)draw(LIVES));
         State state = it->state;
-        Sealed sealed;
+        SavedState sealed;
         double *at = (double *)&state.model;
         for (uint64_t k = draw(4) + 1; k; k--) at[draw(sizeof state.model / sizeof *at)] = number();
-        seal(&sealed, &state);
+        write_saved_state(&sealed, &state);
         if (fmi2SetFMUstate(it, &sealed) == fmi2OK) {
             for (fmi2ValueReference i = 0; i < VARIABLES; i++) get(it, i);
             fmi2DoStep(it, 0.9, 0.01, fmi2True);
@@ -301,7 +301,7 @@ static void calls(uint64_t seed, int turns)
     Instance *quiet = life(3);
     static char before[BYTES], after[BYTES];
     fmi2ValueReference push = 0; /* the input */
-    while (variables[push].rate == NO_SLOPE) push++;
+    while (variables[push].rate_offset == NO_OFFSET) push++;
     bytes_of(quiet, before);
     chance = seed;
     for (int turn = 0; turn < turns; turn++) {
@@ -379,14 +379,14 @@ static void calls(uint64_t seed, int turns)
         default: status = fmi2DeSerializeFMUstate(it, bytes[i], draw(9) ? BYTES : draw(BYTES), &states[k]); break;
         }
         HOLDS(status == fmi2OK || status == fmi2Error);
-        if (it && 31 <= call && call <= 34 && !exchanges(&it->state)) HOLDS(status == fmi2Error);
-        if (it && 37 <= call && call <= 38 && exchanges(&it->state)) HOLDS(status == fmi2Error);
+        if (it && 31 <= call && call <= 34 && !is_model_exchange(&it->state)) HOLDS(status == fmi2Error);
+        if (it && 37 <= call && call <= 38 && is_model_exchange(&it->state)) HOLDS(status == fmi2Error);
     }
     for (int i = 0; i < CROWD; i++) {
         Instance *it = crowd[i] ? crowd[i] : instance("heir");
         HOLDS(fmi2Reset(it) == fmi2OK);
         initialise(it, fmi2OK);
-        if (!exchanges(&it->state)) HOLDS(fmi2DoStep(it, 0.0, 0.3, fmi2True) == fmi2OK);
+        if (!is_model_exchange(&it->state)) HOLDS(fmi2DoStep(it, 0.0, 0.3, fmi2True) == fmi2OK);
         HOLDS(isfinite(get(it, reference_of("energy"))));
         if (states[i]) HOLDS(fmi2FreeFMUstate(it, &states[i]) == fmi2OK);
         fmi2FreeInstance(it);

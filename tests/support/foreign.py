@@ -60,7 +60,7 @@ def main(out):
     import pythonfmu
     import pythonfmu3
 
-    from fmus.packaging.native.compiler import binaries
+    from fmus.packaging.native.compiler import compile_binaries
     from harness.running.in_c import HEADERS
 
     for source in sorted(SOURCES.glob("*.py")):
@@ -70,7 +70,7 @@ def main(out):
         files = {file.name: file.read_text() for file in (source, *HEADERS.glob("fmi2*.h"))}
         with ZipFile(Path(out) / f"{source.stem}.fmu", "w", ZIP_DEFLATED) as archive:
             archive.write(source.with_name("modelDescription.xml"), "modelDescription.xml")
-            for path, content in binaries(source.stem, files, source.name, "linux64", "2").items():
+            for path, content in compile_binaries(source.stem, files, source.name, "linux64", "2").items():
                 archive.writestr(path, content)
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from native_host import compiler
 
 import fmus.packaging.native as native
-from fmus.packaging.native.compiler import SAME_BITS, STRICT
-from fmus.packaging.native.kinds import FLOAT, Group, Object, Row
-from fmus.packaging.native.program import Program
+from fmus.packaging.native.c_types import FLOAT, FloatArray, ScalarTuple, StructPointer
+from fmus.packaging.native.call_graph import CallGraph
+from fmus.packaging.native.compiler import BIT_EXACT, STRICT
 
 RAISED = (ArithmeticError, ValueError, IndexError)  # for which C raises the fault flag
 VALUES = [0.0, -0.0, 1.0, -1.0, 0.3, -2.5, 7.0, 1e-5, 1e5, 710.0, 5e-324, 1e-300, 1e300, math.inf, -math.inf, math.nan]
@@ -36,9 +36,9 @@ def flat(thing):
 def places(layout, cls, prefix):
     """The same numbers in C."""
     for name, kind in layout.fields[cls].items():
-        if isinstance(kind, Object):
+        if isinstance(kind, StructPointer):
             yield from places(layout, kind.cls, f"{prefix}{name}.")
-        elif isinstance(kind, Row):
+        elif isinstance(kind, FloatArray):
             yield from (f"{prefix}{name}[{i}]" for i in range(kind.length))
         else:
             yield prefix + name
@@ -53,13 +53,13 @@ class Frozen:
     """Methods of two floats of an object, in C: each call begins with a fresh object."""
 
     def __init__(self, thing, methods, folder, warnings=STRICT):
-        program = Program(thing)
+        call_graph = CallGraph(thing)
         cls = type(thing)
-        state = list(places(program.layout, cls, "it."))
+        state = list(places(call_graph.layout, cls, "it."))
         calls, self.widths = [], {}
         for name in methods:
-            result = program.entry(f"run_{name}", getattr(cls, name), FLOAT, FLOAT).result
-            parts = [f"r._{i}" for i in range(len(result.parts))] if isinstance(result, Group) else ["r"]
+            result = call_graph.add_model_entry_point(f"run_{name}", getattr(cls, name), FLOAT, FLOAT).result
+            parts = [f"r._{i}" for i in range(len(result.parts))] if isinstance(result, ScalarTuple) else ["r"]
             self.widths[name] = len(parts)
             calls.append(
                 f"int {name}(double x, double y, double *out) {{\n"
@@ -68,11 +68,11 @@ class Frozen:
                 + "".join(f"    *out++ = (double){part};\n" for part in parts + state)
                 + "    return fault;\n}\n"
             )
-        image = f"static const struct {cls.__name__} image = {program.layout.image(thing)};\n"
-        text = '#include "numerics.h"\n' + program.text() + image + "".join(calls)
+        image = f"static const struct {cls.__name__} image = {call_graph.layout.initializer(thing)};\n"
+        text = '#include "python_arithmetic.h"\n' + call_graph.text() + image + "".join(calls)
         (folder / "frozen.c").write_text(text)
         header = Path(native.__file__).parent
-        command = [compiler(), *warnings, *SAME_BITS, "-shared", "-fPIC", f"-I{header}"]
+        command = [compiler(), *warnings, *BIT_EXACT, "-shared", "-fPIC", f"-I{header}"]
         subprocess.run([*command, "frozen.c", "-o", "frozen.so", "-lm"], cwd=folder, check=True)
         self.library, self.size = ctypes.CDLL(str(folder / "frozen.so")), 16 + len(state)
 

@@ -11,7 +11,7 @@
 
 #include "abuse.h"
 
-enum { FEW = 12, BYTES = sizeof(Sealed), CROWD = 20, STRANGER = VARIABLES + 7 };
+enum { FEW = 12, BYTES = sizeof(SavedState), CROWD = 20, STRANGER = VARIABLES + 7 };
 enum { SOLVING, HANDLING, SOLVED, KINDS }; /* co-simulation; with events, early return and looks; model exchange */
 
 /* An instance, and all that its importer hands to it. */
@@ -45,22 +45,22 @@ enum { SOME = 1 << PHASES, EXCHANGED = 2 << PHASES, STEPPED = 4 << PHASES, HANDL
 enum { NEVER = 0, AT_EVENT = 1 << EVENT, GOING = 1 << CONTINUOUS, BEGINNING = 1 << INITIALISING };
 
 #define TRANSITIONS(f)                                                                                                 \
-    f(EnterInitializationMode, NEW, INITIALISING, (it, true, 1e-5, 0.0, true, 9.0), (NULL, false, 0.0, 0.0, false, 0.0)) \
+    f(EnterInitializationMode, IN_INSTANTIATED, INITIALISING, (it, true, 1e-5, 0.0, true, 9.0), (NULL, false, 0.0, 0.0, false, 0.0)) \
     f(ExitInitializationMode, BEGINNING, OURS, (it), (NULL))                                                           \
-    f(EnterEventMode, (BEGUN | HANDLED), EVENT, (it), (NULL))                                                          \
+    f(EnterEventMode, (IN_SIMULATION | HANDLED), EVENT, (it), (NULL))                                                          \
     f(UpdateDiscreteStates, AT_EVENT, STAYS,                                                                           \
       (it, AT->flags, AT->flags + 1, AT->flags + 2, AT->flags + 3, AT->flags + 4, &AT->real),                          \
       (it, AT->flags, AT->flags + 1, AT->flags + 2, NULL, AT->flags + 4, &AT->real))                                   \
     f(EvaluateDiscreteStates, (BEGINNING | AT_EVENT), STAYS, (it), (NULL))                                             \
     f(EnterStepMode, (AT_EVENT | STEPPED), RUNNING, (it), (NULL))                                                      \
     f(EnterContinuousTimeMode, (AT_EVENT | EXCHANGED), CONTINUOUS, (it), (NULL))                                       \
-    f(DoStep, STEPPING, STAYS, (it, AT->t, AT->h, true, AT->flags, AT->flags + 1, AT->flags + 2, &AT->real),           \
+    f(DoStep, IN_STEP_MODE, STAYS, (it, AT->t, AT->h, true, AT->flags, AT->flags + 1, AT->flags + 2, &AT->real),           \
       (it, AT->t, AT->h, true, AT->flags, AT->flags + 1, AT->flags + 2, NULL))                                         \
     f(SetTime, (GOING | EXCHANGED | SOME), STAYS, (it, AT->t), (NULL, 0.0))                                            \
     f(SetContinuousStates, GOING, STAYS, (it, AT->reals, AT->states), (it, AT->reals, STATES + 1))                     \
     f(CompletedIntegratorStep, GOING, STAYS, (it, true, AT->flags, AT->flags + 1), (it, true, NULL, AT->flags))        \
-    f(Reset, ANY, INSTANTIATED, (it), (NULL))                                                                          \
-    f(Terminate, BEGUN, TERMINATED, (it), (NULL))
+    f(Reset, IN_ANY_PHASE, INSTANTIATED, (it), (NULL))                                                                          \
+    f(Terminate, IN_SIMULATION, TERMINATED, (it), (NULL))
 
 #define VALUES(f, TYPE)                                                                               \
     f(Get##TYPE, SOME, STAYS, (it, R, ROOM, AT->count), (it, &AT->one, 1, ROOM, 1))           \
@@ -89,14 +89,14 @@ enum { NEVER = 0, AT_EVENT = 1 << EVENT, GOING = 1 << CONTINUOUS, BEGINNING = 1 
       (it, &AT->unknown, 1, &AT->known, 1, AT->reals, 1, AT->others, 2))                                               \
     f(GetAdjointDerivative, SOME, STAYS, (it, &AT->unknown, 1, &AT->known, 1, AT->reals, 1, AT->others, 1),            \
       (it, &AT->unknown, 1, &AT->known, 1, NULL, 1, AT->others, 1))                                                    \
-    f(GetFMUState, ANY, STAYS, (it, &AT->state), (it, NULL))                                                           \
-    f(SetFMUState, ANY, STAYS, (it, AT->state), (it, NULL))                                                            \
-    f(SerializedFMUStateSize, ANY, STAYS, (it, AT->state, &AT->size), (it, AT->state, NULL))                           \
-    f(SerializeFMUState, ANY, STAYS, (it, AT->state, AT->bytes, BYTES), (it, AT->state, AT->bytes, BYTES - 1))         \
-    f(DeserializeFMUState, ANY, STAYS, (it, AT->bytes, BYTES, &AT->state), (it, AT->bytes, BYTES - 1, &AT->state))     \
+    f(GetFMUState, IN_ANY_PHASE, STAYS, (it, &AT->state), (it, NULL))                                                           \
+    f(SetFMUState, IN_ANY_PHASE, STAYS, (it, AT->state), (it, NULL))                                                            \
+    f(SerializedFMUStateSize, IN_ANY_PHASE, STAYS, (it, AT->state, &AT->size), (it, AT->state, NULL))                           \
+    f(SerializeFMUState, IN_ANY_PHASE, STAYS, (it, AT->state, AT->bytes, BYTES), (it, AT->state, AT->bytes, BYTES - 1))         \
+    f(DeserializeFMUState, IN_ANY_PHASE, STAYS, (it, AT->bytes, BYTES, &AT->state), (it, AT->bytes, BYTES - 1, &AT->state))     \
     f(GetOutputDerivatives, SOME, STAYS, (it, R, AT->orders, AT->reals, AT->count),                                    \
       (it, &AT->one, 1, AT->orders, AT->reals, 1))                                                                     \
-    f(FreeFMUState, ANY, STAYS, (it, &AT->state), (NULL, NULL))                                                        \
+    f(FreeFMUState, IN_ANY_PHASE, STAYS, (it, &AT->state), (NULL, NULL))                                                        \
     f(EnterConfigurationMode, NEVER, STAYS, (it), (NULL))                                                              \
     f(ExitConfigurationMode, NEVER, STAYS, (it), (NULL))                                                               \
     f(GetNumberOfVariableDependencies, NEVER, STAYS, (it, AT->known, &AT->size), (it, AT->known, NULL))                \
@@ -155,8 +155,8 @@ static Instance *born(Desk *desk, int kind)
     bool handles = kind == HANDLING;
     *desk = (Desk){.kind = kind, .one = STRANGER, .states = STATES, .limits = INDICATORS, .h = 0.1};
     for (fmi3ValueReference i = 0; i < VARIABLES; i++) {
-        if (variables[i].moves) desk->known = i;
-        else if (variables[i].slope != NO_SLOPE && variables[i].is_calculated) desk->unknown = i;
+        if (variables[i].is_state_or_input) desk->known = i;
+        else if (variables[i].tangent_offset != NO_OFFSET && variables[i].is_calculated) desk->unknown = i;
     }
     desk->it = kind == SOLVED ? fmi3InstantiateModelExchange("it", MODEL_GUID, NULL, false, true, desk, hear)
                               : fmi3InstantiateCoSimulation("it", MODEL_GUID, NULL, false, true, handles, handles, NULL,
@@ -207,7 +207,7 @@ static void call(Desk *desk)
     desk->look = NULL;
     desk->heard = 0;
     fmi3Status status = (desk->right ? row->right : row->wrong)(it);
-    int to = row->to == OURS ? (it->host.handles ? EVENT : RUNNING) : row->to == STAYS ? phase : row->to;
+    int to = row->to == OURS ? (it->host.event_mode_used ? EVENT : RUNNING) : row->to == STAYS ? phase : row->to;
     bool good = status == fmi3OK ? allowed && !desk->heard && it->state.run.phase == to
                                  : status == fmi3Error && allowed < 1 && desk->heard <= 1 &&
                                        (desk->heard || !desk->right) && !memcmp(&before, &it->state, sizeof before);

@@ -6,10 +6,10 @@ import builds
 import commands
 import pytest
 
-READY = "new Promise(done => { const wait = () => globalThis.bench?.desk.runs.one && Object.values(bench.desk.runs)"
+READY = "new Promise(done => { const wait = () => globalThis.app?.session.runs.main && Object.values(app.session.runs)"
 READY += ".every(run => run.done) ? requestAnimationFrame(() => done(true)) : setTimeout(wait, 5); wait() })"
-FOLLOWED = "new Promise(done => { const { runs } = bench.desk; location.hash = HASH;"
-FOLLOWED += "const look = () => bench.desk.runs === runs ? setTimeout(look, 1) : done(true); look() })"
+FOLLOWED = "new Promise(done => { const { runs } = app.session; location.hash = HASH;"
+FOLLOWED += "const look = () => app.session.runs === runs ? setTimeout(look, 1) : done(true); look() })"
 
 
 def built(name, *words):
@@ -32,7 +32,7 @@ class Page:
     def open(self, hash="", anew=False):
         """Go where a link with this behind the # leads: in the page that is open, by which whatever was set before is
         gone, or by loading it anew; wait until all runs are done."""
-        there = self.run("globalThis.bench && location.href")
+        there = self.run("globalThis.app && location.href")
         link = f"{self.file.as_uri()}#{hash}"
         if anew or not there or there.split("#")[0] != self.file.as_uri() or there == link:
             self.browser.open(link)
@@ -74,7 +74,7 @@ class Page:
 
     def seek(self, t):
         """Put the cursor at a time."""
-        self.run(f"bench.seek({t!r})")
+        self.run(f"app.seek({t!r})")
 
     def middle(self, selector):
         """Where an element has its middle, in the window."""

@@ -7,11 +7,11 @@ import struct
 
 import pytest
 
-from fmus.packaging.native.compiler import BUILT_IN
-from fmus.packaging.native.expressions import ARGUMENTS, PARTIAL, TOTAL
-from fmus.packaging.web.page import HERE
+from fmus.packaging.native.compiler import INTRINSICS
+from fmus.packaging.native.expressions import ARGUMENT_COUNTS, MAY_RAISE, NEVER_RAISING
+from fmus.packaging.web.html_page import HERE
 
-FUNCTIONS = [function for function in (*TOTAL, *PARTIAL) if function not in BUILT_IN]
+FUNCTIONS = [function for function in (*NEVER_RAISING, *MAY_RAISE) if function not in INTRINSICS]
 AT = (0.0, -0.0, 1e-300, 1e-9, 0.3, -0.7, 1.0, -1.0, 2.5, -20.0, 700.0, 1e22, math.inf, -math.inf, math.nan)
 NUMBERS = [0.1, 5e-324, 1.7976931348623157e308, 9007199254740993.0, 1e16, 123456.0, 1e-4, 9.5e-5, 4.35, 2.0**-1074]
 
@@ -48,7 +48,7 @@ def value(function, *arguments):
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)
 def test_mathematics_is_that_of_python(library, function):
-    points = [(a,) for a in AT] if ARGUMENTS.get(function, 1) == 1 else [(a, b) for a in AT for b in AT]
+    points = [(a,) for a in AT] if ARGUMENT_COUNTS.get(function, 1) == 1 else [(a, b) for a in AT for b in AT]
     plain = "(a) => Number.isFinite(a) ? a : String(a)"  # JSON has no other numbers
     listed = ", ".join("[" + ", ".join(map(js, each)) + "]" for each in points)
     found = library(f"[{listed}].map((each) => ({plain})(c.{function.__name__}(...each)))")
@@ -117,6 +117,6 @@ def test_numbers_in_a_sentence_are_written_as_python_writes_them(page):
     doubles = (struct.unpack("<d", draw.randbytes(8))[0] for _ in range(300))
     values = [-abs(each) for each in (*NUMBERS, *doubles) if math.isfinite(each)]
     page.open(".model=stickslip")
-    told = "(m) => { try { bench.desk.runs.one.fmu.begin({ m }, 1) } catch (error) { return error.message } }"
+    told = "(m) => { try { app.session.runs.main.fmu.begin({ m }, 1) } catch (error) { return error.message } }"
     for each, sentence in zip(values, page.run(f"{json.dumps(values)}.map({told})"), strict=True):
         assert sentence.startswith(f"m = {each!r} kg is refused")

@@ -9,9 +9,9 @@ from models import MODELS, declared, outputs, tunable
 
 EXACT, CLOSED = 1e-12, {"smd", "coulomb", "stickslip"}  # of the largest value, where the motion has a closed form
 STATED = 1e-5  # where another library of mathematics shifts the solver's steps, within its tolerance
-ONE = "const one = bench.desk.runs.one;"
-TIMES = f"{ONE} one.grid.map(row => one.time[row])"
-COLUMNS = f"{ONE} one.reals.map(name => one.grid.map(row => one.columns[name][row]))"
+ONE = "const main = app.session.runs.main;"
+TIMES = f"{ONE} main.grid.map(row => main.time[row])"
+COLUMNS = f"{ONE} main.reals.map(name => main.grid.map(row => main.columns[name][row]))"
 
 
 def some(name, seed):
@@ -27,19 +27,19 @@ def some(name, seed):
 def test_random_parameters_and_a_change_while_it_runs_give_the_native_numbers(page, worker, name):
     for seed in range(2):
         page.open(urlencode({".model": name, **some(name, seed)}))
-        stop = page.run("bench.state().stop")
+        stop = page.run("app.state().stop")
         when, (later, factor) = stop / 3, ("k" if "k" in declared(name) else "m", 1.25)
-        was = page.run(f"bench.state().values[{later!r}]")
+        was = page.run(f"app.state().values[{later!r}]")
         page.seek(when)
         page.check("live", True)
         page.put(later, repr(factor * was))
         page.check("live", False)
-        (change,) = page.run("bench.state().changes")
+        (change,) = page.run("app.state().changes")
         assert (change["t"], change["name"]) == (when, later)
         times, columns = page.run(f"{{ {TIMES} }}"), page.run(f"{{ {COLUMNS} }}")
         assert len(times) == 1601
         fmu = worker.instantiate(native_fmus.built() / f"{name}.fmu")
-        fmu.begin(page.run("bench.state().values"), stop=stop)
+        fmu.begin(page.run("app.state().values"), stop=stop)
         names = [v for v in outputs(name) if declared(name)[v].type == "Real"]
         rows = fmu.through(sorted({*times, when}), names, {when: {later: change["value"]}})
         at = dict(zip(sorted({*times, when}), rows, strict=True))

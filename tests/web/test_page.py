@@ -14,8 +14,8 @@ from commands import build
 from models import AUTHORED, LARGER, MODELS, declared, parameters
 
 from fmus.packaging.model_lookup import find_model
-from fmus.packaging.web.page import HERE, MODULES
-from fmus.packaging.web.portrait import bodies
+from fmus.packaging.web.html_page import HERE, MODULES
+from fmus.packaging.web.model_json import list_bodies
 from harness.running.fmu import simulate
 from harness.running.specification import of_scene
 from harness.scenes.scene import load, shipped
@@ -113,7 +113,7 @@ def test_every_parameter_has_a_slider_and_a_field_that_show_its_start_and_its_un
         assert page.run(f"{field}.closest('.field').querySelector('input[type=range]').max") == "400"
         if meaning.display:
             page.put(variable, "10.0")
-            assert page.run(f"bench.state().values[{variable!r}]") == pytest.approx(10.0 / factor)
+            assert page.run(f"app.state().values[{variable!r}]") == pytest.approx(10.0 / factor)
 
 
 # ---- what is done
@@ -125,23 +125,23 @@ def test_a_slider_changes_the_run_and_what_it_says_is_what_is_run(page):
         "(() => { const e = document.querySelector('#field-mu_d').closest('.field').querySelector('input[type=range]');"
         "e.value = 100; e.dispatchEvent(new Event('input')) })()"
     )
-    mu = page.settled("bench.state().values.mu_d")
+    mu = page.settled("app.state().values.mu_d")
     assert 0 < mu < 0.6
     assert page.run("Number(document.getElementById('field-mu_d').value)") == mu
     d = {name: meaning.start for name, meaning in declared("stickslip").items()}
     omega = sqrt(d["k"] / d["m"])
     peak = d["v_driver"] + sqrt(((d["mu_s"] - mu) * d["m"] * d["g"] / d["k"] * omega) ** 2 + d["v_driver"] ** 2)
-    assert page.run("Math.max(...bench.desk.runs.one.columns.v)") == pytest.approx(peak, rel=1e-3)
+    assert page.run("Math.max(...app.session.runs.main.columns.v)") == pytest.approx(peak, rel=1e-3)
 
 
 def test_the_very_next_frame_shows_a_changed_parameter(page):
     page.open(".model=coulomb")
     shown = page.run(
-        "new Promise(done => { const before = bench.plots.get('x').plot.paints;"
+        "new Promise(done => { const before = app.plots.get('x').plot.paints;"
         "const e = document.querySelector('#field-x0').closest('.field').querySelector('input[type=range]');"
         "e.value = 390; e.dispatchEvent(new Event('input'));"
-        "requestAnimationFrame(() => { const { plot, panel } = bench.plots.get('x');"
-        "done([plot.paints - before, panel.content.curves.at(-1).y[0], bench.state().values.x0]) }) })"
+        "requestAnimationFrame(() => { const { plot, panel } = app.plots.get('x');"
+        "done([plot.paints - before, panel.content.curves.at(-1).y[0], app.state().values.x0]) }) })"
     )
     assert shown[0] == 1
     assert shown[1] == shown[2] > 0.1
@@ -153,15 +153,15 @@ def test_of_a_slow_method_the_next_frame_shows_the_motion_by_the_quick_one_and_t
     seen = page.run(
         "new Promise(done => { const e = document.querySelector('.field:has(#field-k) [type=range]');"
         "for (const at of [100, 200, 300]) { e.value = at; e.dispatchEvent(new Event('input')) }"
-        "requestAnimationFrame(() => { const { one, quick } = bench.desk.runs;"
-        "const [ghost, own] = bench.plots.get('x').panel.content.curves.slice(-2);"
-        "done([one.done, one.setting.values.k, quick.setting.values, ghost.x.at(-1), own.x.at(-1)]) }) })"
+        "requestAnimationFrame(() => { const { main, preview } = app.session.runs;"
+        "const [ghost, own] = app.plots.get('x').panel.content.curves.slice(-2);"
+        "done([main.done, main.setting.values.k, preview.setting.values, ghost.x.at(-1), own.x.at(-1)]) }) })"
     )
     done, k, quick, reached, own = seen
     assert (done, quick) == (False, {"x_m": 0.001, "k": k})
     assert own < reached <= 16
-    assert page.settled("bench.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [16, 16]
-    assert page.run("bench.desk.runs.one.setting.values.k") == k
+    assert page.settled("app.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [16, 16]
+    assert page.run("app.session.runs.main.setting.values.k") == k
 
 
 def test_until_the_first_picture_one_model_is_compiled(page):
@@ -171,26 +171,26 @@ def test_until_the_first_picture_one_model_is_compiled(page):
     page.open(anew=True)
     page.browser.call("Page.removeScriptToEvaluateOnNewDocument", **script)
     assert page.run("compiled") == 1
-    assert page.run("bench.plots.get('x').plot.paints") > 0
+    assert page.run("app.plots.get('x').plot.paints") > 0
 
 
 def test_of_two_models_chosen_at_once_the_last_is_shown(page):
     page.open(".model=coulomb")
     for first, last in (("pacejka", "smd"), ("smd", "pendulum"), ("stickslip", "smd")):  # known, and not yet compiled
         page.run(f"for (const name of [{first!r}, {last!r}]) document.querySelector(`input[value=${{name}}]`).click()")
-        page.wait(f"bench.state().model === {last!r}")
+        page.wait(f"app.state().model === {last!r}")
         page.run("new Promise(done => setTimeout(done, 100))")
-        assert page.settled("bench.state().model") == last == page.run("document.querySelector(':checked').value")
+        assert page.settled("app.state().model") == last == page.run("document.querySelector(':checked').value")
 
 
 def test_a_law_beside_another_shows_the_difference_and_the_counts(page):
     page.open(".model=coulomb")
-    page.choose("other", "coulomb")
-    assert page.run("bench.desk.runs.other.setting.values.friction") == 2
+    page.choose("comparison", "coulomb")
+    assert page.run("app.session.runs.comparison.setting.values.friction") == 2
     page.wait("document.getElementById('tables').textContent.includes('largest difference in x')")
     apart = page.run(
-        "(() => { const { one, other } = bench.desk.runs; return Math.max(...one.grid.map((row, i) => "
-        "Math.abs(one.columns.x[row] - other.columns.x[other.grid[i]]))) })()"
+        "(() => { const { main, comparison } = app.session.runs; return Math.max(...main.grid.map((row, i) => "
+        "Math.abs(main.columns.x[row] - comparison.columns.x[comparison.grid[i]]))) })()"
     )
     assert 1e-6 < apart < 1e-2
     rows = page.table("What it costs")
@@ -202,45 +202,45 @@ def test_a_law_beside_another_shows_the_difference_and_the_counts(page):
 
 
 def test_another_model_takes_the_values_of_the_same_names(page):
-    page.open(".model=stickslip&k=500&.beside=pacejka&.beside.x_m=0.005")
-    assert page.run("bench.desk.runs.other.setting.values.k") == 500
-    assert page.run("bench.desk.runs.other.setting.values.x_m") == 0.005
-    assert page.run("bench.desk.runs.other.columns.v.some((v, i) => i > 99 && v > 0 && v < 0.01)")  # it creeps
+    page.open(".model=stickslip&k=500&.compare=pacejka&.compare.x_m=0.005")
+    assert page.run("app.session.runs.comparison.setting.values.k") == 500
+    assert page.run("app.session.runs.comparison.setting.values.x_m") == 0.005
+    assert page.run("app.session.runs.comparison.columns.v.some((v, i) => i > 99 && v > 0 && v < 0.01)")  # it creeps
 
 
 def test_a_change_while_it_plays_acts_from_there_on_and_not_before(page):
     page.open(".model=smd")
-    whole = page.run("[...bench.desk.runs.one.columns.x]")
+    whole = page.run("[...app.session.runs.main.columns.x]")
     page.click("#play")
-    page.wait("bench.state().t > 0.2")
+    page.wait("app.state().t > 0.2")
     page.put("c", "20")
     page.click("#play")
-    (change,) = page.run("bench.state().changes")
+    (change,) = page.run("app.state().changes")
     assert change["name"] == "c"
     assert 0.2 < change["t"] < 4
-    assert page.run("bench.state().values") == {}
-    now = page.settled("({ t: bench.desk.runs.one.time, x: bench.desk.runs.one.columns.x })")
+    assert page.run("app.state().values") == {}
+    now = page.settled("({ t: app.session.runs.main.time, x: app.session.runs.main.columns.x })")
     before = [x for t, x in zip(now["t"], now["x"], strict=True) if t < change["t"]]
     assert before == whole[: len(before)]
     assert max(map(abs, now["x"][-200:])) < 0.1 * max(map(abs, whole[-200:]))
-    assert page.run("bench.desk.runs.before.columns.x.length") == len(whole)
+    assert page.run("app.session.runs.unchanged.columns.x.length") == len(whole)
 
 
 def test_playing_paints_no_curve_anew_and_a_curve_is_no_more_points_than_pixels_allow(page):
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=1")
-    assert page.run("bench.desk.runs.one.time.length") > 60000
-    painted = "[...bench.plots.values()].reduce((sum, { plot }) => sum + plot.paints, 0)"
+    assert page.run("app.session.runs.main.time.length") > 60000
+    painted = "[...app.plots.values()].reduce((sum, { plot }) => sum + plot.paints, 0)"
     before = page.run(painted)
     page.click("#play")
-    page.wait("bench.state().t > 1.2")
+    page.wait("app.state().t > 1.2")
     page.click("#play")
     assert page.run(painted) == before
-    width = page.run("bench.plots.get('step').plot.host.clientWidth")
+    width = page.run("app.plots.get('step').plot.host.clientWidth")
     count = (
-        "(() => { const { plot, panel } = bench.plots.get('step'); const [curve] = panel.content.curves;"
+        "(() => { const { plot, panel } = app.plots.get('step'); const [curve] = panel.content.curves;"
         "let points = 0; const context = { lineTo: () => points++ };"
         "const all = new Proxy(context, { get: (it, key) => it[key] ?? (() => ({ width: 0 })) });"
-        "plot.curve(all, curve, plot.places(plot.host.clientWidth, plot.host.clientHeight)); return points })()"
+        "plot.curve(all, curve, plot.scales(plot.host.clientWidth, plot.host.clientHeight)); return points })()"
     )
     assert width < page.run(count) < 4 * width
 
@@ -249,36 +249,36 @@ def test_playing_paints_no_curve_anew_and_a_curve_is_no_more_points_than_pixels_
 def test_a_dragged_body_begins_where_it_is_let_go(page, name):
     page.browser.size(1280)
     page.open(f".model={name}")
-    body = page.run("bench.desk.portraits.get(bench.state().model).bodies[0]")
+    body = page.run("app.session.models.get(app.state().model).bodies[0]")
     x, y = page.middle("#mechanism .body")
     page.browser.mouse("Pressed", x, y)
     page.browser.mouse("Moved", x + 30, y)
     page.browser.mouse("Moved", x + 60, y)
-    page.wait(f"bench.state().values[{body['start']!r}] !== undefined")
-    start = page.run(f"bench.state().values[{body['start']!r}]")
+    page.wait(f"app.state().values[{body['start']!r}] !== undefined")
+    start = page.run(f"app.state().values[{body['start']!r}]")
     page.browser.mouse("Released", x + 60, y, buttons=0)
-    page.wait("bench.state().t > 0")
+    page.wait("app.state().t > 0")
     page.click("#play")
     assert start > declared(name)[body["start"]].start
-    assert page.settled(f"bench.desk.runs.one.columns[{body['position']!r}][0]") == start
+    assert page.settled(f"app.session.runs.main.columns[{body['position']!r}][0]") == start
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_body_pulled_while_it_runs_feels_a_force_until_it_is_let_go(page, name):
     page.browser.size(1280)
     page.open(f".model={name}&.t=0.3")
-    body = page.run("bench.desk.portraits.get(bench.state().model).bodies[0]")
+    body = page.run("app.session.models.get(app.state().model).bodies[0]")
     x, y = page.middle("#mechanism .body")
     page.browser.mouse("Pressed", x, y)
     page.browser.mouse("Moved", x + 80, y)
-    page.wait("bench.state().changes.length > 0")
+    page.wait("app.state().changes.length > 0")
     page.browser.mouse("Released", x + 80, y, buttons=0)
     page.click("#play")
-    changes = page.settled("bench.state().changes")
+    changes = page.settled("app.state().changes")
     assert {change["name"] for change in changes} == {body["input"]}
     assert any(change["value"] for change in changes)
     assert changes[-1]["value"] == 0
-    apart = "bench.desk.runs.one.columns[p].at(-1) !== bench.desk.runs.before.columns[p].at(-1)"
+    apart = "app.session.runs.main.columns[p].at(-1) !== app.session.runs.unchanged.columns[p].at(-1)"
     assert page.run(f"(p => {apart})({body['position']!r})")
 
 
@@ -290,41 +290,41 @@ def test_a_pull_on_a_slow_method_never_goes_back_in_time(page):
     page.browser.mouse("Pressed", x, y)
     for way in (40, 80, 120):
         page.browser.mouse("Moved", x + way, y)
-    page.wait("bench.state().changes.length > 1")
+    page.wait("app.state().changes.length > 1")
     page.browser.mouse("Released", x + 120, y, buttons=0)
     page.click("#play")
-    first, *_, last = page.settled("bench.state().changes")
-    assert 8 <= first["t"] < last["t"] <= page.run("bench.state().t") + 0.1
+    first, *_, last = page.settled("app.state().changes")
+    assert 8 <= first["t"] < last["t"] <= page.run("app.state().t") + 0.1
     assert (first["name"], last["value"]) == ("F_ext", 0)
 
 
 def test_a_kick_is_a_push_that_ends(page):
     page.open(".model=stickslip&.t=1")
     page.click("#kick")
-    first, last = page.settled("bench.state().changes")
+    first, last = page.settled("app.state().changes")
     assert (first["name"], first["t"], last["value"]) == ("F_ext", 1, 0)
     assert 1 < last["t"] < 2
-    assert page.run("Math.max(...bench.desk.runs.one.columns.v.slice(100, 300))") > 0
+    assert page.run("Math.max(...app.session.runs.main.columns.v.slice(100, 300))") > 0
 
 
 def test_a_link_carries_everything(page):
     page.open(".model=stickslip")
     page.put("mu_d", "0.45")
-    page.choose("other", "pacejka")
+    page.choose("comparison", "pacejka")
     page.seek(5.0)
     page.check("live", True)
     page.put("v_driver", "0.05")
     page.wait("location.hash.includes('v_driver')")
-    hash, state = page.run("location.hash.slice(1)"), page.run("bench.state()")
-    end = page.run("Object.values(bench.desk.runs).map(run => run.columns.x.at(-1))")
+    hash, state = page.run("location.hash.slice(1)"), page.run("app.state()")
+    end = page.run("Object.values(app.session.runs).map(run => run.columns.x.at(-1))")
     page.open(hash, anew=True)
-    assert page.run("bench.state()") == state
-    assert page.run("Object.values(bench.desk.runs).map(run => run.columns.x.at(-1))") == end
+    assert page.run("app.state()") == state
+    assert page.run("Object.values(app.session.runs).map(run => run.columns.x.at(-1))") == end
     page.open(".preset=pacejka-0.001")
-    assert page.run("bench.state().values.x_m") == 0.001
+    assert page.run("app.state().values.x_m") == 0.001
     wrong = "mu_d=0.3&solver.method=7&friction=1.5&c=&.stop=&.change=1 nothing 2&.change=x k 2"
     page.open(f".model=coulomb&k=100&{wrong}")
-    assert page.run("bench.state()") | {"values": {"k": 100}, "changes": [], "stop": 4} == page.run("bench.state()")
+    assert page.run("app.state()") | {"values": {"k": 100}, "changes": [], "stop": 4} == page.run("app.state()")
     told = "document.getElementById('status').textContent"
     page.wait(f"{told}.includes('not known here: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
     page.open(".model=nobody")
@@ -338,14 +338,14 @@ def test_a_link_followed_while_the_address_is_written_is_not_lost(page):
     page.open(".model=smd")
     page.wait("location.hash.includes('stop')")
     page.run("(own => { location.hash = '.model=coulomb'; history.replaceState(null, '', own) })(location.href)")
-    page.wait("bench.state().model === 'coulomb'")
+    page.wait("app.state().model === 'coulomb'")
 
 
 def test_within_another_page_it_runs_and_has_no_address_to_carry(page, tmp_path):
     outer = tmp_path / "outer.html"
     outer.write_text(f'<iframe srcdoc="{escape(page.file.read_text(encoding="utf-8"))}"></iframe>', encoding="utf-8")
     page.browser.open(outer.as_uri())
-    page.wait("frames[0].bench?.desk.done && frames[0].document.querySelector('#status').textContent")
+    page.wait("frames[0].app?.session.done && frames[0].document.querySelector('#status').textContent")
     assert page.run("[frames[0].location.hash, frames[0].document.getElementById('link').hidden]") == ["", True]
 
 
@@ -366,7 +366,7 @@ def test_what_is_no_number_is_told_and_changes_nothing(page):
     for name, text, sentence in (("m", "", "m takes a number: it stays 20 kg."), (".stop", "-1", "stays 16 s long")):
         page.put(name, text)
         assert sentence in page.run(f"{alert}.textContent")
-        assert page.run(f"[{field}, bench.state().values, bench.state().stop]") == ["20", {"m": 20}, 16]
+        assert page.run(f"[{field}, app.state().values, app.state().stop]") == ["20", {"m": 20}, 16]
     page.put("m", "21")
     assert page.run(f"{alert}.hidden")
 
@@ -374,7 +374,7 @@ def test_what_is_no_number_is_told_and_changes_nothing(page):
 @pytest.mark.parametrize("name", MODELS)
 def test_numbers_at_the_end_of_their_range_are_told_or_drawn_and_never_as_no_number(page, name):
     page.open(f".model={name}")
-    body = page.run("bench.desk.portraits.get(bench.state().model).bodies[0]")
+    body = page.run("app.session.models.get(app.state().model).bodies[0]")
     drawn = "document.getElementById('mechanism').innerHTML + document.querySelector('#panels').textContent"
     for variable, text in (
         ("start", "1e308"),
@@ -394,7 +394,7 @@ def test_numbers_at_the_end_of_their_range_are_told_or_drawn_and_never_as_no_num
 def test_every_published_case_measures_what_the_terminal_does(page):
     """To a per mille, but where chatter makes the steps hang on rounding; and beside the same figures."""
     page.open()
-    names = page.run("[...bench.desk.presets.keys()]")
+    names = page.run("[...app.session.presets.keys()]")
     scenes = {scene.name: scene for scene in map(load, shipped()) if scene.published}
     assert sorted(names) == sorted(scenes)
     for name, scene in scenes.items():
@@ -402,8 +402,8 @@ def test_every_published_case_measures_what_the_terminal_does(page):
         native = native_fmus.built() / f"{scene.model}.fmu"  # which runs while the page waits for more to be done
         run = simulate(replace(of_scene(scene), fmu=native, repeat=1))
         page.wait(
-            f"bench.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
-            "bench.desk.presets.get(bench.state().preset).title"
+            f"app.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
+            "app.session.presets.get(app.state().preset).title"
         )
         rows = iter(page.table(scene.title).values())
         quantities = {each.name: each for kind in scene.analyses for each in ANALYSE[kind](run, scene).quantities}
@@ -419,23 +419,23 @@ def test_every_published_case_measures_what_the_terminal_does(page):
                 value = there.in_unit(*unit) if unit and unit != [there.unit] else there.value
                 assert float(size) == pytest.approx(value, rel=1e-3), (name, figure)
     page.choose("preset", "")  # my own: as it is, but no published case any more
-    assert page.run("[bench.state().preset, bench.state().model]") == ["", scene.model]
+    assert page.run("[app.state().preset, app.state().model]") == ["", scene.model]
 
 
 # ---- what is taken away
 
 
 def test_the_csv_file_holds_the_run_and_the_picture_is_a_png(page):
-    page.open(".model=coulomb&.beside=coulomb&.beside.friction=2&.beside.solver.method=2")
+    page.open(".model=coulomb&.compare=coulomb&.compare.friction=2&.compare.solver.method=2")
     page.run("HTMLAnchorElement.prototype.click = function () { globalThis.taken = fetched(this.href, this.download) }")
     page.run("URL.createObjectURL = blob => { globalThis.blob = blob; return 'blob:x' }; URL.revokeObjectURL = () => 0")
     page.run("globalThis.fetched = (href, name) => name")
     page.click("#csv")
     head, *rows = page.run("blob.text()").splitlines()
     assert head.startswith("t [s],x [m],v [m/s],a [m/s2]")
-    assert "beside.x [m]" in head
+    assert "compare.x [m]" in head
     assert len(rows) == 1601
-    assert float(rows[-1].split(",")[1]) == page.run("bench.desk.runs.one.columns.x.at(-1)")
+    assert float(rows[-1].split(",")[1]) == page.run("app.session.runs.main.columns.x.at(-1)")
     page.click("#png")
     page.wait("taken === 'coulomb.png'")
     assert page.run("blob.slice(1, 4).text()") == "PNG"
@@ -464,7 +464,7 @@ def test_paper_is_white_and_everything_is_on_it(page):
 
 def test_what_moves_in_any_model_is_read_from_its_declaration():
     """Of every model that users might write: what kind each body is, and what acts on it."""
-    drawn = {path.stem: bodies(find_model(path).analysis) for path in (*AUTHORED, *LARGER)}
+    drawn = {path.stem: list_bodies(find_model(path).analysis) for path in (*AUTHORED, *LARGER)}
     kinds = {name: [body["kind"] for body in found] for name, found in drawn.items()}
     assert kinds["viscous_pendulum"] == ["pendulum"]
     assert kinds["rotor_brake"] == ["rotor"]
@@ -481,11 +481,11 @@ def test_models_of_users_run_in_a_page_of_their_own(browser):
     for path, count in zip(files, (1, 2), strict=True):
         page.open(f".model={path.stem}")
         assert page.run("[...document.getElementById('method').options].map(each => each.text)") == ["ode45"]
-        assert page.run("bench.desk.runs.one.failure") == ""
-        assert page.run("bench.desk.runs.one.events.length") > 2
+        assert page.run("app.session.runs.main.failure") == ""
+        assert page.run("app.session.runs.main.events.length") > 2
         assert page.run("document.querySelectorAll('#mechanism .body').length") == count
         assert page.run("document.getElementById('body').parentElement.hidden") == (count == 1)
     page.choose("body", 1)  # of its diagrams those of the motion stand first, too
     shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
-    second = page.run("bench.desk.portraits.get('blocks').bodies[1]")
+    second = page.run("app.session.models.get('blocks').bodies[1]")
     assert page.settled(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]

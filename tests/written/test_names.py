@@ -6,7 +6,7 @@ from models import DOP853, LARGER, RODAS
 
 from fmus.packaging.lowering import LAWS, METHODS, lowered_model, select_features, sibling_module
 from fmus.packaging.model_lookup import find_model
-from fmus.packaging.native.interface import header
+from fmus.packaging.native.model_header import render_model_header
 from fmus.runtime.variable_declarations import variables
 
 BELT = '''"""A model."""
@@ -63,7 +63,9 @@ def test_a_name_that_the_numerics_have_for_something_else_changes_nothing(tmp_pa
             changed = changed.replace(old, new)
         path.write_text(changed)
         assert numbers(path, lowered_model(path)(), names) == expected, names
-    assert text == SLED or "typedef struct Mine Model;" in header(lowered_model(path), "3")  # with a slope of d_x
+    assert text == SLED or "typedef struct Mine Model;" in render_model_header(
+        lowered_model(path), "3"
+    )  # with a slope of d_x
 
 
 def test_a_choice_of_an_author_keeps_what_is_called_like_a_method_or_a_law_that_is_not_offered(tmp_path):

@@ -8,6 +8,6 @@
 The script is modules, in the order of MODULES in page.py, each importing only from those before it.
 """
 
-from .page import build
+from .html_page import build
 
 __all__ = ["build"]

@@ -4,21 +4,23 @@ from base64 import b64encode
 from collections.abc import Mapping
 from gzip import compress
 
-from ..native.compiler import linked
-from ..native.sources import COMPILED
+from ..native.compiler import compile_and_link
+from ..native.sources import MAIN_SOURCE
 
 TARGET = "wasm32-wasi"
-CALLED = (  # by script/fmu.js
+EXPORTED = (  # by script/fmu.js
     *("fmi2Instantiate", "fmi2Reset", "fmi2SetupExperiment"),
     *("fmi2EnterInitializationMode", "fmi2ExitInitializationMode", "fmi2DoStep"),
     *("fmi2GetReal", "fmi2GetInteger", "fmi2SetReal", "fmi2SetInteger"),
 )
 # The headers of a C library without the library, which the compiler would first have to make: script/libc.js is one.
 HEADERS = [f"-isystem{{compiler}}/lib/libc/include/{kind}-musl" for kind in ("wasm-wasi", "generic")]
-LINKED = ("-Wl,--no-entry", "-Wl,--import-symbols", *(f"-Wl,--export={name}" for name in CALLED))
-OPTIONS = ("-nostdlib", *HEADERS, *LINKED, "-fvisibility=hidden")
+LINK_OPTIONS = ("-Wl,--no-entry", "-Wl,--import-symbols", *(f"-Wl,--export={name}" for name in EXPORTED))
+OPTIONS = ("-nostdlib", *HEADERS, *LINK_OPTIONS, "-fvisibility=hidden")
 
 
-def packed(name: str, files: Mapping[str, str]) -> str:
+def compile_to_base64(name: str, files: Mapping[str, str]) -> str:
     """The WebAssembly of the FMU `name` from its sources, compressed, in letters."""
-    return b64encode(compress(linked(files, COMPILED["2"], TARGET, f"{name}.wasm", OPTIONS), mtime=0)).decode()
+    return b64encode(
+        compress(compile_and_link(files, MAIN_SOURCE["2"], TARGET, f"{name}.wasm", OPTIONS), mtime=0)
+    ).decode()

@@ -43,15 +43,15 @@ function valueAtPlace(place, { low, high, log }, factor) {
   return Number(((low + share * (high - low)) * factor).toFixed(Math.min(digits, 12))) / factor;
 }
 
-// Gives the size that a variable usually has, where its start is zero: from the default run `one`, by its unit.
-export function sizes(one) {
-  const { portrait } = one.fmu;
-  const [{ position, speed }] = portrait.bodies;
-  const first = (unit) => portrait.variables.find((each) => each.unit === unit && each.start > 0)?.start ?? 1;
-  const length = named(portrait, position).unit === "m" ? one.largest(position) : first("m");
-  const bases = [first("kg"), length, one.largest(position) / one.largest(speed), 1];
+// Gives the size that a variable usually has, where its start is zero: from the default run `main`, by its unit.
+export function sizes(main) {
+  const { modelInfo } = main.fmu;
+  const [{ position, speed }] = modelInfo.bodies;
+  const first = (unit) => modelInfo.variables.find((each) => each.unit === unit && each.start > 0)?.start ?? 1;
+  const length = named(modelInfo, position).unit === "m" ? main.largest(position) : first("m");
+  const bases = [first("kg"), length, main.largest(position) / main.largest(speed), 1];
   return ({ unit, powers }) => {
-    const alike = one.reals.filter((name) => named(portrait, name).unit === unit).map((name) => one.largest(name));
+    const alike = main.reals.filter((name) => named(modelInfo, name).unit === unit).map((name) => main.largest(name));
     const size = Math.max(0, ...alike) || powers.reduce((product, power, i) => product * bases[i] ** power, 1);
     return Number.isFinite(size) && size > 0 ? Number(size.toPrecision(1)) : 1;
   };
@@ -118,10 +118,10 @@ export class Choice {
 export const TOLERANCES = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
 
 // The pairs for a choice of a relative tolerance; zero is that of the model.
-export function tolerances(portrait, chosen) {
+export function tolerances(modelInfo, chosen) {
   const all = chosen && !TOLERANCES.includes(chosen) ? [chosen, ...TOLERANCES] : TOLERANCES;
   const power = (value) => value.toExponential().replace("-", "−");
-  return [[0, `default, ${power(portrait.tolerance)}`], ...all.map((each) => [each, power(each)])];
+  return [[0, `default, ${power(modelInfo.tolerance)}`], ...all.map((each) => [each, power(each)])];
 }
 
 // The pairs for an enumeration.

@@ -15,8 +15,8 @@ export class Diagrams {
     this.host.replaceChildren();
   }
 
-  draw(desk, state, tools) {
-    const found = panels(desk, state, tools);
+  draw(session, state, tools) {
+    const found = panels(session, state, tools);
     for (const [key, { figure }] of this.plots) figure.hidden = !found.some((panel) => panel.key === key);
     const fresh = found.filter(({ key }) => !this.plots.has(key));
     for (const { key } of fresh) this.plots.set(key, this.made(key));
@@ -41,9 +41,9 @@ export class Diagrams {
   }
 
   // Put the cursor at t in s.
-  point(desk, t) {
+  point(session, t) {
     for (const { plot, panel, reading } of this.shown()) {
-      const { spot, readings } = spotted(panel, desk, t);
+      const { spot, readings } = spotted(panel, session, t);
       plot.point(spot);
       reading.replaceChildren(...readings.map(({ text, colour }) => make("span", { class: colour }, text)));
     }

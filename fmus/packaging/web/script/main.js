@@ -1,16 +1,16 @@
 // The page: what people do becomes the state, the state becomes runs, the runs become pictures.
 
 import { make, sizes } from "./controls.js";
-import { Desk } from "./desk.js";
+import { Session } from "./session.js";
 import { Diagrams } from "./diagrams.js";
-import { asPublished, besideAtFirst, change, choose, put } from "./edit.js";
+import { asPublished, besideAtFirst, change, choose, put } from "./overrides.js";
 import { Form } from "./form.js";
-import { Hand } from "./hand.js";
+import { DragController } from "./drag.js";
 import { Mechanism } from "./mechanism.js";
 import { told } from "./plot.js";
 import { fresh, inForce, read, valueAt, written } from "./state.js";
 import { cost, decay, events, published, setting } from "./tables.js";
-import { csv, picture, save } from "./take.js";
+import { csv, picture, save } from "./export.js";
 
 const SLICE = 8; // ms of a frame for the runs
 const SETTLED = 300; // ms without a change after which tables, link and words follow
@@ -18,14 +18,14 @@ const framed = location.protocol === "about:";
 const $$ = (id) => document.getElementById(id);
 
 const data = JSON.parse($$("data").textContent);
-const desk = new Desk(data);
-const page = { desk, state: null, portrait: null, playing: false, put: take, edited, play, wake };
-const hand = new Hand(page);
-const mechanism = new Mechanism($$("mechanism"), hand);
+const session = new Session(data);
+const page = { session, state: null, modelInfo: null, playing: false, put: take, edited, play, wake };
+const drag = new DragController(page);
+const mechanism = new Mechanism($$("mechanism"), drag);
 const diagrams = new Diagrams($$("panels"), seek);
-const form = new Form(desk.portraits, desk.presets, {
-  preset: (name) => (desk.presets.has(name) ? enter(ofPreset(name)) : edited()),
-  choose: (name, value) => { choose(page.portrait, page.state.values, name, value); edited(); },
+const form = new Form(session.models, session.presets, {
+  preset: (name) => (session.presets.has(name) ? enter(ofPreset(name)) : edited()),
+  choose: (name, value) => { choose(page.modelInfo, page.state.values, name, value); edited(); },
   beside: takeOther,
   body: (number) => { page.state.body = number; restart(); },
   put: take,
@@ -46,11 +46,11 @@ let settling = 0;
 async function enter(next, lost = []) {
   if (page.playing) play(false);
   latest = next;
-  await Promise.all([next.model, ...(next.other ? [next.other.model] : [])].map((name) => desk.ready(name)));
+  await Promise.all([next.model, ...(next.comparison ? [next.comparison.model] : [])].map((name) => session.ready(name)));
   if (latest !== next) return; // somebody has chosen another since
   const changed = next.model !== page.state?.model;
   page.state = next;
-  page.portrait = desk.portraits.get(next.model);
+  page.modelInfo = session.models.get(next.model);
   if (changed) arrange();
   unknown = lost.length ? `The link has what is not known here: ${lost.join(", ")}. ` : "";
   restart();
@@ -58,36 +58,36 @@ async function enter(next, lost = []) {
 
 // Go where a link leads: to a state, or to a published case by its name alone; the first model without.
 async function follow(hash) {
-  const found = read(hash, desk.portraits);
+  const found = read(hash, session.models);
   const words = new URLSearchParams(hash.slice(1));
   const preset = words.get(".preset");
   if (found) await enter(found.state, found.lost);
-  else if (desk.presets.has(preset)) await enter(ofPreset(preset));
-  else await enter(fresh(desk.portraits.values().next().value), [words.get(".model")].filter(Boolean));
+  else if (session.presets.has(preset)) await enter(ofPreset(preset));
+  else await enter(fresh(session.models.values().next().value), [words.get(".model")].filter(Boolean));
 }
 
 function ofPreset(name) {
-  const preset = desk.presets.get(name);
-  return asPublished(preset, desk.portraits.get(preset.model));
+  const preset = session.presets.get(name);
+  return asPublished(preset, session.models.get(preset.model));
 }
 
 // Controls and mechanism of another model.
 function arrange() {
-  const { portrait } = page;
-  document.querySelector(`input[name=model][value="${portrait.name}"]`).checked = true;
-  $$("name").textContent = portrait.name;
-  $$("title").textContent = portrait.title;
-  $$("equations").innerHTML = portrait.text; // made by the builder
-  mechanism.build(portrait);
-  $$("kick").hidden = !portrait.bodies.some((body) => body.input);
-  desk.restart(fresh(portrait));
-  desk.runs.one.advance();
-  form.build(portrait, sizes(desk.runs.one));
+  const { modelInfo } = page;
+  document.querySelector(`input[name=model][value="${modelInfo.name}"]`).checked = true;
+  $$("name").textContent = modelInfo.name;
+  $$("title").textContent = modelInfo.title;
+  $$("equations").innerHTML = modelInfo.text; // made by the builder
+  mechanism.build(modelInfo);
+  $$("kick").hidden = !modelInfo.bodies.some((body) => body.input);
+  session.restart(fresh(modelInfo));
+  session.runs.main.advance();
+  form.build(modelInfo, sizes(session.runs.main));
   diagrams.clear();
 }
 
 function restart() {
-  desk.restart(page.state);
+  session.restart(page.state);
   refused = "";
   stale = { curves: true, cursor: true };
   settle();
@@ -95,17 +95,17 @@ function restart() {
   wake();
 }
 
-// A published case is one until something is changed.
+// A published case is main until something is changed.
 function edited() {
   page.state.preset = unknown = "";
   restart();
 }
 
-// A value from a slider, a number field or the hand: from the start, or from the cursor on.
+// A value from a slider, a number field or the drag: from the start, or from the cursor on.
 function take(variable, value) {
-  const { state, portrait } = page;
+  const { state, modelInfo } = page;
   if (!variable.fixed && live() && state.t > 0) change(state, variable.name, value, state.t);
-  else put(portrait, state.values, variable.name, value);
+  else put(modelInfo, state.values, variable.name, value);
   edited();
 }
 
@@ -117,12 +117,12 @@ function takeLength(seconds) {
 }
 
 async function takeOther({ model, ...values }) {
-  const { state, portrait } = page;
-  if (model === "") state.other = null;
+  const { state, modelInfo } = page;
+  if (model === "") state.comparison = null;
   else if (model) {
-    await desk.ready(model);
-    state.other = { model, values: besideAtFirst(portrait, state, model) };
-  } else for (const [name, value] of Object.entries(values)) choose(desk.portraits.get(state.other.model), state.other.values, name, value);
+    await session.ready(model);
+    state.comparison = { model, values: besideAtFirst(modelInfo, state, model) };
+  } else for (const [name, value] of Object.entries(values)) choose(session.models.get(state.comparison.model), state.comparison.values, name, value);
   restart();
 }
 
@@ -132,9 +132,9 @@ function live() {
 }
 
 function showControls() {
-  const { state, portrait } = page;
+  const { state, modelInfo } = page;
   form.show(state, live());
-  mechanism.equip(Object.fromEntries(Object.keys(inForce(portrait, {})).map((name) => [name, valueAt(portrait, state, name, state.t)])));
+  mechanism.equip(Object.fromEntries(Object.keys(inForce(modelInfo, {})).map((name) => [name, valueAt(modelInfo, state, name, state.t)])));
 }
 
 // ---- frames
@@ -150,63 +150,63 @@ function frame(now) {
   const passed = before ? Math.min((now - before) / 1000, 0.1) : 0;
   before = now;
   if (page.playing) advance(passed);
-  if (hand.pull) hand.act();
-  if (desk.work(SLICE)) stale.curves = true;
-  const { one } = desk.runs;
+  if (drag.pull) drag.act();
+  if (session.work(SLICE)) stale.curves = true;
+  const { main } = session.runs;
   if (stale.curves) drawAlert();
-  if (one.time.length && stale.curves) {
-    mechanism.fit(one);
-    diagrams.draw(desk, page.state, { turns: $$("turns").checked });
+  if (main.time.length && stale.curves) {
+    mechanism.fit(main);
+    diagrams.draw(session, page.state, { turns: $$("turns").checked });
   }
-  if (one.time.length && (stale.curves || stale.cursor) && one.reaches(page.state.t)) {
+  if (main.time.length && (stale.curves || stale.cursor) && main.reaches(page.state.t)) {
     drawCursor();
     stale.cursor = false;
   }
-  stale.curves = !one.time.length;
-  if (page.playing || hand.pull || !desk.done) wake();
+  stale.curves = !main.time.length;
+  if (page.playing || drag.pull || !session.done) wake();
   else before = 0;
-  if (!desk.done) settle();
+  if (!session.done) settle();
 }
 
 function advance(passed) {
   const { state } = page;
-  const end = desk.runs.one.time.at(-1) ?? 0; // of what there is
+  const end = session.runs.main.time.at(-1) ?? 0; // of what there is
   state.t = Math.max(state.t, Math.min(state.t + passed * Number($$("speed").value), end));
   stale.cursor = true;
-  if (state.t >= state.stop || (desk.runs.one.done && state.t >= end)) play(false);
+  if (state.t >= state.stop || (session.runs.main.done && state.t >= end)) play(false);
 }
 
-// What a run was refused for; the diagrams of the last one that went stay, and are faint.
+// What a run was refused for; the diagrams of the last main that went stay, and are faint.
 function drawAlert() {
-  const { one, other } = desk.runs;
-  $$("alert").textContent = refused || one.failure || other?.failure || "";
+  const { main, comparison } = session.runs;
+  $$("alert").textContent = refused || main.failure || comparison?.failure || "";
   $$("alert").hidden = !$$("alert").textContent;
-  for (const id of ["panels", "mechanism"]) $$(id).classList.toggle("gone", !one.time.length);
+  for (const id of ["panels", "mechanism"]) $$(id).classList.toggle("gone", !main.time.length);
 }
 
 function drawCursor() {
-  const { state, portrait } = page;
-  const { one } = desk.runs;
-  const t = Math.min(state.t, one.time.at(-1));
-  diagrams.point(desk, t);
-  mechanism.move((name) => (one.modes.includes(name) ? one.columns[name][one.row(t)] : one.at(name, t)));
+  const { state, modelInfo } = page;
+  const { main } = session.runs;
+  const t = Math.min(state.t, main.time.at(-1));
+  diagrams.point(session, t);
+  mechanism.move((name) => (main.modes.includes(name) ? main.columns[name][main.row(t)] : main.at(name, t)));
   $$("scrub").value = Math.round((1000 * state.t) / state.stop);
   $$("clock").textContent = `${state.t.toFixed(state.stop < 10 ? 3 : 2)} s`;
   $$("scrub").setAttribute("aria-valuetext", $$("clock").textContent);
-  if (page.playing && state.changes.length) form.follow(portrait, state);
+  if (page.playing && state.changes.length) form.follow(modelInfo, state);
 }
 
 // Tables, link and words, when nothing has changed for a while.
 function settle() {
   clearTimeout(settling);
   settling = setTimeout(() => {
-    if (!desk.done) return settle();
+    if (!session.done) return settle();
     const { state } = page;
-    const { one } = desk.runs;
-    const made = one.time.length ? [published, cost, decay, events].map((table) => table(desk, state)) : [];
+    const { main } = session.runs;
+    const made = main.time.length ? [published, cost, decay, events].map((table) => table(session, state)) : [];
     $$("tables").replaceChildren(...made.filter(Boolean));
     remember();
-    const ran = one.failure ? "" : `${setting(one)}: ${one.events.length} events in ${told(state.stop)} s.`;
+    const ran = main.failure ? "" : `${setting(main)}: ${main.events.length} events in ${told(state.stop)} s.`;
     if (!page.playing) $$("status").textContent = unknown + ran;
   }, SETTLED);
 }
@@ -237,11 +237,11 @@ function play(playing = true) {
 
 for (const [id, act] of Object.entries({
   play: () => play(!page.playing),
-  kick: () => hand.kick(),
-  reset: () => enter(fresh(page.portrait)),
+  kick: () => drag.kick(),
+  reset: () => enter(fresh(page.modelInfo)),
   print: () => print(),
-  csv: () => save(new Blob([csv(desk.runs.one, desk.runs.other)], { type: "text/csv" }), `${page.state.model}.csv`),
-  png: async () => save(await picture(diagrams.shown(), setting(desk.runs.one)), `${page.state.model}.png`),
+  csv: () => save(new Blob([csv(session.runs.main, session.runs.comparison)], { type: "text/csv" }), `${page.state.model}.csv`),
+  png: async () => save(await picture(diagrams.shown(), setting(session.runs.main)), `${page.state.model}.png`),
   link: copyLink,
 })) $$(id).addEventListener("click", act);
 $$("scrub").addEventListener("input", () => seek((page.state.stop * $$("scrub").value) / 1000));
@@ -284,11 +284,11 @@ for (const look of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) 
 
 $$("version").textContent = data.version;
 $$("link").hidden = framed;
-for (const [name, portrait] of desk.portraits) {
+for (const [name, modelInfo] of session.models) {
   const choice = make("input", { type: "radio", name: "model", value: name });
-  choice.addEventListener("change", () => enter(fresh(portrait)));
+  choice.addEventListener("change", () => enter(fresh(modelInfo)));
   $$("models").append(make("label", {}, choice, name));
 }
 $$("choices").append(...Object.values(form.lists).map(({ element }) => element));
-globalThis.bench = { desk, plots: diagrams.plots, seek, state: () => page.state }; // for the console
+globalThis.app = { session, plots: diagrams.plots, seek, state: () => page.state }; // for the console
 await follow(location.hash);

@@ -22,15 +22,15 @@ function element(name, attributes, parent) {
 }
 
 export class Mechanism {
-  // `hand` is told what is dragged: grab(body), move(position), drop().
-  constructor(host, hand) {
-    Object.assign(this, { host, hand, parts: [] });
+  // `drag` is told what is dragged: grab(body), move(position), drop().
+  constructor(host, drag) {
+    Object.assign(this, { host, drag, parts: [] });
   }
 
   // Draw the bodies of a model anew.
-  build(portrait) {
-    this.portrait = portrait;
-    const bodies = portrait.bodies.filter((body) => body.kind !== "none");
+  build(modelInfo) {
+    this.modelInfo = modelInfo;
+    const bodies = modelInfo.bodies.filter((body) => body.kind !== "none");
     const lanes = Math.max(bodies.length, 1);
     const [top, tall] = bodies.some((body) => body.kind !== "block") ? [0, TALL] : [CUT, LANE * lanes - CUT];
     this.svg = element("svg", { viewBox: `0 ${top} ${WIDE} ${tall}`, role: "img", "aria-label": "" });
@@ -116,7 +116,7 @@ export class Mechanism {
 
   // The rule under the floor, in the unit of the position.
   rule(part, low, step) {
-    const { shown, factor } = named(this.portrait, part.body.position);
+    const { shown, factor } = named(this.modelInfo, part.body.position);
     const y = part.y + FLOOR;
     part.scale.replaceChildren();
     for (const value of ticks(low, part.reach, Math.round((part.reach - low) / step))) {
@@ -171,7 +171,7 @@ export class Mechanism {
 
   words(value) {
     const each = this.parts.map(({ body }) => {
-      const { shown, factor } = named(this.portrait, body.position);
+      const { shown, factor } = named(this.modelInfo, body.position);
       const mode = body.mode ? (value(body.mode) === 0 ? ", stuck" : ", sliding") : "";
       return `${body.position} = ${told(value(body.position) * factor, 3)} ${shown}${mode}`;
     });
@@ -189,13 +189,13 @@ export class Mechanism {
     grip.addEventListener("pointerdown", (event) => {
       grip.setPointerCapture(event.pointerId);
       offset = place(event) - part.at;
-      this.hand.grab(part.body);
+      this.drag.grab(part.body);
       event.preventDefault();
     });
-    grip.addEventListener("pointermove", (event) => offset !== null && this.hand.move(place(event) - offset));
+    grip.addEventListener("pointermove", (event) => offset !== null && this.drag.move(place(event) - offset));
     for (const end of ["pointerup", "pointercancel"]) {
       grip.addEventListener(end, () => {
-        if (offset !== null) this.hand.drop();
+        if (offset !== null) this.drag.drop();
         offset = null;
       });
     }

@@ -33,7 +33,7 @@ export function thinned(x, y, place) {
   const kept = [];
   let column, first, lowest, highest, last, low, high;
   const keep = (row) => row !== undefined && kept.push(place.x(x[row]), place.y(y[row]));
-  const keepColumn = () => [...new Set([first, lowest, highest, last])].sort((one, next) => one - next).forEach(keep);
+  const keepColumn = () => [...new Set([first, lowest, highest, last])].sort((a, b) => a - b).forEach(keep);
   for (let row = 0; row < x.length; row++) {
     const [pixelX, pixelY] = [place.x(x[row]), place.y(y[row])];
     if (!Number.isFinite(pixelX + pixelY)) continue;
@@ -105,7 +105,7 @@ export class Plot {
     if (!this.content || !this.width) return;
     const { width, height } = this;
     const context = this.ready(this.above);
-    const place = this.places(width, height);
+    const place = this.scales(width, height);
     if (spot.x !== undefined) line(context, colours.cursor, 1, [place.x(spot.x), TOP, place.x(spot.x), height - BOTTOM]);
     for (const { x, y, colour } of spot.points) dot(context, colours[colour], place.x(x), place.y(y), 3.5);
   }
@@ -129,7 +129,7 @@ export class Plot {
     return context;
   }
 
-  places(width, height) {
+  scales(width, height) {
     const { x, y } = this.content;
     const raised = y.log ? (value) => (value > 0 ? Math.log10(value) : NaN) : (value) => value;
     const [low, high] = [raised(y.low), raised(y.high)];
@@ -142,7 +142,7 @@ export class Plot {
   // All but the cursor, on any canvas.
   drawn(context, width, height) {
     const { x, y, curves, bands = [], marks = [] } = this.content;
-    const place = this.places(width, height);
+    const place = this.scales(width, height);
     const [right, bottom] = [width - RIGHT, height - BOTTOM];
     context.font = FONT;
     context.lineJoin = "round";

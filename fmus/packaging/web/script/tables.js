@@ -35,29 +35,29 @@ function table(caption, heads, rows) {
 
 // Law and method of a run, in words.
 export function setting(run) {
-  const values = inForce(run.fmu.portrait, run.setting.values);
+  const values = inForce(run.fmu.modelInfo, run.setting.values);
   const label = (name) => run.fmu.variables.get(name)?.items.find(({ value }) => value === values[name])?.label;
   const rtol = values["solver.rtol"] ? `rtol ${values["solver.rtol"]}` : "";
-  return [run.fmu.portrait.name, label("friction"), label("solver.method"), rtol].filter(Boolean).join(", ");
+  return [run.fmu.modelInfo.name, label("friction"), label("solver.method"), rtol].filter(Boolean).join(", ");
 }
 
 // What the runs took, and how far they are apart.
-export function cost(desk, state) {
-  const { one, other, truth } = desk.runs;
-  const runs = [one, other].filter(Boolean);
-  const body = desk.portraits.get(state.model).bodies[state.body];
-  const { shown, factor } = one.fmu.variables.get(body.position);
+export function cost(session, state) {
+  const { main, comparison, reference } = session.runs;
+  const runs = [main, comparison].filter(Boolean);
+  const body = session.models.get(state.model).bodies[state.body];
+  const { shown, factor } = main.fmu.variables.get(body.position);
   const rows = [
     ...Object.entries(COUNTS).map(([name, words]) => [words, ...runs.map((run) => String(run.counts?.[name] ?? ""))]),
     ["run time here, drawing points included", ...runs.map((run) => `${told(1000 * run.seconds, 2)} ms`)],
   ];
-  const off = (run) => (run === truth ? "is the closed form" : `${told(difference(truth, run, body.position).largest * factor, 3)} ${shown}`);
-  const alike = (run) => run.fmu.portrait === truth?.fmu.portrait;
-  if (truth?.done) rows.push([`largest error of ${body.position} against the closed form`, ...runs.map((run) => (alike(run) ? off(run) : ""))]);
-  if (other?.columns[body.position] && other.columns[body.speed]) {
+  const off = (run) => (run === reference ? "is the closed form" : `${told(difference(reference, run, body.position).largest * factor, 3)} ${shown}`);
+  const alike = (run) => run.fmu.modelInfo === reference?.fmu.modelInfo;
+  if (reference?.done) rows.push([`largest error of ${body.position} against the closed form`, ...runs.map((run) => (alike(run) ? off(run) : ""))]);
+  if (comparison?.columns[body.position] && comparison.columns[body.speed]) {
     const apart = (name) => {
-      const variable = one.fmu.variables.get(name);
-      return `${told(difference(one, other, name).largest * variable.factor, 3)} ${variable.shown}`;
+      const variable = main.fmu.variables.get(name);
+      return `${told(difference(main, comparison, name).largest * variable.factor, 3)} ${variable.shown}`;
     };
     rows.push([`largest difference in ${body.position}`, "", apart(body.position)], [`largest difference in ${body.speed}`, "", apart(body.speed)]);
   }
@@ -65,12 +65,12 @@ export function cost(desk, state) {
 }
 
 // A published case beside what this page measures.
-export function published(desk, state) {
-  const preset = desk.presets.get(state.preset);
-  const run = desk.runs.published;
+export function published(session, state) {
+  const preset = session.presets.get(state.preset);
+  const run = session.runs.published;
   if (!preset || !run?.done || run.failure) return null;
-  const portrait = desk.portraits.get(state.model);
-  const measured = figures(run, portrait.bodies[0], preset.decay, inForce(portrait, state.values));
+  const modelInfo = session.models.get(state.model);
+  const measured = figures(run, modelInfo.bodies[0], preset.decay, inForce(modelInfo, state.values));
   const rows = Object.entries(preset.published).filter(([name]) => name !== "source").map(([name, figure]) => compared(name, figure, measured[name]));
   return table(preset.title, ["", "measured here", `published (${preset.published.source})`, "difference"], rows);
 }
@@ -88,12 +88,12 @@ function compared(name, figure, value) {
 }
 
 // What the turning points say.
-export function decay(desk, state) {
-  const { one } = desk.runs;
-  const portrait = desk.portraits.get(state.model);
-  const body = portrait.bodies[state.body];
-  const { shown, factor } = one.fmu.variables.get(body.position);
-  const turning = turningPoints(one.time, one.columns[body.position], one.columns[body.speed]);
+export function decay(session, state) {
+  const { main } = session.runs;
+  const modelInfo = session.models.get(state.model);
+  const body = modelInfo.bodies[state.body];
+  const { shown, factor } = main.fmu.variables.get(body.position);
+  const turning = turningPoints(main.time, main.columns[body.position], main.columns[body.speed]);
   const falling = turning.filter(({ x }, i) => i === 0 || Math.abs(x) < Math.abs(turning[i - 1].x));
   const [first, last] = [falling[0], falling.at(-1)];
   const between = falling.length > 2 && decayBetween(Math.abs(first.x), Math.abs(last.x), (falling.length - 1) / 2);
@@ -101,27 +101,27 @@ export function decay(desk, state) {
   const size = (x) => `${told(Math.abs(x) * factor, 6)} ${shown}`;
   const rows = [
     ["turning points", String(turning.length)],
-    ["the first, the last that is smaller than the one before", `${size(first.x)}, ${size(last.x)}`],
+    ["the first, the last that is smaller than the main before", `${size(first.x)}, ${size(last.x)}`],
     ["logarithmic decrement of a cycle", told(between.delta, 6)],
     ["damping ratio that would give it", told(between.zeta, 6)],
     ["loss of amplitude in a cycle", size(between.loss)],
   ];
-  const energy = portrait.variables.find(({ unit, causality }) => unit === "J" && causality === "output");
+  const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output");
   if (energy) {
-    const force = forceByEnergy(one, body, energy.name, falling);
+    const force = forceByEnergy(main, body, energy.name, falling);
     rows.push([`friction by the energy lost on the way (mean of all losses)`, `${told(force, 6)} ${shown === "deg" ? "N·m" : "N"}`]);
   }
   return table("What the decay says", ["", "measured"], rows);
 }
 
 // The events, each with its time.
-export function events(desk, state) {
-  const { one } = desk.runs;
-  const body = desk.portraits.get(state.model).bodies[state.body];
-  if (!one.events.length) return null;
+export function events(session, state) {
+  const { main } = session.runs;
+  const body = session.models.get(state.model).bodies[state.body];
+  if (!main.events.length) return null;
   const word = { "-1": "slides backward", 0: "sticks", 1: "slides forward" };
-  const rows = one.events.slice(0, LISTED).map(({ t, row }, i) => [String(i + 1), String(t), body.mode ? word[one.columns[body.mode][row]] : ""]);
-  const more = one.events.length - rows.length;
+  const rows = main.events.slice(0, LISTED).map(({ t, row }, i) => [String(i + 1), String(t), body.mode ? word[main.columns[body.mode][row]] : ""]);
+  const more = main.events.length - rows.length;
   const made = table("Events", ["", "t in s", "from then on it"], rows);
   made.classList.add("long");
   if (more > 0) made.append(make("p", {}, `and ${more} more: the CSV file has them all.`));

@@ -1,12 +1,12 @@
 /* Sentences to standard error, wherever that may lead; names as loggers expect them. */
-#ifndef SAY_H
-#define SAY_H
+#ifndef STDERR_OUTPUT_H
+#define STDERR_OUTPUT_H
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "text.h"
+#include "text_buffer.h"
 
 #if defined(_WIN32)
 
@@ -16,7 +16,7 @@ __declspec(dllimport) int __stdcall WriteFile(void *file, const void *bytes, uns
                                               unsigned long *written, void *overlapped);
 
 /* Not through the C runtime, which ends the process when standard error is closed. */
-static void put_on_standard_error(const char *line, size_t length)
+static void write_to_stderr(const char *line, size_t length)
 {
     unsigned long written;
     WriteFile(GetStdHandle((unsigned long)-12), line, (unsigned long)length, &written, NULL);
@@ -29,7 +29,7 @@ static void put_on_standard_error(const char *line, size_t length)
 
 /* A pipe that nobody reads any more sends a signal that ends the process: it is held back in this thread, of which
  * sigprocmask is true on Linux and macOS, and taken away. */
-static void put_on_standard_error(const char *line, size_t length)
+static void write_to_stderr(const char *line, size_t length)
 {
     sigset_t broken, before, pending;
     int awaited, taken;
@@ -48,12 +48,12 @@ static void put_on_standard_error(const char *line, size_t length)
 
 #else
 
-static void put_on_standard_error(const char *line, size_t length) { fwrite(line, 1, length, stderr); }
+static void write_to_stderr(const char *line, size_t length) { fwrite(line, 1, length, stderr); }
 
 #endif
 
 /* The length of the character of UTF-8 that begins here; 0 if none does (RFC 3629, section 4). */
-static size_t character(const unsigned char *c)
+static size_t utf8_length(const unsigned char *c)
 {
     size_t length = *c < 0x80 ? 1 : *c < 0xC2 ? 0 : *c < 0xE0 ? 2 : *c < 0xF0 ? 3 : *c < 0xF5 ? 4 : 0;
     for (size_t i = 1; i < length; i++) {
@@ -67,10 +67,10 @@ static size_t character(const unsigned char *c)
 }
 
 /* The name in UTF-8, which loggers expect: any other byte is told as \xff.  There is room for four times the length. */
-static void copy_name(char *copy, const char *name)
+static void copy_as_utf8(char *copy, const char *name)
 {
     while (*name) {
-        size_t length = character((const unsigned char *)name);
+        size_t length = utf8_length((const unsigned char *)name);
         if (length) memcpy(copy, name, length);
         else snprintf(copy, 5, "\\x%02x", (unsigned char)*name);
         copy += length ? length : 4;
@@ -80,13 +80,13 @@ static void copy_name(char *copy, const char *name)
 }
 
 /* On standard error, whatever has become of it. */
-static void announce(const char *instance, const char *sentence)
+static void print_to_stderr(const char *instance, const char *sentence)
 {
     size_t length = strlen(MODEL_NAME) + strlen(instance) + strlen(sentence) + strlen(" (): \n");
     char *line = malloc(length + 1);
     if (!line) return;
     snprintf(line, length + 1, "%s (%s): %s\n", MODEL_NAME, instance, sentence);
-    put_on_standard_error(line, length);
+    write_to_stderr(line, length);
     free(line);
 }
 

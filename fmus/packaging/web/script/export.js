@@ -1,29 +1,29 @@
-// What people take away: the numbers as CSV, the diagrams as one picture.
+// What people take away: the numbers as CSV, the diagrams as main picture.
 
 const WIDTH = 520; // of a diagram in the picture
 const HEIGHT = 240;
 const TITLE = 26;
-const SHARP = 2; // pixels of the picture for one of the page
+const SHARP = 2; // pixels of the picture for main of the page
 
-// The rows of one run, or of two side by side at the points of their grid; SI units.
-export function csv(one, other) {
+// The rows of main run, or of two side by side at the points of their grid; SI units.
+export function csv(main, comparison) {
   const column = (run, prefix) => (name) => {
     const variable = run.fmu.variables.get(name);
     return { head: `${prefix}${name}${variable.unit ? ` [${variable.unit}]` : ""}`, values: run.columns[name], run };
   };
   const names = (run) => [...run.reals, ...run.modes, "solver.h"];
-  const columns = names(one).map(column(one, ""));
-  if (other) columns.push(...names(other).map(column(other, "beside.")));
-  const rows = other ? Math.min(one.grid.length, other.grid.length) : one.time.length;
-  const place = (run, row) => (other ? run.grid[row] : row);
+  const columns = names(main).map(column(main, ""));
+  if (comparison) columns.push(...names(comparison).map(column(comparison, "compare.")));
+  const rows = comparison ? Math.min(main.grid.length, comparison.grid.length) : main.time.length;
+  const place = (run, row) => (comparison ? run.grid[row] : row);
   const lines = [["t [s]", ...columns.map(({ head }) => head)].join(",")];
   for (let row = 0; row < rows; row++) {
-    lines.push([one.time[place(one, row)], ...columns.map(({ values, run }) => values[place(run, row)])].join(","));
+    lines.push([main.time[place(main, row)], ...columns.map(({ values, run }) => values[place(run, row)])].join(","));
   }
   return `${lines.join("\n")}\n`;
 }
 
-// All diagrams [{plot, heading}] in one picture, two in a row, each under its title.
+// All diagrams [{plot, heading}] in main picture, two in a row, each under its title.
 export function picture(titled, title) {
   const canvas = document.createElement("canvas");
   const rows = Math.ceil(titled.length / 2);

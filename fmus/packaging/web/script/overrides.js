@@ -5,8 +5,8 @@ import { fresh, inForce, named } from "./state.js";
 export const CLOSE = 1 / 400; // of a run: changes of one variable nearer than that are one
 
 // A value from the start on.
-export function put(portrait, values, name, value) {
-  if (value === named(portrait, name).start) delete values[name];
+export function put(modelInfo, values, name, value) {
+  if (value === named(modelInfo, name).start) delete values[name];
   else values[name] = value;
 }
 
@@ -16,15 +16,15 @@ export function change(state, name, value, t) {
   const same = kept.findLast((each) => each.name === name && t - each.t < CLOSE * state.stop);
   if (same) same.value = value;
   else kept.push({ t, name, value });
-  state.changes = kept.sort((one, next) => one.t - next.t);
+  state.changes = kept.sort((a, b) => a.t - b.t);
 }
 
 // A law or a method.  The closed form holds for the hybrid law: whoever takes one of the two chooses the other, too.
-export function choose(portrait, values, name, value) {
-  put(portrait, values, name, value);
-  const [method, law] = ["solver.method", "friction"].map((each) => named(portrait, each));
+export function choose(modelInfo, values, name, value) {
+  put(modelInfo, values, name, value);
+  const [method, law] = ["solver.method", "friction"].map((each) => named(modelInfo, each));
   const [exact, hybrid] = [labelled(method, "exact"), labelled(law, "hybrid")];
-  const now = inForce(portrait, values);
+  const now = inForce(modelInfo, values);
   if (exact === undefined || hybrid === undefined || now["solver.method"] !== exact || now.friction === hybrid) return;
   if (name === "friction") values["solver.method"] = method.items.find((item) => item.value !== exact)?.value ?? exact;
   else values.friction = hybrid;
@@ -36,18 +36,18 @@ export function labelled(variable, label) {
 }
 
 // What stands beside a run at first: of the same model its next law or method, of another what it has by itself.
-export function besideAtFirst(portrait, state, model) {
+export function besideAtFirst(modelInfo, state, model) {
   if (model !== state.model) return {};
-  const now = inForce(portrait, state.values);
-  const other = (name, but) => named(portrait, name)?.items.find(({ label, value }) => label !== but && value !== now[name])?.value;
+  const now = inForce(modelInfo, state.values);
+  const other = (name, but) => named(modelInfo, name)?.items.find(({ label, value }) => label !== but && value !== now[name])?.value;
   const [law, method] = [other("friction"), other("solver.method", "exact")];
   return { ...(law !== undefined && { friction: law }), ...(method !== undefined && { "solver.method": method }) };
 }
 
 // The state of a published case.
-export function asPublished(preset, portrait) {
-  const state = { ...fresh(portrait), preset: preset.name, stop: preset.stop ?? portrait.stop };
-  const chosen = Object.entries(preset.labels).map(([name, label]) => [name, labelled(named(portrait, name), label)]);
-  for (const [name, value] of [...Object.entries(preset.values), ...chosen]) put(portrait, state.values, name, value);
+export function asPublished(preset, modelInfo) {
+  const state = { ...fresh(modelInfo), preset: preset.name, stop: preset.stop ?? modelInfo.stop };
+  const chosen = Object.entries(preset.labels).map(([name, label]) => [name, labelled(named(modelInfo, name), label)]);
+  for (const [name, value] of [...Object.entries(preset.values), ...chosen]) put(modelInfo, state.values, name, value);
   return state;
 }

@@ -9,9 +9,9 @@ import { load } from "./wasm.js";
 
 export const POINTS = 1600; // of the grid
 
-export class Desk {
+export class Session {
   constructor(data) {
-    this.portraits = new Map(data.models.map((portrait) => [portrait.name, portrait]));
+    this.models = new Map(data.models.map((modelInfo) => [modelInfo.name, modelInfo]));
     this.presets = new Map(data.presets.map((preset) => [preset.name, preset]));
     this.codes = new Map();
     this.fmus = new Map();
@@ -20,29 +20,29 @@ export class Desk {
 
   // Compile a model, if it is not yet.
   async ready(name) {
-    if (!this.codes.has(name)) this.codes.set(name, load(this.portraits.get(name).code));
+    if (!this.codes.has(name)) this.codes.set(name, load(this.models.get(name).code));
     this.codes.set(name, await this.codes.get(name));
   }
 
   fmu(name, role) {
     const key = `${name} ${role}`;
-    if (!this.fmus.has(key)) this.fmus.set(key, new Fmu(this.portraits.get(name), this.codes.get(name)));
+    if (!this.fmus.has(key)) this.fmus.set(key, new Fmu(this.models.get(name), this.codes.get(name)));
     return this.fmus.get(key);
   }
 
   // Begin all runs anew; the models must be ready.
   restart(state) {
     const { values, changes, stop } = state;
-    const portrait = this.portraits.get(state.model);
+    const modelInfo = this.models.get(state.model);
     const run = (role, setting = {}, model = state.model) =>
       new Run(this.fmu(model, role), { values, changes, stop, points: POINTS, ...setting });
     const own = Object.entries(values).filter(([name]) => name !== "friction" && !name.startsWith("solver."));
     const runs = {};
-    if (own.length < Object.keys(values).length) runs.quick = run("quick", { values: Object.fromEntries(own) });
-    runs.one = run("one");
-    if (isExact(portrait)) runs.truth = runs.quick ?? runs.one;
-    if (state.other) runs.other = run("other", beside(this.portraits, state), state.other.model);
-    if (changes.length) runs.before = run("before", { changes: [] });
+    if (own.length < Object.keys(values).length) runs.preview = run("preview", { values: Object.fromEntries(own) });
+    runs.main = run("main");
+    if (isExact(modelInfo)) runs.reference = runs.preview ?? runs.main;
+    if (state.comparison) runs.comparison = run("comparison", beside(this.models, state), state.comparison.model);
+    if (changes.length) runs.unchanged = run("unchanged", { changes: [] });
     const preset = this.presets.get(state.preset);
     if (preset) runs.published = run("published", { points: preset.grid ? Math.round(stop / preset.grid) : 0 });
     [this.runs, this.seen] = [runs, 0];
@@ -58,7 +58,7 @@ export class Desk {
     const begun = performance.now();
     const waiting = new Set(Object.values(this.runs).filter((run) => !run.done));
     for (const run of waiting) {
-      const quick = run === this.runs.quick;
+      const quick = run === this.runs.preview;
       if (!run.advance(begun + (quick ? slice / 2 : slice)) && !quick) break;
     }
     const points = Object.values(this.runs).reduce((sum, run) => sum + run.time.length, 0);
@@ -69,7 +69,7 @@ export class Desk {
 }
 
 // Whether a model by itself has its motion in closed form.
-function isExact(portrait) {
-  const { items, start } = named(portrait, "solver.method");
+function isExact(modelInfo) {
+  const { items, start } = named(modelInfo, "solver.method");
   return items.some(({ label, value }) => label === "exact" && value === start);
 }

@@ -16,10 +16,10 @@ from ..model_description import declared_variables
 from ..units import unit_of
 
 FORCES = ("N", "N.m")
-Portrait = dict[str, Any]  # as it stands in the page, in JSON
+ModelJson = dict[str, Any]  # as it stands in the page, in JSON
 
 
-def portrait(source: ModelFile, model: type[VariableOwner]) -> Portrait:
+def build_model_json(source: ModelFile, model: type[VariableOwner]) -> ModelJson:
     """The model of an author's file, as it is written out: words, default run, variables and bodies."""
     title, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
     return {
@@ -28,12 +28,12 @@ def portrait(source: ModelFile, model: type[VariableOwner]) -> Portrait:
         "text": "\n".join(map(format_paragraph, blocks)),
         "stop": float(model.stop_time),  # type: ignore[attr-defined]
         "tolerance": float(model.tolerance),  # type: ignore[attr-defined]
-        "variables": [variable(name, meaning) for name, meaning in declared_variables(model)],
-        "bodies": bodies(source.analysis),
+        "variables": [variable_json(name, meaning) for name, meaning in declared_variables(model)],
+        "bodies": list_bodies(source.analysis),
     }
 
 
-def variable(name: str, meaning: VariableDeclaration) -> Portrait:
+def variable_json(name: str, meaning: VariableDeclaration) -> ModelJson:
     """A declared variable; its value in the unit `shown` is `factor` times that in SI."""
     unit = unit_of(name, meaning.unit or "1")
     shown = {
@@ -55,14 +55,14 @@ def variable(name: str, meaning: VariableDeclaration) -> Portrait:
     return shown | {word: bound for word, bound in bounds.items() if isfinite(bound)}
 
 
-def bodies(analysis: ModelAnalysis) -> list[Portrait]:
+def list_bodies(analysis: ModelAnalysis) -> list[ModelJson]:
     """Whatever has a position, and what acts on it; a model without any shows its first state and its rate."""
-    found = [body(analysis, x) for x in analysis.positions]
+    found = [body_json(analysis, x) for x in analysis.positions]
     x = analysis.states[0]
     return found or [{"kind": "none", "position": x.name, "speed": analysis.rate[x].name}]
 
 
-def body(analysis: ModelAnalysis, x: State) -> Portrait:
+def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
     """One of them: `kind` is block, pendulum or rotor; the rest are names of variables, where there are any."""
     v = analysis.rate[x]
     a = next((e for s, e in analysis.rate.items() if s is v), None)
@@ -70,7 +70,7 @@ def body(analysis: ModelAnalysis, x: State) -> Portrait:
     restoring, damping = differentiate(law, {x: 1.0}), differentiate(law, {v: 1.0})
     turns, bends = x.unit == "rad", depends_on(restoring, (x,))
     frictions = [c for c in analysis.contacts if depends_on(c.slip, (v,))] or [
-        e for e in analysis.outputs if rubs(e, v)
+        e for e in analysis.outputs if is_friction_force(e, v)
     ]
     linked = [y.name for y in analysis.positions if y is not x and depends_on(law, (y,))]
     drives = [d for d in analysis.drivers if depends_on(law, (d,))]
@@ -83,7 +83,7 @@ def body(analysis: ModelAnalysis, x: State) -> Portrait:
         "driver_speed": next((d.constant_rate.name for d in drives), ""),
         "linked": linked,
         "spring": not bends and not is_same_expression(restoring, 0.0) and bool(drives or not linked),
-        "dampers": [] if depends_on(damping, (v,)) else parameters(damping),
+        "dampers": [] if depends_on(damping, (v,)) else scaling_parameters(damping),
         "friction": next((e.name for e in frictions), ""),
         "mode": next((c.mode.name for c in frictions if isinstance(c, Contact)), ""),
         "start": x.start_expression.name if isinstance(x.start_expression, Fixed) else "",
@@ -92,13 +92,13 @@ def body(analysis: ModelAnalysis, x: State) -> Portrait:
     return {word: value for word, value in found.items() if value}
 
 
-def parameters(e: Operand) -> list[str]:
+def scaling_parameters(e: Operand) -> list[str]:
     """The parameters in an expression that are no mass or inertia: any of them at zero makes it zero."""
     return [
         leaf.name for leaf in variables_in(e) if isinstance(leaf, Parameter) and leaf.unit not in ("kg", "kg.m2", "m")
     ]
 
 
-def rubs(e: Output, v: State | Output) -> bool:
+def is_friction_force(e: Output, v: State | Output) -> bool:
     """Whether an output is a force that hangs on the speed, and not in proportion."""
     return e.unit in FORCES and depends_on(differentiate(e, {v: 1.0}), (v,))

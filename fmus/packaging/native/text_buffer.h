@@ -1,6 +1,6 @@
 /* Sentences, with numbers as Python's repr writes them: the fewest digits that read back as the same double. */
-#ifndef TEXT_H
-#define TEXT_H
+#ifndef TEXT_BUFFER_H
+#define TEXT_BUFFER_H
 
 #include <math.h>
 #include <stdint.h>
@@ -10,27 +10,27 @@
 
 typedef struct {
     size_t length;
-    char line[2048]; /* longer than any sentence; what is too long is cut */
-} Text;
+    char buffer[2048]; /* longer than any sentence; what is too long is cut */
+} TextBuffer;
 
-static inline void add(Text *text, const char *piece)
+static inline void append(TextBuffer *text, const char *piece)
 {
-    size_t room = sizeof text->line - 1 - text->length, length = strlen(piece);
-    if (length > room) length = room;
-    memcpy(text->line + text->length, piece, length);
+    size_t space = sizeof text->buffer - 1 - text->length, length = strlen(piece);
+    if (length > space) length = space;
+    memcpy(text->buffer + text->length, piece, length);
     text->length += length;
-    text->line[text->length] = '\0';
+    text->buffer[text->length] = '\0';
 }
 
-static inline void add_integer(Text *text, int64_t number)
+static inline void append_integer(TextBuffer *text, int64_t number)
 {
     char digits[24];
     snprintf(digits, sizeof digits, "%lld", (long long)number);
-    add(text, digits);
+    append(text, digits);
 }
 
 /* One more in the last of some decimal digits; true if that made one digit more. */
-static inline int count_up(char *digits, int length)
+static inline int increment_digits(char *digits, int length)
 {
     for (int i = length - 1; i >= 0; i--) {
         if (digits[i] != '9') {
@@ -44,7 +44,7 @@ static inline int count_up(char *digits, int length)
 }
 
 /* Whether 0.d1d2d3... times ten to the power reads back as the number; free of any decimal point. */
-static inline int reads_back(const char *digits, int power, double number)
+static inline int round_trips(const char *digits, int power, double number)
 {
     char plain[40];
     snprintf(plain, sizeof plain, "%se%d", digits, power - (int)strlen(digits));
@@ -52,7 +52,7 @@ static inline int reads_back(const char *digits, int power, double number)
 }
 
 /* The digits of a positive number and its power: number = 0.d1d2d3... * 10^power. */
-static inline int shortest(double number, char digits[20])
+static inline int shortest_digits(double number, char digits[20])
 {
     for (int length = 1;; length++) {
         char full[40];
@@ -63,27 +63,27 @@ static inline int shortest(double number, char digits[20])
         }
         digits[found] = '\0';
         power = atoi(strchr(full, 'e') + 1) + 1;
-        if (length == 17 || reads_back(digits, power, number)) return power;
-        power += count_up(digits, found); /* beside a power of two the neighbours are not equally far */
-        if (reads_back(digits, power, number)) return power;
+        if (length == 17 || round_trips(digits, power, number)) return power;
+        power += increment_digits(digits, found); /* beside a power of two the neighbours are not equally far */
+        if (round_trips(digits, power, number)) return power;
     }
 }
 
-static inline void add_real(Text *text, double number)
+static inline void append_real(TextBuffer *text, double number)
 {
     char digits[20], piece[40];
     int power, length;
     if (isnan(number)) {
-        add(text, "nan");
+        append(text, "nan");
         return;
     }
-    if (signbit(number)) add(text, "-");
+    if (signbit(number)) append(text, "-");
     number = fabs(number);
     if (isinf(number) || number == 0.0) {
-        add(text, number == 0.0 ? "0.0" : "inf");
+        append(text, number == 0.0 ? "0.0" : "inf");
         return;
     }
-    power = shortest(number, digits);
+    power = shortest_digits(number, digits);
     length = (int)strlen(digits);
     while (length > 1 && digits[length - 1] == '0') digits[--length] = '\0';
     if (power < -3 || power > 16) {
@@ -96,7 +96,7 @@ static inline void add_real(Text *text, double number)
     } else {
         snprintf(piece, sizeof piece, "%.*s.%s", power, digits, digits + power);
     }
-    add(text, piece);
+    append(text, piece);
 }
 
 #endif

@@ -1,6 +1,6 @@
 /* Python's arithmetic in C.  Where Python raises an exception, the fault flag goes up. */
-#ifndef NUMERICS_H
-#define NUMERICS_H
+#ifndef PYTHON_ARITHMETIC_H
+#define PYTHON_ARITHMETIC_H
 
 #include <math.h>
 #include <stdbool.h>
@@ -15,7 +15,7 @@
 #pragma fp_contract(off)
 #endif
 
-static inline double quotient(double a, double b, bool *fault)
+static inline double py_divide(double a, double b, bool *fault)
 {
     if (b == 0.0) {
         *fault = true;
@@ -25,31 +25,31 @@ static inline double quotient(double a, double b, bool *fault)
 }
 
 /* A function of libm faults where it has no value, or none that a double can hold. */
-static inline double judged(double y, bool has_nan, bool all_finite, bool *fault)
+static inline double checked_result(double y, bool has_nan, bool all_finite, bool *fault)
 {
     if (!isfinite(y) && (isnan(y) ? !has_nan : all_finite)) *fault = true;
     return y;
 }
 
-#define OF_ONE(f)                                                                         \
+#define CHECKED_UNARY(f)                                                                         \
     static inline double py_##f(double a, bool *fault)                                    \
     {                                                                                     \
-        return judged(f(a), isnan(a), isfinite(a), fault);                                \
+        return checked_result(f(a), isnan(a), isfinite(a), fault);                                \
     }
-#define OF_TWO(f)                                                                         \
+#define CHECKED_BINARY(f)                                                                         \
     static inline double py_##f(double a, double b, bool *fault)                          \
     {                                                                                     \
-        return judged(f(a, b), isnan(a) || isnan(b), isfinite(a) && isfinite(b), fault);  \
+        return checked_result(f(a, b), isnan(a) || isnan(b), isfinite(a) && isfinite(b), fault);  \
     }
-OF_ONE(sqrt) OF_ONE(sin) OF_ONE(cos) OF_ONE(tan) OF_ONE(asin) OF_ONE(acos) OF_ONE(sinh) OF_ONE(cosh)
-OF_ONE(exp) OF_ONE(expm1) OF_ONE(log) OF_ONE(log1p) OF_TWO(pow) OF_TWO(fmod)
+CHECKED_UNARY(sqrt) CHECKED_UNARY(sin) CHECKED_UNARY(cos) CHECKED_UNARY(tan) CHECKED_UNARY(asin) CHECKED_UNARY(acos) CHECKED_UNARY(sinh) CHECKED_UNARY(cosh)
+CHECKED_UNARY(exp) CHECKED_UNARY(expm1) CHECKED_UNARY(log) CHECKED_UNARY(log1p) CHECKED_BINARY(pow) CHECKED_BINARY(fmod)
 
 /* min and max keep the first of equals, also beside NaN. */
-static inline double lesser(double a, double b) { return b < a ? b : a; }
-static inline double greater(double a, double b) { return b > a ? b : a; }
+static inline double py_min(double a, double b) { return b < a ? b : a; }
+static inline double py_max(double a, double b) { return b > a ? b : a; }
 
 /* The place of an element of a list; negative ones count from the end. */
-static inline int64_t element(int64_t i, int64_t length, bool *fault)
+static inline int64_t py_index(int64_t i, int64_t length, bool *fault)
 {
     if (i < -length || i >= length) {
         *fault = true;

@@ -18,14 +18,14 @@ FLOAT, INT, BOOL = Scalar("float", "double"), Scalar("int", "int64_t"), Scalar("
 
 
 @dataclass(frozen=True)
-class Row:
+class FloatArray:
     """A list of floats, of fixed length."""
 
     length: int
 
 
 @dataclass(frozen=True)
-class Group:
+class ScalarTuple:
     """The numbers that a function returns together."""
 
     parts: tuple[Scalar, ...]
@@ -36,7 +36,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Object:
+class StructPointer:
     """An object that the model owns, known by its class; at run time a pointer to its struct."""
 
     cls: type
@@ -47,14 +47,14 @@ class Object:
 
 
 @dataclass(frozen=True)
-class Known:
+class CompileTimeValue:
     """Known while compiling: a number, a function, a class, a module."""
 
     value: object
 
 
 @dataclass(frozen=True)
-class Method:
+class BoundMethod:
     """A function with the object that it is called on."""
 
     function: FunctionType
@@ -62,26 +62,28 @@ class Method:
     cls: type
 
 
-Kind: TypeAlias = Scalar | Row | Group | Object | Known | Method
+CType: TypeAlias = Scalar | FloatArray | ScalarTuple | StructPointer | CompileTimeValue | BoundMethod
 
 
-def kind_of(value: object) -> Scalar | None:
+def scalar_type_of(value: object) -> Scalar | None:
     """The kind of a Python number; None for anything else."""
     return {float: FLOAT, int: INT, bool: BOOL}.get(type(value))
 
 
-def spell(kind: Kind | None) -> str:
+def c_spelling(ctype: CType | None) -> str:
     """The C type of a variable or a result."""
-    return "void" if kind is None else kind.c if isinstance(kind, (Scalar, Group, Object)) else "double *"
+    return (
+        "void" if ctype is None else ctype.c if isinstance(ctype, (Scalar, ScalarTuple, StructPointer)) else "double *"
+    )
 
 
-def declare(kind: Kind, name: str) -> str:
+def c_declaration(ctype: CType, name: str) -> str:
     """The declaration of a variable or a parameter."""
-    c = spell(kind)
+    c = c_spelling(ctype)
     return f"{c}{name}" if c.endswith("*") else f"{c} {name}"
 
 
-def literal(value: object) -> str:
+def c_literal(value: object) -> str:
     """A Python number as C reads it."""
     if isinstance(value, bool):
         return "true" if value else "false"

@@ -4,9 +4,9 @@ from typing import Any
 
 from ...runtime.variable_declarations import VariableOwner
 from ..lowering import sibling_module
-from .kinds import BOOL, FLOAT, Kind, Object
+from .c_types import BOOL, FLOAT, CType, StructPointer
 
-ASKED = {  # file of the runtime -> its functions; one that others call stands before them
+ENTRY_POINTS = {  # file of the runtime -> its functions; one that others call stands before them
     "call_sequence": (
         *("is_in_range", "rejection_reason", "note_change", "set_experiment", "exit_initialization", "do_step"),
         *("update_outputs", "update_statistics", "is_valid_state"),
@@ -17,7 +17,7 @@ ASKED = {  # file of the runtime -> its functions; one that others call stands b
     ),
     "early_return": ("begin_step", "next_internal_step", "complete_event"),  # for FMI 3.0
 }
-FLAGS = (
+BOOL_PARAMETERS = (
     "calculated",
     "fixed",
     "allowed",
@@ -27,14 +27,16 @@ FLAGS = (
 )  # of their parameters those that are bools
 
 
-def entries(model: type[VariableOwner], run: Object, led: Object, fmi: str) -> dict[Any, list[Kind]]:
+def entry_point_types(
+    model: type[VariableOwner], run: StructPointer, led: StructPointer, fmi: str
+) -> dict[Any, list[CType]]:
     """All these functions, as written out for a model, with what they take: the names of their parameters tell it."""
-    kinds: dict[str, Kind] = {"run": run, "model": led, **dict.fromkeys(FLAGS, BOOL)}
+    arg_types: dict[str, CType] = {"run": run, "model": led, **dict.fromkeys(BOOL_PARAMETERS, BOOL)}
     found = {}
-    for file in [file for file in ASKED if file != "early_return" or fmi == "3"]:
+    for file in [file for file in ENTRY_POINTS if file != "early_return" or fmi == "3"]:
         functions = sibling_module(model, f"runtime.{file}")
-        for name in ASKED[file]:
+        for name in ENTRY_POINTS[file]:
             code = getattr(functions, name).__code__
             taken = code.co_varnames[: code.co_argcount]
-            found[getattr(functions, name)] = [kinds.get(parameter, FLOAT) for parameter in taken]
+            found[getattr(functions, name)] = [arg_types.get(parameter, FLOAT) for parameter in taken]
     return found

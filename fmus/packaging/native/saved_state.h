@@ -4,8 +4,8 @@
  * the GUID of this very FMU, if its checksum holds, and if nothing in it could lead the code astray: no truth value but
  * 0 and 1, no refused value that is not there, no value out of its range, no present point outside the step.
  */
-#ifndef STATE_H
-#define STATE_H
+#ifndef SAVED_STATE_H
+#define SAVED_STATE_H
 
 #include <math.h>
 #include <stdlib.h>
@@ -14,27 +14,27 @@
 #include "model.h"
 
 typedef struct {
-    uint64_t sum; /* of all bytes that follow */
+    uint64_t checksum; /* of all bytes that follow */
     char guid[sizeof MODEL_GUID];
     State state;
-} Sealed;
+} SavedState;
 
-#define LARGEST 9007199254740992 /* an int of the numerics: no sum of two such overflows, and a double holds it */
+#define MAX_INTEGER 9007199254740992 /* an int of the numerics: no sum of two such overflows, and a double holds it */
 
 /* ---- values */
 
-static void *place(Model *model, const Variable *variable) { return (char *)model + variable->offset; }
+static void *variable_address(Model *model, const Variable *variable) { return (char *)model + variable->offset; }
 
-static double value_of(const Model *model, const Variable *variable)
+static double variable_value(const Model *model, const Variable *variable)
 {
     const void *value = (const char *)model + variable->offset;
     return variable->is_real ? *(const double *)value : (double)*(const int64_t *)value;
 }
 
-static bool accepts(const Variable *variable, double value)
+static bool is_allowed_value(const Variable *variable, double value)
 {
     if (variable->items) {
-        for (const int64_t *item = variable->items; item < variable->end_of_items; item++) {
+        for (const int64_t *item = variable->items; item < variable->items_end; item++) {
             if ((double)*item == value) return true;
         }
         return false;
@@ -47,7 +47,7 @@ static bool accepts(const Variable *variable, double value)
 
 /* A sum of bytes in eights.  Each eight is mixed in by steps that can be undone: so a change within one is seen for
  * certain, and any other but for one in 2^64. */
-static uint64_t sum_of(const void *bytes, size_t size)
+static uint64_t checksum_of(const void *bytes, size_t size)
 {
     uint64_t sum = size;
     for (size_t i = 0; i < size; i += sizeof sum) {
@@ -59,32 +59,32 @@ static uint64_t sum_of(const void *bytes, size_t size)
     return sum;
 }
 
-static uint64_t sum_under(const Sealed *sealed)
+static uint64_t payload_checksum(const SavedState *saved)
 {
-    return sum_of((const char *)sealed + sizeof sealed->sum, sizeof *sealed - sizeof sealed->sum);
+    return checksum_of((const char *)saved + sizeof saved->checksum, sizeof *saved - sizeof saved->checksum);
 }
 
-static void seal(Sealed *sealed, const State *state)
+static void write_saved_state(SavedState *saved, const State *state)
 {
-    memset(sealed, 0, sizeof *sealed);
-    memcpy(sealed->guid, MODEL_GUID, sizeof MODEL_GUID);
-    memcpy(&sealed->state, state, sizeof *state);
-    sealed->sum = sum_under(sealed);
+    memset(saved, 0, sizeof *saved);
+    memcpy(saved->guid, MODEL_GUID, sizeof MODEL_GUID);
+    memcpy(&saved->state, state, sizeof *state);
+    saved->checksum = payload_checksum(saved);
 }
 
 /* Whether a block of memory was made here; nothing is read beyond the first difference. */
-static bool is_ours(const Sealed *sealed) { return sealed && !strncmp(sealed->guid, MODEL_GUID, sizeof MODEL_GUID); }
+static bool has_model_guid(const SavedState *saved) { return saved && !strncmp(saved->guid, MODEL_GUID, sizeof MODEL_GUID); }
 
 /* ---- the structure */
 
 /* Whether a byte can be read as a bool. */
 static bool is_bool(const void *byte) { return *(const unsigned char *)byte <= 1; }
 
-static bool are_members_sound(const State *state)
+static bool are_members_valid(const State *state)
 {
     for (const Member *member = members; member < members + MEMBERS; member++) {
         const void *value = (const char *)state + member->offset;
-        if (member->is_bool ? !is_bool(value) : *(const int64_t *)value < -1 || *(const int64_t *)value > LARGEST) {
+        if (member->is_bool ? !is_bool(value) : *(const int64_t *)value < -1 || *(const int64_t *)value > MAX_INTEGER) {
             return false;
         }
     }
@@ -92,41 +92,41 @@ static bool are_members_sound(const State *state)
 }
 
 /* Values out of range are never in the model, but among the refused. */
-static bool are_values_sound(const Model *model)
+static bool are_values_valid(const Model *model)
 {
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
         bool is_free = variable->is_real && variable->is_calculated;
-        if (!is_free && !accepts(variable, value_of(model, variable))) return false;
+        if (!is_free && !is_allowed_value(variable, variable_value(model, variable))) return false;
     }
     return true;
 }
 
-static bool are_refusals_sound(const State *state)
+static bool are_rejections_valid(const State *state)
 {
     int64_t refusals = 0;
-    if (state->turns < 0 || state->turns > LARGEST) return false;
+    if (state->rejection_count < 0 || state->rejection_count > MAX_INTEGER) return false;
     for (int i = 0; i < VARIABLES; i++) {
-        const Refusal *refusal = &state->refused[i];
+        const RejectedValue *refusal = &state->rejected[i];
         if (refusal->reason == OK) continue;
         if (refusal->reason < CALCULATED || refusal->reason > OUT_OF_RANGE) return false;
-        if (refusal->turn < 1 || refusal->turn > state->turns) return false;
+        if (refusal->sequence < 1 || refusal->sequence > state->rejection_count) return false;
         if (!variables[i].is_real && !(fabs(refusal->value) <= 2147483648.0)) return false; /* an fmi2Integer */
         refusals++;
     }
     return refusals == state->run.n_invalid_values;
 }
 
-static bool is_sound(State *state)
+static bool is_state_valid(State *state)
 {
     bool fault = false;
-    return are_members_sound(state) && !state->run.outputs_current && are_values_sound(&state->model) && are_refusals_sound(state) &&
+    return are_members_valid(state) && !state->run.outputs_current && are_values_valid(&state->model) && are_rejections_valid(state) &&
            call_sequence_is_valid_state(&state->run, &state->model, state->run.interface == MODEL_EXCHANGE, &fault) && !fault;
 }
 
 /* The state under the seal; NULL if it is broken in any way. */
-static const State *unsealed(Sealed *sealed)
+static const State *valid_state(SavedState *saved)
 {
-    return is_ours(sealed) && sealed->sum == sum_under(sealed) && is_sound(&sealed->state) ? &sealed->state : NULL;
+    return has_model_guid(saved) && saved->checksum == payload_checksum(saved) && is_state_valid(&saved->state) ? &saved->state : NULL;
 }
 
 #endif

@@ -6,7 +6,7 @@ MAGIC, MAGIC_OF_A_SLICE = 0xCAFEBABE, 0xFEEDFACF
 ALIGNMENT = 14  # as a power of two: the page of arm64, and a multiple of that of x86_64
 
 
-def universal(slices: list[bytes]) -> bytes:
+def make_universal_binary(slices: list[bytes]) -> bytes:
     """The file that holds the slices; each tells its processor itself."""
     place = 1 << ALIGNMENT
     head, body = pack(">II", MAGIC, len(slices)), b""
