@@ -12,7 +12,7 @@ import click
 from .errors import HarnessError
 from .process.interrupt import interruptible
 
-NAME = "python -m harness"
+COMMAND_NAME = "python -m harness"
 
 
 def main() -> None:
@@ -24,7 +24,7 @@ def main() -> None:
 
             prepare()
             try:
-                with commands.make_context(NAME, sys.argv[1:]) as context:
+                with commands.make_context(COMMAND_NAME, sys.argv[1:]) as context:
                     commands.invoke(context)
             finally:
                 sys.stdout.flush()

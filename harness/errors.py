@@ -3,8 +3,8 @@
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 
-LONGEST = 100  # letters of a value in a sentence
-MOST = 100  # names in one
+MAX_VALUE_LENGTH = 100  # letters of a value in a sentence
+MAX_LISTED_NAMES = 100  # names in one
 
 
 class HarnessError(Exception):
@@ -19,31 +19,31 @@ class SceneError(HarnessError):
     status = 2
 
 
-def reason(error: Exception) -> str:
+def first_line(error: Exception) -> str:
     """The first line of somebody else's exception, or its kind where it says nothing."""
     return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
-def shown(value: object) -> str:
+def format_value(value: object) -> str:
     """A value as a sentence can hold it."""
     try:
         text = repr(value)
     except (RecursionError, ValueError):  # an integer of thousands of digits, too, is more than Python writes out
         return "what stands there"
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}... ({len(text)} letters)"
+    return text if len(text) <= MAX_VALUE_LENGTH else f"{text[:MAX_VALUE_LENGTH]}... ({len(text)} letters)"
 
 
-def unknown(kind: str, word: object, allowed: Iterable[str]) -> str:
+def unknown_name_message(kind: str, word: object, allowed: Iterable[str]) -> str:
     """The sentence about a word that is not among the allowed ones, with the nearest of them."""
-    names, text = sorted(allowed), shown(word)
+    names, text = sorted(allowed), format_value(word)
     close = get_close_matches(text.strip("'"), names, n=1)
     hint = f" (nearest: '{close[0]}')" if close else ""
-    more = f" and {len(names) - MOST} more" if len(names) > MOST else ""
-    return f"unknown {kind} {text}{hint}; allowed: {', '.join(names[:MOST]) or 'none'}{more}"
+    more = f" and {len(names) - MAX_LISTED_NAMES} more" if len(names) > MAX_LISTED_NAMES else ""
+    return f"unknown {kind} {text}{hint}; allowed: {', '.join(names[:MAX_LISTED_NAMES]) or 'none'}{more}"
 
 
 def check_names(kind: str, names: Iterable[str], allowed: Collection[str]) -> None:
     """SceneError about the first of some names that is not among the allowed ones."""
     for name in names:
         if name not in allowed:
-            raise SceneError(unknown(kind, name, allowed))
+            raise SceneError(unknown_name_message(kind, name, allowed))

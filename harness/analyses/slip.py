@@ -9,16 +9,16 @@ There too m da/dt = k (v_driver - v) is zero, so that the peak acceleration lies
 import numpy as np
 
 from ..errors import HarnessError
-from ..results.quantity import Measured, Quantity
-from ..running.run import Run
+from ..results.quantity import AnalysisResult, Quantity
+from ..running.trajectory import Trajectory
 from . import samples
 
 
-def analyse(run: Run) -> Measured:
+def analyse(run: Trajectory) -> AnalysisResult:
     """The slips of a sled, their `slip_time` where modes show it, and the peak acceleration where that is recorded;
     HarnessError with fewer than two, or too few samples in one."""
-    driver = run.parameter("v_driver", "the analysis 'slip'")
-    v = run.motion("velocity")
+    driver = run.get_parameter("v_driver", "the analysis 'slip'")
+    v = run.column_of_role("velocity")
     if not driver:
         raise HarnessError("the analysis 'slip' needs a driver that moves, and v_driver is 0 m/s: set it in [values]")
     ahead = v * np.sign(driver) - abs(driver)  # of the driver
@@ -41,10 +41,10 @@ def analyse(run: Run) -> Measured:
     if len(durations):
         found.append(Quantity("slip_time", float(np.mean(durations)), "s", "duration of a slip"))
     found.append(Quantity("peak_speed", crest(run.time, np.abs(v), fast), "m/s", "peak speed"))
-    if "acceleration" in run.wanted.motion:
-        peak = crest(run.time, np.abs(run.motion("acceleration")), widened(fast))
+    if "acceleration" in run.spec.motion_outputs:
+        peak = crest(run.time, np.abs(run.column_of_role("acceleration")), widened(fast))
         found.append(Quantity("peak_acceleration", peak, "m/s2", "peak acceleration"))
-    return Measured(tuple(found))
+    return AnalysisResult(tuple(found))
 
 
 def slips_of_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,22 +3,22 @@
 import numpy as np
 
 from ..errors import HarnessError
-from ..results.quantity import Measured
-from ..results.steps import sizes
-from ..running.run import Run
+from ..results.quantity import AnalysisResult
+from ..results.step_sizes import step_size_quantities
+from ..running.trajectory import Trajectory
 
 NEAR = 5  # steps on either side of a reversal that belong to it
 
 
-def analyse(run: Run) -> Measured:
+def analyse(run: Trajectory) -> AnalysisResult:
     """The step sizes of a run that followed its solver."""
     if run.steps is None or not len(run.steps.h):
         raise HarnessError("the analysis 'steps' needs a run that follows the solver's own steps: add follow = true")
     h = run.steps.h
     collapse = None
-    if "velocity" in run.wanted.motion:
-        collapse = collapse_at_reversals(run.steps.t, h, run.time, run.motion("velocity"))
-    return Measured(sizes(h, int(run.steps.rejected.sum()), collapse))
+    if "velocity" in run.spec.motion_outputs:
+        collapse = collapse_at_reversals(run.steps.t, h, run.time, run.column_of_role("velocity"))
+    return AnalysisResult(step_size_quantities(h, int(run.steps.rejected.sum()), collapse))
 
 
 def collapse_at_reversals(ends: np.ndarray, h: np.ndarray, t: np.ndarray, v: np.ndarray) -> float | None:

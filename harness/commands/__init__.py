@@ -12,9 +12,9 @@ from .terminal import Terminal, results
 def version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
     """Print the versions that every result tells, and end."""
     if wanted:
-        from ..results.provenance import versions
+        from ..results.provenance import package_versions
 
-        click.echo(", ".join(f"{name} {number}" for name, number in versions().items()))
+        click.echo(", ".join(f"{name} {number}" for name, number in package_versions().items()))
         context.exit()
 
 

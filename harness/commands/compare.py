@@ -31,13 +31,13 @@ def compare(one: str, two: str, rtol: float | None, atol: float | None, terminal
       python -m harness compare fmus/coulomb.fmu theirs.fmu --stop 2
       python -m harness compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
     """
-    from ..running.specification import Specification
+    from ..running.run_spec import RunSpec
     from ..studies.compare import job
 
     with terminal.progress(1) as report:
-        asked = Specification(Path(), **how)
+        asked = RunSpec(Path(), **how)
         found, folder = job.perform_compare((one, two), asked, terminal.out, partial(report, "compare"))
-    failed = [each.failed for each in (found.one, found.two) if each.failed]
+    failed = [each.failure for each in (found.one, found.two) if each.failure]
     if rtol is not None or atol is not None:
         failed += found.beyond(rtol or 0.0, atol or 0.0)
     shown = (job.table(found), "", *job.sentences(found))

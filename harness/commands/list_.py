@@ -17,12 +17,12 @@ def list_(as_json: bool) -> None:
     from rich.table import Table
 
     from ..scenes.coupled import scene as coupled
-    from ..scenes.scene import load, shipped
-    from ..scenes.schema import read, structured
+    from ..scenes.scene import load_scene, shipped_scenes
+    from ..scenes.schema import parse_table, read_toml
 
-    rows = [("run", scene.name, scene.file.stem, scene.title) for scene in map(load, shipped())]
-    for file in coupled.shipped():
-        keys = structured(read(file), coupled.CoupledKeys)
+    rows = [("run", scene.name, scene.file.stem, scene.title) for scene in map(load_scene, shipped_scenes())]
+    for file in coupled.shipped_coupled_scenes():
+        keys = parse_table(read_toml(file), coupled.CoupledKeys)
         models = ", ".join(part.model for part in keys.parts.values())
         rows.append(("couple", file.stem, models, keys.title))
     table = Table(*HEADS, box=None, padding=(0, 1, 0, 0))

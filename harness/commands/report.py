@@ -23,9 +23,9 @@ def report(out: Path, quiet: bool, as_json: bool) -> None:
     """
     from ..report.page import write
     from ..report.sections import Published
-    from ..scenes.scene import load, shipped
+    from ..scenes.scene import load_scene, shipped_scenes
 
-    scenes = [scene for scene in map(load, shipped()) if scene.published]
+    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
     found = write(out, [Published(scene.name, scene.file.stem, scene.about) for scene in scenes])
     if as_json:
         tell({"page": str(found.path), "missing": [name for name, _ in found.missing]})

@@ -43,12 +43,16 @@ def run(
       python -m harness run results/pendulum
       python -m harness run --fmu theirs.fmu --set mass=2 --stop 10 --tolerance 1e-4
     """
-    from ..scenes.fmus import fmu_of, known
-    from ..scenes.scene import again, load, shipped
+    from ..scenes.fmu_files import find_fmu, list_models
+    from ..scenes.scene import load_scene, scene_from_provenance, shipped_scenes
 
-    scenes = [file.stem for file in shipped()]
-    if fmu is None and scene and (scene.endswith(".py") or (scene in known() - {*scenes} and not Path(scene).exists())):
-        fmu, scene = fmu_of(scene), None
+    scenes = [file.stem for file in shipped_scenes()]
+    if (
+        fmu is None
+        and scene
+        and (scene.endswith(".py") or (scene in list_models() - {*scenes} and not Path(scene).exists()))
+    ):
+        fmu, scene = find_fmu(scene), None
     if fmu is None and scene and scene.endswith(".fmu"):
         fmu, scene = Path(scene), None
     if fmu is not None and scene is None:
@@ -56,21 +60,21 @@ def run(
         return
     if scene is None or fmu is not None or values or how["stop"] is not None:
         raise click.UsageError("name one SCENE, or --fmu PATH; --set and --stop go with --fmu")
-    from ..results.provenance import trusted
+    from ..results.provenance import load_verified_provenance
     from ..studies.run import job
     from ..studies.run.table import comparison
 
     place = Path(scene)
     if place.is_dir() and scene not in scenes:
-        told = trusted(place)
+        told = load_verified_provenance(place)
         if not (place / job.FILES[0]).is_file() or "title" not in (told["scene"] or {}):
             repeat(context, told["command"])
             return
-        chosen = again(told["scene"])
+        chosen = scene_from_provenance(told["scene"])
         if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
             terminal = replace(terminal, out=place.parent)
     else:
-        chosen = load(scene)
+        chosen = load_scene(scene)
     with terminal.progress(1) as report:
         outcome = job.perform(chosen, terminal.out, partial(report, chosen.name))
     table = comparison([outcome], everything=True)
@@ -88,22 +92,22 @@ def repeat(context: click.Context, command: str) -> None:
 
 def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], terminal: Terminal) -> None:
     """What `run --fmu` does."""
-    from ..results.files import heading
-    from ..running.specification import EVEN, Specification
-    from ..scenes.assigned import assigned
+    from ..results.files import column_heading
+    from ..running.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
+    from ..scenes.assignments import parse_assignment
     from ..studies.run.job import perform_run
 
     with terminal.progress(1) as report:
-        wanted = Specification(path, values=dict(map(assigned, values)), even=EVEN, **how)
+        wanted = RunSpec(path, values=dict(map(parse_assignment, values)), equal_steps=DEFAULT_EQUAL_STEPS, **how)
         found, folder = perform_run(wanted, terminal.out, partial(report, path.stem))
     ends = {name: column[[0, -1]].tolist() for name, column in found.columns.items()}
     final = {name: last for name, (_, last) in ends.items()}
-    told = {"fmu": found.name, "note": found.note, "failed": found.failed, "final": final, "folder": folder}
+    told = {"fmu": found.name, "note": found.note, "failed": found.failure, "final": final, "folder": folder}
     said = [
-        f"{heading(name, found.units[name])}: from {shown(first)} to {shown(last)}"
+        f"{column_heading(name, found.units[name])}: from {shown(first)} to {shown(last)}"
         for name, (first, last) in ends.items()
     ]
-    failed = unfinished(found.failed, folder)
+    failed = unfinished(found.failure, folder)
     terminal.answer(told, *said, *filter(None, [found.note]), folder=folder, failed=failed)
 
 
@@ -119,7 +123,7 @@ def shown(value: float | str) -> str:
 
 def figures(outcome: Any, out: Path) -> dict[str, object]:
     """What a scene gave, for JSON."""
-    from ..results.provenance import replaced
+    from ..results.provenance import replacement_note
 
     told = {"scene": outcome.name, "quantities": outcome.quantities, "error": outcome.error}
-    return told | {"said": [*filter(None, [replaced(out / outcome.name)])]}
+    return told | {"said": [*filter(None, [replacement_note(out / outcome.name)])]}

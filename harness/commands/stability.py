@@ -20,13 +20,13 @@ def stability(models: tuple[str, ...], terminal: Terminal) -> None:
       python -m harness stability
       python -m harness stability stickslip path/to/belt.py
     """
-    from ..results.provenance import named
+    from ..results.provenance import describe_sources
     from ..studies.stability import table as tables
     from ..studies.stability.study import FOLDER, all_cases, survey
 
     chosen = all_cases(models=models)
     with terminal.progress(sum(map(len, chosen))) as report:
-        rows, regions = survey(terminal.out, report, chosen, named(*models))
+        rows, regions = survey(terminal.out, report, chosen, describe_sources(*models))
     told = [{"scene": row.case.label, "well": row.well, "ended": row.ended} for row in rows]
     shown = (tables.endings(rows), "", tables.refusals(rows), "", tables.summary(rows, regions))
     wrong = (f"{row.case.label}: {row.text}" for row in rows if not row.well)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..errors import LONGEST, HarnessError
+from ..errors import MAX_VALUE_LENGTH, HarnessError
 from .terminal import Terminal, anyones, results
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def sweep(
       python -m harness sweep coulomb --vary f=0.1:2 --vary k=50:500 --random 1000 --scheduler tcp://host:8786
     """
     if name is not None and (name.startswith(".") or Path(name).name != name):
-        raise click.UsageError(f"--name {name[:LONGEST]}: the name of one folder, without dots before it")
+        raise click.UsageError(f"--name {name[:MAX_VALUE_LENGTH]}: the name of one folder, without dots before it")
     if find_spec("xarray") is None:  # of which the figure is made, when all runs are done
         raise HarnessError("a sweep needs xarray: python -m pip install 'friction-fmus[sweep]'")
     from ..studies.sweep import file as sweep_file

@@ -18,8 +18,8 @@ from typing import Any
 import click
 
 from ..errors import HarnessError
-from ..process.interrupt import check
-from ..process.room import temporary
+from ..process.interrupt import check_interrupt
+from ..process.temporary_directory import temporary_root
 
 
 def out(text: str) -> Callable[..., Any]:
@@ -77,7 +77,7 @@ FOREIGN = (  # what is said of an FMU that does not show its solver's steps
     click.option("--tolerance", type=POSITIVE, default=1e-6, show_default=True, help="To which it is run, relative."),
     click.option("--exchange", is_flag=True, help="Run it by model exchange, where it offers both."),
     click.option("--lenient", is_flag=True, help="Run it though it breaks the standard."),
-    click.option("--patience", type=POSITIVE, default=60.0, show_default=True, help="For one call of it, in s."),
+    click.option("--timeout", type=POSITIVE, default=60.0, show_default=True, help="For one call of it, in s."),
 )
 
 
@@ -98,7 +98,7 @@ def prepare() -> None:
             setattr(sys, name, open(os.devnull, "r+", encoding="utf-8"))  # noqa: SIM115 - as long as the process
         elif isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
-    tempfile.tempdir = os.environ["TMPDIR"] = str(temporary())
+    tempfile.tempdir = os.environ["TMPDIR"] = str(temporary_root())
 
 
 @contextmanager
@@ -110,7 +110,7 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
     console = Console(file=sys.stderr)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     if quiet or not console.is_terminal:  # a bar that is told to be silent writes an empty line, until rich 14.2
-        yield lambda name, share: check()
+        yield lambda name, share: check_interrupt()
         return
     with (
         os.fdopen(os.dup(sys.stderr.fileno()), "w", errors="replace") as console.file,  # runs redirect standard error
@@ -120,7 +120,7 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
         done: list[str] = []
 
         def report(name: str, share: float) -> None:
-            check()
+            check_interrupt()
             if name not in done:
                 done.append(name)
             bar.update(task, description=name, completed=len(done) - 1 + share)
@@ -130,9 +130,9 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
 
 def tell(result: Any) -> None:
     """Print a result as JSON."""
-    from ..results.files import as_text
+    from ..results.files import to_json
 
-    click.echo(as_text(result))
+    click.echo(to_json(result))
 
 
 @dataclass(frozen=True)
@@ -161,8 +161,8 @@ class Terminal:
                     column.overflow = "fold"  # a name that is cut is not told
                 console.print(each)
             if folder:
-                from ..results.provenance import replaced
+                from ..results.provenance import replacement_note
 
-                console.print("\n".join(filter(None, (replaced(folder), f"Results in {folder}"))))
+                console.print("\n".join(filter(None, (replacement_note(folder), f"Results in {folder}"))))
         if sentences := [*failed]:
             raise HarnessError("\n".join(sentences))

@@ -19,68 +19,70 @@ from typing import Any
 
 from ..errors import HarnessError
 
-BOTH = (SIGINT, SIGTERM)
-HEARD: list[int] = []  # signals, in the order in which they came
-MEANWHILE = 0.2  # s; Ctrl-C is for child processes too, and that one of them has ended may be known before
+SIGNALS = (SIGINT, SIGTERM)
+RECEIVED_SIGNALS: list[int] = []  # signals, in the order in which they came
+GRACE_PERIOD = 0.2  # s; Ctrl-C is for child processes too, and that one of them has ended may be known before
 
 
-class Interrupted(HarnessError):
+class CommandInterruptedError(HarnessError):
     """Ended from outside; what remains to be said of it is one sentence."""
 
     def __init__(self, sentence: str = "") -> None:
-        number = HEARD[0] if HEARD else SIGINT
+        number = RECEIVED_SIGNALS[0] if RECEIVED_SIGNALS else SIGINT
         super().__init__(sentence or ("interrupted" if number == SIGINT else "terminated"))
         self.status = 128 + number
 
 
-def hear(number: int, frame: Any) -> None:
+def handle_signal(number: int, frame: Any) -> None:
     """The handler of both signals."""
-    note(number, frame)
+    record_signal(number, frame)
     raise KeyboardInterrupt
 
 
-def swallowed(unraisable: Any) -> None:
+def ignore_unraisable_interrupt(unraisable: Any) -> None:
     """The hook for exceptions that Python cannot raise where they occur, as in a callback; an interrupt is kept."""
     if not isinstance(unraisable.exc_value, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)
 
 
-def check() -> None:
+def check_interrupt() -> None:
     """KeyboardInterrupt if a signal has come."""
-    if HEARD:
+    if RECEIVED_SIGNALS:
         raise KeyboardInterrupt
 
 
-def note(number: int, frame: Any) -> None:
+def record_signal(number: int, frame: Any) -> None:
     """The handler of both while something is begun that could not be ended half begun."""
-    HEARD.append(number)
+    RECEIVED_SIGNALS.append(number)
     logging.disable()  # what Dask would log of connections that end is no news
 
 
 @contextmanager
-def later() -> Iterator[None]:
+def defer_signals() -> Iterator[None]:
     """Within, a signal waits until the end: for what must not be left half done."""
-    listening = current_thread() is main_thread() and [each for each in BOTH if signal.getsignal(each) == hear]
-    before = len(HEARD)
+    listening = current_thread() is main_thread() and [
+        each for each in SIGNALS if signal.getsignal(each) == handle_signal
+    ]
+    before = len(RECEIVED_SIGNALS)
     for number in listening or ():
-        signal.signal(number, note)
+        signal.signal(number, record_signal)
     try:
         yield
     finally:
         for number in listening or ():
-            signal.signal(number, hear)
-    if listening and len(HEARD) > before:
+            signal.signal(number, handle_signal)
+    if listening and len(RECEIVED_SIGNALS) > before:
         raise KeyboardInterrupt
 
 
 @contextmanager
-def deaf_children() -> Iterator[None]:
+def ignore_sigint() -> Iterator[None]:
     """Processes and threads that are started within never hear a Ctrl-C; the signal waits until the end."""
     from multiprocessing import resource_tracker  # later than `finish` is registered, so that it cleans up before
 
     resource_tracker.ensure_running()  # which multiprocessing would start within, and unblock what is blocked here
     mask = getattr(signal, "pthread_sigmask", lambda how, signals: None)  # none on Windows
-    with later():
+    with defer_signals():
         mask(signal.SIG_BLOCK, [SIGINT])  # which is inherited
         try:
             yield
@@ -88,28 +90,30 @@ def deaf_children() -> Iterator[None]:
             mask(signal.SIG_UNBLOCK, [SIGINT])
 
 
-def finish() -> None:
+def exit_after_signal() -> None:
     """The last of all that is done at the exit: Python would else tell, for any interrupt in the midst of an import,
     that SIGINT killed it, and an FMU in Python that passes an interrupt on may do so late."""
-    if HEARD:
-        os._exit(128 + HEARD[0])
+    if RECEIVED_SIGNALS:
+        os._exit(128 + RECEIVED_SIGNALS[0])
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Within, both signals are heard, unless they were to be ignored, and end in Interrupted."""
-    for number, usual in zip(BOTH, (default_int_handler, SIG_DFL), strict=True):
+    for number, usual in zip(SIGNALS, (default_int_handler, SIG_DFL), strict=True):
         if signal.getsignal(number) == usual:
-            signal.signal(number, hear)
-    sys.unraisablehook = swallowed
-    atexit.register(finish)  # the first to be registered is the last to be called
+            signal.signal(number, handle_signal)
+    sys.unraisablehook = ignore_unraisable_interrupt
+    atexit.register(exit_after_signal)  # the first to be registered is the last to be called
     try:
         yield
-        check()
+        check_interrupt()
     except BaseException as error:  # what a signal made fail may say anything
         if isinstance(error, (OSError, EOFError)):
-            sleep(MEANWHILE)
-        if isinstance(error, KeyboardInterrupt) or (HEARD and not isinstance(error, Interrupted)):
+            sleep(GRACE_PERIOD)
+        if isinstance(error, KeyboardInterrupt) or (
+            RECEIVED_SIGNALS and not isinstance(error, CommandInterruptedError)
+        ):
             clear_frames(error.__traceback__)  # which hold a context that was entered and not yet begun: it is left
-            raise Interrupted from None
+            raise CommandInterruptedError from None
         raise

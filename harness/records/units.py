@@ -10,8 +10,8 @@ LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "nm": 1e-9, "in": 0.025
 TURN = 2 * 3.141592653589793
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": TURN / 360, "°": TURN / 360, "rev": TURN, "gon": TURN / 400}
 STANDARD_GRAVITY = 9.80665
-COUNTS = ("count", "counts", "cts", "tick", "ticks", "pulse", "pulses", "increments", "inc", "lsb", "digits")
-SPELLED = {
+COUNT_NAMES = ("count", "counts", "cts", "tick", "ticks", "pulse", "pulses", "increments", "inc", "lsb", "digits")
+UNIT_SYNONYMS = {
     "seconds": "s", "second": "s", "milliseconds": "ms", "millisecond": "ms", "microseconds": "us", "minutes": "min",
     "hours": "h", "metres": "m", "meters": "m", "metre": "m", "meter": "m", "millimetres": "mm", "millimeters": "mm",
     "centimetres": "cm", "centimeters": "cm", "inches": "in", "inch": "in", "feet": "ft", "radians": "rad",
@@ -21,10 +21,10 @@ SPELLED = {
 }  # fmt: skip
 
 
-LETTERS = str.maketrans("º˚µμ²⁻¹·*", "°°uu2-1  ", "^")  # what stands for what, and what for nothing
+CHARACTER_SUBSTITUTES = str.maketrans("º˚µμ²⁻¹·*", "°°uu2-1  ", "^")  # what stands for what, and what for nothing
 
 
-class Unit(NamedTuple):
+class MotionUnit(NamedTuple):
     """What a unit measures: the `order` of the derivative of a position in `base` (m or rad), and its size in SI."""
 
     order: int
@@ -32,54 +32,54 @@ class Unit(NamedTuple):
     size: float
 
 
-def plain(text: str) -> str:
+def normalize_unit(text: str) -> str:
     """A unit as the tables below write it: µm is um, m·s⁻², m s^-2 and m/s/s are m/s2."""
-    text = re.sub(r"\s+", " ", text.replace("**", "").translate(LETTERS).strip())
+    text = re.sub(r"\s+", " ", text.replace("**", "").translate(CHARACTER_SUBSTITUTES).strip())
     text = re.sub(r"[ .]?s-2$|/s/s$|/\(s2\)$|/sec2$", "/s2", text)
     text = re.sub(r"[ .]s-1$|/sec$", "/s", text)
     return re.sub(r"\s", "", text)
 
 
-def known(text: str) -> Unit | None:
+def find_unit(text: str) -> MotionUnit | None:
     """The unit of that name, or None where it is none of a motion."""
-    name = plain(text)
+    name = normalize_unit(text)
     if name not in UNITS:
         name = name.lower()
     stem, slash, over = name.partition("/")
-    return UNITS.get(SPELLED.get(stem, stem) + slash + over)
+    return UNITS.get(UNIT_SYNONYMS.get(stem, stem) + slash + over)
 
 
-def time_size(text: str) -> float | None:
+def time_unit_size(text: str) -> float | None:
     """The size of a unit of time in s, of so many of them as in 0.01s, or None where it is none."""
-    number, name = re.fullmatch(r"([0-9.]*(?:e-?[0-9]+)?)(.*)", plain(text).lower(), re.S).groups()  # type: ignore[union-attr]
-    size = TIMES.get(SPELLED.get(name, name))
+    number, name = re.fullmatch(r"([0-9.]*(?:e-?[0-9]+)?)(.*)", normalize_unit(text).lower(), re.S).groups()  # type: ignore[union-attr]
+    size = TIMES.get(UNIT_SYNONYMS.get(name, name))
     try:
         return size and size * float(number or 1)
     except ValueError:
         return None
 
 
-def per_count(text: str) -> tuple[float, str]:
+def parse_per_count(text: str) -> tuple[float, str]:
     """The size and the unit of one count, as in 0.36deg or 1e-3 mm."""
     found = re.fullmatch(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*", text)
-    if not found or known(found[2]) is None:
+    if not found or find_unit(found[2]) is None:
         raise SceneError(f"--per-count {text}: what one count is has a number and a unit, as in 0.36deg or 0.001mm")
     return float(found[1]), found[2]
 
 
-def table() -> dict[str, Unit]:
+def build_unit_table() -> dict[str, MotionUnit]:
     """Every unit, with its rates."""
     bases = ((LENGTHS, "m"), (ANGLES, "rad"))
     units = {
-        name + rate: Unit(order, base, size)
+        name + rate: MotionUnit(order, base, size)
         for sizes, base in bases
         for name, size in sizes.items()
         for order, rate in enumerate(("", "/s", "/s2"))
     }
-    units["rpm"] = Unit(1, "rad", TURN / 60)
-    units["g"] = Unit(2, "m", STANDARD_GRAVITY)
-    units["mg"] = Unit(2, "m", 1e-3 * STANDARD_GRAVITY)
+    units["rpm"] = MotionUnit(1, "rad", TURN / 60)
+    units["g"] = MotionUnit(2, "m", STANDARD_GRAVITY)
+    units["mg"] = MotionUnit(2, "m", 1e-3 * STANDARD_GRAVITY)
     return units
 
 
-UNITS = table()
+UNITS = build_unit_table()

@@ -12,7 +12,7 @@ from urllib.parse import quote
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..errors import HarnessError
-from ..results.provenance import HARNESS, installed
+from ..results.provenance import HARNESS, package_version
 from .gallery import Sketch, gallery
 from .sections import Published, Section, sections
 
@@ -66,7 +66,7 @@ def page(found: list[Section], sketches: tuple[Sketch, ...], results: Path) -> s
         measured=[clauses(sentence) for sentences in measured for sentence in sentences],
         live=LIVE if LIVE.is_file() else None,
         bench=LIVE.read_text(encoding="utf-8", errors="replace") if LIVE.is_file() else "",
-        made=f"{date.today()}, {HARNESS} {installed(HARNESS)}, {platform.platform()}",
+        made=f"{date.today()}, {HARNESS} {package_version(HARNESS)}, {platform.platform()}",
     )
 
 

@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import reason
+from ..errors import first_line
 from ..results import provenance
-from ..results.quantity import interval as spelled_interval
-from ..results.steps import sizes as step_sizes
+from ..results.quantity import format_interval as spelled_interval
+from ..results.step_sizes import step_size_quantities as step_sizes
 
 SHOWN = "trajectory.csv"
 SHORTEST = 12  # decimals cut from long numbers in cells
@@ -101,14 +101,16 @@ def read(place: Path, make: Callable[[Path], Item]) -> Item:
         return replace(part, origin=origin(place), files=numbers(place)) if part.grid or part.pictures else part
     except Exception as error:  # it may hold anything: half of a file, another version's, somebody else's
         return Item(
-            place.name, (f"{place} cannot be shown ({type(error).__name__}: {reason(error)[:100]}).",), lost=True
+            place.name, (f"{place} cannot be shown ({type(error).__name__}: {first_line(error)[:100]}).",), lost=True
         )
 
 
 def origin(place: Path) -> tuple[str, ...]:
     """Where the results at a place came from: told in their folder, or in a file of their own beside them."""
     own = place.with_suffix(".json")
-    return provenance.sentences(own if own.is_file() else (place if place.is_dir() else place.parent) / provenance.FILE)
+    return provenance.summarize_provenance(
+        own if own.is_file() else (place if place.is_dir() else place.parent) / provenance.FILE
+    )
 
 
 def numbers(place: Path) -> tuple[Path, ...]:
@@ -187,7 +189,7 @@ def sizes(folder: Path) -> Item:
     """The row of one case."""
     _, h, rejected = np.array(table(folder / "steps.csv", cut=False).rows, float).T
     told = step_sizes(h, int(rejected.sum()))
-    row = (folder.name, *(" ".join(each.told()).strip() for each in told))
+    row = (folder.name, *(" ".join(each.formatted()).strip() for each in told))
     return Item(folder.name, grid=TableCells(("case", *(each.text for each in told)), (row,)))
 
 

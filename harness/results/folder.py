@@ -21,8 +21,8 @@ from shutil import rmtree
 from tempfile import mkdtemp
 
 from ..errors import HarnessError
-from ..process.interrupt import later
-from .provenance import FILE, load, succeed
+from ..process.interrupt import defer_signals
+from .provenance import FILE, load_provenance, note_replaced_result
 
 if sys.platform != "win32":
     import fcntl
@@ -33,7 +33,7 @@ AT_FDCWD, RENAME_EXCHANGE, RENAME_SWAP = -100, 2, 2  # of Linux and macOS
 
 
 @contextmanager
-def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[Path]:
+def replace_folder(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[Path]:
     """A new folder beside `folder` to write into; it takes its place if nothing is raised, and is removed otherwise.
     Its account tells what was there before, by the first of the files that are `ours`.
 
@@ -43,24 +43,24 @@ def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[P
     try:
         drawn = (name.replace(".svg", ".png") for name in ours)  # as earlier versions drew them
         ours = (*ours, *drawn, FILE)
-        refuse(folder, ours)
-        keep(folder, source)
+        check_replaceable(folder, ours)
+        check_same_source(folder, source)
         missing = [each for each in folder.absolute().parents if not each.exists()]
         folder.parent.mkdir(parents=True, exist_ok=True)
-        tidy(folder, ours)
+        clean_up(folder, ours)
     except OSError as error:
         raise HarnessError(f"cannot write below {folder.parent}: {error.strerror}; choose another --out") from None
     fresh, held = None, ExitStack()
     try:
-        with later():
-            fresh = begun(folder, held)
+        with defer_signals():
+            fresh = create_locked_folder(folder, held)
         yield fresh
-        succeed(folder, fresh, ours[0])
-        swap(fresh, folder)
+        note_replaced_result(folder, fresh, ours[0])
+        swap_in(fresh, folder)
     except OSError as error:
         raise HarnessError(f"cannot write {folder}: {error.strerror or error}; choose another --out") from None
     finally:
-        with later():
+        with defer_signals():
             if fresh:
                 rmtree(fresh, ignore_errors=True)
             held.close()
@@ -69,7 +69,7 @@ def replacing(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[P
                     each.rmdir()
 
 
-def refuse(folder: Path, ours: Collection[str]) -> None:
+def check_replaceable(folder: Path, ours: Collection[str]) -> None:
     """HarnessError if something is in the way that is no result."""
     if folder.is_symlink():
         raise HarnessError(f"{folder} is a link, which a result does not replace; remove it or choose another --out")
@@ -80,9 +80,9 @@ def refuse(folder: Path, ours: Collection[str]) -> None:
             raise HarnessError(f"{folder} holds {foreign[0]}, which is not a result; move it or choose another --out")
 
 
-def keep(folder: Path, source: str, account: str = FILE) -> None:
+def check_same_source(folder: Path, source: str, account: str = FILE) -> None:
     """HarnessError if a result of another source is there, and the user did not say that it may be replaced."""
-    older = load(folder, account)
+    older = load_provenance(folder, account)
     if older.get("source", source) != source and not OVERWRITE.get():
         made = f"`{older['command']}`" + (f", from {older['source']}" if older["source"] else "")
         raise HarnessError(
@@ -90,20 +90,20 @@ def keep(folder: Path, source: str, account: str = FILE) -> None:
         )
 
 
-def begun(folder: Path, held: ExitStack) -> Path:
+def create_locked_folder(folder: Path, held: ExitStack) -> Path:
     """A new folder beside, whose lock is `held`."""
     while True:
         # absolute: an interrupt may come while fmpy, which loads a library, is in its folder
         fresh = Path(mkdtemp(prefix=f".{folder.name}-", suffix=FRESH, dir=folder.parent.absolute()))
         fresh.chmod(0o755)  # mkdtemp gives 0o700
-        held.enter_context(locked(fresh, wait=True))
+        held.enter_context(lock_folder(fresh, wait=True))
         if fresh.exists():  # nobody took it for one that was left, before it was locked
             return fresh
         held.close()
 
 
 @contextmanager
-def locked(folder: Path, wait: bool = False) -> Iterator[None]:
+def lock_folder(folder: Path, wait: bool = False) -> Iterator[None]:
     """Within, the folder is locked, where there are locks; OSError if another process has it, and one does not wait."""
     if sys.platform == "win32":
         yield
@@ -117,24 +117,24 @@ def locked(folder: Path, wait: bool = False) -> Iterator[None]:
         os.close(lock)
 
 
-def tidy(folder: Path, ours: Collection[str]) -> None:
+def clean_up(folder: Path, ours: Collection[str]) -> None:
     """Put back what a kill left between the two steps of an exchange, and remove what else killed runs left."""
     beside = re.compile(rf"\.{re.escape(folder.name)}-[a-z0-9_]{{8}}({FRESH}|{OLD})")
     for left in sorted(folder.parent.iterdir()):
         if beside.fullmatch(left.name) and left.is_dir() and {file.name for file in left.iterdir()} <= set(ours):
-            with suppress(OSError), locked(left):  # or somebody writes it
+            with suppress(OSError), lock_folder(left):  # or somebody writes it
                 if left.suffix == OLD and not folder.exists():
                     left.rename(folder)
                 rmtree(left, ignore_errors=True)
 
 
-def swap(fresh: Path, folder: Path) -> None:
+def swap_in(fresh: Path, folder: Path) -> None:
     """Put the fresh folder where the old one is, which is left in its place; the old one stays if that fails."""
     if not folder.exists():
         fresh.rename(folder)
-    elif not exchanged(fresh, folder):
+    elif not exchange_folders(fresh, folder):
         old = fresh.with_suffix(OLD)
-        with later():
+        with defer_signals():
             folder.rename(old)
             try:
                 fresh.rename(folder)
@@ -144,7 +144,7 @@ def swap(fresh: Path, folder: Path) -> None:
             rmtree(old, ignore_errors=True)
 
 
-def exchanged(one: Path, two: Path) -> bool:
+def exchange_folders(one: Path, two: Path) -> bool:
     """Whether two folders have taken each other's place, in one step."""
     ours, theirs = os.fsencode(one), os.fsencode(two)
     try:

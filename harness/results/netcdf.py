@@ -17,80 +17,85 @@ CHAR, DOUBLE = 2, 6  # types
 
 
 @dataclass(frozen=True)
-class Variable:
+class NetCDFVariable:
     """A variable over dimensions: of numbers, or, where the last one is `letters` long, of texts."""
 
     name: str
     dimensions: tuple[str, ...]
     attributes: Mapping[str, str | float]
-    letters: int = 0
+    text_length: int = 0
 
     @property
-    def kind(self) -> np.dtype:
+    def dtype(self) -> np.dtype:
         """How one value stands in the file."""
-        return np.dtype(f"S{self.letters}" if self.letters else ">f8")
+        return np.dtype(f"S{self.text_length}" if self.text_length else ">f8")
 
 
 @dataclass
-class NetCDF:
+class NetCDFWriter:
     """The file, open for writing; `sizes` are of its dimensions."""
 
     file: BinaryIO
     sizes: Mapping[str, int]
-    variables: Sequence[Variable]
+    variables: Sequence[NetCDFVariable]
     attributes: Mapping[str, str | float]
-    begins: dict[str, int] = field(default_factory=dict)  # where the values of each variable stand
+    offsets: dict[str, int] = field(default_factory=dict)  # where the values of each variable stand
 
     def __post_init__(self) -> None:
         """Write all but the values, which are zero."""
         at = len(self.header(dict.fromkeys((each.name for each in self.variables), 0)))
         for each in self.variables:
-            self.begins[each.name] = at
-            at += padded(self.length(each))
-        self.file.write(self.header(self.begins))
+            self.offsets[each.name] = at
+            at += padded_length(self.length(each))
+        self.file.write(self.header(self.offsets))
         self.file.truncate(at)
 
-    def length(self, variable: Variable) -> int:
+    def length(self, variable: NetCDFVariable) -> int:
         """Bytes of its values."""
-        return prod(self.sizes[name] for name in variable.dimensions) * (1 if variable.letters else 8)
+        return prod(self.sizes[name] for name in variable.dimensions) * (1 if variable.text_length else 8)
 
     def header(self, begins: Mapping[str, int]) -> bytes:
         places = {name: i for i, name in enumerate(self.sizes)}
-        dimensions = [named(name) + pack(">i", size) for name, size in self.sizes.items()]
+        dimensions = [encode_name(name) + pack(">i", size) for name, size in self.sizes.items()]
         variables = []
         for each in self.variables:
             over = pack(f">{1 + len(each.dimensions)}i", len(each.dimensions), *map(places.get, each.dimensions))
-            size = min(padded(self.length(each)), 2**32 - 1)
-            rest = pack(">iIq", CHAR if each.letters else DOUBLE, size, begins[each.name])
-            variables.append(named(each.name) + over + attributed(each.attributes) + rest)
+            size = min(padded_length(self.length(each)), 2**32 - 1)
+            rest = pack(">iIq", CHAR if each.text_length else DOUBLE, size, begins[each.name])
+            variables.append(encode_name(each.name) + over + encode_attributes(each.attributes) + rest)
         begun = b"CDF\x02" + pack(">i", 0)
-        return begun + listed(DIMENSIONS, dimensions) + attributed(self.attributes) + listed(VARIABLES, variables)
+        return (
+            begun
+            + encode_list(DIMENSIONS, dimensions)
+            + encode_attributes(self.attributes)
+            + encode_list(VARIABLES, variables)
+        )
 
-    def put(self, name: str, first: int, values: np.ndarray) -> None:
+    def write_values(self, name: str, first: int, values: np.ndarray) -> None:
         """Write values of a variable, in the order of its dimensions, from number `first` on."""
         (variable,) = (each for each in self.variables if each.name == name)
-        self.file.seek(self.begins[name] + first * variable.kind.itemsize)
-        self.file.write(values.astype(variable.kind).tobytes())
+        self.file.seek(self.offsets[name] + first * variable.dtype.itemsize)
+        self.file.write(values.astype(variable.dtype).tobytes())
 
 
-def padded(length: int) -> int:
+def padded_length(length: int) -> int:
     """Every item begins at a multiple of four."""
     return length + -length % 4
 
 
-def named(text: str) -> bytes:
+def encode_name(text: str) -> bytes:
     """A text with its length before it."""
     content = text.encode()
-    return pack(">i", len(content)) + content.ljust(padded(len(content)), b"\0")
+    return pack(">i", len(content)) + content.ljust(padded_length(len(content)), b"\0")
 
 
-def listed(tag: int, items: Sequence[bytes]) -> bytes:
+def encode_list(tag: int, items: Sequence[bytes]) -> bytes:
     return pack(">ii", tag if items else 0, len(items)) + b"".join(items)
 
 
-def attributed(attributes: Mapping[str, str | float]) -> bytes:
+def encode_attributes(attributes: Mapping[str, str | float]) -> bytes:
     items = []
     for name, value in attributes.items():
-        content = pack(">i", CHAR) + named(value) if isinstance(value, str) else pack(">iid", DOUBLE, 1, value)
-        items.append(named(name) + content)
-    return listed(ATTRIBUTES, items)
+        content = pack(">i", CHAR) + encode_name(value) if isinstance(value, str) else pack(">iid", DOUBLE, 1, value)
+        items.append(encode_name(name) + content)
+    return encode_list(ATTRIBUTES, items)

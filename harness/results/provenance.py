@@ -13,18 +13,18 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import HarnessError
-from .files import as_text
+from .files import to_json
 
 FILE = "provenance.json"
 HARNESS = "friction-fmus"
 REPLACED = "replaced"
-IMPLIED = {"values", "name", "file", "source"}  # of a scene: in its parameters, or in what it was made from
+IMPLIED_SCENE_KEYS = {"values", "name", "file", "source"}  # of a scene: in its parameters, or in what it was made from
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 
 Parameters = Mapping[str, tuple[object, str]]  # by name: the value in force, and its unit
 
 
-def record(
+def write_provenance(
     folder: Path,
     files: Iterable[Path],
     parameters: Parameters | None = None,
@@ -38,100 +38,104 @@ def record(
         "source": source,
         "command": shlex.join(["python", "-m", "harness", *sys.argv[1:]]),
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
-        "versions": versions(),
+        "versions": package_versions(),
         "platform": platform.platform(),
-        "files": {str(file): digest(file) for file in files if file.is_file()},
+        "files": {str(file): file_digest(file) for file in files if file.is_file()},
         "parameters": {name: {"value": value, "unit": unit} for name, (value, unit) in (parameters or {}).items()},
         "scene": scene,
     }
-    (folder / name).write_text(as_text(told) + "\n", encoding="utf-8")
+    (folder / name).write_text(to_json(told) + "\n", encoding="utf-8")
 
 
-def of_each(parts: Mapping[str, Parameters]) -> Parameters:
+def prefix_parameters(parts: Mapping[str, Parameters]) -> Parameters:
     """The parameters of several parts, each by the name of its own before it."""
     return {f"{part}: {name}": told for part, each in parts.items() for name, told in each.items()}
 
 
-def named(*sources: str) -> str:
+def describe_sources(*sources: str) -> str:
     """What a result was made from, for its account: paths of what is there in full, other words as they are."""
     return ", ".join(str(Path(each).resolve()) if Path(each).exists() else each for each in sources)
 
 
-def digest(file: Path) -> str:
+def file_digest(file: Path) -> str:
     return sha256(file.read_bytes()).hexdigest()
 
 
-def versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
     """Of the harness, and of what its numbers hang on."""
-    return {package: installed(package) for package in PACKAGES} | {"python": platform.python_version()}
+    return {package: package_version(package) for package in PACKAGES} | {"python": platform.python_version()}
 
 
 @cache
-def installed(package: str) -> str:
+def package_version(package: str) -> str:
     try:
         return version(package)
     except PackageNotFoundError:
         return "not installed"
 
 
-def load(folder: Path, name: str = FILE) -> dict[str, Any]:
+def load_provenance(folder: Path, name: str = FILE) -> dict[str, Any]:
     """What a folder of results says of its origin; nothing where it does not."""
     try:
         told = json.loads((folder / name).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
-    return told if isinstance(told, dict) and whole(told) else {}
+    return told if isinstance(told, dict) and is_complete(told) else {}
 
 
-def whole(told: dict[str, Any]) -> bool:
+def is_complete(told: dict[str, Any]) -> bool:
     """Whether all is there that others ask for."""
     texts = all(isinstance(told.get(name), str) for name in ("command", "date"))
     tables = all(isinstance(told.get(name), dict) for name in ("files", "parameters")) and "scene" in told
     return texts and tables and all(isinstance(each, dict) and len(each) == 2 for each in told["parameters"].values())
 
 
-def succeed(older: Path, fresh: Path, file: str) -> None:
+def note_replaced_result(older: Path, fresh: Path, file: str) -> None:
     """Let the account of a fresh result tell of the older one whose place it takes: what that was made with, if it was
     not the same; otherwise, of a scene, whether the file of both is the same."""
-    before, after = load(older), load(fresh)
+    before, after = load_provenance(older), load_provenance(fresh)
     if not before or not after:
         return
-    had = [worded(name, **each) for name, each in before["parameters"].items() if each != after["parameters"].get(name)]
+    had = [
+        format_parameter(name, **each)
+        for name, each in before["parameters"].items()
+        if each != after["parameters"].get(name)
+    ]
     scene, now = before["scene"] or {}, after["scene"] or {}
-    kept = [name for name in scene if name in IMPLIED or scene[name] == now.get(name)]
-    had += [option(name, value) for name, value in scene.items() if name not in kept]
+    kept = [name for name in scene if name in IMPLIED_SCENE_KEYS or scene[name] == now.get(name)]
+    had += [format_option(name, value) for name, value in scene.items() if name not in kept]
     had += [f"another {name}" for name, told in before["files"].items() if told != after["files"].get(name)]
     if had:
         sentence = f"It takes the place of the result of {before['date']}, which had {', '.join(sorted(had))}."
     elif scene:
-        same = (older / file).is_file() and digest(older / file) == digest(fresh / file)
+        same = (older / file).is_file() and file_digest(older / file) == file_digest(fresh / file)
         told = "the same, bit for bit" if same else "not the same to the last bit"
         sentence = f"The result of {before['date']} was {told}."
     else:
         return
-    (fresh / FILE).write_text(as_text(after | {REPLACED: sentence}) + "\n", encoding="utf-8")
+    (fresh / FILE).write_text(to_json(after | {REPLACED: sentence}) + "\n", encoding="utf-8")
 
 
-def option(name: str, value: object) -> str:
+def format_option(name: str, value: object) -> str:
     """What was asked, in words."""
     return name if value is True else f"{name} = {value}" if value else f"no {name}"
 
 
-def replaced(folder: Path) -> str:
+def replacement_note(folder: Path) -> str:
     """What a result says of the one whose place it took; empty where there was none."""
-    return str(load(folder).get(REPLACED, ""))
+    return str(load_provenance(folder).get(REPLACED, ""))
 
 
-def trusted(folder: Path) -> dict[str, Any]:
+def load_verified_provenance(folder: Path) -> dict[str, Any]:
     """What a folder of results says of its origin; HarnessError if it says nothing, or if a file is not what it was."""
-    told = load(folder)
+    told = load_provenance(folder)
     if not told:
         raise HarnessError(f"{folder} holds no result that tells what made it: name one with a whole {FILE}")
     for name, before in told["files"].items():
         file = Path(name)
         if not file.is_file():
             raise HarnessError(f"{file}, from which this was made, is not here: run from the folder where it is")
-        if (now := digest(file)) != before:
+        if (now := file_digest(file)) != before:
             raise HarnessError(
                 f"{file} has changed since this was made from it (sha256 {before[:12]} then, {now[:12]} now): put it "
                 f"back, or make a new result with `{told['command']}`"
@@ -139,7 +143,7 @@ def trusted(folder: Path) -> dict[str, Any]:
     return told
 
 
-def sentences(file: Path) -> tuple[str, ...]:
+def summarize_provenance(file: Path) -> tuple[str, ...]:
     """What a reader of the results wants to know of such a file, if it is there; ValueError, KeyError or TypeError if
     it holds something else."""
     if not file.is_file():
@@ -149,9 +153,9 @@ def sentences(file: Path) -> tuple[str, ...]:
     versions = told["versions"]
     made = f"harness {versions[HARNESS]}, fmpy {versions['fmpy']}, Python {versions['python']}, {told['platform']}"
     origin = f"Made from {', '.join(files) or 'no file'} by {made}, on {told['date'][:10]}: {told['command']}"
-    values = [worded(name, **each) for name, each in told["parameters"].items()]
+    values = [format_parameter(name, **each) for name, each in told["parameters"].items()]
     return (origin, f"Parameters: {', '.join(values)}.") if values else (origin,)
 
 
-def worded(name: str, value: object, unit: str) -> str:
+def format_parameter(name: str, value: object, unit: str) -> str:
     return f"{name} = {value} {unit}" if unit not in ("", "1") else f"{name} = {value}"

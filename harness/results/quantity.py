@@ -4,14 +4,14 @@ from dataclasses import dataclass
 from math import ceil, isfinite, log10, pi
 
 # Units in which figures are published: the SI unit and the size of one in it.
-UNITS = {
+PUBLISHED_UNITS = {
     "ms": ("s", 1e-3),
     "deg": ("rad", pi / 180),
     "lbf.in": ("N.m", 0.45359237 * 9.80665 * 0.0254),
 }
 
-UNEVEN = 0.1  # of an interval: beyond, its ends are told rather than its half
-MOST = 8  # digits, in which ends that are nearer to each other are alike
+MAX_ASYMMETRY = 0.1  # of an interval: beyond, its ends are told rather than its half
+MAX_DIGITS = 8  # digits, in which ends that are nearer to each other are alike
 
 
 @dataclass(frozen=True)
@@ -23,41 +23,41 @@ class Quantity:
     unit: str
     text: str
 
-    def told(self) -> tuple[str, str]:
+    def formatted(self) -> tuple[str, str]:
         """Value and unit as people read them: five digits, times below a second in ms."""
         value, unit = self.value, self.unit
         if unit == "s" and abs(value) < 1:
             value, unit = 1e3 * value, "ms"
-        return spelled(value), "" if unit == "1" else unit
+        return format_number(value), "" if unit == "1" else unit
 
-    def in_unit(self, unit: str) -> float:
+    def to_unit(self, unit: str) -> float:
         """The value in another unit of the table; KeyError if it does not measure the same thing."""
         if unit == self.unit:
             return self.value
-        base, size = UNITS[unit]
+        base, size = PUBLISHED_UNITS[unit]
         if base != self.unit:
             raise KeyError(unit)
         return self.value / size
 
 
 @dataclass(frozen=True)
-class Measured:
+class AnalysisResult:
     """What an analysis has found."""
 
     quantities: tuple[Quantity, ...]
 
 
-def in_degrees(unit: str) -> tuple[str, float]:
+def display_unit(unit: str) -> tuple[str, float]:
     """The unit in which people look at what is in a `unit`, degrees for angles and their rates, and its size in it."""
     return (unit.replace("rad", "deg"), pi / 180) if unit in ("rad", "rad/s", "rad/s2") else (unit, 1.0)
 
 
-def spelled(value: float, digits: int = 5) -> str:
+def format_number(value: float, digits: int = 5) -> str:
     """A number with so many digits; a count with all of its own."""
     return str(value) if isinstance(value, int) else f"{value:.{digits}g}"
 
 
-def interval(value: float, low: float, high: float) -> str:
+def format_interval(value: float, low: float, high: float) -> str:
     """A value, with the digits that its interval leaves, and half of it; its ends where they are not alike; the value
     alone where there is none (NaN or infinity)."""
     below, above = value - low, high - value
@@ -66,8 +66,8 @@ def interval(value: float, low: float, high: float) -> str:
     if value == 0:
         return f"< {high:.2g}"
     margin = max(below, above)
-    digits = min(max(ceil(log10(abs(value) / margin)) + 1, 1), MOST) if margin > 0 else MOST
-    if digits == MOST or abs(above - below) <= UNEVEN * (above + below):
+    digits = min(max(ceil(log10(abs(value) / margin)) + 1, 1), MAX_DIGITS) if margin > 0 else MAX_DIGITS
+    if digits == MAX_DIGITS or abs(above - below) <= MAX_ASYMMETRY * (above + below):
         return f"{value:.{digits}g} ± {margin:.2g}"
     digits = max(digits, 2)
     return f"{value:.{digits}g} ({low:.{digits}g} to {high:.{digits}g})"

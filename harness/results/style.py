@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from matplotlib import artist, rc_context
 
-from .files import heading
+from .files import column_heading
 
 artist.kwdoc = lambda artist: ""  # the lists of properties in all docstrings, a third of what is still to be imported
 
@@ -27,7 +27,7 @@ from matplotlib.text import Text  # noqa: E402
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
 GREY = "#777777"  # of what is only there to compare with
 # Methods of one family have one colour.
-FAMILIES = {
+METHOD_COLOURS = {
     "exact": "#000000",
     **dict.fromkeys(("ode23", "RK23"), BLUE),
     **dict.fromkeys(("ode45", "RK45"), ORANGE),
@@ -60,14 +60,14 @@ DARK = {  # what stands for a colour where the reader's screen is dark
     ORANGE.lower(): "#f08a4b",
     GREEN.lower(): "#2cc295",
 }
-SWITCHED = "".join(
+DARK_RULES = "".join(
     f'[style*="{part}: {light}"] {{ {part}: {dark} !important }}\n'
     for light, dark in DARK.items()
     for part in ("fill", "stroke")
 )
-FOLLOWING = f"@media screen and (prefers-color-scheme: dark) {{\ntext {{ fill: {DARK['#000000']} }}\n{SWITCHED}}}\n"
-CROWDED = 1000  # points with a mark each: more are one image in the drawing
-ABOVE: dict[str, Any] = {  # of a legend above its panel, where it hides nothing
+DARK_STYLE = f"@media screen and (prefers-color-scheme: dark) {{\ntext {{ fill: {DARK['#000000']} }}\n{DARK_RULES}}}\n"
+MAX_VECTOR_MARKERS = 1000  # points with a mark each: more are one image in the drawing
+LEGEND_ABOVE: dict[str, Any] = {  # of a legend above its panel, where it hides nothing
     "loc": "lower right",
     "bbox_to_anchor": (1.0, 1.0),
     "frameon": False,
@@ -75,15 +75,17 @@ ABOVE: dict[str, Any] = {  # of a legend above its panel, where it hides nothing
     "columnspacing": 1.2,
     "handlelength": 1.4,
 }
-LARGEST = 1e150  # that is drawn
-LONGEST = 500  # letters of a text that are drawn
-NAME = re.compile(r"(\s+|(?<=[._\]]))")  # where a text may go on in the next line: a model's names have no blanks
+MAX_DRAWN_VALUE = 1e150  # that is drawn
+MAX_TEXT_LENGTH = 500  # letters of a text that are drawn
+LINE_BREAKS = re.compile(
+    r"(\s+|(?<=[._\]]))"
+)  # where a text may go on in the next line: a model's names have no blanks
 UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML: a path may be no text
 WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
 
 
 @contextmanager
-def sheet(
+def open_figure(
     path: Path, width: float, height: float, layout: Literal["constrained"] | None = "constrained"
 ) -> Iterator[Figure]:
     """A figure in this look, of a size in inches; saved as SVG, light or dark as the reader's screen is, when all has
@@ -96,15 +98,15 @@ def sheet(
         warnings.simplefilter("ignore")
         figure = Figure(figsize=(width, height), dpi=130, layout=layout)
         yield figure
-        for text in texts(figure):
+        for text in find_texts(figure):
             text.set_parse_math(False)
-            text.set_text(UNWRITABLE.sub("\N{REPLACEMENT CHARACTER}", text.get_text()[:LONGEST]))
-        for part, within in ((figure, figure.texts), *((axes, texts(axes)) for axes in figure.axes)):
+            text.set_text(UNWRITABLE.sub("\N{REPLACEMENT CHARACTER}", text.get_text()[:MAX_TEXT_LENGTH]))
+        for part, within in ((figure, figure.texts), *((axes, find_texts(axes)) for axes in figure.axes)):
             place = part.get_window_extent()
             for text in within:
-                fold(text, place.height if text.get_rotation() == 90 else place.width)
+                wrap_text(text, place.height if text.get_rotation() == 90 else place.width)
         for axes in figure.axes:
-            for crowd in filter(crowded, (*axes.lines, *axes.collections)):
+            for crowd in filter(is_crowded, (*axes.lines, *axes.collections)):
                 crowd.set_rasterized(True)
         if engine := figure.get_layout_engine():
             engine.execute(figure)
@@ -112,17 +114,17 @@ def sheet(
         drawn = StringIO()
         figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
     short = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d\d)\d+", r"\1", line[0]), drawn.getvalue())
-    path.write_text(short.replace("</style>", f"{FOLLOWING}</style>", 1), encoding="utf-8")
+    path.write_text(short.replace("</style>", f"{DARK_STYLE}</style>", 1), encoding="utf-8")
 
 
-def crowded(within: artist.Artist) -> bool:
+def is_crowded(within: artist.Artist) -> bool:
     """Whether something is drawn in so many pieces that nobody wants each of them in a file."""
     if isinstance(within, Line2D):
-        return within.get_marker() not in ("None", None) and np.size(within.get_xdata()) > CROWDED
+        return within.get_marker() not in ("None", None) and np.size(within.get_xdata()) > MAX_VECTOR_MARKERS
     return isinstance(within, QuadMesh)
 
 
-def texts(within: artist.Artist) -> Iterator[Text]:
+def find_texts(within: artist.Artist) -> Iterator[Text]:
     """All texts in a figure but the numbers at its axes, where powers are set as mathematics."""
     for child in within.get_children():
         if isinstance(child, Text):
@@ -130,28 +132,28 @@ def texts(within: artist.Artist) -> Iterator[Text]:
         elif isinstance(child, Axis):
             yield from (child.label, child.offsetText)  # to ask for all of its children makes its ticks, each time anew
         else:
-            yield from texts(child)
+            yield from find_texts(child)
 
 
-def fold(text: Text, place: float) -> None:
+def wrap_text(text: Text, place: float) -> None:
     """Break what is longer than its `place`, in pixels, into lines."""
     extent, lines = text.get_window_extent(), text.get_text().splitlines()
     if (longest := max(extent.width, extent.height)) > place:
         folded = textwrap.TextWrapper(max(1, int(max(map(len, lines)) * place / longest)))
-        folded.wordsep_re = NAME
+        folded.wordsep_re = LINE_BREAKS
         text.set_text("\n".join(map(folded.fill, lines)))
 
 
-def drawable(y: np.ndarray) -> np.ndarray:
+def mask_undrawable(y: np.ndarray) -> np.ndarray:
     """Values (n,) without those so large that differences of them have no number, which no axis can show."""
-    return np.where(np.abs(y) < LARGEST, y, np.nan)
+    return np.where(np.abs(y) < MAX_DRAWN_VALUE, y, np.nan)
 
 
-def label(name: str, unit: str) -> str:
+def axis_label(name: str, unit: str) -> str:
     """The heading of an axis."""
-    return heading(name, spelled(unit))
+    return column_heading(name, format_unit(unit))
 
 
-def spelled(unit: str) -> str:
+def format_unit(unit: str) -> str:
     """A unit as figures show it."""
     return unit.replace("2", "²").replace(".", "·")

@@ -10,13 +10,13 @@ from zipfile import ZipFile
 from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssv
 
-from ..process.child import serve
-from ..process.room import room
+from ..process.subprocess_runner import serve_request
+from ..process.temporary_directory import temporary_directory
 
 
 def run(archive: str, step: float, count: int, read: list[tuple[str, str, int]], values: str) -> list[list[float]]:
     """The rows of a run."""
-    with room("ssv-") as folder, ZipFile(archive) as content:
+    with temporary_directory("ssv-") as folder, ZipFile(archive) as content:
         name = "resources/parameters.ssv"
         parameters: Any = None
         if name in content.namelist():
@@ -26,4 +26,4 @@ def run(archive: str, step: float, count: int, read: list[tuple[str, str, int]],
 
 
 if __name__ == "__main__":
-    serve(dict, lambda asked: run(**asked))
+    serve_request(dict, lambda asked: run(**asked))

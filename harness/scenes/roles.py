@@ -7,7 +7,7 @@ from typing import Any
 ROLES = {"position": ("x", "theta"), "velocity": ("v", "omega"), "acceleration": ("a", "alpha")}
 
 
-def roles(outputs: Collection[str] | Mapping[str, Any]) -> dict[str, str]:
+def find_roles(outputs: Collection[str] | Mapping[str, Any]) -> dict[str, str]:
     """The output that plays each role, of those there are: by the names above; of variables of an FMU, by their names,
     that of the first position whose rate has a rate, as their declarations say, whatever it is called."""
     if isinstance(outputs, Mapping):

@@ -23,20 +23,20 @@ from cattrs.errors import (
 )
 from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn, override
 
-from ..errors import SceneError, shown, unknown
+from ..errors import SceneError, format_value, unknown_name_message
 
-THERE = "`python -m harness list` shows the scenes that there are"
-LONGEST_TITLE = 200  # letters
-LARGEST = 1_000_000  # bytes of a file that somebody wrote
+LIST_HINT = "`python -m harness list` shows the scenes that there are"
+MAX_TITLE_LENGTH = 200  # letters
+MAX_FILE_BYTES = 1_000_000  # bytes of a file that somebody wrote
 Schema = TypeVar("Schema")
 
 
 @dataclass(frozen=True)
-class Kind:
+class Constraint:
     """What a value must be, and the words for it."""
 
     accepts: Callable[[Any], bool]
-    words: str
+    description: str
 
 
 def is_text(value: object) -> bool:
@@ -45,7 +45,7 @@ def is_text(value: object) -> bool:
 
 def is_title(value: object) -> bool:
     text = str(value)
-    return is_text(value) and len(text) <= LONGEST_TITLE and text.splitlines() == [text] and "\0" not in text
+    return is_text(value) and len(text) <= MAX_TITLE_LENGTH and text.splitlines() == [text] and "\0" not in text
 
 
 def is_number(value: object) -> bool:
@@ -63,115 +63,120 @@ def is_names(value: object) -> bool:
     return isinstance(value, list) and all(map(is_text, value)) and len(set(value)) == len(value)
 
 
-TITLE = Kind(is_title, f"a text of one line and at most {LONGEST_TITLE} letters")
-TEXT = Kind(is_text, "a text")
-NUMBER = Kind(is_number, "a finite number")
-POSITIVE = Kind(lambda value: is_number(value) and value > 0, "a finite number above 0")
-NAMES = Kind(is_names, "a list of different names")
-FLAG = Kind(lambda value: isinstance(value, bool), "true or false")
-TABLE = Kind(lambda value: isinstance(value, dict), "a table")
-LIST = Kind(lambda value: isinstance(value, list), "a list")
+TITLE = Constraint(is_title, f"a text of one line and at most {MAX_TITLE_LENGTH} letters")
+TEXT = Constraint(is_text, "a text")
+NUMBER = Constraint(is_number, "a finite number")
+POSITIVE = Constraint(lambda value: is_number(value) and value > 0, "a finite number above 0")
+NAMES = Constraint(is_names, "a list of different names")
+FLAG = Constraint(lambda value: isinstance(value, bool), "true or false")
+TABLE = Constraint(lambda value: isinstance(value, dict), "a table")
+LIST = Constraint(lambda value: isinstance(value, list), "a list")
 
 Hook = Callable[[Any, Any], Any]
 CONVERTER = Converter(forbid_extra_keys=True)
 
 
-def kind_of(annotation: Any) -> Kind | None:
+def find_constraint(annotation: Any) -> Constraint | None:
     """The kind that stands beside a type."""
-    return next((each for each in getattr(annotation, "__metadata__", ()) if isinstance(each, Kind)), None)
+    return next((each for each in getattr(annotation, "__metadata__", ()) if isinstance(each, Constraint)), None)
 
 
-def of_kind(kind: Kind, then: Hook) -> Hook:
+def make_checked_hook(kind: Constraint, then: Hook) -> Hook:
     """What refuses a value that is not of its kind, and goes on with one that is."""
 
     def hook(value: Any, annotation: Any) -> Any:
         if not kind.accepts(value):
-            raise ValueError(f"{shown(value)} is not {kind.words}")
+            raise ValueError(f"{format_value(value)} is not {kind.description}")
         return then(value, annotation)
 
     return hook
 
 
-def plain(annotation: Any) -> Hook:
+def make_value_hook(annotation: Any) -> Hook:
     """A value stays as it is; a list, which could be changed, becomes a tuple."""
-    kind = kind_of(annotation)
+    kind = find_constraint(annotation)
     assert kind is not None
-    return of_kind(kind, lambda value, _: tuple(value) if isinstance(value, list) else value)
+    return make_checked_hook(kind, lambda value, _: tuple(value) if isinstance(value, list) else value)
 
 
-def table(annotation: Any) -> Hook:
+def make_table_hook(annotation: Any) -> Hook:
     """A table whose keys are the fields of a dataclass; `from_` stands for the key `from`."""
-    renamed: Any = {name: override(rename=name.rstrip("_")) for name in keys(annotation) if name.endswith("_")}
-    return of_kind(TABLE, make_dict_structure_fn(annotation, CONVERTER, **renamed))
+    renamed: Any = {name: override(rename=name.rstrip("_")) for name in field_names(annotation) if name.endswith("_")}
+    return make_checked_hook(TABLE, make_dict_structure_fn(annotation, CONVERTER, **renamed))
 
 
-def keys(schema: Any) -> list[str]:
+def field_names(schema: Any) -> list[str]:
     return [each.name for each in fields(schema)]
 
 
-def tables(annotation: Any) -> Hook:
+def make_mapping_hook(annotation: Any) -> Hook:
     """A table whose keys are free, and whose values are alike."""
-    return of_kind(TABLE, make_mapping_structure_fn(annotation, CONVERTER))
+    return make_checked_hook(TABLE, make_mapping_structure_fn(annotation, CONVERTER))
 
 
-def items(annotation: Any) -> Hook:
+def make_list_hook(annotation: Any) -> Hook:
     """A list whose items are alike."""
     alike: Any = GenericAlias(list, get_args(annotation)[:1])
-    return of_kind(LIST, lambda value, _: tuple(CONVERTER.structure(value, alike)))
+    return make_checked_hook(LIST, lambda value, _: tuple(CONVERTER.structure(value, alike)))
 
 
-def made_of(container: Any) -> Callable[[Any], bool]:
+def has_origin(container: Any) -> Callable[[Any], bool]:
     return lambda annotation: get_origin(annotation) is container
 
 
-for concerns, hooks in ((is_dataclass, table), (made_of(dict), tables), (made_of(tuple), items), (kind_of, plain)):
+for concerns, hooks in (
+    (is_dataclass, make_table_hook),
+    (has_origin(dict), make_mapping_hook),
+    (has_origin(tuple), make_list_hook),
+    (find_constraint, make_value_hook),
+):
     CONVERTER.register_structure_hook_factory(concerns, hooks)  # type: ignore[arg-type]
 
 
-def structured(written: dict[str, Any], schema: type[Schema]) -> Schema:
+def parse_table(written: dict[str, Any], schema: type[Schema]) -> Schema:
     """A table as its schema says; SceneError in one sentence if it does not fit."""
     try:
         return CONVERTER.structure(written, schema)
     except BaseValidationError as error:
-        raise SceneError(min(faults(error))[1]) from None
+        raise SceneError(min(find_faults(error))[1]) from None
 
 
-def faults(error: Exception, where: str = "") -> Iterator[tuple[int, str]]:
+def find_faults(error: Exception, where: str = "") -> Iterator[tuple[int, str]]:
     """What is wrong at a place and below it, a sentence each; a key that nobody knows explains most: rank 0."""
     if isinstance(error, ClassValidationError | IterableValidationError):
         placed, others = error.group_exceptions()
         for each, note in placed:
             key = note.index if isinstance(note, IterableValidationNote) else note.name.rstrip("_")
-            yield from faults(each, below(where, key))
+            yield from find_faults(each, join_key_path(where, key))
         for each in others:
-            yield from faults(each, where)
+            yield from find_faults(each, where)
     elif isinstance(error, ForbiddenExtraKeysError):
-        allowed = [name.rstrip("_") for name in keys(error.cl)]
-        yield 0, unknown(f"key in [{where}]" if where else "key", min(error.extra_fields), allowed)
+        allowed = [name.rstrip("_") for name in field_names(error.cl)]
+        yield 0, unknown_name_message(f"key in [{where}]" if where else "key", min(error.extra_fields), allowed)
     elif isinstance(error, KeyError):
         yield 2, f"the key '{where}' is missing"
     else:
         yield 1, f"{where} = {error}"
 
 
-def below(where: str, key: str | int) -> str:
+def join_key_path(where: str, key: str | int) -> str:
     """The place of a key, or of an item counted from 0."""
     if isinstance(key, int):
         return f"{where}[{key}]"
-    name = key if key.isidentifier() else shown(key)
+    name = key if key.isidentifier() else format_value(key)
     return f"{where}.{name}" if where else name
 
 
-def read(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, Any]:
     """The table in a TOML file; SceneError in one sentence if there is none."""
     try:
         if path.exists() and not path.is_file():
-            raise SceneError(f"cannot read the scene {path}: not a file; {THERE}")
-        if path.stat().st_size > LARGEST:
-            raise SceneError(f"scene {path.stem}: more than {LARGEST} bytes are no scene; {THERE}")
+            raise SceneError(f"cannot read the scene {path}: not a file; {LIST_HINT}")
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise SceneError(f"scene {path.stem}: more than {MAX_FILE_BYTES} bytes are no scene; {LIST_HINT}")
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise SceneError(f"cannot read the scene {path}: {error.strerror}; {THERE}") from None
+        raise SceneError(f"cannot read the scene {path}: {error.strerror}; {LIST_HINT}") from None
     except UnicodeDecodeError:
         raise SceneError(f"scene {path.stem}: not a text file in UTF-8: save it as one") from None
     except RecursionError:

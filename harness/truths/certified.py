@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import HarnessError
-from ..results.files import heading, write_rows
-from ..running.inside import Inside, embedded, offered
-from ..scenes.fmus import fmu_of
+from ..results.files import column_heading, write_csv_rows
+from ..running.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from ..scenes.fmu_files import find_fmu
 from .models import CASES
 from .pieces import Span, Values
 from .reference import DOUBT, FOLDER, POINTS, Reference, difference
@@ -37,9 +37,9 @@ def certify(file: Path) -> list[Certified]:
     fmu = file.with_suffix(".fmu")
     if not fmu.is_file():
         raise HarnessError(f"there is no {fmu}: build it with `python build_fmus.py {file}`")
-    model = embedded(fmu)
+    model = load_model_class(fmu)
     found = again(file) or {file.stem: agreed(model, file)}
-    heads = ["t [s]", *(heading(name, unit) for name, unit in states(model))]
+    heads = ["t [s]", *(column_heading(name, unit) for name, unit in states(model))]
     return [kept(file.with_name(f"{name}.csv"), heads, reference) for name, reference in found.items()]
 
 
@@ -57,9 +57,9 @@ def again(file: Path) -> dict[str, Reference]:
 def kept(path: Path, heads: list[str], found: Reference) -> Certified:
     """The files of a result."""
     rows = np.column_stack([found.times, found.motion]).tolist()
-    write_rows(path, heads, rows, f"# {found.how}{DOUBT}{found.doubt:.1e}\n")
+    write_csv_rows(path, heads, rows, f"# {found.how}{DOUBT}{found.doubt:.1e}\n")
     if found.modes:
-        write_rows(path.with_name(f"{path.stem}-events.csv"), ["t [s]", "mode"], found.modes)
+        write_csv_rows(path.with_name(f"{path.stem}-events.csv"), ["t [s]", "mode"], found.modes)
     return Certified(path, found.doubt)
 
 
@@ -71,8 +71,8 @@ def states(model: type) -> list[tuple[str, str]]:
 
 def by_two_methods(model: str, spans: list[Span], grid: Grid) -> Truth:
     """What two methods of an FMU agree about, over a single span from 0 s on."""
-    file, ((_, _, values),) = fmu_of(model), spans
-    carried: Any = embedded(file)
+    file, ((_, _, values),) = find_fmu(model), spans
+    carried: Any = load_model_class(file)
     times = grid.times(())
     found = agreed(carried, file, values, times)
     position = next(place for place, rate in enumerate(carried.states.values()) if rate in carried.states)
@@ -85,17 +85,17 @@ def agreed(model: Any, file: Path, values: Values | None = None, times: list[flo
 
     Without more it is the default run, at the common points.
     """
-    if missing := METHODS.keys() - offered(model):
+    if missing := METHODS.keys() - method_numbers(model):
         methods = ", ".join(sorted(missing))
         raise HarnessError(f"{file.with_suffix('.fmu')} does not offer {methods}: build it with all of its methods")
     times = np.linspace(0.0, model.stop_time, POINTS).tolist() if times is None else times
-    first, second = (Inside.prepared(model, values or {}, method, rtol) for method, rtol in METHODS.items())
-    answers = [run.answer(times, PATIENCE) for run in (first, second)]
+    first, second = (EmbeddedModel.create(model, values or {}, method, rtol) for method, rtol in METHODS.items())
+    answers = [run.solve(times, PATIENCE) for run in (first, second)]
     how, apart = " and ".join(METHODS), difference(*answers)
     if not apart <= AGREED:
         raise HarnessError(
             f"{file.name}: {how} differ by {apart:.1e}, more than {AGREED:g}, and nothing is certified: shorten the "
             "default run, or smooth a law that jumps"
         )
-    modes = first.modes(times[-1]) if answers[0].events is not None else []
-    return Reference(np.array(times), answers[0].motion, modes, how, apart)
+    modes = first.find_modes(times[-1]) if answers[0].events is not None else []
+    return Reference(np.array(times), answers[0].states, modes, how, apart)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ..running.answer import Answer
+from ..running.solution import Solution
 from .models import FOUND
 from .models.pendulum import Pendulum
 from .peers import solve
@@ -33,10 +33,10 @@ def made(case: Case) -> Reference:
     times = np.linspace(0.0, problem.stop, POINTS)
     answer, how, apart = routes(name, problem, times)
     start = [(0.0, problem.mode_from(0.0, *problem.start))] if problem.dry else []
-    return Reference(times, answer.motion, start + (answer.events or []), how, apart)
+    return Reference(times, answer.states, start + (answer.events or []), how, apart)
 
 
-def routes(name: str, problem: Equations, times: np.ndarray) -> tuple[Answer, str, float]:
+def routes(name: str, problem: Equations, times: np.ndarray) -> tuple[Solution, str, float]:
     """The motion, the routes that led to it, and their largest difference relative to the largest of each column."""
     if name in CLOSED:
         return closed(name, times), "closed form in 40 digits", ROUNDING
@@ -49,10 +49,10 @@ def routes(name: str, problem: Equations, times: np.ndarray) -> tuple[Answer, st
     return explicit, "DOP853 and Radau", difference(explicit, implicit)
 
 
-def closed(name: str, times: np.ndarray) -> Answer:
+def closed(name: str, times: np.ndarray) -> Solution:
     """The doubles next to the closed form; what changes after the last of the times is left out."""
     found = list(CLOSED[name](float(times[-1])))
     motion = sampled(found, times.tolist())
     motion[np.abs(motion) < NOTHING] = 0.0
     events = [(t, mode) for t, mode in changes(found) if t <= times[-1]]
-    return Answer(motion, events, 0)
+    return Solution(motion, events, 0)

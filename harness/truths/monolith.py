@@ -12,7 +12,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..errors import HarnessError
-from ..scenes.coupled.scene import Coupled
+from ..scenes.coupled.scene import CoupledScene
 from .models import FOUND
 
 RTOL, ATOL = 1e-11, 1e-14
@@ -43,7 +43,7 @@ class Bodies:
 LINEAR = {name: each.friction for name, each in FOUND.items() if hasattr(each, "friction")}  # the models of bodies
 
 
-def bodies(scene: Coupled, defaults: dict[str, dict[str, float]]) -> tuple[Bodies, np.ndarray]:
+def bodies(scene: CoupledScene, defaults: dict[str, dict[str, float]]) -> tuple[Bodies, np.ndarray]:
     """The bodies of a scene and their start (x, v) (2 n,), from the values of the models and of the scene."""
     values = [defaults[part.model] | part.values for part in scene.parts]
     places = {part.name: i for i, part in enumerate(scene.parts)}
@@ -58,12 +58,12 @@ def bodies(scene: Coupled, defaults: dict[str, dict[str, float]]) -> tuple[Bodie
     return Bodies(*constants, tuple(couplings(scene, places))), np.concatenate([each("x0"), each("v0")])
 
 
-def couplings(scene: Coupled, places: dict[str, int]) -> Iterator[tuple[int, int, str, float]]:
+def couplings(scene: CoupledScene, places: dict[str, int]) -> Iterator[tuple[int, int, str, float]]:
     """What acts on each body from the others: of a spring on its flange a k (x_b - x_a) + c (v_b - v_a)."""
-    for each in scene.passed:
+    for each in scene.direct_connections:
         yield places[each.sink], places[each.source], each.output, 1.0
     for spring in scene.springs:
-        for flange, part in spring.acts:
+        for flange, part in spring.force_ends:
             for end, source in (("a", spring.a), ("b", spring.b)):
                 sign = -1.0 if end == flange else 1.0
                 for output, factor in (("x", spring.k), ("v", spring.c)) if source else ():

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import HarnessError
-from ..running.answer import Answer
+from ..running.solution import Solution
 from .problem import Equations, Rates, State
 
 SCIPY = ("RK23", "RK45", "DOP853", "Radau", "LSODA")
@@ -86,7 +86,7 @@ def missing() -> dict[str, str]:
 
 def solve(
     peer: str, method: str, problem: Equations, times: np.ndarray, rtol: float, atol: float, watched: Watch = unwatched
-) -> Answer:
+) -> Solution:
     """The motion at `times` (n,), which begin at 0 and end at the stop; HarnessError says why there is none."""
     ask = partial({"scipy": by_scipy, "cvode": by_cvode}[peer], Task(method, problem, watched, rtol, atol))
     t, state = 0.0, problem.start
@@ -113,7 +113,7 @@ def solve(
             done = max(done, passed)
             if release <= problem.stop:
                 events.append((t, mode))
-    return Answer(motion, events if problem.dry else None, evaluations)
+    return Solution(motion, events if problem.dry else None, evaluations)
 
 
 def by_scipy(task: Task, mode: int, t: float, state: tuple[float, float], times: np.ndarray) -> Stretch:

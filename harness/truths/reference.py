@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..running.answer import Answer
+from ..running.solution import Solution
 from .problem import Equations
 
 FOLDER = Path(__file__).parents[2] / "fmus"
@@ -89,9 +89,9 @@ def load(name: str, folder: Path = FOLDER) -> Reference:
     return Reference(times, np.array(motion).T, changes, how, float(doubt) if told else nan)
 
 
-def errors(answer: Answer, truth: Reference) -> Errors:
+def errors(answer: Solution, truth: Reference) -> Errors:
     """How far an answer at the common points is from the truth."""
-    off = relative(answer.motion, truth.motion)
+    off = relative(answer.states, truth.motion)
     asked = answer.events is not None
     return Errors(
         final=float(off[-1]),
@@ -107,9 +107,9 @@ def relative(motion: np.ndarray, truth: np.ndarray) -> np.ndarray:
     return (np.abs(motion - truth) / np.where(largest > 0, largest, 1.0)).max(axis=1)
 
 
-def difference(one: Answer, other: Answer) -> float:
+def difference(one: Solution, other: Solution) -> float:
     """The largest error of an answer, the first being the truth."""
-    return float(relative(other.motion, one.motion).max())
+    return float(relative(other.states, one.states).max())
 
 
 def late(events: Sequence[tuple[float, int]], truth: Sequence[tuple[float, int]]) -> float:

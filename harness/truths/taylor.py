@@ -5,14 +5,14 @@ from collections.abc import Callable
 import numpy as np
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
-from ..running.answer import Answer
+from ..running.solution import Solution
 from .models.pendulum import Pendulum, Reaction
 
 DIGITS = 25
 WITHIN = (0.25, 0.45)  # s: half a period and then some, which holds one turning point
 
 
-def swings(problem: Pendulum, times: list[float]) -> Answer:
+def swings(problem: Pendulum, times: list[float]) -> Solution:
     """The motion at the times, and the changes of mode."""
     with workdps(DIGITS):
         weight, arm = mpf(problem.m) * mpf(problem.g), mpf(problem.mu) * mpf(problem.r)
@@ -47,4 +47,4 @@ def swings(problem: Pendulum, times: list[float]) -> Answer:
         events.append((t, 0))
         motion += [(x, mpf(0)) for s in times if s >= t]
         assert len(motion) == len(times)
-        return Answer(np.array(motion, float), [(float(t), mode) for t, mode in events], 0)
+        return Solution(np.array(motion, float), [(float(t), mode) for t, mode in events], 0)

@@ -5,11 +5,11 @@ import pytest
 
 from harness.analyses.slip import crest, crossings, slips_of_modes
 from harness.analyses.steps import collapse_at_reversals
-from harness.results.steps import published_mean
+from harness.results.step_sizes import published_mean_step
 
 
 def test_the_published_mean_counts_the_last_step_twice():
-    assert published_mean(np.array([1.0, 2.0, 6.0])) == (1 + 2 + 6 + 6) / 4
+    assert published_mean_step(np.array([1.0, 2.0, 6.0])) == (1 + 2 + 6 + 6) / 4
 
 
 def test_collapse_compares_the_median_step_with_the_smallest_at_reversals():

@@ -16,13 +16,13 @@ from pathlib import Path
 import pytest
 from builds import ROOT
 
-import harness.process.wait
+import harness.process.interruptible_wait
 from harness.commands.terminal import progress
 from harness.process import interrupt
-from harness.process.child import Hangs, ask
-from harness.process.crew import Crew, Died
-from harness.process.interrupt import Interrupted, check, interruptible, later
-from harness.process.wait import ended
+from harness.process.interrupt import CommandInterruptedError, check_interrupt, defer_signals, interruptible
+from harness.process.interruptible_wait import wait_for_any
+from harness.process.subprocess_runner import SubprocessTimeoutError, run_subprocess
+from harness.process.worker_pool import WorkerDiedError, WorkerPool
 
 SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
 COMMANDS = {  # and a file or folder that is there once it is under way
@@ -95,14 +95,14 @@ def test_a_context_is_left_though_a_signal_came_when_it_was_just_entered():
         held.__enter__()
         raise KeyboardInterrupt
 
-    with pytest.raises(Interrupted) as told, interruptible():
+    with pytest.raises(CommandInterruptedError) as told, interruptible():
         entered()
     assert told
     assert left == ["folder"]
 
 
 def test_an_interrupt_that_something_swallowed_still_ends_it(monkeypatch):
-    monkeypatch.setattr(interrupt, "HEARD", [])
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
 
     def swallowed():
@@ -112,25 +112,25 @@ def test_an_interrupt_that_something_swallowed_still_ends_it(monkeypatch):
             raise RuntimeError("a step failed, for what it is worth")
 
     usual = signal.default_int_handler, signal.SIG_DFL  # a shell lets what it starts in the background ignore Ctrl-C
-    before = [signal.signal(number, handler) for number, handler in zip(interrupt.BOTH, usual, strict=True)]
+    before = [signal.signal(number, handler) for number, handler in zip(interrupt.SIGNALS, usual, strict=True)]
     try:
-        with pytest.raises(Interrupted, match="interrupted") as told:
+        with pytest.raises(CommandInterruptedError, match="interrupted") as told:
             swallowed()
         assert told.value.status == 130
         with pytest.raises(KeyboardInterrupt):
-            check()
+            check_interrupt()
     finally:
-        for number, handler in zip(interrupt.BOTH, before, strict=True):
+        for number, handler in zip(interrupt.SIGNALS, before, strict=True):
             signal.signal(number, handler)
 
 
 def test_a_signal_in_a_beginning_waits_for_its_end(monkeypatch):
-    monkeypatch.setattr(interrupt, "HEARD", [])
-    before = signal.signal(signal.SIGTERM, interrupt.hear)
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
+    before = signal.signal(signal.SIGTERM, interrupt.handle_signal)
     begun = []
 
     def begin():
-        with later():
+        with defer_signals():
             signal.raise_signal(signal.SIGTERM)
             begun.append("whole")
 
@@ -144,29 +144,29 @@ def test_a_signal_in_a_beginning_waits_for_its_end(monkeypatch):
 
 def test_a_signal_while_the_command_waits_leaves_no_lock_held(monkeypatch):
     """At whatever line of the waiting it comes, of ours or of the library's: else what is awaited could never end."""
-    monkeypatch.setattr(harness.process.wait, "OFTEN", 1e-4)
-    before, trace = signal.signal(signal.SIGINT, interrupt.hear), sys.gettrace()
+    monkeypatch.setattr(harness.process.interruptible_wait, "POLL_INTERVAL", 1e-4)
+    before, trace = signal.signal(signal.SIGINT, interrupt.handle_signal), sys.gettrace()
 
     def interrupted(line):
         """Whether the waiting has so many lines; it is interrupted at the last."""
-        monkeypatch.setattr(interrupt, "HEARD", [])
+        monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
         pending, lines = Future(), iter(range(line))
 
         def look(frame, event, _):
-            if event == "line" and not interrupt.HEARD and next(lines, None) is None:
+            if event == "line" and not interrupt.RECEIVED_SIGNALS and next(lines, None) is None:
                 signal.raise_signal(signal.SIGINT)
             return look
 
         with suppress(KeyboardInterrupt):
             sys.settrace(look)
-            ended([pending])
+            wait_for_any([pending])
             sys.settrace(trace)  # before suppress, which is Python, too, goes on
         sys.settrace(trace)
         other = threading.Thread(target=pending.cancel, daemon=True)
         other.start()
         other.join(timeout=10)
         assert not other.is_alive()
-        return bool(interrupt.HEARD)
+        return bool(interrupt.RECEIVED_SIGNALS)
 
     try:
         assert next(line for line in count() if not interrupted(line)) > 100
@@ -176,15 +176,15 @@ def test_a_signal_while_the_command_waits_leaves_no_lock_held(monkeypatch):
 
 
 def test_what_is_asked_may_be_longer_than_a_pipe_holds_and_is_heard_late():
-    done = ask(["sh", "-c", "sleep 0.3; wc -c"], "a" * 200_000, patience=60.0)
+    done = run_subprocess(["sh", "-c", "sleep 0.3; wc -c"], "a" * 200_000, timeout=60.0)
     assert (done.returncode, done.stdout.strip()) == (0, "200000")
 
 
 def test_a_program_that_hangs_ends_with_all_that_it_started(tmp_path):
     script = "sleep 100 & echo $! > pid; wait"
-    with pytest.raises(Hangs, match=r"no answer after 0\.5 s") as late:
-        ask(["sh", "-c", f"cd '{tmp_path}'; echo so far; {script}"], patience=0.5)
-    assert late.value.done.stdout == "so far\n"
+    with pytest.raises(SubprocessTimeoutError, match=r"no answer after 0\.5 s") as late:
+        run_subprocess(["sh", "-c", f"cd '{tmp_path}'; echo so far; {script}"], timeout=0.5)
+    assert late.value.process.stdout == "so far\n"
     state = Path("/proc", (tmp_path / "pid").read_text().strip(), "stat")
     for _ in range(100):
         if not state.exists() or state.read_text().split()[2] == "Z":  # nobody asks for its status
@@ -194,55 +194,55 @@ def test_a_program_that_hangs_ends_with_all_that_it_started(tmp_path):
 
 
 def test_a_program_that_a_thread_waits_for_ends_with_the_command(tmp_path, monkeypatch):
-    monkeypatch.setattr(interrupt, "HEARD", [])
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
     ended = []
 
     def wait():
         try:
-            ask(["sleep", "100"])
+            run_subprocess(["sleep", "100"])
         except KeyboardInterrupt:
             ended.append("here")
 
     thread = threading.Thread(target=wait)
     thread.start()
-    interrupt.HEARD.append(signal.SIGINT)
+    interrupt.RECEIVED_SIGNALS.append(signal.SIGINT)
     thread.join(timeout=30)
     assert ended == ["here"]
 
 
 def test_a_worker_that_is_killed_while_it_is_told_much_is_replaced(tmp_path):
-    crew = Crew(1, tmp_path, [])
+    crew = WorkerPool(1, tmp_path, [])
     try:
         pid = result(crew, os.getpid)
         os.kill(pid, signal.SIGSTOP)  # it reads no more
         threading.Timer(0.2, os.kill, [pid, signal.SIGKILL]).start()
-        with pytest.raises(Died, match="exit code -9"):
+        with pytest.raises(WorkerDiedError, match="exit code -9"):
             result(crew, len, bytes(10_000_000))
         assert result(crew, len, bytes(10_000_000)) == 10_000_000
     finally:
-        crew.end()
+        crew.kill()
 
 
 def result(crew, function, *arguments):
     future = crew.submit(function, *arguments)
-    while not crew.ended([future]):
+    while not crew.wait_for_any([future]):
         pass
     return future.result()
 
 
 def test_a_sentence_about_the_interrupt_survives_the_clean_up(monkeypatch):
-    monkeypatch.setattr(interrupt, "HEARD", [signal.SIGTERM])
-    before = signal.signal(signal.SIGTERM, interrupt.hear)
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [signal.SIGTERM])
+    before = signal.signal(signal.SIGTERM, interrupt.handle_signal)
 
     def told():
         try:
-            raise Interrupted("half of it is kept")
+            raise CommandInterruptedError("half of it is kept")
         finally:
-            with later():
+            with defer_signals():
                 pass
 
     try:
-        with pytest.raises(Interrupted, match="half of it is kept") as ended:
+        with pytest.raises(CommandInterruptedError, match="half of it is kept") as ended:
             told()
     finally:
         signal.signal(signal.SIGTERM, before)
@@ -251,9 +251,9 @@ def test_a_sentence_about_the_interrupt_survives_the_clean_up(monkeypatch):
 
 @pytest.mark.parametrize("quiet", [True, False])
 def test_whoever_tells_its_progress_hears_of_an_interrupt_that_was_swallowed(monkeypatch, quiet):
-    monkeypatch.setattr(interrupt, "HEARD", [])
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
     with progress(quiet, 2) as report:
         report("one", 0.5)
-        interrupt.HEARD.append(signal.SIGINT)
+        interrupt.RECEIVED_SIGNALS.append(signal.SIGINT)
         with pytest.raises(KeyboardInterrupt):
             report("one", 1.0)

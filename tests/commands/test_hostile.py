@@ -21,7 +21,7 @@ from harness.commands import commands
 from harness.errors import HarnessError
 from harness.results.style import Figure
 from harness.scenes.scene import SceneKeys
-from harness.scenes.schema import keys
+from harness.scenes.schema import field_names
 
 SCENE = {"title": '"a title"', "model": '"smd"', "outputs": '["x", "v"]', "stop": "0.1", "plots": "[]"}
 TIMES = ("start", "stop", "follow", "h_max")
@@ -131,7 +131,7 @@ def check(status, said, shown):
         assert said.strip(), shown
 
 
-@pytest.mark.parametrize("key", [*keys(SceneKeys), "nosuch"])
+@pytest.mark.parametrize("key", [*field_names(SceneKeys), "nosuch"])
 def test_whatever_a_scene_says_it_runs_or_is_refused(here, key):
     usual = SCENE if key in TIMES else SCENE | {"grid": "0.01"}  # else there are 4096 points, which tell no more
     for value in VALUES:
@@ -182,7 +182,9 @@ def test_whatever_stands_in_a_table_it_is_compared_or_refused(here, monkeypatch)
     (here / "\udcff$_{.csv").write_text("t [s],x [m]\n0,1\n1,2.5\n2,3\n")
     for name in (*names, "\udcff$_{.csv"):
         check(*ended("compare", name, "good.csv", "--quiet"), (name, Path(name).read_text()[:200]))
-    monkeypatch.setattr("harness.studies.compare.figure.sheet", partial(unseen, Figure))  # the same tables are drawn
+    monkeypatch.setattr(
+        "harness.studies.compare.figure.open_figure", partial(unseen, Figure)
+    )  # the same tables are drawn
     for name in names:
         for pair in (("good.csv", name), (name, name)):
             check(*ended("compare", *pair, "--quiet"), (pair, Path(name).read_text()[:200]))

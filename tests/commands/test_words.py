@@ -21,7 +21,7 @@ from rich.console import Console
 from harness.commands import commands
 from harness.errors import HarnessError
 from harness.scenes.coupled import scene as coupled
-from harness.scenes.scene import load, shipped
+from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.bench.measure import Beside, Measure
 from harness.studies.bench.table import numbers
 from harness.studies.importers import table as importers
@@ -139,7 +139,7 @@ def test_a_command_without_its_fmus_says_how_to_build_them(tmp_path, monkeypatch
     (tmp_path / "fmus").mkdir()
     for name in MODELS:
         (tmp_path / f"fmus/{name}.py").write_text("")
-    monkeypatch.setattr("harness.scenes.fmus.FOLDERS", (Path("fmus"),))
+    monkeypatch.setattr("harness.scenes.fmu_files.FOLDERS", (Path("fmus"),))
     monkeypatch.chdir(tmp_path)
     with pytest.raises(HarnessError, match=r"there is no .*fmus.*: build .* with `python build_fmus\.py`"):
         commands.main(arguments.split(), standalone_mode=False)
@@ -197,11 +197,13 @@ def test_the_versions_are_told(tmp_path):
 
 def test_the_list_as_json_is_what_the_commands_take(here):
     found = json.loads(harness(here, "list", "--json").stdout)
-    assert [each["scene"] for each in found if each["command"] == "run"] == [file.stem for file in shipped()]
-    assert [each["scene"] for each in found if each["command"] == "couple"] == [file.stem for file in coupled.shipped()]
+    assert [each["scene"] for each in found if each["command"] == "run"] == [file.stem for file in shipped_scenes()]
+    assert [each["scene"] for each in found if each["command"] == "couple"] == [
+        file.stem for file in coupled.shipped_coupled_scenes()
+    ]
     for each in found:
         if each["command"] == "run":
-            scene = load(each["scene"])
+            scene = load_scene(each["scene"])
             assert (each["title"], each["model"]) == (scene.title, scene.file.stem)
 
 

@@ -16,7 +16,7 @@ from builds import made, of_file
 from models import AUTHORED, LARGER, MODELS
 
 from harness.errors import HarnessError
-from harness.process.child import Hangs
+from harness.process.subprocess_runner import SubprocessTimeoutError
 from harness.studies.importers import checks, table
 from harness.studies.importers.checks import CHECKS, ELSEWHERE, IMPORTERS, Wrong
 from harness.studies.importers.request import END, Reply, Request
@@ -77,7 +77,7 @@ def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
     """Whatever follows is asked in another process; a process that ends badly takes the last of its answers with it."""
     asked = []
 
-    def process(module, text, patience):
+    def process(module, text, timeout):
         asked.append([json.loads(line)["instances"][0] for line in text.splitlines()])
         answered = [*takewhile(lambda name: name not in ("crash", "hang"), asked[-1])]
         last = asked[-1][: len(answered) + 1][-1]  # that it was about
@@ -86,10 +86,10 @@ def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
         said = "".join(f"{name} speaks{END}" for name in answered) + "a reason\n" * bool(ends)
         done = CompletedProcess([], ends, replies, said)
         if last == "hang":
-            raise Hangs(patience, done)
+            raise SubprocessTimeoutError(timeout, done)
         return done
 
-    monkeypatch.setattr(checks, "ask_module", process)
+    monkeypatch.setattr(checks, "run_module", process)
     monkeypatch.setattr(checks, "ANSWERS", {})
     tool, *_ = (importer for importer in IMPORTERS if importer.name == "Ecos")
     names = ["one", "crash", "two", "hang", "three", "leak"]

@@ -9,7 +9,7 @@ from models import MODELS, Choice, Input, Output, Parameter, declared, model_cla
 from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.messages import value_message
 from fmus.runtime.variable_declarations import Count, Fixed, Local, VariableOwner
-from harness.scenes.roles import roles
+from harness.scenes.roles import find_roles
 
 POUND, INCH = 0.45359237, 0.0254
 SLED = {"m": 12.5, "k": 742.5, "mu_s": 0.9, "mu_d": 0.6, "g": 9.81, "v_driver": 0.034}
@@ -146,4 +146,4 @@ def test_a_rate_says_whose_it_is_so_that_a_motion_is_found_by_its_roles(fmus, na
     whose = {v.name: v.derivative.name for v in variables.values() if v.derivative is not None}
     assert whose == ({"omega": "theta", "alpha": "omega"} if name == "pendulum" else {"v": "x", "a": "v"})
     named = [*whose.values(), "alpha" if name == "pendulum" else "a"]
-    assert list(roles(variables).values()) == named
+    assert list(find_roles(variables).values()) == named

@@ -12,8 +12,8 @@ from decays import swung
 from harness.analyses.decay.figures import Known
 from harness.analyses.decay.fit import identify
 from harness.errors import HarnessError, SceneError
-from harness.records.columns import Columns, read, split
-from harness.records.units import known, time_size
+from harness.records.columns import ColumnOptions, read_record, split_heading
+from harness.records.units import find_unit, time_unit_size
 
 T = np.arange(600) / 100
 TRUTH = {"omega": 12.566, "zeta": 0.01, "r": 0.002}
@@ -194,7 +194,7 @@ def found_in(record, pendulum):
 def test_a_file_as_people_have_it_gives_its_answer(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(FILES[name]())
-    record = read(str(path), Columns(**ASKED.get(name, {})), path.stem)
+    record = read_record(str(path), ColumnOptions(**ASKED.get(name, {})), path.stem)
     assert record.quantity == QUANTITIES.get(name, "position")
     found = found_in(record, name in PENDULUMS)
     values = {each.name: each for each in found.estimates}
@@ -289,7 +289,7 @@ def test_numbers_and_times_are_read_however_they_are_written(tmp_path, name):
     path, (content, asked) = tmp_path / "record", WRITTEN[name]
     written = content()
     path.write_bytes(written.encode() if isinstance(written, str) else written)
-    record = read(str(path), Columns(**asked), "record")
+    record = read_record(str(path), ColumnOptions(**asked), "record")
     assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
     assert record.x - record.x[0] == pytest.approx(X - X[0], abs=1e-6)
 
@@ -300,39 +300,39 @@ ROWS = "\n".join(f"{i},{i}" for i in range(20))
 @pytest.mark.parametrize(
     ("text", "columns", "sentence"),
     [
-        (f"t,x\n{ROWS}", Columns(), "x has no unit"),
-        (f"t,a\n{ROWS}", Columns(), "as in --unit m/s2 or g"),
-        (f"millivolts,x [m]\n{ROWS}", Columns(), "millivolts has whole or huge numbers and no unit"),
-        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", Columns(), "as in --time-unit ms, s, or 0.01s"),
-        (f"t [s],x [m]\n{ROWS}", Columns(position="y"), "unknown column 'y'"),
-        (f"t [h/m],x [m]\n{ROWS}", Columns(), "unknown unit of t 'h/m'"),
-        (f"t [s],x [m]\n{ROWS}\n20,abc", Columns(), "'abc' in row 22, column x [m], is not a number"),
-        (f"t [s],x [m]\n{ROWS}\n20,1,2", Columns(), "row 22 has 3 cells where the heading has 2"),
-        (f"t [s],x [m]\n{ROWS}\n5,5", Columns(), "time does not rise after t = 19.0 s"),
-        (f"t [s],x [m]\n{ROWS}\n20,1e200", Columns(), "which nothing measures"),
-        (f"t [s],x [m]\n{ROWS}", Columns(begin=15), "has 5 samples"),
+        (f"t,x\n{ROWS}", ColumnOptions(), "x has no unit"),
+        (f"t,a\n{ROWS}", ColumnOptions(), "as in --unit m/s2 or g"),
+        (f"millivolts,x [m]\n{ROWS}", ColumnOptions(), "millivolts has whole or huge numbers and no unit"),
+        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", ColumnOptions(), "as in --time-unit ms, s, or 0.01s"),
+        (f"t [s],x [m]\n{ROWS}", ColumnOptions(position="y"), "unknown column 'y'"),
+        (f"t [h/m],x [m]\n{ROWS}", ColumnOptions(), "unknown unit of t 'h/m'"),
+        (f"t [s],x [m]\n{ROWS}\n20,abc", ColumnOptions(), "'abc' in row 22, column x [m], is not a number"),
+        (f"t [s],x [m]\n{ROWS}\n20,1,2", ColumnOptions(), "row 22 has 3 cells where the heading has 2"),
+        (f"t [s],x [m]\n{ROWS}\n5,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
+        (f"t [s],x [m]\n{ROWS}\n20,1e200", ColumnOptions(), "which nothing measures"),
+        (f"t [s],x [m]\n{ROWS}", ColumnOptions(begin=15), "has 5 samples"),
         (
             f"t [s],x [m]\n{ROWS.replace(',1', ',').replace(',3', ',')}\n20,\n21,\n22,\n23,",
-            Columns(),
+            ColumnOptions(),
             "rows have no number",
         ),
-        (ROWS, Columns(), "--columns 't [s],x [mm]'"),
-        (ROWS, Columns(names="t"), "--columns names 1 columns, and record.csv has 2"),
-        ("", Columns(), "is empty"),
-        ("Dear Sir,\nno table.\n", Columns(), "has no table"),
-        (f"t [s],count [counts]\n{ROWS}", Columns(), "--per-count"),
-        (f"t [s],count [counts]\n{ROWS}", Columns(per_count="half a turn"), "has a number and a unit"),
-        (f"t [s],acceleration [mm]\n{ROWS}", Columns(), "the name of an acceleration and the unit of a position"),
-        (f"t [s],a [m/s^2]\n{ROWS}", Columns(quantity="position"), "is that of an acceleration"),
-        ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, Columns(names="t,x [m]"), "is no time stamp"),
-        ('t [s],"x [m]\n' + ROWS, Columns(), "has no table"),
+        (ROWS, ColumnOptions(), "--columns 't [s],x [mm]'"),
+        (ROWS, ColumnOptions(names="t"), "--columns names 1 columns, and record.csv has 2"),
+        ("", ColumnOptions(), "is empty"),
+        ("Dear Sir,\nno table.\n", ColumnOptions(), "has no table"),
+        (f"t [s],count [counts]\n{ROWS}", ColumnOptions(), "--per-count"),
+        (f"t [s],count [counts]\n{ROWS}", ColumnOptions(per_count="half a turn"), "has a number and a unit"),
+        (f"t [s],acceleration [mm]\n{ROWS}", ColumnOptions(), "the name of an acceleration and the unit of a position"),
+        (f"t [s],a [m/s^2]\n{ROWS}", ColumnOptions(quantity="position"), "is that of an acceleration"),
+        ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, ColumnOptions(names="t,x [m]"), "is no time stamp"),
+        ('t [s],"x [m]\n' + ROWS, ColumnOptions(), "has no table"),
     ],
 )
 def test_a_file_that_is_no_record_is_refused_in_one_sentence(tmp_path, text, columns, sentence):
     path = tmp_path / "record.csv"
     path.write_text(text)
     with pytest.raises(SceneError) as refusal:
-        read(str(path), columns, "record")
+        read_record(str(path), columns, "record")
     assert sentence in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
@@ -343,7 +343,7 @@ def test_a_damaged_file_is_refused_in_one_sentence(tmp_path, name, share):
     path, data = tmp_path / name, FILES[name]()
     path.write_bytes(data[: int(share * len(data))])
     with pytest.raises(HarnessError) as refusal:
-        read(str(path), Columns(unit="m"), path.stem)
+        read_record(str(path), ColumnOptions(unit="m"), path.stem)
     assert name in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
@@ -361,7 +361,7 @@ def test_no_bytes_end_in_a_traceback(tmp_path):
             bytes_[place] = rng.integers(256)
         path.write_bytes(bytes_)
         with contextlib.suppress(HarnessError):
-            read(str(path), Columns(), "record")
+            read_record(str(path), ColumnOptions(), "record")
 
 
 def test_an_archive_is_told_with_what_is_in_it(tmp_path):
@@ -370,21 +370,21 @@ def test_an_archive_is_told_with_what_is_in_it(tmp_path):
         archive.writestr("Raw Data.csv", FILES["phone.csv"]())
         archive.writestr("meta/device.csv", "property,value")
     with pytest.raises(SceneError, match=r"swing.zip is an archive: unpack it .* 'Raw Data.csv'"):
-        read(str(tmp_path / "swing.zip"), Columns(), "swing")
+        read_record(str(tmp_path / "swing.zip"), ColumnOptions(), "swing")
 
 
 def test_a_missing_file_is_told_with_the_nearest(tmp_path):
     (tmp_path / "swing.csv").write_text("t [s],x [m]\n" + ROWS)
     with pytest.raises(SceneError, match=r"cannot read .*No such file or directory \(nearest: 'swing.csv'\)"):
-        read(str(tmp_path / "swng.csv"), Columns(), "swng")
+        read_record(str(tmp_path / "swng.csv"), ColumnOptions(), "swng")
 
 
 def test_a_heading_is_taken_as_it_stands_in_the_file(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("clock [s],x [mm],Laser 2 [mm]\n" + rows(T, 0 * X, 1e3 * X))
-    record = read(str(path), Columns(time="clock [s]", position="Laser 2 [mm]"), "record")
+    record = read_record(str(path), ColumnOptions(time="clock [s]", position="Laser 2 [mm]"), "record")
     assert record.x == pytest.approx(X, abs=1e-9)
-    assert read(str(path), Columns(position="laser 2"), "record").x == pytest.approx(X, abs=1e-9)
+    assert read_record(str(path), ColumnOptions(position="laser 2"), "record").x == pytest.approx(X, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -404,7 +404,7 @@ def test_a_heading_is_taken_as_it_stands_in_the_file(tmp_path):
     ],
 )
 def test_a_unit_tells_what_was_measured(written, order, base, size):
-    assert known(written) == (order, base, pytest.approx(size, rel=1e-15))
+    assert find_unit(written) == (order, base, pytest.approx(size, rel=1e-15))
 
 
 @pytest.mark.parametrize(
@@ -421,13 +421,13 @@ def test_a_unit_tells_what_was_measured(written, order, base, size):
     ],
 )
 def test_a_heading_is_a_name_and_a_unit(heading, name, unit):
-    assert split(heading) == (name, unit)
-    assert unit is None or known(unit) or time_size(unit)
+    assert split_heading(heading) == (name, unit)
+    assert unit is None or find_unit(unit) or time_unit_size(unit)
 
 
 def test_a_unit_that_is_not_known_is_kept_and_said(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("t [s],sensor [V]\n" + rows(T, X))
-    record = read(str(path), Columns(), "record")
+    record = read_record(str(path), ColumnOptions(), "record")
     assert (record.unit, record.order) == ("V", 0)
     assert "taken for a position" in record.notes[0]

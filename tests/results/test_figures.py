@@ -4,13 +4,13 @@ from xml.etree.ElementTree import fromstring
 
 import numpy as np
 
-from harness.results.style import sheet
+from harness.results.style import open_figure
 
 
 def drawn(path, **style):
     """The text of a figure of 200 000 points, in a path under a name that no XML may hold."""
     t = np.linspace(0.0, 1.0, 200_000)
-    with sheet(path, 5.0, 3.0) as figure:
+    with open_figure(path, 5.0, 3.0) as figure:
         axes = figure.subplots()
         axes.plot(t, np.sin(900 * t) * np.exp(-t), **style)
         axes.set_title("a<b & \x00\x1b\udcff\ufffe $x_")
@@ -32,7 +32,7 @@ def test_very_many_points_make_a_file_of_hundreds_of_kilobytes_at_most(tmp_path)
 def test_a_name_that_is_longer_than_its_panel_goes_on_in_the_next_line(tmp_path):
     """As of a model in Modelica: without a blank, and told from the next by its end alone."""
     name = "mechanics.axis1.bearing.friction.plate[12].frame_a.angular_acceleration_of_the_inner_ring.relative.x[{}]"
-    with sheet(tmp_path / "a.svg", 5.0, 6.0) as figure:
+    with open_figure(tmp_path / "a.svg", 5.0, 6.0) as figure:
         heading = figure.suptitle(f"{name}\nshort")
         panels = figure.subplots(3)
         for i, axes in enumerate(panels):

@@ -10,7 +10,7 @@ from builds import ROOT
 
 from harness.errors import HarnessError
 from harness.results import folder as folders
-from harness.results.folder import replacing
+from harness.results.folder import replace_folder
 
 OURS = ("a.csv", "b.csv")
 
@@ -29,7 +29,7 @@ def older(tmp_path):
 
 
 def test_a_new_result_takes_the_place_of_the_old_one(older):
-    with replacing(older, OURS) as fresh:
+    with replace_folder(older, OURS) as fresh:
         (fresh / "b.csv").write_text("new")
         assert contents(older) == {"a.csv": "old"}
     assert contents(older) == {"b.csv": "new"}
@@ -39,7 +39,7 @@ def test_a_new_result_takes_the_place_of_the_old_one(older):
 @pytest.mark.parametrize("reason", [HarnessError("no"), KeyboardInterrupt()])
 def test_what_fails_half_way_leaves_the_old_result_and_nothing_else(older, reason):
     def fail():
-        with replacing(older, OURS) as fresh:
+        with replace_folder(older, OURS) as fresh:
             (fresh / "b.csv").write_text("half")
             raise reason
 
@@ -51,7 +51,7 @@ def test_what_fails_half_way_leaves_the_old_result_and_nothing_else(older, reaso
 
 def test_what_fails_leaves_no_folder_that_was_made_for_it(older):
     def fail():
-        with replacing(older.parent / "new/place/case", OURS):
+        with replace_folder(older.parent / "new/place/case", OURS):
             raise HarnessError("no")
 
     with pytest.raises(HarnessError):
@@ -61,14 +61,14 @@ def test_what_fails_leaves_no_folder_that_was_made_for_it(older):
 
 def test_a_folder_with_other_files_is_not_replaced(older):
     (older / "notes.txt").write_text("mine")
-    with pytest.raises(HarnessError, match=r"holds notes\.txt"), replacing(older, OURS):
+    with pytest.raises(HarnessError, match=r"holds notes\.txt"), replace_folder(older, OURS):
         pass
     assert contents(older) == {"a.csv": "old", "notes.txt": "mine"}
 
 
 def test_a_file_in_the_way_is_told(tmp_path):
     (tmp_path / "results").write_text("a file")
-    with pytest.raises(HarnessError, match="cannot write below"), replacing(tmp_path / "results/case", OURS):
+    with pytest.raises(HarnessError, match="cannot write below"), replace_folder(tmp_path / "results/case", OURS):
         pass
 
 
@@ -76,19 +76,19 @@ def test_a_file_in_the_way_is_told(tmp_path):
 def steps(request, monkeypatch):
     """A system that exchanges two folders in one step, and one that does not."""
     if request.param == "two steps":
-        monkeypatch.setattr(folders, "exchanged", lambda one, two: False)
+        monkeypatch.setattr(folders, "exchange_folders", lambda one, two: False)
     return request.param
 
 
 def test_whichever_way_folders_are_exchanged_nothing_is_left_beside(older, steps):
-    with replacing(older, OURS) as fresh:
+    with replace_folder(older, OURS) as fresh:
         (fresh / "b.csv").write_text("new")
     assert contents(older) == {"b.csv": "new"}
     assert list(older.parent.iterdir()) == [older]
 
 
 def test_an_exchange_that_fails_half_way_leaves_the_old_result(older, monkeypatch):
-    monkeypatch.setattr(folders, "exchanged", lambda one, two: False)
+    monkeypatch.setattr(folders, "exchange_folders", lambda one, two: False)
     rename = Path.rename
 
     def fail(self, target):
@@ -97,7 +97,10 @@ def test_an_exchange_that_fails_half_way_leaves_the_old_result(older, monkeypatc
         return rename(self, target)
 
     monkeypatch.setattr(Path, "rename", fail)
-    with pytest.raises(HarnessError, match=r"cannot write .*case: No space left on device"), replacing(older, OURS):
+    with (
+        pytest.raises(HarnessError, match=r"cannot write .*case: No space left on device"),
+        replace_folder(older, OURS),
+    ):
         pass
     assert contents(older) == {"a.csv": "old"}
     assert list(older.parent.iterdir()) == [older]
@@ -108,7 +111,7 @@ import json, os, sys
 from pathlib import Path
 from harness.results import folder as folders
 if sys.argv[2] == "two":
-    folders.exchanged = lambda one, two: False
+    folders.exchange_folders = lambda one, two: False
 place, ours = Path(sys.argv[1]), ("a.csv", "b.csv")
 
 def replace(last):
@@ -118,7 +121,7 @@ def replace(last):
         calls += event in ("c_call", "c_return") and getattr(call, "__module__", "") in ("posix", None)
         if calls == last:
             os.kill(os.getpid(), 9)
-    with folders.replacing(place, ours) as fresh:
+    with folders.replace_folder(place, ours) as fresh:
         (fresh / "b.csv").write_text("new")
         sys.setprofile(counted)
     sys.setprofile(None)
@@ -133,7 +136,7 @@ while status:
     status = os.waitpid(child, 0)[1]
     found = os.listdir(place) if place.exists() else []
     try:
-        with folders.replacing(place, ours):
+        with folders.replace_folder(place, ours):
             raise folders.HarnessError("the next run, which fails")
     except folders.HarnessError:
         pass
@@ -166,9 +169,9 @@ def test_what_a_killed_run_left_is_removed_but_neither_another_ones_nor_what_is_
     for folder in (*beside, foreign):
         folder.mkdir()
     (foreign / "notes.txt").write_text("mine")
-    with replacing(older, OURS) as other:
+    with replace_folder(older, OURS) as other:
         (other / "b.csv").write_text("of a run that goes on")
-        with replacing(older, OURS) as fresh:
+        with replace_folder(older, OURS) as fresh:
             (fresh / "a.csv").write_text("of one that is quicker")
         assert contents(other) == {"b.csv": "of a run that goes on"}
         assert not beside[0].exists()
@@ -181,7 +184,7 @@ def test_what_a_killed_run_left_is_removed_but_neither_another_ones_nor_what_is_
 def test_a_result_folder_that_is_a_link_is_refused_and_stays(tmp_path, target):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "case").symlink_to(tmp_path / target)
-    with pytest.raises(HarnessError, match="case is a link"), replacing(tmp_path / "case", OURS):
+    with pytest.raises(HarnessError, match="case is a link"), replace_folder(tmp_path / "case", OURS):
         pass
     assert (tmp_path / "case").is_symlink()
     assert list((tmp_path / "elsewhere").iterdir()) == []
@@ -189,14 +192,14 @@ def test_a_result_folder_that_is_a_link_is_refused_and_stays(tmp_path, target):
 
 def test_a_result_folder_that_is_a_file_is_refused_and_stays(tmp_path):
     (tmp_path / "case").write_text("mine")
-    with pytest.raises(HarnessError, match="case holds a file of that name"), replacing(tmp_path / "case", OURS):
+    with pytest.raises(HarnessError, match="case holds a file of that name"), replace_folder(tmp_path / "case", OURS):
         pass
     assert (tmp_path / "case").read_text() == "mine"
 
 
 def test_a_full_disk_is_told_and_the_old_result_stays(older):
     def fill():
-        with replacing(older, OURS) as fresh:
+        with replace_folder(older, OURS) as fresh:
             (fresh / "b.csv").write_text("half")
             with open("/dev/full", "w") as full:
                 full.write("the rest")

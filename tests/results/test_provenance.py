@@ -15,7 +15,7 @@ from commands import UNPLOTTED
 from fmpy import read_model_description
 from models import MODELS
 
-from harness.scenes.scene import shipped
+from harness.scenes.scene import shipped_scenes
 
 COMMANDS = {  # that take seconds, and the folders of their results
     "run": (("run", "coulomb"), "coulomb"),
@@ -147,7 +147,9 @@ def test_a_result_is_made_again_by_its_folder_and_to_the_last_bit(made):
         assert harness(here, "run", folder.relative_to(here), "--quiet").returncode == 0  # and again
 
 
-@pytest.mark.parametrize("scene", [path.stem for path in shipped() if path.stem not in ("coulomb", "pacejka-0.001")])
+@pytest.mark.parametrize(
+    "scene", [path.stem for path in shipped_scenes() if path.stem not in ("coulomb", "pacejka-0.001")]
+)
 def test_every_shipped_scene_is_run_again_to_the_last_bit(here, scene):
     shutil.copytree(published() / "results" / scene, here / "results" / scene)
     assert "the same, bit for bit" in harness(here, "run", f"results/{scene}").stdout

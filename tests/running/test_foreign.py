@@ -14,14 +14,14 @@ import pytest
 from fmpy.model_description import Dimension, ModelVariable
 
 from harness.errors import HarnessError, SceneError
-from harness.running.description import description
-from harness.running.foreign.agreement import agreed
-from harness.running.foreign.job import recording, shape
-from harness.running.foreign.passes import Pass
-from harness.running.foreign.request import Request
-from harness.running.foreign.rows import Recorder, Rows
-from harness.running.values import accepted
-from harness.scenes.assigned import Written
+from harness.running.description import read_description
+from harness.running.external.refinement_run import RefinementRun
+from harness.running.external.request import ExternalRunRequest
+from harness.running.external.sample_rows import RowRecorder, SampleRows
+from harness.running.external.simulation import array_shape, read_longest_rows
+from harness.running.external.step_refinement import refine
+from harness.running.variable_values import convert_value
+from harness.scenes.assignments import NumberWithText
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +196,7 @@ def test_an_fmu_that_ends_itself_is_told_by_its_status_and_keeps_what_it_compute
 @pytest.mark.parametrize(
     ("kind", "told"),
     [
-        (1, "a call of it has not come back within 1.5 s (--patience waits longer), after t = 0.5 s"),
+        (1, "a call of it has not come back within 1.5 s (--timeout waits longer), after t = 0.5 s"),
         (2, "its binary has crashed (Segmentation fault), after t = 0.5 s"),
         (3, "fmi2DoStep answered Fatal at t = 0.5 s: "),
         (5, "x is nan at t = 0.515625 s"),
@@ -204,7 +204,7 @@ def test_an_fmu_that_ends_itself_is_told_by_its_status_and_keeps_what_it_compute
     ],
 )
 def test_what_hangs_crashes_raises_or_is_lost_is_one_sentence_and_keeps_what_it_computed(run, kind, told):
-    done, rows = run("Trouble", "--set", f"kind={kind}", "--patience", "1.5", blank=True)
+    done, rows = run("Trouble", "--set", f"kind={kind}", "--timeout", "1.5", blank=True)
     refused(done, 1, f"Trouble.fmu: {told}")
     assert done.stderr.count("\n") == 1
     assert rows["t [s]"][-1] == 0.5
@@ -214,16 +214,16 @@ def test_what_hangs_crashes_raises_or_is_lost_is_one_sentence_and_keeps_what_it_
 def test_of_passes_that_broke_off_the_one_that_came_farthest_is_kept(tmp_path):
     x = ModelVariable("x", type="Float64", valueReference=0)
     for number, times in enumerate(([0.0, 0.5, 1.0], [0.0, 0.25, 0.5, 0.75], [])):
-        recorder = Recorder(
+        recorder = RowRecorder(
             SimpleNamespace(getFloat64=lambda *_: [1.5]), "3.0", [(x, ())], tmp_path / f"rows-{number}", None
         )
         for t in times:
-            recorder.sample(t)
+            recorder.record(t)
         recorder.file.close()
     with (tmp_path / "rows-0").open("ab") as file:
         file.write(b"cut off")
-    assert recording(tmp_path, None, [(x, ())]).time.tolist() == [0.0, 0.5, 1.0]
-    assert recording(tmp_path, 1, [(x, ())]).columns["x"].tolist() == [1.5] * 4
+    assert read_longest_rows(tmp_path, None, [(x, ())]).time.tolist() == [0.0, 0.5, 1.0]
+    assert read_longest_rows(tmp_path, 1, [(x, ())]).columns["x"].tolist() == [1.5] * 4
 
 
 def test_what_an_fmu_prints_is_told_and_spoils_nothing(run):
@@ -318,10 +318,10 @@ def test_a_damaged_file_is_one_sentence(run, theirs, tmp_path, name, changes, se
 
 def test_a_file_that_changes_is_read_anew(theirs, tmp_path):
     fmu = foreign.edited(theirs / "Midpoint.fmu", tmp_path / "mine.fmu", {})
-    assert "x" in [variable.name for variable in description(fmu).modelVariables]
+    assert "x" in [variable.name for variable in read_description(fmu).modelVariables]
     foreign.edited(theirs / "Midpoint.fmu", fmu, described(lambda text: text.replace('name="x"', 'name="y"')))
     os.utime(fmu, ns=(0, 1))  # however coarse the clock of the files is
-    assert "y" in [variable.name for variable in description(fmu).modelVariables]
+    assert "y" in [variable.name for variable in read_description(fmu).modelVariables]
 
 
 def test_names_beyond_ascii_and_no_units_are_as_good_as_others(run, theirs, tmp_path):
@@ -351,25 +351,25 @@ def test_two_results_that_never_agree_are_kept_with_what_they_differ_by(exchange
 
     def run(h, tolerance):
         time = np.linspace(0.0, 1.0, 65)
-        passes.append(Pass(len(passes), Rows(time, {"x": np.full(65, values[len(passes) % 2])})))
+        passes.append(RefinementRun(len(passes), SampleRows(time, {"x": np.full(65, values[len(passes) % 2])})))
         return passes[-1]
 
-    asked = Request("", "", exchange, 0.0, 1.0, tolerance=1e-6, patience=1.0)
-    answer = agreed(
+    asked = ExternalRunRequest("", "", exchange, 0.0, 1.0, tolerance=1e-6, timeout=1.0)
+    answer = refine(
         asked, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
     )
-    assert answer.taken == len(passes) - 1
-    assert "of its largest value, more than the tolerance of 1e-06; raise --tolerance" in answer.failed
+    assert answer.run_number == len(passes) - 1
+    assert "of its largest value, more than the tolerance of 1e-06; raise --tolerance" in answer.failure
     assert len(passes) < 20
 
 
 def test_an_array_is_as_large_as_its_structural_parameters_say():
     n = ModelVariable("n", type="UInt64", start="3")
     y = ModelVariable("y", type="Float64", dimensions=[Dimension(None, 1, n), Dimension(2, None)])
-    assert shape(y, {}) == (3, 2)
-    assert shape(y, {"n": 5}) == (5, 2)
+    assert array_shape(y, {}) == (3, 2)
+    assert array_shape(y, {"n": 5}) == (5, 2)
     with pytest.raises(HarnessError, match="n = -1 is outside its range; allowed: any whole number"):
-        shape(y, {"n": -1})
+        array_shape(y, {"n": -1})
 
 
 @pytest.mark.parametrize("kind", ["Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"])
@@ -377,10 +377,10 @@ def test_a_whole_number_of_any_width_is_taken_to_its_last_digit_and_refused_beyo
     width = int(kind.lstrip("UInt"))
     least, most = (0, 2**width - 1) if kind[0] == "U" else (-(2 ** (width - 1)), 2 ** (width - 1) - 1)
     n, several = ModelVariable("n", type=kind), f"{least}, {most}"
-    assert [accepted(n, Written(str(number))) for number in (least, most)] == [least, most]
-    assert accepted(n, several, (2,)) == [least, most]
+    assert [convert_value(n, NumberWithText(str(number))) for number in (least, most)] == [least, most]
+    assert convert_value(n, several, (2,)) == [least, most]
     for beyond in (least - 1, most + 1):
         with pytest.raises(
             SceneError, match=f"n = {beyond} is .* any whole number, at least {least} and at most {most}$"
         ):
-            accepted(n, Written(str(beyond)))
+            convert_value(n, NumberWithText(str(beyond)))

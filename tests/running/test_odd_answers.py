@@ -7,12 +7,12 @@ import pytest
 from fmpy.model_description import ModelVariable
 
 from harness.errors import HarnessError
-from harness.running.foreign.agreement import agreed
-from harness.running.foreign.cosimulation import cosimulate
-from harness.running.foreign.exchange import settled
-from harness.running.foreign.passes import Ended, Pass, Span
-from harness.running.foreign.request import Request
-from harness.running.foreign.rows import Recorder, Rows, Texts, read
+from harness.running.external.cosimulation import cosimulate
+from harness.running.external.model_exchange import update_discrete_states
+from harness.running.external.refinement_run import RefinementRun, TerminatedError, TimeGrid
+from harness.running.external.request import ExternalRunRequest
+from harness.running.external.sample_rows import RowRecorder, SampleRows, StringTable, read_rows
+from harness.running.external.step_refinement import refine
 
 NAN, HUGE = float("nan"), 1e300
 
@@ -20,8 +20,8 @@ NAN, HUGE = float("nan"), 1e300
 def stepped(answer):
     """The times that are sampled of an FMU whose fmi3DoStep answers so, and what was raised."""
     times = []
-    with pytest.raises((Ended, HarnessError)) as caught:
-        cosimulate(SimpleNamespace(doStep=answer), "3.0", Span(0.0, 1.0, 0.25), times.append, lambda share: None)
+    with pytest.raises((TerminatedError, HarnessError)) as caught:
+        cosimulate(SimpleNamespace(doStep=answer), "3.0", TimeGrid(0.0, 1.0, 0.25), times.append, lambda share: None)
     return times, str(caught.value)
 
 
@@ -43,14 +43,14 @@ def test_the_time_at_which_it_ends_itself_lies_within_the_step(told, last):
 @pytest.mark.parametrize("told", [NAN, 1.9, -HUGE])
 def test_an_event_that_comes_in_the_past_or_never_is_refused(told):
     with pytest.raises(HarnessError, match=re.escape(f"tells its next event for {told:.9g} s, at t = 2 s")):
-        settled(lambda: (False, False, False, False, True, told), 2.0)
+        update_discrete_states(lambda: (False, False, False, False, True, told), 2.0)
 
 
 def test_an_event_at_once_is_handled_at_once_and_not_for_ever():
     answers = iter([(False, False, False, False, True, 2.0), (False, False, False, False, True, 3.0)])
-    assert settled(lambda: next(answers), 2.0) == 3.0
+    assert update_discrete_states(lambda: next(answers), 2.0) == 3.0
     with pytest.raises(HarnessError, match="do not settle at t = 2 s"):
-        settled(lambda: (False, False, False, False, True, 2.0), 2.0)
+        update_discrete_states(lambda: (False, False, False, False, True, 2.0), 2.0)
 
 
 @pytest.mark.parametrize("declared", ["0", "-1"])
@@ -59,10 +59,10 @@ def test_a_step_that_cannot_be_is_as_if_it_were_not_declared(declared):
 
     def run(h, tolerance):
         steps.append(h)
-        return Pass(len(steps), Rows([0.0], {}), "no")
+        return RefinementRun(len(steps), SampleRows([0.0], {}), "no")
 
     found = SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=declared), defaultExperiment=None)
-    agreed(Request("", "", False, 0.0, 1.0, tolerance=1e-6, patience=1.0), found, run)
+    refine(ExternalRunRequest("", "", False, 0.0, 1.0, tolerance=1e-6, timeout=1.0), found, run)
     assert min(steps) > 0.0
 
 
@@ -73,9 +73,9 @@ def test_a_text_that_is_none_or_no_utf_8_is_recorded(tmp_path, bytes_, text):
 
     variable = ModelVariable("said", valueReference=7, type="String")
     fmu = SimpleNamespace(fmi3GetString=answer, component=None, getString=None)
-    texts = Texts(tmp_path / "texts")
-    recorder = Recorder(fmu, "3.0", [(variable, ())], tmp_path / "rows", texts)
-    recorder.sample(0.0)
+    texts = StringTable(tmp_path / "texts")
+    recorder = RowRecorder(fmu, "3.0", [(variable, ())], tmp_path / "rows", texts)
+    recorder.record(0.0)
     recorder.file.close(), texts.file.close()
-    assert read(tmp_path / "rows", [(variable, ())]).columns["said"].tolist() == [0]
+    assert read_rows(tmp_path / "rows", [(variable, ())]).columns["said"].tolist() == [0]
     assert (tmp_path / "texts").read_text() == text + "\n"

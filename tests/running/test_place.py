@@ -10,9 +10,9 @@ from builds import ROOT
 from commands import UNPLOTTED, harness
 
 from harness.errors import HarnessError
-from harness.process import room as rooms
-from harness.process.room import plain, room
-from harness.running import unpacked
+from harness.process import temporary_directory as rooms
+from harness.process.temporary_directory import has_plain_uri, temporary_directory
+from harness.running import unpacking
 
 ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
 
@@ -48,13 +48,13 @@ def test_any_letter_may_stand_in_the_path_of_temporary_files_of_fmus_and_of_resu
 
 
 def test_without_a_plain_folder_an_fmu_in_python_is_refused_and_another_one_runs(odd, fmus, monkeypatch):
-    monkeypatch.setattr(rooms, "SHARED", ())
+    monkeypatch.setattr(rooms, "FALLBACK_DIRECTORIES", ())
     monkeypatch.setattr(tempfile, "tempdir", str(odd))
     refused = pytest.raises(HarnessError, match=r"smd\.fmu is an FMU in Python, which cannot be run from .*TMPDIR")
-    with refused, unpacked.unpacked(fmus / "smd.fmu"):
+    with refused, unpacking.unpack(fmus / "smd.fmu"):
         pass
     compiled = without(fmus / "smd.fmu", odd / "c.fmu", lambda name: name.startswith("binaries/"))
-    with unpacked.unpacked(compiled) as folder:
+    with unpacking.unpack(compiled) as folder:
         assert folder.parent == odd
     assert sorted(file.name for file in odd.iterdir()) == ["c.fmu", "fmus"]
 
@@ -71,7 +71,7 @@ def test_an_fmu_in_python_that_lacks_what_its_library_looks_for_is_refused(fmus,
 
 def test_a_temporary_folder_that_cannot_be_written_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
-    with pytest.raises(HarnessError, match="cannot write into the temporary folder"), room():
+    with pytest.raises(HarnessError, match="cannot write into the temporary folder"), temporary_directory():
         pass
 
 
@@ -79,7 +79,7 @@ def test_a_temporary_folder_that_cannot_be_written_is_told(tmp_path, monkeypatch
     ("path", "expected"), [("/a b/c-d.e_~", True), ("/a/%20", False), ("/é", False), ("/+", False)]
 )
 def test_a_path_is_plain_whose_uri_escapes_nothing_but_blanks(path, expected):
-    assert plain(Path(path)) is expected
+    assert has_plain_uri(Path(path)) is expected
 
 
 def without(fmu, copy, left_out):

@@ -11,7 +11,7 @@ from models import CASES, MODELS, ROOT, SIGN, declared, label, model_class, outp
 from fmus.packaging.lowering import lowered_files
 from fmus.packaging.model_lookup import find_model
 from fmus.runtime.variable_declarations import variables
-from harness.running.inside import embedded
+from harness.running.embedded_model import load_model_class
 
 FMI_SIDE = [
     *("__init__", "failure_handling", "fmu_instance", "messages", "method_registry", "pythonfmu_workarounds"),
@@ -243,6 +243,6 @@ def test_a_solver_that_makes_no_headway_is_stopped_with_a_sentence(capfd):
 @pytest.mark.parametrize("name", MODELS)
 def test_what_runs_all_the_time_has_fewer_attributes_than_cpython_keeps_at_hand(name, fmus):
     """Thirty of them, and a step takes a tenth longer (3.11)."""
-    solver = embedded(fmus / f"{name}.fmu")().solver
+    solver = load_model_class(fmus / f"{name}.fmu")().solver
     sizes = {type(each).__name__: len(vars(each)) for each in (solver, solver.step, solver.step.interpolant)}
     assert max(sizes.values()) < 30, sizes

@@ -5,8 +5,8 @@ import pytest
 from harness.errors import SceneError
 from harness.results.quantity import Quantity
 from harness.scenes.coupled.scene import CoupledKeys
-from harness.scenes.scene import load, shipped
-from harness.scenes.schema import structured
+from harness.scenes.scene import load_scene, shipped_scenes
+from harness.scenes.schema import parse_table
 
 GOOD = {"title": '"a title"', "model": '"stickslip"', "outputs": '["x", "v", "a"]'}
 
@@ -19,22 +19,22 @@ def write(folder, extra="", **keys):
     return path
 
 
-@pytest.mark.parametrize("path", shipped(), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", shipped_scenes(), ids=lambda path: path.stem)
 def test_every_shipped_scene_loads_and_names_its_source(path):
-    scene = load(path.stem)
-    assert scene == load(path)
+    scene = load_scene(path.stem)
+    assert scene == load_scene(path)
     assert scene.published["source"]
 
 
 def test_what_a_scene_leaves_out_is_left_to_the_fmu(tmp_path):
-    scene = load(write(tmp_path))
+    scene = load_scene(write(tmp_path))
     assert {scene.method, scene.law, scene.rtol, scene.start, scene.stop, scene.grid} == {None}
-    assert (scene.analyses, scene.values, scene.follow, scene.follows) == ((), {}, None, True)
+    assert (scene.analyses, scene.values, scene.follow, scene.follows_solver_steps) == ((), {}, None, True)
 
 
 def test_a_grid_does_not_follow_the_solver_unless_asked(tmp_path):
-    assert not load(write(tmp_path, grid="0.1")).follows
-    assert load(write(tmp_path, grid="0.1", follow="true")).follows
+    assert not load_scene(write(tmp_path, grid="0.1")).follows_solver_steps
+    assert load_scene(write(tmp_path, grid="0.1", follow="true")).follows_solver_steps
 
 
 @pytest.mark.parametrize(
@@ -47,9 +47,9 @@ def test_a_grid_does_not_follow_the_solver_unless_asked(tmp_path):
     ],
 )
 def test_a_scene_that_names_no_plots_has_those_of_its_outputs(tmp_path, outputs, plots):
-    found = load(write(tmp_path, outputs=outputs)).plots
+    found = load_scene(write(tmp_path, outputs=outputs)).plots
     assert found == plots if isinstance(plots, tuple) else len(found) == plots + 1
-    assert load(write(tmp_path, outputs=outputs, plots="[]")).plots == ()
+    assert load_scene(write(tmp_path, outputs=outputs, plots="[]")).plots == ()
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_a_scene_that_names_no_plots_has_those_of_its_outputs(tmp_path, outputs,
 )
 def test_a_wrong_scene_is_told_in_one_sentence(tmp_path, keys, sentence):
     with pytest.raises(SceneError) as caught:
-        load(write(tmp_path, **keys))
+        load_scene(write(tmp_path, **keys))
     assert str(caught.value).startswith("scene mine: ")
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -120,23 +120,23 @@ PAIR = {
     ids=lambda value: value if isinstance(value, str) else "",
 )
 def test_whatever_is_wrong_its_place_is_told_however_deep_it_is(wrong, sentence):
-    structured(PAIR, CoupledKeys)
+    parse_table(PAIR, CoupledKeys)
     with pytest.raises(SceneError) as caught:
-        structured(PAIR | wrong, CoupledKeys)
+        parse_table(PAIR | wrong, CoupledKeys)
     assert str(caught.value).startswith(sentence)
 
 
 def test_an_unknown_scene_is_told_the_shipped_names():
     with pytest.raises(SceneError, match=r"unknown scene 'pendulm' \(nearest: 'pendulum'\); allowed: coulomb, "):
-        load("pendulm")
+        load_scene("pendulm")
 
 
 def test_a_missing_file_is_told():
     with pytest.raises(SceneError, match=r"cannot read the scene nowhere\.toml: No such file"):
-        load("nowhere.toml")
+        load_scene("nowhere.toml")
 
 
 def test_quantities_change_their_unit_but_not_what_they_measure():
-    assert Quantity("T_f", 0.1129848290276167, "N.m", "").in_unit("lbf.in") == pytest.approx(1.0, rel=1e-15)
+    assert Quantity("T_f", 0.1129848290276167, "N.m", "").to_unit("lbf.in") == pytest.approx(1.0, rel=1e-15)
     with pytest.raises(KeyError):
-        Quantity("period", 1.0, "s", "").in_unit("deg")
+        Quantity("period", 1.0, "s", "").to_unit("deg")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from models import model_class
 
-from harness.running.inside import Inside, offered
+from harness.running.embedded_model import EmbeddedModel, method_numbers
 from harness.studies.precision import anchors
 from harness.truths import peers
 from harness.truths.anchors import Belt, Classic, Plain, Smoothed
@@ -34,21 +34,21 @@ def test_the_true_end_of_the_block_is_the_published_one():
 def test_the_true_end_of_the_block_is_that_of_two_methods():
     for method, rtol in (("DOP853", 3e-14), ("Radau", 1e-11)):
         answer = peers.solve("scipy", method, Belt(), np.array([0.0, 50.0]), rtol, 1e-3 * rtol)
-        assert answer.motion[-1] == pytest.approx(anchors.BLOCK, abs=2e-11)
+        assert answer.states[-1] == pytest.approx(anchors.BLOCK, abs=2e-11)
 
 
 @pytest.mark.parametrize("method", ["ode23", "ode45", "dop853", "rodas"])
 def test_every_method_of_the_runtime_brings_the_block_to_its_end(rows, method):
-    assert method in offered(anchors.block())
+    assert method in method_numbers(anchors.block())
     row = next(row for row in rows("block on a belt", anchors.RUNTIME) if row.method == method)
     assert row.error < 200 * row.rtol
     assert row.evaluations < 10_000
 
 
 def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
-    run = Inside.prepared(anchors.block(), {}, "dop853", 1e-11)
+    run = EmbeddedModel.create(anchors.block(), {}, "dop853", 1e-11)
     truth = peers.solve("scipy", "DOP853", Belt(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
-    found = run.events(50.0)
+    found = run.find_mode_changes(50.0)
     assert [mode for _, mode in found] == [mode for _, mode in truth] == [0, -1] * 4
     assert [t for t, _ in found] == pytest.approx([t for t, _ in truth], abs=1e-8)
 
@@ -60,7 +60,7 @@ def test_smoothing_is_four_digits_worse_at_more_cost_than_locating_events(rows):
     assert smooth.evaluations > located.evaluations
 
 
-@pytest.mark.parametrize("method", offered(model_class("coulomb")))
+@pytest.mark.parametrize("method", method_numbers(model_class("coulomb")))
 def test_every_method_of_the_runtime_stops_the_classic_once_and_for_good(rows, method):
     row = next(row for row in rows("chattering classic", anchors.RUNTIME) if row.method == method)
     assert row.error < 10 * row.rtol

@@ -12,9 +12,9 @@ import pytest
 from native_fmus import built as native_built
 
 from harness.errors import HarnessError
-from harness.results.provenance import load
-from harness.running import in_c, loops
-from harness.running.clock import best
+from harness.results.provenance import load_provenance
+from harness.running import c_host, stepping_loops
+from harness.running.timing import time_fastest_call
 from harness.studies.bench import exchange, native
 from harness.studies.bench import speed as bench_speed
 from harness.studies.bench.accuracy import default, drift, exact, last, late
@@ -46,7 +46,7 @@ def both_kinds(fmus, tmp_path, monkeypatch):
     (tmp_path / "fmus" / "native" / "fmi3").symlink_to(fmi3_hosts.built())
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(native, "REPEAT", 3)
-    monkeypatch.setattr(loops, "REPEAT", 5)
+    monkeypatch.setattr(stepping_loops, "REPEATS", 5)
     forget()
     return tmp_path / "fmus"
 
@@ -72,7 +72,7 @@ def test_exact_and_its_events_and_the_pendulum_reach_their_numbers_and_a_stuck_b
 
 def test_an_accuracy_that_is_missed_is_told(all_measures):
     model, card, *rest = of(all_measures, default)[0].args
-    loose = replace(card, defaults={**card.defaults, "solver.method": 2, "solver.rtol": 1e-3})
+    loose = replace(card, start_values={**card.start_values, "solver.method": 2, "solver.rtol": 1e-3})
     measure = default(model, loose, *rest)
     assert not measure.reached
     assert 1e-4 < measure.value < 0.1
@@ -85,7 +85,7 @@ def test_the_fmus_own_code_is_faster_than_python_peers(all_measures):
 
 
 def test_a_communication_step_is_measured_beside_that_of_an_empty_fmu_with_the_same_outputs(all_measures, monkeypatch):
-    monkeypatch.setattr(loops, "REPEAT", 2)
+    monkeypatch.setattr(stepping_loops, "REPEATS", 2)
     measure = of(all_measures, communication_step)[2]()
     usual, empty, lean, lean_empty = (beside.value for beside in measure.beside)
     assert measure.value == usual / empty
@@ -95,7 +95,7 @@ def test_a_communication_step_is_measured_beside_that_of_an_empty_fmu_with_the_s
 
 def test_the_best_run_counts_after_one_to_warm_up():
     calls = []
-    assert 0.0 <= best(partial(calls.append, 1), 4) < inf
+    assert 0.0 <= time_fastest_call(partial(calls.append, 1), 4) < inf
     assert len(calls) == 5
 
 
@@ -112,13 +112,13 @@ def test_a_peer_is_told_as_a_multiple_and_a_missing_one_by_name():
 def test_the_csv_holds_every_number_and_the_account_every_parameter(tmp_path, place, monkeypatch):
     monkeypatch.chdir(place)
     bench([lambda: FAST], tmp_path, lambda name, share: None)
-    assert load(tmp_path / FOLDER)["parameters"]["smd: c"] == {"value": 2.0, "unit": "N.s/m"}
+    assert load_provenance(tmp_path / FOLDER)["parameters"]["smd: c"] == {"value": 2.0, "unit": "N.s/m"}
     with (tmp_path / FOLDER / FILE).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [(row["measured"], row["its value"]) for row in rows] == [("2e-06", "5e-06"), ("2e-06", "")]
 
 
-@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+@pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_one_in_python(both_kinds):
     for _ in range(3):  # a busy machine may spoil a measurement, hardly three
         forget()
@@ -131,12 +131,12 @@ def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_one_in_python(bot
     assert native.off("stickslip", native.of_fmu("stickslip", "native")) < 1e-12
 
 
-@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+@pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 @pytest.mark.parametrize("case", native.REACH)
 def test_the_cvode_fmu_gets_better_with_its_tolerance_and_the_native_one_is_better_still(case, both_kinds):
     try:
         errors = [native.off(case, native.of_cvode(case, rtol)) for rtol in (1e-4, 1e-6, 1e-8)]
-    except in_c.NotHereError as error:
+    except c_host.MissingToolError as error:
         pytest.skip(str(error))
     assert 0.1 > errors[0] > 5 * errors[1] > 25 * errors[2] > 0.0
     measure = native.against_cvode(case)
@@ -145,24 +145,24 @@ def test_the_cvode_fmu_gets_better_with_its_tolerance_and_the_native_one_is_bett
 
 
 def test_what_a_machine_lacks_is_told_in_its_row_and_fails_nothing(both_kinds, monkeypatch):
-    monkeypatch.setattr(in_c, "COMPILER", None)
+    monkeypatch.setattr(c_host, "COMPILER", None)
     shutil.rmtree(both_kinds / "native")
-    in_c.host.cache_clear()
+    c_host.build_host.cache_clear()
     native.cvode.cache_clear()
     found = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.against_cvode("smd")]
     assert [measure.reached for measure in found] == [False, False, False]
     assert [measure.beside[0].name.split(":")[0] for measure in found] == ["not built"] * 3
-    with pytest.raises(in_c.NotHereError, match="not installed: a C compiler"):
+    with pytest.raises(c_host.MissingToolError, match="not installed: a C compiler"):
         native.of_cvode("smd", 1e-6)
-    monkeypatch.setattr(in_c, "COMPILER", "false")  # one that finds no header
-    with pytest.raises(in_c.NotHereError, match="not installed: SUNDIALS"):
+    monkeypatch.setattr(c_host, "COMPILER", "false")  # one that finds no header
+    with pytest.raises(c_host.MissingToolError, match="not installed: SUNDIALS"):
         native.of_cvode("smd", 1e-6)
     assert "not measured" in "".join(str(cell) for cell in numbers(found).columns[3].cells)
 
 
-@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+@pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_run_that_an_fmu_refuses_in_c_gives_its_sentence(both_kinds):
-    library = in_c.built(both_kinds / "native" / "stickslip.fmu")
+    library = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
     with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
         native.runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
 
@@ -171,7 +171,7 @@ LED = [scene for scene in exchange.LED if not scene.its.problem.stiff or str(sce
 LATE = [scene for scene in exchange.LATE if scene.ramps and not scene.its.problem.stiff]
 
 
-@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+@pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 @pytest.mark.parametrize("scene", [*exchange.PLAIN, *LED, *LATE], ids=str)
 def test_model_exchange_errs_as_cvode_does_with_its_events_by_hand(scene, both_kinds):
     """At most three times as much, also where the input jumps or ramps, and from a late start: the solver errs, not the
@@ -189,11 +189,11 @@ def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene,
     assert exchange.beside_co_simulation(scene).reached
 
 
-@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+@pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_call_of_model_exchange_is_measured_beside_that_of_a_reference_fmu(both_kinds, tmp_path, monkeypatch):
     """An FMU of ours stands for theirs, whose sources are not here: that is told."""
     assert exchange.calls("smd").beside[0].name.startswith("not here: Reference-FMUs")
-    sled = in_c.built(both_kinds / "native" / "stickslip.fmu")
+    sled = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
     monkeypatch.setattr(exchange, "bouncing_ball", lambda acceleration: sled)
     monkeypatch.setattr(exchange, "TURNS", 10)
     monkeypatch.setattr(exchange, "THEIRS", (3, 2))
@@ -235,7 +235,7 @@ __attribute__((visibility("default"))) double ask(double x, double v, double for
 }
 
 
-@pytest.mark.skipif(in_c.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
+@pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_reference_fmu_is_given_the_acceleration_of_each_model(tmp_path, monkeypatch):
     for file, text in THEIRS.items():
         (tmp_path / file).parent.mkdir(exist_ok=True)

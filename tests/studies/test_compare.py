@@ -12,7 +12,7 @@ from builds import published
 from scipy.io import savemat
 
 from harness.errors import HarnessError
-from harness.running.trajectory import Trajectory
+from harness.running.signals import Signals
 from harness.studies.compare.difference import compare
 from harness.studies.compare.files import read
 
@@ -112,7 +112,7 @@ UNITS = {"x": "m", "v": "m/s", "y": "m", "mode": ""}
 
 
 def path(name, times, events=None, **columns):
-    return Trajectory(name, times, columns, {name: UNITS.get(name, "") for name in columns}, events)
+    return Signals(name, times, columns, {name: UNITS.get(name, "") for name in columns}, events)
 
 
 def test_between_samples_a_variable_follows_its_rate_or_stays_between_its_neighbours():
@@ -153,7 +153,7 @@ def test_a_jump_is_compared_as_a_jump(late):
         since = np.where(t >= at, t - at, 0.0)
         columns = {"a": np.where(t >= at, 2.0, 0.0), "v": 2 * since, "x": since**2}
         units = {"a": "m/s2", "v": "m/s", "x": "m"}
-        return Trajectory(name, t, columns, units, np.array([[0, 0], [at, 1]]))
+        return Signals(name, t, columns, units, np.array([[0, 0], [at, 1]]))
 
     found = compare(motion("one", np.linspace(0, 2, 101), 1.0), motion("two", np.linspace(0, 1.99, 57), 1.0 + late))
     largest = {each.name: each.largest for each in found.differences}
@@ -175,8 +175,8 @@ def test_a_time_that_stands_twice_has_both_sides_of_a_jump(tmp_path):
 
 def test_what_only_one_side_has_and_what_has_no_unit_is_said():
     t = np.arange(20.0)
-    one = Trajectory("one", t, {"x": t, "a": t, "F": t}, {"x": "m", "a": "m/s²", "F": "N"})
-    two = Trajectory("two", t, {"x": t, "a": t, "E": t}, {"x": "", "a": "m/s^2", "E": "J"})
+    one = Signals("one", t, {"x": t, "a": t, "F": t}, {"x": "m", "a": "m/s²", "F": "N"})
+    two = Signals("two", t, {"x": t, "a": t, "E": t}, {"x": "", "a": "m/s^2", "E": "J"})
     found = compare(one, two)
     assert [each.name for each in found.differences] == ["x", "a"]
     assert found.left_out == (
@@ -228,8 +228,8 @@ def test_what_shares_no_variable_is_refused():
 )
 def test_events_are_matched_by_kind_and_time(second, sentence, shift):
     t = np.arange(20.0)
-    one = Trajectory("one", t, {"x": t}, {"x": "m"}, np.array([[0, 0], [1, 1], [2, 0.0]]))
-    two = Trajectory("two", t, {"x": t}, {"x": "m"}, np.array([[0, 0], *second], float))
+    one = Signals("one", t, {"x": t}, {"x": "m"}, np.array([[0, 0], [1, 1], [2, 0.0]]))
+    two = Signals("two", t, {"x": t}, {"x": "m"}, np.array([[0, 0], *second], float))
     pairs = compare(one, two).pairs
     assert pairs.sentence(("one", "two")) == sentence
     assert pairs.shift == pytest.approx(shift, nan_ok=True)
@@ -238,9 +238,9 @@ def test_events_are_matched_by_kind_and_time(second, sentence, shift):
 def test_an_event_that_is_matched_from_afar_hides_no_difference():
     """The other one jumps back in between, so that what lies between is no one's jump."""
     t = np.linspace(0, 3, 301)
-    one = Trajectory("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, np.array([[0, 0], [1, 1.0]]))
+    one = Signals("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, np.array([[0, 0], [1, 1.0]]))
     step = (t >= 0.5) & (t < 0.8) | (t >= 2)
-    two = Trajectory("two", t, {"y": step + 0.5}, {"y": "m"}, np.array([[0, 0], [0.5, 2], [0.8, 0], [2, 1.0]]))
+    two = Signals("two", t, {"y": step + 0.5}, {"y": "m"}, np.array([[0, 0], [0.5, 2], [0.8, 0], [2, 1.0]]))
     assert compare(one, two).differences[0].largest == 1.0
 
 
@@ -262,9 +262,7 @@ def test_an_event_that_is_matched_from_afar_hides_no_difference():
 )
 def test_units_have_one_spelling_and_are_converted_or_refused(left, right, factor):
     t = np.arange(20.0)
-    pair = (
-        Trajectory(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", left), ("two", right))
-    )
+    pair = (Signals(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", left), ("two", right)))
     found = compare(*pair)
     if factor is None:
         assert found.left_out == (f"y is in {left} in one and in {right} in two, and is left out",)
@@ -401,7 +399,7 @@ def test_what_is_not_finite_on_either_side_is_a_difference_beyond_any_bound(lost
     left = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}
     right = {"a": good, "x": bad if where != "left" else np.cos(t), "z": good}
     units = dict.fromkeys(left, "m")
-    found = compare(Trajectory("one", t, left, units), Trajectory("two", t + shift, right, units))
+    found = compare(Signals("one", t, left, units), Signals("two", t + shift, right, units))
     assert np.isnan(found.worst)
     assert not found.worst <= 1e300
 
@@ -421,7 +419,7 @@ def test_within_fails_on_what_is_not_a_number(tmp_path):
 def test_a_difference_is_relative_to_the_larger_side(turned):
     t = np.linspace(0, 1, 20)
     small, large = ({"x": np.full(20, size)} for size in (1.0, 4.0))
-    pair = [Trajectory(name, t, columns, {"x": "m"}) for name, columns in (("small", small), ("large", large))]
+    pair = [Signals(name, t, columns, {"x": "m"}) for name, columns in (("small", small), ("large", large))]
     (found,) = compare(*(reversed(pair) if turned else pair)).differences
     assert found.relative == 0.75
     assert found.largest == 3.0
@@ -430,5 +428,5 @@ def test_a_difference_is_relative_to_the_larger_side(turned):
 def test_differences_near_the_end_of_the_range_of_numbers_have_a_share():
     t = np.linspace(0, 1, 20)
     one, two = ({"x": np.full(20, value)} for value in (1e308, -1e308))
-    found = compare(Trajectory("one", t, one, {"x": "m"}), Trajectory("two", t, two, {"x": "m"}))
+    found = compare(Signals("one", t, one, {"x": "m"}), Signals("two", t, two, {"x": "m"}))
     assert found.worst == 2.0

@@ -14,7 +14,7 @@ from builds import made
 from fmpy.ssp.ssd import read_ssd
 
 from harness.errors import HarnessError, SceneError
-from harness.scenes.coupled.scene import shipped
+from harness.scenes.coupled.scene import shipped_coupled_scenes
 from harness.studies.coupled import engine, study
 from harness.studies.coupled.engine import ENGINES
 from harness.truths.monolith import Bodies, solve
@@ -102,7 +102,7 @@ def run(fmus):
     return run
 
 
-SCENES = [file.stem for file in shipped()]
+SCENES = [file.stem for file in shipped_coupled_scenes()]
 
 
 def engines(folder):

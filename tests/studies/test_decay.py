@@ -51,7 +51,7 @@ def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(
     drawn = {line.get_label(): line.get_data() for line in signal.lines}
     assert np.degrees(1.0) == pytest.approx(np.max(drawn["record"][1]), rel=5e-3)
     assert len(drawn.get("left out", [[]])[0]) == len(record.t) - len(found.t)
-    assert found.record.at(1.7e9 + 0.0125) == "1700000000.0125"
+    assert found.record.format_time(1.7e9 + 0.0125) == "1700000000.0125"
 
 
 @pytest.mark.parametrize("count", [3000, 120_000])

@@ -13,9 +13,9 @@ from builds import of_file
 from models import AUTHORED
 
 from harness.errors import HarnessError
-from harness.results.provenance import record
-from harness.running.answer import Answer
-from harness.running.inside import Inside, embedded, offered
+from harness.results.provenance import write_provenance
+from harness.running.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from harness.running.solution import Solution
 from harness.studies.precision import advice, laws
 from harness.studies.precision.study import FMPY, FMU, FULL, QUICK, WAYS, Extent, Job, Point, Study, jobs, study, sweep
 from harness.studies.precision.survey import survey
@@ -35,7 +35,7 @@ def command(place, *arguments):
 @pytest.mark.parametrize("name", ["smd", "coulomb", "stickslip"])
 def test_exact_is_within_1e_13_of_the_truth_and_1e_14_of_every_event(fmus, name):
     truth = load(name)
-    answer = Inside.prepared(embedded(fmus / f"{name}.fmu"), {}, "exact", 0.0).answer(truth.times.tolist())
+    answer = EmbeddedModel.create(load_model_class(fmus / f"{name}.fmu"), {}, "exact", 0.0).solve(truth.times.tolist())
     found = errors(answer, truth)
     assert found.largest < 1e-13
     assert not found.events or found.events < 1e-14 * truth.times[-1]
@@ -43,12 +43,12 @@ def test_exact_is_within_1e_13_of_the_truth_and_1e_14_of_every_event(fmus, name)
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_every_method_of_the_fmu_comes_near_the_truth_of_its_law(fmus, case):
-    truth, model = load(case.truth), embedded(fmus / f"{case.model}.fmu")
+    truth, model = load(case.truth), load_model_class(fmus / f"{case.model}.fmu")
     within = 0.02 if case.truth == "stickslip-threshold" else 2e-3  # where it comes to rest below eps is left to chance
-    for method in offered(model):
+    for method in method_numbers(model):
         if (case.name == "pacejka-0.0001" and method != "rodas") or (case.chatters and method == "exact"):
             continue  # seconds of explicit steps; refused
-        answer = Inside.prepared(model, case.values, method, 1e-6).answer(truth.times.tolist())
+        answer = EmbeddedModel.create(model, case.values, method, 1e-6).solve(truth.times.tolist())
         assert errors(answer, truth).largest < within
         assert answer.evaluations > 0
 
@@ -72,7 +72,7 @@ def test_a_peer_that_is_not_installed_is_named_and_left_out(fmus, monkeypatch):
     monkeypatch.setitem(peers.PACKAGES, "cvode", ("no_such_module", "scikit-sundae"))
     assert peers.missing()["cvode"] == "scikit-sundae"
     file = fmus / "smd.fmu"
-    assert "cvode" not in [job.tool for job in jobs(CASE["smd"], embedded(file), file)]
+    assert "cvode" not in [job.tool for job in jobs(CASE["smd"], load_model_class(file), file)]
 
 
 def test_a_run_is_watched_in_steps_and_in_time():
@@ -93,7 +93,7 @@ def test_a_failed_run_is_a_gap_and_after_a_slow_one_tighter_ones_are_not_tried()
         if rtol == 1e-5:
             sleep(0.06)
             raise HarnessError("it took too long")
-        return Answer(load("smd").motion, None, 7), 0.25
+        return Solution(load("smd").motion, None, 7), 0.25
 
     def broken(rtol, extent):
         raise HarnessError("it fell over")
@@ -154,13 +154,13 @@ def test_a_quick_run_does_not_take_the_place_of_a_whole_one(place, tmp_path, mon
     monkeypatch.chdir(place)
     folder = tmp_path / "precision"
     folder.mkdir()
-    record(folder, [], name="smd.json")
+    write_provenance(folder, [], name="smd.json")
     with pytest.raises(HarnessError, match="keep it and name another --out, or replace it with --overwrite"):
         survey(["smd"], QUICK, tmp_path, print)
 
 
 def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
-    found = {case.name: laws.analyse(case, embedded(fmus / f"{case.model}.fmu")) for case in CASES if case.dry}
+    found = {case.name: laws.analyse(case, load_model_class(fmus / f"{case.model}.fmu")) for case in CASES if case.dry}
     assert found["coulomb-sign"].largest == 0.0
     assert found["stickslip-threshold"].creep == pytest.approx(1e-7)  # the threshold itself
     assert found["stickslip-threshold"].period == pytest.approx(3.345104499330, rel=1e-4)

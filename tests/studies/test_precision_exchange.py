@@ -14,7 +14,7 @@ from fmi3_hosts import built
 
 from harness.errors import HarnessError
 from harness.running import fmi3
-from harness.running.inside import embedded
+from harness.running.embedded_model import load_model_class
 from harness.studies.precision import advice, study
 from harness.studies.precision.study import CS, FMPY, FMU, ME, QUICK, WAYS, Extent, jobs, sweep
 from harness.truths import peers
@@ -45,7 +45,7 @@ def points(both):
     @cache
     def points(name, tool, tolerances=TOLERANCES):
         file = both / "fmus" / f"{CASE[name].model}.fmu"
-        asked = [job for job in jobs(CASE[name], embedded(file), file) if job.tool == tool]
+        asked = [job for job in jobs(CASE[name], load_model_class(file), file) if job.tool == tool]
         return [point for job in asked for point in sweep(CASE[name], job, Extent(tolerances, 5.0, 0.0))]
 
     with patch.object(study, "best", lambda run, budget: 0.0):
@@ -94,7 +94,7 @@ def test_where_cvode_may_take_no_more_steps_there_is_a_gap_with_fmpys_reason(poi
 
 
 def test_each_run_of_an_instance_begins_anew(both):
-    with fmi3.instance(both / "fmus/native/fmi3/stickslip.fmu", fmi3.EXCHANGE) as fmu:
+    with fmi3.open_fmi3_instance(both / "fmus/native/fmi3/stickslip.fmu", fmi3.MODEL_EXCHANGE) as fmu:
         first, again = (fmu.simulate({"mu_s": 0.8}, ("x", "v", "mode"), 16.0, 0.5, 1e-6) for _ in range(2))
         other = fmu.simulate({}, ("x", "v", "mode"), 16.0, 0.5, 1e-6)
     assert np.array_equal(first.rows, again.rows)
@@ -102,11 +102,11 @@ def test_each_run_of_an_instance_begins_anew(both):
     assert other.rows["x"][-1] != first.rows["x"][-1]
 
 
-@pytest.mark.parametrize("way", [fmi3.EXCHANGE, fmi3.COSIMULATION])
+@pytest.mark.parametrize("way", [fmi3.MODEL_EXCHANGE, fmi3.CO_SIMULATION])
 def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
-    def refused(file, values=None, patience=None):
-        with pytest.raises(HarnessError) as error, fmi3.instance(file, way) as fmu:
-            fmu.simulate(values or {}, ("x",), 16.0, 0.01, 1e-6, patience)
+    def refused(file, values=None, timeout=None):
+        with pytest.raises(HarnessError) as error, fmi3.open_fmi3_instance(file, way) as fmu:
+            fmu.simulate(values or {}, ("x",), 16.0, 0.01, 1e-6, timeout)
         return str(error.value)
 
     sled, missing, broken = both / "fmus/native/fmi3/stickslip.fmu", tmp_path / "missing.fmu", tmp_path / "broken.fmu"
@@ -114,7 +114,7 @@ def test_what_fails_is_one_sentence(both, tmp_path, way, capfd):
     assert "m = -1.0 kg is refused" in refused(sled, {"m": -1.0})
     unknown = "stickslip.fmu: The start values for the following variables could not be set: mess"
     assert refused(sled, {"mess": 1.0}) == unknown
-    assert refused(sled, patience=1e-3).endswith(" s after 0.001 s of run time")
+    assert refused(sled, timeout=1e-3).endswith(" s after 0.001 s of run time")
     assert refused(missing) == f"not built: {missing} (python build_fmus.py --fmi 3)"
     assert refused(broken) == "broken.fmu cannot be unpacked: File is not a zip file"
     out, err = capfd.readouterr()  # where the FMU itself says its sentence

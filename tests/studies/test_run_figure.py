@@ -19,14 +19,14 @@ from dataclasses import replace
 from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from harness.scenes.scene import load
+from harness.scenes.scene import load_scene
 from harness.studies.run import job
 
-told, run = {}, job.any_fmu.run
+told, run = {}, job.runner.run
 def kept(wanted, report):
     runs.append(run(wanted, report))
     return runs[-1]
-job.any_fmu.run = kept
+job.runner.run = kept
 def covered(axes):
     (title,) = (each for each in axes.findobj(Text) if each.get_text() == axes.get_title(loc="left"))
     legend = axes.get_legend()
@@ -34,7 +34,7 @@ def covered(axes):
 for name in sys.argv[1:]:
     figures, runs = [], []
     Figure.savefig = lambda figure, file, **how: figures.append(figure)
-    job.perform(replace(load(name), repeat=1), Path("results"), lambda share: None)
+    job.perform(replace(load_scene(name), repeat=1), Path("results"), lambda share: None)
     figures[0].draw_without_rendering()
     events = runs[0].events
     told[name] = {

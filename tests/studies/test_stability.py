@@ -18,8 +18,8 @@ from builds import of_file
 from models import AUTHORED, LARGER, MODELS, ROOT, declared
 
 from harness.errors import HarnessError
-from harness.results.provenance import load
-from harness.running.probe import Counts, Motion, Refusal, Refusals
+from harness.results.provenance import load_provenance
+from harness.running.fmu_session import CompletedRun, RefusalSummary, RefusedRun, RunCounts
 from harness.studies.stability.bounded import bounded
 from harness.studies.stability.cases import Trial, scenes, spans, spread
 from harness.studies.stability.study import (
@@ -162,7 +162,7 @@ def test_a_process_is_asked_again_and_a_new_one_the_same_where_what_came_before_
 
 CASE = Trial("rest", "coulomb", "exact", setting=None, grid=Grid(0.0, 1.0, 2), spans=[], finish=1e-3)
 REST = Truth(np.array([0.0, 0.5, 1.0]), np.ones(3), np.zeros(3), ((0.5, 0),))
-GOOD = Motion(np.ones(3), np.zeros(3), np.zeros(3), 0.5, Counts(1, 2, 0, 3), 0.1)
+GOOD = CompletedRun(np.ones(3), np.zeros(3), np.zeros(3), 0.5, RunCounts(1, 2, 0, 3), 0.1)
 
 
 @pytest.fixture
@@ -182,7 +182,7 @@ def test_a_true_motion_is_finished(case):
         ({"v": np.array([0.0, nan, 0.0])}, "error nan"),
         ({"energy": np.array([1.0, 0.5, 0.6])}, "energy rises by 0.1"),
         ({"t_last": 0.6}, "error 0.1"),
-        ({"counts": Counts(2, 2, 0, 3)}, "2 events, not 1"),
+        ({"counts": RunCounts(2, 2, 0, 3)}, "2 events, not 1"),
     ],
     ids=["far", "not a number", "energy out of nothing", "late", "one event too many"],
 )
@@ -195,16 +195,16 @@ def test_a_plausible_wrong_motion_is_wrong(case, changed, said):
 
 def test_a_refusal_says_the_words_and_leaves_no_numbers(case):
     expecting = replace(case, finish=None, refuse="mu_d is")
-    assert refused(expecting, Refusal("mu_d is 1.0, above", silent=True)).ended == REFUSED
-    for wrong in (Refusal("", True), Refusal("mu_d is 1.0", False), Refusal("something else", True)):
+    assert refused(expecting, RefusedRun("mu_d is 1.0, above", all_nan=True)).ended == REFUSED
+    for wrong in (RefusedRun("", True), RefusedRun("mu_d is 1.0", False), RefusedRun("something else", True)):
         assert refused(expecting, wrong).ended == WRONG
-    assert refused(case, Refusal("mu_d is 1.0", True)).ended == WRONG
-    assert all_refused(expecting, Refusals(6, ("m = nan was taken",))).ended == WRONG
+    assert refused(case, RefusedRun("mu_d is 1.0", True)).ended == WRONG
+    assert all_refused(expecting, RefusalSummary(6, ("m = nan was taken",))).ended == WRONG
 
 
 def test_the_slope_is_that_of_the_stiff_end(case):
     rows = [
-        Ending(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=Counts(0, n, 0, 0)))
+        Ending(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=RunCounts(0, n, 0, 0)))
         for x, n in ((1e-4, 1000), (1e-3, 100), (1e-2, 50))
     ]
     (found,) = regions(rows)
@@ -242,7 +242,7 @@ def test_a_part_of_the_table_ends_as_it_should(place, tmp_path, monkeypatch):
     assert {row.case.model for row in rows} == set(MODELS)
     with (tmp_path / "stability" / "stability.csv").open(encoding="utf-8", newline="") as file:
         assert len(list(csv.DictReader(file))) == len(rows) > 100
-    told = load(tmp_path / "stability")["parameters"]
+    told = load_provenance(tmp_path / "stability")["parameters"]
     assert told["pendulum: theta0"]["unit"] == "rad"
     assert {name.partition(":")[0] for name in told} == set(MODELS)
     assert region.method == "rodas"

@@ -9,8 +9,8 @@ from models import MODELS
 from sweeps import opened, xarray
 
 from harness.errors import HarnessError
-from harness.results.netcdf import NetCDF, Variable
-from harness.running.description import description
+from harness.results.netcdf import NetCDFVariable, NetCDFWriter
+from harness.running.description import read_description
 from harness.studies.sweep import figure
 from harness.studies.sweep import file as writing
 from harness.studies.sweep.boundaries import known
@@ -51,12 +51,12 @@ def test_a_netcdf_file_written_piece_by_piece_is_read_as_it_was_meant(tmp_path):
     texts = np.array(["", "a", "four", "\u00e9\u00e9", "b"])
     with (tmp_path / "a.nc").open("wb") as stream:
         said = {"units": "m/s2", "size": 0.1}
-        text = Variable("text", ("n", "letters"), {"_Encoding": "utf-8"}, 4)
+        text = NetCDFVariable("text", ("n", "letters"), {"_Encoding": "utf-8"}, 4)
         sizes = {"y": 3, "x": 4, "n": 5, "letters": 4}
-        whole = NetCDF(stream, sizes, [Variable("a", ("y", "x"), said), text], {"b": "c"})
+        whole = NetCDFWriter(stream, sizes, [NetCDFVariable("a", ("y", "x"), said), text], {"b": "c"})
         for first in (8, 0, 4):
-            whole.put("a", first, values.ravel()[first : first + 4])
-        whole.put("text", 0, np.char.encode(texts))
+            whole.write_values("a", first, values.ravel()[first : first + 4])
+        whole.write_values("text", 0, np.char.encode(texts))
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         assert data["a"].dims == ("y", "x")
         assert (data["a"].to_numpy() == values).all()
@@ -86,7 +86,7 @@ def test_known_boundaries_travel_in_the_fmu_and_depend_on_its_parameters(fmus, n
     """At its own values each quantity is a number; what it depends on is declared."""
     values = {
         variable.name: float(variable.start)
-        for variable in description(fmus / f"{name}.fmu").modelVariables
+        for variable in read_description(fmus / f"{name}.fmu").modelVariables
         if variable.causality == "parameter" and variable.type == "Real"
     }
     found = known(fmus / f"{name}.fmu", tuple(values), {})

@@ -64,7 +64,7 @@ def test_a_damaged_journal_is_told_and_the_runs_are_done_again(harness, tmp_path
     assert harness(*arguments, "--out", "whole", blank=True).returncode == 0
     (tmp_path / "results/sweep").mkdir(parents=True)
     points = Points((axis("m=1:2:4", False),))
-    usual = ("exchange", False), ("lenient", False), ("patience", 60.0), ("stop", None), ("tolerance", 1e-6)
+    usual = ("exchange", False), ("lenient", False), ("stop", None), ("timeout", 60.0), ("tolerance", 1e-6)
     sweep = Sweep(Runs("smd", ("m",), (), (), usual), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
     sweep.journal(tmp_path / "results/sweep").path.write_bytes(b"garbage\n" + line(0, [[1.0]], {}))
     done = harness(*arguments, blank=True)

@@ -92,8 +92,8 @@ class Server:
 
 def serve():
     """Load all that can be; then fork for every line that is read, and answer with the exit status."""
-    crew = import_module("harness.process.crew")
-    crew.context = lambda preload: multiprocessing.get_context("fork")  # no server has to load it all once more
+    crew = import_module("harness.process.worker_pool")
+    crew.process_context = lambda preload: multiprocessing.get_context("fork")  # no server has to load it all once more
     resource_tracker.ensure_running()  # nor has each command to start one
     packages = [(import_module(name).__path__, f"{name}.") for name in ("harness", "fmus.packaging")]
     for name in (*(module.name for package in packages for module in walk_packages(*package)), *LATE):
@@ -101,14 +101,14 @@ def serve():
             if not name.endswith("__main__"):
                 import_module(name)
     import_module("fmus.packaging.lowering").lowered_model("smd")  # reads what every model is written out from
-    from harness.process import child as asking
+    from harness.process import subprocess_runner as asking
     from harness.results import provenance, style
 
-    provenance.record(Path(), ())  # what packages and the system are is looked up once
+    provenance.write_provenance(Path(), ())  # what packages and the system are is looked up once
     asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": Forked})
-    with style.sheet(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
+    with style.open_figure(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
         figure.subplots().set_title("a title")
-    drawing = [each for each in sys.modules.values() if getattr(each, "sheet", None) is style.sheet]
+    drawing = [each for each in sys.modules.values() if getattr(each, "open_figure", None) is style.open_figure]
     gc.freeze()  # else whoever is forked copies all that there is, to count who refers to it
     for line in sys.stdin:
         child = os.fork()
@@ -117,7 +117,7 @@ def serve():
             become(**asked)
             if blank:
                 for each in drawing:
-                    each.sheet = partial(unseen, None if blank == UNPLOTTED else style.Figure)
+                    each.open_figure = partial(unseen, None if blank == UNPLOTTED else style.Figure)
             run(module)
             return
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)

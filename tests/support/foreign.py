@@ -61,7 +61,7 @@ def main(out):
     import pythonfmu3
 
     from fmus.packaging.native.compiler import compile_binaries
-    from harness.running.in_c import HEADERS
+    from harness.running.c_host import HEADERS
 
     for source in sorted(SOURCES.glob("*.py")):
         package = pythonfmu3 if "pythonfmu3" in source.read_text() else pythonfmu

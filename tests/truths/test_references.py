@@ -9,7 +9,7 @@ import pytest
 from evidence import Piece, Trajectory
 from mpmath import mpf
 
-from harness.running.answer import Answer
+from harness.running.solution import Solution
 from harness.truths.anchors import Belt, Plain, Smoothed
 from harness.truths.making import CLOSED, closed
 from harness.truths.models import CASES
@@ -92,7 +92,7 @@ def test_the_pendulum_references_agree_with_a_third_route(reaction):
     truth = load("pendulum-reaction" if reaction else "pendulum")
     swing = evidence_pendulum.Swing([(0.0, evidence_pendulum.Pendulum(reaction))], evidence_pendulum.THETA0, 0.0, 5.0)
     other = np.array([swing.at(float(t)) for t in truth.times])
-    assert errors(Answer(other, swing.events, 0), truth).largest < 1e-11
+    assert errors(Solution(other, swing.events, 0), truth).largest < 1e-11
     assert late(swing.events, truth.events) < 1e-11
 
 
@@ -105,7 +105,7 @@ def test_the_built_fmu_comes_to_the_same_reference(launch, case):
     values = {"solver.method": RODAS if smooth else DOP853, "solver.rtol": 1e-10 if smooth else 1e-12, **case.values}
     fmu = launch(case.model, values, stop=case.problem.stop)
     motion = np.array(fmu.run(truth.times.tolist(), ["x", "v"] if smooth else ["theta", "omega"]))
-    assert errors(Answer(motion, None, 0), truth).largest < (1e-8 if smooth else 1e-11)
+    assert errors(Solution(motion, None, 0), truth).largest < (1e-8 if smooth else 1e-11)
 
 
 @pytest.mark.parametrize("name", TRUTHS)
@@ -123,7 +123,7 @@ def test_every_reference_covers_its_run_and_states_its_doubt(name):
 def test_the_script_makes_the_numbers_beside_it(name):
     truth = load(name)
     answer = closed(name, truth.times)
-    assert answer.motion.tolist() == truth.motion.tolist()
+    assert answer.states.tolist() == truth.motion.tolist()
     assert answer.events == truth.events
 
 
@@ -144,7 +144,7 @@ def test_a_jacobian_is_the_slope_of_the_rates(problem):
 def test_errors_are_relative_to_the_largest_of_each_column():
     truth = load("smd")
     off = truth.motion + np.array([1e-3 * np.abs(truth.motion[:, 0]).max(), 0.0])
-    found = errors(Answer(off, None, 0), truth)
+    found = errors(Solution(off, None, 0), truth)
     assert [found.final, found.rms, found.largest] == pytest.approx([1e-3] * 3, rel=1e-10)
     assert found.events is None
 

@@ -16,9 +16,9 @@ from models import AUTHORED, LARGER, MODELS, declared, parameters
 from fmus.packaging.model_lookup import find_model
 from fmus.packaging.web.html_page import HERE, MODULES
 from fmus.packaging.web.model_json import list_bodies
-from harness.running.fmu import simulate
-from harness.running.specification import of_scene
-from harness.scenes.scene import load, shipped
+from harness.running.fmi2 import simulate
+from harness.running.run_spec import spec_from_scene
+from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.run.job import ANALYSE
 
 WIDTHS = (360, 768, 1280)
@@ -395,12 +395,12 @@ def test_every_published_case_measures_what_the_terminal_does(page):
     """To a per mille, but where chatter makes the steps hang on rounding; and beside the same figures."""
     page.open()
     names = page.run("[...app.session.presets.keys()]")
-    scenes = {scene.name: scene for scene in map(load, shipped()) if scene.published}
+    scenes = {scene.name: scene for scene in map(load_scene, shipped_scenes()) if scene.published}
     assert sorted(names) == sorted(scenes)
     for name, scene in scenes.items():
         page.choose("preset", name)
         native = native_fmus.built() / f"{scene.model}.fmu"  # which runs while the page waits for more to be done
-        run = simulate(replace(of_scene(scene), fmu=native, repeat=1))
+        run = simulate(replace(spec_from_scene(scene), fmu=native, repeat=1))
         page.wait(
             f"app.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
             "app.session.presets.get(app.state().preset).title"
@@ -416,7 +416,7 @@ def test_every_published_case_measures_what_the_terminal_does(page):
             if figure != "run_time" and not (name == "stickslip-threshold" and "step" in figure):
                 size, *unit = measured.replace("\N{MIDDLE DOT}", ".").replace("²", "2").split()
                 there = quantities[figure]
-                value = there.in_unit(*unit) if unit and unit != [there.unit] else there.value
+                value = there.to_unit(*unit) if unit and unit != [there.unit] else there.value
                 assert float(size) == pytest.approx(value, rel=1e-3), (name, figure)
     page.choose("preset", "")  # my own: as it is, but no published case any more
     assert page.run("[app.state().preset, app.state().model]") == ["", scene.model]

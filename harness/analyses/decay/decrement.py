@@ -19,7 +19,7 @@ from ...results.quantity import Quantity
 from .. import samples
 
 if TYPE_CHECKING:
-    from ...running.run import Run  # a record from a file needs nothing that runs
+    from ...running.trajectory import Trajectory  # a record from a file needs nothing that runs
 
 
 FORCES = {"f": ("N", "friction force", False), "T_f": ("N.m", "joint torque", True)}  # unit, words, of a rotation
@@ -36,10 +36,10 @@ class Decay:
     quantities: tuple[Quantity, ...]
 
 
-def analyse(run: "Run", gives: str, first: int = 0, cycles: float | None = None) -> Decay:
+def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None = None) -> Decay:
     """What the decay of the recorded position `gives` (zeta, f or T_f) from the peak `first` over so many cycles, None
     for all; HarnessError if the run does not show one."""
-    times, positions = turning_points(run.time, run.motion("position"), run.motion("velocity"))
+    times, positions = turning_points(run.time, run.column_of_role("position"), run.column_of_role("velocity"))
     times, positions, cycles = chosen(times, positions, first, cycles)
     samples.check(run.time, times[:-1], times[1:], "half swing")
     x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
@@ -49,7 +49,7 @@ def analyse(run: "Run", gives: str, first: int = 0, cycles: float | None = None)
         unit, words, turning = FORCES[gives]
         force = friction(x_0, x_n, cycles, stiffness(run, turning, f"the decay to {gives}"))
         result = Quantity(gives, force, unit, f"{words}, {cycles:g} cycles")
-    unit = run.units[run.wanted.motion["position"]]
+    unit = run.units[run.spec.motion_outputs["position"]]
     ends = (
         Quantity("x_0", x_0, unit, f"peak {first:g}"),
         Quantity("x_n", x_n, unit, f"peak {first + cycles:g}"),
@@ -59,15 +59,15 @@ def analyse(run: "Run", gives: str, first: int = 0, cycles: float | None = None)
     return Decay(result, cycles, times, positions, (*ends, result))
 
 
-def stiffness(run: "Run", turning: bool, purpose: str) -> float:
+def stiffness(run: "Trajectory", turning: bool, purpose: str) -> float:
     """That of a spring, k, or of a pendulum, m g a; HarnessError if the model has none."""
-    return prod(run.parameter(name, purpose) for name in (("m", "g", "a") if turning else ("k",)))
+    return prod(run.get_parameter(name, purpose) for name in (("m", "g", "a") if turning else ("k",)))
 
 
-def sampled(run: "Run", time: float) -> float:
+def sampled(run: "Trajectory", time: float) -> float:
     """The larger of the two samples around a turning point: what a plot of the samples shows as the peak."""
     i = int(np.clip(np.searchsorted(run.time, time), 1, len(run.time) - 1))
-    return float(np.abs(run.motion("position")[i - 1 : i + 1]).max())
+    return float(np.abs(run.column_of_role("position")[i - 1 : i + 1]).max())
 
 
 def turning_points(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

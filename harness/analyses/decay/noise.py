@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...records.record import FEWEST, Record
+from ...records.record import MIN_SAMPLES, Record
 
 FAR = 8.0  # times the noise of a stray sample
 SPIKE = 0.02  # of the range: no smaller one hides a turning point
@@ -20,7 +20,7 @@ def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     itself before the first change, or after the last, is no sign of a quiet sensor.
     """
     changes = np.flatnonzero(np.diff(x))
-    if len(changes) and changes[-1] - changes[0] > 2 * FEWEST:
+    if len(changes) and changes[-1] - changes[0] > 2 * MIN_SAMPLES:
         moving = slice(changes[0], changes[-1] + 2)
         t, x = t[moving], x[moving]
     noise = typical(beside(t, x))

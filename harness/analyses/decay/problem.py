@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from ...records.record import FEWEST, Record
+from ...records.record import MIN_SAMPLES, Record
 from .chain import MOST, chain
 from .energy import losses
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, T0, TERMS, UNKNOWNS, ZETA, Terms, unknowns_of
@@ -62,9 +62,9 @@ class Problem:
     def only(self, keep: np.ndarray | slice) -> Self:
         """The same with some of the samples; Unfit where these are too few to be fitted."""
         some = replace(self, t=self.t[keep], x=self.x[keep])
-        if len(some.t) < FEWEST:
+        if len(some.t) < MIN_SAMPLES:
             raise Unfit(
-                f"has only {len(some.t)} samples in a row that follow the free decay of one oscillator, and {FEWEST} "
+                f"has only {len(some.t)} samples in a row that follow the free decay of one oscillator, and {MIN_SAMPLES} "
                 "are needed",
                 "sample finer, or cut out what is one with --from and --until",
             )

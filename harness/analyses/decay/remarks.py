@@ -35,7 +35,7 @@ def refuse(record: Record, problem: Problem, full: Law, spread: Spread, pendulum
             advice = "say --pendulum if it is one, or " + advice
         raise Unfit(
             f"is not a free decay of one oscillator: the best fit leaves {100 * min(share, 1.0):.0f} % of the "
-            f"motion, most of it about t = {record.at(worst(problem, full.p, e))} s",
+            f"motion, most of it about t = {record.format_time(worst(problem, full.p, e))} s",
             advice,
         )
     if gains(problem, full) < -GAINS:
@@ -70,7 +70,7 @@ def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, 
     share = spread.rms / problem.motion
     if rough and share > PART:
         e, _ = problem.off(full.p, full.terms)
-        most = f"most of it about t = {record.at(worst(problem, full.p, e))} s"
+        most = f"most of it about t = {record.format_time(worst(problem, full.p, e))} s"
         said.append(
             f"{off}, {100 * share:.1f} % of the motion, where the {scatter}: {also}, {most}; the intervals are "
             "widened, but where the law does not hold its values mean little."

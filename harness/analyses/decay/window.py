@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...records.record import FEWEST, Record
+from ...records.record import MIN_SAMPLES, Record
 from .law import OMEGA, T0, TERMS, UNKNOWNS, Terms
 from .noise import FAR, scatter, typical
 from .problem import LEAST_NOISE, Fitted, Problem, prepare
@@ -44,7 +44,7 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
     notes = []
     if turns.start > record.t[0]:
         notes.append(
-            f"Before the gap that ends at t = {record.at(turns.start)} s are too few swings; they are left out."
+            f"Before the gap that ends at t = {record.format_time(turns.start)} s are too few swings; they are left out."
         )
     begin = max(turns.start - problem.origin, seed[T0])
     later = problem.only(problem.t >= begin)
@@ -58,14 +58,14 @@ def free_motion(record: Record, turns: Turns, terms: Terms, pendulum: bool, drif
         used, p, squares = pushed
         used, p, squares = until_stop(used, p, squares, terms, used)
         notes.append(
-            f"The motion is free from t = {record.at(used.t[0] + used.origin)} s on; what is before is left out."
+            f"The motion is free from t = {record.format_time(used.t[0] + used.origin)} s on; what is before is left out."
         )
 
     if used.rough(squares) and squares > len(used.t) * (2 * used.noise) ** 2:
         broken = until_disturbed(record, turns, used, squares, terms)
         if broken is not None:
             used, p, squares, strayed = without_strays(*broken, terms)
-            at = record.at(used.t[-1] + used.origin)
+            at = record.format_time(used.t[-1] + used.origin)
             notes.append(
                 f"The record follows the law until t = {at} s, and then departs from it; it is used until there."
             )
@@ -156,7 +156,7 @@ def until_disturbed(record: Record, turns: Turns, used: Problem, squares: float,
         problem, p = begun(record, first, terms, used.model.sine, used.drift)
         problem = problem.only(problem.t >= begin - problem.origin)
         early, last = problem, float(first.t[-1] - problem.origin)
-        if np.searchsorted(problem.t, last, "right") < FEWEST:
+        if np.searchsorted(problem.t, last, "right") < MIN_SAMPLES:
             return None
         for _ in range(ROUNDS):  # what is fitted reaches farther than what was
             early = problem.only(problem.t <= last)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import HarnessError
-from ...running.inside import Inside, embedded
-from ...running.probe import Card, Motion, Setting, card, run
-from ...scenes.fmus import fmu_of
+from ...running.embedded_model import EmbeddedModel, load_model_class
+from ...running.fmu_session import CompletedRun, FmuInfo, InitialValues, read_info, run_steps
+from ...scenes.fmu_files import find_fmu
 from ...truths.linear import mp
 from ...truths.models import CASES, MODELS
 from ...truths.problem import Equations
@@ -25,11 +25,11 @@ CLOSED = Beside("closed form in 120 digits")
 
 def accuracy() -> list[Callable[[], Measure]]:
     """What to measure, in the order of the design's table."""
-    cards = {model: card(model) for model in MODELS}
+    cards = {model: read_info(model) for model in MODELS}
     closed = [model for model in MODELS if "exact" in cards[model].methods]
     return [
         *(partial(exact, model, cards[model]) for model in closed),
-        *(partial(late, model, cards[model]) for model in closed if "friction" in cards[model].choices),
+        *(partial(late, model, cards[model]) for model in closed if "friction" in cards[model].enumerations),
         partial(last, "coulomb", {"f": 1e-7}, 300_000, swings),
         partial(last, "stickslip", {}, 200_000, slips),
         *(partial(default, "pendulum", cards["pendulum"], "pin_load", load, 1e-9) for load in ("weight", "reaction")),
@@ -39,36 +39,36 @@ def accuracy() -> list[Callable[[], Measure]]:
     ]
 
 
-def moved(setting: Setting, times: list[float]) -> Motion:
+def moved(setting: InitialValues, times: list[float]) -> CompletedRun:
     """The motion through the times; HarnessError with the FMU's sentence if it is refused."""
-    ending = run(setting, [(t, ahead - t) for t, ahead in pairwise(times)], {})
-    if not isinstance(ending, Motion):
-        raise HarnessError(f"{setting.model}: {ending.sentence}")
+    ending = run_steps(setting, [(t, ahead - t) for t, ahead in pairwise(times)], {})
+    if not isinstance(ending, CompletedRun):
+        raise HarnessError(f"{setting.model}: {ending.message}")
     return ending
 
 
-def error(model: str, its: Card, chosen: dict[str, float | str]) -> float:
+def error(model: str, its: FmuInfo, chosen: dict[str, float | str]) -> float:
     """The largest error of the default experiment, as a share of the largest value."""
-    values = its.numbers({**its.defaults, **chosen})
+    values = its.resolve_labels({**its.start_values, **chosen})
     answer = truth(model, [(0.0, its.stop, values)], Grid(0.0, its.stop, POINTS))
-    motion = moved(Setting(model, values, stop=its.stop), answer.times.tolist())
+    motion = moved(InitialValues(model, values, stop=its.stop), answer.times.tolist())
     return answer.error(motion.x, motion.v)
 
 
-def exact(model: str, its: Card) -> Measure:
+def exact(model: str, its: FmuInfo) -> Measure:
     return Measure(f"{model}, exact: whole run", error(model, its, {}), "1", 1e-13, (CLOSED,))
 
 
-def default(model: str, its: Card, name: str, value: float | str, reach: float) -> Measure:
+def default(model: str, its: FmuInfo, name: str, value: float | str, reach: float) -> Measure:
     """A model with its own method and tolerance."""
     beside = Beside("scipy Radau at 1e-11" if problem(model).stiff else "scipy DOP853 at 1e-13")
     return Measure(f"{model}, default, {name} {value}", error(model, its, {name: value}), "1", reach, (beside,))
 
 
-def late(model: str, its: Card) -> Measure:
+def late(model: str, its: FmuInfo) -> Measure:
     """The largest error of the time of an event, relative to it."""
-    answer = truth(model, [(0.0, its.stop, its.defaults)], Grid(0.0, its.stop, 1))
-    found = Inside.prepared(embedded(fmu_of(model)), {}, "exact", 0.0).events(its.stop)
+    answer = truth(model, [(0.0, its.stop, its.start_values)], Grid(0.0, its.stop, 1))
+    found = EmbeddedModel.create(load_model_class(find_fmu(model)), {}, "exact", 0.0).find_mode_changes(its.stop)
     if [mode for _, mode in found] != [mode for _, mode in answer.events]:
         raise HarnessError(f"{model}: the modes after its events are not the true ones")
     off = max(abs(t / true - 1) for (t, _), (true, _) in zip(found, answer.events, strict=True))
@@ -77,10 +77,10 @@ def late(model: str, its: Card) -> Measure:
 
 def last(model: str, values: dict[str, float], number: int, law: Callable[[Any, int], Any]) -> Measure:
     """How far off the time of the last of many events is, in units of its last place."""
-    inside = Inside.prepared(embedded(fmu_of(model)), values, "exact", 0.0)
+    inside = EmbeddedModel.create(load_model_class(find_fmu(model)), values, "exact", 0.0)
     true, next_one = (law(inside.model, n) for n in (number, number + 1))
     stop = float((true + next_one) / 2)
-    inside.motion([stop * i / 10 for i in range(10)] + [stop])
+    inside.compute_states([stop * i / 10 for i in range(10)] + [stop])
     inside.model.solver.report(inside.model.events)
     events = inside.model.events
     if events.count != number:
@@ -106,12 +106,12 @@ def slips(model: Any, number: int) -> Any:
     return h / u + (number - 1) // 2 * (slip + stick) + (0 if number % 2 else slip)
 
 
-def between_grids(model: str, its: Card) -> Measure:
+def between_grids(model: str, its: FmuInfo) -> Measure:
     """The largest difference at shared times between an even grid and a random one, as a share of the largest."""
     even = [its.stop * i / 200 for i in range(201)]
     draw = Random(model)
     both = sorted({*even, *(draw.uniform(0.0, its.stop) for _ in range(777))})
-    setting = Setting(model, its.defaults, stop=its.stop)
+    setting = InitialValues(model, its.start_values, stop=its.stop)
     one, other = moved(setting, even), moved(setting, both)
     shared = np.searchsorted(both, even)
     parts = ((one.x, other.x), (one.v, other.v))
@@ -119,9 +119,9 @@ def between_grids(model: str, its: Card) -> Measure:
     return Measure(f"{model}, default: difference between two grids", off, "1", 1e-12, (Beside("each other"),))
 
 
-def drift(model: str, its: Card, chosen: dict[str, float]) -> Measure:
+def drift(model: str, its: FmuInfo, chosen: dict[str, float]) -> Measure:
     """How far a stuck body gets."""
-    setting = Setting(model, {**its.defaults, **chosen}, stop=1e6)
+    setting = InitialValues(model, {**its.start_values, **chosen}, stop=1e6)
     x = moved(setting, [1e4 * i for i in range(101)]).x
     off = float(np.abs(x - x[0]).max())
     return Measure(f"{model}, stuck for 1e6 s: displacement", off, problem(model).unit, 0.0, ())

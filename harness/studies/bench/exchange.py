@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.child import ask
-from ...process.room import room
-from ...running.fmi3 import COSIMULATION, EXCHANGE, Recording, instance, sibling
-from ...running.in_c import Library, NotHereError, built, compiled
-from ...scenes.fmus import fmu_of
+from ...process.subprocess_runner import run_subprocess
+from ...process.temporary_directory import temporary_directory
+from ...running.c_host import Library, MissingToolError, compile_source, load_library
+from ...running.fmi3 import CO_SIMULATION, MODEL_EXCHANGE, RecordedRun, fmi3_path, open_fmi3_instance
+from ...scenes.fmu_files import find_fmu
 from ...truths.models import MODELS
 from ...truths.reference import relative
 from .measure import NUMBERS, Beside, Measure
@@ -55,7 +55,7 @@ def by_cvode(scene: Scene, tolerances: tuple[float, ...] = TOLERANCES) -> Measur
             errors = {"CVODE by hand": error(scene, hand(scene, rtol)), "fmpy": error(scene, fmpy(scene, rtol))}
             try:
                 errors["fmusim"] = error(scene, fmusim(scene, rtol))
-            except NotHereError as why:
+            except MissingToolError as why:
                 lacks.add(Beside(str(why)))
             by_hand, *theirs = errors.values()
             ratio = max(ratio, *(each / by_hand for each in theirs))
@@ -68,9 +68,9 @@ def by_cvode(scene: Scene, tolerances: tuple[float, ...] = TOLERANCES) -> Measur
     return row(f"{scene}, model exchange: largest error, ratio to CVODE's by hand", "1", figures)
 
 
-def error(scene: Scene, found: Recording | np.ndarray) -> float:
+def error(scene: Scene, found: RecordedRun | np.ndarray) -> float:
     """The largest at the common times, of a recording or of position and speed (n, 2)."""
-    motion = found.at(scene.times, scene.its.outputs) if isinstance(found, Recording) else found
+    motion = found.sample_at(scene.times, scene.its.outputs) if isinstance(found, RecordedRun) else found
     return float(relative(motion, scene.truth).max())
 
 
@@ -94,25 +94,25 @@ def hand(scene: Scene, rtol: float) -> np.ndarray:
     return np.array([answer.split()[1:] for answer in answers if answer.startswith("values")], dtype=float)
 
 
-def fmpy(scene: Scene, rtol: float, way: str = EXCHANGE) -> Recording:
+def fmpy(scene: Scene, rtol: float, way: str = MODEL_EXCHANGE) -> RecordedRun:
     """A run of the FMI 3.0 FMU through fmpy, its events counted."""
     its = scene.its
     outputs = (*its.outputs, *["events.count"] * its.problem.dry)
     span = scene.stop, scene.interval, rtol, None, scene.start
-    with instance(three(its.model), way) as fmu:
-        return fmu.simulate(scene.numbers, outputs, *span, signals=scene.signals, led=scene.ramps)
+    with open_fmi3_instance(three(its.model), way) as fmu:
+        return fmu.simulate(scene.numbers, outputs, *span, signals=scene.signals, drive_inputs=scene.ramps)
 
 
-def fmusim(scene: Scene, rtol: float) -> Recording:
+def fmusim(scene: Scene, rtol: float) -> RecordedRun:
     """A run of the FMI 3.0 FMU through fmusim."""
     program, its = shutil.which("fmusim"), scene.its
     if program is None:
-        raise NotHereError("not installed: fmusim")
+        raise MissingToolError("not installed: fmusim")
     if scene.ramps:
-        raise NotHereError("fmusim holds an input within its steps")
+        raise MissingToolError("fmusim holds an input within its steps")
     if scene.start:
-        raise NotHereError("fmusim takes times for the same that differ by 1e-5 of them")
-    with room("fmusim-") as folder:
+        raise MissingToolError("fmusim takes times for the same that differ by 1e-5 of them")
+    with temporary_directory("fmusim-") as folder:
         file, led = folder / "out.csv", folder / "in.csv"
         command = [program, "--interface-type", "me", "--solver", "cvode", "--tolerance", repr(rtol)]
         command += ["--start-time", repr(scene.start), "--stop-time", repr(scene.stop)]
@@ -122,10 +122,10 @@ def fmusim(scene: Scene, rtol: float) -> Recording:
             heads = ",".join(scene.signals.dtype.names or ())
             np.savetxt(led, scene.signals, "%.17g", ",", header=heads, comments="")
             command += ["--input-file", str(led)]
-        done = ask([*command, str(three(its.model))])
+        done = run_subprocess([*command, str(three(its.model))])
         if done.returncode:
             raise HarnessError(" ".join((done.stderr or done.stdout).split()) or "fmusim gives no reason")
-        return Recording(np.genfromtxt(file, delimiter=",", names=True), 0)
+        return RecordedRun(np.genfromtxt(file, delimiter=",", names=True), 0)
 
 
 def beside_co_simulation(scene: Scene) -> Measure:
@@ -133,10 +133,10 @@ def beside_co_simulation(scene: Scene) -> Measure:
     each output; without bound if they count different events."""
 
     def figures() -> Figures:
-        one, other = (fmpy(scene, 1e-10, way) for way in (EXCHANGE, COSIMULATION))
+        one, other = (fmpy(scene, 1e-10, way) for way in (MODEL_EXCHANGE, CO_SIMULATION))
         counts = [int(found.rows["events.count"][-1]) if scene.its.problem.dry else 0 for found in (one, other)]
         told = Beside("{} events in model exchange, {} in co-simulation".format(*counts))
-        apart = relative(*(found.at(scene.times, scene.its.outputs) for found in (one, other))).max()
+        apart = relative(*(found.sample_at(scene.times, scene.its.outputs) for found in (one, other))).max()
         return float(apart) if counts[0] == counts[1] else inf, 1e-6, (told,)
 
     return row(f"{scene}: model exchange at rtol 1e-10, difference from co-simulation", "1", figures)
@@ -147,7 +147,7 @@ def calls(model: str) -> Measure:
     multiple of those of BouncingBall with the acceleration of the model written by hand."""
 
     def figures() -> Figures:
-        library, equation = built(fmu(model, "native")), NUMBERS["acceleration"][model]
+        library, equation = load_library(fmu(model, "native")), NUMBERS["acceleration"][model]
         root = ElementTree.parse(library.file.parents[2] / "modelDescription.xml").getroot()
         states = len(root.findall("ModelStructure/Derivatives/Unknown"))
         indicators = int(root.attrib["numberOfEventIndicators"])
@@ -175,19 +175,19 @@ def bouncing_ball(acceleration: str) -> Library:
     clone = REFERENCES.absolute()
     model, source = clone / "BouncingBall", clone / "src"
     if not model.is_dir():
-        raise NotHereError(f"not here: {REFERENCES} (git clone https://github.com/modelica/Reference-FMUs)")
+        raise MissingToolError(f"not here: {REFERENCES} (git clone https://github.com/modelica/Reference-FMUs)")
     (guid,) = re.findall(r'INSTANTIATION_TOKEN "(.*)"', (model / "config.h").read_text(encoding="utf-8"))
     options = ("-std=gnu99", "-DFMI_VERSION=2", "-DDISABLE_PREFIX", f"-I{clone / 'include'}", f"-I{model}")
     others = (str(source / name) for name in ("fmi2Functions.c", "cosimulation.c"))
     whole = (*options, f"-DACCELERATION={acceleration}", "-shared", "-fPIC", "-fvisibility=hidden", *others)
     name = f"BouncingBall-{sha256(acceleration.encode()).hexdigest()[:8]}.so"
-    file = compiled(Path(__file__).with_name("bouncing.c"), name, whole, ("-lm",))
+    file = compile_source(Path(__file__).with_name("bouncing.c"), name, whole, ("-lm",))
     return Library(file, {"h": 1, "v": 3}, guid)
 
 
 def three(model: str) -> Path:
     """The FMI 3.0 FMU of a model."""
-    file = sibling(fmu_of(model))
+    file = fmi3_path(find_fmu(model))
     if not file.is_file():
-        raise NotHereError(f"not built: {file} (python build_fmus.py --fmi 3)")
+        raise MissingToolError(f"not built: {file} (python build_fmus.py --fmi 3)")
     return file

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.child import ask
-from ...running.in_c import Library, NotHereError, built, compiled, compiler
-from ...running.loops import POINTS, direct, shared
-from ...scenes.fmus import fmu_of
+from ...process.subprocess_runner import run_subprocess
+from ...running.c_host import Library, MissingToolError, compile_source, find_compiler, load_library
+from ...running.stepping_loops import COMMUNICATION_STEPS, time_direct_loop, time_per_step
+from ...scenes.fmu_files import find_fmu
 from ...truths.models import CASES, MODELS
 from ...truths.reference import relative
 from .measure import NUMBERS, Beside, Measure
@@ -45,33 +45,35 @@ def run_in_c(case: str) -> Measure:
     def figures() -> Figures:
         try:
             peer = Beside("FMU in Python", of_fmu(case, "python").seconds)
-        except NotHereError as error:
+        except MissingToolError as error:
             peer = Beside(f"FMU in Python: {error}")
         return of_fmu(case, "native").seconds, REACH[case], (peer,)
 
-    return row(f"{case}, native: {CASE[case].problem.stop:g} s, {POINTS} points, host in C", "s", figures)
+    return row(f"{case}, native: {CASE[case].problem.stop:g} s, {COMMUNICATION_STEPS} points, host in C", "s", figures)
 
 
 def step_in_c(case: str) -> Measure:
     """One communication step in the host in C, with position and speed read."""
 
     def seconds(kind: str) -> float:
-        return shared(of_fmu(case, kind).seconds, of_fmu(case, kind, 1).seconds)
+        return time_per_step(of_fmu(case, kind).seconds, of_fmu(case, kind, 1).seconds)
 
     return row(f"{case}, native: communication step, host in C", "s", partial(duel, seconds))
 
 
 def run_through_fmpy(model: str) -> Measure:
     """One run with 1600 points through fmpy, all outputs recorded."""
-    seconds = partial(through_fmpy, model, steps=POINTS)
-    return row(f"{model}, native: {POINTS} points through fmpy, harness's loop", "s", partial(duel, seconds))
+    seconds = partial(through_fmpy, model, steps=COMMUNICATION_STEPS)
+    return row(
+        f"{model}, native: {COMMUNICATION_STEPS} points through fmpy, harness's loop", "s", partial(duel, seconds)
+    )
 
 
 def step_through_fmpy(model: str) -> Measure:
     """One communication step through fmpy, all outputs recorded."""
 
     def seconds(kind: str) -> float:
-        return shared(through_fmpy(model, kind, steps=POINTS), through_fmpy(model, kind, steps=1))
+        return time_per_step(through_fmpy(model, kind, steps=COMMUNICATION_STEPS), through_fmpy(model, kind, steps=1))
 
     return row(f"{model}, native: communication step through fmpy, harness's loop", "s", partial(duel, seconds))
 
@@ -105,18 +107,18 @@ def row(what: str, unit: str, figures: Callable[[], Figures]) -> Measure:
     """The measure of what was measured, to reach and beside; or why nothing is."""
     try:
         value, reach, others = figures()
-    except NotHereError as error:
+    except MissingToolError as error:
         return Measure(what, nan, unit, nan, (Beside(str(error)),))
     return Measure(what, value, unit, reach, others)
 
 
 def fmu(model: str, kind: str) -> Path:
     """The built FMU in Python or the native one."""
-    path, option = fmu_of(model), ""
+    path, option = find_fmu(model), ""
     if kind == "native":
         path, option = path.parent / "native" / path.name, " --native"
     if not path.is_file():
-        raise NotHereError(f"not built: {path} (python build_fmus.py{option})")
+        raise MissingToolError(f"not built: {path} (python build_fmus.py{option})")
     return path
 
 
@@ -141,7 +143,7 @@ def runs(
 
 def played(library: Library, calls: str) -> str:
     """What the host in C answers."""
-    done = ask(library.command, calls, library.environment)
+    done = run_subprocess(library.command, calls, library.environment)
     if done.returncode:
         raise HarnessError((done.stderr.splitlines() or [f"{library.file.name} ends the host in C"])[0])
     return done.stdout
@@ -153,20 +155,20 @@ def played(library: Library, calls: str) -> str:
 @cache
 def cvode(model: str, plain: bool = False) -> Library:
     """The CVODE FMU, compiled for a model; `plain` as importers solve in model exchange."""
-    looking = [compiler(), "-E", "-x", "c", "-", "-o", os.devnull]
-    if ask(looking, "#include <cvode/cvode.h>\n").returncode:
-        raise NotHereError("not installed: SUNDIALS for C (on Debian libsundials-dev)")
+    looking = [find_compiler(), "-E", "-x", "c", "-", "-o", os.devnull]
+    if run_subprocess(looking, "#include <cvode/cvode.h>\n").returncode:
+        raise MissingToolError("not installed: SUNDIALS for C (on Debian libsundials-dev)")
     options = (f"-DMODEL={model.upper()}", f"-DPLAIN={plain:d}", "-shared", "-fPIC")
     libraries = ("-lsundials_cvode", "-lsundials_nvecserial", "-lm")
-    file = compiled(Path(__file__).with_name("cvode.c"), f"{model}-{plain:d}-cvode.so", options, libraries)
+    file = compile_source(Path(__file__).with_name("cvode.c"), f"{model}-{plain:d}-cvode.so", options, libraries)
     return Library(file, {name: place for place, name in enumerate(("x", "v", "rtol", "atol", "x_m", "force", "rate"))})
 
 
 @cache
-def of_fmu(case: str, kind: str, steps: int = POINTS) -> Timing:
+def of_fmu(case: str, kind: str, steps: int = COMMUNICATION_STEPS) -> Timing:
     """A built FMU with its own method and tolerance in the host in C."""
     its = CASE[case]
-    library = built(fmu(its.model, kind))
+    library = load_library(fmu(its.model, kind))
     repeat = REPEAT if kind == "native" else REPEAT_PYTHON
     return runs(library, its.values, its.outputs, its.problem.stop, steps, repeat)
 
@@ -176,16 +178,16 @@ def of_cvode(case: str, rtol: float) -> Timing:
     """The CVODE FMU in the host in C."""
     its = CASE[case]
     values = {**its.values, "rtol": rtol, "atol": rtol * its.problem.absolute}
-    return runs(cvode(its.model), values, ("x", "v"), its.problem.stop, POINTS, REPEAT)
+    return runs(cvode(its.model), values, ("x", "v"), its.problem.stop, COMMUNICATION_STEPS, REPEAT)
 
 
 @cache
 def through_fmpy(model: str, kind: str, steps: int) -> float:
     """Run time in s of a built FMU in the harness's loop through fmpy."""
-    return direct(fmu(model, kind), steps)
+    return time_direct_loop(fmu(model, kind), steps)
 
 
 def off(case: str, found: Timing) -> float:
     """The largest error at the points of the reference, relative to the largest of position and speed."""
     truth = CASE[case].reference
-    return float(relative(found.rows[:: POINTS // (len(truth.times) - 1)], truth.motion).max())
+    return float(relative(found.rows[:: COMMUNICATION_STEPS // (len(truth.times) - 1)], truth.motion).max())

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...running.probe import card
+from ...running.fmu_session import read_info
 from ...truths.reference import POINTS, Case
 from ...truths.truth import Grid, truth
 from .native import CASE
@@ -87,8 +87,8 @@ class Scene:
         """Position and speed (n, 2) at the common times."""
         if self.is_plain:
             return self.its.reference.motion
-        known = card(self.its.model)
-        values = known.numbers({**known.defaults, **self.numbers})
+        known = read_info(self.its.model)
+        values = known.resolve_labels({**known.start_values, **self.numbers})
         lines = [(t, end, {**dict.fromkeys(self.led, value), "rate": rate}) for t, end, value, rate in self.lines]
         spans = [(t, end, {**values, **led}) for t, end, led in lines]
         found = truth(self.its.model, spans, Grid(self.start, self.stop, POINTS - 1))

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ...running import loops
-from ...running.clock import best, timed
-from ...running.description import description
-from ...running.inside import Inside, embedded
-from ...running.loops import POINTS
-from ...scenes.fmus import fmu_of
+from ...running import stepping_loops
+from ...running.description import read_description
+from ...running.embedded_model import EmbeddedModel, load_model_class
+from ...running.stepping_loops import COMMUNICATION_STEPS
+from ...running.timing import time_call, time_fastest_call
+from ...scenes.fmu_files import find_fmu
 from ...truths import peers
 from ...truths.models import MODELS
 from ...truths.models.pacejka import Pacejka
@@ -30,12 +30,12 @@ STEPS = 500  # of a peer, to take the mean of
 
 def speed() -> list[Callable[[], Measure]]:
     """What to measure, in the order of the design's table."""
-    sled = embedded(fmu_of("stickslip"))
-    pacejka = partial(inside_python, "pacejka", embedded(fmu_of("pacejka")), "rodas", 8e-3, ("Radau", "BDF"))
+    sled = load_model_class(find_fmu("stickslip"))
+    pacejka = partial(inside_python, "pacejka", load_model_class(find_fmu("pacejka")), "rodas", 8e-3, ("Radau", "BDF"))
     return [
         partial(inside_python, "stickslip", sled, "exact", 0.5e-3, ("RK23", "Adams"), Stickslip(), {}),
         *(partial(pacejka, Pacejka(x_m), {"x_m": x_m}) for x_m in (1e-2, 1e-3)),
-        partial(step, embedded(fmu_of("smd"))),
+        partial(step, load_model_class(find_fmu("smd"))),
         *(partial(communication_step, model) for model in MODELS),
         partial(many_runs, sled),
     ]
@@ -51,18 +51,24 @@ def inside_python(
     values: dict[str, float],
 ) -> Measure:
     """One run with 1600 points, without fmpy; `rivals` are methods of scipy and of CVODE."""
-    times = np.linspace(0.0, problem.stop, POINTS + 1)
-    mine = Inside.prepared(carried, values, method, RTOL, ATOL)
-    seconds = best(partial(mine.motion, times.tolist()), 20)
+    times = np.linspace(0.0, problem.stop, COMMUNICATION_STEPS + 1)
+    mine = EmbeddedModel.create(carried, values, method, RTOL, ATOL)
+    seconds = time_fastest_call(partial(mine.compute_states, times.tolist()), 20)
     beside = []
     for peer, name in zip(("scipy", "cvode"), rivals, strict=True):
         if peer in peers.missing():
             beside.append(Beside(f"{peer} {name}: {peers.missing()[peer]} is not installed"))
         else:
             ask = partial(peers.solve, peer, name, problem, times, RTOL, ATOL)
-            beside.append(Beside(f"{peer} {name} at {RTOL:g}", best(ask, 3)))
+            beside.append(Beside(f"{peer} {name} at {RTOL:g}", time_fastest_call(ask, 3)))
     setting = ", ".join([model, *(f"{name} {value:g}" for name, value in values.items()), method])
-    return Measure(f"{setting}: {problem.stop:g} s, {POINTS} points, inside Python", seconds, "s", reach, tuple(beside))
+    return Measure(
+        f"{setting}: {problem.stop:g} s, {COMMUNICATION_STEPS} points, inside Python",
+        seconds,
+        "s",
+        reach,
+        tuple(beside),
+    )
 
 
 def step(carried: type) -> Measure:
@@ -70,8 +76,8 @@ def step(carried: type) -> Measure:
     from scipy.integrate import RK23
 
     problem, rtol = Smd(), 1e-8
-    mine = Inside.prepared(carried, {}, "ode23", rtol, 1e-3 * rtol)
-    seconds = best(partial(mine.motion, [0.0, problem.stop]), 10)
+    mine = EmbeddedModel.create(carried, {}, "ode23", rtol, 1e-3 * rtol)
+    seconds = time_fastest_call(partial(mine.compute_states, [0.0, problem.stop]), 10)
     solver = mine.model.solver
     solver.report(mine.model.events)
     rival: Any = RK23(problem.rates(1), 0.0, problem.start, problem.stop, rtol=rtol, atol=1e-3 * rtol)
@@ -80,24 +86,30 @@ def step(carried: type) -> Measure:
         for _ in range(STEPS):
             rival.step()
 
-    peer = Beside("scipy RK23", best(steps, 5) / STEPS)
+    peer = Beside("scipy RK23", time_fastest_call(steps, 5) / STEPS)
     return Measure("smd, ode23: one step", seconds / (solver.steps + solver.rejected), "s", 2e-6, (peer,))
 
 
 def communication_step(model: str) -> Measure:
     """A communication step through fmpy with all outputs recorded, as a multiple of that of an empty FMU."""
-    mine = fmu_of(model)
+    mine = find_fmu(model)
     with TemporaryDirectory(prefix="fmu-") as folder:
-        found = description(fmu_of(model))
+        found = read_description(find_fmu(model))
         stop = float(found.defaultExperiment.stopTime)
         variables = found.modelVariables
         kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
         traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
         nothing = bench_empty.build(f"Empty{model.capitalize()}", traits, stop, Path(folder))
-        ways = [(loop, fmu) for loop in (loops.usual, loops.direct) for fmu in (mine, nothing)]
+        ways = [
+            (loop, fmu)
+            for loop in (stepping_loops.time_fmpy_loop, stepping_loops.time_direct_loop)
+            for fmu in (mine, nothing)
+        ]
         turns = []
         for _ in range(3):  # in turns: what else runs on the machine hits all
-            turns.append([loops.shared(loop(fmu, POINTS), loop(fmu, 1)) for loop, fmu in ways])
+            turns.append(
+                [stepping_loops.time_per_step(loop(fmu, COMMUNICATION_STEPS), loop(fmu, 1)) for loop, fmu in ways]
+            )
     usual, empty, lean, lean_empty = map(min, zip(*turns, strict=True))
     beside = (
         Beside("this FMU", usual),
@@ -122,8 +134,8 @@ def many_runs(carried: type) -> Measure:
         solver.report(model.events)
         return solver.x, solver.v, model.events.count
 
-    seconds = timed(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
+    seconds = time_call(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
     problem = Stickslip()
     ask = partial(peers.solve, "scipy", "RK23", problem, np.array([0.0, problem.stop]), RTOL, ATOL)
-    rival = Beside(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * best(ask, 5))
+    rival = Beside(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * time_fastest_call(ask, 5))
     return Measure(f"stickslip, exact: {RUNS} runs of {problem.stop:g} s, one core", seconds, "s", 10.0, (rival,))

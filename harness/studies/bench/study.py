@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from ...results.files import write_rows
-from ...results.folder import replacing
-from ...results.provenance import of_each, record
-from ...running.description import parameters
-from ...scenes.fmus import fmu_of
+from ...results.files import write_csv_rows
+from ...results.folder import replace_folder
+from ...results.provenance import prefix_parameters, write_provenance
+from ...running.description import declared_parameters
+from ...scenes.fmu_files import find_fmu
 from ...truths.models import MODELS
 from ...truths.truth import check
 from .measure import Measure
@@ -28,14 +28,14 @@ def measures() -> list[Callable[[], Measure]]:
 
 def bench(chosen: list[Callable[[], Measure]], out: Path, report: Callable[[str, float], None]) -> list[Measure]:
     """Measure the chosen and write out/bench/bench.csv; told of each as it comes."""
-    with replacing(out / FOLDER, (FILE,)) as folder:
+    with replace_folder(out / FOLDER, (FILE,)) as folder:
         found = []
         for measure in chosen:
             found.append(measure())
             report(found[-1].what, 1.0)
         save(found, folder / FILE)
-        fmus = [fmu for fmu in map(fmu_of, MODELS) if fmu.is_file()]
-        record(folder, fmus, of_each({fmu.stem: parameters(fmu) for fmu in fmus}))
+        fmus = [fmu for fmu in map(find_fmu, MODELS) if fmu.is_file()]
+        write_provenance(folder, fmus, prefix_parameters({fmu.stem: declared_parameters(fmu) for fmu in fmus}))
     return found
 
 
@@ -43,4 +43,4 @@ def save(found: list[Measure], path: Path) -> None:
     """One line for each measure and for each number beside it."""
     heads = ["what", "measured", "unit", "to reach", "reached", "beside", "its value"]
     mine = ((each, (each.what, each.value, each.unit, each.reach, each.reached)) for each in found)
-    write_rows(path, heads, ((*cells, beside.name, beside.value) for each, cells in mine for beside in each.beside))
+    write_csv_rows(path, heads, ((*cells, beside.name, beside.value) for each, cells in mine for beside in each.beside))

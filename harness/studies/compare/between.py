@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-from ...running.trajectory import Trajectory
+from ...running.signals import Signals
 from .units import is_rate
 
 LARGE, REDUCED = 1e150, 2.0**-600  # differences of larger values have no number: they are reckoned in a smaller unit
@@ -32,7 +32,7 @@ class Sides:
 class Motion:
     """What a trajectory is between its samples."""
 
-    path: Trajectory
+    path: Signals
 
     def sides(self, name: str, at: np.ndarray, jumps: np.ndarray) -> Sides:
         """A variable at the times `at` (n,), which the trajectory covers; `jumps` (k, 2) are the stretches of time in

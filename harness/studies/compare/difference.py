@@ -7,7 +7,7 @@ from math import isnan
 import numpy as np
 
 from ...errors import HarnessError
-from ...running.trajectory import Trajectory
+from ...running.signals import Signals
 from .between import Motion, Sides
 from .pairs import Pairs, paired
 from .trajectory import common
@@ -39,8 +39,8 @@ class Comparison:
     """Two trajectories at the `time` (n,) of comparison, with the `pairs` of their events, None where they are not
     known."""
 
-    one: Trajectory
-    two: Trajectory
+    one: Signals
+    two: Signals
     time: np.ndarray
     interpolated: bool
     differences: tuple[Difference, ...]
@@ -73,7 +73,7 @@ class Comparison:
         return self.pairs.sentence((self.one.name, self.two.name)) if self.pairs else ""
 
 
-def compare(one: Trajectory, two: Trajectory) -> Comparison:
+def compare(one: Signals, two: Signals) -> Comparison:
     """Compare what both have, over the time that both cover; HarnessError if that is nothing."""
     shared = [name for name in one.columns if name in two.columns]
     if not shared:
@@ -100,7 +100,7 @@ def compare(one: Trajectory, two: Trajectory) -> Comparison:
     return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs)
 
 
-def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, float, str]:
+def units(one: Signals, two: Signals, name: str) -> tuple[str | None, float, str]:
     """The unit in which a variable is compared, None where that cannot be, how large the other's is in it, and what is
     to be said of that."""
     left, right = (each.units[name] for each in (one, two))
@@ -116,11 +116,11 @@ def units(one: Trajectory, two: Trajectory, name: str) -> tuple[str | None, floa
     return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; it is compared in {left}"
 
 
-def textual(path: Trajectory, name: str) -> bool:
+def textual(path: Signals, name: str) -> bool:
     return path.columns[name].dtype.kind == "U"
 
 
-def coded(one: Trajectory, two: Trajectory) -> Iterator[Motion]:
+def coded(one: Signals, two: Signals) -> Iterator[Motion]:
     """Both motions, of a text in both the place among all that either says."""
     texts = [name for name in one.columns if name in two.columns and textual(one, name) and textual(two, name)]
     known = {name: np.unique(np.concatenate([each.columns[name] for each in (one, two)])) for name in texts}
@@ -148,7 +148,7 @@ def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: 
     return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, size, left, right)
 
 
-def times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[np.ndarray, bool]:
+def times(one: Signals, two: Signals, begin: float, end: float) -> tuple[np.ndarray, bool]:
     """The times of comparison (n,), and whether one is interpolated: those that are common if there are enough of them,
     else those of the coarser one."""
     near = SAME * (end - begin)
@@ -161,9 +161,7 @@ def times(one: Trajectory, two: Trajectory, begin: float, end: float) -> tuple[n
     return coarser, True
 
 
-def events(
-    one: Trajectory, two: Trajectory, begin: float, end: float
-) -> tuple[Pairs | None, tuple[np.ndarray, np.ndarray]]:
+def events(one: Signals, two: Signals, begin: float, end: float) -> tuple[Pairs | None, tuple[np.ndarray, np.ndarray]]:
     """The events of both in pairs, and the stretches of time in s in which each of the two jumps (k, 2): from the
     earlier to the later of a pair, and where one alone has an event."""
     known = [np.zeros((1, 2)) if each.events is None else each.events for each in (one, two)]

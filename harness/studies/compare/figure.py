@@ -4,8 +4,21 @@ from pathlib import Path
 
 import numpy as np
 
-from ...results.quantity import in_degrees
-from ...results.style import ABOVE, BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet, spelled
+from ...results.quantity import display_unit
+from ...results.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    HEIGHT,
+    LEGEND_ABOVE,
+    ORANGE,
+    WIDTH,
+    Axes,
+    axis_label,
+    format_unit,
+    mask_undrawable,
+    open_figure,
+)
 from . import units
 from .difference import Comparison, textual
 
@@ -19,23 +32,25 @@ def draw(found: Comparison, path: Path) -> None:
     chosen = sorted(numbers, key=lambda each: -each.relative)[:MOST]
     if not chosen:
         return
-    with sheet(path, 2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(chosen)) as figure:
+    with open_figure(path, 2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(chosen)) as figure:
         figure.suptitle(f"{found.one.name} and {found.two.name}", fontsize=11)
         panels = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)
         for (both, off), each in zip(panels, chosen, strict=True):
-            unit, size = in_degrees(each.unit)
+            unit, size = display_unit(each.unit)
             for side, style in ((found.one, {"color": BLUE}), (found.two, {"color": ORANGE, "linestyle": "--"})):
-                values = drawable(side.columns[each.name]) * (units.size(side.units[each.name], each.unit) or 1.0)
+                values = mask_undrawable(side.columns[each.name]) * (
+                    units.size(side.units[each.name], each.unit) or 1.0
+                )
                 both.plot(side.time, values / size, label=f"{side.name} ", **style)
-            both.set_ylabel(label(each.name, unit))
-            left, right = (drawable(values) / size for values in (each.left, each.right))
+            both.set_ylabel(axis_label(each.name, unit))
+            left, right = (mask_undrawable(values) / size for values in (each.left, each.right))
             off.plot(found.time, left - right, color=GREEN, linewidth=0.8)
             resolved(off, np.nanmax(np.abs([left, right]), initial=0.0))
             largest, rms = each.largest / size, each.rms / size
-            off.set_title(f"difference: largest {largest:.3g}, rms {rms:.3g} {spelled(unit)}")
+            off.set_title(f"difference: largest {largest:.3g}, rms {rms:.3g} {format_unit(unit)}")
             off.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
             off.axvline(each.at, color=GREY, linestyle=":", linewidth=0.8)
-        panels[0, 0].legend(**ABOVE, ncols=2)
+        panels[0, 0].legend(**LEGEND_ABOVE, ncols=2)
         for axes in panels[-1]:
             axes.set_xlabel("t [s]")
             axes.set_xlim(np.min(found.time), np.max(found.time))

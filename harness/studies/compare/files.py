@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import SceneError, reason, shown
-from ...records.columns import numeric, split
-from ...records.files import content
+from ...errors import SceneError, first_line, format_value
+from ...records.columns import read_numeric, split_heading
+from ...records.table_files import read_content
 from ...records.units import TIMES
-from ...running.foreign.rows import elements
-from ...running.trajectory import Trajectory
+from ...running.external.sample_rows import element_names
+from ...running.signals import Signals
 
 LATEST = 1e100  # s, either way
 ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # of an array; its brackets hold no unit
@@ -24,7 +24,7 @@ TRUTHS = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 Columns = dict[str, np.ndarray]
 
 
-def read(path: Path) -> Trajectory:
+def read(path: Path) -> Signals:
     """The trajectory in a file or a result folder; SceneError in one sentence if there is none."""
     file = path / "trajectory.csv" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
@@ -34,7 +34,7 @@ def read(path: Path) -> Trajectory:
     if unit not in TIMES:
         raise SceneError(f"{file.name}: the first column must be the time, and its unit is '{unit}'")
     if time.dtype.kind == "U":
-        raise SceneError(f"{file.name}: the first column must be the time, and it holds {shown(str(time[0]))}")
+        raise SceneError(f"{file.name}: the first column must be the time, and it holds {format_value(str(time[0]))}")
     time = time * TIMES[unit]
     if not ((np.abs(time) < LATEST).all() and (np.diff(time) >= 0).all()):
         raise SceneError(f"{file.name}: the time in its first column must rise, within {LATEST:g} s")
@@ -42,9 +42,9 @@ def read(path: Path) -> Trajectory:
     for head, column in others:
         name, unit = parted(head)
         if name in columns or name == parted(clock)[0]:
-            raise SceneError(f"{file.name}: two columns are named {shown(name)}")
+            raise SceneError(f"{file.name}: two columns are named {format_value(name)}")
         columns[name], units[name] = column, unit
-    return Trajectory(path.stem, time, columns, units, events(path), file=file)
+    return Signals(path.stem, time, columns, units, events(path), file=file)
 
 
 def events(path: Path) -> np.ndarray | None:
@@ -52,7 +52,7 @@ def events(path: Path) -> np.ndarray | None:
     file = path / "events.csv"
     if not path.is_dir() or not file.is_file():
         return None
-    known = numeric(file)[1]
+    known = read_numeric(file)[1]
     if known.shape[1] != 2 or not np.isfinite(known).all():
         raise SceneError(f"{file} holds no times and modes")
     return known
@@ -62,16 +62,16 @@ def parted(head: str) -> tuple[str, str]:
     """Name and unit of a heading."""
     if ELEMENT.fullmatch(head):
         return head, ""
-    name, unit = split(head)
+    name, unit = split_heading(head)
     return name, unit or ""
 
 
 def table(file: Path) -> Columns:
     """What instruments, spreadsheets and MATLAB write; SceneError if it is no table."""
-    heads, numbers = numeric(file)
+    heads, numbers = read_numeric(file)
     twice = [head for i, head in enumerate(heads) if head in heads[:i]]
     if twice:
-        raise SceneError(f"{file.name}: two columns are named {shown(twice[0])}")
+        raise SceneError(f"{file.name}: two columns are named {format_value(twice[0])}")
     return dict(zip(heads, numbers.T, strict=True))
 
 
@@ -79,7 +79,7 @@ def plain(file: Path) -> Columns | None:
     """The columns by heading of a CSV file with commas, a heading and nothing but rows of its width; numbers, truths,
     texts, and, as fmpy writes them, arrays with blanks between; None if it is something else."""
     try:
-        heads, *rows = csv.reader(io.StringIO(content(file).decode("utf-8-sig"), newline=""))
+        heads, *rows = csv.reader(io.StringIO(read_content(file).decode("utf-8-sig"), newline=""))
     except (UnicodeDecodeError, ValueError, csv.Error):
         return None
     names = [head.strip() for head in heads]
@@ -101,7 +101,7 @@ def column(head: str, cells: list[str]) -> Columns:
         parts = [numbers(part) for part in zip(*map(str.split, cells), strict=True)]
         known = [part for part in parts if part is not None]
         if len(known) == len(parts):
-            return dict(zip(elements(head, (len(parts),)), known, strict=True))
+            return dict(zip(element_names(head, (len(parts),)), known, strict=True))
     return {head: np.array(cells) if whole is None else whole}
 
 
@@ -116,7 +116,7 @@ def numbers(cells: Sequence[str]) -> np.ndarray | None:
 def modelica(file: Path) -> Columns | None:
     """The columns of a result of OpenModelica or Dymola, which is a MATLAB file of version 4, also where it was saved
     anew as 5; None if it is none."""
-    data = content(file)
+    data = read_content(file)
     sure = b"Aclass" in data[:40]
     if not sure and not data.startswith(b"MATLAB 5.0"):
         return None
@@ -140,7 +140,7 @@ def modelica(file: Path) -> Columns | None:
     except Exception as error:  # scipy raises what it meets in a damaged file
         if not sure:
             return None
-        raise SceneError(f"{file.name} is no whole result of OpenModelica or Dymola: {reason(error)}") from None
+        raise SceneError(f"{file.name} is no whole result of OpenModelica or Dymola: {first_line(error)}") from None
 
 
 def line(letters: np.ndarray) -> str:

@@ -8,31 +8,35 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
-from ...results.files import as_text
-from ...results.folder import replacing
-from ...results.provenance import named, of_each, record
-from ...running.fmu import Report
-from ...running.specification import Specification
+from ...results.files import to_json
+from ...results.folder import replace_folder
+from ...results.provenance import describe_sources, prefix_parameters, write_provenance
+from ...running.fmi2 import ProgressCallback
+from ...running.run_spec import RunSpec
 from . import trajectory
 from .difference import Comparison, compare
 
 
-def perform_compare(sources: tuple[str, str], how: Specification, out: Path, report: Report) -> tuple[Comparison, Path]:
+def perform_compare(
+    sources: tuple[str, str], how: RunSpec, out: Path, report: ProgressCallback
+) -> tuple[Comparison, Path]:
     """Compare two FMUs, scenes, result folders or CSV files, and write the differences to out/compare/<one>-<two>;
     `how` says how FMUs are run."""
     from .figure import draw
 
     names = trajectory.names(sources)
     folder = out / "compare" / "-".join(names).replace("/", "-")
-    with replacing(folder, ("compare.json", "figure.svg"), named(*sources)) as fresh:
+    with replace_folder(folder, ("compare.json", "figure.svg"), describe_sources(*sources)) as fresh:
         one, two = (
             replace(each, name=name) for each, name in zip(trajectory.both(sources, how, report), names, strict=True)
         )
         found = compare(one, two)
-        (fresh / "compare.json").write_text(as_text(numbers(found)) + "\n", encoding="utf-8")
+        (fresh / "compare.json").write_text(to_json(numbers(found)) + "\n", encoding="utf-8")
         draw(found, fresh / "figure.svg")
-        values = of_each({"one": one.parameters, "two": two.parameters})
-        record(fresh, [each.file for each in (one, two) if each.file], values, how, source=named(*sources))
+        values = prefix_parameters({"one": one.parameters, "two": two.parameters})
+        write_provenance(
+            fresh, [each.file for each in (one, two) if each.file], values, how, source=describe_sources(*sources)
+        )
     return found, folder
 
 

@@ -7,34 +7,36 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError, SceneError
-from ...running.any_fmu import POINTS, run
-from ...running.description import description, stop_of
-from ...running.fmu import Report
-from ...running.specification import Specification, of_scene
-from ...running.trajectory import Trajectory, of_run
-from ...scenes.fmus import check_built, fmu_of
-from ...scenes.scene import load
+from ...running.description import read_description, resolve_stop
+from ...running.fmi2 import ProgressCallback
+from ...running.run_spec import RunSpec, spec_from_scene
+from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
+from ...running.signals import Signals, signals_from_trajectory
+from ...scenes.fmu_files import check_built, find_fmu
+from ...scenes.scene import load_scene
 from .files import read
 
 FILES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
 SUFFIXES = (".fmu", ".py", ".toml")  # of what is run
 
 
-def both(sources: tuple[str, str], how: Specification, report: Report) -> tuple[Trajectory, Trajectory]:
+def both(sources: tuple[str, str], how: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
     """The trajectories of two folders, files, FMUs' paths or scenes.  What can be run is run to the same times, those
     of the other one if that is recorded or is a scene with a grid, and to the same stop; `how` says the rest."""
     found = [recorded(source) for source in sources]
     runs = [None if each else wanted(source, how) for each, source in zip(found, sources, strict=True)]
     grids = [spacing(each.time) for each in found if each] + [each.grid for each in runs if each]
     grid = next(filter(None, grids), None)
-    ends = [stop_of(each, description(each.fmu, each.lenient)) for each in runs if each]
+    ends = [resolve_stop(each, read_description(each.fmu, each.lenient)) for each in runs if each]
     stops = {*ends, *(float(each.time[-1]) for each in found if each)}
     stop = how.stop if None in stops or len(stops) == 1 else min(filter(None, stops))
     sides = []
     for each, asked in zip(found, runs, strict=True):
         if asked:
-            asked = replace(asked, grid=grid, even=POINTS, stop=stop if how.stop is None else how.stop)
-            each = of_run(run(asked, report))
+            asked = replace(
+                asked, grid=grid, equal_steps=DEFAULT_COMMUNICATION_STEPS, stop=stop if how.stop is None else how.stop
+            )
+            each = signals_from_trajectory(run(asked, report))
         assert each
         sides.append(each)
     return sides[0], sides[1]
@@ -50,16 +52,16 @@ def names(sources: tuple[str, str]) -> list[str]:
     return ["/".join(parts[-apart:]) for parts in (one, two)]
 
 
-def wanted(source: str, how: Specification) -> Specification:
+def wanted(source: str, how: RunSpec) -> RunSpec:
     """What runs an FMU by its path or by that of its model, or a scene."""
     if Path(source).suffix in (".fmu", ".py"):
-        return replace(how, fmu=fmu_of(source))
-    scene = load(source)
+        return replace(how, fmu=find_fmu(source))
+    scene = load_scene(source)
     check_built(scene.file)
-    return of_scene(scene)
+    return spec_from_scene(scene)
 
 
-def recorded(source: str) -> Trajectory | None:
+def recorded(source: str) -> Signals | None:
     """The trajectory of a folder or a file; None for what has to be run."""
     path = Path(source)
     if path.exists() and path.suffix not in SUFFIXES:
@@ -78,7 +80,7 @@ def spacing(time: np.ndarray) -> float | None:
     return h if even.mean() > 0.5 else None
 
 
-def common(one: Trajectory, two: Trajectory) -> tuple[float, float]:
+def common(one: Signals, two: Signals) -> tuple[float, float]:
     """The stretch of time in s that both cover; HarnessError if there is none."""
     begin, end = max(one.time[0], two.time[0]), min(one.time[-1], two.time[-1])
     if not end > begin:

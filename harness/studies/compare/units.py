@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from functools import cache
 
-from ...records.units import known
+from ...records.units import find_unit
 
 SAME = (("²", "2"), ("³", "3"), ("⁻", "-"), ("¹", "1"), ("**", ""), ("^", ""), ("·", "."), ("*", "."), ("µ", "u"))
 FACTOR = re.compile(r"([^\W\d_]+|°|%)(-?\d+)?|1")
@@ -34,7 +34,7 @@ def size(unit: str, other: str) -> float | None:
     """How large a unit is in another; None if they do not measure the same thing, as far as is known here."""
     if spelled(unit) == spelled(other):
         return 1.0
-    one, two = known(unit), known(other)
+    one, two = find_unit(unit), find_unit(other)
     if one and two and (one.order, one.base) == (two.order, two.base):
         return one.size / two.size
     return None

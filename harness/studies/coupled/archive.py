@@ -14,13 +14,13 @@ from pyssp_standard.ssd import SSD, Component, Connection, Connector, DefaultExp
 from pyssp_standard.ssp import SSP
 from pyssp_standard.ssv import SSV, Parameter
 
-from ...scenes.coupled.scene import Coupled
+from ...scenes.coupled.scene import CoupledScene
 
 WHOLE, SET = "parameters", "initialValues"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
 
-def write(scene: Coupled, values: dict[str, dict[str, float]], fmus: dict[str, Path], path: Path) -> None:
+def write(scene: CoupledScene, values: dict[str, dict[str, float]], fmus: dict[str, Path], path: Path) -> None:
     """Write the archive of the FMUs of its elements with these values, and check it against the schemas of the
     standard."""
     whole = {f"{element}.{name}": value for element, each in values.items() for name, value in each.items()}
@@ -48,16 +48,16 @@ def table(values: dict[str, float], path: Path) -> Path:
     return path
 
 
-def fill(structure: SSD, scene: Coupled, values: dict[str, dict[str, float]], fmus: dict[str, Path]) -> None:
+def fill(structure: SSD, scene: CoupledScene, values: dict[str, dict[str, float]], fmus: dict[str, Path]) -> None:
     """The system, its components and connections."""
-    structure.name, structure.version = scene.system, "1.0"
-    structure.system = System(name=scene.system)
+    structure.name, structure.version = scene.identifier, "1.0"
+    structure.system = System(name=scene.identifier)
     for name, fmu in fmus.items():
         component = Component()
         component.name, component.source = name, f"resources/{fmu.name}"
         component.component_type = "application/x-fmu-sharedlibrary"
         wanted = {each.output: "output" for each in scene.connections if each.source == name}
-        wanted |= {each.entry: "input" for each in scene.connections if each.sink == name}
+        wanted |= {each.input: "input" for each in scene.connections if each.sink == name}
         wanted |= dict.fromkeys(values.get(name, ()), "parameter")
         wanted |= {"x": "output"} if name in [part.name for part in scene.parts] else {}
         component.connectors = [Connector(None, connector, kind, TypeReal(None)) for connector, kind in wanted.items()]
@@ -65,7 +65,7 @@ def fill(structure: SSD, scene: Coupled, values: dict[str, dict[str, float]], fm
             component.parameter_bindings = [ParameterBinding(source=f"resources/{name}.ssv")]
         structure.system.elements.append(component)
     for each in scene.connections:
-        ends = {"end_element": each.sink, "end_connector": each.entry}
+        ends = {"end_element": each.sink, "end_connector": each.input}
         structure.system.connections.append(Connection(start_element=each.source, start_connector=each.output, **ends))
     structure.system.annotations.add_annotation(master(scene.steps[-1]))
     experiment = DefaultExperiment()

@@ -4,7 +4,7 @@ import ctypes
 import sys
 from pathlib import Path
 
-from ...process.child import serve
+from ...process.subprocess_runner import serve_request
 from .engine import Request
 
 
@@ -26,4 +26,4 @@ def run(asked: Request) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    serve(Request, run)
+    serve_request(Request, run)

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ...errors import HarnessError
-from ...process.child import Hangs, ask_module
+from ...process.subprocess_runner import SubprocessTimeoutError, run_module
 
 PATIENCE = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
@@ -34,8 +34,8 @@ def rows(engine: str, asked: Request) -> list[list[float]]:
     last words of the engine if it gives none."""
     failed = f"{engine} could not run {Path(asked.archive).name}"
     try:
-        done = ask_module(ENGINES[engine], json.dumps(asdict(asked)), patience=PATIENCE)
-    except Hangs as late:
+        done = run_module(ENGINES[engine], json.dumps(asdict(asked)), timeout=PATIENCE)
+    except SubprocessTimeoutError as late:
         raise HarnessError(f"{failed}: {late}") from None
     if done.returncode or not done.stdout:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, label, sheet
+from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, axis_label, open_figure
 from .convergence import Convergence
 
 MOST = 8  # names of variables that are drawn, a panel each
@@ -15,7 +15,7 @@ OTHERS = ("#CC79A7", "#56B4E9", "#E69F00")  # colours
 def draw(found: Convergence, path: Path) -> None:
     """Save the figure."""
     kinds = [*dict.fromkeys(zip([name for _, name, _ in found.read], found.units, strict=True))][:MOST]
-    with sheet(path, 2.2 * WIDTH, max(1.6, len(kinds)) * HEIGHT) as figure:
+    with open_figure(path, 2.2 * WIDTH, max(1.6, len(kinds)) * HEIGHT) as figure:
         figure.suptitle(found.title, fontsize=11)
         left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 2))[0]
         panels = left.subplots(len(kinds), sharex=True, squeeze=False)[:, 0]
@@ -25,7 +25,7 @@ def draw(found: Convergence, path: Path) -> None:
                 motion.plot(found.time, found.x[:, i], color=colour, label=found.labels[i])
                 motion.plot(found.time, found.truth[:, i], color="black", linestyle=":", linewidth=0.9)
             motion.plot([], [], color="black", linestyle=":", label=found.reference)
-            motion.set_ylabel(label(name, unit))
+            motion.set_ylabel(axis_label(name, unit))
             motion.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         panels[0].set_title(f"coupled, communication step {1e3 * found.steps[-1]:g} ms")
         panels[-1].set_xlabel("t [s]")
@@ -39,4 +39,4 @@ def draw(found: Convergence, path: Path) -> None:
             error.legend()
         error.set_title(f"error against the {found.reference} (order {found.order:.2f})")
         error.set_xlabel("communication step [ms]")
-        error.set_ylabel(label("error", found.unit))
+        error.set_ylabel(axis_label("error", found.unit))

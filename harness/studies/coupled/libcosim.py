@@ -1,6 +1,6 @@
 """Runs an SSP archive with libcosim (package libcosimpy), whose first values are those after the first step."""
 
-from ...process.child import serve
+from ...process.subprocess_runner import serve_request
 from .engine import Request
 
 NANO = 1e9  # libcosim counts time in whole ns
@@ -27,4 +27,4 @@ def run(asked: Request) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    serve(Request, run)
+    serve_request(Request, run)

@@ -11,28 +11,28 @@ from shutil import copy
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.child import HOME, ask_module
-from ...process.room import room
-from ...results.files import heading, write_rows
-from ...results.files import write as write_csv
-from ...results.folder import replacing
-from ...results.provenance import named, record
-from ...running.description import description
-from ...running.fmu import Report
-from ...scenes.coupled.scene import Coupled, load
-from ...scenes.fmus import fmu_of
+from ...process.subprocess_runner import PROJECT_ROOT, run_module
+from ...process.temporary_directory import temporary_directory
+from ...results.files import column_heading, write_csv_rows
+from ...results.files import write_csv as write_csv
+from ...results.folder import replace_folder
+from ...results.provenance import describe_sources, write_provenance
+from ...running.description import read_description
+from ...running.fmi2 import ProgressCallback
+from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
+from ...scenes.fmu_files import find_fmu
 from ...truths.monolith import LINEAR, bodies, solve
 from .convergence import Convergence
 from .engine import ENGINES, EXTRA, MAIN, Request, rows
 
 FOLDER = "coupled"
 FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.svg")
-SPRING = HOME / "fmus" / "more" / "spring.py"
+SPRING = PROJECT_ROOT / "fmus" / "more" / "spring.py"
 
 Starts = dict[str, dict[str, float]]  # start values of the real parameters of each model
 
 
-def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple[Convergence, Path]:
+def perform(source: str, out: Path, stop: float | None, report: ProgressCallback) -> tuple[Convergence, Path]:
     """Run a coupled scene or an archive at each communication step, compare, and write out/coupled/<name>; a stop, in
     s, stands above its own."""
     try:
@@ -41,18 +41,18 @@ def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple
         raise HarnessError(f"a coupled scene needs {error.name}: {EXTRA}") from None
     from .figure import draw
 
-    with room("ssp-") as plain:
+    with temporary_directory("ssp-") as plain:
         if source.endswith(".ssp"):
             name, file = Path(source).stem, plain / "theirs.ssp"
             asked, fmus, scene = theirs.asked(Path(source), file, stop), [Path(source)], None
         else:
-            scene = load(source, LINEAR, stop)
-            defaults = {model: starts(fmu_of(model)) for model in LINEAR}
+            scene = load_coupled_scene(source, LINEAR, stop)
+            defaults = {model: starts(find_fmu(model)) for model in LINEAR}
             check(scene, defaults)
-            name, file = scene.name, plain / f"{scene.system}.ssp"
+            name, file = scene.name, plain / f"{scene.identifier}.ssp"
             asked, fmus = blank(scene), [part.fmu for part in scene.parts]
         folder = out / FOLDER / name
-        with replacing(folder, (*FILES, file.name), named(source)) as fresh:
+        with replace_folder(folder, (*FILES, file.name), describe_sources(source)) as fresh:
             if scene:
                 archive.write(scene, values(scene, defaults), built(scene, plain), file)
             copy(file, fresh)
@@ -60,11 +60,11 @@ def perform(source: str, out: Path, stop: float | None, report: Report) -> tuple
             save(found, fresh)
             draw(found, fresh / "figure.svg")
             told = {"stop": found.stop} | (vars(scene) if scene else {})
-            record(fresh, fmus, theirs.in_force(file), told, source=named(source))
+            write_provenance(fresh, fmus, theirs.in_force(file), told, source=describe_sources(source))
     return found, folder
 
 
-def check(scene: Coupled, defaults: Starts) -> None:
+def check(scene: CoupledScene, defaults: Starts) -> None:
     """What is set is there to be set."""
     for part in scene.parts:
         unknown = sorted(set(part.values) - set(defaults[part.model]))
@@ -76,12 +76,12 @@ def starts(fmu: Path) -> dict[str, float]:
     """The start values of an FMU's real parameters."""
     return {
         variable.name: float(variable.start)
-        for variable in description(fmu).modelVariables
+        for variable in read_description(fmu).modelVariables
         if variable.causality == "parameter" and variable.type == "Real"
     }
 
 
-def values(scene: Coupled, defaults: Starts) -> Starts:
+def values(scene: CoupledScene, defaults: Starts) -> Starts:
     """What is set in each element of the archive: a spring begins where the parts do."""
     models = {part.name: defaults[part.model] | part.values for part in scene.parts}
     found = {part.name: part.values for part in scene.parts if part.values}
@@ -91,17 +91,17 @@ def values(scene: Coupled, defaults: Starts) -> Starts:
     return found
 
 
-def built(scene: Coupled, folder: Path) -> dict[str, Path]:
+def built(scene: CoupledScene, folder: Path) -> dict[str, Path]:
     """The FMU of each element; that of the springs is built for the occasion."""
     fmus = {part.name: part.fmu for part in scene.parts}
     if scene.springs:
-        done = ask_module("build_fmus", "", str(SPRING), "--out", str(folder))
+        done = run_module("build_fmus", "", str(SPRING), "--out", str(folder))
         if done.returncode:
             raise HarnessError(f"the spring could not be built: {done.stderr.strip()}")
     return fmus | {each.name: folder / "spring.fmu" for each in scene.springs}
 
 
-def blank(scene: Coupled) -> Convergence:
+def blank(scene: CoupledScene) -> Convergence:
     """What is to be run: the positions of the parts."""
     read = tuple((part.name, "x", reference(part.fmu, "x")) for part in scene.parts)
     labels = tuple(f"{part.name} ({part.model})" for part in scene.parts)
@@ -110,17 +110,17 @@ def blank(scene: Coupled) -> Convergence:
 
 def reference(fmu: Path, name: str) -> int:
     """The value reference of a variable."""
-    return next(int(each.valueReference) for each in description(fmu).modelVariables if each.name == name)
+    return next(int(each.valueReference) for each in read_description(fmu).modelVariables if each.name == name)
 
 
-def solver(scene: Coupled, defaults: Starts) -> Callable[[np.ndarray], np.ndarray]:
+def solver(scene: CoupledScene, defaults: Starts) -> Callable[[np.ndarray], np.ndarray]:
     """What gives the positions (m, n) at times (m,) in s."""
     system, start = bodies(scene, defaults)
     return lambda times: solve(system, start, times)
 
 
 def study(
-    asked: Convergence, archive: Path, truth: Callable[[np.ndarray], np.ndarray] | None, report: Report
+    asked: Convergence, archive: Path, truth: Callable[[np.ndarray], np.ndarray] | None, report: ProgressCallback
 ) -> Convergence:
     """Run the archive at each communication step, beside the reference; with the finest one in the other engines,
     too."""
@@ -158,12 +158,14 @@ def save(found: Convergence, folder: Path) -> None:
     """Write the three tables."""
     names = [f"{element}.{variable}" for element, variable, _ in found.read]
     heads, truths, ends = (
-        [heading(name + more, size) for name, size in zip(names, found.units, strict=True)]
+        [column_heading(name + more, size) for name, size in zip(names, found.units, strict=True)]
         for more in ("", " reference", " at the stop")
     )
     write_csv(folder / "trajectory.csv", ["t [s]", *heads, *truths], [found.time, *found.x.T, *found.truth.T])
     columns = [np.array(found.steps[: len(found.errors)]), np.array(found.errors)]
-    write_csv(folder / "error.csv", ["communication step [s]", heading("largest error", found.unit)], columns)
+    write_csv(folder / "error.csv", ["communication step [s]", column_heading("largest error", found.unit)], columns)
     table = [[engine, *(end or [None] * len(names)), off, why] for engine, (end, off, why) in found.engines.items()]
     table.append([found.reference, *found.truth[-1].tolist(), 0.0, ""])
-    write_rows(folder / "engines.csv", ["engine", *ends, heading("largest error", found.unit), "why not"], table)
+    write_csv_rows(
+        folder / "engines.csv", ["engine", *ends, column_heading("largest error", found.unit), "why not"], table
+    )

@@ -11,9 +11,9 @@ from pyssp_standard.ssd import Component
 from pyssp_standard.ssp import SSP
 from pyssp_standard.ssv import SSV
 
-from ...errors import HarnessError, SceneError, reason
-from ...running.description import description, parameters
-from ...running.values import REALS, element, unit
+from ...errors import HarnessError, SceneError, first_line
+from ...running.description import declared_parameters, read_description
+from ...running.variable_values import REAL_TYPES, parse_element, variable_unit
 from .convergence import Convergence
 
 COARSEST, HALVINGS = 100, 4  # communication steps of the first run
@@ -35,7 +35,7 @@ def asked(source: Path, file: Path, stop: float | None) -> Convergence:
             ]
             sets = [name for part in (system, *components(system)) for name, _ in bound(part, archive.unpacked_path)]
     except (OSError, KeyError, ValueError, AttributeError, zipfile.BadZipFile, etree.LxmlError) as error:
-        raise HarnessError(f"{source.name} cannot be read: {reason(error)}") from None
+        raise HarnessError(f"{source.name} cannot be read: {first_line(error)}") from None
     end = stop if stop is not None else experiment and experiment.stop_time
     if not end:
         raise SceneError(f"{source.name} names no stop time; name one, as in --stop 10")
@@ -45,7 +45,7 @@ def asked(source: Path, file: Path, stop: float | None) -> Convergence:
         title=str(system.name),
         read=tuple((name, variable.name, int(variable.valueReference)) for name, variable in found),
         labels=tuple(f"{name}.{variable.name}" for name, variable in found),
-        units=tuple(unit(variable) for _, variable in found),
+        units=tuple(variable_unit(variable) for _, variable in found),
         steps=tuple(float(end) / COARSEST / 2**i for i in range(HALVINGS + 1)),
         stop=float(end),
         reference="finest run",
@@ -56,8 +56,8 @@ def asked(source: Path, file: Path, stop: float | None) -> Convergence:
 def outputs(part: Component, folder: Path) -> list[Any]:
     """The real variables of a component's FMU that are output connectors."""
     named = [each.name for each in part.connectors if each.kind == "output"]
-    variables = description(folder / part.source).modelVariables if named else []
-    return [each for each in variables if each.name in named and each.type in REALS]
+    variables = read_description(folder / part.source).modelVariables if named else []
+    return [each for each in variables if each.name in named and each.type in REAL_TYPES]
 
 
 def components(system: Any) -> list[Component]:
@@ -81,11 +81,13 @@ def in_force(file: Path) -> dict[str, tuple[object, str]]:
     with SSP(file, mode="r") as archive, archive.system_structure as structure:
         folder, parts = archive.unpacked_path, components(structure.system)
         found = {
-            f"{each.name}.{name}": told for each in parts for name, told in parameters(folder / each.source).items()
+            f"{each.name}.{name}": told
+            for each in parts
+            for name, told in declared_parameters(folder / each.source).items()
         }
         for part, own in [*((each, f"{each.name}.") for each in parts), (structure.system, "")]:
             for _, values in bound(part, folder):
                 for name, value in values.items():
                     if own + name in found:
-                        found[own + name] = element(value), found[own + name][1]
+                        found[own + name] = parse_element(value), found[own + name][1]
     return found

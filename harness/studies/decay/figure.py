@@ -8,8 +8,8 @@ import numpy as np
 from ...analyses.decay.fit import Identified
 from ...analyses.decay.law import Terms
 from ...analyses.decay.loss import Loss
-from ...results.quantity import in_degrees
-from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, label, sheet
+from ...results.quantity import display_unit
+from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
 
 MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
 MOST = 4000  # points of a line: more are not seen
@@ -18,7 +18,7 @@ COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"} 
 
 def draw(found: Identified, loss: Loss, path: Path) -> None:
     """Save the figure."""
-    with sheet(path, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None) as figure:
+    with open_figure(path, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None) as figure:
         grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
         above = figure.add_subplot(grid[0])
         below = figure.add_subplot(grid[1], sharex=above)
@@ -30,7 +30,7 @@ def draw(found: Identified, loss: Loss, path: Path) -> None:
 def signal(axes: Axes, found: Identified) -> None:
     """Record, fit, rest position, turning points, and what was left out."""
     record, t = found.record, found.t
-    unit, size = in_degrees(record.unit)
+    unit, size = display_unit(record.unit)
     used = np.isin(record.t - found.problem.origin, found.problem.t)
     points(axes, t, found.x / size, color=BLUE, label="record")
     if not used.all():
@@ -45,7 +45,7 @@ def signal(axes: Axes, found: Identified) -> None:
         style: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
         axes.plot(found.turns.t, found.turns.x / size, "o", label="turning points", **style)
     axes.set_title(f"{record.name}: {found.best.words}")
-    axes.set_ylabel(label(("x", "v", "a")[record.order], unit))
+    axes.set_ylabel(axis_label(("x", "v", "a")[record.order], unit))
     axes.legend(loc="upper right", ncols=3)
 
 
@@ -68,19 +68,19 @@ def extremes(x: np.ndarray) -> np.ndarray:
 
 def residuals(axes: Axes, found: Identified) -> None:
     """Record less fit."""
-    unit, size = in_degrees(found.record.unit)
+    unit, size = display_unit(found.record.unit)
     left = (found.x - found.signal(found.best, found.t)) / size
     points(axes, found.t, left, color=BLUE)
     axes.axhline(0, color="black", linewidth=0.6)
     axes.set_title(f"residuals (rms {found.rms / size:.3g} {unit})")
-    axes.set_ylabel(label("record - fit", unit))
+    axes.set_ylabel(axis_label("record - fit", unit))
     axes.set_xlabel("t [s]")
 
 
 def shares(axes: Axes, found: Identified, loss: Loss) -> None:
     """The share of its energy that each half swing loses, with the curves of all laws."""
     best, others = found.best, found.laws[1:]
-    unit, size = in_degrees(found.record.base)
+    unit, size = display_unit(found.record.base)
 
     def curve(loss: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
         """Amplitudes, and shares in percent."""
@@ -101,5 +101,5 @@ def shares(axes: Axes, found: Identified, loss: Loss) -> None:
         axes.set_ylim(min(low - margin, 0.0), high + margin)
     axes.set_title("energy lost in a half swing, against its amplitude")
     axes.set_ylabel("share of the energy [%]")
-    axes.set_xlabel(label("amplitude", unit))
+    axes.set_xlabel(axis_label("amplitude", unit))
     axes.legend(loc="best", ncols=2)

@@ -15,11 +15,11 @@ from ...analyses.decay.fit import Identified, identify
 from ...analyses.decay.law import AMPLITUDE, T0
 from ...analyses.decay.loss import Loss, losses_seen
 from ...errors import HarnessError, SceneError
-from ...records.columns import Columns, read
-from ...records.record import Record, check
+from ...records.columns import ColumnOptions, read_record
+from ...records.record import Record, check_record
 from ...results import provenance
-from ...results.files import as_text, heading, write
-from ...results.folder import replacing
+from ...results.files import column_heading, to_json, write_csv
+from ...results.folder import replace_folder
 
 FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
@@ -30,7 +30,7 @@ Loaded = tuple[Record, Known, dict[str, Any]]  # and what their account tells: f
 
 def perform(
     source: str,
-    columns: Columns,
+    columns: ColumnOptions,
     known: Known,
     drag: bool,
     drift: bool,
@@ -41,11 +41,11 @@ def perform(
     record, force, told = load_record(source, columns, known, report)
     scene = told.pop("scene", {}) | vars(columns) | vars(known) | {"drag": drag, "drift": drift}
     folder = out / FOLDER / record.name
-    named = provenance.named(source)
-    with replacing(folder, FILES, named) as fresh:  # before the fit: what is in the way is told at once
+    named = provenance.describe_sources(source)
+    with replace_folder(folder, FILES, named) as fresh:  # before the fit: what is in the way is told at once
         found = identify(record, force, drag, drift, report)
         save(found, fresh)
-        provenance.record(fresh, **told, scene=scene, source=named)
+        provenance.write_provenance(fresh, **told, scene=scene, source=named)
     return found, folder
 
 
@@ -61,36 +61,38 @@ def uncollected() -> Iterator[None]:
         gc.enable()
 
 
-def load_record(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> Loaded:
+def load_record(source: str, columns: ColumnOptions, known: Known, report: Callable[[float], None]) -> Loaded:
     """The record of a file, or of a run of a scene together with the stiffness that its model has."""
     path = Path(source)
     if source == "-":
-        return read(source, columns, "stdin"), known, {"files": ()}
+        return read_record(source, columns, "stdin"), known, {"files": ()}
     if path.suffix.lower() != ".toml" and (path.is_file() or path.is_fifo() or path.suffix):
         name = path.stem.encode("utf-8", "replace").decode()
-        return read(source, columns, name), known, {"files": (path,)}
+        return read_record(source, columns, name), known, {"files": (path,)}
     if path.is_dir():
         raise SceneError(f"{source} is a folder; name a file in it")
     return recorded(source, columns, known, report)
 
 
-def recorded(source: str, columns: Columns, known: Known, report: Callable[[float], None]) -> Loaded:
+def recorded(source: str, columns: ColumnOptions, known: Known, report: Callable[[float], None]) -> Loaded:
     """The positions in a run of a scene."""
-    from ...running.fmu import simulate
-    from ...running.specification import of_scene
-    from ...scenes.fmus import check_built
-    from ...scenes.scene import load
+    from ...running.fmi2 import simulate
+    from ...running.run_spec import spec_from_scene
+    from ...scenes.fmu_files import check_built
+    from ...scenes.scene import load_scene
 
-    scene = load(source)
+    scene = load_scene(source)
     check_built(scene.file)
-    wanted = of_scene(scene)
-    if "position" not in wanted.motion:
+    wanted = spec_from_scene(scene)
+    if "position" not in wanted.motion_outputs:
         raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
     run = simulate(wanted, report)
-    unit = run.units[wanted.motion["position"]]
-    record = Record(scene.name, run.time, run.motion("position"), unit, 0, unit).between(columns.begin, columns.end)
-    check(record)
-    told = {"files": (scene.file,), "parameters": run.in_force, "scene": vars(scene)}
+    unit = run.units[wanted.motion_outputs["position"]]
+    record = Record(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(
+        columns.begin, columns.end
+    )
+    check_record(record)
+    told = {"files": (scene.file,), "parameters": run.effective_parameters, "scene": vars(scene)}
     if known.k is None and known.m is None:
         with suppress(HarnessError):  # a model without it has no force to tell
             known = Known(k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad")
@@ -103,12 +105,14 @@ def save(found: Identified, folder: Path) -> None:
 
     unit = found.record.unit
     loss = losses_seen(found)
-    (folder / "decay.json").write_text(as_text(numbers(found, loss)) + "\n", encoding="utf-8")
-    write(folder / "turning-points.csv", ["t [s]", heading("x", found.record.base)], [found.turns.t, found.turns.x])
+    (folder / "decay.json").write_text(to_json(numbers(found, loss)) + "\n", encoding="utf-8")
+    write_csv(
+        folder / "turning-points.csv", ["t [s]", column_heading("x", found.record.base)], [found.turns.t, found.turns.x]
+    )
     fitted = found.signal(found.best, found.t)
     name = ("x", "v", "a")[found.record.order]
-    heads = ["t [s]", heading(name, unit), heading("fit", unit), heading("residual", unit)]
-    write(folder / "fit.csv", heads, [found.t, found.x, fitted, found.x - fitted])
+    heads = ["t [s]", column_heading(name, unit), column_heading("fit", unit), column_heading("residual", unit)]
+    write_csv(folder / "fit.csv", heads, [found.t, found.x, fitted, found.x - fitted])
     draw(found, loss, folder / "figure.svg")
 
 

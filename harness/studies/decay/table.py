@@ -5,7 +5,7 @@ from rich.table import Table
 
 from ...analyses.decay.figures import Estimate
 from ...analyses.decay.fit import Identified
-from ...results.quantity import interval
+from ...results.quantity import format_interval
 
 
 def table(found: Identified) -> Table:
@@ -26,7 +26,7 @@ def table(found: Identified) -> Table:
 
 def told(each: Estimate) -> str:
     """As every result tells it."""
-    return interval(each.value, each.low, each.high)
+    return format_interval(each.value, each.low, each.high)
 
 
 def sentences(found: Identified) -> list[str]:
@@ -39,7 +39,7 @@ def sentences(found: Identified) -> list[str]:
     left = len(record.t) - len(used)
     if left:
         said.append(
-            f"Fitted to {record.quantity} from t = {record.at(used[0])} to {record.at(used[-1])} s; {left} of "
+            f"Fitted to {record.quantity} from t = {record.format_time(used[0])} to {record.format_time(used[-1])} s; {left} of "
             f"{len(record.t)} samples are left out (before the release, after the last sure swing, or stray)."
         )
     return [*said, *found.remarks]

@@ -10,21 +10,21 @@ from dataclasses import asdict
 from functools import cache
 from pathlib import Path
 
-from ...process.child import Hangs, ask
-from ...running.in_c import built, compiler
+from ...process.subprocess_runner import SubprocessTimeoutError, run_subprocess
+from ...running.c_host import find_compiler, load_library
 from .request import END, Reply, Request
 
 
-def ran(text: str, patience: float) -> subprocess.CompletedProcess[str]:
-    """The C program, ended, which has carried out requests, as if it were a player; Hangs after `patience` s."""
+def ran(text: str, timeout: float) -> subprocess.CompletedProcess[str]:
+    """The C program, ended, which has carried out requests, as if it were a player; Hangs after `timeout` s."""
     requests = [Request(**json.loads(line)) for line in text.splitlines()]
-    library = built(Path(requests[0].fmu))
+    library = load_library(Path(requests[0].fmu))
     calls = [call for each in requests for call in [*(life(each) * each.lives or runs(each)), "0 end"]]
     asked = "".join(f"{call}\n" for call in [*calls, "0 unload"])
     try:
-        return answered(requests, ask(library.command, asked, library.environment, patience))
-    except Hangs as late:
-        answered(requests, late.done)
+        return answered(requests, run_subprocess(library.command, asked, library.environment, timeout))
+    except SubprocessTimeoutError as late:
+        answered(requests, late.process)
         raise
 
 
@@ -91,5 +91,5 @@ def told(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
 @cache
 def version() -> str:
     """The version that the compiler tells of itself."""
-    told = subprocess.run([compiler(), "--version"], capture_output=True, text=True, check=True)
+    told = subprocess.run([find_compiler(), "--version"], capture_output=True, text=True, check=True)
     return (re.findall(r"\d+(?:\.\d+)+", told.stdout.splitlines()[0]) or ["of unknown version"])[-1]

@@ -11,19 +11,19 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.logging import addLoggerProxy
 
-from ...running.description import description
-from ...running.unpacked import kept
+from ...running.description import read_description
+from ...running.unpacking import unpack_once
 from .request import Reply, Request, serve
 
 
 def play(request: Request, logged: tuple[str, ...] = ("",)) -> Reply:
     """The answer; of the log what begins so."""
-    found = description(Path(request.fmu))
+    found = read_description(Path(request.fmu))
     callbacks = logging(logged)
     about = {
         "guid": found.guid,
         "modelIdentifier": found.coSimulation.modelIdentifier,
-        "unzipDirectory": str(kept(Path(request.fmu))),
+        "unzipDirectory": str(unpack_once(Path(request.fmu))),
     }
     instances = [fmi2.FMU2Slave(instanceName=name, **about) for name in request.instances]
     for instance in instances:

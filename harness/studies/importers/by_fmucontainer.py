@@ -15,17 +15,17 @@ from typing import Any
 
 from fmu_manipulation_toolbox.cli.fmucontainer import fmucontainer
 
-from ...process.room import room
-from ...running.description import description
-from ...running.unchanged import once
-from ...running.unpacked import HELD
+from ...process.temporary_directory import temporary_directory
+from ...running.cached_by_mtime import cached_by_mtime
+from ...running.description import read_description
+from ...running.unpacking import PROCESS_RESOURCES
 from . import by_fmpy
 from .request import Reply, Request, serve
 
 
 def play(request: Request) -> Reply:
     path, files = Path(request.fmu), tuple(f"{i}.fmu" for i in range(len(request.instances)))
-    reals = [variable for variable in description(path).modelVariables if variable.type == "Real"]
+    reals = [variable for variable in read_description(path).modelVariables if variable.type == "Real"]
     settable = [each.name for each in reals if each.causality == "input" or each.variability == "tunable"]
     entries = dict.fromkeys([*settable, *request.values, *request.change])  # for most requests the same
     told: dict[str, Any] = {
@@ -40,7 +40,7 @@ def play(request: Request) -> Reply:
     inside = replace(
         request,
         fmu=str(fmu),
-        references={variable.name: variable.valueReference for variable in description(fmu).modelVariables},
+        references={variable.name: variable.valueReference for variable in read_description(fmu).modelVariables},
         read=[name for _, _, name in told["output"]],
         instances=request.instances[:1],
         connect=[],
@@ -48,10 +48,10 @@ def play(request: Request) -> Reply:
     return replace(by_fmpy.play(inside, ("0.fmu: ", "1.fmu: ")), version=version("fmu-manipulation-toolbox"))
 
 
-@once
+@cached_by_mtime
 def built(fmu: Path, files: tuple[str, ...], told: str) -> Path:
     """The container as it is told, of copies of an FMU."""
-    folder = HELD.enter_context(room("container-"))
+    folder = PROCESS_RESOURCES.enter_context(temporary_directory("container-"))
     for file in files:
         copy(fmu, folder / file)
     (folder / "container.json").write_text(told, encoding="utf-8")

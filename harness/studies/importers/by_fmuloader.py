@@ -10,9 +10,9 @@ from typing import Any
 
 from fmuloader.fmi2 import Fmi2Error, Fmi2Slave, Fmi2Status, Fmi2Type
 
-from ...running.description import description
-from ...running.fmu import FMICallException
-from ...running.unpacked import kept
+from ...running.description import read_description
+from ...running.fmi2 import FMICallException
+from ...running.unpacking import unpack_once
 from .by_fmpy import played
 from .request import Reply, Request, serve
 
@@ -52,8 +52,8 @@ def hear(environment: Any, name: bytes, status: int, category: bytes, text: byte
 
 
 def play(request: Request) -> Reply:
-    found = description(Path(request.fmu))
-    instances = [Instance(kept(Path(request.fmu)), found, name) for name in request.instances]
+    found = read_description(Path(request.fmu))
+    instances = [Instance(unpack_once(Path(request.fmu)), found, name) for name in request.instances]
     return played(request, instances, version("fmuloader"))
 
 

@@ -14,9 +14,9 @@ from typing import Any
 from zipfile import ZipFile
 
 from ...errors import HarnessError
-from ...process.child import Hangs, ask_module
-from ...running.description import description
-from ...running.in_c import COMPILER, EMBEDDED
+from ...process.subprocess_runner import SubprocessTimeoutError, run_module
+from ...running.c_host import COMPILER, PYTHON_LIBRARY
+from ...running.description import read_description
 from . import by_c
 from .request import END, Reply, Request
 
@@ -87,7 +87,7 @@ def absent(importer: Importer, fmu: Path | None = None) -> str:
     if importer.player == "by_c":
         if COMPILER is None:
             return "there is no C compiler here"
-        if not EMBEDDED.is_file():
+        if not PYTHON_LIBRARY.is_file():
             return "this Python has no shared library that a C program could load"
     if importer.exchange and fmu and not exports(fmu, EXCHANGE):
         return f"it opens only FMUs whose library has all functions of FMI, and {fmu.name} has none of model exchange"
@@ -125,9 +125,9 @@ def asked(player: str, texts: list[str]) -> list[Played | Wrong]:
     text, hung = "\n".join(texts), ""
     try:
         in_c = player == "by_c"
-        done = by_c.ran(text, PATIENCE) if in_c else ask_module(f"{__package__}.{player}", text, patience=PATIENCE)
-    except Hangs as late:
-        done, hung = late.done, f"hangs for {PATIENCE} s"
+        done = by_c.ran(text, PATIENCE) if in_c else run_module(f"{__package__}.{player}", text, timeout=PATIENCE)
+    except SubprocessTimeoutError as late:
+        done, hung = late.process, f"hangs for {PATIENCE} s"
     *said, rest = done.stderr.split(END)
     replies = [Reply(**json.loads(line)) for line in done.stdout.splitlines()]
     found: list[Played | Wrong] = [Played(*each) for each in zip(replies, said, strict=False)]
@@ -155,7 +155,7 @@ def subject(fmu: Path) -> Subject:
     """Read the description of an FMU of this project."""
     if not fmu.is_file():
         raise HarnessError(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another folder")
-    found = description(fmu)
+    found = read_description(fmu)
     if found.fmiVersion != "2.0":
         raise HarnessError(f"{fmu} is of FMI {found.fmiVersion}; the importers are asked with FMUs of FMI 2.0")
     reals = {v.name: v for v in found.modelVariables if v.type == "Real"}

@@ -9,11 +9,11 @@ from pathlib import Path
 from rich.table import Table
 
 from ...errors import HarnessError
-from ...process.wait import each
-from ...results.files import write_rows
-from ...results.folder import replacing
-from ...results.provenance import named, of_each, record
-from ...running.description import parameters
+from ...process.interruptible_wait import map_in_threads
+from ...results.files import write_csv_rows
+from ...results.folder import replace_folder
+from ...results.provenance import describe_sources, prefix_parameters, write_provenance
+from ...running.description import declared_parameters
 from .checks import CHECKS, ELSEWHERE, IMPORTERS, Importer, Judge, Subject, Unfit, Wrong, absent, play, prepare, subject
 from .request import Request
 
@@ -35,11 +35,16 @@ class Checked:
 
 def perform(fmus: Path, out: Path, report: Callable[[str, float], None]) -> list[Checked]:
     """Ask about the FMUs in a folder, and write the rows to out/importers/importers.csv."""
-    with replacing(out / FOLDER, FILES, named(str(fmus))) as folder:
+    with replace_folder(out / FOLDER, FILES, describe_sources(str(fmus))) as folder:
         found = rows(fmus, report)
         save(found, folder / FILES[0])
         files = [fmus / f"{name}.fmu" for name in models(found)]
-        record(folder, files, of_each({file.stem: parameters(file) for file in files}), source=named(str(fmus)))
+        write_provenance(
+            folder,
+            files,
+            prefix_parameters({file.stem: declared_parameters(file) for file in files}),
+            source=describe_sources(str(fmus)),
+        )
     return found
 
 
@@ -58,7 +63,7 @@ def rows(folder: Path, report: Callable[[str, float], None]) -> list[Checked]:
     reasons = [absent(importer, subjects[0].fmu) for importer in IMPORTERS]
     present = [importer for importer, reason in zip(IMPORTERS, reasons, strict=True) if not reason]
     # fmpy first, whose answers the others are set beside
-    with closing(each(WORKERS, partial(ask, subjects), present)) as asked:
+    with closing(map_in_threads(WORKERS, partial(ask, subjects), present)) as asked:
         for importer, reason in zip(IMPORTERS, reasons, strict=True):
             if reason:
                 found.append(Checked(importer.name, "", reason=reason))
@@ -139,4 +144,4 @@ def save(found: list[Checked], path: Path) -> None:
     names = models(found)
     nothing = ("",) * len(names)
     rows = ((row.importer, row.check or f"not asked: {row.reason}", *(row.cells or nothing)) for row in found)
-    write_rows(path, ["importer", "check", *names], rows)
+    write_csv_rows(path, ["importer", "check", *names], rows)

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.child import ask_module
-from ...process.room import room
-from ...running.answer import Answer
-from ...running.inside import Inside, embedded, offered
-from ...scenes.fmus import fmu_of
+from ...process.subprocess_runner import run_module
+from ...process.temporary_directory import temporary_directory
+from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from ...running.solution import Solution
+from ...scenes.fmu_files import find_fmu
 from ...truths import peers
 from ...truths.anchors import Belt, Classic, Plain, Smoothed
 from ...truths.problem import Equations
@@ -55,7 +55,7 @@ def analyse() -> Iterator[AnchorRun]:
     yield from others(name, Belt(), BLOCK, EVENTS, {"scipy": ("RK23", "RK45", "DOP853", "LSODA"), "cvode": ("Adams",)})
     yield from others(name, Smoothed(), BLOCK, "arctan(1e6 v)", {"scipy": ("RK45", "LSODA")})
     name, values = "chattering classic", {"m": 1.0, "k": 1.0, "f": 10.0, "x0": 0.0, "v0": 5.0}
-    yield from runtime(name, embedded(fmu_of("coulomb")), values, Classic.stop, CLASSIC)
+    yield from runtime(name, load_model_class(find_fmu("coulomb")), values, Classic.stop, CLASSIC)
     yield from others(name, Classic(), CLASSIC, EVENTS, {"scipy": ("RK23", "RK45", "LSODA")})
     yield from others(name, Plain(), CLASSIC, "plain sign(v)", {"scipy": ("RK23", "RK45", "LSODA", "Radau")})
 
@@ -63,21 +63,21 @@ def analyse() -> Iterator[AnchorRun]:
 @cache
 def block() -> type:
     """The model of the block, inside the FMU that is built of block.py on the spot."""
-    with room("block-") as folder:
-        done = ask_module("build_fmus", "", str(Path(__file__).with_name("block.py")), "--out", str(folder))
+    with temporary_directory("block-") as folder:
+        done = run_module("build_fmus", "", str(Path(__file__).with_name("block.py")), "--out", str(folder))
         if done.returncode:
             raise HarnessError(f"the block on a belt cannot be built: {(done.stderr.splitlines() or ['?'])[-1]}")
-        return embedded(folder / "block.fmu")
+        return load_model_class(folder / "block.fmu")
 
 
 def runtime(
     name: str, model: type, values: dict[str, float], stop: float, end: tuple[float, float]
 ) -> Iterator[AnchorRun]:
     """Every method that the runtime offers for a model, up to the stop in s."""
-    for method in offered(model):
+    for method in method_numbers(model):
         rtol = TIGHT.get(method, 1e-8)
-        run = Inside.prepared(model, values, method, rtol, 1e-3 * rtol)
-        yield row(partial(AnchorRun, name, RUNTIME, method, rtol), partial(run.answer, [0.0, stop]), end)
+        run = EmbeddedModel.create(model, values, method, rtol, 1e-3 * rtol)
+        yield row(partial(AnchorRun, name, RUNTIME, method, rtol), partial(run.solve, [0.0, stop]), end)
 
 
 def others(
@@ -92,10 +92,10 @@ def others(
             yield row(partial(AnchorRun, name, f"{peer}, {way}", method, rtol), solve, end)
 
 
-def row(begin: Callable[..., AnchorRun], solve: Callable[[], Answer], end: tuple[float, float]) -> AnchorRun:
+def row(begin: Callable[..., AnchorRun], solve: Callable[[], Solution], end: tuple[float, float]) -> AnchorRun:
     """One line of the table."""
     try:
         answer = solve()
     except HarnessError as error:
         return begin(None, float("nan"), str(error))
-    return begin(answer.evaluations, float(np.abs(answer.motion[-1] - end).max()))
+    return begin(answer.evaluations, float(np.abs(answer.states[-1] - end).max()))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ...results.style import FAMILIES, GREY, WIDTH, sheet
+from ...results.style import GREY, METHOD_COLOURS, WIDTH, open_figure
 from ...truths.reference import Case
 from .laws import Shortcut
 from .study import CS, FMPY, FMU, ME, Study
@@ -37,7 +37,7 @@ def draw(study: Study, laws: Sequence[Shortcut], path: Path) -> None:
     """
     cases = [case for case in study.cases if not case.chatters]
     shortcuts = [case for case in study.cases if case.chatters]
-    with sheet(path, 2 * WIDTH + 1.5, 0.8 + 3.6 * len(cases)) as figure:
+    with open_figure(path, 2 * WIDTH + 1.5, 0.8 + 3.6 * len(cases)) as figure:
         figure.suptitle(f"{study.model}: what accuracy costs\n{LEGEND}", fontsize=11)
         panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
         for case, row in zip(cases, panels, strict=True):
@@ -70,4 +70,4 @@ def curves(axes: Axes, study: Study, case: Case, cost: str) -> None:
         star = {"markersize": 9, "marker": "*", "fillstyle": FILL.get(tool, "none")}
         shape = {**style, **(star if method == "exact" and tool != CS else {})}
         costs = [np.nan if p.failure else getattr(p, cost) for p in mine]
-        axes.loglog(errors, costs, color=FAMILIES.get(method, GREY), label=text, **shape)
+        axes.loglog(errors, costs, color=METHOD_COLOURS.get(method, GREY), label=text, **shape)

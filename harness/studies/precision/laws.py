@@ -11,8 +11,8 @@ from functools import partial
 import numpy as np
 
 from ...analyses.slip import crossings
-from ...running.answer import Answer
-from ...running.inside import Inside
+from ...running.embedded_model import EmbeddedModel
+from ...running.solution import Solution
 from ...truths.reference import Case, Reference, errors, load
 
 FINE = 16001  # points among which peaks and slips are looked for
@@ -40,7 +40,7 @@ def analyse(case: Case, model: type) -> Shortcut:
     """The law of a case beside dry friction; `model` is the class inside the FMU."""
     assert case.dry is not None
     truth, dry = load(case.truth), load(case.dry)
-    off = errors(Answer(truth.motion, None, 0), dry)
+    off = errors(Solution(truth.motion, None, 0), dry)
     law = partial(Shortcut, case.model, case.name, case.law, off.final, off.rms, off.largest)
     held = stuck(dry)
     if not held.any():
@@ -49,8 +49,8 @@ def analyse(case: Case, model: type) -> Shortcut:
     if case.problem.dry:
         return law(creep, float(np.mean(np.diff([t for t, mode in truth.modes if mode]))), None)
     times = np.linspace(0.0, case.problem.stop, FINE)
-    run = Inside.prepared(model, case.values, None, TOLERANCE)
-    motion = run.motion(times.tolist())
+    run = EmbeddedModel.create(model, case.values, None, TOLERANCE)
+    motion = run.compute_states(times.tolist())
     rates = case.problem.rates(1)
     a = [rates(t, y)[1] for t, y in zip(times.tolist(), motion, strict=True)]
     slips = crossings(times, np.array(motion)[:, 1] - run.model.v_driver)

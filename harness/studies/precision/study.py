@@ -18,12 +18,12 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...running import fmi3
-from ...running.answer import Answer
-from ...running.clock import timed
-from ...running.fmu import simulate
-from ...running.inside import Inside, embedded, offered
-from ...running.specification import Specification
-from ...scenes.fmus import fmu_of
+from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
+from ...running.fmi2 import simulate
+from ...running.run_spec import RunSpec
+from ...running.solution import Solution
+from ...running.timing import time_call
+from ...scenes.fmu_files import find_fmu
 from ...truths import peers
 from ...truths.certified import agreed
 from ...truths.models import CASES
@@ -34,16 +34,16 @@ MOST = 20  # timed runs of one point
 
 FMU, FMPY = "FMU", "fmpy"  # the FMU's own code in this process; the FMU through fmpy
 CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # the FMI 3.0 FMU through fmpy, in co-simulation and in model exchange
-WAYS = {CS: fmi3.COSIMULATION, ME: fmi3.EXCHANGE}
+WAYS = {CS: fmi3.CO_SIMULATION, ME: fmi3.MODEL_EXCHANGE}
 
 
 @dataclass(frozen=True)
 class Extent:
-    """How far a sweep goes: `patience` in s is for one run, and where one takes longer tighter ones are not tried;
+    """How far a sweep goes: `timeout` in s is for one run, and where one takes longer tighter ones are not tried;
     `budget` in s is for the timed runs of one point; solvers are told apart by run times that differ `clear` times."""
 
     tolerances: tuple[float, ...]
-    patience: float
+    timeout: float
     budget: float
     clear: float = 0.0
 
@@ -82,7 +82,7 @@ class Job:
     tool: str
     method: str
     absolute: float
-    run: Callable[[float, Extent], tuple[Answer, float] | None]
+    run: Callable[[float, Extent], tuple[Solution, float] | None]
     must: bool = False
     swept: bool = True
 
@@ -117,8 +117,8 @@ class Study:
 def study(model: str, extent: Extent, report: Callable[[float], None]) -> Study:
     """Sweep every case of a model, of ours by its name or of anybody by the path of its file; told how far it is as a
     share."""
-    file = fmu_of(model)
-    carried = embedded(file)
+    file = find_fmu(model)
+    carried = load_model_class(file)
     cases = tuple(case for case in CASES if case.model == model) or (default(model, file, carried),)
     work = [(case, job) for case in cases for job in jobs(case, carried, file)]
     points: list[Point] = []
@@ -150,58 +150,58 @@ class Asking:
     def times(self) -> np.ndarray:
         return self.case.reference.times
 
-    def inside(self, method: str, taken: dict[float, float], rtol: float, extent: Extent) -> tuple[Answer, float]:
+    def inside(self, method: str, taken: dict[float, float], rtol: float, extent: Extent) -> tuple[Solution, float]:
         """The FMU's own code, in this process."""
-        run, times = Inside.prepared(self.carried, self.case.values, method, rtol), self.times.tolist()
-        answer = run.answer(times, extent.patience)
-        taken[rtol] = best(partial(run.motion, times), extent.budget)
+        run, times = EmbeddedModel.create(self.carried, self.case.values, method, rtol), self.times.tolist()
+        answer = run.solve(times, extent.timeout)
+        taken[rtol] = best(partial(run.compute_states, times), extent.budget)
         return answer, taken[rtol]
 
     def through_fmpy(
         self, method: str, taken: dict[float, float], rtol: float, extent: Extent
-    ) -> tuple[Answer, float] | None:
+    ) -> tuple[Solution, float] | None:
         """The FMU through fmpy, states recorded; only where it did not fail without fmpy, then it must not."""
         if rtol not in taken:
             return None
         outputs, tolerance = self.case.outputs, {"solver.rtol": rtol} if rtol else {}
         values: dict[str, float | str] = {**self.case.values, **tolerance, "solver.method": method}
         grid, repeat = float(self.times[1]), repeats(taken[rtol], extent.budget)
-        run = simulate(Specification(self.file, outputs, values, grid=grid, follow=False, repeat=repeat))
-        assert run.cost  # ours tell it
+        run = simulate(RunSpec(self.file, outputs, values, grid=grid, follow=False, repeat=repeat))
+        assert run.statistics  # ours tell it
         columns = np.column_stack([run.columns[name] for name in outputs])
-        return Answer(columns, None, run.cost.evaluations), run.cost.seconds
+        return Solution(columns, None, run.statistics.evaluations), run.statistics.seconds
 
-    def by_importer(self, tool: str, rtol: float, extent: Extent) -> tuple[Answer, float]:
+    def by_importer(self, tool: str, rtol: float, extent: Extent) -> tuple[Solution, float]:
         """The FMI 3.0 FMU through fmpy, states recorded, and in model exchange every change of mode; the run time is
         that of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
         outputs, stop, step = self.case.outputs, float(self.times[-1]), float(self.times[1])
         marks = tuple(self.carried.contacts) if tool == ME and self.case.reference.modes else ()
-        with fmi3.instance(fmi3.sibling(self.file), WAYS[tool]) as fmu:
+        with fmi3.open_fmi3_instance(fmi3.fmi3_path(self.file), WAYS[tool]) as fmu:
             run = partial(fmu.simulate, self.case.values, outputs + marks, stop, step, rtol or None)
-            found = run(extent.patience)
+            found = run(extent.timeout)
             seconds = best(run, extent.budget)
-        events = found.changes(*marks) if marks else None
-        return Answer(found.at(self.times, outputs), events, found.evaluations), seconds
+        events = found.find_changes(*marks) if marks else None
+        return Solution(found.sample_at(self.times, outputs), events, found.evaluations), seconds
 
-    def by_peer(self, peer: str, method: str, rtol: float, extent: Extent) -> tuple[Answer, float]:
+    def by_peer(self, peer: str, method: str, rtol: float, extent: Extent) -> tuple[Solution, float]:
         """Somebody else's solver."""
         problem = self.case.problem
         ask = partial(peers.solve, peer, method, problem, self.times, rtol, problem.absolute * rtol)
-        return ask(peers.within(extent.patience)), best(ask, extent.budget)
+        return ask(peers.within(extent.timeout)), best(ask, extent.budget)
 
 
 def jobs(case: Case, carried: Any, file: Path) -> Iterator[Job]:
     """Every solver that is asked about a case."""
     ask, absolute = Asking(case, carried, file), case.problem.absolute
-    for method in offered(carried):
+    for method in method_numbers(carried):
         if not (method == "exact" and case.chatters):
             taken: dict[float, float] = {}  # run time in s by rtol, from the first of the two for the second
             swept = method != "exact"
             yield Job(FMU, method, nan, partial(ask.inside, method, taken), swept=swept)
             yield Job(FMPY, method, nan, partial(ask.through_fmpy, method, taken), True, swept)
     if not case.chatters:
-        usual = {number: name for name, number in offered(carried).items()}[carried().solver.method]
-        for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3.sibling(file).is_file())):
+        usual = {number: name for name, number in method_numbers(carried).items()}[carried().solver.method]
+        for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3.fmi3_path(file).is_file())):
             yield Job(tool, method, nan, partial(ask.by_importer, tool), swept=swept)
         absent = peers.PACKAGES if isinstance(case.problem, Unwritten) else peers.missing()
         for peer, methods in (("scipy", peers.SCIPY), ("cvode", ("BDF",) if case.problem.stiff else ("Adams",))):
@@ -224,7 +224,7 @@ def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
         except HarnessError as error:
             if job.must:
                 raise
-            if perf_counter() - begun > 0.5 * extent.patience:
+            if perf_counter() - begun > 0.5 * extent.timeout:
                 given_up = f"at rtol {rtol:g} it was only {error}"
             yield point(failure=str(error))
             continue
@@ -237,8 +237,8 @@ def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
 
 def best(call: Callable[[], object], budget: float) -> float:
     """The time of the fastest of several calls, in s."""
-    found = [timed(call)]
-    found += [timed(call) for _ in range(repeats(found[0], budget) - 1)]
+    found = [time_call(call)]
+    found += [time_call(call) for _ in range(repeats(found[0], budget) - 1)]
     return min(found)
 
 

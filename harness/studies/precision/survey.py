@@ -7,12 +7,12 @@ from math import isnan
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
-from ...results.files import heading, write_rows
-from ...results.folder import keep, replacing
-from ...results.provenance import record
-from ...running.description import parameters
-from ...running.inside import embedded
-from ...scenes.fmus import check_built, fmu_of
+from ...results.files import column_heading, write_csv_rows
+from ...results.folder import check_same_source, replace_folder
+from ...results.provenance import write_provenance
+from ...running.description import declared_parameters
+from ...running.embedded_model import load_model_class
+from ...scenes.fmu_files import check_built, find_fmu
 from ...truths.models import CASES
 from ...truths.peers import missing
 from . import anchors, laws
@@ -44,13 +44,13 @@ class Survey:
 
 def survey(models: Sequence[str], extent: Extent, out: Path, report: Callable[[str, float], None]) -> Survey:
     """Study the models and write results to out/precision; what is there on other models stays."""
-    files = list(map(fmu_of, models))
+    files = list(map(find_fmu, models))
     for file in files:
         check_built(file)
         if extent == QUICK:
-            keep(out / FOLDER, QUICKLY, f"{file.stem}.json")
+            check_same_source(out / FOLDER, QUICKLY, f"{file.stem}.json")
     kept = [path.name for path in (out / FOLDER).glob("*") if path.name.endswith(ENDS)]
-    with replacing(out / FOLDER, ["anchors.csv", *kept]) as folder:
+    with replace_folder(out / FOLDER, ["anchors.csv", *kept]) as folder:
         if (out / FOLDER).exists():
             stale = ignore_patterns(*(f"{file.stem}[.-]*" for file in files))
             copytree(out / FOLDER, folder, ignore=stale, dirs_exist_ok=True)
@@ -62,7 +62,7 @@ def survey(models: Sequence[str], extent: Extent, out: Path, report: Callable[[s
 def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float], None]) -> Survey:
     """Run everything."""
     studies = tuple(study(model, extent, partial(report, model)) for model in models)
-    carried = {model: embedded(fmu_of(model)) for model in models}
+    carried = {model: load_model_class(find_fmu(model)) for model in models}
     told = [laws.analyse(case, carried[case.model]) for case in CASES if case.dry and case.model in models]
     report("anchors", 0.0)
     rows = tuple(anchors.analyse()) if told or any(case.model in models for case in CASES) else ()
@@ -88,7 +88,7 @@ def write(found: Survey, files: Sequence[Path], folder: Path, source: str) -> No
 
     for each, file, sentence in zip(found.studies, files, found.advice, strict=True):
         values = {case.name: case.values for case in each.cases}
-        record(folder, [file], parameters(file), values, f"{each.model}.json", source)
+        write_provenance(folder, [file], declared_parameters(file), values, f"{each.model}.json", source)
         (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
         save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
         exchanged = each.exchanged()
@@ -106,9 +106,9 @@ def write(found: Survey, files: Sequence[Path], folder: Path, source: str) -> No
 
 def heads(kind: type) -> list[str]:
     """The names of a record's fields, with the units that they are declared with."""
-    return [heading(field.name, UNITS.get(field.name, "")) for field in fields(kind)]
+    return [column_heading(field.name, UNITS.get(field.name, "")) for field in fields(kind)]
 
 
 def save(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """A CSV file; None and NaN are left empty."""
-    write_rows(path, heads, ([None if value != value else value for value in row] for row in rows))
+    write_csv_rows(path, heads, ([None if value != value else value for value in row] for row in rows))

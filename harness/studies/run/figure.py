@@ -12,13 +12,25 @@ from typing import Any
 
 import numpy as np
 
-from ...results.quantity import UNITS, Quantity, in_degrees
-from ...results.steps import published_mean
-from ...results.style import ABOVE, BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, drawable, label, sheet
-from ...running import any_fmu
-from ...running.description import description
-from ...running.fmu import simulate
-from ...running.run import Run
+from ...results.quantity import PUBLISHED_UNITS, Quantity, display_unit
+from ...results.step_sizes import published_mean_step
+from ...results.style import (
+    BLUE,
+    GREEN,
+    GREY,
+    HEIGHT,
+    LEGEND_ABOVE,
+    ORANGE,
+    WIDTH,
+    Axes,
+    axis_label,
+    mask_undrawable,
+    open_figure,
+)
+from ...running import runner
+from ...running.description import read_description
+from ...running.fmi2 import simulate
+from ...running.trajectory import Trajectory
 
 BESIDE = ("phase", "steps")  # on the right; what is over time stands on the left, one below the other
 EDGES = np.array([[1.01, -0.01], [-0.01, 1.01]])  # of a time axis, from start and stop
@@ -37,28 +49,33 @@ Results = dict[str, Any]  # by the name of the analysis
 class Drawn:
     """A run with points enough for smooth curves, the `results` of its analyses, and the `published` figures."""
 
-    run: Run
+    run: Trajectory
     results: Results
     published: Mapping[str, Any]
 
     def unit(self, name: str) -> tuple[str, float]:
         """The unit in which an output is drawn, and its size in the output's own."""
-        return in_degrees(self.run.units[name])
+        return display_unit(self.run.units[name])
 
     def values(self, name: str) -> np.ndarray:
         """An output (n,) as it is drawn."""
-        values, (_, size) = drawable(self.run.columns[name]), self.unit(name)
+        values, (_, size) = mask_undrawable(self.run.columns[name]), self.unit(name)
         return values if size == 1 else values / size
 
     def figure(self, name: str) -> float | None:
         """A published figure in SI units, None where there is no such number."""
         found = self.published.get(name)
         value, unit = found if isinstance(found, tuple) else (found, "")
-        return value * UNITS.get(unit, ("", 1.0))[1] if isinstance(value, int | float) else None
+        return value * PUBLISHED_UNITS.get(unit, ("", 1.0))[1] if isinstance(value, int | float) else None
 
 
 def draw(
-    title: str, plots: Iterable[str], run: Run, results: Results, path: Path, published: Mapping[str, Any] | None = None
+    title: str,
+    plots: Iterable[str],
+    run: Trajectory,
+    results: Results,
+    path: Path,
+    published: Mapping[str, Any] | None = None,
 ) -> None:
     """Save the figure of these plots; of an array every element, of a text nothing."""
     chosen = [each for name in plots for each in drawn(name, run)]
@@ -67,8 +84,8 @@ def draw(
         return
     shown = Drawn(smooth(run), results, published or {})
     height = HEIGHT * max(2, *map(len, columns), 2)
-    with sheet(path, WIDTH * len(columns), height) as figure:
-        figure.suptitle(f"{title}\n{run.setting}".strip(), fontsize=11)
+    with open_figure(path, WIDTH * len(columns), height) as figure:
+        figure.suptitle(f"{title}\n{run.settings_label}".strip(), fontsize=11)
         parts = figure.subfigures(1, len(columns), squeeze=False)[0]
         for part, names in zip(parts, columns, strict=True):
             over_time = names[0] not in BESIDE
@@ -76,24 +93,22 @@ def draw(
                 PANELS[name](axes, shown) if name in PANELS else history(axes, shown, name)
 
 
-def drawn(name: str, run: Run) -> list[str]:
+def drawn(name: str, run: Trajectory) -> list[str]:
     """What is drawn for one plot that is named."""
-    if name in PANELS or name in run.wanted.motion:
+    if name in PANELS or name in run.spec.motion_outputs:
         return [name]
     own = [each for each in run.columns if each == name or each.startswith(f"{name}[")]
     return [each for each in own if run.columns[each].dtype.kind != "U"]
 
 
-def smooth(run: Run) -> Run:
+def smooth(run: Trajectory) -> Trajectory:
     """The run with what the FMU says between its points, where these are far apart; that it is asked does not move
     it."""
     start, stop = run.time[[0, -1]].tolist()
     fine = np.diff(run.time).max() <= 2 * (stop - start) / SMOOTH
-    if fine or run.failed or not any_fmu.shows_steps(description(run.wanted.fmu)):
+    if fine or run.failure or not runner.exposes_solver_steps(read_description(run.spec.fmu)):
         return run
-    between = simulate(
-        replace(run.wanted, start=start, stop=stop, grid=(stop - start) / SMOOTH, follow=False, repeat=1)
-    )
+    between = simulate(replace(run.spec, start=start, stop=stop, grid=(stop - start) / SMOOTH, follow=False, repeat=1))
     time, places = np.unique(np.append(run.time, between.time), return_index=True)
     columns = {name: np.append(column, between.columns[name])[places] for name, column in run.columns.items()}
     return replace(run, time=time, columns=columns)
@@ -102,7 +117,7 @@ def smooth(run: Run) -> Run:
 def history(axes: Axes, shown: Drawn, name: str) -> None:
     """One output over time, or what plays its role."""
     run, role = shown.run, name
-    name = run.wanted.motion.get(role, role)
+    name = run.spec.motion_outputs.get(role, role)
     values, (unit, size) = shown.values(name), shown.unit(name)
     style = "steps-post" if values.dtype.kind in "iu" else "default"
     axes.plot(run.time, values, color=BLUE, drawstyle=style)
@@ -112,13 +127,13 @@ def history(axes: Axes, shown: Drawn, name: str) -> None:
         axes.axhline(level / size, color=GREEN, linestyle=":", label="published peak")
     axes.set_title(run.descriptions[name])
     legend(axes)
-    axes.set_ylabel(label(name, unit))
+    axes.set_ylabel(axis_label(name, unit))
     axes.set_xlabel("t [s]")
     axes.set_xlim(*EDGES @ run.time[[0, -1]])
     axes.label_outer()
 
 
-def modes(axes: Axes, run: Run) -> None:
+def modes(axes: Axes, run: Trajectory) -> None:
     """Where friction holds, shaded; where a motion turns without a rest, a line."""
     if run.events is None:
         return
@@ -142,7 +157,7 @@ def position(axes: Axes, shown: Drawn) -> None:
         axes.plot(run.time, run.columns["x_driver"], color=ORANGE, linestyle="--", label="x_driver")
     if "decay" in results:
         decay = results["decay"]
-        _, size = shown.unit(run.wanted.motion["position"])
+        _, size = shown.unit(run.spec.motion_outputs["position"])
         axes.plot(decay.times, decay.positions / size, "o", color=ORANGE, fillstyle="none", label="turning points")
         for name, which in PEAKS.items():
             peak = shown.figure(name)
@@ -174,7 +189,7 @@ def legend(axes: Axes) -> None:
     handles, labels = axes.get_legend_handles_labels()
     once = dict(zip(labels, handles, strict=True))
     if once:
-        axes.legend(once.values(), once, **ABOVE, ncols=len(once))
+        axes.legend(once.values(), once, **LEGEND_ABOVE, ncols=len(once))
         title = axes.get_title(loc="left")
         if len(title) + sum(len(each) + HANDLE for each in once) > LINE:
             axes.set_title(title, pad=LIFTED)
@@ -182,12 +197,12 @@ def legend(axes: Axes) -> None:
 
 def phase(axes: Axes, shown: Drawn) -> None:
     """Velocity over position."""
-    motion = shown.run.wanted.motion
+    motion = shown.run.spec.motion_outputs
     x, v = motion["position"], motion["velocity"]
     axes.plot(shown.values(x), shown.values(v), color=BLUE)
     axes.set_title("phase plane")
-    axes.set_xlabel(label(x, shown.unit(x)[0]))
-    axes.set_ylabel(label(v, shown.unit(v)[0]))
+    axes.set_xlabel(axis_label(x, shown.unit(x)[0]))
+    axes.set_ylabel(axis_label(v, shown.unit(v)[0]))
 
 
 def steps(axes: Axes, shown: Drawn) -> None:
@@ -197,12 +212,12 @@ def steps(axes: Axes, shown: Drawn) -> None:
     axes.semilogy(run.steps.t[:-1], run.steps.h, color=BLUE, linewidth=0.6, marker=".", markersize=3)
     if "steps" in shown.results:
         found = {
-            "mean": (published_mean(run.steps.h), ORANGE, "--"),
+            "mean": (published_mean_step(run.steps.h), ORANGE, "--"),
             "published": (shown.figure("mean_step"), GREEN, ":"),
         }
         for word, (mean, color, style) in found.items():
             if mean is not None:
-                told = " ".join(Quantity("mean_step", mean, "s", "").told())
+                told = " ".join(Quantity("mean_step", mean, "s", "").formatted())
                 axes.axhline(mean, color=color, linestyle=style, label=f"{word} {told}")
     axes.set_title("step size of the solver")
     legend(axes)

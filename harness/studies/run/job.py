@@ -9,36 +9,36 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ...errors import HarnessError, SceneError, unknown
-from ...process.interrupt import check
-from ...results.files import write_motion
-from ...results.folder import replacing
-from ...results.provenance import named, record
+from ...errors import HarnessError, SceneError, unknown_name_message
+from ...process.interrupt import check_interrupt
+from ...results.files import write_signals
+from ...results.folder import replace_folder
+from ...results.provenance import describe_sources, write_provenance
 from ...results.quantity import Quantity
-from ...running import any_fmu
-from ...running.run import Run
-from ...running.specification import Specification, of_scene
-from ...running.trajectory import Trajectory, of_run
-from ...scenes.fmus import check_built
-from ...scenes.scene import Scene, load, shipped, usual
+from ...running import runner
+from ...running.run_spec import RunSpec, spec_from_scene
+from ...running.signals import Signals, signals_from_trajectory
+from ...running.trajectory import Trajectory
+from ...scenes.fmu_files import check_built
+from ...scenes.scene import Scene, default_plots, load_scene, shipped_scenes
 from .table import Outcome, save
 
 FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.svg")  # all that a result folder may hold
 
 
-def decay(run: Run, scene: Scene) -> Any:
+def decay(run: Trajectory, scene: Scene) -> Any:
     from ...analyses.decay.decrement import analyse
 
     return analyse(run, scene.decay.gives or "", scene.decay.first, scene.decay.cycles)
 
 
-def slip(run: Run, scene: Scene) -> Any:
+def slip(run: Trajectory, scene: Scene) -> Any:
     from ...analyses.slip import analyse
 
     return analyse(run)
 
 
-def steps(run: Run, scene: Scene) -> Any:
+def steps(run: Trajectory, scene: Scene) -> Any:
     from ...analyses.steps import analyse
 
     return analyse(run)
@@ -50,7 +50,7 @@ ANALYSE = {"decay": decay, "slip": slip, "steps": steps}
 def perform(scene: Scene, out: Path, report: Callable[[float], None]) -> Outcome:
     """Run, analyse and write results to out/<scene>; HarnessError leaves older results as they are."""
     try:
-        with replacing(out / scene.name, FILES, scene.source) as folder:
+        with replace_folder(out / scene.name, FILES, scene.source) as folder:
             return fill(scene, folder, report)
     except HarnessError as error:
         raise type(error)(f"scene {scene.name}: {error}") from None
@@ -59,30 +59,30 @@ def perform(scene: Scene, out: Path, report: Callable[[float], None]) -> Outcome
 def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome:
     """Run and analyse a scene, and write its results into an empty folder."""
     check_built(scene.file)
-    run = any_fmu.run(of_scene(scene), report)
+    run = runner.run(spec_from_scene(scene), report)
     check_steps(scene, run)
     results: dict[str, Any] = {}
-    for name in () if run.failed else scene.analyses:
+    for name in () if run.failure else scene.analyses:
         results[name] = ANALYSE[name](run, scene)
     quantities = tuple(quantity for result in results.values() for quantity in result.quantities)
-    quantities += run.cost.quantities if run.cost else ()
-    if not run.failed:
+    quantities += run.statistics.quantities if run.statistics else ()
+    if not run.failure:
         check_published(scene, quantities)
     run.save(folder)
-    stop = scene.stop if run.failed else float(run.time[-1])
-    follow = scene.follow if run.wanted.grid is None else run.wanted.follow
-    as_run = replace(scene, start=float(run.time[0]), stop=stop, grid=run.wanted.grid, follow=follow)
-    record(folder, [scene.file], run.in_force, as_run, source=scene.source)
+    stop = scene.stop if run.failure else float(run.time[-1])
+    follow = scene.follow if run.spec.grid is None else run.spec.follow
+    as_run = replace(scene, start=float(run.time[0]), stop=stop, grid=run.spec.grid, follow=follow)
+    write_provenance(folder, [scene.file], run.effective_parameters, as_run, source=scene.source)
     if results:
         save(quantities, scene.published, folder / "figures.csv")
     if scene.plots:
         from .figure import draw
 
         draw(scene.title, scene.plots, run, results, folder / "figure.svg", scene.published)
-    return Outcome(scene.name, scene, run, quantities, run.failed or None)
+    return Outcome(scene.name, scene, run, quantities, run.failure or None)
 
 
-def check_steps(scene: Scene, run: Run) -> None:
+def check_steps(scene: Scene, run: Trajectory) -> None:
     """The FMU shows its solver's steps, where they are asked for."""
     if run.steps is None and "steps" in (*scene.analyses, *scene.plots):
         raise SceneError(
@@ -97,10 +97,10 @@ def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
         if name == "source":
             continue
         if name not in measured:
-            raise SceneError(unknown("name in [published]", name, measured))
+            raise SceneError(unknown_name_message("name in [published]", name, measured))
         if isinstance(value, tuple):
             try:
-                measured[name].in_unit(value[1])
+                measured[name].to_unit(value[1])
             except KeyError:
                 unit = measured[name].unit
                 raise SceneError(
@@ -110,7 +110,7 @@ def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
 
 def published() -> list[str]:
     """The names of the shipped scenes that have figures to stand beside; HarnessError if an FMU is not built."""
-    scenes = [scene for scene in map(load, shipped()) if scene.published]
+    scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
     for scene in scenes:
         check_built(scene.file)
     return [scene.name for scene in scenes]
@@ -119,23 +119,23 @@ def published() -> list[str]:
 def main_job(names: Iterable[str], out: Path, report: Callable[[str, float], None]) -> Iterator[Outcome]:
     """The outcome of each scene; one that fails does not lose the others."""
     for name in names:
-        check()
+        check_interrupt()
         try:
-            yield perform(load(name), out, partial(report, name))
+            yield perform(load_scene(name), out, partial(report, name))
         except HarnessError as error:
-            check()  # an FMU in Python may have swallowed the interrupt that made it fail
+            check_interrupt()  # an FMU in Python may have swallowed the interrupt that made it fail
             yield Outcome(name, None, None, (), str(error))
 
 
-def perform_run(wanted: Specification, out: Path, report: Callable[[float], None]) -> tuple[Trajectory, Path]:
+def perform_run(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Signals, Path]:
     """Run an FMU of any origin, and write its outputs to out/<name of the file>."""
     from .figure import draw
 
-    folder, source = out / wanted.model, named(str(wanted.fmu))
-    with replacing(folder, FILES, source) as fresh:
-        done = any_fmu.run(wanted, report)
-        found = of_run(done)
-        write_motion(fresh / FILES[0], found.time, found.columns, found.units)
-        draw(wanted.fmu.name, usual(tuple(found.columns)), done, {}, fresh / "figure.svg")
-        record(fresh, [wanted.fmu], found.parameters, wanted, source=source)
+    folder, source = out / wanted.model, describe_sources(str(wanted.fmu))
+    with replace_folder(folder, FILES, source) as fresh:
+        done = runner.run(wanted, report)
+        found = signals_from_trajectory(done)
+        write_signals(fresh / FILES[0], found.time, found.columns, found.units)
+        draw(wanted.fmu.name, default_plots(tuple(found.columns)), done, {}, fresh / "figure.svg")
+        write_provenance(fresh, [wanted.fmu], found.parameters, wanted, source=source)
     return found, folder

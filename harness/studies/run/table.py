@@ -9,9 +9,9 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from ...results.files import write_rows
-from ...results.quantity import Quantity, spelled
-from ...running.run import Run
+from ...results.files import write_csv_rows
+from ...results.quantity import Quantity, format_number
+from ...running.trajectory import Trajectory
 from ...scenes.scene import Scene
 
 ELSEWHERE = "elsewhere: the published run time is that of another machine"
@@ -24,7 +24,7 @@ class Outcome:
 
     name: str
     scene: Scene | None
-    run: Run | None
+    run: Trajectory | None
     quantities: tuple[Quantity, ...]
     error: str | None
 
@@ -46,7 +46,7 @@ def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
             table.add_row(Text(outcome.name, style="bold red"), Text("failed", style="red"))
             continue
         figures = outcome.scene.published
-        title = Text.assemble((outcome.name, "bold"), f"\n  {outcome.run.setting}")
+        title = Text.assemble((outcome.name, "bold"), f"\n  {outcome.run.settings_label}")
         table.add_row(title, *("", "", Text("\n" + figures.get("source", ""), style="italic"))[: width - 1])
         for quantity in outcome.quantities:
             if everything or quantity.name in figures or quantity.name in ALWAYS:
@@ -61,12 +61,12 @@ def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
     text, value, unit = f"  {quantity.text}", quantity.value, quantity.unit
     if isinstance(figure, tuple):
         figure, unit = figure
-        value = quantity.in_unit(unit)
+        value = quantity.to_unit(unit)
     if not isinstance(figure, int | float):
-        measured, unit = quantity.told()
+        measured, unit = quantity.formatted()
         return text, measured, unit, str(figure or ""), ""
     published = repr(figure)
-    measured = spelled(value, max(5, len(published.replace(".", "").lstrip("0"))))
+    measured = format_number(value, max(5, len(published.replace(".", "").lstrip("0"))))
     difference = f"{100 * (value / figure - 1):+.2g} %" if figure else ""
     difference = "elsewhere" if quantity.name == "run_time" else difference
     return text, measured, "" if unit == "1" else unit, published, difference
@@ -76,6 +76,6 @@ def save(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) 
     """Write what the table shows of a scene as CSV, with the source of the published figures in its heading."""
     told = [(text.strip(), *cells) for text, *cells in (row(each, published.get(each.name)) for each in quantities)]
     if not published:
-        write_rows(path, ["", "measured", "unit"], (cells[:3] for cells in told))
+        write_csv_rows(path, ["", "measured", "unit"], (cells[:3] for cells in told))
         return
-    write_rows(path, ["", "measured", "unit", f"published ({published['source']})", "difference"], told)
+    write_csv_rows(path, ["", "measured", "unit", f"published ({published['source']})", "difference"], told)

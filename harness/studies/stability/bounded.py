@@ -11,44 +11,44 @@ from time import monotonic
 from typing import Any
 
 from ...errors import HarnessError
-from ...process.child import OFTEN
-from ...process.crew import Died, Hand, context
-from ...process.interrupt import check
-from ...process.room import room
+from ...process.interrupt import check_interrupt
+from ...process.subprocess_runner import POLL_INTERVAL
+from ...process.temporary_directory import temporary_directory
+from ...process.worker_pool import Worker, WorkerDiedError, process_context
 
 # imported once, where processes are forked from
 PRELOAD = [f"{__package__}.study", "harness.truths.linear", "scipy.integrate"]
 
-CONTEXT: Any = context(PRELOAD)
+CONTEXT: Any = process_context(PRELOAD)
 
 
-class Bounded(Hand):
+class Bounded(Worker):
     """A process with a folder of its own."""
 
     def __init__(self) -> None:
         self.held = ExitStack()
-        super().__init__(CONTEXT, self.held.enter_context(room("bounded-")))
+        super().__init__(CONTEXT, self.held.enter_context(temporary_directory("bounded-")))
 
     def within(self, limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
         """As `bounded`; only who answers is asked again."""
         late = monotonic() + limit
         try:
-            self.ask(function, *arguments)
-            while not self.answers(OFTEN):
+            self.send_task(function, *arguments)
+            while not self.has_result(POLL_INTERVAL):
                 if monotonic() > late:
                     raise HarnessError(f"no answer after {limit:g} s")
-                check()
-            found = self.answer()
+                check_interrupt()
+            found = self.receive_result()
         except BaseException:
-            self.end()
+            self.kill()
             raise
         IDLE.append(self)
         if isinstance(found, BaseException):
             raise found
         return found
 
-    def end(self) -> None:
-        super().end()
+    def kill(self) -> None:
+        super().kill()
         self.held.close()
 
 
@@ -59,7 +59,7 @@ IDLE: list[Bounded] = []
 def dismiss() -> None:
     """End those that wait."""
     while IDLE:
-        IDLE.pop().end()
+        IDLE.pop().kill()
 
 
 def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
@@ -67,6 +67,6 @@ def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
 
     The function must be known to pickle by name; any other exception of its comes through.
     """
-    with suppress(IndexError, Died):  # where none waits, or what was asked of it before has killed it
+    with suppress(IndexError, WorkerDiedError):  # where none waits, or what was asked of it before has killed it
         return IDLE.pop().within(limit, function, *arguments)
     return Bounded().within(limit, function, *arguments)

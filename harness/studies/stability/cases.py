@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...running.probe import Card, Setting
+from ...running.fmu_session import FmuInfo, InitialValues
 from ...truths.pieces import Span
 from ...truths.truth import Grid
 
@@ -25,7 +25,7 @@ class Trial:
     title: str
     model: str
     method: str
-    setting: Setting
+    setting: InitialValues
     grid: Grid
     spans: list[Span]
     calls: list[tuple[float, float]] | None = None
@@ -59,11 +59,13 @@ def scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
     return [one for scene in table["scene"] for one in spread(scene)], table["finish"]
 
 
-def usual(model: str, card: Card, settled: bool) -> list[dict[str, Any]]:
+def usual(model: str, card: FmuInfo, settled: bool) -> list[dict[str, Any]]:
     """Scenes for a model of somebody's: every number a tenth of what it is, and ten times; tolerances; few steps; what
     is no number.  `settled`: whether its events can be told."""
     of_all = {"model": model, "either": True, "driven": True, "events": "all" if settled else "none"}
-    numbers = {n: x for n, x in card.defaults.items() if x and n not in card.choices and not n.startswith("solver.")}
+    numbers = {
+        n: x for n, x in card.start_values.items() if x and n not in card.enumerations and not n.startswith("solver.")
+    }
     found: list[dict[str, Any]] = [{"title": "as it comes"}, {"title": "one communication step", "points": 1}]
     found += [{"title": f"rtol = {rtol:g}", "rtol": rtol, "finish": {}} for rtol in (1e-3, 1e-9)]
     found += [
@@ -90,10 +92,10 @@ def spread(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
             yield {**scene, **new, "model": model, **told}
 
 
-def cases(scene: dict[str, Any], card: Card, finish: dict[str, float]) -> list[Trial]:
+def cases(scene: dict[str, Any], card: FmuInfo, finish: dict[str, float]) -> list[Trial]:
     """The cases of one scene: the methods that it names, of those that its FMU offers."""
     methods = scene.get("methods", card.methods)
-    methods = [card.default if method == "default" else method for method in methods]
+    methods = [card.default_method if method == "default" else method for method in methods]
     return [
         case(scene, card, method, largest_error(scene, method, finish)) for method in methods if method in card.methods
     ]
@@ -109,19 +111,21 @@ def largest_error(scene: dict[str, Any], method: str, finish: dict[str, float]) 
     return own.get("other", max(finish["tolerances"] * scene.get("rtol", RTOL), finish["least"]))
 
 
-def case(scene: dict[str, Any], card: Card, method: str, finish: float) -> Trial:
+def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> Trial:
     """A scene with a method."""
     chosen = {"solver.rtol": scene.get("rtol", RTOL), **scene.get("values", {}), "solver.method": method}
-    values = card.numbers({**card.defaults, **chosen})
+    values = card.resolve_labels({**card.start_values, **chosen})
     start, stop = scene.get("start", 0.0), scene.get("stop", card.stop)
-    changes = {row["t"]: card.numbers({k: v for k, v in row.items() if k != "t"}) for row in scene.get("changes", ())}
+    changes = {
+        row["t"]: card.resolve_labels({k: v for k, v in row.items() if k != "t"}) for row in scene.get("changes", ())
+    }
     points = round((stop - start) / scene["step"]) if "step" in scene else scene.get("points", POINTS)
     ends = not ("refuse" in scene or "poison" in scene)
     return Trial(
         title=scene["title"],
         model=scene["model"],
         method=method,
-        setting=Setting(scene["model"], values, start, stop),
+        setting=InitialValues(scene["model"], values, start, stop),
         grid=Grid(start, stop, points, tuple(changes), scene.get("at_events", False)),
         spans=spans(start, stop, values, changes),
         calls=[(t, h) for t, h in scene["calls"]] if "calls" in scene else None,

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...running.probe import Motion
+from ...running.fmu_session import CompletedRun
 from .cases import Trial
 
 FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
@@ -23,7 +23,7 @@ class Ending:
     text: str
     error: float = math.nan
     rise: float = math.nan
-    motion: Motion | None = None
+    motion: CompletedRun | None = None
 
     @property
     def expected(self) -> str:

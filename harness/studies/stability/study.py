@@ -14,14 +14,22 @@ from typing import Any
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.wait import each
-from ...results.files import write_rows
-from ...results.folder import replacing
-from ...results.provenance import of_each, record
-from ...running.description import parameters
-from ...running.inside import embedded
-from ...running.probe import Card, Motion, Refusal, Refusals, card, poison, run
-from ...scenes.fmus import check_built, fmu_of
+from ...process.interruptible_wait import map_in_threads
+from ...results.files import write_csv_rows
+from ...results.folder import replace_folder
+from ...results.provenance import prefix_parameters, write_provenance
+from ...running.description import declared_parameters
+from ...running.embedded_model import load_model_class
+from ...running.fmu_session import (
+    CompletedRun,
+    FmuInfo,
+    RefusalSummary,
+    RefusedRun,
+    inject_nonfinite,
+    read_info,
+    run_steps,
+)
+from ...scenes.fmu_files import check_built, find_fmu
 from ...truths.certified import by_two_methods
 from ...truths.models import MODELS
 from ...truths.truth import Truth, check, truth, worst
@@ -40,15 +48,15 @@ def survey(
     """Run the chosen groups of cases and write results to out/stability; `source`: of whom, if not of all."""
     from .figure import draw
 
-    with replacing(out / FOLDER, FILES, source) as folder:
+    with replace_folder(out / FOLDER, FILES, source) as folder:
         rows = table(report, chosen)
         found = regions(rows)
         save(rows, folder / "stability.csv")
         if found:
             draw(found, folder / "region.svg")
-        fmus = {row.case.name: fmu_of(row.case.model) for row in rows}
-        values = of_each({name: parameters(fmu) for name, fmu in fmus.items()})
-        record(folder, fmus.values(), values, source=source)
+        fmus = {row.case.name: find_fmu(row.case.model) for row in rows}
+        values = prefix_parameters({name: declared_parameters(fmu) for name, fmu in fmus.items()})
+        write_provenance(folder, fmus.values(), values, source=source)
     return rows, found
 
 
@@ -62,7 +70,7 @@ def table(report: Callable[[str, float], None], chosen: list[list[Trial]]) -> li
             report(row.case.label, 1.0)
         return found
 
-    found = [row for found in each(WORKERS, rows, chosen) for row in found]
+    found = [row for found in map_in_threads(WORKERS, rows, chosen) for row in found]
     return sorted(found, key=lambda row: row.case.place)
 
 
@@ -73,12 +81,12 @@ def all_cases(
     together.  A model without scenes of its own meets the usual ones."""
     check()
     for model in models:
-        check_built(fmu_of(model))
+        check_built(find_fmu(model))
     found, finish = scenes()
     found = [scene for scene in found if wanted(scene) and (not models or scene["model"] in models)]
-    cards: dict[str, Card] = {}
+    cards: dict[str, FmuInfo] = {}
     for model in dict.fromkeys((*models, *(scene["model"] for scene in found))):
-        cards[model] = bounded(LIMIT, card, model)
+        cards[model] = bounded(LIMIT, read_info, model)
         if model not in [scene["model"] for scene in found]:
             settled = len(bounded(LIMIT, modes, model)) < 2
             found += usual(model, cards[model], settled)
@@ -92,7 +100,7 @@ def all_cases(
 
 def modes(model: str) -> list[str]:
     """The names of the modes of a model; HarnessError where nothing moves as a body does."""
-    carried: Any = embedded(fmu_of(model))
+    carried: Any = load_model_class(find_fmu(model))
     if not {*carried.states} & {*carried.states.values()}:
         raise HarnessError(f"{model}: no state is the rate of another, and the scenes are about positions and speeds")
     return list(carried.contacts)
@@ -105,7 +113,7 @@ def judged(group: Iterable[Trial]) -> Iterator[Ending]:
     for case in group:
         try:
             if case.poison:
-                yield all_refused(case, bounded(LIMIT, poison, case.setting))
+                yield all_refused(case, bounded(LIMIT, inject_nonfinite, case.setting))
                 continue
             if case.refuse is None and answer is None and not doubt:
                 answering = truth if case.model in MODELS else by_two_methods
@@ -117,8 +125,8 @@ def judged(group: Iterable[Trial]) -> Iterator[Ending]:
                     doubt = str(error)  # of values that the run may refuse
             times = answer.times.tolist() if answer else case.grid.times(())
             calls = case.calls or [(t, ahead - t) for t, ahead in pairwise(times)]
-            ending = bounded(LIMIT, run, case.setting, calls, case.changes)
-            if isinstance(ending, Refusal):
+            ending = bounded(LIMIT, run_steps, case.setting, calls, case.changes)
+            if isinstance(ending, RefusedRun):
                 yield refused(case, ending)
             elif answer is None or case.refuse is not None:
                 yield Ending(case, WRONG, doubt or "it was taken", motion=ending)
@@ -128,24 +136,24 @@ def judged(group: Iterable[Trial]) -> Iterator[Ending]:
             yield Ending(case, WRONG, str(error))
 
 
-def all_refused(case: Trial, ending: Refusals) -> Ending:
-    if ending.wrong:
-        return Ending(case, WRONG, f"{len(ending.wrong)} of {ending.tried}: {'; '.join(ending.wrong)}")
-    return Ending(case, REFUSED, f"{ending.tried} of {ending.tried}, each by name")
+def all_refused(case: Trial, ending: RefusalSummary) -> Ending:
+    if ending.failures:
+        return Ending(case, WRONG, f"{len(ending.failures)} of {ending.n_tried}: {'; '.join(ending.failures)}")
+    return Ending(case, REFUSED, f"{ending.n_tried} of {ending.n_tried}, each by name")
 
 
-def refused(case: Trial, ending: Refusal) -> Ending:
+def refused(case: Trial, ending: RefusedRun) -> Ending:
     """A refusal says the words that the scene expects, and leaves no number to be taken for a result."""
-    if not ending.sentence:
+    if not ending.message:
         return Ending(case, WRONG, "it was refused without a sentence")
-    if not ending.silent:
-        return Ending(case, WRONG, f"refused, but numbers can still be read: {ending.sentence}")
-    if not case.either and (case.refuse is None or case.refuse not in ending.sentence):
-        return Ending(case, WRONG, f"refused: {ending.sentence}")
-    return Ending(case, REFUSED, ending.sentence)
+    if not ending.all_nan:
+        return Ending(case, WRONG, f"refused, but numbers can still be read: {ending.message}")
+    if not case.either and (case.refuse is None or case.refuse not in ending.message):
+        return Ending(case, WRONG, f"refused: {ending.message}")
+    return Ending(case, REFUSED, ending.message)
 
 
-def finished(case: Trial, motion: Motion, answer: Truth) -> Ending:
+def finished(case: Trial, motion: CompletedRun, answer: Truth) -> Ending:
     """A motion has the right events, is as near to the answer as the scene expects, and makes no energy."""
     assert case.finish is not None
     error = answer.error(motion.x, motion.v)
@@ -185,7 +193,7 @@ def save(rows: list[Ending], path: Path) -> None:
     """Write stability.csv: one line for each row."""
     told = ["model", "scene", "method", "expected", "ended", "error [1]", "energy rise [1]"]
     heads = [*told, "events", "steps", "rejected", "evaluations", "run time [s]", "sentence"]
-    write_rows(path, heads, map(line, rows))
+    write_csv_rows(path, heads, map(line, rows))
 
 
 def line(row: Ending) -> list[Any]:

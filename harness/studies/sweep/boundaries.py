@@ -19,7 +19,7 @@ from zipfile import ZipFile
 
 import numpy as np
 
-from ...errors import HarnessError, reason, shown
+from ...errors import HarnessError, first_line, format_value
 
 INSIDE = "documentation/boundaries.toml"
 STOP = "t"
@@ -71,4 +71,4 @@ def known(fmu: Path, varied: tuple[str, ...], there: Mapping[str, Any]) -> tuple
         known = {*varied, *there}
         return tuple(each for each in found if each.parameters & {*varied} and each.parameters <= known)
     except (KeyError, TypeError, ValueError, SyntaxError, RecursionError) as error:
-        raise HarnessError(f"{fmu.name}: {INSIDE} is not understood: {shown(reason(error))}") from None
+        raise HarnessError(f"{fmu.name}: {INSIDE} is not understood: {format_value(first_line(error))}") from None

@@ -7,8 +7,8 @@ from contextlib import contextmanager, suppress
 from time import monotonic
 from typing import Any
 
-from ...errors import HarnessError, reason
-from ...process.wait import ended
+from ...errors import HarnessError, first_line
+from ...process.interruptible_wait import wait_for_any
 
 PATIENCE = 60.0  # s without a worker
 EXTRA = "python -m pip install 'friction-fmus[sweep]'"
@@ -23,7 +23,7 @@ class Cluster:
 
         self.client, self.address = client, address
         self.pool = client.get_executor(pure=False)
-        self.died: tuple[type[Exception], ...] = (KilledWorker,)
+        self.death_errors: tuple[type[Exception], ...] = (KilledWorker,)
         self.seen = monotonic()
 
     @property
@@ -39,9 +39,9 @@ class Cluster:
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         return self.pool.submit(function, *arguments)
 
-    def ended(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
+    def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
         """Those that have ended once one has, or after a while."""
-        return ended(futures)
+        return wait_for_any(futures)
 
 
 @contextmanager
@@ -56,7 +56,7 @@ def cluster(address: str, unload: Callable[[], None]) -> Iterator[Cluster]:
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as error:
-        raise HarnessError(f"no scheduler answers at {address}: {reason(error)}") from None
+        raise HarnessError(f"no scheduler answers at {address}: {first_line(error)}") from None
     with client:
         found = Cluster(client, address)
         if not found.size:

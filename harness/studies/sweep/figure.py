@@ -13,7 +13,7 @@ import xarray
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
-from ...results.style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, label, sheet
+from ...results.style import BLUE, GREEN, HEIGHT, ORANGE, WIDTH, axis_label, open_figure
 from .boundaries import Boundary
 
 FAILED = "#bbbbbb"
@@ -37,7 +37,7 @@ def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) ->
     across = len(varied) if scattered else min(len(measures), 2)
     down = len(measures) if scattered else -(-len(measures) // 2)
     height = HEIGHT * (1.2 if scattered or len(varied) == 1 else 1.7)
-    with sheet(path, max(1.2, across) * WIDTH, height * down + 0.6) as figure:
+    with open_figure(path, max(1.2, across) * WIDTH, height * down + 0.6) as figure:
         figure.suptitle(f"{data.attrs['title']}{f' ({failed} runs failed)' if failed else ''}", fontsize=11)
         panels = figure.subplots(down, across, squeeze=False)
         if scattered:
@@ -64,7 +64,7 @@ def named(axes: Axes, data: xarray.Dataset, across: str, up: str) -> None:
 def words(data: xarray.Dataset, name: str) -> str:
     """A name with its unit."""
     unit = data[name].attrs["units"]
-    return label(name, "" if unit == "1" else unit)
+    return axis_label(name, "" if unit == "1" else unit)
 
 
 def scale(data: xarray.Dataset, name: str) -> str:

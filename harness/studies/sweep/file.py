@@ -22,14 +22,14 @@ from typing import Any
 import numpy as np
 
 from ...errors import HarnessError, SceneError, check_names
-from ...results.files import heading
-from ...results.folder import replacing
-from ...results.netcdf import NetCDF, Variable
-from ...results.provenance import named, record
-from ...running.description import description
-from ...running.values import REALS, unit
-from ...scenes.assigned import assigned
-from ...scenes.fmus import check_built, fmu_of
+from ...results.files import column_heading
+from ...results.folder import replace_folder
+from ...results.netcdf import NetCDFVariable, NetCDFWriter
+from ...results.provenance import describe_sources, write_provenance
+from ...running.description import read_description
+from ...running.variable_values import REAL_TYPES, variable_unit
+from ...scenes.assignments import parse_assignment
+from ...scenes.fmu_files import check_built, find_fmu
 from .boundaries import Boundary, known
 from .journal import Block, Journal
 from .measures import Column
@@ -97,24 +97,24 @@ class About:
 
 def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, report: Callable[[float], None]) -> Swept:
     """Run the sweep and write its files to out/sweep/<name>; HarnessError in one sentence."""
-    check_built(file := fmu_of(asked.model))
+    check_built(file := find_fmu(asked.model))
     axes = tuple(axis(text, asked.random is not None) for text in asked.vary)
     names = tuple(each.name for each in axes)
     if len(set(names)) < len(names):
         raise SceneError("--vary names a parameter twice")
     points = Points(axes, asked.random, asked.seed)
-    values, options = map(assigned, asked.values), sorted(asked.options.items())
+    values, options = map(parse_assignment, asked.values), sorted(asked.options.items())
     runs = Runs(file.stem, names, tuple(values), asked.measures, tuple(options))
     about = describe(runs, points, file)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
     kept = sweep.journal(out / FOLDER)
     before = kept.done
     folder = out / FOLDER / (asked.name or "-".join((runs.model, *names, sweep.key[:8])))
-    source = named(str(file))
-    with replacing(folder, FILES, source) as fresh:  # from before the runs on: what is in the way is told at once
+    source = describe_sources(str(file))
+    with replace_folder(folder, FILES, source) as fresh:  # from before the runs on: what is in the way is told at once
         seconds = perform(sweep, kept, scheduler, workers, report)
         failures = save(sweep, kept, about, fresh)
-        record(fresh, [file], about.constants, asked, source=source)
+        write_provenance(fresh, [file], about.constants, asked, source=source)
     kept.forget()
     return Swept(len(points), folder, before, kept.damaged, failures, seconds)
 
@@ -124,14 +124,14 @@ def describe(runs: Runs, points: Points, file: Path) -> About:
 
     Some first runs show what is wrong with it before workers are started.
     """
-    said = description(file, specified(runs, file).lenient)
+    said = read_description(file, specified(runs, file).lenient)
     variables = {variable.name: variable for variable in said.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
     check_names("parameter to vary", runs.varied, settable)
     for each in points.axes:
         if each.name in dict(runs.values):
             raise SceneError(f"{each.name} is both varied and set: leave one out")
-        if variables[each.name].type not in REALS and any(value % 1 for value in each.values):
+        if variables[each.name].type not in REAL_TYPES and any(value % 1 for value in each.values):
             raise SceneError(f"{each.name} is a choice: vary it over whole numbers, as in {each.name}=1,2")
     with ready(runs, file) as runner:
         for number in (len(points) - 1, len(points) // 2, 0):
@@ -142,7 +142,7 @@ def describe(runs: Runs, points: Points, file: Path) -> About:
         else:
             raise HarnessError(f"none of three runs of the sweep comes to its end: {measured}")
         constants = {name: value for name, value in runner.constants().items() if name not in runs.varied}
-        varied = {name: (unit(variables[name]), variables[name].description or name) for name in runs.varied}
+        varied = {name: (variable_unit(variables[name]), variables[name].description or name) for name in runs.varied}
         numbers = {name: value for name, (value, _) in constants.items() if isinstance(value, float)}
         return About(varied, runner.columns, constants, runner.stop, known(file, runs.varied, numbers))
 
@@ -161,13 +161,15 @@ def save(sweep: Sweep, kept: Journal, about: About, folder: Path) -> tuple[Failu
     dimensions = names if grid else ("run",)
     sizes = {each.name: len(each.values) for each in sweep.points.axes} if grid else {"run": length}
     letters = f"string{longest}"
-    variables = [Variable(name, (name,) if grid else ("run",), said) for name, said in labels(sweep, about).items()]
+    variables = [
+        NetCDFVariable(name, (name,) if grid else ("run",), said) for name, said in labels(sweep, about).items()
+    ]
     where: dict[str, str] = {} if grid else {"coordinates": " ".join(names)}
     for column in about.columns:
         said = {"units": column.unit or "1", "long_name": column.text}
-        variables.append(Variable(column.name, dimensions, said | where))
+        variables.append(NetCDFVariable(column.name, dimensions, said | where))
     said = {"long_name": "why a run failed; empty if it did not", "_Encoding": "utf-8"}
-    variables.append(Variable("error", (*dimensions, letters), said | where, longest))
+    variables.append(NetCDFVariable("error", (*dimensions, letters), said | where, longest))
     attributes: dict[str, str | float] = {
         "title": f"{sweep.runs.model} over {', '.join(names)}",
         "model": sweep.runs.model,
@@ -180,19 +182,19 @@ def save(sweep: Sweep, kept: Journal, about: About, folder: Path) -> tuple[Failu
         (folder / "sweep.nc").open("wb") as file,
         (folder / "sweep.csv").open("w", encoding="utf-8", newline="") as text,
     ):
-        data = NetCDF(file, sizes | {letters: longest}, variables, attributes)
+        data = NetCDFWriter(file, sizes | {letters: longest}, variables, attributes)
         table = csv.writer(text, lineterminator="\n")
         heads = [(each.name, str(each.attributes.get("units", "1"))) for each in variables]
-        table.writerow([heading(name, "" if size == "1" else size) for name, size in heads])
+        table.writerow([column_heading(name, "" if size == "1" else size) for name, size in heads])
         for each in sweep.points.axes if grid else ():
-            data.put(each.name, 0, np.array(each.values))
+            data.write_values(each.name, 0, np.array(each.values))
         for block in kept.blocks():
             spots = sweep.points.between(block.first, block.last)
             for name, column in zip(names, () if grid else spots.T, strict=not grid):
-                data.put(name, block.first, column)
+                data.write_values(name, block.first, column)
             for column, values in zip(about.columns, block.values.T, strict=True):
-                data.put(column.name, block.first, values)
-            data.put("error", block.first, np.array([sentence.encode() for sentence in sentences(block)]))
+                data.write_values(column.name, block.first, values)
+            data.write_values("error", block.first, np.array([sentence.encode() for sentence in sentences(block)]))
             table.writerows(rows(spots, block))
     draw(folder / "sweep.nc", folder / "figure.svg", about.boundaries, sum(each.runs for each in failures))
     return failures

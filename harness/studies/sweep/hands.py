@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...process.room import room
+from ...process.temporary_directory import temporary_directory
 from .rerun import Runner, Runs, ready
 
 BUSY = Lock()  # an FMU of pythonfmu is one thread's at a time
@@ -47,7 +47,7 @@ def work(points: np.ndarray, runs: Runs, digest: str, fmu: bytes) -> Work | None
 def load(runs: Runs, digest: str, fmu: bytes) -> Runner:
     """The runner of another sweep; the one before is freed."""
     free()
-    file = HELD.enter_context(room("sweep-")) / f"{runs.model}.fmu"
+    file = HELD.enter_context(temporary_directory("sweep-")) / f"{runs.model}.fmu"
     file.write_bytes(fmu)
     LOADED[runs, digest] = found = HELD.enter_context(ready(runs, file))
     return found

@@ -13,9 +13,9 @@ import numpy as np
 from ...analyses.decay.decrement import damping_ratio, friction, turning_points
 from ...analyses.slip import crest, crossings, slips_of_modes
 from ...errors import HarnessError
-from ...running.run import Run
-from ...running.values import unit
-from ...scenes.roles import roles
+from ...running.trajectory import Trajectory
+from ...running.variable_values import variable_unit
+from ...scenes.roles import find_roles
 
 PIECES = 400  # communication steps along a path; the ends of the solver's own steps come on top
 
@@ -37,50 +37,52 @@ class AlongPath:
     needs: tuple[str, ...]
     unit: str
     text: str
-    measure: Callable[[Run], float]
+    measure: Callable[[Trajectory], float]
     modes: bool = False
     decay: bool = False
     like: str = ""
 
 
-def starts(run: Run) -> np.ndarray:
+def starts(run: Trajectory) -> np.ndarray:
     """Times in s at which slips begin."""
     if run.events is not None:
         return slips_of_modes(run.events.t, run.events.mode)[0]
-    driver = run.parameter("v_driver", "the measure 'slips'")
-    return crossings(run.time, run.motion("velocity") * np.sign(driver) - abs(driver)) if driver else np.array([])
+    driver = run.get_parameter("v_driver", "the measure 'slips'")
+    return (
+        crossings(run.time, run.column_of_role("velocity") * np.sign(driver) - abs(driver)) if driver else np.array([])
+    )
 
 
-def period(run: Run) -> float:
+def period(run: Trajectory) -> float:
     times = starts(run)
     return float(np.mean(np.diff(times))) if len(times) > 1 else np.nan
 
 
-def peak_speed(run: Run) -> float:
-    speed = np.abs(run.motion("velocity"))
+def peak_speed(run: Trajectory) -> float:
+    speed = np.abs(run.column_of_role("velocity"))
     return crest(run.time, speed, np.ones(len(speed), bool))
 
 
-def stuck(run: Run) -> float:
+def stuck(run: Trajectory) -> float:
     if run.events is None:
         return np.nan
     lengths = np.diff(np.append(run.events.t, run.time[-1]))
     return float(lengths[run.events.mode == 0].sum())
 
 
-def rest(run: Run) -> float:
-    return float(run.motion("position")[-1]) if run.events and run.events.mode[-1] == 0 else np.nan
+def rest(run: Trajectory) -> float:
+    return float(run.column_of_role("position")[-1]) if run.events and run.events.mode[-1] == 0 else np.nan
 
 
-def unsteady(run: Run) -> float:
-    driver = run.parameter("v_driver", "the measure 'unsteady'")
-    late = run.motion("velocity")[2 * run.time > run.time[0] + run.time[-1]]
+def unsteady(run: Trajectory) -> float:
+    driver = run.get_parameter("v_driver", "the measure 'unsteady'")
+    late = run.column_of_role("velocity")[2 * run.time > run.time[0] + run.time[-1]]
     return float(np.ptp(late) / 2 / abs(driver)) if driver else np.nan
 
 
-def decayed(run: Run, law: Callable[[float, float, float], float]) -> float:
+def decayed(run: Trajectory, law: Callable[[float, float, float], float]) -> float:
     """A figure from the first and the last turning point of a free decay about zero."""
-    _, places = turning_points(run.time, run.motion("position"), run.motion("velocity"))
+    _, places = turning_points(run.time, run.column_of_role("position"), run.column_of_role("velocity"))
     sizes = places * np.where(np.arange(len(places)) % 2, -1.0, 1.0) * np.sign(places[:1])
     places = sizes[sizes > 0]  # the last one may come to rest on its own side
     try:
@@ -127,7 +129,7 @@ def offered(variables: Collection[str], ours: bool, values: Mapping[str, object]
     if not ours:
         return found
     found += [name for name, (_, variable) in AT_END.items() if variable in variables]
-    if {"position", "velocity"} <= set(roles(variables)):
+    if {"position", "velocity"} <= set(find_roles(variables)):
         for name, path in ON_PATH.items():
             lawful = not path.modes or values.get("friction", "hybrid") in ("hybrid", 1)
             if lawful and set(path.needs) <= set(variables) and not (path.decay and DRIVER in variables):
@@ -143,15 +145,15 @@ def columns(measures: Iterable[str], variables: Mapping[str, Any], recorded: Ite
             for name in recorded:
                 variable = variables.get(name) or variables[name.partition("[")[0]]  # of an element of an array
                 text = f"{variable.description or name} {OF_OUTPUTS[measure][1]}"
-                found.append(Column(f"{measure}_{name}", unit(variable), text))
+                found.append(Column(f"{measure}_{name}", variable_unit(variable), text))
         elif measure == "run_time":
             found.append(Column("run_time", "s", "run time"))
         elif measure in AT_END:
             found.append(AT_END[measure][0])
         else:
             path = ON_PATH[measure]
-            like = roles(variables).get(path.like) if not path.unit else None
-            found.append(Column(measure, unit(variables[like]) if like else path.unit, path.text))
+            like = find_roles(variables).get(path.like) if not path.unit else None
+            found.append(Column(measure, variable_unit(variables[like]) if like else path.unit, path.text))
     return tuple(found)
 
 

@@ -13,13 +13,23 @@ from time import perf_counter
 from typing import Any
 
 from ...errors import HarnessError, check_names
-from ...running import any_fmu
-from ...running.description import description
-from ...running.fmu import WARNING, FMICallException, Heard, buffer, gather, instance, parameters, planned, traced
-from ...running.settings import settings
-from ...running.specification import Specification
-from ...running.values import unit
-from ...scenes.roles import roles
+from ...running import runner
+from ...running.description import read_description
+from ...running.fmi2 import (
+    WARNING,
+    FMICallException,
+    LogCapture,
+    build_trajectory,
+    make_buffer,
+    open_instance,
+    plan_run,
+    read_parameters,
+    record_run,
+)
+from ...running.run_spec import RunSpec
+from ...running.settings import resolve_settings
+from ...running.variable_values import variable_unit
+from ...scenes.roles import find_roles
 from .measures import AT_END, OF_OUTPUTS, ON_PATH, PIECES, USUAL, columns, of_outputs, offered
 
 
@@ -41,28 +51,28 @@ class Ours:
     `columns` are what is measured in a run; `stop` is the time in s at which one stops.
     """
 
-    def __init__(self, runs: Runs, found: Any, fmu: Any, heard: Heard, wanted: Specification) -> None:
+    def __init__(self, runs: Runs, found: Any, fmu: Any, heard: LogCapture, wanted: RunSpec) -> None:
         self.fmu, self.component, self.heard = fmu, c_void_p(fmu.component), heard
         self.variables = {variable.name: variable for variable in found.modelVariables}
         measures = chosen(runs, self.variables, ours=True)
-        motion = roles(self.variables)
+        motion = find_roles(self.variables)
         outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
         if len(outputs) < 2:
-            outputs = tuple(name for name in any_fmu.outputs(found) if self.variables[name].type == "Real")
-        self.plan = planned(replace(wanted, outputs=outputs), found)
+            outputs = tuple(name for name in runner.default_outputs(found) if self.variables[name].type == "Real")
+        self.plan = plan_run(replace(wanted, outputs=outputs), found)
         self.stop = self.plan.stop
         ends = [name for name in measures if name in AT_END]
         self.along = [name for name in measures if name in ON_PATH or (name in OF_OUTPUTS and name != "final")]
         if self.along:
             grid = (self.stop - self.plan.start) / PIECES
-            self.plan = planned(replace(self.plan.wanted, grid=grid, follow=True), found)
-        self.n_real, self.real_at, self.real = buffer(self.variables, list(outputs), c_double)
-        self.n_whole, self.whole_at, self.whole = buffer(self.variables, [AT_END[name][1] for name in ends], c_int)
+            self.plan = plan_run(replace(self.plan.spec, grid=grid, follow=True), found)
+        self.n_real, self.real_at, self.real = make_buffer(self.variables, list(outputs), c_double)
+        self.n_whole, self.whole_at, self.whole = make_buffer(self.variables, [AT_END[name][1] for name in ends], c_int)
         self.columns = columns(measures, self.variables, outputs)
         read = [each.name for each in columns(["final", *ends, "run_time", *self.along], self.variables, outputs)]
         self.order = [read.index(column.name) for column in self.columns]
         self.slots: list[tuple[Any, int, type]] = []
-        self.calls = self.prepared(settings(self.plan.wanted, self.variables), runs.varied)
+        self.calls = self.prepared(resolve_settings(self.plan.spec, self.variables), runs.varied)
 
     def prepared(self, fixed: list[tuple[Any, float]], varied: Sequence[str]) -> list[tuple[str, Any, tuple[Any, ...]]]:
         """The calls that reset, set and initialise; `slots` tells where they take each varied value from, as what."""
@@ -71,7 +81,7 @@ class Ours:
         slots = {}
         for function, kind, number in (("fmi2SetReal", c_double, float), ("fmi2SetInteger", c_int, int)):
             names = [name for name in (*values, *varied) if (self.variables[name].type == "Real") is (number is float)]
-            n, at, held = buffer(self.variables, names, kind)
+            n, at, held = make_buffer(self.variables, names, kind)
             for i, name in enumerate(names):
                 held[i], slots[name] = values.get(name, 0), (held, i, number)
             calls += [(function, at, n, held)] if n else []
@@ -82,11 +92,11 @@ class Ours:
 
     def run(self, point: Sequence[float]) -> list[float] | str:
         """The measures at a point of the varied values, or the sentence why there are none."""
-        self.heard.forget()
+        self.heard.clear()
         try:
             return self.measured(point)
         except FMICallException as error:
-            return self.heard.sentence or str(error)
+            return self.heard.error_message or str(error)
         except HarnessError as error:
             return str(error)
 
@@ -99,7 +109,7 @@ class Ours:
         start, dll = self.plan.start, self.fmu.dll
         begun, along = perf_counter(), []
         if self.along:
-            run = gather(self.plan, self.fmu, traced(self.plan, self.fmu, lambda share: None, 0), 0.0)
+            run = build_trajectory(self.plan, self.fmu, record_run(self.plan, self.fmu, lambda share: None, 0), 0.0)
             for name in self.along:
                 along += of_outputs(name, run.columns) if name in OF_OUTPUTS else [ON_PATH[name].measure(run)]
         else:
@@ -112,7 +122,10 @@ class Ours:
 
     def constants(self) -> dict[str, tuple[object, str]]:
         """The value of every parameter in the last run, and its unit."""
-        return {name: (value, unit(self.variables[name])) for name, value in parameters(self.plan, self.fmu).items()}
+        return {
+            name: (value, variable_unit(self.variables[name]))
+            for name, value in read_parameters(self.plan, self.fmu).items()
+        }
 
 
 def heed(function: str, status: int) -> None:
@@ -123,12 +136,12 @@ def heed(function: str, status: int) -> None:
 class Theirs:
     """The same of an FMU that does not show its steps; each run is in a process of its own, whole or a sentence."""
 
-    def __init__(self, runs: Runs, found: Any, wanted: Specification) -> None:
+    def __init__(self, runs: Runs, found: Any, wanted: RunSpec) -> None:
         self.varied, self.stop = runs.varied, 0.0
         self.variables = {variable.name: variable for variable in found.modelVariables}
         self.measures = chosen(runs, self.variables, ours=False)
         texts = {name for name, variable in self.variables.items() if variable.type == "String"}
-        outputs = tuple(name for name in any_fmu.outputs(found) if name not in texts)
+        outputs = tuple(name for name in runner.default_outputs(found) if name not in texts)
         self.wanted = replace(wanted, outputs=outputs)
         self.columns = columns(self.measures, self.variables, outputs)
         self.told: dict[str, tuple[object, str]] = {}
@@ -137,13 +150,13 @@ class Theirs:
         values = {**self.wanted.values, **dict(zip(self.varied, point, strict=True))}
         begun = perf_counter()
         try:
-            found = any_fmu.run(replace(self.wanted, values=values), lambda share: None)
+            found = runner.run(replace(self.wanted, values=values), lambda share: None)
         except HarnessError as error:
             return str(error)
         seconds = perf_counter() - begun
-        if found.failed:
-            return found.failed
-        self.told, self.stop = found.in_force, float(found.time[-1])
+        if found.failure:
+            return found.failure
+        self.told, self.stop = found.effective_parameters, float(found.time[-1])
         row: list[float] = []
         for name in self.measures:
             row += [seconds] if name == "run_time" else of_outputs(name, found.columns)
@@ -163,18 +176,18 @@ def chosen(runs: Runs, variables: dict[str, Any], ours: bool) -> tuple[str, ...]
     return runs.measures or tuple(name for name in USUAL if name in there)
 
 
-def specified(runs: Runs, file: Path) -> Specification:
+def specified(runs: Runs, file: Path) -> RunSpec:
     """What all of them run."""
-    return Specification(file, values=dict(runs.values), follow=False, **dict(runs.options))
+    return RunSpec(file, values=dict(runs.values), follow=False, **dict(runs.options))
 
 
 @contextmanager
 def ready(runs: Runs, file: Path) -> Iterator[Runner]:
     """The FMU in a file, ready to run."""
     wanted = specified(runs, file)
-    found = description(file, wanted.lenient)
-    if any_fmu.shows_steps(found):
-        with instance(wanted) as (_, fmu, heard):
+    found = read_description(file, wanted.lenient)
+    if runner.exposes_solver_steps(found):
+        with open_instance(wanted) as (_, fmu, heard):
             yield Ours(runs, found, fmu, heard, wanted)
     else:
         yield Theirs(runs, found, replace(wanted, follow=True))

@@ -6,7 +6,7 @@ from math import isfinite, log, prod
 
 import numpy as np
 
-from ...errors import LONGEST, SceneError
+from ...errors import MAX_VALUE_LENGTH, SceneError
 
 MOST = 10_000_000  # runs
 HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --random, m=1:2"
@@ -25,7 +25,7 @@ def axis(text: str, random: bool) -> Axis:
     """The axis that a text names; SceneError if it does not name one."""
     name, _, span = text.partition("=")
     name = name.strip()
-    wrong = SceneError(f"--vary {text[:LONGEST]} is not understood; write it {HELP}")
+    wrong = SceneError(f"--vary {text[:MAX_VALUE_LENGTH]} is not understood; write it {HELP}")
     words = span.split(":")
     ratio = words[-1] == "log"
     words = words[: len(words) - ratio]

@@ -18,9 +18,9 @@ from time import perf_counter
 import numpy as np
 
 from ...errors import HarnessError
-from ...process.crew import Crew
-from ...process.interrupt import HEARD, Interrupted, check
-from ...process.room import room
+from ...process.interrupt import RECEIVED_SIGNALS, CommandInterruptedError, check_interrupt
+from ...process.temporary_directory import temporary_directory
+from ...process.worker_pool import WorkerPool
 from .cluster import Cluster, cluster
 from .hands import Work, unload, work
 from .journal import Block, Journal
@@ -72,34 +72,34 @@ def perform(sweep: Sweep, kept: Journal, scheduler: str | None, workers: int, re
                 kept.add(block)
                 report(kept.done / len(sweep.points))
     except BaseException as error:  # what an interrupt makes fail may say anything
-        if not (HEARD or isinstance(error, KeyboardInterrupt)):
+        if not (RECEIVED_SIGNALS or isinstance(error, KeyboardInterrupt)):
             raise
         if not kept.done:
             kept.forget()
         state = f"{kept.done} of {len(sweep.points)} runs are kept"
-        raise Interrupted(f"interrupted: {state}; the same command does the rest") from None
+        raise CommandInterruptedError(f"interrupted: {state}; the same command does the rest") from None
     return perf_counter() - begun
 
 
 @contextmanager
-def crew(scheduler: str | None, workers: int, runs: int) -> Iterator[Crew | Cluster]:
+def crew(scheduler: str | None, workers: int, runs: int) -> Iterator[WorkerPool | Cluster]:
     """Those who do the runs: processes of this machine, or the cluster of a scheduler."""
     if scheduler is not None:
         with cluster(scheduler, unload) as found:
             yield found
         return
-    with room("sweep-") as folder:
-        hands = Crew(min(workers, runs), folder, [Work.__module__])
+    with temporary_directory("sweep-") as folder:
+        hands = WorkerPool(min(workers, runs), folder, [Work.__module__])
         try:
             yield hands
         finally:
-            hands.end()
+            hands.kill()
 
 
 class Shift:
     """The runs of a sweep on their way through the workers, in blocks that grow until each takes half a second."""
 
-    def __init__(self, sweep: Sweep, hands: Crew | Cluster, left: list[Span]) -> None:
+    def __init__(self, sweep: Sweep, hands: WorkerPool | Cluster, left: list[Span]) -> None:
         self.sweep, self.hands, self.left = sweep, hands, left[::-1]
         self.size = 1
         self.busy: dict[Future[Work | None], Span] = {}
@@ -110,9 +110,9 @@ class Shift:
     def finished(self) -> Iterator[Block]:
         """The blocks as workers finish them."""
         while self.left or self.suspects or self.busy:
-            check()
+            check_interrupt()
             self.deal()
-            for future in self.hands.ended(self.busy):
+            for future in self.hands.wait_for_any(self.busy):
                 yield from self.answered(future, self.busy.pop(future))
 
     def deal(self) -> None:
@@ -144,7 +144,7 @@ class Shift:
         first, last = span
         try:
             found = future.result()
-        except self.hands.died:
+        except self.hands.death_errors:
             if self.alone and last - first == 1:
                 self.bury([])
                 yield Block(first, np.full((1, self.sweep.columns), np.nan), {0: DIED})
