@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import HarnessError
 from ..results.quantity import AnalysisResult, Quantity
 from ..running.trajectory import Trajectory
-from . import samples
+from . import sample_density
 
 
 def analyse(run: Trajectory) -> AnalysisResult:
@@ -23,15 +23,15 @@ def analyse(run: Trajectory) -> AnalysisResult:
         raise HarnessError("the analysis 'slip' needs a driver that moves, and v_driver is 0 m/s: set it in [values]")
     ahead = v * np.sign(driver) - abs(driver)  # of the driver
     if run.events is not None and len(run.events.t) > 1:
-        starts, durations = slips_of_modes(run.events.t, run.events.mode)
+        starts, durations = slips_from_modes(run.events.t, run.events.mode)
         ends = starts[: len(durations)] + durations
     else:
-        starts, durations = crossings(run.time, ahead), np.array([])
-        ends = crossings(run.time, -ahead)
+        starts, durations = upward_crossings(run.time, ahead), np.array([])
+        ends = upward_crossings(run.time, -ahead)
         ends = ends[np.searchsorted(ends, starts[:1]).sum() :]  # a slip that was under way is no slip that started
     if len(starts) < 2:
         raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: take a later stop")
-    samples.check(run.time, starts[: len(ends)], ends, "slip")
+    sample_density.require_dense_sampling(run.time, starts[: len(ends)], ends, "slip")
     fast = ahead >= 0
     found = [
         Quantity("slips", len(starts), "", "slips"),
@@ -40,14 +40,14 @@ def analyse(run: Trajectory) -> AnalysisResult:
     ]
     if len(durations):
         found.append(Quantity("slip_time", float(np.mean(durations)), "s", "duration of a slip"))
-    found.append(Quantity("peak_speed", crest(run.time, np.abs(v), fast), "m/s", "peak speed"))
+    found.append(Quantity("peak_speed", peak_value(run.time, np.abs(v), fast), "m/s", "peak speed"))
     if "acceleration" in run.spec.motion_outputs:
-        peak = crest(run.time, np.abs(run.column_of_role("acceleration")), widened(fast))
+        peak = peak_value(run.time, np.abs(run.column_of_role("acceleration")), include_neighbours(fast))
         found.append(Quantity("peak_acceleration", peak, "m/s2", "peak acceleration"))
     return AnalysisResult(tuple(found))
 
 
-def slips_of_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def slips_from_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Starts and durations in s of the slips that modes (n,) from times t (n,) show; one cut short has no duration."""
     stuck = np.flatnonzero(mode == 0)
     starts = t[stuck[stuck < len(t) - 1] + 1]
@@ -56,13 +56,13 @@ def slips_of_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndar
     return starts, ends - starts[: len(ends)]
 
 
-def crossings(t: np.ndarray, y: np.ndarray) -> np.ndarray:
+def upward_crossings(t: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Times (m,) where y (n,) rises through zero, on straight lines between its samples."""
     i = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
     return t[i] - y[i] * (t[i + 1] - t[i]) / (y[i + 1] - y[i])
 
 
-def widened(among: np.ndarray) -> np.ndarray:
+def include_neighbours(among: np.ndarray) -> np.ndarray:
     """The samples named, and the neighbours of each."""
     wide = among.copy()
     wide[:-1] |= among[1:]
@@ -70,7 +70,7 @@ def widened(among: np.ndarray) -> np.ndarray:
     return wide
 
 
-def crest(t: np.ndarray, y: np.ndarray, among: np.ndarray) -> float:
+def peak_value(t: np.ndarray, y: np.ndarray, among: np.ndarray) -> float:
     """The largest y (n,) of the samples named, or the top of the parabola through it and its neighbours among them."""
     i = int(np.argmax(np.where(among, y, -np.inf)))
     if not (0 < i < len(y) - 1 and among[i - 1] and among[i + 1]):

@@ -7,7 +7,7 @@ from ..results.quantity import AnalysisResult
 from ..results.step_sizes import step_size_quantities
 from ..running.trajectory import Trajectory
 
-NEAR = 5  # steps on either side of a reversal that belong to it
+NEIGHBOUR_STEPS = 5  # steps on either side of a reversal that belong to it
 
 
 def analyse(run: Trajectory) -> AnalysisResult:
@@ -17,11 +17,11 @@ def analyse(run: Trajectory) -> AnalysisResult:
     h = run.steps.h
     collapse = None
     if "velocity" in run.spec.motion_outputs:
-        collapse = collapse_at_reversals(run.steps.t, h, run.time, run.column_of_role("velocity"))
+        collapse = step_collapse(run.steps.t, h, run.time, run.column_of_role("velocity"))
     return AnalysisResult(step_size_quantities(h, int(run.steps.rejected.sum()), collapse))
 
 
-def collapse_at_reversals(ends: np.ndarray, h: np.ndarray, t: np.ndarray, v: np.ndarray) -> float | None:
+def step_collapse(ends: np.ndarray, h: np.ndarray, t: np.ndarray, v: np.ndarray) -> float | None:
     """The median step over the median of the smallest steps near the reversals of v (m,) at t (m,).
 
     `ends` (n + 1,) bounds the steps h (n,).  A reversal is a change of sign, rests skipped; None without any.
@@ -31,5 +31,5 @@ def collapse_at_reversals(ends: np.ndarray, h: np.ndarray, t: np.ndarray, v: np.
     if not len(reversals):
         return None
     at = np.clip(np.searchsorted(ends, t[reversals]) - 1, 0, len(h) - 1)
-    smallest = [h[max(i - NEAR, 0) : i + NEAR + 1].min() for i in at]
+    smallest = [h[max(i - NEIGHBOUR_STEPS, 0) : i + NEIGHBOUR_STEPS + 1].min() for i in at]
     return float(np.median(h) / np.median(smallest))

@@ -59,7 +59,7 @@ def decay(
       a column of a pipe:     zcat swing.gz | python -m harness decay - --unit mm --from 2.5
       a scene:                python -m harness decay coulomb
     """
-    from ..analyses.decay.figures import Known
+    from ..analyses.decay.estimates import KnownParameters
     from ..records.columns import ColumnOptions
     from ..studies.decay import job as decays
     from ..studies.decay.table import sentences, table
@@ -70,7 +70,7 @@ def decay(
         if columns["position"] is not None or columns["quantity"] not in (None, "velocity"):
             raise click.UsageError("--velocity: one column is fitted; leave out --position and --quantity")
         columns |= {"position": velocity, "quantity": "velocity"}
-    asked, known = ColumnOptions(**columns), Known(k, m, pendulum)
+    asked, known = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
     with decays.uncollected(), terminal.progress(1) as report:
         progressed = partial(report, "standard input" if source == "-" else source)
         found, folder = decays.perform(source, asked, known, drag, drift, terminal.out, progressed)

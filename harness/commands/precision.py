@@ -22,10 +22,10 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
       python -m harness precision pacejka --quick
       python -m harness precision path/to/belt.py
     """
+    from ..references.models import MODELS
     from ..studies.precision import table as tables
     from ..studies.precision.study import FULL, QUICK
     from ..studies.precision.survey import FOLDER, survey
-    from ..truths.models import MODELS
 
     with terminal.progress(len(models or MODELS) + 1) as report:
         found = survey(models or MODELS, QUICK if quick else FULL, terminal.out, report)

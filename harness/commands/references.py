@@ -24,7 +24,7 @@ def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
     Example:
       python -m harness references belt.py
     """
-    from ..truths.certified import certify
+    from ..references.certification import certify
 
     made = [one for file in files for one in certify(file)]
     shown = (f"{one.path}, relative difference {one.difference:.1e}" for one in made)

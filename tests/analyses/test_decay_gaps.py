@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from commands import harness
 
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
-from harness.analyses.decay.problem import prepare
-from harness.analyses.decay.turning import find
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.extrema import find_extrema
+from harness.analyses.decay.fit_problem import prepare_problem
+from harness.analyses.decay.identification import fit_decay
 from harness.errors import HarnessError
 from harness.records.record import Record
 
@@ -35,7 +35,9 @@ SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
 )
 def test_a_pause_of_any_length_leaves_the_answer_right(begin, share, noise):
     """Without the laws with drag, which take most of a fit and come after a pause; below are some with them."""
-    found = {each.name: each for each in identify(paused(begin, share, noise), Known(), drag=False).estimates}
+    found = {
+        each.name: each for each in fit_decay(paused(begin, share, noise), KnownParameters(), drag=False).estimates
+    }
     for name, truth in {"omega": OMEGA, "zeta": RATE / OMEGA}.items():
         assert abs(found[name].value - truth) < 1e-7 * truth + 5 * found[name].error
     assert found["omega"].error < 1e-3 * OMEGA
@@ -43,13 +45,13 @@ def test_a_pause_of_any_length_leaves_the_answer_right(begin, share, noise):
 
 @pytest.mark.parametrize("share", [0.35, 0.55, 0.7])
 def test_a_pause_in_which_no_turning_point_is_lost_costs_no_other_sample(share):
-    found = identify(paused(0.55, share), Known())
+    found = fit_decay(paused(0.55, share), KnownParameters())
     assert found.t[0] == 0.0
     assert found.remarks == ()
 
 
 def test_too_few_swings_before_a_pause_are_left_out_and_said():
-    found = identify(paused(0.55, 1.3), Known())
+    found = fit_decay(paused(0.55, 1.3), KnownParameters())
     assert found.t[0] > 0.55
     assert "Before the gap that ends at t = 0.8760 s are too few swings" in " ".join(found.remarks)
 
@@ -69,6 +71,6 @@ def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
 def test_a_window_with_fewer_samples_than_a_fit_needs_is_told(kept):
     """Whatever has taken the others away."""
     record = paused(2.03, 0.95)
-    problem, _ = prepare(record, find(record, False), False, False)
+    problem, _ = prepare_problem(record, find_extrema(record, False), False, False)
     with pytest.raises(HarnessError, match=f"has only {kept} samples in a row that follow .* and 12 are needed"):
         problem.only(slice(kept))

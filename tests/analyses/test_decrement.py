@@ -5,7 +5,12 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from harness.analyses.decay.decrement import chosen, damping_ratio, friction, turning_points
+from harness.analyses.decay.decrement import (
+    damping_ratio,
+    find_extrema_from_velocity,
+    friction_from_envelope,
+    select_cycles,
+)
 from harness.errors import HarnessError
 
 
@@ -33,8 +38,8 @@ def rubbed(loss, n=4001):
 @pytest.mark.parametrize("zeta", [1e-4, 0.0796, 0.3])
 @pytest.mark.parametrize("cycles", [0.5, 2, 2.5, 5])
 def test_the_damping_ratio_of_an_exact_signal_comes_back(zeta, cycles):
-    times, positions = turning_points(*damped(zeta))
-    _, positions, used = chosen(times, positions, 0, cycles)
+    times, positions = find_extrema_from_velocity(*damped(zeta))
+    _, positions, used = select_cycles(times, positions, 0, cycles)
     assert used == cycles
     assert damping_ratio(abs(positions[0]), abs(positions[-1]), used) == pytest.approx(zeta, abs=1e-6)
 
@@ -44,12 +49,12 @@ def test_turning_points_between_samples_converge_with_the_fourth_power(n):
     """Twice the samples, a sixteenth of the error; here bounded by the error of a cubic, h^4/384 x''''."""
     t, x, v = damped(0.0, n)
     h = t[1]
-    _, positions = turning_points(t, x, v)
+    _, positions = find_extrema_from_velocity(t, x, v)
     assert np.abs(np.abs(positions) - 1).max() <= 1.01 * h**4 / 384
 
 
 def test_turning_points_are_on_both_sides_and_half_a_cycle_apart():
-    times, positions = turning_points(*damped(0.1))
+    times, positions = find_extrema_from_velocity(*damped(0.1))
     assert np.diff(times) == pytest.approx(pi / sqrt(1 - 0.01), abs=1e-7)
     assert positions == pytest.approx([(-1) ** i * exp(-0.1 * times[i]) for i in range(len(times))], abs=1e-7)
 
@@ -57,13 +62,13 @@ def test_turning_points_are_on_both_sides_and_half_a_cycle_apart():
 @pytest.mark.parametrize("cycles", [0.5, 1, 1.5, 3])
 def test_the_friction_of_an_exact_signal_comes_back(cycles):
     """With k = 2 the loss of 0.1 per half cycle, 2 f/k, means f = 0.1."""
-    times, positions = turning_points(*rubbed(0.1))
-    _, positions, used = chosen(times, positions, 1, cycles)
-    assert friction(abs(positions[0]), abs(positions[-1]), used, 2.0) == pytest.approx(0.1, abs=1e-4)
+    times, positions = find_extrema_from_velocity(*rubbed(0.1))
+    _, positions, used = select_cycles(times, positions, 1, cycles)
+    assert friction_from_envelope(abs(positions[0]), abs(positions[-1]), used, 2.0) == pytest.approx(0.1, abs=1e-4)
 
 
 def test_rest_ends_the_turning_points():
-    times, positions = turning_points(*rubbed(0.3))
+    times, positions = find_extrema_from_velocity(*rubbed(0.3))
     assert np.abs(positions) == pytest.approx([1.0, 0.7, 0.4, 0.1], abs=1e-4)
     assert times == pytest.approx([0.0, pi, 2 * pi, 3 * pi], abs=1e-2)
 
@@ -72,7 +77,7 @@ def test_a_rest_between_two_motions_of_one_direction_is_no_turning_point():
     t = np.arange(7.0)
     x = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 1.5, 2.0])
     v = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
-    assert len(turning_points(t, x, v)[0]) == 0
+    assert len(find_extrema_from_velocity(t, x, v)[0]) == 0
 
 
 @pytest.mark.parametrize(
@@ -80,9 +85,9 @@ def test_a_rest_between_two_motions_of_one_direction_is_no_turning_point():
     [(0, 7, "needs 15 turning points"), (6, None, "needs 14 turning points"), (5, 1.5, "needs 14 turning points")],
 )
 def test_too_few_turning_points_are_refused(first, cycles, sentence):
-    times, positions = turning_points(*damped(0.05))
+    times, positions = find_extrema_from_velocity(*damped(0.05))
     with pytest.raises(HarnessError, match=sentence):
-        chosen(times[:13], positions[:13], first, cycles)
+        select_cycles(times[:13], positions[:13], first, cycles)
 
 
 @pytest.mark.parametrize(("x_0", "x_n"), [(1.0, 1.0), (1.0, 1.1), (1.0, 0.0), (0.0, 0.0)])
@@ -90,4 +95,4 @@ def test_what_does_not_decay_is_refused(x_0, x_n):
     with pytest.raises(HarnessError, match="do not decay"):
         damping_ratio(x_0, x_n, 1)
     with pytest.raises(HarnessError, match="do not decay"):
-        friction(x_0, x_n, 1, 1.0)
+        friction_from_envelope(x_0, x_n, 1, 1.0)

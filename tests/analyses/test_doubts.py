@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from decays import OMEGA, T, said, swung
 
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
 from harness.errors import HarnessError
 from harness.records.record import Record
 
 
 def test_a_drift_is_told_and_fitted_where_it_is_asked_for():
     record = swung(0.01, 0.001, drift=0.002, noise=1e-4)
-    assert "--drift" in said(identify(record, Known()))
-    found = identify(record, Known(), drift=True)
+    assert "--drift" in said(fit_decay(record, KnownParameters()))
+    found = fit_decay(record, KnownParameters(), drift=True)
     each = {one.name: one for one in found.estimates}
     assert each["drift"].value == pytest.approx(0.002, rel=2e-2)
     assert each["zeta"].low < 0.01 < each["zeta"].high
@@ -24,9 +24,9 @@ def test_a_drift_is_told_and_fitted_where_it_is_asked_for():
 
 def test_noise_that_is_not_independent_is_told_and_widens_the_intervals():
     record = swung(0.01, 0.001, noise=1e-3)
-    white = identify(record, Known(), drag=False)
+    white = fit_decay(record, KnownParameters(), drag=False)
     noise = np.convolve(np.random.default_rng(3).standard_normal(1019), np.ones(20), "valid") * 2e-4
-    alike = identify(Record("alike", record.t, swung(0.01, 0.001).x + noise), Known(), drag=False)
+    alike = fit_decay(Record("alike", record.t, swung(0.01, 0.001).x + noise), KnownParameters(), drag=False)
     assert "not independent" in said(alike)
     zeta = [next(each for each in found.estimates if each.name == "zeta") for found in (white, alike)]
     assert zeta[1].low < 0.01 < zeta[1].high
@@ -37,13 +37,15 @@ def test_noise_that_is_not_independent_is_told_and_widens_the_intervals():
 def test_a_loss_that_keeps_time_with_the_steps_of_the_sensor_is_told(r, alike):
     """Of 1 mm, at which a half swing takes 2 r."""
     side = 1.0 if r > 1.9995e-3 else -1.0
-    found = identify(swung(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), Known(), drag=False)
+    found = fit_decay(
+        swung(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), KnownParameters(), drag=False
+    )
     assert ("rounds all turning points alike" in said(found)) == alike
 
 
 def test_a_second_motion_is_told():
     x = swung(0.02).x + 0.004 * np.sin(50 * T)
-    assert "something else acts" in said(identify(Record("two", T, x), Known()))
+    assert "something else acts" in said(fit_decay(Record("two", T, x), KnownParameters()))
 
 
 @pytest.mark.parametrize(
@@ -60,7 +62,7 @@ def test_a_second_motion_is_told():
 )
 def test_what_is_no_decay_is_refused_in_one_sentence(x, sentence):
     with pytest.raises(HarnessError, match=sentence) as refusal:
-        identify(Record("bad", T, x), Known())
+        fit_decay(Record("bad", T, x), KnownParameters())
     assert "\n" not in str(refusal.value)
 
 
@@ -80,7 +82,7 @@ def test_a_drift_too_large_for_a_fit_is_named_with_its_remedy(sine, order, drift
         0.01, sine=sine, drift=drift * size, noise=1e-3 * size, order=order, turn=0.0, t=np.linspace(0, 5, 450)
     )
     with pytest.raises(HarnessError, match="over the record: --drift fits that as well") as refusal:
-        identify(record, Known(pendulum=sine), drag)
+        fit_decay(record, KnownParameters(pendulum=sine), drag)
     over = float(str(refusal.value).split("drifts, by ")[1].split()[0])
     assert over == pytest.approx(5 * drift * size, rel=0.02)
 
@@ -89,18 +91,18 @@ def test_a_drift_too_large_for_a_fit_is_named_with_its_remedy(sine, order, drift
 def test_the_two_peaks_of_a_large_angular_acceleration_are_named_with_their_remedy(a):
     record = swung(0.01, sine=True, a=a, omega=6.0, noise=0.05, order=2, turn=0.0, t=np.linspace(0, 5, 500))
     with pytest.raises(HarnessError, match="two peaks a swing: record the angle or its rate"):
-        identify(record, Known(pendulum=True), drag=a < 3.0)
+        fit_decay(record, KnownParameters(pendulum=True), drag=a < 3.0)
 
 
 def test_a_pendulum_that_is_not_said_to_be_one_is_hinted_at():
     record = swung(0.005, 0.001, sine=True, a=1.5, noise=1e-3, t=np.linspace(0, 5, 700))
     with pytest.raises(HarnessError, match="say --pendulum"):
-        identify(record, Known())
+        fit_decay(record, KnownParameters())
 
 
 def test_a_pendulum_is_measured_by_its_angle():
     with pytest.raises(HarnessError, match="measured by its angle"):
-        identify(swung(0.02), Known(pendulum=True))
+        fit_decay(swung(0.02), KnownParameters(pendulum=True))
 
 
 @pytest.mark.parametrize("seed", [3, 11, 29, 30])
@@ -108,4 +110,4 @@ def test_whatever_a_fit_tries_a_record_ends_in_a_fit_or_in_one_sentence(seed):
     """A walk at random, on which fits may try anything."""
     walk = np.random.default_rng(seed).standard_normal(60).cumsum()
     with contextlib.suppress(HarnessError):
-        assert identify(Record("walk", np.linspace(0, 1, 60), walk), Known())
+        assert fit_decay(Record("walk", np.linspace(0, 1, 60), walk), KnownParameters())

@@ -5,8 +5,8 @@ import pytest
 from decays import random_record
 from intervals import FAR
 
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
 
 
@@ -19,7 +19,7 @@ def of_each_law(request):
     """A record of 200 samples or more for each law, of any amplitude, rate and noise: its truth, and what is found."""
     sine, quantised, order = request.param
     records = [random_record(100 + i, law, sine, quantised, 200, order) for i, law in enumerate(LAWS)]
-    return [(truth, identify(record, Known(pendulum=sine))) for record, truth, _ in records]
+    return [(truth, fit_decay(record, KnownParameters(pendulum=sine))) for record, truth, _ in records]
 
 
 def test_no_answer_is_far_off_without_a_remark(of_each_law):

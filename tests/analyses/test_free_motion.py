@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from decays import OMEGA, said, swung, values
 
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
 from harness.records.record import QUANTITIES, Record
 
 
@@ -18,7 +18,7 @@ def test_a_hold_before_and_a_rest_after_the_motion_are_left_out():
     held = np.concatenate(
         [np.full(100, record.x[record.x.argmin()]), record.x[record.x.argmin() :], np.full(300, 0.03)]
     )
-    found = identify(Record("held", 0.004 * np.arange(len(held)), held), Known())
+    found = fit_decay(Record("held", 0.004 * np.arange(len(held)), held), KnownParameters())
     assert values(found.estimates)["r"] == pytest.approx(0.005, rel=1e-3)
     assert "are left out" in said(found)
 
@@ -27,7 +27,7 @@ def test_a_push_before_the_motion_is_left_out_and_said():
     t = np.linspace(0, 6, 1500)
     x = swung(0.01, 0.001, turn=1.06, t=t, noise=1e-5).x
     x[t < 1.2] = 0.02 + 1e-5 * np.random.default_rng(2).standard_normal((t < 1.2).sum())
-    found = identify(Record("pushed", t, x), Known(), drag=False)
+    found = fit_decay(Record("pushed", t, x), KnownParameters(), drag=False)
     assert values(found.estimates)["zeta"] == pytest.approx(0.01, rel=1e-2)
     assert found.t[0] >= 1.2
     assert "The motion is free from t = " in said(found)
@@ -37,7 +37,7 @@ def test_a_hand_that_stops_the_motion_is_left_out_and_said():
     t = np.linspace(0, 8, 1500)
     x = swung(0.005, 0.0003, turn=0.0, t=t, noise=1e-4).x
     x[t > 6] = 0.02 + 0.3 * (x[t > 6] - 0.02)
-    found = identify(Record("stopped", t, x), Known())
+    found = fit_decay(Record("stopped", t, x), KnownParameters())
     assert values(found.estimates)["zeta"] == pytest.approx(0.005, rel=0.1)
     assert "follows the law until t = " in said(found)
 
@@ -47,7 +47,7 @@ def test_samples_that_a_logger_repeats_before_and_after_the_motion_are_left_out(
     """They are longer than the motion, and stop it in mid-swing."""
     record = swung(0.01, 0.001, turn=0.0, noise=1e-4)
     x = np.concatenate([np.full(900, record.x[0]), record.x, np.full(1200, record.x[-1])])
-    found = identify(Record("padded", 0.004 * np.arange(len(x)), x), Known(), drag)
+    found = fit_decay(Record("padded", 0.004 * np.arange(len(x)), x), KnownParameters(), drag)
     each = {one.name: one for one in found.estimates}
     assert abs(each["zeta"].value - 0.01) < 4 * each["zeta"].error < 0.002
     assert abs(each["r"].value - 0.001) < 4 * each["r"].error < 1e-4
@@ -57,7 +57,7 @@ def test_samples_that_a_logger_repeats_before_and_after_the_motion_are_left_out(
 def test_one_sample_far_off_bends_the_fit_no_more_than_it_counts(order):
     record = swung(0.01, 0.001, turn=0.0, noise=1e-5 * OMEGA**order, order=order)
     record.x[0] += 0.3 * OMEGA**order
-    found = identify(record, Known(), drag=False)
+    found = fit_decay(record, KnownParameters(), drag=False)
     assert values(found.estimates)["zeta"] == pytest.approx(0.01, rel=1e-2)
     assert len(found.t) == len(record.t) - 1
 
@@ -65,7 +65,7 @@ def test_one_sample_far_off_bends_the_fit_no_more_than_it_counts(order):
 def test_stray_samples_are_left_out_and_counted():
     record = swung(0.02, 0.003, noise=1e-4)
     record.x[[200, 500]] += (0.05, -0.08)
-    found = identify(record, Known())
+    found = fit_decay(record, KnownParameters())
     assert values(found.estimates)["r"] == pytest.approx(0.003, rel=2e-2)
     assert "Left out as stray: 2 of 1000 samples." in said(found)
 
@@ -80,7 +80,7 @@ def test_many_samples_that_were_not_measured_are_left_out_and_counted(value, run
     record = swung(0.02, 0.003, rest=0.2, noise=1e-4)
     at = np.random.default_rng(3).choice(np.arange(10, 900, 9), 20 // run, replace=False)
     record.x[(at[:, None] + np.arange(run)).ravel()] = value
-    found = identify(record, Known(), drag)
+    found = fit_decay(record, KnownParameters(), drag)
     each = values(found.estimates)
     assert (each["r"], each["zeta"]) == (pytest.approx(0.003, rel=2e-2), pytest.approx(0.02, rel=2e-2))
     assert 20 <= 1000 - len(found.record.t) <= 30  # a run may take its neighbours with it
@@ -92,7 +92,7 @@ def test_both_sides_of_a_gap_are_used(gap):
     t = np.linspace(0, 6, 1500)
     keep = (t < gap[0]) | (t > gap[1])
     record = swung(0.01, 0.001, t=t, noise=1e-4)
-    found = identify(Record("gap", t[keep], record.x[keep]), Known(), drag=False)
+    found = fit_decay(Record("gap", t[keep], record.x[keep]), KnownParameters(), drag=False)
     assert values(found.estimates) == pytest.approx(
         {"zeta": 0.01, "r": 0.001, "omega": OMEGA, "rest": 0.02}, rel=2e-2, abs=0.05
     )

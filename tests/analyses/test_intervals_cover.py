@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from decays import random_record
 
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
 
 RECORDS = 40
 
@@ -15,7 +15,7 @@ def test_intervals_are_of_95_percent_and_their_errors_are_those_that_are_made():
     widths, misses = [], []
     for seed in range(RECORDS):
         record, truth, _ = random_record(seed, ("zeta", "r"), False, False, 600)
-        for each in identify(record, Known(), drag=False).estimates:
+        for each in fit_decay(record, KnownParameters(), drag=False).estimates:
             if each.name in ("omega", "zeta", "r") and each.low > 0.0:
                 widths.append((each.high - each.low) / (2.0 * each.error))
                 misses.append((truth[each.name] - (each.high + each.low) / 2) / each.error)

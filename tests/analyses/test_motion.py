@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from harness.analyses.decay.law import TERMS, unknowns_of
-from harness.analyses.decay.model import Model
+from harness.analyses.decay.law import TERMS, unknown_indices
+from harness.analyses.decay.signal_model import SignalModel
 from harness.records.record import QUANTITIES
 
 
@@ -42,8 +42,8 @@ def test_the_motion_is_that_of_an_integrator_restarted_at_every_turning_point(ze
         if abs(np.sin(place) if sine else place) <= r:
             expected[:, times > begin] = [[place], [0], [0]]
     for order in range(3):
-        model = Model(1.0, order, sine, 0.0, 1e-9 * a)
-        found, _ = model(np.array([0, a, 0, 0, 2.0, zeta, r, b]), unknowns_of(TERMS, False), times / 2)
+        model = SignalModel(1.0, order, sine, 0.0, 1e-9 * a)
+        found, _ = model(np.array([0, a, 0, 0, 2.0, zeta, r, b]), unknown_indices(TERMS, False), times / 2)
         assert found == pytest.approx(expected[order] * 2.0**order, abs=3e-9 * 5**order * a)
 
 
@@ -51,8 +51,8 @@ def test_the_motion_is_that_of_an_integrator_restarted_at_every_turning_point(ze
 @pytest.mark.parametrize("order", range(3), ids=QUANTITIES)
 def test_the_jacobian_is_that_of_differences(order, sine):
     """Between samples that lie in the same half swing; at a reversal an acceleration jumps."""
-    model, p = Model(1.0, order, sine, 1.0, 1e-9), np.array([0.05, 1.0, 0.01, 0.02, 5.0, 0.01, 0.02, 0.05])
-    unknowns, t = unknowns_of(TERMS, True), np.linspace(0.0, 4.0, 500)
+    model, p = SignalModel(1.0, order, sine, 1.0, 1e-9), np.array([0.05, 1.0, 0.01, 0.02, 5.0, 0.01, 0.02, 0.05])
+    unknowns, t = unknown_indices(TERMS, True), np.linspace(0.0, 4.0, 500)
     _, jacobian = model(p, unknowns, t)
     for column, place in zip(jacobian.T, unknowns, strict=True):
         up, down = (p + way * 1e-5 * (np.arange(8) == place) for way in (1, -1))
@@ -63,16 +63,16 @@ def test_the_jacobian_is_that_of_differences(order, sine):
 @pytest.mark.parametrize(("sine", "r"), [(False, 0.51), (True, 0.49)])
 def test_what_friction_holds_does_not_move(sine, r):
     """Of a pendulum neither from an angle of less than arcsin r, which is more than r."""
-    model, p = Model(1.0, 0, sine, 0.0, 1e-9), np.array([0, 0.5, 0, 0, 1.0, 0.0, r, 0])
-    assert set(model(p, unknowns_of(TERMS, False), np.linspace(-1.0, 10.0, 20))[0]) == {0.5}
+    model, p = SignalModel(1.0, 0, sine, 0.0, 1e-9), np.array([0, 0.5, 0, 0, 1.0, 0.0, r, 0])
+    assert set(model(p, unknown_indices(TERMS, False), np.linspace(-1.0, 10.0, 20))[0]) == {0.5}
 
 
 @pytest.mark.parametrize("sine", [False, True])
 @pytest.mark.parametrize("b", [0.0026, 0.0051, 0.0116])
 def test_the_motion_has_no_step_in_its_drag(b, sine):
     """A stretch that begins just before a turning point once lost half a cycle."""
-    t, model = np.linspace(0, 60, 3000), Model(1.0, 0, sine, 0.0, 1e-9)
+    t, model = np.linspace(0, 60, 3000), SignalModel(1.0, 0, sine, 0.0, 1e-9)
     near = [
-        model(np.array([0, 1.0, 0, 0, 1.0, 0.01, 0.001, b + h]), unknowns_of(TERMS, False), t)[0] for h in (0, 1e-7)
+        model(np.array([0, 1.0, 0, 0, 1.0, 0.01, 0.001, b + h]), unknown_indices(TERMS, False), t)[0] for h in (0, 1e-7)
     ]
     assert np.abs(near[1] - near[0]).max() < 1e-5

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from harness.analyses.slip import crest, crossings, slips_of_modes
-from harness.analyses.steps import collapse_at_reversals
+from harness.analyses.slip import peak_value, slips_from_modes, upward_crossings
+from harness.analyses.steps import step_collapse
 from harness.results.step_sizes import published_mean_step
 
 
@@ -18,12 +18,12 @@ def test_collapse_compares_the_median_step_with_the_smallest_at_reversals():
     h[30] = 1e-6  # far from any reversal
     ends = np.concatenate([[0.0], np.cumsum(h)])
     v = np.cos(np.pi * np.arange(61) / 20 - np.pi / 2 + np.pi / 40)  # changes sign within steps 0, 20, 40
-    assert collapse_at_reversals(ends, h, ends, v) == pytest.approx(100.0)
+    assert step_collapse(ends, h, ends, v) == pytest.approx(100.0)
 
 
 def test_a_motion_without_reversal_has_no_collapse():
     ends = np.arange(5.0)
-    assert collapse_at_reversals(ends, np.diff(ends), ends, np.array([0.0, 1.0, 0.0, 0.0, 1.0])) is None
+    assert step_collapse(ends, np.diff(ends), ends, np.array([0.0, 1.0, 0.0, 0.0, 1.0])) is None
 
 
 @pytest.mark.parametrize(
@@ -37,16 +37,16 @@ def test_a_motion_without_reversal_has_no_collapse():
     ],
 )
 def test_slips_last_from_stick_to_stick(mode, starts, durations):
-    found = slips_of_modes(np.arange(float(len(mode))), np.array(mode))
+    found = slips_from_modes(np.arange(float(len(mode))), np.array(mode))
     assert [list(values) for values in found] == [starts, durations]
 
 
 def test_crossings_rise_through_zero_between_samples():
-    assert list(crossings(np.arange(6.0), np.array([-1.0, 1.0, -3.0, 1.0, 0.0, 2.0]))) == [0.5, 2.75]
+    assert list(upward_crossings(np.arange(6.0), np.array([-1.0, 1.0, -3.0, 1.0, 0.0, 2.0]))) == [0.5, 2.75]
 
 
 def test_the_crest_of_a_parabola_is_found_between_uneven_samples():
     t = np.array([0.0, 1.0, 1.5, 3.0])
     y = 7 - 2 * (t - 1.3) ** 2
-    assert crest(t, y, np.full(4, True)) == pytest.approx(7.0, abs=1e-12)
-    assert crest(t, y, np.array([True, True, False, False])) == y[1]  # not across the edge of what counts
+    assert peak_value(t, y, np.full(4, True)) == pytest.approx(7.0, abs=1e-12)
+    assert peak_value(t, y, np.array([True, True, False, False])) == y[1]  # not across the edge of what counts

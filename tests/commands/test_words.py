@@ -20,6 +20,7 @@ from rich.console import Console
 
 from harness.commands import commands
 from harness.errors import HarnessError
+from harness.references.models import CASES, MODELS
 from harness.scenes.coupled import scene as coupled
 from harness.scenes.scene import load_scene, shipped_scenes
 from harness.studies.bench.measure import Beside, Measure
@@ -29,7 +30,6 @@ from harness.studies.importers.checks import CHECKS
 from harness.studies.precision import laws, table
 from harness.studies.precision.anchors import AnchorRun
 from harness.studies.precision.study import FMU, ME, Point, Study
-from harness.truths.models import CASES, MODELS
 
 WIDTH = 80
 PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}

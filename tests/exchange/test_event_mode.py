@@ -10,7 +10,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 from models import MODELS, declared, model_class, outputs, push
 
-from harness.truths.reference import load
+from harness.references.certified_reference import load_reference
 
 COUNTED = [name for name in MODELS if "mode" in outputs(name)]
 BREAK_AWAY = 0.9 * 12.5 * 9.81 / (742.5 * 0.034)  # of the sled
@@ -85,7 +85,7 @@ def through(fmu, stop, h, at_event):
 @pytest.mark.parametrize("name", COUNTED)
 def test_a_master_with_long_steps_sees_every_event_at_its_time(unpacked, name, method):
     """The mode is that before the event until event mode is entered, and the other one from then on."""
-    true, seen = load(name).events, []
+    true, seen = load_reference(name).events, []
     stop = model_class(name).stop_time
     values = {} if method == "default" else {"solver.method": 3, "solver.rtol": 1e-10}
     with master(unpacked, name, values, eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):

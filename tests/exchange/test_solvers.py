@@ -24,14 +24,14 @@ from models import MODELS, SIGN, declared, model_class, outputs
 
 from fmus.runtime.codes import OUT_OF_RANGE
 from fmus.runtime.messages import value_message
-from harness.truths.models import CASES
-from harness.truths.reference import POINTS, late, load, relative
+from harness.references.certified_reference import POINTS, event_time_error, load_reference, relative_errors
+from harness.references.models import CASES
 from tests.runtime.test_changes import spans
 
 fmus, worker, _workers = fmi3_hosts.FIXTURES
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 CERTIFIED = [name for name in MODELS if (ROOT / "fmus" / f"{name}.csv").is_file()]
-TRUTHS = {name: load(name) for name in CERTIFIED}
+TRUTHS = {name: load_reference(name) for name in CERTIFIED}
 PEAK, FASTEST, DRIVER = 2.9546, 0.41736, 0.034  # acceleration, speed, speed of the driver: of the slipping sled, SI
 GROWTH = dict.fromkeys(CERTIFIED, 1.0) | dict.fromkeys(("stickslip", "pacejka"), PEAK / DRIVER * 0.544 / FASTEST)
 EVENTS = ("events.count", "events.t_last")
@@ -78,13 +78,13 @@ def test_the_error_under_cvode_is_within_what_its_tolerance_allows(runs):
     name, table = runs
     for rtol, columns, evaluations in table:
         assert columns["time"] == TRUTHS[name].times.tolist()
-        assert relative(motion(name, columns), TRUTHS[name].motion).max() <= bound(name, evaluations, rtol)
+        assert relative_errors(motion(name, columns), TRUTHS[name].motion).max() <= bound(name, evaluations, rtol)
 
 
 def test_the_error_under_cvode_falls_with_its_tolerance(runs):
     """Order q makes it fall with the power q/(q + 1): at the least, q = 1, a thousandfold for the millionfold."""
     name, table = runs
-    errors = [relative(motion(name, columns), TRUTHS[name].motion).max() for _, columns, _ in table]
+    errors = [relative_errors(motion(name, columns), TRUTHS[name].motion).max() for _, columns, _ in table]
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 1e-3 * errors[0]
 
@@ -100,7 +100,7 @@ def test_events_under_cvode_come_in_their_order_and_at_their_time(runs):
         found, true = events(columns), TRUTHS[name].events
         if rtol < 1e-5 or name != "coulomb":
             assert columns["events.count"][-1] == len(true)
-        assert late(found[: len(true)], true) <= 2.0 * evaluations * rtol * model_class(name).stop_time
+        assert event_time_error(found[: len(true)], true) <= 2.0 * evaluations * rtol * model_class(name).stop_time
 
 
 def test_a_stuck_mass_does_not_move_under_cvode(runs):
@@ -124,7 +124,7 @@ def test_every_output_is_that_of_co_simulation(runs, worker, fmus):
     for variable in outputs(name):
         if declared(name)[variable].type == "Real":
             mine, theirs = (np.array(table[variable])[:, None] for table in (columns, solved))
-            assert relative(mine, theirs).max() <= 20.0 * bound(name, evaluations, rtol) + 1e-6, variable
+            assert relative_errors(mine, theirs).max() <= 20.0 * bound(name, evaluations, rtol) + 1e-6, variable
         else:
             assert columns[variable] == solved[variable]
 
@@ -137,7 +137,7 @@ def test_a_second_solver_comes_to_the_same(worker, fmus, name):
     fmu.go_on()
     method, rtol = ("Radau", 1e-8) if name == "pacejka" else ("DOP853", 1e-11)
     rows, evaluations = fmu.solve(truth.times.tolist(), outputs(name)[:2], method, rtol, {})
-    assert relative(np.array(rows), truth.motion).max() <= bound(name, evaluations, rtol)
+    assert relative_errors(np.array(rows), truth.motion).max() <= bound(name, evaluations, rtol)
     if "mode" in outputs(name):
         assert fmu.get("events.count") == len(truth.events)
     fmu.free()
@@ -148,7 +148,7 @@ def test_a_later_start_shifts_the_motion_and_nothing_else(runs_at, name):
     """The start time is told to nobody, and nobody needs it: the driver's position is a state."""
     (early, n), (late_, m) = runs_at(name, 0.0), runs_at(name, 5.0)
     assert late_["time"][0] == 5.0
-    assert relative(motion(name, late_), motion(name, early)).max() <= bound(name, n + m, 1e-8)
+    assert relative_errors(motion(name, late_), motion(name, early)).max() <= bound(name, n + m, 1e-8)
     if "x_driver" in early:
         assert late_["x_driver"][0] == 0.0
         assert late_["x_driver"][-1] == pytest.approx(0.034 * 16.0, rel=1e-6)
@@ -214,7 +214,7 @@ def test_a_ramp_of_force_pulls_as_a_faster_driver_would(worker, fmus):
         Trajectory([(0.0, evidence.stickslip(v_driver=DRIVER + faster))], 0.0, 0.0, 17.0),
     )
     rows, evaluations = fmu.solve(times, ["x", "v"], "DOP853", 1e-10, {"F_ext": [0.0, faster * k]})
-    off = relative(np.array(rows), np.array([[float(y) for y in truth.at(t)] for t in times]))
+    off = relative_errors(np.array(rows), np.array([[float(y) for y in truth.at(t)] for t in times]))
     assert off.max() <= bound("stickslip", evaluations, 1e-10)
     assert fmu.get("events.count") == len([t for t, _ in truth.events if t < times[-1]])
     fmu.free()
@@ -241,7 +241,7 @@ def test_a_tunable_changed_in_event_mode_acts_from_there_on(worker, fmus, change
     true = np.array([[float(y) for y in truth.at(time)] for time in columns["time"]])
     scale = np.abs(true).max(axis=0)
     growth = GROWTH["stickslip"] * max(1.0, scale[1] / FASTEST)
-    assert relative(motion("stickslip", columns), true).max() <= 2.0 * evaluations * 1e-9 * growth
+    assert relative_errors(motion("stickslip", columns), true).max() <= 2.0 * evaluations * 1e-9 * growth
     assert columns["events.count"][-1] == len(truth.events)
 
 
@@ -256,7 +256,7 @@ def test_a_force_that_jumps_acts_from_there_on(worker, fmus):
     changes = {t: {"F_ext": force} for t, force in pushes.items()}
     truth = Trajectory(spans(evidence.stickslip, {}, changes), 0.0, 0.0, 16.0)
     true = np.array([[float(y) for y in truth.at(t)] for t in columns["time"]])
-    assert relative(motion("stickslip", columns), true).max() <= bound("stickslip", evaluations, 1e-8)
+    assert relative_errors(motion("stickslip", columns), true).max() <= bound("stickslip", evaluations, 1e-8)
     assert columns["events.count"][-1] == len(truth.events)
 
 
@@ -270,11 +270,11 @@ def test_every_other_law_comes_to_its_reference(worker, fmus, case):
     columns, evaluations = exchange(
         worker, fmus / f"{case.model}.fmu", case.model, start_values=case.values, relative_tolerance=1e-7
     )
-    truth = load(case.truth)
+    truth = load_reference(case.reference_source)
     assert columns["time"] == truth.times.tolist()
-    assert relative(motion(case.model, columns), truth.motion).max() <= bound(case.model, evaluations, 1e-7)
+    assert relative_errors(motion(case.model, columns), truth.motion).max() <= bound(case.model, evaluations, 1e-7)
     if "events.count" in columns:
-        assert columns["events.count"][-1] == (0 if case.chatters else len(truth.events))
+        assert columns["events.count"][-1] == (0 if case.is_chattering else len(truth.events))
 
 
 def test_a_solver_that_gives_up_on_the_sign_law_leaves_the_fmu_well(worker, fmus):

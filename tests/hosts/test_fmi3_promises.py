@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from models import MODELS, model_class, outputs
 
-from harness.truths.reference import POINTS, load, relative
+from harness.references.certified_reference import POINTS, load_reference, relative_errors
 from tests.runtime.test_changes import (  # noqa: F401
     test_a_changed_value_acts_from_its_communication_point_on,
     test_a_pendulum_twisted_in_motion_and_at_rest,
@@ -33,12 +33,12 @@ REACH = dict.fromkeys(MODELS, 1e-13) | {"pendulum": 1e-9, "pacejka": 1e-6}  # by
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_default_experiment_in_fmpy_reaches_the_reference(worker, fmus, name):
-    truth = load(name)
+    truth = load_reference(name)
     interval = model_class(name).stop_time / (POINTS - 1)
     columns = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
     assert columns["time"] == truth.times.tolist()
     motion = np.array([columns[v] for v in outputs(name)[:2]]).T
-    assert relative(motion, truth.motion).max() < REACH[name]
+    assert relative_errors(motion, truth.motion).max() < REACH[name]
     if "mode" in columns:
         assert columns["mode"][-1] == truth.modes[-1][1]
 

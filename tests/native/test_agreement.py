@@ -127,8 +127,8 @@ def start_values(name):
 def beginnings(draw, name, choices, stop):
     """The first event of a life, and of that after a reset."""
     values = choices | {v: likely(draw, s) for v, s in start_values(name).items() if draw.random() < 0.4 and v != "x_m"}
-    chatters = choices.get("friction", HYBRID) != HYBRID
-    values["solver.rtol"] = draw.choice([1e-2, 1e-3] if chatters else [0.0, 1e-3, 1e-5, 1e-7])
+    is_chattering = choices.get("friction", HYBRID) != HYBRID
+    values["solver.rtol"] = draw.choice([1e-2, 1e-3] if is_chattering else [0.0, 1e-3, 1e-5, 1e-7])
     if draw.random() < 0.3:
         values["solver.h_max"] = stop * draw.uniform(0.001, 0.2)
     start = draw.choice([0.0, 0.0, -3.0, 1e4])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from decays import swung
 
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
 from harness.errors import HarnessError, SceneError
 from harness.records.columns import ColumnOptions, read_record, split_heading
 from harness.records.units import find_unit, time_unit_size
@@ -186,7 +186,7 @@ def found_in(record, pendulum):
     numbers = [np.round(each, 8).tobytes() for each in (record.t, record.x)]
     key = (*numbers, record.unit, record.base, record.order, record.notes, pendulum)
     if key not in FOUND:
-        FOUND[key] = identify(record, Known(pendulum=pendulum), drag=False)  # whose laws take most of a fit
+        FOUND[key] = fit_decay(record, KnownParameters(pendulum=pendulum), drag=False)  # whose laws take most of a fit
     return FOUND[key]
 
 

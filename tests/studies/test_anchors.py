@@ -6,10 +6,15 @@ import numpy as np
 import pytest
 from models import model_class
 
+from harness.references import peer_solvers
+from harness.references.literature_problems import (
+    BeltBlock,
+    ChatteringOscillator,
+    ChatteringOscillatorSign,
+    SmoothedBeltBlock,
+)
 from harness.running.embedded_model import EmbeddedModel, method_numbers
 from harness.studies.precision import anchors
-from harness.truths import peers
-from harness.truths.anchors import Belt, Classic, Plain, Smoothed
 
 BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as published
 
@@ -33,7 +38,7 @@ def test_the_true_end_of_the_block_is_the_published_one():
 
 def test_the_true_end_of_the_block_is_that_of_two_methods():
     for method, rtol in (("DOP853", 3e-14), ("Radau", 1e-11)):
-        answer = peers.solve("scipy", method, Belt(), np.array([0.0, 50.0]), rtol, 1e-3 * rtol)
+        answer = peer_solvers.solve("scipy", method, BeltBlock(), np.array([0.0, 50.0]), rtol, 1e-3 * rtol)
         assert answer.states[-1] == pytest.approx(anchors.BLOCK, abs=2e-11)
 
 
@@ -47,7 +52,7 @@ def test_every_method_of_the_runtime_brings_the_block_to_its_end(rows, method):
 
 def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
     run = EmbeddedModel.create(anchors.block(), {}, "dop853", 1e-11)
-    truth = peers.solve("scipy", "DOP853", Belt(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
+    truth = peer_solvers.solve("scipy", "DOP853", BeltBlock(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
     found = run.find_mode_changes(50.0)
     assert [mode for _, mode in found] == [mode for _, mode in truth] == [0, -1] * 4
     assert [t for t, _ in found] == pytest.approx([t for t, _ in truth], abs=1e-8)
@@ -75,6 +80,8 @@ def test_no_peer_comes_to_an_end_with_plain_sign(rows):
 
 def test_the_two_forms_of_each_anchor_are_one_equation():
     for mode in (-1, 1):
-        assert Plain().rates(1)(0.0, (0.3, mode * 0.2)) == Classic().rates(mode)(0.0, (0.3, mode * 0.2))
-    smooth = Smoothed().rates(1)(3.0, (0.4, 0.2))[1]
-    assert smooth == pytest.approx(Belt().rates(1)(3.0, (0.4, 0.2))[1], abs=1e-5)
+        assert ChatteringOscillatorSign().rates(1)(0.0, (0.3, mode * 0.2)) == ChatteringOscillator().rates(mode)(
+            0.0, (0.3, mode * 0.2)
+        )
+    smooth = SmoothedBeltBlock().rates(1)(3.0, (0.4, 0.2))[1]
+    assert smooth == pytest.approx(BeltBlock().rates(1)(3.0, (0.4, 0.2))[1], abs=1e-5)

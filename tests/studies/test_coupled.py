@@ -14,10 +14,10 @@ from builds import made
 from fmpy.ssp.ssd import read_ssd
 
 from harness.errors import HarnessError, SceneError
+from harness.references.single_model_reference import CoupledBodies, solve_bodies
 from harness.scenes.coupled.scene import shipped_coupled_scenes
 from harness.studies.coupled import engine, study
 from harness.studies.coupled.engine import ENGINES
-from harness.truths.monolith import Bodies, solve
 
 here = all(map(find_spec, ("pyssp_standard", "ecospy", "libcosimpy")))
 pytestmark = pytest.mark.skipif(not here, reason="the extras 'coupled' and 'importers' are not installed")
@@ -48,12 +48,12 @@ def couple(fmus, tmp_path):
 def bodies(**changes):
     one = np.ones(1)
     values = {"m": one, "k": one, "c": 0 * one, "hold": 0 * one, "slide": 0 * one, "driver": 0 * one, "couplings": ()}
-    return Bodies(**values | {name: value * one for name, value in changes.items()})
+    return CoupledBodies(**values | {name: value * one for name, value in changes.items()})
 
 
 def test_the_reference_knows_the_closed_form_of_dry_friction():
     """x falls by 2 f/k in each half cycle, and rests where |x| <= f/k."""
-    x = solve(bodies(hold=0.1, slide=0.1), np.array([1.0, 0.0]), np.pi * np.arange(8))[:, 0]
+    x = solve_bodies(bodies(hold=0.1, slide=0.1), np.array([1.0, 0.0]), np.pi * np.arange(8))[:, 0]
     assert x == pytest.approx([1.0, -0.8, 0.6, -0.4, 0.2, 0.0, 0.0, 0.0], abs=1e-9)
 
 
@@ -62,7 +62,7 @@ def test_the_reference_knows_the_period_of_stick_slip():
     sled = bodies(m=m, k=k, hold=mu_s * m * g, slide=mu_d * m * g, driver=driver)
     first, period = mu_s * m * g / (k * driver), 3.345104499330
     times = np.array([0.0, first - 1e-6, first + 0.5, first + period - 1e-6, first + period + 0.5])
-    x = solve(sled, np.zeros(2), times)[:, 0]
+    x = solve_bodies(sled, np.zeros(2), times)[:, 0]
     assert x[1] == 0.0
     assert x[2] == x[3]
     assert x[4] - x[2] == pytest.approx(period * driver, rel=1e-9)

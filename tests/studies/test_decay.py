@@ -14,22 +14,22 @@ from builds import ROOT
 from decays import swung
 from matplotlib.figure import Figure
 
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
+from harness.analyses.decay.energy_loss import measure_energy_loss
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
-from harness.analyses.decay.loss import losses_seen
 from harness.studies.decay.figure import MOST, draw, extremes
 from harness.studies.decay.job import numbers
 from harness.studies.decay.table import table
 
 
 def test_the_table_has_a_row_for_every_value():
-    found = identify(swung(0.02, 0.003, noise=1e-4), Known(k=157.9))
+    found = fit_decay(swung(0.02, 0.003, noise=1e-4), KnownParameters(k=157.9))
     assert table(found).row_count == len(found.estimates) == 8
 
 
 def test_the_numbers_keep_their_names():
-    found = numbers(identify(swung(0.02, 0.003, noise=1e-4), Known()))
+    found = numbers(fit_decay(swung(0.02, 0.003, noise=1e-4), KnownParameters()))
     assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(found)
     assert {each["name"] for each in found["fit"]} == {"omega", "zeta", "r", "b", "rest"}
     assert all({"value", "error", "low", "high", "unit"} <= set(each) for each in found["fit"])
@@ -43,8 +43,8 @@ def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(
     monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
     t = np.linspace(0.0, 9.0, 3001)
     record = swung(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
-    found = identify(replace(record, t=record.t + 1.7e9), Known(pendulum=True))
-    draw(found, losses_seen(found), tmp_path / "figure.svg")
+    found = fit_decay(replace(record, t=record.t + 1.7e9), KnownParameters(pendulum=True))
+    draw(found, measure_energy_loss(found), tmp_path / "figure.svg")
     signal, residuals, shares = figures[0].get_axes()
     assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
     assert shares.get_xlabel() == "amplitude [deg]"
@@ -110,13 +110,13 @@ import sys
 from matplotlib.figure import Figure
 from pathlib import Path
 from decays import swung
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
 from harness.studies.decay.job import save
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
-save(identify(swung(0.02), Known()), Path.cwd())
+save(fit_decay(swung(0.02), KnownParameters()), Path.cwd())
 print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harness.scenes") if name in sys.modules])
 """
     done = subprocess.run(

@@ -13,18 +13,18 @@ from builds import of_file
 from models import AUTHORED
 
 from harness.errors import HarnessError
+from harness.references import peer_solvers
+from harness.references.certified_reference import compute_errors, load_reference
+from harness.references.models import CASES
 from harness.results.provenance import write_provenance
 from harness.running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from harness.running.solution import Solution
 from harness.studies.precision import advice, laws
 from harness.studies.precision.study import FMPY, FMU, FULL, QUICK, WAYS, Extent, Job, Point, Study, jobs, study, sweep
 from harness.studies.precision.survey import survey
-from harness.truths import peers
-from harness.truths.models import CASES
-from harness.truths.reference import errors, load
 
 CASE = {case.name: case for case in CASES}
-SMOOTH = [case for case in CASES if not case.chatters]
+SMOOTH = [case for case in CASES if not case.is_chattering]
 
 
 def command(place, *arguments):
@@ -34,53 +34,55 @@ def command(place, *arguments):
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "stickslip"])
 def test_exact_is_within_1e_13_of_the_truth_and_1e_14_of_every_event(fmus, name):
-    truth = load(name)
+    truth = load_reference(name)
     answer = EmbeddedModel.create(load_model_class(fmus / f"{name}.fmu"), {}, "exact", 0.0).solve(truth.times.tolist())
-    found = errors(answer, truth)
+    found = compute_errors(answer, truth)
     assert found.largest < 1e-13
     assert not found.events or found.events < 1e-14 * truth.times[-1]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_every_method_of_the_fmu_comes_near_the_truth_of_its_law(fmus, case):
-    truth, model = load(case.truth), load_model_class(fmus / f"{case.model}.fmu")
-    within = 0.02 if case.truth == "stickslip-threshold" else 2e-3  # where it comes to rest below eps is left to chance
+    truth, model = load_reference(case.reference_source), load_model_class(fmus / f"{case.model}.fmu")
+    within = (
+        0.02 if case.reference_source == "stickslip-threshold" else 2e-3
+    )  # where it comes to rest below eps is left to chance
     for method in method_numbers(model):
-        if (case.name == "pacejka-0.0001" and method != "rodas") or (case.chatters and method == "exact"):
+        if (case.name == "pacejka-0.0001" and method != "rodas") or (case.is_chattering and method == "exact"):
             continue  # seconds of explicit steps; refused
         answer = EmbeddedModel.create(model, case.values, method, 1e-6).solve(truth.times.tolist())
-        assert errors(answer, truth).largest < within
+        assert compute_errors(answer, truth).largest < within
         assert answer.evaluations > 0
 
 
 @pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
 def test_every_peer_that_is_installed_comes_near_the_truth_and_its_events(case):
-    truth = load(case.truth)
+    truth = load_reference(case.reference_source)
     for peer, methods in {"scipy": ("DOP853", "LSODA", "Radau"), "cvode": ("Adams", "BDF")}.items():
         for method in methods:
-            if peer in peers.missing() or (case.problem.stiff and method in ("DOP853", "Adams")):
+            if peer in peer_solvers.missing_packages() or (case.problem.is_stiff and method in ("DOP853", "Adams")):
                 continue
-            answer = peers.solve(peer, method, case.problem, truth.times, 1e-7, 1e-10)
-            found = errors(answer, truth)
+            answer = peer_solvers.solve(peer, method, case.problem, truth.times, 1e-7, 1e-10)
+            found = compute_errors(answer, truth)
             assert found.largest < 1e-3
-            assert (found.events is not None) == case.problem.dry
+            assert (found.events is not None) == case.problem.has_dry_friction
             assert not found.events or found.events < 1e-4
             assert answer.evaluations > 100
 
 
 def test_a_peer_that_is_not_installed_is_named_and_left_out(fmus, monkeypatch):
-    monkeypatch.setitem(peers.PACKAGES, "cvode", ("no_such_module", "scikit-sundae"))
-    assert peers.missing()["cvode"] == "scikit-sundae"
+    monkeypatch.setitem(peer_solvers.PACKAGES, "cvode", ("no_such_module", "scikit-sundae"))
+    assert peer_solvers.missing_packages()["cvode"] == "scikit-sundae"
     file = fmus / "smd.fmu"
     assert "cvode" not in [job.tool for job in jobs(CASE["smd"], load_model_class(file), file)]
 
 
 def test_a_run_is_watched_in_steps_and_in_time():
-    ask = partial(peers.solve, "scipy", "RK23", CASE["smd"].problem, load("smd").times, 1e-9, 1e-12)
+    ask = partial(peer_solvers.solve, "scipy", "RK23", CASE["smd"].problem, load_reference("smd").times, 1e-9, 1e-12)
     with pytest.raises(HarnessError, match=r"^at t = .* s after 500 right-hand sides$"):
-        ask(peers.at_most(500))
+        ask(peer_solvers.limit_evaluations(500))
     with pytest.raises(HarnessError, match=r"^at t = .* s after 0\.001 s of run time$"):
-        ask(peers.within(1e-3))
+        ask(peer_solvers.limit_run_time(1e-3))
 
 
 def test_a_failed_run_is_a_gap_and_after_a_slow_one_tighter_ones_are_not_tried():
@@ -93,7 +95,7 @@ def test_a_failed_run_is_a_gap_and_after_a_slow_one_tighter_ones_are_not_tried()
         if rtol == 1e-5:
             sleep(0.06)
             raise HarnessError("it took too long")
-        return Solution(load("smd").motion, None, 7), 0.25
+        return Solution(load_reference("smd").motion, None, 7), 0.25
 
     def broken(rtol, extent):
         raise HarnessError("it fell over")
@@ -160,7 +162,11 @@ def test_a_quick_run_does_not_take_the_place_of_a_whole_one(place, tmp_path, mon
 
 
 def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
-    found = {case.name: laws.analyse(case, load_model_class(fmus / f"{case.model}.fmu")) for case in CASES if case.dry}
+    found = {
+        case.name: laws.analyse(case, load_model_class(fmus / f"{case.model}.fmu"))
+        for case in CASES
+        if case.dry_friction_reference
+    }
     assert found["coulomb-sign"].largest == 0.0
     assert found["stickslip-threshold"].creep == pytest.approx(1e-7)  # the threshold itself
     assert found["stickslip-threshold"].period == pytest.approx(3.345104499330, rel=1e-4)
@@ -174,10 +180,10 @@ def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
 
 
 def test_stuck_points_are_those_between_a_stop_and_the_next_break_away():
-    truth = load("stickslip")
+    truth = load_reference("stickslip")
     stuck = laws.stuck(truth)
     assert np.array_equal(stuck, truth.motion[:, 1] == 0.0)
-    assert not laws.stuck(load("coulomb"))[1:].any()
+    assert not laws.stuck(load_reference("coulomb"))[1:].any()
 
 
 @pytest.mark.parametrize(("path", "ending"), [*zip(AUTHORED, cycle((".py", ".fmu")))], ids=lambda one: Path(one).name)

@@ -13,16 +13,16 @@ import pytest
 from fmi3_hosts import built
 
 from harness.errors import HarnessError
+from harness.references import peer_solvers
+from harness.references.certified_reference import load_reference
+from harness.references.models import CASES
 from harness.running import fmi3
 from harness.running.embedded_model import load_model_class
 from harness.studies.precision import advice, study
 from harness.studies.precision.study import CS, FMPY, FMU, ME, QUICK, WAYS, Extent, jobs, sweep
-from harness.truths import peers
-from harness.truths.models import CASES
-from harness.truths.reference import load
 
 CASE = {case.name: case for case in CASES}
-SMOOTH = [case for case in CASES if not case.chatters]
+SMOOTH = [case for case in CASES if not case.is_chattering]
 TOLERANCES = (1e-4, 1e-6, 1e-8)
 
 
@@ -57,7 +57,7 @@ def amplification(case):
     size over the speed of the driver, and one in speed, that times the largest acceleration."""
     if case.model not in ("stickslip", "pacejka"):
         return 1.0
-    x, v = np.abs(load("stickslip").motion).max(axis=0)
+    x, v = np.abs(load_reference("stickslip").motion).max(axis=0)
     return 2.9546 / 0.034 * x / v
 
 
@@ -71,7 +71,7 @@ def test_errors_in_model_exchange_fall_with_the_tolerance_and_stay_below_the_sum
         assert point.largest < amplification(case) * point.evaluations * point.rtol
 
 
-@pytest.mark.parametrize("case", [case for case in SMOOTH if case.problem.dry], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [case for case in SMOOTH if case.problem.has_dry_friction], ids=lambda case: case.name)
 def test_every_change_of_mode_is_seen_in_model_exchange(points, case):
     *_, middle, tight = points(case.name, ME)
     assert tight.events < 0.1 * middle.events < 1e-4
@@ -188,7 +188,7 @@ def test_the_command_writes_every_point_and_says_what_to_use_and_results_on_othe
     assert (folder / "pendulum.txt").read_text() == "older"
     texts = files["smd.csv"], (folder / "smd.csv").read_text()
     rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
-    tools = {FMU, FMPY, *WAYS, "scipy", "cvode"} - peers.missing().keys()
+    tools = {FMU, FMPY, *WAYS, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
     assert {row["tool"] for row in rows} == tools
     unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
     assert [row["failure"] for row in later if row["tool"] in WAYS] == [unbuilt, unbuilt]

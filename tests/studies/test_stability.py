@@ -18,6 +18,8 @@ from builds import of_file
 from models import AUTHORED, LARGER, MODELS, ROOT, declared
 
 from harness.errors import HarnessError
+from harness.references.models.pacejka import MagicFormula
+from harness.references.reference_trajectory import CommunicationGrid, ReferenceTrajectory, compute_reference
 from harness.results.provenance import load_provenance
 from harness.running.fmu_session import CompletedRun, RefusalSummary, RefusedRun, RunCounts
 from harness.studies.stability.bounded import bounded
@@ -36,8 +38,6 @@ from harness.studies.stability.study import (
     survey,
 )
 from harness.studies.stability.table import endings, refusals, summary
-from harness.truths.models.pacejka import Curve
-from harness.truths.truth import Grid, Truth, truth
 
 QUICK = (
     "c = {} N.s/m: damping ratio c/20",
@@ -92,7 +92,7 @@ LINEAR = {
 def test_the_closed_form_is_that_of_the_evidence(case):
     name, chosen = case
     values, stop = {**defaults(name), **chosen}, 16.0 if name == "stickslip" else 4.0
-    found = truth(name, [(0.0, stop, values)], Grid(0.0, stop, 60))
+    found = compute_reference(name, [(0.0, stop, values)], CommunicationGrid(0.0, stop, 60))
     traits = {k: v for k, v in chosen.items() if k not in ("x0", "v0")}
     motion = evidence.Trajectory([(0.0, getattr(evidence, name)(**traits))], values["x0"], values["v0"], stop)
     expected = np.array([[float(value) for value in motion.at(t)] for t in found.times]).T
@@ -104,7 +104,9 @@ def test_the_closed_form_is_that_of_the_evidence(case):
 def test_a_change_of_values_starts_a_new_piece():
     values = defaults("stickslip")
     changes = {2.0: {"F_ext": 90.0}, 2.1: {"F_ext": -50.0}}
-    found = truth("stickslip", spans(0.0, 16.0, values, changes), Grid(0.0, 16.0, 40, (2.0, 2.1)))
+    found = compute_reference(
+        "stickslip", spans(0.0, 16.0, values, changes), CommunicationGrid(0.0, 16.0, 40, (2.0, 2.1))
+    )
     parts = [(0.0, evidence.stickslip()), *((t, evidence.stickslip(**change)) for t, change in changes.items())]
     motion = evidence.Trajectory(parts, 0.0, 0.0, 16.0)
     assert list(found.x) == pytest.approx([float(motion.at(t)[0]) for t in found.times], rel=1e-15, abs=1e-18)
@@ -113,7 +115,7 @@ def test_a_change_of_values_starts_a_new_piece():
 @pytest.mark.parametrize("reaction", [False, True], ids=["weight", "reaction"])
 def test_the_pendulum_is_that_of_the_evidence(reaction):
     values = {**defaults("pendulum"), "pin_load": 1 + reaction}
-    found = truth("pendulum", [(0.0, 5.0, values)], Grid(0.0, 5.0, 60))
+    found = compute_reference("pendulum", [(0.0, 5.0, values)], CommunicationGrid(0.0, 5.0, 60))
     swing = evidence_pendulum.Swing([(0.0, evidence_pendulum.Pendulum(reaction))], values["theta0"], 0.0, 5.0)
     assert list(found.x) == pytest.approx([swing.at(t)[0] for t in found.times], abs=1e-11)
     assert [mode for _, mode in found.events] == [mode for _, mode in swing.events]
@@ -122,8 +124,8 @@ def test_the_pendulum_is_that_of_the_evidence(reaction):
 def test_the_smooth_sled_makes_no_energy_of_its_own():
     """Radau against the balance of power: d(kinetic energy) is the work of pull and friction."""
     values = defaults("pacejka")
-    found = truth("pacejka", [(0.0, 8.0, values)], Grid(0.0, 8.0, 8000))
-    curve, pull = Curve(values), values["k"] * (values["v_driver"] * found.times - found.x)
+    found = compute_reference("pacejka", [(0.0, 8.0, values)], CommunicationGrid(0.0, 8.0, 8000))
+    curve, pull = MagicFormula(values), values["k"] * (values["v_driver"] * found.times - found.x)
     power = [(f - curve.mu(v) * values["m"] * values["g"]) * v for f, v in zip(pull, found.v, strict=True)]
     work = np.concatenate([[0.0], np.cumsum(np.diff(found.times) * (np.array(power[1:]) + power[:-1]) / 2)])
     np.testing.assert_allclose(0.5 * values["m"] * found.v**2, work, atol=3e-4)
@@ -160,8 +162,8 @@ def test_a_process_is_asked_again_and_a_new_one_the_same_where_what_came_before_
 # ---- the judgement
 
 
-CASE = Trial("rest", "coulomb", "exact", setting=None, grid=Grid(0.0, 1.0, 2), spans=[], finish=1e-3)
-REST = Truth(np.array([0.0, 0.5, 1.0]), np.ones(3), np.zeros(3), ((0.5, 0),))
+CASE = Trial("rest", "coulomb", "exact", setting=None, grid=CommunicationGrid(0.0, 1.0, 2), spans=[], finish=1e-3)
+REST = ReferenceTrajectory(np.array([0.0, 0.5, 1.0]), np.ones(3), np.zeros(3), ((0.5, 0),))
 GOOD = CompletedRun(np.ones(3), np.zeros(3), np.zeros(3), 0.5, RunCounts(1, 2, 0, 3), 0.1)
 
 

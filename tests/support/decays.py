@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from harness.analyses.decay.law import LAWS, TERMS, unknowns_of
-from harness.analyses.decay.model import Model
+from harness.analyses.decay.law import LAWS, TERMS, unknown_indices
+from harness.analyses.decay.signal_model import SignalModel
 from harness.records.record import Record
 from harness.studies.decay.table import sentences
 
@@ -37,8 +37,8 @@ def swung(
     seed=6,
 ):
     """The record of a decay from the amplitude `a`, at rest there until `turn`; with white noise, rounded to `step`."""
-    model = Model(side, order, sine, 0.0, 1e-7 * a)
-    x, _ = model(np.array([turn, a, rest, drift, omega, zeta, r, b]), unknowns_of(TERMS, False), t)
+    model = SignalModel(side, order, sine, 0.0, 1e-7 * a)
+    x, _ = model(np.array([turn, a, rest, drift, omega, zeta, r, b]), unknown_indices(TERMS, False), t)
     if order:
         x[t < turn] = rest  # held
     x = x + noise * np.random.default_rng(seed).standard_normal(len(t))

@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from decays import random_record
 
-from harness.analyses.decay.figures import Known
-from harness.analyses.decay.fit import identify
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
 from harness.errors import HarnessError
 from harness.records.record import QUANTITIES
@@ -36,7 +36,7 @@ def judged(number):
     law, sine, quantised, order = CASES[number % len(CASES)]
     record, truth, _ = random_record(number, law, sine, quantised, SAMPLES, order)
     try:
-        found = identify(record, Known(pendulum=sine))
+        found = fit_decay(record, KnownParameters(pendulum=sine))
     except HarnessError as refusal:
         return [], str(refusal)
     each = {one.name: one for one in found.estimates}

@@ -9,20 +9,20 @@ import pytest
 from evidence import Piece, Trajectory
 from mpmath import mpf
 
+from harness.references.certified_reference import POINTS, compute_errors, event_time_error, load_reference
+from harness.references.generation import CLOSED_FORMS, evaluate_closed_form
+from harness.references.literature_problems import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
+from harness.references.models import CASES
 from harness.running.solution import Solution
-from harness.truths.anchors import Belt, Plain, Smoothed
-from harness.truths.making import CLOSED, closed
-from harness.truths.models import CASES
-from harness.truths.reference import POINTS, errors, late, load
 
 ULP = 2.0**-52
-TRUTHS = {case.truth: case for case in CASES}
+TRUTHS = {case.reference_source: case for case in CASES}
 DOP853, RODAS = 4, 5
 
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "stickslip"])
 def test_an_exact_reference_is_the_double_next_to_the_closed_form(name):
-    truth, problem = load(name), TRUTHS[name].problem
+    truth, problem = load_reference(name), TRUTHS[name].problem
     motion = Trajectory([(0.0, getattr(evidence, name)())], *problem.start, problem.stop)
     for t, (x, v) in zip(truth.times, truth.motion, strict=True):
         for value, exact in zip((x, v), motion.at(float(t)), strict=True):
@@ -74,7 +74,7 @@ def held_below(eps, stop):
 
 
 def test_the_threshold_reference_is_the_double_next_to_its_pieces():
-    truth = load("stickslip-threshold")
+    truth = load_reference("stickslip-threshold")
     pieces = held_below(mpf(1e-7), 16)
     starts = [(t, mode) for t, mode, *_ in pieces]
     events = [after for before, after in pairwise(starts) if before[1] != after[1]]
@@ -89,46 +89,48 @@ def test_the_threshold_reference_is_the_double_next_to_its_pieces():
 
 @pytest.mark.parametrize("reaction", [False, True])
 def test_the_pendulum_references_agree_with_a_third_route(reaction):
-    truth = load("pendulum-reaction" if reaction else "pendulum")
+    truth = load_reference("pendulum-reaction" if reaction else "pendulum")
     swing = evidence_pendulum.Swing([(0.0, evidence_pendulum.Pendulum(reaction))], evidence_pendulum.THETA0, 0.0, 5.0)
     other = np.array([swing.at(float(t)) for t in truth.times])
-    assert errors(Solution(other, swing.events, 0), truth).largest < 1e-11
-    assert late(swing.events, truth.events) < 1e-11
+    assert compute_errors(Solution(other, swing.events, 0), truth).largest < 1e-11
+    assert event_time_error(swing.events, truth.events) < 1e-11
 
 
 @pytest.mark.parametrize(
     "case", [case for case in CASES if case.model in ("pacejka", "pendulum")], ids=lambda case: case.name
 )
 def test_the_built_fmu_comes_to_the_same_reference(launch, case):
-    truth = load(case.truth)
+    truth = load_reference(case.reference_source)
     smooth = case.model == "pacejka"
     values = {"solver.method": RODAS if smooth else DOP853, "solver.rtol": 1e-10 if smooth else 1e-12, **case.values}
     fmu = launch(case.model, values, stop=case.problem.stop)
     motion = np.array(fmu.run(truth.times.tolist(), ["x", "v"] if smooth else ["theta", "omega"]))
-    assert errors(Solution(motion, None, 0), truth).largest < (1e-8 if smooth else 1e-11)
+    assert compute_errors(Solution(motion, None, 0), truth).largest < (1e-8 if smooth else 1e-11)
 
 
 @pytest.mark.parametrize("name", TRUTHS)
 def test_every_reference_covers_its_run_and_states_its_doubt(name):
-    truth, problem = load(name), TRUTHS[name].problem
+    truth, problem = load_reference(name), TRUTHS[name].problem
     assert truth.times.tolist() == np.linspace(0.0, problem.stop, POINTS).tolist()
     assert truth.motion.shape == (POINTS, 2)
     assert tuple(truth.motion[0]) == problem.start
-    assert bool(truth.modes) == problem.dry
-    assert truth.how
-    assert 0.0 < truth.doubt < 2e-11
+    assert bool(truth.modes) == problem.has_dry_friction
+    assert truth.method
+    assert 0.0 < truth.estimated_error < 2e-11
 
 
-@pytest.mark.parametrize("name", CLOSED)
+@pytest.mark.parametrize("name", CLOSED_FORMS)
 def test_the_script_makes_the_numbers_beside_it(name):
-    truth = load(name)
-    answer = closed(name, truth.times)
+    truth = load_reference(name)
+    answer = evaluate_closed_form(name, truth.times)
     assert answer.states.tolist() == truth.motion.tolist()
     assert answer.events == truth.events
 
 
 @pytest.mark.parametrize(
-    "problem", [*(case.problem for case in CASES), Belt(), Plain(), Smoothed()], ids=lambda p: type(p).__name__
+    "problem",
+    [*(case.problem for case in CASES), BeltBlock(), ChatteringOscillatorSign(), SmoothedBeltBlock()],
+    ids=lambda p: type(p).__name__,
 )
 def test_a_jacobian_is_the_slope_of_the_rates(problem):
     for mode in (-1, 1):
@@ -142,16 +144,16 @@ def test_a_jacobian_is_the_slope_of_the_rates(problem):
 
 
 def test_errors_are_relative_to_the_largest_of_each_column():
-    truth = load("smd")
+    truth = load_reference("smd")
     off = truth.motion + np.array([1e-3 * np.abs(truth.motion[:, 0]).max(), 0.0])
-    found = errors(Solution(off, None, 0), truth)
+    found = compute_errors(Solution(off, None, 0), truth)
     assert [found.final, found.rms, found.largest] == pytest.approx([1e-3] * 3, rel=1e-10)
     assert found.events is None
 
 
 def test_event_times_compare_only_where_the_modes_agree():
     truth = [(1.0, 1), (2.0, 0)]
-    assert late([(1.0, 1), (2.25, 0)], truth) == 0.25
-    assert np.isnan(late([(1.0, 1)], truth))
-    assert np.isnan(late([(1.0, -1), (2.0, 0)], truth))
-    assert late([], []) == 0.0
+    assert event_time_error([(1.0, 1), (2.25, 0)], truth) == 0.25
+    assert np.isnan(event_time_error([(1.0, 1)], truth))
+    assert np.isnan(event_time_error([(1.0, -1), (2.0, 0)], truth))
+    assert event_time_error([], []) == 0.0

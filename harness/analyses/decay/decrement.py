@@ -16,7 +16,7 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...results.quantity import Quantity
-from .. import samples
+from .. import sample_density
 
 if TYPE_CHECKING:
     from ...running.trajectory import Trajectory  # a record from a file needs nothing that runs
@@ -26,7 +26,7 @@ FORCES = {"f": ("N", "friction force", False), "T_f": ("N.m", "joint torque", Tr
 
 
 @dataclass(frozen=True)
-class Decay:
+class DecrementResult:
     """`result` (zeta, f or T_f) over `cycles` cycles; `times` in s and `positions` of the turning points used."""
 
     result: Quantity
@@ -36,27 +36,29 @@ class Decay:
     quantities: tuple[Quantity, ...]
 
 
-def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None = None) -> Decay:
+def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None = None) -> DecrementResult:
     """What the decay of the recorded position `gives` (zeta, f or T_f) from the peak `first` over so many cycles, None
     for all; HarnessError if the run does not show one."""
-    times, positions = turning_points(run.time, run.column_of_role("position"), run.column_of_role("velocity"))
-    times, positions, cycles = chosen(times, positions, first, cycles)
-    samples.check(run.time, times[:-1], times[1:], "half swing")
+    times, positions = find_extrema_from_velocity(
+        run.time, run.column_of_role("position"), run.column_of_role("velocity")
+    )
+    times, positions, cycles = select_cycles(times, positions, first, cycles)
+    sample_density.require_dense_sampling(run.time, times[:-1], times[1:], "half swing")
     x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
     if gives == "zeta":
         result = Quantity("zeta", damping_ratio(x_0, x_n, cycles), "1", f"damping ratio, {cycles:g} cycles")
     else:
         unit, words, turning = FORCES[gives]
-        force = friction(x_0, x_n, cycles, stiffness(run, turning, f"the decay to {gives}"))
+        force = friction_from_envelope(x_0, x_n, cycles, stiffness(run, turning, f"the decay to {gives}"))
         result = Quantity(gives, force, unit, f"{words}, {cycles:g} cycles")
     unit = run.units[run.spec.motion_outputs["position"]]
     ends = (
         Quantity("x_0", x_0, unit, f"peak {first:g}"),
         Quantity("x_n", x_n, unit, f"peak {first + cycles:g}"),
-        Quantity("sample_0", sampled(run, times[0]), unit, f"peak {first:g}, as sampled"),
-        Quantity("sample_n", sampled(run, times[-1]), unit, f"peak {first + cycles:g}, as sampled"),
+        Quantity("sample_0", sampled_peak(run, times[0]), unit, f"peak {first:g}, as sampled"),
+        Quantity("sample_n", sampled_peak(run, times[-1]), unit, f"peak {first + cycles:g}, as sampled"),
     )
-    return Decay(result, cycles, times, positions, (*ends, result))
+    return DecrementResult(result, cycles, times, positions, (*ends, result))
 
 
 def stiffness(run: "Trajectory", turning: bool, purpose: str) -> float:
@@ -64,13 +66,13 @@ def stiffness(run: "Trajectory", turning: bool, purpose: str) -> float:
     return prod(run.get_parameter(name, purpose) for name in (("m", "g", "a") if turning else ("k",)))
 
 
-def sampled(run: "Trajectory", time: float) -> float:
+def sampled_peak(run: "Trajectory", time: float) -> float:
     """The larger of the two samples around a turning point: what a plot of the samples shows as the peak."""
     i = int(np.clip(np.searchsorted(run.time, time), 1, len(run.time) - 1))
     return float(np.abs(run.column_of_role("position")[i - 1 : i + 1]).max())
 
 
-def turning_points(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def find_extrema_from_velocity(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Times and positions where the velocity passes through zero or comes to rest there.
 
     Between two samples the position is the cubic of their x and v, and the turning point is where its slope is zero.
@@ -80,16 +82,16 @@ def turning_points(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> tuple[np.ndar
     sign = np.sign(v)
     i = np.flatnonzero(sign[:-1] * sign[1:] < 0)
     h, x0, x1, v0, v1 = t[i + 1] - t[i], x[i], x[i + 1], v[i], v[i + 1]
-    s = slope_zero(h, x1 - x0, v0, v1)
+    s = locate_zero_slope(h, x1 - x0, v0, v1)
     r = 1 - s
     cubic = (1 + 2 * s) * r * r * x0 + s * r * r * h * v0 + s * s * (3 - 2 * s) * x1 - s * s * r * h * v1
-    rests = np.array([j for j in np.flatnonzero(sign == 0).tolist() if turns(sign, j)], int)
+    rests = np.array([j for j in np.flatnonzero(sign == 0).tolist() if is_turning_point(sign, j)], int)
     times, positions = np.append(t[i] + s * h, t[rests]), np.append(cubic, x[rests])
     order = np.argsort(times, kind="stable")
     return times[order], positions[order]
 
 
-def turns(sign: np.ndarray, i: int) -> bool:
+def is_turning_point(sign: np.ndarray, i: int) -> bool:
     """Whether the zero at sample i begins a rest that ends a motion and is not followed by more of the same."""
     before = sign[i - 1] if i else 0.0
     if i and before == 0:
@@ -100,7 +102,7 @@ def turns(sign: np.ndarray, i: int) -> bool:
     return sign[i + 1 + moving[0]] != before and (i > 0 or moving[0] == 0)
 
 
-def slope_zero(h: np.ndarray, rise: np.ndarray, v0: np.ndarray, v1: np.ndarray) -> np.ndarray:
+def locate_zero_slope(h: np.ndarray, rise: np.ndarray, v0: np.ndarray, v1: np.ndarray) -> np.ndarray:
     """Where in [0, 1] cubics (n,) of steps h (s) and slopes v0, v1 of opposite sign are level.
 
     Their slope is v0 + 2 b s + c s^2 with b = 3 rise/h - 2 v0 - v1 and c = 3 (v0 + v1) - 6 rise/h.
@@ -114,7 +116,7 @@ def slope_zero(h: np.ndarray, rise: np.ndarray, v0: np.ndarray, v1: np.ndarray) 
     return np.where(abs(one - 0.5) <= abs(other - 0.5), one, other)  # inside: opposite slopes allow just one
 
 
-def chosen(
+def select_cycles(
     times: np.ndarray, positions: np.ndarray, first: int, cycles: float | None
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """The turning points from cycle `first` over `cycles` cycles (None: all that follow), and how many cycles."""
@@ -134,7 +136,7 @@ def damping_ratio(x_0: float, x_n: float, cycles: float) -> float:
     return delta / sqrt(4 * pi * pi + delta * delta)
 
 
-def friction(x_0: float, x_n: float, cycles: float, stiffness: float) -> float:
+def friction_from_envelope(x_0: float, x_n: float, cycles: float, stiffness: float) -> float:
     """Friction from the linear envelope: force for a stiffness in N/m, torque for one in N.m/rad."""
     check_decrease(x_0, x_n)
     return stiffness * (x_0 - x_n) / (4 * cycles)

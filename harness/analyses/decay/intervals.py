@@ -13,10 +13,10 @@ from statistics import NormalDist
 
 import numpy as np
 
-from .bounded import FAR, bounded
+from .fit_problem import FitProblem
 from .law import OMEGA, ZETA, Terms
-from .problem import Problem
-from .squares import scales
+from .least_squares import column_norms
+from .nonnegative_intervals import NEGLIGIBLE_BOUND, nonnegative_interval
 
 NORMAL = NormalDist()
 SIDE = NORMAL.inv_cdf(0.975)
@@ -27,7 +27,7 @@ ALIKE = 4.5  # standard deviations of the correlation of white residuals
 
 
 @dataclass(frozen=True)
-class Spread:
+class FitUncertainty:
     """Of the `unknowns` (n,): standard `errors`, their `correlation` (n, n), and `free`, where they would be if losses
     could be negative.  Of the residuals: rms, correlation `rho` of neighbours, and whether they are `alike`."""
 
@@ -41,11 +41,11 @@ class Spread:
     freedom: int
 
 
-def spread(problem: Problem, p: np.ndarray, terms: Terms) -> Spread:
+def spread(problem: FitProblem, p: np.ndarray, terms: Terms) -> FitUncertainty:
     """The spread of the values p of a law fitted to the problem."""
     e, jacobian = problem.off(p, terms)
     unknowns, n = problem.unknowns(terms), len(e)
-    scale = scales(jacobian)
+    scale = column_norms(jacobian)
     jacobian = jacobian / scale
     inverse = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
     freedom = max(n - len(unknowns), 1)
@@ -59,7 +59,7 @@ def spread(problem: Problem, p: np.ndarray, terms: Terms) -> Spread:
         variance = np.max([white, *(by_blocks(jacobian, e, inverse, count) for count in sorted(counts))], axis=0)
     free = p[unknowns] - inverse @ (jacobian.T @ e) / scale
     rms = float(np.sqrt(np.mean(e**2)))
-    return Spread(unknowns, np.sqrt(variance) / scale, correlated(inverse), free, rms, rho, alike, freedom)
+    return FitUncertainty(unknowns, np.sqrt(variance) / scale, correlated(inverse), free, rms, rho, alike, freedom)
 
 
 def correlated(covariance: np.ndarray) -> np.ndarray:
@@ -89,7 +89,7 @@ def by_blocks(jacobian: np.ndarray, e: np.ndarray, inverse: np.ndarray, count: i
     return np.diag(inverse @ (scores.T @ scores) @ inverse) * len(edges) / free
 
 
-def student(freedom: int) -> float:
+def student_t_quantile(freedom: int) -> float:
     """Student's t at 97.5 %, by the series of Abramowitz and Stegun (26.7.5) from ten degrees of freedom on."""
     if freedom <= len(FEW):
         return FEW[freedom - 1] if freedom > 0 else float("nan")
@@ -103,12 +103,12 @@ def interval(
     i: int, unknowns: np.ndarray, free: np.ndarray, errors: np.ndarray, correlation: np.ndarray, freedom: int
 ) -> tuple[float, float]:
     """The 95 % interval of the i-th of the `unknowns` (places in UNKNOWNS) that were measured as `free`."""
-    wide = errors * student(freedom) / SIDE
+    wide = errors * student_t_quantile(freedom) / SIDE
     losses = (unknowns >= ZETA) & (wide > 0)
     z = free / np.where(losses, wide, 1.0)
-    near = losses & (z < FAR)
+    near = losses & (z < NEGLIGIBLE_BOUND)
     if not losses[i] or not near.any():
         return float(free[i] - SIDE * wide[i]), float(free[i] + SIDE * wide[i])
     some = [i, *(j for j in np.flatnonzero(near).tolist() if j != i)]
-    low, high = bounded(z[some], correlation[np.ix_(some, some)])
+    low, high = nonnegative_interval(z[some], correlation[np.ix_(some, some)])
     return float(low * wide[i]), float(high * wide[i])

@@ -17,28 +17,28 @@ UNKNOWNS = ("t0", "amplitude", "rest", "drift", "omega", "zeta", "r", "b")
 T0, AMPLITUDE, REST, DRIFT, OMEGA, ZETA, R, B = range(8)
 TERMS = ("zeta", "r", "b")
 LAWS = tuple(law for size in (3, 2, 1) for law in combinations(TERMS, size))  # the full law first
-WORDS = {"zeta": "viscous damping", "r": "dry friction", "b": "quadratic drag"}
+TERM_NAMES = {"zeta": "viscous damping", "r": "dry friction", "b": "quadratic drag"}
 
 Terms = tuple[str, ...]
 
 
-def laws_of(terms: Terms) -> tuple[Terms, ...]:
+def sublaws(terms: Terms) -> tuple[Terms, ...]:
     """Every law of some of these terms, the full one first."""
     return tuple(law for law in LAWS if set(law) <= set(terms))
 
 
-def unknowns_of(terms: Terms, drift: bool) -> np.ndarray:
+def unknown_indices(terms: Terms, drift: bool) -> np.ndarray:
     """The places in UNKNOWNS of what a law with these terms leaves to find."""
     basic = [T0, AMPLITUDE, REST, *([DRIFT] if drift else []), OMEGA]
     return np.array(basic + [UNKNOWNS.index(term) for term in terms])
 
 
-def in_words(terms: Terms) -> str:
+def describe_law(terms: Terms) -> str:
     """A law by the names of its terms."""
-    *most, last = (WORDS[term] for term in terms)
+    *most, last = (TERM_NAMES[term] for term in terms)
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def at_rest(r: np.ndarray, sine: bool) -> np.ndarray:
+def sticking_limit(r: np.ndarray, is_pendulum: bool) -> np.ndarray:
     """The largest distance from rest at which friction holds (same shape as r)."""
-    return np.arcsin(np.clip(r, 0.0, 1.0)) if sine else r
+    return np.arcsin(np.clip(r, 0.0, 1.0)) if is_pendulum else r

@@ -12,7 +12,7 @@ LONGEST = 40  # rounds: a run of so many samples, too, is taken away from its en
 MOST = 0.05  # share of the samples
 
 
-def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
+def estimate_noise(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     """Standard deviation of the noise of x (n,), and the step of a quantiser that stands out of it, or 0.
 
     The noise is what is left of a sample by the cubic through its four neighbours, robustly by the median; also the
@@ -23,7 +23,7 @@ def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     if len(changes) and changes[-1] - changes[0] > 2 * MIN_SAMPLES:
         moving = slice(changes[0], changes[-1] + 2)
         t, x = t[moving], x[moving]
-    noise = typical(beside(t, x))
+    noise = robust_std(interpolation_residuals(t, x))
     rungs = np.diff(np.unique(x))
     rungs = rungs[rungs > 1e-9 * np.ptp(x)]  # the same value, computed twice
     step = float(rungs.min()) if len(rungs) else 0.0
@@ -31,7 +31,7 @@ def scatter(t: np.ndarray, x: np.ndarray) -> tuple[float, float]:
     return max(noise, step / np.sqrt(12)), step if coarse else 0.0
 
 
-def beside(t: np.ndarray, x: np.ndarray) -> np.ndarray:
+def interpolation_residuals(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     """How far each inner sample of x (n,) lies beside the cubic through its four neighbours (n - 4,), scaled so that
     white noise keeps its size."""
     n = len(t) - 4
@@ -45,17 +45,17 @@ def beside(t: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(left) / np.sqrt(1 + (weights**2).sum(axis=0)))
 
 
-def typical(e: np.ndarray) -> float:
+def robust_std(e: np.ndarray) -> float:
     """The standard deviation of residuals (n,) as their median tells it."""
     return 1.4826 * float(np.median(np.abs(e)))
 
 
-def without_spikes(record: Record) -> Record:
+def remove_spikes(record: Record) -> Record:
     """The record without the samples that lie far beside their neighbours; whole where such samples are many."""
     t, x = record.t, record.x
     for _ in range(LONGEST):
-        e = beside(t, x)
-        beyond = np.pad(np.where(e > max(FAR * typical(e), SPIKE * np.ptp(x)), e, 0.0), 2)
+        e = interpolation_residuals(t, x)
+        beyond = np.pad(np.where(e > max(FAR * robust_std(e), SPIKE * np.ptp(x)), e, 0.0), 2)
         alone = beyond[2:-2] >= np.max([beyond[i : len(x) - 4 + i] for i in range(5)], axis=0)
         spikes = 2 + np.flatnonzero(alone & (beyond[2:-2] > 0))
         t, x = np.delete(t, spikes), np.delete(x, spikes)
@@ -67,7 +67,7 @@ def without_spikes(record: Record) -> Record:
     return replace(record, t=t, x=x, notes=(*record.notes, f"Left out as stray: {lost} of {len(record.x)} samples."))
 
 
-def smooth(x: np.ndarray, width: int, degree: int) -> np.ndarray:
+def savitzky_golay(x: np.ndarray, width: int, degree: int) -> np.ndarray:
     """x (n,) through the polynomials of least squares over `width` samples (odd) about each, those at the ends over
     the first and the last `width` (A. Savitzky, M. J. E. Golay, Analytical Chemistry 36 (1964))."""
     half = width // 2
@@ -77,7 +77,7 @@ def smooth(x: np.ndarray, width: int, degree: int) -> np.ndarray:
     return np.concatenate([project[:half] @ x[:width], inner, project[half + 1 :] @ x[-width:]])
 
 
-def reversals(x: np.ndarray, least: float) -> np.ndarray:
+def find_reversals(x: np.ndarray, least: float) -> np.ndarray:
     """Samples at which x (n,) turns back by `least` or more, the first extreme included."""
     found: list[int] = []
     low = high = 0

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from ...records.record import Record
-from .choice import Law, more
-from .figures import Estimate, sizes
-from .intervals import Spread, spread
+from .estimates import Estimate, sizes
+from .fit_problem import FitProblem
+from .intervals import FitUncertainty, spread
 from .law import AMPLITUDE, DRIFT, OMEGA, REST, UNKNOWNS, ZETA
-from .problem import Problem
-from .squares import Unfit
+from .least_squares import FitError
+from .model_selection import FittedLaw, more
 
 ROUGH = 1.5  # times the noise: residuals beyond are no noise of single samples
 UNFIT = 0.1  # share of the motion: residuals beyond are no free decay of one oscillator
@@ -25,7 +25,9 @@ KEEPS_TIME = 12.0  # of n R^2, R the mean of n places on a circle: once in a hun
 FEWEST = 100  # samples of a half that is fitted apart
 
 
-def refuse(record: Record, problem: Problem, full: Law, spread: Spread, pendulum: bool) -> None:
+def reject_unusable_fit(
+    record: Record, problem: FitProblem, full: FittedLaw, spread: FitUncertainty, pendulum: bool
+) -> None:
     """Unfit where the best fit is no answer."""
     e, _ = problem.off(full.p, full.terms)
     share = spread.rms / problem.motion
@@ -33,24 +35,24 @@ def refuse(record: Record, problem: Problem, full: Law, spread: Spread, pendulum
         advice = "cut the record there with --from or --until"
         if record.base == "rad" and not pendulum:
             advice = "say --pendulum if it is one, or " + advice
-        raise Unfit(
+        raise FitError(
             f"is not a free decay of one oscillator: the best fit leaves {100 * min(share, 1.0):.0f} % of the "
-            f"motion, most of it about t = {record.format_time(worst(problem, full.p, e))} s",
+            f"motion, most of it about t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s",
             advice,
         )
     if gains(problem, full) < -GAINS:
-        raise Unfit("gains energy, so it is driven: the damping ratio that fits it best is negative")
+        raise FitError("gains energy, so it is driven: the damping ratio that fits it best is negative")
 
 
-def worst(problem: Problem, p: np.ndarray, e: np.ndarray) -> float:
+def time_of_largest_residuals(problem: FitProblem, p: np.ndarray, e: np.ndarray) -> float:
     """The time in s of the half swing whose residuals are largest."""
     width = max(int(np.pi / p[OMEGA] / float(np.median(np.diff(problem.t)))), 1)
     sums = np.add.reduceat(e**2, np.arange(0, len(e), width))
     at = min(int(np.argmax(sums)) * width + width // 2, len(e) - 1)
-    return float(problem.t[at] + problem.origin)
+    return float(problem.t[at] + problem.time_origin)
 
 
-def gains(problem: Problem, full: Law) -> float:
+def gains(problem: FitProblem, full: FittedLaw) -> float:
     """Of the viscous law alone: how many errors its damping ratio, if it could be negative, is above zero."""
     if full.p[ZETA:].any():
         return 0.0
@@ -58,9 +60,11 @@ def gains(problem: Problem, full: Law) -> float:
     return float(found.free[-1] / found.errors[-1]) if found.errors[-1] > 0 else 0.0
 
 
-def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, spread: Spread) -> tuple[str, ...]:
+def remarks(
+    record: Record, problem: FitProblem, laws: tuple[FittedLaw, ...], full: FittedLaw, spread: FitUncertainty
+) -> tuple[str, ...]:
     """The sentences."""
-    noise, rms, unit = problem.noise * problem.unit, spread.rms * problem.unit, record.unit
+    noise, rms, unit = problem.noise * problem.scale, spread.rms * problem.scale, record.unit
     rough, exact = spread.rms > ROUGH * problem.noise, spread.rms < 1e-9 * full.p[AMPLITUDE]
     if exact:
         return ()
@@ -70,7 +74,7 @@ def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, 
     share = spread.rms / problem.motion
     if rough and share > PART:
         e, _ = problem.off(full.p, full.terms)
-        most = f"most of it about t = {record.format_time(worst(problem, full.p, e))} s"
+        most = f"most of it about t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s"
         said.append(
             f"{off}, {100 * share:.1f} % of the motion, where the {scatter}: {also}, {most}; the intervals are "
             "widened, but where the law does not hold its values mean little."
@@ -83,44 +87,44 @@ def remarks(record: Record, problem: Problem, laws: tuple[Law, ...], full: Law, 
         said.append(
             f"Neighbouring residuals are alike (correlation {spread.rho:.2f}): {alone}; the intervals are widened."
         )
-    drift = drifting(record, problem, full) if spread.alike and not problem.drift else ""
-    alike = rounded_alike(problem, full, unit)
-    return (*said, *([drift] if drift else []), *alike, *undecided(problem, laws))
+    drift = drift_remark(record, problem, full) if spread.alike and not problem.drift else ""
+    alike = rounding_remark(problem, full, unit)
+    return (*said, *([drift] if drift else []), *alike, *ambiguity_remark(problem, laws))
 
 
-def rounded_alike(problem: Problem, full: Law, unit: str) -> tuple[str, ...]:
+def rounding_remark(problem: FitProblem, full: FittedLaw, unit: str) -> tuple[str, ...]:
     """A sentence where the steps of a sensor and the loss of a half swing keep time, so that its rounding is no noise:
     Rayleigh's test of where the turning points lie between two steps."""
-    amplitudes, begins = problem.half_swings(full.p)
+    amplitudes, begins = problem.half_cycles(full.p)
     places = full.p[REST] + problem.model.side * amplitudes * (-1.0) ** np.arange(len(amplitudes))
     seen = (begins >= 0) & (begins <= problem.t[-1])
     amplitudes, places, step = amplitudes[seen], places[seen], problem.step
     if not step or problem.model.order or len(amplitudes) < LEAST_TURNS:
         return ()
-    alike = abs(np.mean(np.exp(2j * np.pi * places * problem.unit / step)))
+    alike = abs(np.mean(np.exp(2j * np.pi * places * problem.scale / step)))
     if len(amplitudes) * alike**2 < KEEPS_TIME:
         return ()
-    near = 2 / np.pi * np.arccos(1 - min(step / (problem.unit * amplitudes.mean()), 1.0))  # share of the time there
+    near = 2 / np.pi * np.arccos(1 - min(step / (problem.scale * amplitudes.mean()), 1.0))  # share of the time there
     return (
         f"The sensor rounds all turning points alike, for what a half swing loses keeps time with its steps of "
         f"{step:.3g} {unit}: the rest position may be off by some {step / 2 * near:.1g} {unit}, amplitudes as much.",
     )
 
 
-def drifting(record: Record, problem: Problem, full: Law) -> str:
+def drift_remark(record: Record, problem: FitProblem, full: FittedLaw) -> str:
     """A sentence where the rest position would drift if it could."""
     free = replace(problem, drift=True)
     found = spread(free, full.p, full.terms)
     names = [UNKNOWNS[place] for place in found.unknowns]
     at = names.index("drift")
     p, squares = free.fit(full.p, full.terms)
-    if not (abs(found.free[at]) > DRIFTS * found.errors[at] or squares < full.squares / 2):
+    if not (abs(found.free[at]) > DRIFTS * found.errors[at] or squares < full.sum_of_squares / 2):
         return ""
-    over = float(p[DRIFT] * (problem.t[-1] - problem.t[0]) * problem.unit)
+    over = float(p[DRIFT] * (problem.t[-1] - problem.t[0]) * problem.scale)
     return f"The rest position drifts, by {over:.3g} {record.unit} over the record: --drift fits that as well."
 
 
-def undecided(problem: Problem, laws: tuple[Law, ...]) -> tuple[str, ...]:
+def ambiguity_remark(problem: FitProblem, laws: tuple[FittedLaw, ...]) -> tuple[str, ...]:
     """Laws that this record cannot tell from the best one, and what would."""
     best, n = laws[0], len(problem.t)
     gains = [more(problem, law, best) for law in laws]
@@ -133,19 +137,20 @@ def undecided(problem: Problem, laws: tuple[Law, ...]) -> tuple[str, ...]:
         return ()
     apart = max(abs(next(gain for law, gain in zip(laws, gains, strict=True) if law is rivals[0])), 1.0)
     factor = float(np.sqrt((CLEAR + np.log(n)) / apart))
-    words = " and ".join(f"{law.words} ({law.bic - best.bic:+.1f})" for law in rivals)
+    description = " and ".join(f"{law.description} ({law.bic - best.bic:+.1f})" for law in rivals)
     return (
-        f"{words[0].upper()}{words[1:]} cannot be told from {best.words} at this noise: a record with {factor:.1f} "
+        f"{description[0].upper()}{description[1:]} cannot be told from {best.description} at this noise: "
+        f"a record with {factor:.1f} "
         f"times less noise, or {np.ceil(factor**2):.0f} times as many samples, or more and larger swings, would tell.",
     )
 
 
-def halves_apart(
-    problem: Problem, full: Law, estimates: tuple[Estimate, ...]
+def compare_halves(
+    problem: FitProblem, full: FittedLaw, estimates: tuple[Estimate, ...]
 ) -> tuple[tuple[Estimate, ...], tuple[str, ...]]:
     """Where the fit is rough: the law in the first and in the second half of the record; where they disagree by more
     than their errors that is told, and the intervals hold both."""
-    _, begins = problem.half_swings(full.p)
+    _, begins = problem.half_cycles(full.p)
     cut = int(np.searchsorted(begins, problem.t[len(problem.t) // 2]))
     if cut >= len(begins) - 3:
         return estimates, ()

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from ...errors import HarnessError
+from ...references.models import CASES, MODELS
+from ...references.ode_problem import OdeProblem
+from ...references.piecewise_linear import mp
+from ...references.reference_trajectory import CommunicationGrid, compute_reference
 from ...running.embedded_model import EmbeddedModel, load_model_class
 from ...running.fmu_session import CompletedRun, FmuInfo, InitialValues, read_info, run_steps
 from ...scenes.fmu_files import find_fmu
-from ...truths.linear import mp
-from ...truths.models import CASES, MODELS
-from ...truths.problem import Equations
-from ...truths.truth import Grid, truth
 from .measure import NUMBERS, Beside, Measure
 
 POINTS = 1600
@@ -50,7 +50,7 @@ def moved(setting: InitialValues, times: list[float]) -> CompletedRun:
 def error(model: str, its: FmuInfo, chosen: dict[str, float | str]) -> float:
     """The largest error of the default experiment, as a share of the largest value."""
     values = its.resolve_labels({**its.start_values, **chosen})
-    answer = truth(model, [(0.0, its.stop, values)], Grid(0.0, its.stop, POINTS))
+    answer = compute_reference(model, [(0.0, its.stop, values)], CommunicationGrid(0.0, its.stop, POINTS))
     motion = moved(InitialValues(model, values, stop=its.stop), answer.times.tolist())
     return answer.error(motion.x, motion.v)
 
@@ -61,13 +61,13 @@ def exact(model: str, its: FmuInfo) -> Measure:
 
 def default(model: str, its: FmuInfo, name: str, value: float | str, reach: float) -> Measure:
     """A model with its own method and tolerance."""
-    beside = Beside("scipy Radau at 1e-11" if problem(model).stiff else "scipy DOP853 at 1e-13")
+    beside = Beside("scipy Radau at 1e-11" if problem(model).is_stiff else "scipy DOP853 at 1e-13")
     return Measure(f"{model}, default, {name} {value}", error(model, its, {name: value}), "1", reach, (beside,))
 
 
 def late(model: str, its: FmuInfo) -> Measure:
     """The largest error of the time of an event, relative to it."""
-    answer = truth(model, [(0.0, its.stop, its.start_values)], Grid(0.0, its.stop, 1))
+    answer = compute_reference(model, [(0.0, its.stop, its.start_values)], CommunicationGrid(0.0, its.stop, 1))
     found = EmbeddedModel.create(load_model_class(find_fmu(model)), {}, "exact", 0.0).find_mode_changes(its.stop)
     if [mode for _, mode in found] != [mode for _, mode in answer.events]:
         raise HarnessError(f"{model}: the modes after its events are not the true ones")
@@ -127,6 +127,6 @@ def drift(model: str, its: FmuInfo, chosen: dict[str, float]) -> Measure:
     return Measure(f"{model}, stuck for 1e6 s: displacement", off, problem(model).unit, 0.0, ())
 
 
-def problem(model: str) -> Equations:
+def problem(model: str) -> OdeProblem:
     """The equations of a model, as they are written a second time."""
     return next(case.problem for case in CASES if case.model == model)

@@ -15,11 +15,11 @@ import numpy as np
 from ...errors import HarnessError
 from ...process.subprocess_runner import run_subprocess
 from ...process.temporary_directory import temporary_directory
+from ...references.certified_reference import relative_errors
+from ...references.models import MODELS
 from ...running.c_host import Library, MissingToolError, compile_source, load_library
 from ...running.fmi3 import CO_SIMULATION, MODEL_EXCHANGE, RecordedRun, fmi3_path, open_fmi3_instance
 from ...scenes.fmu_files import find_fmu
-from ...truths.models import MODELS
-from ...truths.reference import relative
 from .measure import NUMBERS, Beside, Measure
 from .native import CASE, REACH, Figures, cvode, fmu, of_cvode, off, played, row
 from .scene import Scene
@@ -71,7 +71,7 @@ def by_cvode(scene: Scene, tolerances: tuple[float, ...] = TOLERANCES) -> Measur
 def error(scene: Scene, found: RecordedRun | np.ndarray) -> float:
     """The largest at the common times, of a recording or of position and speed (n, 2)."""
     motion = found.sample_at(scene.times, scene.its.outputs) if isinstance(found, RecordedRun) else found
-    return float(relative(motion, scene.truth).max())
+    return float(relative_errors(motion, scene.truth).max())
 
 
 def hand(scene: Scene, rtol: float) -> np.ndarray:
@@ -84,7 +84,7 @@ def hand(scene: Scene, rtol: float) -> np.ndarray:
     read = "0 getr {} {}".format(*map(library.references.__getitem__, ("x", "v")))
     led = {t: put(force=value, rate=rate) for t, _, value, rate in scene.lines}
     common = {*scene.times.tolist()}
-    calls = ["0 new hand quiet", *put(**its.values, rtol=rtol, atol=rtol * its.problem.absolute)]
+    calls = ["0 new hand quiet", *put(**its.values, rtol=rtol, atol=rtol * its.problem.atol_factor)]
     calls += [*led.pop(scene.start), f"0 begin {scene.start!r}", read]
     for t, ahead in pairwise(sorted(common | led.keys())):
         calls += [*led.get(t, []), f"0 step {t!r} {ahead - t!r}", *[read] * (ahead in common)]
@@ -97,7 +97,7 @@ def hand(scene: Scene, rtol: float) -> np.ndarray:
 def fmpy(scene: Scene, rtol: float, way: str = MODEL_EXCHANGE) -> RecordedRun:
     """A run of the FMI 3.0 FMU through fmpy, its events counted."""
     its = scene.its
-    outputs = (*its.outputs, *["events.count"] * its.problem.dry)
+    outputs = (*its.outputs, *["events.count"] * its.problem.has_dry_friction)
     span = scene.stop, scene.interval, rtol, None, scene.start
     with open_fmi3_instance(three(its.model), way) as fmu:
         return fmu.simulate(scene.numbers, outputs, *span, signals=scene.signals, drive_inputs=scene.ramps)
@@ -134,9 +134,11 @@ def beside_co_simulation(scene: Scene) -> Measure:
 
     def figures() -> Figures:
         one, other = (fmpy(scene, 1e-10, way) for way in (MODEL_EXCHANGE, CO_SIMULATION))
-        counts = [int(found.rows["events.count"][-1]) if scene.its.problem.dry else 0 for found in (one, other)]
+        counts = [
+            int(found.rows["events.count"][-1]) if scene.its.problem.has_dry_friction else 0 for found in (one, other)
+        ]
         told = Beside("{} events in model exchange, {} in co-simulation".format(*counts))
-        apart = relative(*(found.sample_at(scene.times, scene.its.outputs) for found in (one, other))).max()
+        apart = relative_errors(*(found.sample_at(scene.times, scene.its.outputs) for found in (one, other))).max()
         return float(apart) if counts[0] == counts[1] else inf, 1e-6, (told,)
 
     return row(f"{scene}: model exchange at rtol 1e-10, difference from co-simulation", "1", figures)

@@ -12,11 +12,11 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...process.subprocess_runner import run_subprocess
+from ...references.certified_reference import relative_errors
+from ...references.models import CASES, MODELS
 from ...running.c_host import Library, MissingToolError, compile_source, find_compiler, load_library
 from ...running.stepping_loops import COMMUNICATION_STEPS, time_direct_loop, time_per_step
 from ...scenes.fmu_files import find_fmu
-from ...truths.models import CASES, MODELS
-from ...truths.reference import relative
 from .measure import NUMBERS, Beside, Measure
 
 Figures = tuple[float, float, tuple[Beside, ...]]  # measured, to reach, beside
@@ -83,7 +83,7 @@ def against_cvode(case: str) -> Measure:
 
     The time is compared with CVODE's shortest, the error with its smallest, which is that of another tolerance.
     """
-    method = "BDF" if CASE[case].problem.stiff else "Adams"
+    method = "BDF" if CASE[case].problem.is_stiff else "Adams"
 
     def figures() -> Figures:
         mine, theirs = of_fmu(case, "native"), [of_cvode(case, rtol) for rtol in TOLERANCES]
@@ -177,7 +177,7 @@ def of_fmu(case: str, kind: str, steps: int = COMMUNICATION_STEPS) -> Timing:
 def of_cvode(case: str, rtol: float) -> Timing:
     """The CVODE FMU in the host in C."""
     its = CASE[case]
-    values = {**its.values, "rtol": rtol, "atol": rtol * its.problem.absolute}
+    values = {**its.values, "rtol": rtol, "atol": rtol * its.problem.atol_factor}
     return runs(cvode(its.model), values, ("x", "v"), its.problem.stop, COMMUNICATION_STEPS, REPEAT)
 
 
@@ -190,4 +190,4 @@ def through_fmpy(model: str, kind: str, steps: int) -> float:
 def off(case: str, found: Timing) -> float:
     """The largest error at the points of the reference, relative to the largest of position and speed."""
     truth = CASE[case].reference
-    return float(relative(found.rows[:: COMMUNICATION_STEPS // (len(truth.times) - 1)], truth.motion).max())
+    return float(relative_errors(found.rows[:: COMMUNICATION_STEPS // (len(truth.times) - 1)], truth.motion).max())

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ...references.certified_reference import POINTS, ReferenceCase
+from ...references.reference_trajectory import CommunicationGrid, compute_reference
 from ...running.fmu_session import read_info
-from ...truths.reference import POINTS, Case
-from ...truths.truth import Grid, truth
 from .native import CASE
 
 Line = tuple[float, float, float, float]  # from, to in s, the value at the beginning, and its rate
@@ -30,7 +30,7 @@ class Scene:
         return f"{self.case}, {self.what}" + (f" from {self.start:g} s" if self.start else "")
 
     @property
-    def its(self) -> Case:
+    def its(self) -> ReferenceCase:
         return CASE[self.case]
 
     @property
@@ -91,5 +91,5 @@ class Scene:
         values = known.resolve_labels({**known.start_values, **self.numbers})
         lines = [(t, end, {**dict.fromkeys(self.led, value), "rate": rate}) for t, end, value, rate in self.lines]
         spans = [(t, end, {**values, **led}) for t, end, led in lines]
-        found = truth(self.its.model, spans, Grid(self.start, self.stop, POINTS - 1))
+        found = compute_reference(self.its.model, spans, CommunicationGrid(self.start, self.stop, POINTS - 1))
         return np.column_stack([found.x, found.v])

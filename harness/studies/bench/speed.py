@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from ...references import peer_solvers
+from ...references.models import MODELS
+from ...references.models.pacejka import Pacejka
+from ...references.models.smd import Smd
+from ...references.models.stickslip import Stickslip
+from ...references.ode_problem import OdeProblem
 from ...running import stepping_loops
 from ...running.description import read_description
 from ...running.embedded_model import EmbeddedModel, load_model_class
 from ...running.stepping_loops import COMMUNICATION_STEPS
 from ...running.timing import time_call, time_fastest_call
 from ...scenes.fmu_files import find_fmu
-from ...truths import peers
-from ...truths.models import MODELS
-from ...truths.models.pacejka import Pacejka
-from ...truths.models.smd import Smd
-from ...truths.models.stickslip import Stickslip
-from ...truths.problem import Equations
 from . import empty as bench_empty
 from .measure import Beside, Measure
 
@@ -47,7 +47,7 @@ def inside_python(
     method: str,
     reach: float,
     rivals: tuple[str, str],
-    problem: Equations,
+    problem: OdeProblem,
     values: dict[str, float],
 ) -> Measure:
     """One run with 1600 points, without fmpy; `rivals` are methods of scipy and of CVODE."""
@@ -56,10 +56,10 @@ def inside_python(
     seconds = time_fastest_call(partial(mine.compute_states, times.tolist()), 20)
     beside = []
     for peer, name in zip(("scipy", "cvode"), rivals, strict=True):
-        if peer in peers.missing():
-            beside.append(Beside(f"{peer} {name}: {peers.missing()[peer]} is not installed"))
+        if peer in peer_solvers.missing_packages():
+            beside.append(Beside(f"{peer} {name}: {peer_solvers.missing_packages()[peer]} is not installed"))
         else:
-            ask = partial(peers.solve, peer, name, problem, times, RTOL, ATOL)
+            ask = partial(peer_solvers.solve, peer, name, problem, times, RTOL, ATOL)
             beside.append(Beside(f"{peer} {name} at {RTOL:g}", time_fastest_call(ask, 3)))
     setting = ", ".join([model, *(f"{name} {value:g}" for name, value in values.items()), method])
     return Measure(
@@ -136,6 +136,6 @@ def many_runs(carried: type) -> Measure:
 
     seconds = time_call(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
     problem = Stickslip()
-    ask = partial(peers.solve, "scipy", "RK23", problem, np.array([0.0, problem.stop]), RTOL, ATOL)
+    ask = partial(peer_solvers.solve, "scipy", "RK23", problem, np.array([0.0, problem.stop]), RTOL, ATOL)
     rival = Beside(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * time_fastest_call(ask, 5))
     return Measure(f"stickslip, exact: {RUNS} runs of {problem.stop:g} s, one core", seconds, "s", 10.0, (rival,))

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from ...references.models import MODELS
+from ...references.reference_trajectory import require_reference_packages
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
 from ...running.description import declared_parameters
 from ...scenes.fmu_files import find_fmu
-from ...truths.models import MODELS
-from ...truths.truth import check
 from .measure import Measure
 
 FOLDER, FILE = "bench", "bench.csv"
@@ -17,7 +17,7 @@ FOLDER, FILE = "bench", "bench.csv"
 
 def measures() -> list[Callable[[], Measure]]:
     """All that is measured: run times, then those of the native FMUs, then model exchange, then errors."""
-    check()
+    require_reference_packages()
     from .accuracy import accuracy
     from .exchange import exchange
     from .native import native

@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import HarnessError
 from ...process.subprocess_runner import PROJECT_ROOT, run_module
 from ...process.temporary_directory import temporary_directory
+from ...references.single_model_reference import BODY_MODELS, build_bodies, solve_bodies
 from ...results.files import column_heading, write_csv_rows
 from ...results.files import write_csv as write_csv
 from ...results.folder import replace_folder
@@ -21,7 +22,6 @@ from ...running.description import read_description
 from ...running.fmi2 import ProgressCallback
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu
-from ...truths.monolith import LINEAR, bodies, solve
 from .convergence import Convergence
 from .engine import ENGINES, EXTRA, MAIN, Request, rows
 
@@ -46,8 +46,8 @@ def perform(source: str, out: Path, stop: float | None, report: ProgressCallback
             name, file = Path(source).stem, plain / "theirs.ssp"
             asked, fmus, scene = theirs.asked(Path(source), file, stop), [Path(source)], None
         else:
-            scene = load_coupled_scene(source, LINEAR, stop)
-            defaults = {model: starts(find_fmu(model)) for model in LINEAR}
+            scene = load_coupled_scene(source, BODY_MODELS, stop)
+            defaults = {model: starts(find_fmu(model)) for model in BODY_MODELS}
             check(scene, defaults)
             name, file = scene.name, plain / f"{scene.identifier}.ssp"
             asked, fmus = blank(scene), [part.fmu for part in scene.parts]
@@ -115,8 +115,8 @@ def reference(fmu: Path, name: str) -> int:
 
 def solver(scene: CoupledScene, defaults: Starts) -> Callable[[np.ndarray], np.ndarray]:
     """What gives the positions (m, n) at times (m,) in s."""
-    system, start = bodies(scene, defaults)
-    return lambda times: solve(system, start, times)
+    system, start = build_bodies(scene, defaults)
+    return lambda times: solve_bodies(system, start, times)
 
 
 def study(

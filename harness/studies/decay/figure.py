@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.fit import Identified
+from ...analyses.decay.energy_loss import EnergyLoss
+from ...analyses.decay.identification import DecayIdentification
 from ...analyses.decay.law import Terms
-from ...analyses.decay.loss import Loss
 from ...results.quantity import display_unit
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
 
@@ -16,7 +16,7 @@ MOST = 4000  # points of a line: more are not seen
 COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of one term
 
 
-def draw(found: Identified, loss: Loss, path: Path) -> None:
+def draw(found: DecayIdentification, loss: EnergyLoss, path: Path) -> None:
     """Save the figure."""
     with open_figure(path, 1.8 * WIDTH, 3.4 * HEIGHT, layout=None) as figure:
         grid = figure.add_gridspec(3, 1, height_ratios=(3, 1.2, 2.2), **MARGINS)
@@ -27,24 +27,24 @@ def draw(found: Identified, loss: Loss, path: Path) -> None:
         shares(figure.add_subplot(grid[2]), found, loss)
 
 
-def signal(axes: Axes, found: Identified) -> None:
+def signal(axes: Axes, found: DecayIdentification) -> None:
     """Record, fit, rest position, turning points, and what was left out."""
     record, t = found.record, found.t
     unit, size = display_unit(record.unit)
-    used = np.isin(record.t - found.problem.origin, found.problem.t)
+    used = np.isin(record.t - found.problem.time_origin, found.problem.t)
     points(axes, t, found.x / size, color=BLUE, label="record")
     if not used.all():
         points(axes, record.t[~used], record.x[~used] / size, color=GREY, label="left out")
     fine = np.linspace(t[0], t[-1], MOST) if len(t) < MOST else t[extremes(found.x)]
     axes.plot(
-        fine, found.signal(found.best, fine) / size, color=ORANGE, linewidth=0.9, label=f"fit: {found.best.words}"
+        fine, found.signal(found.best, fine) / size, color=ORANGE, linewidth=0.9, label=f"fit: {found.best.description}"
     )
     rest = found.rest(found.best, fine[[0, -1]]) / size
     axes.plot(fine[[0, -1]], rest, color=GREY, linestyle="--", linewidth=0.8, label="rest")
     if not record.order:
         style: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
-        axes.plot(found.turns.t, found.turns.x / size, "o", label="turning points", **style)
-    axes.set_title(f"{record.name}: {found.best.words}")
+        axes.plot(found.extrema.t, found.extrema.x / size, "o", label="turning points", **style)
+    axes.set_title(f"{record.name}: {found.best.description}")
     axes.set_ylabel(axis_label(("x", "v", "a")[record.order], unit))
     axes.legend(loc="upper right", ncols=3)
 
@@ -66,7 +66,7 @@ def extremes(x: np.ndarray) -> np.ndarray:
     return np.unique(places[:, 0] + [np.zeros_like(low), low, high])
 
 
-def residuals(axes: Axes, found: Identified) -> None:
+def residuals(axes: Axes, found: DecayIdentification) -> None:
     """Record less fit."""
     unit, size = display_unit(found.record.unit)
     left = (found.x - found.signal(found.best, found.t)) / size
@@ -77,7 +77,7 @@ def residuals(axes: Axes, found: Identified) -> None:
     axes.set_xlabel("t [s]")
 
 
-def shares(axes: Axes, found: Identified, loss: Loss) -> None:
+def shares(axes: Axes, found: DecayIdentification, loss: EnergyLoss) -> None:
     """The share of its energy that each half swing loses, with the curves of all laws."""
     best, others = found.best, found.laws[1:]
     unit, size = display_unit(found.record.base)
@@ -87,14 +87,14 @@ def shares(axes: Axes, found: Identified, loss: Loss) -> None:
         return loss[0] / size, 100 * loss[1]
 
     for law in (law for law in others if law.terms in COLOURS):
-        axes.plot(*curve(loss.curves[law.terms]), color=COLOURS[law.terms], linestyle="--", label=law.words)
+        axes.plot(*curve(loss.curves[law.terms]), color=COLOURS[law.terms], linestyle="--", label=law.description)
     for i, law in enumerate(law for law in others if law.terms not in COLOURS):
         label_once = "" if i else "other mixed laws"
         axes.plot(*curve(loss.curves[law.terms]), color=GREY, linestyle=":", label=label_once)
-    axes.plot(*curve(loss.curves[best.terms]), color=ORANGE, linewidth=2, label=f"fit: {best.words}")
+    axes.plot(*curve(loss.curves[best.terms]), color=ORANGE, linewidth=2, label=f"fit: {best.description}")
     if len(loss.amplitude):
-        axes.plot(*curve((loss.amplitude, loss.share)), "o", color="black", fillstyle="none", label="turning points")
-    drawn = np.concatenate([loss.share, loss.curves[best.terms][1]])
+        axes.plot(*curve((loss.amplitude, loss.fraction)), "o", color="black", fillstyle="none", label="turning points")
+    drawn = np.concatenate([loss.fraction, loss.curves[best.terms][1]])
     if len(drawn):
         low, high = np.percentile(100 * drawn, [5, 95])
         margin = 0.4 * (high - low) + 0.1 * abs(high) + 1e-9

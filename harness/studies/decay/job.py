@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ...analyses.decay.decrement import stiffness
-from ...analyses.decay.figures import Known
-from ...analyses.decay.fit import Identified, identify
+from ...analyses.decay.energy_loss import EnergyLoss, measure_energy_loss
+from ...analyses.decay.estimates import KnownParameters
+from ...analyses.decay.identification import DecayIdentification, fit_decay
 from ...analyses.decay.law import AMPLITUDE, T0
-from ...analyses.decay.loss import Loss, losses_seen
 from ...errors import HarnessError, SceneError
 from ...records.columns import ColumnOptions, read_record
 from ...records.record import Record, check_record
@@ -25,25 +25,25 @@ FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
 
 
-Loaded = tuple[Record, Known, dict[str, Any]]  # and what their account tells: files, parameters, scene
+Loaded = tuple[Record, KnownParameters, dict[str, Any]]  # and what their account tells: files, parameters, scene
 
 
 def perform(
     source: str,
     columns: ColumnOptions,
-    known: Known,
+    known: KnownParameters,
     drag: bool,
     drift: bool,
     out: Path,
     report: Callable[[float], None],
-) -> tuple[Identified, Path]:
+) -> tuple[DecayIdentification, Path]:
     """Identify the decay of a record's file or of a scene; results go to out/decay/<name>."""
     record, force, told = load_record(source, columns, known, report)
     scene = told.pop("scene", {}) | vars(columns) | vars(known) | {"drag": drag, "drift": drift}
     folder = out / FOLDER / record.name
     named = provenance.describe_sources(source)
     with replace_folder(folder, FILES, named) as fresh:  # before the fit: what is in the way is told at once
-        found = identify(record, force, drag, drift, report)
+        found = fit_decay(record, force, drag, drift, report)
         save(found, fresh)
         provenance.write_provenance(fresh, **told, scene=scene, source=named)
     return found, folder
@@ -61,7 +61,7 @@ def uncollected() -> Iterator[None]:
         gc.enable()
 
 
-def load_record(source: str, columns: ColumnOptions, known: Known, report: Callable[[float], None]) -> Loaded:
+def load_record(source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]) -> Loaded:
     """The record of a file, or of a run of a scene together with the stiffness that its model has."""
     path = Path(source)
     if source == "-":
@@ -74,7 +74,7 @@ def load_record(source: str, columns: ColumnOptions, known: Known, report: Calla
     return recorded(source, columns, known, report)
 
 
-def recorded(source: str, columns: ColumnOptions, known: Known, report: Callable[[float], None]) -> Loaded:
+def recorded(source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]) -> Loaded:
     """The positions in a run of a scene."""
     from ...running.fmi2 import simulate
     from ...running.run_spec import spec_from_scene
@@ -95,19 +95,21 @@ def recorded(source: str, columns: ColumnOptions, known: Known, report: Callable
     told = {"files": (scene.file,), "parameters": run.effective_parameters, "scene": vars(scene)}
     if known.k is None and known.m is None:
         with suppress(HarnessError):  # a model without it has no force to tell
-            known = Known(k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad")
+            known = KnownParameters(k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad")
     return record, known, told
 
 
-def save(found: Identified, folder: Path) -> None:
+def save(found: DecayIdentification, folder: Path) -> None:
     """Write numbers, turning points, the fitted motion and the figure."""
     from .figure import draw
 
     unit = found.record.unit
-    loss = losses_seen(found)
+    loss = measure_energy_loss(found)
     (folder / "decay.json").write_text(to_json(numbers(found, loss)) + "\n", encoding="utf-8")
     write_csv(
-        folder / "turning-points.csv", ["t [s]", column_heading("x", found.record.base)], [found.turns.t, found.turns.x]
+        folder / "turning-points.csv",
+        ["t [s]", column_heading("x", found.record.base)],
+        [found.extrema.t, found.extrema.x],
     )
     fitted = found.signal(found.best, found.t)
     name = ("x", "v", "a")[found.record.order]
@@ -116,19 +118,19 @@ def save(found: Identified, folder: Path) -> None:
     draw(found, loss, folder / "figure.svg")
 
 
-def numbers(found: Identified, loss: Loss | None = None) -> dict[str, Any]:
+def numbers(found: DecayIdentification, loss: EnergyLoss | None = None) -> dict[str, Any]:
     """Everything found, for JSON."""
     problem, record, best = found.problem, found.record, found.best
-    loss = loss or losses_seen(found)
+    loss = loss or measure_energy_loss(found)
     return {
         "record": record.name,
         "quantity": record.quantity,
         "unit": record.unit,
         "sentence": found.sentence,
         "remarks": list(found.remarks),
-        "noise": found.turns.noise,
+        "noise": found.extrema.noise,
         "residual": found.rms,
-        "turning points": len(found.turns.t),
+        "turning points": len(found.extrema.t),
         "used": {
             "from": float(found.t[0]),
             "until": float(found.t[-1]),
@@ -137,26 +139,26 @@ def numbers(found: Identified, loss: Loss | None = None) -> dict[str, Any]:
             "time_unit": "s",
         },
         "release": {
-            "time": float(best.p[T0]) + problem.origin,
-            "amplitude": float(best.p[AMPLITUDE]) * problem.unit,
+            "time": float(best.p[T0]) + problem.time_origin,
+            "amplitude": float(best.p[AMPLITUDE]) * problem.scale,
             "unit": record.base,
         },
         "fit": [asdict(each) for each in found.estimates],
-        "turning_points": [asdict(each) for each in found.by_turns],
-        "published": [asdict(each) for each in found.published],
-        "why_empty": {name: why for name, why in found.why.items() if why},
+        "turning_points": [asdict(each) for each in found.extrema_estimates],
+        "published": [asdict(each) for each in found.two_peak_estimates],
+        "why_empty": {name: why for name, why in found.unavailable.items() if why},
         "laws": [
             {
                 "terms": list(law.terms),
                 "bic": law.bic,
-                "residual": float(np.sqrt(law.squares / len(found.t))) * problem.unit,
+                "residual": float(np.sqrt(law.sum_of_squares / len(found.t))) * problem.scale,
             }
             for law in found.laws
         ],
         "loss": {
             "unit": record.base,
             "amplitude": loss.amplitude.tolist(),
-            "share_of_energy": loss.share.tolist(),
+            "share_of_energy": loss.fraction.tolist(),
             "laws": {"+".join(law.terms): loss.curves[law.terms][1].tolist() for law in found.laws},
             "laws_amplitude": {"+".join(law.terms): loss.curves[law.terms][0].tolist() for law in found.laws},
         },

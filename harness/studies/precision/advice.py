@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from itertools import groupby
 from math import isnan
 
-from ...truths.reference import Case
+from ...references.certified_reference import ReferenceCase
 from .laws import Shortcut
 from .study import FMPY, FMU, WAYS, Point, Study
 
@@ -20,7 +20,7 @@ def needed(curve: Iterable[Point], target: float, beside_dry: bool = False) -> P
     return min(right, key=lambda point: point.seconds, default=None)
 
 
-def ranking(study: Study, case: Case, target: float) -> list[Point]:
+def ranking(study: Study, case: ReferenceCase, target: float) -> list[Point]:
     """The fastest point of every solver that meets the target, fastest first; FMUs without the ways through fmpy."""
     curves = [study.curve(case, *solver) for solver in study.solvers(case) if solver[0] not in (FMPY, *WAYS)]
     found = [point for curve in curves if (point := needed(curve, target))]
@@ -29,14 +29,14 @@ def ranking(study: Study, case: Case, target: float) -> list[Point]:
 
 def advise(study: Study, laws: Iterable[Shortcut], clear: float = 0.0) -> str:
     """One sentence on what to use for a model; of what takes less than `clear` times as long as another, none."""
-    best = [(case, ranking(study, case, TARGET)) for case in study.cases if not case.chatters]
+    best = [(case, ranking(study, case, TARGET)) for case in study.cases if not case.is_chattering]
     nothing = UNTOLD.format(study.cases[0].model) if clear else NOBODY
     parts = []
     for method, cases in groupby(best, key=lambda pair: choice(pair[1], clear)):
         parts.append(f"use {method}: " + series([price(*each) for each in cases]) if method else nothing)
-    parts += [shortcut(study, case) for case in study.cases if case.chatters]
+    parts += [shortcut(study, case) for case in study.cases if case.is_chattering]
     off = {law.case: law.largest for law in laws}
-    smooth = [f"{off[case.name]:.2g}" for case in study.cases if case.name in off and not case.chatters]
+    smooth = [f"{off[case.name]:.2g}" for case in study.cases if case.name in off and not case.is_chattering]
     if smooth:
         parts.append(f"however well integrated, these laws are {series(smooth)} of the motion away from dry friction")
     return f"{study.model}: " + "; ".join(parts) + "."
@@ -50,7 +50,7 @@ def choice(ranks: list[Point], clear: float) -> str:
     return best.method
 
 
-def price(case: Case, ranks: list[Point]) -> str:
+def price(case: ReferenceCase, ranks: list[Point]) -> str:
     """What the best method of the FMU costs, and how much longer the next best and the best peer take."""
     own = [point for point in ranks if point.tool == FMU]
     peers = [point for point in ranks if point.tool != FMU]
@@ -66,7 +66,7 @@ def price(case: Case, ranks: list[Point]) -> str:
     return text + (f"; for {power(TARGET)} {series(said)})" if said else ")")
 
 
-def shortcut(study: Study, case: Case) -> str:
+def shortcut(study: Study, case: ReferenceCase) -> str:
     """What a law that chatters costs, compared with the first law of the model."""
     solvers = [solver for solver in study.solvers(case) if solver[0] == FMU]
     points = [point for solver in solvers for point in study.curve(case, *solver)]

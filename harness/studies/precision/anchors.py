@@ -17,12 +17,17 @@ import numpy as np
 from ...errors import HarnessError
 from ...process.subprocess_runner import run_module
 from ...process.temporary_directory import temporary_directory
+from ...references import peer_solvers
+from ...references.literature_problems import (
+    BeltBlock,
+    ChatteringOscillator,
+    ChatteringOscillatorSign,
+    SmoothedBeltBlock,
+)
+from ...references.ode_problem import OdeProblem
 from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from ...running.solution import Solution
 from ...scenes.fmu_files import find_fmu
-from ...truths import peers
-from ...truths.anchors import Belt, Classic, Plain, Smoothed
-from ...truths.problem import Equations
 
 LIMIT = 20_000  # right-hand sides after which a run counts as without end
 RUNTIME, EVENTS = "this runtime", "events"
@@ -51,13 +56,17 @@ TIGHT = {"RK23": 1e-6, "ode23": 1e-6, "DOP853": 1e-10, "dop853": 1e-10}  # and 1
 def analyse() -> Iterator[AnchorRun]:
     """Both anchors with every method of the runtime, then with the peers."""
     name = "block on a belt"
-    yield from runtime(name, block(), {}, Belt.stop, BLOCK)
-    yield from others(name, Belt(), BLOCK, EVENTS, {"scipy": ("RK23", "RK45", "DOP853", "LSODA"), "cvode": ("Adams",)})
-    yield from others(name, Smoothed(), BLOCK, "arctan(1e6 v)", {"scipy": ("RK45", "LSODA")})
+    yield from runtime(name, block(), {}, BeltBlock.stop, BLOCK)
+    yield from others(
+        name, BeltBlock(), BLOCK, EVENTS, {"scipy": ("RK23", "RK45", "DOP853", "LSODA"), "cvode": ("Adams",)}
+    )
+    yield from others(name, SmoothedBeltBlock(), BLOCK, "arctan(1e6 v)", {"scipy": ("RK45", "LSODA")})
     name, values = "chattering classic", {"m": 1.0, "k": 1.0, "f": 10.0, "x0": 0.0, "v0": 5.0}
-    yield from runtime(name, load_model_class(find_fmu("coulomb")), values, Classic.stop, CLASSIC)
-    yield from others(name, Classic(), CLASSIC, EVENTS, {"scipy": ("RK23", "RK45", "LSODA")})
-    yield from others(name, Plain(), CLASSIC, "plain sign(v)", {"scipy": ("RK23", "RK45", "LSODA", "Radau")})
+    yield from runtime(name, load_model_class(find_fmu("coulomb")), values, ChatteringOscillator.stop, CLASSIC)
+    yield from others(name, ChatteringOscillator(), CLASSIC, EVENTS, {"scipy": ("RK23", "RK45", "LSODA")})
+    yield from others(
+        name, ChatteringOscillatorSign(), CLASSIC, "plain sign(v)", {"scipy": ("RK23", "RK45", "LSODA", "Radau")}
+    )
 
 
 @cache
@@ -81,14 +90,23 @@ def runtime(
 
 
 def others(
-    name: str, problem: Equations, end: tuple[float, float], way: str, methods: dict[str, tuple[str, ...]]
+    name: str, problem: OdeProblem, end: tuple[float, float], way: str, methods: dict[str, tuple[str, ...]]
 ) -> Iterator[AnchorRun]:
     """The peers that are installed."""
     times = np.array([0.0, problem.stop])
-    for peer in (peer for peer in methods if peer not in peers.missing()):
+    for peer in (peer for peer in methods if peer not in peer_solvers.missing_packages()):
         for method in methods[peer]:
             rtol = TIGHT.get(method, 1e-8)
-            solve = partial(peers.solve, peer, method, problem, times, rtol, 1e-3 * rtol, peers.at_most(LIMIT))
+            solve = partial(
+                peer_solvers.solve,
+                peer,
+                method,
+                problem,
+                times,
+                rtol,
+                1e-3 * rtol,
+                peer_solvers.limit_evaluations(LIMIT),
+            )
             yield row(partial(AnchorRun, name, f"{peer}, {way}", method, rtol), solve, end)
 
 

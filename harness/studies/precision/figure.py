@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from ...references.certified_reference import ReferenceCase
 from ...results.style import GREY, METHOD_COLOURS, WIDTH, open_figure
-from ...truths.reference import Case
 from .laws import Shortcut
 from .study import CS, FMPY, FMU, ME, Study
 
@@ -35,8 +35,8 @@ def draw(study: Study, laws: Sequence[Shortcut], path: Path) -> None:
 
     Laws that chatter are drawn in the row of true stick and slip, by their error beside that.
     """
-    cases = [case for case in study.cases if not case.chatters]
-    shortcuts = [case for case in study.cases if case.chatters]
+    cases = [case for case in study.cases if not case.is_chattering]
+    shortcuts = [case for case in study.cases if case.is_chattering]
     with open_figure(path, 2 * WIDTH + 1.5, 0.8 + 3.6 * len(cases)) as figure:
         figure.suptitle(f"{study.model}: what accuracy costs\n{LEGEND}", fontsize=11)
         panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
@@ -57,16 +57,18 @@ def draw(study: Study, laws: Sequence[Shortcut], path: Path) -> None:
         figure.legend(lines.values(), lines.keys(), loc="outside right upper")
 
 
-def curves(axes: Axes, study: Study, case: Case, cost: str) -> None:
+def curves(axes: Axes, study: Study, case: ReferenceCase, cost: str) -> None:
     """Every solver of a case, log-log; a failed run is a gap."""
     for tool, method in study.solvers(case):
-        same = tool in (FMPY, CS) and (cost != "seconds" or case.chatters)  # the same right-hand sides
+        same = tool in (FMPY, CS) and (cost != "seconds" or case.is_chattering)  # the same right-hand sides
         if same or not study.curve(case, tool, method):
             continue
         mine = [p for p in study.points if (p.case, p.tool, p.method) == (case.name, tool, method)]
-        errors = [max(p.beside_dry if case.chatters and p.beside_dry is not None else p.largest, FLOOR) for p in mine]
-        style = CHATTERING if case.chatters else TOOLS[tool]
-        text = f"{method}, law '{case.law}'" if case.chatters else f"{tool}: {method}"
+        errors = [
+            max(p.beside_dry if case.is_chattering and p.beside_dry is not None else p.largest, FLOOR) for p in mine
+        ]
+        style = CHATTERING if case.is_chattering else TOOLS[tool]
+        text = f"{method}, law '{case.law}'" if case.is_chattering else f"{tool}: {method}"
         star = {"markersize": 9, "marker": "*", "fillstyle": FILL.get(tool, "none")}
         shape = {**style, **(star if method == "exact" and tool != CS else {})}
         costs = [np.nan if p.failure else getattr(p, cost) for p in mine]

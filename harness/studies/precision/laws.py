@@ -10,10 +10,10 @@ from functools import partial
 
 import numpy as np
 
-from ...analyses.slip import crossings
+from ...analyses.slip import upward_crossings
+from ...references.certified_reference import CertifiedReference, ReferenceCase, compute_errors, load_reference
 from ...running.embedded_model import EmbeddedModel
 from ...running.solution import Solution
-from ...truths.reference import Case, Reference, errors, load
 
 FINE = 16001  # points among which peaks and slips are looked for
 TOLERANCE = 1e-8
@@ -36,28 +36,28 @@ class Shortcut:
     asymmetry: float | None
 
 
-def analyse(case: Case, model: type) -> Shortcut:
+def analyse(case: ReferenceCase, model: type) -> Shortcut:
     """The law of a case beside dry friction; `model` is the class inside the FMU."""
-    assert case.dry is not None
-    truth, dry = load(case.truth), load(case.dry)
-    off = errors(Solution(truth.motion, None, 0), dry)
+    assert case.dry_friction_reference is not None
+    truth, dry = load_reference(case.reference_source), load_reference(case.dry_friction_reference)
+    off = compute_errors(Solution(truth.motion, None, 0), dry)
     law = partial(Shortcut, case.model, case.name, case.law, off.final, off.rms, off.largest)
     held = stuck(dry)
     if not held.any():
         return law(None, None, None)
     creep = float(np.median(np.abs(truth.motion[held, 1])))
-    if case.problem.dry:
+    if case.problem.has_dry_friction:
         return law(creep, float(np.mean(np.diff([t for t, mode in truth.modes if mode]))), None)
     times = np.linspace(0.0, case.problem.stop, FINE)
     run = EmbeddedModel.create(model, case.values, None, TOLERANCE)
     motion = run.compute_states(times.tolist())
     rates = case.problem.rates(1)
     a = [rates(t, y)[1] for t, y in zip(times.tolist(), motion, strict=True)]
-    slips = crossings(times, np.array(motion)[:, 1] - run.model.v_driver)
+    slips = upward_crossings(times, np.array(motion)[:, 1] - run.model.v_driver)
     return law(creep, float(np.mean(np.diff(slips))), max(a) / -min(a))
 
 
-def stuck(truth: Reference) -> np.ndarray:
+def stuck(truth: CertifiedReference) -> np.ndarray:
     """Which of the common points (n,) find the body stuck."""
     starts, modes = zip(*truth.modes, strict=True)
     return np.array(modes)[np.searchsorted(starts, truth.times, side="right") - 1] == 0

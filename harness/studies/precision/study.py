@@ -17,6 +17,11 @@ from typing import Any
 import numpy as np
 
 from ...errors import HarnessError
+from ...references import peer_solvers
+from ...references.certification import certify_default_run
+from ...references.certified_reference import ReferenceCase, compute_errors, load_reference
+from ...references.models import CASES
+from ...references.ode_problem import UnspecifiedProblem
 from ...running import fmi3
 from ...running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from ...running.fmi2 import simulate
@@ -24,11 +29,6 @@ from ...running.run_spec import RunSpec
 from ...running.solution import Solution
 from ...running.timing import time_call
 from ...scenes.fmu_files import find_fmu
-from ...truths import peers
-from ...truths.certified import agreed
-from ...truths.models import CASES
-from ...truths.problem import Unwritten
-from ...truths.reference import Case, errors, load
 
 MOST = 20  # timed runs of one point
 
@@ -92,15 +92,15 @@ class Study:
     """All points of one model, its cases in order."""
 
     model: str
-    cases: tuple[Case, ...]
+    cases: tuple[ReferenceCase, ...]
     points: tuple[Point, ...]
 
-    def curve(self, case: Case, tool: str, method: str) -> list[Point]:
+    def curve(self, case: ReferenceCase, tool: str, method: str) -> list[Point]:
         """The points of one solver that did not fail, in the order of the sweep."""
         mine = (case.name, tool, method)
         return [p for p in self.points if (p.case, p.tool, p.method) == mine and not p.failure]
 
-    def solvers(self, case: Case) -> list[tuple[str, str]]:
+    def solvers(self, case: ReferenceCase) -> list[tuple[str, str]]:
         """Tool and method of every curve of a case, in order."""
         return list(dict.fromkeys((point.tool, point.method) for point in self.points if point.case == case.name))
 
@@ -128,13 +128,13 @@ def study(model: str, extent: Extent, report: Callable[[float], None]) -> Study:
     return Study(file.stem, cases, tuple(points))
 
 
-def default(model: str, file: Path, carried: Any) -> Case:
+def default(model: str, file: Path, carried: Any) -> ReferenceCase:
     """The default run of a model that nobody has written a second time: its certified result lies beside the file, or
     two methods agree about it."""
     beside = file.with_suffix(".csv").is_file()
-    truth = load(file.stem, file.parent) if beside else agreed(carried, file)
+    truth = load_reference(file.stem, file.parent) if beside else certify_default_run(carried, file)
     law, outputs = "default run", tuple(carried.states)
-    return Case(file.stem, model, law, truth, Unwritten(float(truth.times[-1])), outputs=outputs)
+    return ReferenceCase(file.stem, model, law, truth, UnspecifiedProblem(float(truth.times[-1])), outputs=outputs)
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class Asking:
     """The ways to ask about a case: the model that its FMU carries, that FMU in a file, its sibling, and peers.  Each
     takes rtol and an extent, and gives the answer with the run time in s."""
 
-    case: Case
+    case: ReferenceCase
     carried: Any
     file: Path
 
@@ -186,32 +186,37 @@ class Asking:
     def by_peer(self, peer: str, method: str, rtol: float, extent: Extent) -> tuple[Solution, float]:
         """Somebody else's solver."""
         problem = self.case.problem
-        ask = partial(peers.solve, peer, method, problem, self.times, rtol, problem.absolute * rtol)
-        return ask(peers.within(extent.timeout)), best(ask, extent.budget)
+        ask = partial(peer_solvers.solve, peer, method, problem, self.times, rtol, problem.atol_factor * rtol)
+        return ask(peer_solvers.limit_run_time(extent.timeout)), best(ask, extent.budget)
 
 
-def jobs(case: Case, carried: Any, file: Path) -> Iterator[Job]:
+def jobs(case: ReferenceCase, carried: Any, file: Path) -> Iterator[Job]:
     """Every solver that is asked about a case."""
-    ask, absolute = Asking(case, carried, file), case.problem.absolute
+    ask, absolute = Asking(case, carried, file), case.problem.atol_factor
     for method in method_numbers(carried):
-        if not (method == "exact" and case.chatters):
+        if not (method == "exact" and case.is_chattering):
             taken: dict[float, float] = {}  # run time in s by rtol, from the first of the two for the second
             swept = method != "exact"
             yield Job(FMU, method, nan, partial(ask.inside, method, taken), swept=swept)
             yield Job(FMPY, method, nan, partial(ask.through_fmpy, method, taken), True, swept)
-    if not case.chatters:
+    if not case.is_chattering:
         usual = {number: name for name, number in method_numbers(carried).items()}[carried().solver.method]
         for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3.fmi3_path(file).is_file())):
             yield Job(tool, method, nan, partial(ask.by_importer, tool), swept=swept)
-        absent = peers.PACKAGES if isinstance(case.problem, Unwritten) else peers.missing()
-        for peer, methods in (("scipy", peers.SCIPY), ("cvode", ("BDF",) if case.problem.stiff else ("Adams",))):
+        absent = (
+            peer_solvers.PACKAGES if isinstance(case.problem, UnspecifiedProblem) else peer_solvers.missing_packages()
+        )
+        for peer, methods in (
+            ("scipy", peer_solvers.SCIPY),
+            ("cvode", ("BDF",) if case.problem.is_stiff else ("Adams",)),
+        ):
             for method in methods if peer not in absent else ():
                 yield Job(peer, method, absolute, partial(ask.by_peer, peer, method))
 
 
-def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
+def sweep(case: ReferenceCase, job: Job, extent: Extent) -> Iterator[Point]:
     """One solver over all tolerances, from loose to tight."""
-    truth, dry = case.reference, load(case.dry) if case.dry else None
+    truth, dry = case.reference, load_reference(case.dry_friction_reference) if case.dry_friction_reference else None
     given_up = ""
     for rtol in extent.tolerances if job.swept else (nan,):
         point = partial(Point, case.name, job.tool, job.method, rtol, job.absolute * rtol)
@@ -231,8 +236,8 @@ def sweep(case: Case, job: Job, extent: Extent) -> Iterator[Point]:
         if not found:
             continue
         answer, seconds = found
-        beside_dry = errors(answer, dry).largest if dry else None
-        yield point(seconds, answer.evaluations, **vars(errors(answer, truth)), beside_dry=beside_dry)
+        beside_dry = compute_errors(answer, dry).largest if dry else None
+        yield point(seconds, answer.evaluations, **vars(compute_errors(answer, truth)), beside_dry=beside_dry)
 
 
 def best(call: Callable[[], object], budget: float) -> float:

@@ -7,14 +7,14 @@ from math import isnan
 from pathlib import Path
 from shutil import copytree, ignore_patterns
 
+from ...references.models import CASES
+from ...references.peer_solvers import missing_packages
 from ...results.files import column_heading, write_csv_rows
 from ...results.folder import check_same_source, replace_folder
 from ...results.provenance import write_provenance
 from ...running.description import declared_parameters
 from ...running.embedded_model import load_model_class
 from ...scenes.fmu_files import check_built, find_fmu
-from ...truths.models import CASES
-from ...truths.peers import missing
 from . import anchors, laws
 from .advice import advise
 from .study import QUICK, Extent, Point, Study, study
@@ -63,11 +63,15 @@ def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float],
     """Run everything."""
     studies = tuple(study(model, extent, partial(report, model)) for model in models)
     carried = {model: load_model_class(find_fmu(model)) for model in models}
-    told = [laws.analyse(case, carried[case.model]) for case in CASES if case.dry and case.model in models]
+    told = [
+        laws.analyse(case, carried[case.model])
+        for case in CASES
+        if case.dry_friction_reference and case.model in models
+    ]
     report("anchors", 0.0)
     rows = tuple(anchors.analyse()) if told or any(case.model in models for case in CASES) else ()
     said = tuple(advise(each, [law for law in told if law.model == each.model], extent.clear) for each in studies)
-    absent = (f"{peer} is left out: pip install {package}" for peer, package in missing().items())
+    absent = (f"{peer} is left out: pip install {package}" for peer, package in missing_packages().items())
     return Survey(studies, tuple(told), rows, said, (*map(gaps, studies), *reasons(studies), *absent))
 
 

@@ -17,7 +17,7 @@ from ...process.temporary_directory import temporary_directory
 from ...process.worker_pool import Worker, WorkerDiedError, process_context
 
 # imported once, where processes are forked from
-PRELOAD = [f"{__package__}.study", "harness.truths.linear", "scipy.integrate"]
+PRELOAD = [f"{__package__}.study", "harness.references.piecewise_linear", "scipy.integrate"]
 
 CONTEXT: Any = process_context(PRELOAD)
 

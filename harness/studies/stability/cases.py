@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ...references.reference_trajectory import CommunicationGrid
+from ...references.segments import ParameterSpan
 from ...running.fmu_session import FmuInfo, InitialValues
-from ...truths.pieces import Span
-from ...truths.truth import Grid
 
 FILE = Path(__file__).with_name("stability.toml")
 RTOL = 1e-6
@@ -26,8 +26,8 @@ class Trial:
     model: str
     method: str
     setting: InitialValues
-    grid: Grid
-    spans: list[Span]
+    grid: CommunicationGrid
+    spans: list[ParameterSpan]
     calls: list[tuple[float, float]] | None = None
     changes: dict[float, dict[str, float]] = field(default_factory=dict)
     finish: float | None = None
@@ -126,7 +126,7 @@ def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> Tr
         model=scene["model"],
         method=method,
         setting=InitialValues(scene["model"], values, start, stop),
-        grid=Grid(start, stop, points, tuple(changes), scene.get("at_events", False)),
+        grid=CommunicationGrid(start, stop, points, tuple(changes), scene.get("at_events", False)),
         spans=spans(start, stop, values, changes),
         calls=[(t, h) for t, h in scene["calls"]] if "calls" in scene else None,
         changes=changes,
@@ -140,7 +140,9 @@ def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> Tr
     )
 
 
-def spans(start: float, stop: float, values: dict[str, float], changes: dict[float, dict[str, float]]) -> list[Span]:
+def spans(
+    start: float, stop: float, values: dict[str, float], changes: dict[float, dict[str, float]]
+) -> list[ParameterSpan]:
     """From one change to the next, and the values that hold there; those of the solver are none of the truth's."""
     physical = {name: value for name, value in values.items() if not name.startswith("solver.")}
     found, begin = [], start

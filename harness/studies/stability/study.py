@@ -15,6 +15,14 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...process.interruptible_wait import map_in_threads
+from ...references.certification import compute_by_two_methods
+from ...references.models import MODELS
+from ...references.reference_trajectory import (
+    ReferenceTrajectory,
+    compute_reference,
+    max_or_nan,
+    require_reference_packages,
+)
 from ...results.files import write_csv_rows
 from ...results.folder import replace_folder
 from ...results.provenance import prefix_parameters, write_provenance
@@ -30,9 +38,6 @@ from ...running.fmu_session import (
     run_steps,
 )
 from ...scenes.fmu_files import check_built, find_fmu
-from ...truths.certified import by_two_methods
-from ...truths.models import MODELS
-from ...truths.truth import Truth, check, truth, worst
 from .bounded import bounded
 from .cases import Trial, cases, scenes, usual
 from .endings import FINISHED, REFUSED, WRONG, Ending, Region
@@ -79,7 +84,7 @@ def all_cases(
 ) -> list[list[Trial]]:
     """The cases of all wanted scenes, of some models only if they are named; those that share one true answer stand
     together.  A model without scenes of its own meets the usual ones."""
-    check()
+    require_reference_packages()
     for model in models:
         check_built(find_fmu(model))
     found, finish = scenes()
@@ -108,7 +113,7 @@ def modes(model: str) -> list[str]:
 
 def judged(group: Iterable[Trial]) -> Iterator[Ending]:
     """The rows of cases that share one true answer."""
-    answer: Truth | None = None
+    answer: ReferenceTrajectory | None = None
     doubt = ""
     for case in group:
         try:
@@ -116,7 +121,7 @@ def judged(group: Iterable[Trial]) -> Iterator[Ending]:
                 yield all_refused(case, bounded(LIMIT, inject_nonfinite, case.setting))
                 continue
             if case.refuse is None and answer is None and not doubt:
-                answering = truth if case.model in MODELS else by_two_methods
+                answering = compute_reference if case.model in MODELS else compute_by_two_methods
                 try:
                     answer = bounded(LIMIT, answering, case.model, case.spans, case.grid)
                 except HarnessError as error:
@@ -153,7 +158,7 @@ def refused(case: Trial, ending: RefusedRun) -> Ending:
     return Ending(case, REFUSED, ending.message)
 
 
-def finished(case: Trial, motion: CompletedRun, answer: Truth) -> Ending:
+def finished(case: Trial, motion: CompletedRun, answer: ReferenceTrajectory) -> Ending:
     """A motion has the right events, is as near to the answer as the scene expects, and makes no energy."""
     assert case.finish is not None
     error = answer.error(motion.x, motion.v)
@@ -167,7 +172,7 @@ def finished(case: Trial, motion: CompletedRun, answer: Truth) -> Ending:
             wrong.append(f"{motion.counts.events} events, not {len(answer.events)}")
         elif answer.events:
             late = abs(motion.t_last - answer.events[-1][0])
-            error = worst(error, late / (case.grid.stop - case.grid.start))
+            error = max_or_nan(error, late / (case.grid.stop - case.grid.start))
     if not error <= case.finish:
         wrong.append(f"error {error:.2g}, more than {case.finish:g}")
     if free and not rise <= case.finish:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...analyses.decay.decrement import damping_ratio, friction, turning_points
-from ...analyses.slip import crest, crossings, slips_of_modes
+from ...analyses.decay.decrement import damping_ratio, find_extrema_from_velocity, friction_from_envelope
+from ...analyses.slip import peak_value, slips_from_modes, upward_crossings
 from ...errors import HarnessError
 from ...running.trajectory import Trajectory
 from ...running.variable_values import variable_unit
@@ -46,10 +46,12 @@ class AlongPath:
 def starts(run: Trajectory) -> np.ndarray:
     """Times in s at which slips begin."""
     if run.events is not None:
-        return slips_of_modes(run.events.t, run.events.mode)[0]
+        return slips_from_modes(run.events.t, run.events.mode)[0]
     driver = run.get_parameter("v_driver", "the measure 'slips'")
     return (
-        crossings(run.time, run.column_of_role("velocity") * np.sign(driver) - abs(driver)) if driver else np.array([])
+        upward_crossings(run.time, run.column_of_role("velocity") * np.sign(driver) - abs(driver))
+        if driver
+        else np.array([])
     )
 
 
@@ -60,7 +62,7 @@ def period(run: Trajectory) -> float:
 
 def peak_speed(run: Trajectory) -> float:
     speed = np.abs(run.column_of_role("velocity"))
-    return crest(run.time, speed, np.ones(len(speed), bool))
+    return peak_value(run.time, speed, np.ones(len(speed), bool))
 
 
 def stuck(run: Trajectory) -> float:
@@ -82,7 +84,7 @@ def unsteady(run: Trajectory) -> float:
 
 def decayed(run: Trajectory, law: Callable[[float, float, float], float]) -> float:
     """A figure from the first and the last turning point of a free decay about zero."""
-    _, places = turning_points(run.time, run.column_of_role("position"), run.column_of_role("velocity"))
+    _, places = find_extrema_from_velocity(run.time, run.column_of_role("position"), run.column_of_role("velocity"))
     sizes = places * np.where(np.arange(len(places)) % 2, -1.0, 1.0) * np.sign(places[:1])
     places = sizes[sizes > 0]  # the last one may come to rest on its own side
     try:
@@ -92,7 +94,7 @@ def decayed(run: Trajectory, law: Callable[[float, float, float], float]) -> flo
 
 
 zeta = partial(decayed, law=damping_ratio)
-f_over_k = partial(decayed, law=partial(friction, stiffness=1.0))
+f_over_k = partial(decayed, law=partial(friction_from_envelope, stiffness=1.0))
 
 AT_END = {  # and the variable that tells it
     "events": (Column("events", "", "changes of mode"), "events.count"),

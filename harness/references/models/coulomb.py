@@ -1,0 +1,35 @@
+"""Spring and mass with Coulomb friction."""
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from ..certified_reference import ReferenceCase
+from ..ode_problem import LinearOscillator, RhsFunction, closed_form_segments
+
+
+class Coulomb(LinearOscillator):
+    """m v' = -k x - f sign(v)."""
+
+    start, stop, has_dry_friction = (0.1, 0.0), 4.0, True
+    m, k, f = 1.0, 157.9, 0.5
+
+    def rates(self, mode: int) -> RhsFunction:
+        square, drag = self.k / self.m, mode * self.f / self.m
+        return lambda t, y: (y[1], -square * y[0] - drag)
+
+    def hold(self, t: float, x: float) -> tuple[float, float, float]:
+        return -self.k * x, 0.0, self.f
+
+
+def friction(value: Mapping[str, Any]) -> tuple[Any, Any]:
+    """What slides and what holds."""
+    return value["f"], value["f"]
+
+
+pieces = partial(closed_form_segments, friction)
+CASES = (
+    ReferenceCase("coulomb", "coulomb", "hybrid", "coulomb", Coulomb()),
+    ReferenceCase("coulomb-sign", "coulomb", "sign", "coulomb", Coulomb(), {"friction": 2}, "coulomb"),
+)
+CLOSED_FORMS = {"coulomb": lambda stop: pieces([(0.0, stop, Coulomb().values("m", "k", "f"))])}

@@ -1,0 +1,88 @@
+"""The sled with the magic formula, by scipy's Radau, with the slope of the curve, restarted where a value changes."""
+
+from collections.abc import Iterator
+from math import asin, atan, cos, pi, sin, tan
+
+import numpy as np
+
+from ..certified_reference import ReferenceCase
+from ..ode_problem import JacobianFunction, OdeProblem, RhsFunction, StateVector
+from ..segments import ParameterSpan, ParameterValues, Segment, shift_time
+from .stickslip import Stickslip
+
+
+class MagicFormula:
+    """The magic formula: mu and its slope at a speed."""
+
+    def __init__(self, p: ParameterValues):
+        self.D, self.C = p["mu_s"], 1 + (1 - 2 * asin(p["mu_d"] / p["mu_s"]) / pi)
+        self.B = (p["mu_s"] / (p["x_m"] / 2)) / (self.C * self.D)
+        top = self.B * p["x_m"]
+        self.E = (top - tan(pi / (2 * self.C))) / (top - atan(top))
+
+    def mu(self, v: float) -> float:
+        bv = self.B * v
+        return self.D * sin(self.C * atan(bv - self.E * (bv - atan(bv))))
+
+    def slope(self, v: float) -> float:
+        bv = self.B * v
+        inner = bv - self.E * (bv - atan(bv))
+        rise = self.B * (1 - self.E * bv * bv / (1 + bv * bv))
+        return self.D * self.C * cos(self.C * atan(inner)) * rise / (1 + inner * inner)
+
+
+class Pacejka(Stickslip):
+    """The sled with the magic formula: one smooth equation, no modes."""
+
+    has_dry_friction, is_stiff = False, True
+
+    def __init__(self, x_m: float = 0.01) -> None:
+        self.atol_factor = min(x_m, OdeProblem.atol_factor)  # the curve is as fine as that
+        self.curve = MagicFormula({"mu_s": self.mu_s, "mu_d": self.mu_d, "x_m": x_m})
+
+    def rates(self, mode: int) -> RhsFunction:
+        square, speed, weight = self.k / self.m, self.v_driver, self.curve.D * self.g
+        B, C, E = self.curve.B, self.curve.C, self.curve.E  # written out, as who wants it fast would
+
+        def rates(t: float, y: StateVector) -> tuple[float, float]:
+            x, v = y
+            z = B * v
+            return v, square * (speed * t - x) - weight * sin(C * atan(z - E * (z - atan(z))))
+
+        return rates
+
+    def jacobian(self, mode: int) -> JacobianFunction:
+        square = self.k / self.m
+        return lambda t, y: [[0.0, 1.0], [-square, -self.curve.slope(y[1]) * self.g]]
+
+
+def pieces(spans: list[ParameterSpan]) -> Iterator[Segment]:
+    """m a = F_ext + k (x_driver - x) - mu(v) m g, in one piece from each change of values on."""
+    from scipy.integrate import solve_ivp
+
+    y, drive = [spans[0][2]["x0"], spans[0][2]["v0"]], 0.0
+    for begin, end, p in spans:
+        curve = MagicFormula(p)
+
+        def rates(
+            s: float, y: np.ndarray, p: ParameterValues = p, curve: MagicFormula = curve, drive: float = drive
+        ) -> tuple[float, float]:
+            pull = p["F_ext"] + p.get("rate", 0.0) * s + p["k"] * (drive + p["v_driver"] * s - y[0])
+            return y[1], pull / p["m"] - curve.mu(y[1]) * p["g"]
+
+        def slopes(s: float, y: np.ndarray, p: ParameterValues = p, curve: MagicFormula = curve) -> list[list[float]]:
+            return [[0.0, 1.0], [-p["k"] / p["m"], -curve.slope(y[1]) * p["g"]]]
+
+        # in the time from the beginning of the span, which has finer digits than that of the clock
+        run = solve_ivp(rates, (0.0, end - begin), y, "Radau", jac=slopes, rtol=1e-11, atol=1e-15, dense_output=True)
+        yield Segment(begin, 1, shift_time(run.sol, begin))
+        y, drive = run.y[:, -1], drive + p["v_driver"] * (end - begin)
+
+
+def case(x_m: str, truth: str) -> ReferenceCase:
+    """One of its curves."""
+    law, problem = f"magic formula, x_m = {x_m} m/s", Pacejka(float(x_m))
+    return ReferenceCase(f"pacejka-{x_m}", "pacejka", law, truth, problem, {"x_m": float(x_m)}, "stickslip")
+
+
+CASES = (case("0.01", "pacejka"), case("0.001", "pacejka-0.001"), case("0.0001", "pacejka-0.0001"))

@@ -1,0 +1,23 @@
+"""Spring, mass and viscous damper."""
+
+from functools import partial
+
+from ..certified_reference import ReferenceCase
+from ..ode_problem import LinearOscillator, RhsFunction, closed_form_segments
+
+
+class Smd(LinearOscillator):
+    """m v' = -k x - c v."""
+
+    start, stop = (0.1, 0.0), 4.0
+    m, k, c = 1.0, 157.9, 2.0
+
+    def rates(self, mode: int) -> RhsFunction:
+        square, damping = self.k / self.m, self.c / self.m
+        return lambda t, y: (y[1], -square * y[0] - damping * y[1])
+
+
+friction = None
+pieces = partial(closed_form_segments, friction)
+CASES = (ReferenceCase("smd", "smd", "linear damping", "smd", Smd()),)
+CLOSED_FORMS = {"smd": lambda stop: pieces([(0.0, stop, Smd().values("m", "k", "c"))])}

@@ -1,0 +1,52 @@
+"""Drag sled pulled through a spring."""
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any
+
+from ..certified_reference import ReferenceCase
+from ..ode_problem import LinearOscillator, RhsFunction, closed_form_segments
+from ..segments import Segment
+
+THRESHOLD = "stickslip-threshold"
+
+
+class Stickslip(LinearOscillator):
+    """m v' = k (v_driver t - x) - mu m g sign(v)."""
+
+    start, stop, has_dry_friction = (0.0, 0.0), 16.0, True
+    m, k, g, mu_s, mu_d, v_driver = 12.5, 742.5, 9.81, 0.9, 0.6, 0.034
+
+    def rates(self, mode: int) -> RhsFunction:
+        square, drag, speed = self.k / self.m, mode * self.mu_d * self.g, self.v_driver
+        return lambda t, y: (y[1], square * (speed * t - y[0]) - drag)
+
+    def hold(self, t: float, x: float) -> tuple[float, float, float]:
+        return self.k * (self.v_driver * t - x), self.k * self.v_driver, self.mu_s * self.m * self.g
+
+
+VALUES = Stickslip().values("m", "k", "g", "mu_s", "mu_d", "v_driver")
+
+
+def friction(value: Mapping[str, Any]) -> tuple[Any, Any]:
+    """What slides and what holds."""
+    weight = value["m"] * value["g"]
+    return value["mu_d"] * weight, value["mu_s"] * weight
+
+
+def held_below(eps: float, stop: float) -> Iterator[Segment]:
+    """Its motion under the threshold law."""
+    from .. import piecewise_linear
+
+    return piecewise_linear.threshold_segments(piecewise_linear.system(VALUES, friction), eps, stop)
+
+
+pieces = partial(closed_form_segments, friction)
+CASES = (
+    ReferenceCase("stickslip", "stickslip", "hybrid", "stickslip", Stickslip()),
+    ReferenceCase(THRESHOLD, "stickslip", "threshold", THRESHOLD, Stickslip(), {"friction": 3}, "stickslip"),
+)
+CLOSED_FORMS = {
+    "stickslip": lambda stop: pieces([(0.0, stop, VALUES)]),
+    THRESHOLD: lambda stop: held_below(1e-7, stop),
+}
