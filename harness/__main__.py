@@ -20,9 +20,9 @@ def main() -> None:
     try:
         with interruptible():
             from .commands import commands
-            from .commands.terminal import prepare
+            from .commands.terminal import prepare_process
 
-            prepare()
+            prepare_process()
             try:
                 with commands.make_context(COMMAND_NAME, sys.argv[1:]) as context:
                     commands.invoke(context)

@@ -5,11 +5,11 @@ from pkgutil import iter_modules
 
 import click
 
-from .run import figures
-from .terminal import Terminal, results
+from .run import outcome_as_json
+from .terminal import Terminal, result_options
 
 
-def version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+def print_version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
     """Print the versions that every result tells, and end."""
     if wanted:
         from ..results.provenance import package_versions
@@ -18,7 +18,7 @@ def version(context: click.Context, option: click.Parameter, wanted: bool) -> No
         context.exit()
 
 
-class Commands(click.Group):
+class FullHelpGroup(click.Group):
     """Whose help cuts no sentence short."""
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
@@ -27,9 +27,11 @@ class Commands(click.Group):
             formatter.write_dl([(name, each.get_short_help_str(limit=1000)) for name, each in self.commands.items()])
 
 
-@click.group(cls=Commands, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
-@results
-@click.option("--version", is_flag=True, is_eager=True, expose_value=False, callback=version, help="Print versions.")
+@click.group(cls=FullHelpGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@result_options
+@click.option(
+    "--version", is_flag=True, is_eager=True, expose_value=False, callback=print_version, help="Print versions."
+)
 @click.pass_context
 def commands(context: click.Context, terminal: Terminal) -> None:
     """Run the built FMUs, measure what they do, and set it beside what was published.
@@ -46,15 +48,15 @@ def commands(context: click.Context, terminal: Terminal) -> None:
     """
     context.default_map = dict.fromkeys(commands.commands, vars(terminal))  # before the command, they hold for it too
     if context.invoked_subcommand is None:
-        from ..studies.run import job
-        from ..studies.run.table import comparison
+        from ..studies.run import study
+        from ..studies.run.table import results_table
 
-        names = job.published()
+        names = study.published_scene_names()
         with terminal.progress(len(names)) as report:
-            outcomes = list(job.main_job(names, terminal.out, report))
-        told = [figures(outcome, terminal.out) for outcome in outcomes]
+            outcomes = list(study.run_scenes(names, terminal.out, report))
+        told = [outcome_as_json(outcome, terminal.out) for outcome in outcomes]
         failed = (outcome.error for outcome in outcomes if outcome.error)
-        terminal.answer(told, comparison(outcomes, everything=False), folder=terminal.out, failed=failed)
+        terminal.print_result(told, results_table(outcomes, everything=False), folder=terminal.out, failed=failed)
 
 
 for file in iter_modules(__path__):

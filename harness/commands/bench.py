@@ -2,11 +2,11 @@
 
 import click
 
-from .terminal import Terminal, results
+from .terminal import Terminal, result_options
 
 
 @click.command()
-@results
+@result_options
 def bench(terminal: Terminal) -> None:
     """Measure the numbers to reach, each beside what it is compared with in the same run.
 
@@ -15,9 +15,9 @@ def bench(terminal: Terminal) -> None:
       python -m harness bench
     """
     from ..studies.bench import study as work
-    from ..studies.bench.table import numbers
+    from ..studies.bench.table import benchmark_table
 
-    chosen = work.measures()
+    chosen = work.all_benchmarks()
     with terminal.progress(len(chosen)) as report:
-        found = work.bench(chosen, terminal.out, report)
-    terminal.answer(found, numbers(found), folder=terminal.out / work.FOLDER)
+        found = work.run_benchmarks(chosen, terminal.out, report)
+    terminal.print_result(found, benchmark_table(found), folder=terminal.out / work.FOLDER)

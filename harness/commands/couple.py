@@ -4,13 +4,13 @@ from functools import partial
 
 import click
 
-from .terminal import POSITIVE, Terminal, results
+from .terminal import POSITIVE, Terminal, result_options
 
 
 @click.command()
 @click.argument("scene")
 @click.option("--stop", type=POSITIVE, help="Stop time in s (the one that it names).")
-@results
+@result_options
 def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
     """Couple the FMUs of a SCENE: written as an SSP archive, run by Ecos beside a monolithic reference, and by libcosim
     and fmpy where they can.
@@ -24,10 +24,10 @@ def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
       python -m harness couple my-pair.toml --out elsewhere
       python -m harness couple theirs.ssp --stop 10
     """
-    from ..studies.coupled.study import perform
+    from ..studies.coupled.study import run_coupled
 
     with terminal.progress(1) as report:
-        found, folder = perform(scene, terminal.out, stop, partial(report, scene))
+        found, folder = run_coupled(scene, terminal.out, stop, partial(report, scene))
     engines = {name: {"largest error": off, "why not": why} for name, (_, off, why) in found.engines.items()}
     told = {"steps": found.steps, "errors": found.errors, "order": found.order, "engines": engines, "folder": folder}
     shown = [
@@ -36,4 +36,4 @@ def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
         f"The error falls with the power {found.order:.2f} of the step.",
         *(f"{name:<24} {why or f'{off:.3e} with the finest step'}" for name, (_, off, why) in found.engines.items()),
     ]
-    terminal.answer(told, *shown, folder=folder)
+    terminal.print_result(told, *shown, folder=folder)

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from .terminal import POSITIVE, Terminal, results
+from .terminal import POSITIVE, Terminal, result_options
 
 
 @click.command()
@@ -29,7 +29,7 @@ from .terminal import POSITIVE, Terminal, results
 @click.option("--pendulum", is_flag=True, help="The restoring torque is k sin(theta), k = m g a.")
 @click.option("--drag/--no-drag", default=True, show_default=True, help="Try the laws with quadratic drag.")
 @click.option("--drift", is_flag=True, help="Let the rest position (or the offset of a sensor) drift steadily.")
-@results
+@result_options
 def decay(
     source: str,
     velocity: str | None,
@@ -61,8 +61,8 @@ def decay(
     """
     from ..analyses.decay.estimates import KnownParameters
     from ..records.columns import ColumnOptions
-    from ..studies.decay import job as decays
-    from ..studies.decay.table import sentences, table
+    from ..studies.decay import study as decays
+    from ..studies.decay.table import decay_table, summary_lines
 
     if k is not None and m is not None:
         raise click.UsageError("--k and --m: give one of them; the frequency tells the other")
@@ -71,7 +71,9 @@ def decay(
             raise click.UsageError("--velocity: one column is fitted; leave out --position and --quantity")
         columns |= {"position": velocity, "quantity": "velocity"}
     asked, known = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
-    with decays.uncollected(), terminal.progress(1) as report:
+    with decays.gc_paused(), terminal.progress(1) as report:
         progressed = partial(report, "standard input" if source == "-" else source)
-        found, folder = decays.perform(source, asked, known, drag, drift, terminal.out, progressed)
-    terminal.answer(decays.numbers(found), table(found), "", *sentences(found), folder=folder)
+        found, folder = decays.identify_decay(source, asked, known, drag, drift, terminal.out, progressed)
+    terminal.print_result(
+        decays.identified_as_json(found), decay_table(found), "", *summary_lines(found), folder=folder
+    )

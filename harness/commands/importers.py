@@ -4,12 +4,12 @@ from pathlib import Path
 
 import click
 
-from .terminal import Terminal, results
+from .terminal import Terminal, result_options
 
 
 @click.command()
 @click.option("--fmus", type=click.Path(file_okay=False, path_type=Path), default=Path("fmus"), show_default=True)
-@results
+@result_options
 def importers(fmus: Path, terminal: Terminal) -> None:
     """Run the FMUs of a folder in tools that others wrote, and set their answers beside fmpy's.
 
@@ -24,7 +24,7 @@ def importers(fmus: Path, terminal: Terminal) -> None:
     from ..studies.importers.checks import IMPORTERS
 
     with terminal.progress(len(IMPORTERS)) as report:
-        rows = work.perform(fmus, terminal.out, report)
+        rows = work.run_importer_checks(fmus, terminal.out, report)
     failed = (f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed)
-    shown = (work.table(rows), *work.sentences(rows))
-    terminal.answer(rows, *shown, folder=terminal.out / work.FOLDER, failed=failed)
+    shown = (work.importer_table(rows), *work.legend_lines(rows))
+    terminal.print_result(rows, *shown, folder=terminal.out / work.FOLDER, failed=failed)

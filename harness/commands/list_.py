@@ -2,11 +2,11 @@
 
 import click
 
-from .terminal import JSON, Terminal
+from .terminal import Terminal, json_option
 
 
 @click.command("list")
-@JSON
+@json_option
 def list_(as_json: bool) -> None:
     """List the scenes that come with the harness: those to `run`, and those of several FMUs to `couple`.
 
@@ -25,10 +25,10 @@ def list_(as_json: bool) -> None:
         keys = parse_table(read_toml(file), coupled.CoupledKeys)
         models = ", ".join(part.model for part in keys.parts.values())
         rows.append(("couple", file.stem, models, keys.title))
-    table = Table(*HEADS, box=None, padding=(0, 1, 0, 0))
+    table = Table(*HEADINGS, box=None, padding=(0, 1, 0, 0))
     for row in rows:
         table.add_row(*row)
-    Terminal(False, as_json).answer([dict(zip(HEADS, row, strict=True)) for row in rows], table)
+    Terminal(False, as_json).print_result([dict(zip(HEADINGS, row, strict=True)) for row in rows], table)
 
 
-HEADS = ("command", "scene", "model", "title")
+HEADINGS = ("command", "scene", "model", "title")

@@ -4,15 +4,15 @@ from pathlib import Path
 
 import click
 
-from .terminal import JSON, QUIET, Terminal
+from .terminal import Terminal, json_option, quiet_option
 
 FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 
 @click.command()
 @click.argument("files", metavar="FILE.py...", nargs=-1, required=True, type=FILE)
-@QUIET
-@JSON
+@quiet_option
+@json_option
 def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
     """Write the certified result of the model in each FILE.py, whose FMU is built, beside it: FILE.csv.
 
@@ -28,4 +28,4 @@ def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
 
     made = [one for file in files for one in certify(file)]
     shown = (f"{one.path}, relative difference {one.difference:.1e}" for one in made)
-    Terminal(quiet, as_json).answer(made, *shown)
+    Terminal(quiet, as_json).print_result(made, *shown)

@@ -10,15 +10,15 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from .terminal import Terminal, anyones, results
+from .terminal import Terminal, result_options, run_options
 
 
 @click.command()
 @click.argument("scene", required=False)
 @click.option("--fmu", type=click.Path(path_type=Path), help="Run this FMU, of any origin, instead of a scene.")
 @click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="With --fmu: a value to set.")
-@anyones
-@results
+@run_options
+@result_options
 @click.pass_context
 def run(
     context: click.Context,
@@ -56,19 +56,19 @@ def run(
     if fmu is None and scene and scene.endswith(".fmu"):
         fmu, scene = Path(scene), None
     if fmu is not None and scene is None:
-        run_any(fmu, values, how, terminal)
+        run_fmu_file(fmu, values, how, terminal)
         return
     if scene is None or fmu is not None or values or how["stop"] is not None:
         raise click.UsageError("name one SCENE, or --fmu PATH; --set and --stop go with --fmu")
     from ..results.provenance import load_verified_provenance
-    from ..studies.run import job
-    from ..studies.run.table import comparison
+    from ..studies.run import study
+    from ..studies.run.table import results_table
 
     place = Path(scene)
     if place.is_dir() and scene not in scenes:
         told = load_verified_provenance(place)
-        if not (place / job.FILES[0]).is_file() or "title" not in (told["scene"] or {}):
-            repeat(context, told["command"])
+        if not (place / study.FILES[0]).is_file() or "title" not in (told["scene"] or {}):
+            rerun_command(context, told["command"])
             return
         chosen = scene_from_provenance(told["scene"])
         if context.get_parameter_source("out") is not ParameterSource.COMMANDLINE:
@@ -76,52 +76,52 @@ def run(
     else:
         chosen = load_scene(scene)
     with terminal.progress(1) as report:
-        outcome = job.perform(chosen, terminal.out, partial(report, chosen.name))
-    table = comparison([outcome], everything=True)
+        outcome = study.run_scene(chosen, terminal.out, partial(report, chosen.name))
+    table = results_table([outcome], everything=True)
     folder, said = terminal.out / chosen.name, [outcome.run.note] if outcome.run and outcome.run.note else []
-    failed = unfinished(outcome.error, folder)
-    terminal.answer(figures(outcome, terminal.out), table, *said, folder=folder, failed=failed)
+    failed = failure_message(outcome.error, folder)
+    terminal.print_result(outcome_as_json(outcome, terminal.out), table, *said, folder=folder, failed=failed)
 
 
-def repeat(context: click.Context, command: str) -> None:
+def rerun_command(context: click.Context, command: str) -> None:
     """Run a command again that made a result."""
     root, sys.argv[1:] = context.find_root(), shlex.split(command)[3:]  # which the new result tells as its command
     with root.command.make_context(root.info_name, sys.argv[1:]) as fresh:
         root.command.invoke(fresh)
 
 
-def run_any(path: Path, values: tuple[str, ...], how: dict[str, Any], terminal: Terminal) -> None:
+def run_fmu_file(path: Path, values: tuple[str, ...], how: dict[str, Any], terminal: Terminal) -> None:
     """What `run --fmu` does."""
     from ..results.files import column_heading
     from ..running.run_spec import DEFAULT_EQUAL_STEPS, RunSpec
     from ..scenes.assignments import parse_assignment
-    from ..studies.run.job import perform_run
+    from ..studies.run.study import run_fmu
 
     with terminal.progress(1) as report:
         wanted = RunSpec(path, values=dict(map(parse_assignment, values)), equal_steps=DEFAULT_EQUAL_STEPS, **how)
-        found, folder = perform_run(wanted, terminal.out, partial(report, path.stem))
+        found, folder = run_fmu(wanted, terminal.out, partial(report, path.stem))
     ends = {name: column[[0, -1]].tolist() for name, column in found.columns.items()}
     final = {name: last for name, (_, last) in ends.items()}
     told = {"fmu": found.name, "note": found.note, "failed": found.failure, "final": final, "folder": folder}
     said = [
-        f"{column_heading(name, found.units[name])}: from {shown(first)} to {shown(last)}"
+        f"{column_heading(name, found.units[name])}: from {format_value(first)} to {format_value(last)}"
         for name, (first, last) in ends.items()
     ]
-    failed = unfinished(found.failure, folder)
-    terminal.answer(told, *said, *filter(None, [found.note]), folder=folder, failed=failed)
+    failed = failure_message(found.failure, folder)
+    terminal.print_result(told, *said, *filter(None, [found.note]), folder=folder, failed=failed)
 
 
-def unfinished(why: str | None, folder: Path) -> list[str]:
+def failure_message(why: str | None, folder: Path) -> list[str]:
     """The sentence about a run that has failed, if it has."""
     return [f"{why}; what it computed until then is in {folder}"] if why else []
 
 
-def shown(value: float | str) -> str:
+def format_value(value: float | str) -> str:
     """A value as people read it."""
     return value if isinstance(value, str) else f"{value:.6g}"
 
 
-def figures(outcome: Any, out: Path) -> dict[str, object]:
+def outcome_as_json(outcome: Any, out: Path) -> dict[str, object]:
     """What a scene gave, for JSON."""
     from ..results.provenance import replacement_note
 

@@ -2,12 +2,12 @@
 
 import click
 
-from .terminal import Terminal, results
+from .terminal import Terminal, result_options
 
 
 @click.command()
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
-@results
+@result_options
 def stability(models: tuple[str, ...], terminal: Terminal) -> None:
     """Run stiff and extreme scenes with every method: each ends right, or is refused with a sentence.
 
@@ -22,12 +22,12 @@ def stability(models: tuple[str, ...], terminal: Terminal) -> None:
     """
     from ..results.provenance import describe_sources
     from ..studies.stability import table as tables
-    from ..studies.stability.study import FOLDER, all_cases, survey
+    from ..studies.stability.study import FOLDER, grouped_cases, run_stability
 
-    chosen = all_cases(models=models)
+    chosen = grouped_cases(models=models)
     with terminal.progress(sum(map(len, chosen))) as report:
-        rows, regions = survey(terminal.out, report, chosen, describe_sources(*models))
-    told = [{"scene": row.case.label, "well": row.well, "ended": row.ended} for row in rows]
-    shown = (tables.endings(rows), "", tables.refusals(rows), "", tables.summary(rows, regions))
-    wrong = (f"{row.case.label}: {row.text}" for row in rows if not row.well)
-    terminal.answer(told, *shown, folder=terminal.out / FOLDER, failed=wrong)
+        rows, regions = run_stability(terminal.out, report, chosen, describe_sources(*models))
+    told = [{"scene": row.case.label, "passed": row.passed, "ended": row.ended} for row in rows]
+    shown = (tables.error_table(rows), "", tables.refusal_table(rows), "", tables.summary(rows, regions))
+    wrong = (f"{row.case.label}: {row.text}" for row in rows if not row.passed)
+    terminal.print_result(told, *shown, folder=terminal.out / FOLDER, failed=wrong)

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..errors import MAX_VALUE_LENGTH, HarnessError
-from .terminal import Terminal, anyones, results
+from .terminal import Terminal, result_options, run_options
 
 if TYPE_CHECKING:
-    from ..studies.sweep.file import Swept
+    from ..studies.sweep.result_files import SweepResult
 
-SHOWN = 10  # kinds of failures
+MAX_FAILURE_KINDS = 10  # kinds of failures
 WORKERS = click.IntRange(1, 1024)
 
 
@@ -33,8 +33,8 @@ WORKERS = click.IntRange(1, 1024)
 @click.option("--workers", type=WORKERS, default=lambda: os.cpu_count() or 1, help="Processes on this machine.")
 @click.option("--scheduler", metavar="ADDRESS", help="An existing Dask cluster, as in tcp://host:8786.")
 @click.option("--name", help="Name of the result folder.")
-@anyones
-@results
+@run_options
+@result_options
 def sweep(
     model: str,
     vary: tuple[str, ...],
@@ -65,26 +65,26 @@ def sweep(
         raise click.UsageError(f"--name {name[:MAX_VALUE_LENGTH]}: the name of one folder, without dots before it")
     if find_spec("xarray") is None:  # of which the figure is made, when all runs are done
         raise HarnessError("a sweep needs xarray: python -m pip install 'friction-fmus[sweep]'")
-    from ..studies.sweep import file as sweep_file
+    from ..studies.sweep import result_files as sweep_file
 
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
-    asked = sweep_file.Asked(model, vary, values, random, seed, measures, name, options)
+    asked = sweep_file.SweepRequest(model, vary, values, random, seed, measures, name, options)
     with terminal.progress(1) as report:
-        swept = sweep_file.carry_out(asked, terminal.out, scheduler, workers, partial(report, model))
-    fresh = swept.runs - swept.before
-    shown = [f"{swept.runs} runs, {swept.before} of them done before, {swept.failed} failed"]
+        swept = sweep_file.run_sweep(asked, terminal.out, scheduler, workers, partial(report, model))
+    fresh = swept.runs - swept.n_resumed
+    shown = [f"{swept.runs} runs, {swept.n_resumed} of them done before, {swept.failed} failed"]
     if swept.damaged:
         shown.append(f"{swept.damaged} damaged lines of the earlier sweep's journal were left out, and run again")
     if fresh:
         shown.append(f"{fresh} runs in {swept.seconds:.3g} s: {fresh / swept.seconds:.4g} runs/s")
-    terminal.answer(swept, *shown, folder=swept.folder, failed=told(swept) if swept.failed else ())
+    terminal.print_result(swept, *shown, folder=swept.folder, failed=describe_failures(swept) if swept.failed else ())
 
 
-def told(swept: "Swept") -> Iterator[str]:
+def describe_failures(swept: "SweepResult") -> Iterator[str]:
     """How runs failed, alike ones together."""
     yield f"{swept.failed} of {swept.runs} runs failed; each has its sentence in {swept.folder / 'sweep.csv'}"
-    for each in swept.failures[:SHOWN]:
+    for each in swept.failures[:MAX_FAILURE_KINDS]:
         where = ", ".join(f"{name} = {value!r}" for name, value in each.where.items())
         yield f"{each.runs} like {where}: {each.sentence}"
-    if len(swept.failures) > SHOWN:
-        yield f"and {len(swept.failures) - SHOWN} other kinds"
+    if len(swept.failures) > MAX_FAILURE_KINDS:
+        yield f"and {len(swept.failures) - MAX_FAILURE_KINDS} other kinds"

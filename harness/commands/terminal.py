@@ -22,40 +22,44 @@ from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
 
 
-def out(text: str) -> Callable[..., Any]:
+def out_option(text: str) -> Callable[..., Any]:
     """The option that names the folder of results, and what is said of it."""
     folder = click.Path(file_okay=False, path_type=Path)
     return click.option("--out", type=folder, default=Path("results"), show_default=True, help=text)
 
 
-OUT = out("Folder that receives one folder for each scene.")
-QUIET = click.option("--quiet", is_flag=True, help="Print errors only.")
-JSON = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
+default_out_option = out_option("Folder that receives one folder for each scene.")
+quiet_option = click.option("--quiet", is_flag=True, help="Print errors only.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
 
 
-def overwrite(context: click.Context, option: click.Parameter, wanted: bool) -> None:
+def allow_overwrite(context: click.Context, option: click.Parameter, wanted: bool) -> None:
     """Say so where results are written."""
     from ..results.folder import OVERWRITE as allowed
 
     allowed.set(allowed.get() or wanted)
 
 
-OVERWRITE = click.option(
-    "--overwrite", is_flag=True, expose_value=False, callback=overwrite, help="Replace the result of something else."
+overwrite_option = click.option(
+    "--overwrite",
+    is_flag=True,
+    expose_value=False,
+    callback=allow_overwrite,
+    help="Replace the result of something else.",
 )
 
 
-def results(command: Callable[..., Any]) -> Callable[..., Any]:
+def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options of all commands that have results: they become its `terminal`."""
 
     @wraps(command)
     def told(out: Path, quiet: bool, as_json: bool, **others: Any) -> Any:
         return command(terminal=Terminal(quiet, as_json, out), **others)
 
-    return OUT(OVERWRITE(QUIET(JSON(told))))
+    return default_out_option(overwrite_option(quiet_option(json_option(told))))
 
 
-class Number(click.FloatRange):
+class FiniteFloat(click.FloatRange):
     """A finite number, in a range or not; click lets NaN through, which is in no range."""
 
     name = "number"
@@ -71,9 +75,9 @@ class Number(click.FloatRange):
         return number
 
 
-NUMBER, POSITIVE = Number(), Number(min=0, min_open=True)
-STOP = click.option("--stop", type=NUMBER, help="Stop time in s (the FMU's own).")
-FOREIGN = (  # what is said of an FMU that does not show its solver's steps
+FINITE, POSITIVE = FiniteFloat(), FiniteFloat(min=0, min_open=True)
+STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s (the FMU's own).")
+EXTERNAL_FMU_OPTIONS = (  # what is said of an FMU that does not show its solver's steps
     click.option("--tolerance", type=POSITIVE, default=1e-6, show_default=True, help="To which it is run, relative."),
     click.option("--exchange", is_flag=True, help="Run it by model exchange, where it offers both."),
     click.option("--lenient", is_flag=True, help="Run it though it breaks the standard."),
@@ -81,14 +85,14 @@ FOREIGN = (  # what is said of an FMU that does not show its solver's steps
 )
 
 
-def anyones(command: Callable[..., Any]) -> Callable[..., Any]:
+def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """The options of commands that run anyone's FMUs: fields of a Specification."""
-    for option in reversed((STOP, *FOREIGN)):
+    for option in reversed((STOP_OPTION, *EXTERNAL_FMU_OPTIONS)):
         command = option(command)
     return command
 
 
-def prepare() -> None:
+def prepare_process() -> None:
     """Let standard output take every letter, a closed stream be an empty one, temporary files lie where every library
     finds them, and numpy's products be summed by one thread: several sum in another order, and mostly wait."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -128,7 +132,7 @@ def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
         yield report
 
 
-def tell(result: Any) -> None:
+def print_json(result: Any) -> None:
     """Print a result as JSON."""
     from ..results.files import to_json
 
@@ -146,14 +150,14 @@ class Terminal:
     def progress(self, total: int) -> AbstractContextManager[Callable[[str, float], None]]:
         return progress(self.quiet or self.as_json, total)
 
-    def answer(self, result: Any, *shown: Any, folder: Path | None = None, failed: Iterable[str] = ()) -> None:
+    def print_result(self, result: Any, *shown: Any, folder: Path | None = None, failed: Iterable[str] = ()) -> None:
         """Print a result as JSON, or, unless all is to be quiet, the tables and sentences that people are shown; last
         what is said of the older result in its folder, and where that is.  HarnessError if something has `failed`."""
         from rich.console import Console
         from rich.table import Table
 
         if self.as_json:
-            tell(result)
+            print_json(result)
         elif not self.quiet:
             console = Console(markup=False, highlight=False)  # units and names have brackets, too
             for each in shown:

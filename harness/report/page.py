@@ -13,14 +13,14 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from ..errors import HarnessError
 from ..results.provenance import HARNESS, package_version
-from .gallery import Sketch, gallery
-from .sections import Published, Section, sections
+from .gallery import GalleryEntry, build_gallery
+from .sections import PublishedScene, Section, build_sections
 
 FILE = "report.html"
 TEMPLATE = Environment(
     loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
 ).get_template("page.html")
-LIVE = Path("fmus/web/index.html")  # the page that runs, where it has been built
+LIVE_PAGE = Path("fmus/web/index.html")  # the page that runs, where it has been built
 ADVICE = (
     "Dry friction that must hold: the law hybrid. Stick and slip are modes, what is stuck does not creep, and every "
     "change of mode is an event at its own time.",
@@ -31,31 +31,33 @@ ADVICE = (
 
 
 @dataclass(frozen=True)
-class Page:
+class ReportPage:
     """Where the page was written, and what it could not show: name and command of each."""
 
     path: Path
     missing: tuple[tuple[str, str], ...]
 
 
-def write(results: Path, scenes: Sequence[Published]) -> Page:
+def write_report(results: Path, scenes: Sequence[PublishedScene]) -> ReportPage:
     """Write the page of all results below a folder into it; HarnessError if there are none."""
-    found = sections(results, scenes)
-    if not any(part.grid or part.pictures or part.lost for section in found for part in section.parts):
+    found = build_sections(results, scenes)
+    if not any(part.grid or part.pictures or part.unreadable for section in found for part in section.parts):
         raise HarnessError(
             f"there are no results in {results}: make some with `python -m harness`, or name another --out"
         )
     path = results / FILE
     fresh = path.with_suffix(".new")
     try:
-        fresh.write_text(page(found, gallery(scenes, results), results), encoding="utf-8", errors="replace")
+        fresh.write_text(
+            render_page(found, build_gallery(scenes, results), results), encoding="utf-8", errors="replace"
+        )
         fresh.replace(path)
     except OSError as error:
         raise HarnessError(f"cannot write {path}: {error.strerror}") from None
-    return Page(path, tuple(gap for section in found for gap in section.missing))
+    return ReportPage(path, tuple(gap for section in found for gap in section.missing))
 
 
-def page(found: list[Section], sketches: tuple[Sketch, ...], results: Path) -> str:
+def render_page(found: list[Section], sketches: tuple[GalleryEntry, ...], results: Path) -> str:
     """The HTML text of a page that lies in the folder of the results."""
     measured = [part.sentences for section in found if section.name == "precision" for part in section.parts]
     return TEMPLATE.render(
@@ -63,14 +65,14 @@ def page(found: list[Section], sketches: tuple[Sketch, ...], results: Path) -> s
         sections=found,
         sketches=sketches,
         advice=ADVICE,
-        measured=[clauses(sentence) for sentences in measured for sentence in sentences],
-        live=LIVE if LIVE.is_file() else None,
-        bench=LIVE.read_text(encoding="utf-8", errors="replace") if LIVE.is_file() else "",
+        measured=[split_clauses(sentence) for sentences in measured for sentence in sentences],
+        live=LIVE_PAGE if LIVE_PAGE.is_file() else None,
+        bench=LIVE_PAGE.read_text(encoding="utf-8", errors="replace") if LIVE_PAGE.is_file() else "",
         made=f"{date.today()}, {HARNESS} {package_version(HARNESS)}, {platform.platform()}",
     )
 
 
-def clauses(sentence: str) -> tuple[str, list[str]]:
+def split_clauses(sentence: str) -> tuple[str, list[str]]:
     """A long piece of advice: the model that it is about, and its clauses, each of which may hold brackets.
 
     >>> clauses("smd: use exact (1e-15; ode45 2 times); no more.")

@@ -18,12 +18,12 @@ from ..results import provenance
 from ..results.quantity import format_interval as spelled_interval
 from ..results.step_sizes import step_size_quantities as step_sizes
 
-SHOWN = "trajectory.csv"
+TRAJECTORY_FILE = "trajectory.csv"
 SHORTEST = 12  # decimals cut from long numbers in cells
 
 
 @dataclass(frozen=True)
-class Published:
+class PublishedScene:
     """A scene with figures that others published: its name, that of its model, and what this does, where it says so."""
 
     name: str
@@ -49,7 +49,7 @@ class TableCells:
 
 
 @dataclass(frozen=True)
-class Item:
+class SectionItem:
     """A piece of a section: heading, sentences, table and pictures, as far as there are any, sentences on
     their origin, and files of its numbers; `lost` if its results could not be read, which a sentence says."""
 
@@ -57,7 +57,7 @@ class Item:
     sentences: tuple[str, ...] = ()
     grid: TableCells | None = None
     pictures: tuple[Picture, ...] = ()
-    lost: bool = False
+    unreadable: bool = False
     origin: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
 
@@ -69,11 +69,11 @@ class Section:
     name: str
     title: str
     intro: str
-    parts: tuple[Item, ...]
+    parts: tuple[SectionItem, ...]
     missing: tuple[tuple[str, str], ...]
 
 
-def sections(results: Path, scenes: Sequence[Published]) -> list[Section]:
+def build_sections(results: Path, scenes: Sequence[PublishedScene]) -> list[Section]:
     """Every section, from the results below a folder; those of the published scenes stand first."""
     found = [
         *(oscillators(scenes, results), runs(scenes, results), decays(results), steps(scenes, results)),
@@ -83,25 +83,27 @@ def sections(results: Path, scenes: Sequence[Published]) -> list[Section]:
     return [each for each in found if each.parts or each.missing]
 
 
-def section(name: str, title: str, intro: str, parts: list[Item], lack: str, command: str) -> Section:
+def section(name: str, title: str, intro: str, parts: list[SectionItem], lack: str, command: str) -> Section:
     """A section that lacks nothing as soon as it has a part."""
     return Section(name, title, intro, tuple(parts), () if parts else ((lack, f"python -m harness {command}"),))
 
 
-def items(results: Path, pattern: str, show: Callable[[Path], Item]) -> list[Item]:
+def items(results: Path, pattern: str, show: Callable[[Path], SectionItem]) -> list[SectionItem]:
     """What is shown of every file of a pattern below a folder; of the folder that holds it, where that is free."""
     files = sorted(results.glob(pattern))
     return [read(file.parent if "*" in pattern else file, show) for file in files]
 
 
-def read(place: Path, make: Callable[[Path], Item]) -> Item:
+def read(place: Path, make: Callable[[Path], SectionItem]) -> SectionItem:
     """What is made of a file or folder of results; a sentence in its place if that holds something else."""
     try:
         part = make(place)
         return replace(part, origin=origin(place), files=numbers(place)) if part.grid or part.pictures else part
     except Exception as error:  # it may hold anything: half of a file, another version's, somebody else's
-        return Item(
-            place.name, (f"{place} cannot be shown ({type(error).__name__}: {first_line(error)[:100]}).",), lost=True
+        return SectionItem(
+            place.name,
+            (f"{place} cannot be shown ({type(error).__name__}: {first_line(error)[:100]}).",),
+            unreadable=True,
         )
 
 
@@ -118,38 +120,40 @@ def numbers(place: Path) -> tuple[Path, ...]:
     return tuple(sorted(place.glob("*.csv") if place.is_dir() else place.parent.glob(f"{place.stem}*.csv")))
 
 
-def oscillators(scenes: Sequence[Published], results: Path) -> Section:
+def oscillators(scenes: Sequence[PublishedScene], results: Path) -> Section:
     parts, missing = [], []
     for scene in scenes:
         said = (scene.about,) if scene.about else ()
-        if (results / scene.name / "figures.csv").is_file():
+        if (results / scene.name / "quantities.csv").is_file():
             parts.append(read(results / scene.name, partial(oscillator, said)))
         else:
             missing.append((scene.name, f"python -m harness run {scene.name}"))
-            parts += [Item(scene.name, said)] if said else []
+            parts += [SectionItem(scene.name, said)] if said else []
     intro = "What each of them does, with figures measured here beside those that were published."
     return Section("oscillators", "The oscillators", intro, tuple(parts), tuple(missing))
 
 
-def oscillator(said: tuple[str, ...], folder: Path) -> Item:
+def oscillator(said: tuple[str, ...], folder: Path) -> SectionItem:
     picture = drawn(folder / "figure.svg", f"{folder.name}: position, velocity and phase plane of the run")
-    return Item(folder.name, said, table(folder / "figures.csv", cut=False), picture)
+    return SectionItem(folder.name, said, table(folder / "quantities.csv", cut=False), picture)
 
 
-def runs(scenes: Sequence[Published], results: Path) -> Section:
+def runs(scenes: Sequence[PublishedScene], results: Path) -> Section:
     """What was run besides: scenes and FMUs of whoever reads the page."""
     cases = [scene.name for scene in scenes]
-    found = sorted(file.parent for file in results.glob(f"[!.]*/{SHOWN}"))
-    others = [folder for folder in found if folder.name not in cases or not (folder / "figures.csv").is_file()]
+    found = sorted(file.parent for file in results.glob(f"[!.]*/{TRAJECTORY_FILE}"))
+    others = [folder for folder in found if folder.name not in cases or not (folder / "quantities.csv").is_file()]
     intro = "Scenes and FMUs of one's own, from their first value to their last."
     return Section("runs", "Other runs", intro, tuple(read(folder, own) for folder in others), ())
 
 
-def own(folder: Path) -> Item:
-    figures, recorded = folder / "figures.csv", table(folder / SHOWN)
+def own(folder: Path) -> SectionItem:
+    figures, recorded = folder / "quantities.csv", table(folder / TRAJECTORY_FILE)
     rows = tuple(zip(recorded.heads, recorded.rows[0], recorded.rows[-1], strict=True))
     grid = table(figures, cut=False) if figures.is_file() else TableCells(("", "first", "last"), rows)
-    return Item(folder.name, (), grid, drawn(folder / "figure.svg", f"{folder.name}: the plots that its scene names"))
+    return SectionItem(
+        folder.name, (), grid, drawn(folder / "figure.svg", f"{folder.name}: the plots that its scene names")
+    )
 
 
 def decays(results: Path) -> Section:
@@ -158,7 +162,7 @@ def decays(results: Path) -> Section:
     return section("decay", "Decay", intro, parts, "a decay", "decay coulomb")
 
 
-def decay(folder: Path) -> Item:
+def decay(folder: Path) -> SectionItem:
     found = json.loads((folder / "decay.json").read_text(encoding="utf-8"))
     ways = [{one["name"]: interval(one) for one in found[way]} for way in ("fit", "turning_points", "published")]
     rows = tuple(
@@ -168,15 +172,15 @@ def decay(folder: Path) -> Item:
     grid = TableCells(("", "whole signal", "turning points", "first and last peak", "unit"), rows)
     said = found["sentence"]
     text = f"Decay of {found['record']}: signal, turning points, envelope and fit, and residuals. {said}"
-    return Item(found["record"], (said, *found["remarks"]), grid, drawn(folder / "figure.svg", text))
+    return SectionItem(found["record"], (said, *found["remarks"]), grid, drawn(folder / "figure.svg", text))
 
 
-def steps(scenes: Sequence[Published], results: Path) -> Section:
+def steps(scenes: Sequence[PublishedScene], results: Path) -> Section:
     cases = [results / scene.name for scene in scenes if (results / scene.name / "steps.csv").is_file()]
     made = [read(case, sizes) for case in cases]
     rows = [row for part in made if part.grid for row in part.grid.rows]
     heads = next((part.grid.heads for part in made if part.grid), ())
-    parts = [Item("The solver's own steps", (), TableCells(heads, tuple(rows)))] if rows else []
+    parts = [SectionItem("The solver's own steps", (), TableCells(heads, tuple(rows)))] if rows else []
     parts += [part for part in made if not part.grid]
     intro = (
         "Seen through solver.t_next, whatever the communication step. Where friction is a jump that the solver is not "
@@ -185,15 +189,15 @@ def steps(scenes: Sequence[Published], results: Path) -> Section:
     return Section("steps", "Steps", intro, tuple(parts), () if rows else (("steps", "python -m harness"),))
 
 
-def sizes(folder: Path) -> Item:
+def sizes(folder: Path) -> SectionItem:
     """The row of one case."""
     _, h, rejected = np.array(table(folder / "steps.csv", cut=False).rows, float).T
     told = step_sizes(h, int(rejected.sum()))
     row = (folder.name, *(" ".join(each.formatted()).strip() for each in told))
-    return Item(folder.name, grid=TableCells(("case", *(each.text for each in told)), (row,)))
+    return SectionItem(folder.name, grid=TableCells(("case", *(each.text for each in told)), (row,)))
 
 
-def precision(scenes: Sequence[Published], results: Path) -> Section:
+def precision(scenes: Sequence[PublishedScene], results: Path) -> Section:
     parts, missing, folder = [], [], results / "precision"
     models = {scene.model for scene in scenes}
     for model in sorted(models | {file.stem for file in folder.glob("*.svg")}):
@@ -209,14 +213,14 @@ def precision(scenes: Sequence[Published], results: Path) -> Section:
     return Section("precision", "Error against run time", intro, tuple(parts), tuple(missing))
 
 
-def tradeoff(place: Path) -> Item:
+def tradeoff(place: Path) -> SectionItem:
     """One model's, whose files begin with its name."""
     picture = drawn(
         place.with_suffix(".svg"), f"{place.name}: run time and right-hand sides over the largest error, by method"
     )
     text, exchanged = place.with_suffix(".txt"), place.with_name(f"{place.name}-exchange.csv")
     said = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
-    return Item(place.name, said, table(exchanged) if exchanged.is_file() else None, picture)
+    return SectionItem(place.name, said, table(exchanged) if exchanged.is_file() else None, picture)
 
 
 def stability(results: Path) -> Section:
@@ -225,7 +229,7 @@ def stability(results: Path) -> Section:
     return section("stability", "Stability", intro, parts, "stability", "stability")
 
 
-def endings(file: Path) -> Item:
+def endings(file: Path) -> SectionItem:
     found = table(file, cut=False)
     at = {name: i for i, name in enumerate(found.heads)}
     counts = Counter((row[at["model"]], row[at["method"]], row[at["ended"]]) for row in found.rows)
@@ -236,7 +240,7 @@ def endings(file: Path) -> Item:
         file.with_name("region.svg"), "Steps of each method over the speed at the peak of the friction curve"
     )
     text = f"{len(found.rows)} stiff and extreme cases; how each ended:"
-    return Item("Endings", (text,), TableCells(("model", "method", *kinds), rows), picture)
+    return SectionItem("Endings", (text,), TableCells(("model", "method", *kinds), rows), picture)
 
 
 def importers(results: Path) -> Section:
@@ -251,7 +255,7 @@ def sweeps(results: Path) -> Section:
     return section("sweeps", "Sweeps", intro, items(results, "sweep/[!.]*/sweep.csv", swept), "a sweep", command)
 
 
-def swept(folder: Path) -> Item:
+def swept(folder: Path) -> SectionItem:
     with (folder / "sweep.csv").open(encoding="utf-8", newline="") as file:
         rows = csv.reader(file)  # one at a time: there may be millions
         heads = next(rows)
@@ -259,7 +263,7 @@ def swept(folder: Path) -> Item:
         failed = Counter(bool(row[place]) for row in rows)
     measured = ", ".join(heads[:place])
     text = f"{failed.total()} runs, {failed[True]} failed. Columns: {measured}."
-    return Item(folder.name, (text,), None, drawn(folder / "figure.svg", f"Sweep {folder.name}. {text}"))
+    return SectionItem(folder.name, (text,), None, drawn(folder / "figure.svg", f"Sweep {folder.name}. {text}"))
 
 
 def comparisons(results: Path) -> Section:
@@ -268,7 +272,7 @@ def comparisons(results: Path) -> Section:
     return section("compare", "Comparisons", intro, parts, "a comparison", command)
 
 
-def comparison(folder: Path) -> Item:
+def comparison(folder: Path) -> SectionItem:
     found = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
     figures = {"largest": ".3e", "rms": ".3e", "relative": ".2e"}
     rows = tuple(
@@ -278,7 +282,7 @@ def comparison(folder: Path) -> Item:
     grid = TableCells(("variable", "largest", "rms", "relative", "unit"), rows)
     title = f"{found['one']['name']} and {found['two']['name']}"
     said = tuple(filter(None, (found["one"]["note"], found["two"]["note"], found["events"])))
-    return Item(title, said, grid, drawn(folder / "figure.svg", f"{title}, and their difference"))
+    return SectionItem(title, said, grid, drawn(folder / "figure.svg", f"{title}, and their difference"))
 
 
 def coupled(results: Path) -> Section:
@@ -287,9 +291,9 @@ def coupled(results: Path) -> Section:
     return section("coupled", "Coupled", intro, parts, "a coupled scene", "couple two-masses")
 
 
-def pair(folder: Path) -> Item:
+def pair(folder: Path) -> SectionItem:
     alternative = f"Coupled scene {folder.name}: positions beside the monolithic reference, and error over the step"
-    return Item(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.svg", alternative))
+    return SectionItem(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.svg", alternative))
 
 
 def bench(results: Path) -> Section:
@@ -298,9 +302,9 @@ def bench(results: Path) -> Section:
     return section("bench", "Numbers", intro, parts, "numbers", "bench")
 
 
-def whole(title: str, file: Path) -> Item:
+def whole(title: str, file: Path) -> SectionItem:
     """All of a table."""
-    return Item(title, (), table(file))
+    return SectionItem(title, (), table(file))
 
 
 def drawn(file: Path, text: str) -> tuple[Picture, ...]:

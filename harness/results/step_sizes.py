@@ -1,4 +1,4 @@
-"""The sizes of a solver's own steps, as the screen, figures.csv and the page tell them."""
+"""The sizes of a solver's own steps, as the screen, quantities.csv and the page tell them."""
 
 import numpy as np
 

@@ -231,7 +231,9 @@ def test_scenes_with_letters_changed_at_random_run_or_are_refused(here):
                 text[dice.randrange(len(text))] = dice.choice('"[]{}=.,#\\\n0-e$\0\u00e9 ')
             (here / "mine.toml").write_text("".join(text), encoding="utf-8")
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr("harness.studies.coupled.study.built", refuse)  # what comes after reading takes long
+                patch.setattr(
+                    "harness.studies.coupled.study.element_fmus", refuse
+                )  # what comes after reading takes long
                 check(*ended("couple", "mine.toml", "--quiet"), "".join(text))
     base = written(SCENE) + "grid = 0.01\n[values]\nm = 1.5\n"
     for _ in range(150):
@@ -248,7 +250,7 @@ def refuse(*arguments):
 
 UNREADABLE = "\udcff\udcfe"
 RESULTS = {
-    "smd/figures.csv": ["", "a,b\n1\n", '"', "\0"],
+    "smd/quantities.csv": ["", "a,b\n1\n", '"', "\0"],
     "smd/steps.csv": ["", "t,h,rejected\n", "t,h,rejected\nx,y,z\n", "t\n0\n"],
     "decay/mine/decay.json": ["", "{}", "[]", "[" * 100_000, '{"fit": 1, "turning_points": [1], "published": null}'],
     "compare/a-b/compare.json": ["", "null", '{"variables": [{}]}', '{"variables": [], "one": 1}'],
@@ -264,7 +266,7 @@ RESULTS = {
 
 def test_the_report_survives_whatever_stands_in_a_result(tmp_path):
     """The first content of each file, then the second of each, and so on; in the end each is a folder."""
-    good = tmp_path / "coulomb/figures.csv"
+    good = tmp_path / "coulomb/quantities.csv"
     good.parent.mkdir(parents=True)
     good.write_text(",measured\nright hand,42.5\n")
     for file in RESULTS:

@@ -325,13 +325,13 @@ def test_a_scene_imports_only_what_it_names(place, tmp_path):
     optional = ["harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps", "matplotlib"]
     extras = ("plots = []", "plots = []\nanalyses = ['slip']", "plots = ['position']")
     code = (
-        "import sys; from pathlib import Path; from harness.studies.run.job import perform\n"
+        "import sys; from pathlib import Path; from harness.studies.run.study import run_scene\n"
         "from harness.scenes.scene import load_scene\n"
     )
     for number, extra in enumerate(extras):
         (tmp_path / f"{number}.toml").write_text(BASE + extra)
         code += (
-            f"perform(load_scene({str(tmp_path / f'{number}.toml')!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
+            f"run_scene(load_scene({str(tmp_path / f'{number}.toml')!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
             f"print([name for name in {optional} if name in sys.modules])\n"
         )
     done = python(place, "-c", code)

@@ -23,12 +23,12 @@ from harness.errors import HarnessError
 from harness.references.models import CASES, MODELS
 from harness.scenes.coupled import scene as coupled
 from harness.scenes.scene import load_scene, shipped_scenes
-from harness.studies.bench.measure import Beside, Measure
-from harness.studies.bench.table import numbers
+from harness.studies.bench.benchmark import Baseline, Benchmark
+from harness.studies.bench.table import benchmark_table
 from harness.studies.importers import table as importers
 from harness.studies.importers.checks import CHECKS
-from harness.studies.precision import laws, table
-from harness.studies.precision.anchors import AnchorRun
+from harness.studies.precision import law_deviations, table
+from harness.studies.precision.literature_problems import LiteratureRun
 from harness.studies.precision.study import FMU, ME, Point, Study
 
 WIDTH = 80
@@ -74,25 +74,44 @@ POINTS = [
 ]
 TABLES = {  # whose commands take long, filled with long words
     "precision": (
-        [table.work(Study(m, tuple(c for c in CASES if c.model == m), tuple(POINTS))) for m in MODELS],
+        [table.work_precision_table(Study(m, tuple(c for c in CASES if c.model == m), tuple(POINTS))) for m in MODELS],
         "1e-3:",
     ),
     "laws": (
-        [table.laws([laws.Shortcut("stickslip", "stickslip-threshold", "threshold", *(1.2e-5,) * 4, 3.3451, 0.877)])],
+        [
+            table.deviation_table(
+                [
+                    law_deviations.LawDeviation(
+                        "stickslip", "stickslip-threshold", "threshold", *(1.2e-5,) * 4, 3.3451, 0.877
+                    )
+                ]
+            )
+        ],
         "creep [m/s]",
     ),
     "anchors": (
-        [table.anchors([AnchorRun("block on a belt", "scipy, arctan(1e6 v)", "DOP853", 1e-10, 123456, 1.2e-5)])],
+        [
+            table.literature_table(
+                [LiteratureRun("block on a belt", "scipy, arctan(1e6 v)", "DOP853", 1e-10, 123456, 1.2e-5)]
+            )
+        ],
         "error [SI]",
     ),
     "bench": (
-        [numbers([Measure("16 s of " + 9 * "words ", 0.0123, "s", 0.02, (Beside("an empty FMU in Python", 0.1),))])],
+        [
+            benchmark_table(
+                [Benchmark("16 s of " + 9 * "words ", 0.0123, "s", 0.02, (Baseline("an empty FMU in Python", 0.1),))]
+            )
+        ],
         "to reach",
     ),
     "importers": (
         [
-            importers.table(
-                [importers.Checked("libcosim 0.0.6", check, ("1.23e-16",) * 5, fmus=tuple(MODELS)) for check in CHECKS]
+            importers.importer_table(
+                [
+                    importers.CheckResult("libcosim 0.0.6", check, ("1.23e-16",) * 5, fmus=tuple(MODELS))
+                    for check in CHECKS
+                ]
             )
         ],
         "pendulum",
@@ -219,7 +238,7 @@ def test_a_quantity_is_spelled_alike_on_the_screen_in_its_file_and_on_the_page(h
     said = harness(here, "run", scene, **PLAIN).stdout
     assert harness(here, "report").returncode == 0
     page = page_of(here)
-    with (here / f"results/{scene}/figures.csv").open() as file:
+    with (here / f"results/{scene}/quantities.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) > 10
     for row in rows:

@@ -6,19 +6,19 @@ import fmi3_hosts
 import pytest
 from models import MODELS
 
-from harness.studies.importers.checks import IMPORTERS, absent, play, prepare, subject
+from harness.studies.importers.checks import IMPORTERS, describe_fmu, prepare, run_request, unavailable_reason
 
 ECOS = next(importer for importer in IMPORTERS if importer.name == "Ecos")
 
 
-@pytest.mark.skipif(bool(absent(ECOS)), reason=absent(ECOS))
+@pytest.mark.skipif(bool(unavailable_reason(ECOS)), reason=unavailable_reason(ECOS))
 @pytest.mark.parametrize("name", MODELS)
 def test_ecos_runs_it_in_co_simulation_as_it_runs_that_of_fmi_2(name, fmus):
     """The same value references, the same grid; only the stop time, which never arrives, may move an internal step."""
-    older = subject(fmus / f"{name}.fmu").basis
+    older = describe_fmu(fmus / f"{name}.fmu").base_request
     newer = replace(older, fmu=str(fmi3_hosts.built() / f"{name}.fmu"))
     prepare(ECOS, [older, newer])
-    found, expected = play(ECOS, newer).answer, play(ECOS, older).answer
+    found, expected = run_request(ECOS, newer).reply, run_request(ECOS, older).reply
     assert len(found.rows) == len(expected.rows) > 100
     for mine, theirs in zip(found.rows, expected.rows, strict=True):
         assert mine == pytest.approx(theirs, rel=1e-6, abs=1e-7)

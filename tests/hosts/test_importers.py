@@ -18,8 +18,8 @@ from models import AUTHORED, LARGER, MODELS
 from harness.errors import HarnessError
 from harness.process.subprocess_runner import SubprocessTimeoutError
 from harness.studies.importers import checks, table
-from harness.studies.importers.checks import CHECKS, ELSEWHERE, IMPORTERS, Wrong
-from harness.studies.importers.request import END, Reply, Request
+from harness.studies.importers.checks import CHECKS, IMPORTERS, NOT_RUN, CheckFailedError
+from harness.studies.importers.request import END, ImporterReply, ImporterRequest
 
 # What is a model's own is the same, to the last bit, in both kinds (native/test_agreement.py), and what is a kind's own
 # in all models: each model is asked about in one kind, the driven sled in both.
@@ -35,7 +35,7 @@ def asked(request, fmus, tmp_path_factory):
         folder = tmp_path_factory.mktemp("asked")
         for name in names:
             (folder / f"{name}.fmu").symlink_to(source / f"{name}.fmu")
-        (out / "rows").write_bytes(pickle.dumps(table.rows(folder, lambda name, share: None)))
+        (out / "rows").write_bytes(pickle.dumps(table.run_checks(folder, lambda name, share: None)))
 
     return names, pickle.loads((made(f"importers-{request.param}", make) / "rows").read_bytes())
 
@@ -56,8 +56,8 @@ def test_the_importer_passes(asked, importer, check):
 def test_the_table_lists_every_model_and_names_the_tools_that_are_not_there(asked):
     names, rows = asked
     unfit = [row.importer.removesuffix(".fmu") for row in rows if row.importer.endswith(".fmu")]
-    assert sorted([*table.models(rows), *unfit]) == names
-    assert {row.importer for row in rows if row.reason} >= set(ELSEWHERE)
+    assert sorted([*table.fmu_names(rows), *unfit]) == names
+    assert {row.importer for row in rows if row.reason} >= set(NOT_RUN)
 
 
 def test_an_fmu_that_the_checks_cannot_be_made_with_is_left_out_with_the_reason(tmp_path, monkeypatch):
@@ -66,10 +66,10 @@ def test_an_fmu_that_the_checks_cannot_be_made_with_is_left_out_with_the_reason(
     path = next(path for path in AUTHORED if path.stem == "rotor_brake")
     (tmp_path / "rotor_brake.fmu").symlink_to(of_file(path) / "rotor_brake.fmu")
     with pytest.raises(HarnessError, match="the checks want a mass m, an input, and an output of its unit"):
-        table.rows(tmp_path, print)
+        table.run_checks(tmp_path, print)
     path = next(path for path in LARGER if path.stem == "belt")
     (tmp_path / "belt.fmu").symlink_to(of_file(path) / "belt.fmu")
-    first, *_ = table.rows(tmp_path, print)
+    first, *_ = table.run_checks(tmp_path, print)
     assert (first.importer, first.reason.split(",")[0]) == ("rotor_brake.fmu", "the checks want a mass m")
 
 
@@ -82,7 +82,7 @@ def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
         answered = [*takewhile(lambda name: name not in ("crash", "hang"), asked[-1])]
         last = asked[-1][: len(answered) + 1][-1]  # that it was about
         ends = {"crash": -11, "hang": -9, "leak": -6}.get(last, 0)
-        replies = "\n".join(json.dumps(asdict(Reply(name, [], [], 0))) for name in answered)
+        replies = "\n".join(json.dumps(asdict(ImporterReply(name, [], [], 0))) for name in answered)
         said = "".join(f"{name} speaks{END}" for name in answered) + "a reason\n" * bool(ends)
         done = CompletedProcess([], ends, replies, said)
         if last == "hang":
@@ -90,32 +90,34 @@ def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
         return done
 
     monkeypatch.setattr(checks, "run_module", process)
-    monkeypatch.setattr(checks, "ANSWERS", {})
+    monkeypatch.setattr(checks, "RESULTS", {})
     tool, *_ = (importer for importer in IMPORTERS if importer.name == "Ecos")
     names = ["one", "crash", "two", "hang", "three", "leak"]
-    requests = [Request("a.fmu", {}, 1.0, 1, [], instances=[name]) for name in names]
+    requests = [ImporterRequest("a.fmu", {}, 1.0, 1, [], instances=[name]) for name in names]
     checks.prepare(tool, requests[:3])
     checks.prepare(tool, requests)
     told = {}
     for name, request in zip(names, requests, strict=True):
         try:
-            played = checks.play(tool, request)
-            told[name] = played.answer.version, played.said
-        except Wrong as wrong:
+            played = checks.run_request(tool, request)
+            told[name] = played.reply.version, played.stderr
+        except CheckFailedError as wrong:
             told[name] = str(wrong)
     assert told == {
         **{name: (name, f"{name} speaks") for name in ("one", "two", "three")},
         **{"crash": "exit status -11: a reason", "hang": "hangs for 300 s", "leak": "exit status -6: a reason"},
     }
     assert asked == [names[:3], ["two"], names[3:], names[4:]]
-    assert [table.titled(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]
+    assert [table.name_with_version(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]
 
 
 def test_a_tool_that_is_not_asked_is_named_with_the_reason():
-    said = table.sentences([table.Checked("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")])
+    said = table.legend_lines(
+        [table.CheckResult("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")]
+    )
     assert "Ecos was not asked: it is not installed: pip install -e '.[importers]'" in said
 
 
 def test_fmus_of_another_version_of_fmi_are_refused_in_one_sentence():
     with pytest.raises(HarnessError, match=r"\.fmu is of FMI 3\.0; the importers are asked with FMUs of FMI 2\.0"):
-        table.rows(fmi3_hosts.built(), lambda name, share: None)
+        table.run_checks(fmi3_hosts.built(), lambda name, share: None)

@@ -130,7 +130,9 @@ def test_a_damaged_account_is_told_in_the_page(here, swung):
 def files(folder):
     """What a result holds, but for its account, which has a date, and its figures, which have a run time."""
     return {
-        path.name: path.read_bytes() for path in folder.iterdir() if path.name not in ("provenance.json", "figures.csv")
+        path.name: path.read_bytes()
+        for path in folder.iterdir()
+        if path.name not in ("provenance.json", "quantities.csv")
     }
 
 

@@ -14,14 +14,14 @@ from harness.references.literature_problems import (
     SmoothedBeltBlock,
 )
 from harness.running.embedded_model import EmbeddedModel, method_numbers
-from harness.studies.precision import anchors
+from harness.studies.precision import literature_problems
 
 BELT = (-0.2992525, -0.6308870)  # position in m and speed in m/s after 50 s, as published
 
 
 @cache
 def table():
-    return list(anchors.analyse())
+    return list(literature_problems.solve_all())
 
 
 @pytest.fixture
@@ -32,26 +32,26 @@ def rows(place, monkeypatch):
 
 
 def test_the_true_end_of_the_block_is_the_published_one():
-    x, v = anchors.BLOCK
+    x, v = literature_problems.BLOCK
     assert (round(x + 0.2 * 50.0, 7), round(v + 0.2, 7)) == BELT
 
 
 def test_the_true_end_of_the_block_is_that_of_two_methods():
     for method, rtol in (("DOP853", 3e-14), ("Radau", 1e-11)):
         answer = peer_solvers.solve("scipy", method, BeltBlock(), np.array([0.0, 50.0]), rtol, 1e-3 * rtol)
-        assert answer.states[-1] == pytest.approx(anchors.BLOCK, abs=2e-11)
+        assert answer.states[-1] == pytest.approx(literature_problems.BLOCK, abs=2e-11)
 
 
 @pytest.mark.parametrize("method", ["ode23", "ode45", "dop853", "rodas"])
 def test_every_method_of_the_runtime_brings_the_block_to_its_end(rows, method):
-    assert method in method_numbers(anchors.block())
-    row = next(row for row in rows("block on a belt", anchors.RUNTIME) if row.method == method)
+    assert method in method_numbers(literature_problems.block_model())
+    row = next(row for row in rows("block on a belt", literature_problems.RUNTIME) if row.method == method)
     assert row.error < 200 * row.rtol
     assert row.evaluations < 10_000
 
 
 def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
-    run = EmbeddedModel.create(anchors.block(), {}, "dop853", 1e-11)
+    run = EmbeddedModel.create(literature_problems.block_model(), {}, "dop853", 1e-11)
     truth = peer_solvers.solve("scipy", "DOP853", BeltBlock(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
     found = run.find_mode_changes(50.0)
     assert [mode for _, mode in found] == [mode for _, mode in truth] == [0, -1] * 4
@@ -60,14 +60,14 @@ def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
 
 def test_smoothing_is_four_digits_worse_at_more_cost_than_locating_events(rows):
     smooth = next(row for row in rows("block on a belt", "scipy, arctan(1e6 v)") if row.method == "LSODA")
-    located = next(row for row in rows("block on a belt", anchors.RUNTIME) if row.method == "ode45")
+    located = next(row for row in rows("block on a belt", literature_problems.RUNTIME) if row.method == "ode45")
     assert smooth.error > 1e4 * located.error
     assert smooth.evaluations > located.evaluations
 
 
 @pytest.mark.parametrize("method", method_numbers(model_class("coulomb")))
 def test_every_method_of_the_runtime_stops_the_classic_once_and_for_good(rows, method):
-    row = next(row for row in rows("chattering classic", anchors.RUNTIME) if row.method == method)
+    row = next(row for row in rows("chattering classic", literature_problems.RUNTIME) if row.method == method)
     assert row.error < 10 * row.rtol
     assert row.evaluations < 200
 

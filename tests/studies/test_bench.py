@@ -15,15 +15,21 @@ from harness.errors import HarnessError
 from harness.results.provenance import load_provenance
 from harness.running import c_host, stepping_loops
 from harness.running.timing import time_fastest_call
-from harness.studies.bench import exchange, native
+from harness.studies.bench import model_exchange, native
 from harness.studies.bench import speed as bench_speed
-from harness.studies.bench.accuracy import default, drift, exact, last, late
-from harness.studies.bench.measure import Beside, Measure
-from harness.studies.bench.speed import communication_step, inside_python, many_runs, step
-from harness.studies.bench.study import FILE, FOLDER, bench, measures
-from harness.studies.bench.table import numbers, words
+from harness.studies.bench.accuracy import (
+    default_run_error,
+    event_time_error,
+    exact_run_error,
+    last_event_error,
+    stuck_drift,
+)
+from harness.studies.bench.benchmark import Baseline, Benchmark
+from harness.studies.bench.speed import time_communication_step, time_in_process, time_many_runs, time_one_step
+from harness.studies.bench.study import FILE, FOLDER, all_benchmarks, run_benchmarks
+from harness.studies.bench.table import benchmark_table, format_baseline
 
-FAST = Measure("a step", 2e-6, "s", 3e-6, (Beside("theirs", 5e-6), Beside("absent is not installed")))
+FAST = Benchmark("a step", 2e-6, "s", 3e-6, (Baseline("theirs", 5e-6), Baseline("absent is not installed")))
 
 
 @pytest.fixture
@@ -31,7 +37,7 @@ def all_measures(place, monkeypatch):
     """What the benchmark measures."""
     monkeypatch.chdir(place)
     monkeypatch.setattr(bench_speed, "RUNS", 20)
-    return measures()
+    return all_benchmarks()
 
 
 @pytest.fixture
@@ -53,7 +59,7 @@ def both_kinds(fmus, tmp_path, monkeypatch):
 
 def forget():
     """Nothing has been measured yet."""
-    for measured in (native.of_fmu, native.of_cvode, native.through_fmpy):
+    for measured in (native.time_fmu, native.time_cvode, native.time_through_fmpy):
         measured.cache_clear()
 
 
@@ -63,31 +69,39 @@ def of(all_measures, function):
 
 
 def test_exact_and_its_events_and_the_pendulum_reach_their_numbers_and_a_stuck_body_stays(all_measures):
-    chosen = [call for function in (exact, late, last, drift) for call in of(all_measures, function)]
-    chosen += [call for call in of(all_measures, default) if call.args[0] == "pendulum"]
+    chosen = [
+        call
+        for function in (exact_run_error, event_time_error, last_event_error, stuck_drift)
+        for call in of(all_measures, function)
+    ]
+    chosen += [call for call in of(all_measures, default_run_error) if call.args[0] == "pendulum"]
     found = [call() for call in chosen]
     assert len(found) == 3 + 2 + 2 + 3 + 2
-    assert [measure.what for measure in found if not measure.reached] == []
+    assert [measure.name for measure in found if not measure.is_met] == []
 
 
 def test_an_accuracy_that_is_missed_is_told(all_measures):
-    model, card, *rest = of(all_measures, default)[0].args
+    model, card, *rest = of(all_measures, default_run_error)[0].args
     loose = replace(card, start_values={**card.start_values, "solver.method": 2, "solver.rtol": 1e-3})
-    measure = default(model, loose, *rest)
-    assert not measure.reached
+    measure = default_run_error(model, loose, *rest)
+    assert not measure.is_met
     assert 1e-4 < measure.value < 0.1
 
 
 def test_the_fmus_own_code_is_faster_than_python_peers(all_measures):
-    for call in (of(all_measures, inside_python)[0], *of(all_measures, step), *of(all_measures, many_runs)):
+    for call in (
+        of(all_measures, time_in_process)[0],
+        *of(all_measures, time_one_step),
+        *of(all_measures, time_many_runs),
+    ):
         measure = call()
-        assert 0.0 < measure.value < measure.beside[0].value
+        assert 0.0 < measure.value < measure.baselines[0].value
 
 
 def test_a_communication_step_is_measured_beside_that_of_an_empty_fmu_with_the_same_outputs(all_measures, monkeypatch):
     monkeypatch.setattr(stepping_loops, "REPEATS", 2)
-    measure = of(all_measures, communication_step)[2]()
-    usual, empty, lean, lean_empty = (beside.value for beside in measure.beside)
+    measure = of(all_measures, time_communication_step)[2]()
+    usual, empty, lean, lean_empty = (beside.value for beside in measure.baselines)
     assert measure.value == usual / empty
     assert 0.0 < usual < 10 * empty
     assert 0.0 < lean < 10 * lean_empty
@@ -101,17 +115,20 @@ def test_the_best_run_counts_after_one_to_warm_up():
 
 @pytest.mark.parametrize(("value", "reached"), [(1.0, True), (1.1, False), (nan, False)])
 def test_a_number_is_reached_up_to_its_bound(value, reached):
-    assert Measure("a number", value, "1", 1.0, ()).reached is reached
+    assert Benchmark("a number", value, "1", 1.0, ()).is_met is reached
 
 
 def test_a_peer_is_told_as_a_multiple_and_a_missing_one_by_name():
-    assert [words(FAST, beside) for beside in FAST.beside] == ["theirs: 5 µs, 2.5 times", "absent is not installed"]
-    assert numbers([FAST]).row_count == 1
+    assert [format_baseline(FAST, beside) for beside in FAST.baselines] == [
+        "theirs: 5 µs, 2.5 times",
+        "absent is not installed",
+    ]
+    assert benchmark_table([FAST]).row_count == 1
 
 
 def test_the_csv_holds_every_number_and_the_account_every_parameter(tmp_path, place, monkeypatch):
     monkeypatch.chdir(place)
-    bench([lambda: FAST], tmp_path, lambda name, share: None)
+    run_benchmarks([lambda: FAST], tmp_path, lambda name, share: None)
     assert load_provenance(tmp_path / FOLDER)["parameters"]["smd: c"] == {"value": 2.0, "unit": "N.s/m"}
     with (tmp_path / FOLDER / FILE).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -124,83 +141,89 @@ def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_one_in_python(bot
         forget()
         found = [native.run_in_c("stickslip"), native.step_in_c("stickslip")]
         found += [native.run_through_fmpy("stickslip"), native.step_through_fmpy("stickslip")]
-        slower = [measure for measure in found if not 0.0 < measure.value < measure.beside[0].value]
+        slower = [measure for measure in found if not 0.0 < measure.value < measure.baselines[0].value]
         if not slower:
             break
     assert slower == []
-    assert native.off("stickslip", native.of_fmu("stickslip", "native")) < 1e-12
+    assert native.largest_error("stickslip", native.time_fmu("stickslip", "native")) < 1e-12
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-@pytest.mark.parametrize("case", native.REACH)
+@pytest.mark.parametrize("case", native.RUN_TIME_TARGETS)
 def test_the_cvode_fmu_gets_better_with_its_tolerance_and_the_native_one_is_better_still(case, both_kinds):
     try:
-        errors = [native.off(case, native.of_cvode(case, rtol)) for rtol in (1e-4, 1e-6, 1e-8)]
+        errors = [native.largest_error(case, native.time_cvode(case, rtol)) for rtol in (1e-4, 1e-6, 1e-8)]
     except c_host.MissingToolError as error:
         pytest.skip(str(error))
     assert 0.1 > errors[0] > 5 * errors[1] > 25 * errors[2] > 0.0
-    measure = native.against_cvode(case)
-    assert measure.value >= native.off(case, native.of_fmu(case, "native")) / min(errors)
-    assert len(measure.beside) == 4
+    measure = native.compare_with_cvode(case)
+    assert measure.value >= native.largest_error(case, native.time_fmu(case, "native")) / min(errors)
+    assert len(measure.baselines) == 4
 
 
 def test_what_a_machine_lacks_is_told_in_its_row_and_fails_nothing(both_kinds, monkeypatch):
     monkeypatch.setattr(c_host, "COMPILER", None)
     shutil.rmtree(both_kinds / "native")
     c_host.build_host.cache_clear()
-    native.cvode.cache_clear()
-    found = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.against_cvode("smd")]
-    assert [measure.reached for measure in found] == [False, False, False]
-    assert [measure.beside[0].name.split(":")[0] for measure in found] == ["not built"] * 3
+    native.build_cvode_fmu.cache_clear()
+    found = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.compare_with_cvode("smd")]
+    assert [measure.is_met for measure in found] == [False, False, False]
+    assert [measure.baselines[0].name.split(":")[0] for measure in found] == ["not built"] * 3
     with pytest.raises(c_host.MissingToolError, match="not installed: a C compiler"):
-        native.of_cvode("smd", 1e-6)
+        native.time_cvode("smd", 1e-6)
     monkeypatch.setattr(c_host, "COMPILER", "false")  # one that finds no header
     with pytest.raises(c_host.MissingToolError, match="not installed: SUNDIALS"):
-        native.of_cvode("smd", 1e-6)
-    assert "not measured" in "".join(str(cell) for cell in numbers(found).columns[3].cells)
+        native.time_cvode("smd", 1e-6)
+    assert "not measured" in "".join(str(cell) for cell in benchmark_table(found).columns[3].cells)
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_run_that_an_fmu_refuses_in_c_gives_its_sentence(both_kinds):
     library = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
     with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
-        native.runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
+        native.time_runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
 
 
-LED = [scene for scene in exchange.LED if not scene.its.problem.is_stiff or str(scene) == "pacejka-0.01, ramps"]
-LATE = [scene for scene in exchange.LATE if scene.ramps and not scene.its.problem.is_stiff]
+LED = [
+    scene
+    for scene in model_exchange.DRIVEN_SCENARIOS
+    if not scene.reference_case.problem.is_stiff or str(scene) == "pacejka-0.01, ramps"
+]
+LATE = [
+    scene for scene in model_exchange.LATE_SCENARIOS if scene.has_ramps and not scene.reference_case.problem.is_stiff
+]
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-@pytest.mark.parametrize("scene", [*exchange.PLAIN, *LED, *LATE], ids=str)
+@pytest.mark.parametrize("scene", [*model_exchange.DEFAULT_SCENARIOS, *LED, *LATE], ids=str)
 def test_model_exchange_errs_as_cvode_does_with_its_events_by_hand(scene, both_kinds):
     """At most three times as much, also where the input jumps or ramps, and from a late start: the solver errs, not the
     FMU."""
-    measure = exchange.by_cvode(scene, exchange.TOLERANCES if scene.is_plain else (1e-8,))
-    if "not installed: SUNDIALS" in measure.beside[0].name:
-        pytest.skip(measure.beside[0].name)
-    assert measure.reach == 3.0
-    assert 0.0 < measure.value <= 3.0, measure.beside
+    measure = model_exchange.error_ratio_to_cvode(scene, model_exchange.TOLERANCES if scene.is_default else (1e-8,))
+    if "not installed: SUNDIALS" in measure.baselines[0].name:
+        pytest.skip(measure.baselines[0].name)
+    assert measure.target == 3.0
+    assert 0.0 < measure.value <= 3.0, measure.baselines
 
 
-@pytest.mark.parametrize("scene", exchange.BOTH_WAYS, ids=str)
+@pytest.mark.parametrize("scene", model_exchange.COMPARED_SCENARIOS, ids=str)
 def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene, both_kinds):
     """Also at ties, where the last bit decides or the physics."""
-    assert exchange.beside_co_simulation(scene).reached
+    assert model_exchange.difference_from_cosimulation(scene).is_met
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_call_of_model_exchange_is_measured_beside_that_of_a_reference_fmu(both_kinds, tmp_path, monkeypatch):
     """An FMU of ours stands for theirs, whose sources are not here: that is told."""
-    assert exchange.calls("smd").beside[0].name.startswith("not here: Reference-FMUs")
+    assert model_exchange.call_overhead("smd").baselines[0].name.startswith("not here: Reference-FMUs")
     sled = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
-    monkeypatch.setattr(exchange, "bouncing_ball", lambda acceleration: sled)
-    monkeypatch.setattr(exchange, "TURNS", 10)
-    monkeypatch.setattr(exchange, "THEIRS", (3, 2))
-    monkeypatch.setattr(exchange, "START", {"x0": 0.1, "v0": 0.3})
-    measure = exchange.calls("stickslip")
+    monkeypatch.setattr(model_exchange, "build_bouncing_ball", lambda acceleration: sled)
+    monkeypatch.setattr(model_exchange, "REPEATS", 10)
+    monkeypatch.setattr(model_exchange, "BOUNCING_BALL_SIZES", (3, 2))
+    monkeypatch.setattr(model_exchange, "BOUNCING_BALL_START", {"x0": 0.1, "v0": 0.3})
+    measure = model_exchange.call_overhead("stickslip")
     assert 0.0 < measure.value < 100.0
-    assert len(measure.beside) == 9
+    assert len(measure.baselines) == 9
 
 
 THEIRS = {  # a Reference FMU that has just what the bench puts aside, and asks for it
@@ -240,11 +263,11 @@ def test_a_reference_fmu_is_given_the_acceleration_of_each_model(tmp_path, monke
     for file, text in THEIRS.items():
         (tmp_path / file).parent.mkdir(exist_ok=True)
         (tmp_path / file).write_text(text + "\n")
-    monkeypatch.setattr(exchange, "REFERENCES", tmp_path)
+    monkeypatch.setattr(model_exchange, "REFERENCE_FMUS", tmp_path)
     given = {"x": 0.1, "v": 0.3, "force": -2.0, "mass": 4.0}
-    for name in exchange.MODELS:
-        equation = exchange.NUMBERS["acceleration"][name]
-        ask = ctypes.CDLL(str(exchange.bouncing_ball(equation).file)).ask
+    for name in model_exchange.MODELS:
+        equation = model_exchange.SETTINGS["acceleration"][name]
+        ask = ctypes.CDLL(str(model_exchange.build_bouncing_ball(equation).file)).ask
         ask.restype, ask.argtypes = ctypes.c_double, [ctypes.c_double] * len(given)
         assert ask(*given.values()) == pytest.approx(eval(equation, {"sin": sin, "atan": atan, **given}), rel=1e-14)
-    exchange.bouncing_ball.cache_clear()
+    model_exchange.build_bouncing_ball.cache_clear()

@@ -14,7 +14,7 @@ from scipy.io import savemat
 from harness.errors import HarnessError
 from harness.running.signals import Signals
 from harness.studies.compare.difference import compare
-from harness.studies.compare.files import read
+from harness.studies.compare.trajectory_files import read_trajectory
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +167,7 @@ def test_a_time_that_stands_twice_has_both_sides_of_a_jump(tmp_path):
     (tmp_path / "twice.csv").write_text("t [s],x [m]\n0,1\n1,1\n1,5\n2,5\n")
     for value, apart in ((1, 4.0), (3, 2.0), (5, 4.0), (6, 5.0)):
         (tmp_path / "other.csv").write_text(f"t [s],x [m]\n0,{value}\n1,{value}\n2,{value}\n")
-        one, two = (read(tmp_path / name) for name in ("twice.csv", "other.csv"))
+        one, two = (read_trajectory(tmp_path / name) for name in ("twice.csv", "other.csv"))
         (x,) = compare(one, two).differences
         assert x.largest == apart
         assert abs(x.left[1] - x.right[1]) == (0 if 1 <= value <= 5 else 1)
@@ -231,7 +231,7 @@ def test_events_are_matched_by_kind_and_time(second, sentence, shift):
     one = Signals("one", t, {"x": t}, {"x": "m"}, np.array([[0, 0], [1, 1], [2, 0.0]]))
     two = Signals("two", t, {"x": t}, {"x": "m"}, np.array([[0, 0], *second], float))
     pairs = compare(one, two).pairs
-    assert pairs.sentence(("one", "two")) == sentence
+    assert pairs.summary(("one", "two")) == sentence
     assert pairs.shift == pytest.approx(shift, nan_ok=True)
 
 
@@ -286,7 +286,7 @@ def test_results_of_other_tools_compare(tmp_path, pair):
     for name, text in OTHERS.items():
         (tmp_path / name).write_text(text)
     modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4], [2, 3, 1, 5, 6]]))
-    found = compare(*(read(tmp_path / name) for name in pair))
+    found = compare(*(read_trajectory(tmp_path / name) for name in pair))
     assert {each.name: each.largest for each in found.differences} == {"x": 0, "on": 0, "turn[1]": 0, "turn[2]": 0}
 
 
@@ -313,7 +313,7 @@ def modelica(file, rows, turned=True, version="4"):
 def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version):
     """In both of its layouts, and saved anew by MATLAB."""
     modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4]]), turned, version)
-    found = read(tmp_path / "modelica.mat")
+    found = read_trajectory(tmp_path / "modelica.mat")
     assert (found.units["x"], found.units["on"]) == ("m", "")
     assert [*found.columns] == ["x", "on", "turn[1]", "turn[2]", "minus"]
     assert found.columns["minus"].tolist() == [-1.0, -2.0]
@@ -322,7 +322,7 @@ def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version
 def test_texts_are_compared_as_texts(tmp_path):
     (tmp_path / "one.csv").write_text("t [s],says,x\n0,cold,1\n1,cold,1\n2,warm,1\n")
     (tmp_path / "two.csv").write_text("t [s],says,x\n0,cold,1\n1,warm,1\n2,warm,one\n")
-    found = compare(*(read(tmp_path / name) for name in ("one.csv", "two.csv")))
+    found = compare(*(read_trajectory(tmp_path / name) for name in ("one.csv", "two.csv")))
     (says,) = found.differences
     assert (says.name, says.largest, says.at) == ("says", 1.0, 1.0)
     assert found.left_out == ("x is a text in two and a number in one, and is left out",)

@@ -194,15 +194,15 @@ def test_what_a_coupled_scene_gets_wrong_is_one_sentence(couple, tmp_path, text,
 
 def test_a_scene_is_read_before_any_fmu_is(monkeypatch, tmp_path):
     """A slip of the pen is told as such where nothing is built."""
-    monkeypatch.setattr(study, "starts", lambda fmu: pytest.fail("an FMU was read"))
+    monkeypatch.setattr(study, "start_values", lambda fmu: pytest.fail("an FMU was read"))
     with pytest.raises(SceneError, match="unknown coupled scene 'two-mases'"):
-        study.perform("two-mases", tmp_path, None, lambda share: None)
+        study.run_coupled("two-mases", tmp_path, None, lambda share: None)
 
 
 def test_an_engine_that_hangs_is_told_by_its_name(monkeypatch, tmp_path):
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(100)\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setitem(ENGINES, "Sleeper", "sleeps")
-    monkeypatch.setattr(engine, "PATIENCE", 0.3)
+    monkeypatch.setattr(engine, "ENGINE_TIMEOUT", 0.3)
     with pytest.raises(HarnessError, match=r"Sleeper could not run pair\.ssp: no answer after 0\.3 s"):
-        engine.rows("Sleeper", engine.Request("pair.ssp", 0.1, 1, []))
+        engine.run_engine("Sleeper", engine.EngineRequest("pair.ssp", 0.1, 1, []))

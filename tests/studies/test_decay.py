@@ -18,18 +18,18 @@ from harness.analyses.decay.energy_loss import measure_energy_loss
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import LAWS
-from harness.studies.decay.figure import MOST, draw, extremes
-from harness.studies.decay.job import numbers
-from harness.studies.decay.table import table
+from harness.studies.decay.figure import MAX_POINTS, draw, extremes
+from harness.studies.decay.study import identified_as_json
+from harness.studies.decay.table import decay_table
 
 
 def test_the_table_has_a_row_for_every_value():
     found = fit_decay(swung(0.02, 0.003, noise=1e-4), KnownParameters(k=157.9))
-    assert table(found).row_count == len(found.estimates) == 8
+    assert decay_table(found).row_count == len(found.estimates) == 8
 
 
 def test_the_numbers_keep_their_names():
-    found = numbers(fit_decay(swung(0.02, 0.003, noise=1e-4), KnownParameters()))
+    found = identified_as_json(fit_decay(swung(0.02, 0.003, noise=1e-4), KnownParameters()))
     assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(found)
     assert {each["name"] for each in found["fit"]} == {"omega", "zeta", "r", "b", "rest"}
     assert all({"value", "error", "low", "high", "unit"} <= set(each) for each in found["fit"])
@@ -57,8 +57,8 @@ def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(
 @pytest.mark.parametrize("count", [3000, 120_000])
 def test_of_many_samples_those_are_drawn_that_show_how_far_they_reach(count):
     x = np.sin(np.arange(count)) + np.random.default_rng(1).standard_normal(count)
-    some, wide = extremes(x), -(-2 * count // MOST)
-    assert len(some) <= min(count, 3 * MOST // 2)
+    some, wide = extremes(x), -(-2 * count // MAX_POINTS)
+    assert len(some) <= min(count, 3 * MAX_POINTS // 2)
     for begin in range(0, count, 100 * wide):
         those = x[some[(some >= begin) & (some < begin + 10 * wide)]]
         assert (those.min(), those.max()) == (x[begin : begin + 10 * wide].min(), x[begin : begin + 10 * wide].max())
@@ -112,11 +112,11 @@ from pathlib import Path
 from decays import swung
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
-from harness.studies.decay.job import save
+from harness.studies.decay.study import write_results
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
-save(fit_decay(swung(0.02), KnownParameters()), Path.cwd())
+write_results(fit_decay(swung(0.02), KnownParameters()), Path.cwd())
 print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harness.scenes") if name in sys.modules])
 """
     done = subprocess.run(

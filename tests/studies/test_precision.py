@@ -19,9 +19,22 @@ from harness.references.models import CASES
 from harness.results.provenance import write_provenance
 from harness.running.embedded_model import EmbeddedModel, load_model_class, method_numbers
 from harness.running.solution import Solution
-from harness.studies.precision import advice, laws
-from harness.studies.precision.study import FMPY, FMU, FULL, QUICK, WAYS, Extent, Job, Point, Study, jobs, study, sweep
-from harness.studies.precision.survey import survey
+from harness.studies.precision import advice, law_deviations
+from harness.studies.precision.study import (
+    FMI3_INTERFACES,
+    FMPY,
+    FMU,
+    FULL,
+    QUICK,
+    Point,
+    SolverJob,
+    Study,
+    SweepSettings,
+    solver_jobs,
+    study_model,
+    sweep_tolerances,
+)
+from harness.studies.precision.survey import run_survey
 
 CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.is_chattering]
@@ -74,7 +87,7 @@ def test_a_peer_that_is_not_installed_is_named_and_left_out(fmus, monkeypatch):
     monkeypatch.setitem(peer_solvers.PACKAGES, "cvode", ("no_such_module", "scikit-sundae"))
     assert peer_solvers.missing_packages()["cvode"] == "scikit-sundae"
     file = fmus / "smd.fmu"
-    assert "cvode" not in [job.tool for job in jobs(CASE["smd"], load_model_class(file), file)]
+    assert "cvode" not in [job.tool for job in solver_jobs(CASE["smd"], load_model_class(file), file)]
 
 
 def test_a_run_is_watched_in_steps_and_in_time():
@@ -101,11 +114,15 @@ def test_a_failed_run_is_a_gap_and_after_a_slow_one_tighter_ones_are_not_tried()
         raise HarnessError("it fell over")
 
     with pytest.raises(HarnessError, match="it fell over"):
-        list(sweep(CASE["smd"], Job("tool", "method", 1e-3, broken, must=True), QUICK))
-    assert list(sweep(CASE["smd"], Job("tool", "method", 1e-3, lambda rtol, extent: None), QUICK)) == []
+        list(sweep_tolerances(CASE["smd"], SolverJob("tool", "method", 1e-3, broken, must_succeed=True), QUICK))
+    assert (
+        list(sweep_tolerances(CASE["smd"], SolverJob("tool", "method", 1e-3, lambda rtol, extent: None), QUICK)) == []
+    )
 
     tolerances = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
-    points = list(sweep(CASE["smd"], Job("tool", "method", 1e-3, run), Extent(tolerances, 0.1, 0.1)))
+    points = list(
+        sweep_tolerances(CASE["smd"], SolverJob("tool", "method", 1e-3, run), SweepSettings(tolerances, 0.1, 0.1))
+    )
     assert asked == [1e-2, 1e-3, 1e-4, 1e-5]
     assert [point.rtol for point in points] == list(tolerances)
     assert [point.seconds for point in points] == pytest.approx([0.25, nan, 0.25, nan, nan], nan_ok=True)
@@ -129,12 +146,12 @@ def test_the_advice_is_read_off_the_points():
         point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
     )
     study = Study("stickslip", (CASE["stickslip"], CASE["stickslip-threshold"]), points)
-    assert advice.advise(study, []) == (
+    assert advice.recommend(study, []) == (
         "stickslip: use ode45: 1e-6 of the motion takes 2 ms at rtol 1e-6 (hybrid; for 1e-6 ode23 4 times and "
         "scipy RK45 10 times as long); the law 'threshold' never comes nearer to true stick and slip than 0.005."
     )
     nothing = Study("stickslip", (CASE["stickslip"],), points[:1])
-    assert advice.advise(nothing, []) == "stickslip: no method of the FMU gets there."
+    assert advice.recommend(nothing, []) == "stickslip: no method of the FMU gets there."
 
 
 def test_advice_is_not_given_where_the_figures_do_not_carry_it():
@@ -144,12 +161,12 @@ def test_advice_is_not_given_where_the_figures_do_not_carry_it():
     untold = "stickslip: a quick run does not tell what to use, `python -m harness precision stickslip` does."
     for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
         study = Study("stickslip", (CASE["stickslip"],), (own, slower, point("LSODA", peer, 1e-7, "scipy")))
-        quick, whole = (advice.advise(study, [], clear) for clear in (QUICK.clear, FULL.clear))
+        quick, whole = (advice.recommend(study, [], clear) for clear in (QUICK.min_ratio, FULL.min_ratio))
         assert (quick == whole) == carried
         assert carried or quick == untold
         assert whole.startswith("stickslip: use rodas: ")
         assert ("only scipy LSODA, which is no method of the FMU, 0.85 of that" in whole) == (peer < own.seconds)
-    assert advice.advise(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.clear) == untold
+    assert advice.recommend(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.min_ratio) == untold
 
 
 def test_a_quick_run_does_not_take_the_place_of_a_whole_one(place, tmp_path, monkeypatch):
@@ -158,12 +175,12 @@ def test_a_quick_run_does_not_take_the_place_of_a_whole_one(place, tmp_path, mon
     folder.mkdir()
     write_provenance(folder, [], name="smd.json")
     with pytest.raises(HarnessError, match="keep it and name another --out, or replace it with --overwrite"):
-        survey(["smd"], QUICK, tmp_path, print)
+        run_survey(["smd"], QUICK, tmp_path, print)
 
 
 def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
     found = {
-        case.name: laws.analyse(case, load_model_class(fmus / f"{case.model}.fmu"))
+        case.name: law_deviations.compare_with_dry_friction(case, load_model_class(fmus / f"{case.model}.fmu"))
         for case in CASES
         if case.dry_friction_reference
     }
@@ -181,18 +198,18 @@ def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
 
 def test_stuck_points_are_those_between_a_stop_and_the_next_break_away():
     truth = load_reference("stickslip")
-    stuck = laws.stuck(truth)
+    stuck = law_deviations.stuck_points(truth)
     assert np.array_equal(stuck, truth.motion[:, 1] == 0.0)
-    assert not laws.stuck(load_reference("coulomb"))[1:].any()
+    assert not law_deviations.stuck_points(load_reference("coulomb"))[1:].any()
 
 
 @pytest.mark.parametrize(("path", "ending"), [*zip(AUTHORED, cycle((".py", ".fmu")))], ids=lambda one: Path(one).name)
 def test_a_file_of_a_user_is_studied_by_its_path_or_that_of_its_fmu_as_ours_are(path, ending):
     """Every way that needs no equations but those of the file; two of its methods agree about what is true."""
     name = (of_file(path) / path.name).with_suffix(ending)
-    found = study(str(name), Extent((1e-6,), 5.0, 0.0), lambda share: None)
+    found = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), lambda share: None)
     assert found.model == path.stem
-    assert {tool for tool, _ in found.solvers(found.cases[0])} == {FMU, FMPY, *WAYS}
+    assert {tool for tool, _ in found.solvers(found.cases[0])} == {FMU, FMPY, *FMI3_INTERFACES}
     best = {p.tool: p.largest for p in found.points if p.method == "dop853"}
     assert best[FMU] == best[FMPY] < 1e-3
 

@@ -19,7 +19,17 @@ from harness.references.models import CASES
 from harness.running import fmi3
 from harness.running.embedded_model import load_model_class
 from harness.studies.precision import advice, study
-from harness.studies.precision.study import CS, FMPY, FMU, ME, QUICK, WAYS, Extent, jobs, sweep
+from harness.studies.precision.study import (
+    CS,
+    FMI3_INTERFACES,
+    FMPY,
+    FMU,
+    ME,
+    QUICK,
+    SweepSettings,
+    solver_jobs,
+    sweep_tolerances,
+)
 
 CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.is_chattering]
@@ -45,10 +55,12 @@ def points(both):
     @cache
     def points(name, tool, tolerances=TOLERANCES):
         file = both / "fmus" / f"{CASE[name].model}.fmu"
-        asked = [job for job in jobs(CASE[name], load_model_class(file), file) if job.tool == tool]
-        return [point for job in asked for point in sweep(CASE[name], job, Extent(tolerances, 5.0, 0.0))]
+        asked = [job for job in solver_jobs(CASE[name], load_model_class(file), file) if job.tool == tool]
+        return [
+            point for job in asked for point in sweep_tolerances(CASE[name], job, SweepSettings(tolerances, 5.0, 0.0))
+        ]
 
-    with patch.object(study, "best", lambda run, budget: 0.0):
+    with patch.object(study, "best_time", lambda run, budget: 0.0):
         yield points
 
 
@@ -161,7 +173,7 @@ def test_the_command_shows_both_ways_beside_the_others_and_error_against_toleran
     assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
     printed = said.partition("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol")[2]
     told = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
-    assert told == [[advice.power(float(number)) if number else "-" for number in row] for row in table]
+    assert told == [[advice.format_power(float(number)) if number else "-" for number in row] for row in table]
 
 
 def test_json_holds_all_of_it(twice):
@@ -188,10 +200,10 @@ def test_the_command_writes_every_point_and_says_what_to_use_and_results_on_othe
     assert (folder / "pendulum.txt").read_text() == "older"
     texts = files["smd.csv"], (folder / "smd.csv").read_text()
     rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
-    tools = {FMU, FMPY, *WAYS, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
+    tools = {FMU, FMPY, *FMI3_INTERFACES, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
     assert {row["tool"] for row in rows} == tools
     unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
-    assert [row["failure"] for row in later if row["tool"] in WAYS] == [unbuilt, unbuilt]
+    assert [row["failure"] for row in later if row["tool"] in FMI3_INTERFACES] == [unbuilt, unbuilt]
     assert [told for told in json.loads(lacking)["missing"] if unbuilt in told] == [unbuilt]
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
     assert len(inside) == 1 + 4 * len(QUICK.tolerances)

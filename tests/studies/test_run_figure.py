@@ -20,13 +20,13 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from harness.scenes.scene import load_scene
-from harness.studies.run import job
+from harness.studies.run import study
 
-told, run = {}, job.runner.run
+told, run = {}, study.runner.run
 def kept(wanted, report):
     runs.append(run(wanted, report))
     return runs[-1]
-job.runner.run = kept
+study.runner.run = kept
 def covered(axes):
     (title,) = (each for each in axes.findobj(Text) if each.get_text() == axes.get_title(loc="left"))
     legend = axes.get_legend()
@@ -34,7 +34,7 @@ def covered(axes):
 for name in sys.argv[1:]:
     figures, runs = [], []
     Figure.savefig = lambda figure, file, **how: figures.append(figure)
-    job.perform(replace(load_scene(name), repeat=1), Path("results"), lambda share: None)
+    study.run_scene(replace(load_scene(name), repeat=1), Path("results"), lambda share: None)
     figures[0].draw_without_rendering()
     events = runs[0].events
     told[name] = {

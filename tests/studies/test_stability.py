@@ -22,22 +22,22 @@ from harness.references.models.pacejka import MagicFormula
 from harness.references.reference_trajectory import CommunicationGrid, ReferenceTrajectory, compute_reference
 from harness.results.provenance import load_provenance
 from harness.running.fmu_session import CompletedRun, RefusalSummary, RefusedRun, RunCounts
-from harness.studies.stability.bounded import bounded
-from harness.studies.stability.cases import Trial, scenes, spans, spread
+from harness.studies.stability.cases import StabilityCase, expand_scene, load_scenes, value_spans
+from harness.studies.stability.run_with_timeout import run_with_timeout
 from harness.studies.stability.study import (
     FINISHED,
     REFUSED,
     WRONG,
-    Ending,
-    all_cases,
-    all_refused,
-    finished,
-    judged,
-    refused,
-    regions,
-    survey,
+    CaseOutcome,
+    grouped_cases,
+    judge_injections,
+    judge_refusal,
+    judge_solution,
+    run_group,
+    run_stability,
+    stability_regions,
 )
-from harness.studies.stability.table import endings, refusals, summary
+from harness.studies.stability.table import error_table, refusal_table, summary
 
 QUICK = (
     "c = {} N.s/m: damping ratio c/20",
@@ -105,7 +105,7 @@ def test_a_change_of_values_starts_a_new_piece():
     values = defaults("stickslip")
     changes = {2.0: {"F_ext": 90.0}, 2.1: {"F_ext": -50.0}}
     found = compute_reference(
-        "stickslip", spans(0.0, 16.0, values, changes), CommunicationGrid(0.0, 16.0, 40, (2.0, 2.1))
+        "stickslip", value_spans(0.0, 16.0, values, changes), CommunicationGrid(0.0, 16.0, 40, (2.0, 2.1))
     )
     parts = [(0.0, evidence.stickslip()), *((t, evidence.stickslip(**change)) for t, change in changes.items())]
     motion = evidence.Trajectory(parts, 0.0, 0.0, 16.0)
@@ -136,33 +136,35 @@ def test_the_smooth_sled_makes_no_energy_of_its_own():
 
 def test_a_hang_is_a_sentence():
     with pytest.raises(HarnessError, match=r"no answer after 0\.5 s"):
-        bounded(0.5, time.sleep, 60)
+        run_with_timeout(0.5, time.sleep, 60)
 
 
 def test_a_crash_is_a_sentence():
     with pytest.raises(HarnessError, match="the process died with exit code 7"):
-        bounded(30.0, os._exit, 7)
+        run_with_timeout(30.0, os._exit, 7)
 
 
 def test_what_is_raised_comes_through():
     with pytest.raises(ValueError, match="invalid literal"):
-        bounded(30.0, int, "x")
+        run_with_timeout(30.0, int, "x")
 
 
 def test_a_process_is_asked_again_and_a_new_one_the_same_where_what_came_before_kills_it(tmp_path, monkeypatch):
     """Each call is made where it is asked."""
-    first = bounded(30.0, os.getpid)
+    first = run_with_timeout(30.0, os.getpid)
     monkeypatch.chdir(tmp_path)
-    assert (bounded(30.0, os.getpid), bounded(30.0, os.getcwd)) == (first, str(tmp_path))
-    bounded(30.0, signal.setitimer, signal.ITIMER_REAL, 0.05)
-    bounded(30.0, time.sleep, 0.5)
-    assert bounded(30.0, os.getpid) != first
+    assert (run_with_timeout(30.0, os.getpid), run_with_timeout(30.0, os.getcwd)) == (first, str(tmp_path))
+    run_with_timeout(30.0, signal.setitimer, signal.ITIMER_REAL, 0.05)
+    run_with_timeout(30.0, time.sleep, 0.5)
+    assert run_with_timeout(30.0, os.getpid) != first
 
 
 # ---- the judgement
 
 
-CASE = Trial("rest", "coulomb", "exact", setting=None, grid=CommunicationGrid(0.0, 1.0, 2), spans=[], finish=1e-3)
+CASE = StabilityCase(
+    "rest", "coulomb", "exact", setting=None, grid=CommunicationGrid(0.0, 1.0, 2), spans=[], max_error=1e-3
+)
 REST = ReferenceTrajectory(np.array([0.0, 0.5, 1.0]), np.ones(3), np.zeros(3), ((0.5, 0),))
 GOOD = CompletedRun(np.ones(3), np.zeros(3), np.zeros(3), 0.5, RunCounts(1, 2, 0, 3), 0.1)
 
@@ -174,7 +176,7 @@ def case():
 
 
 def test_a_true_motion_is_finished(case):
-    assert finished(case, GOOD, REST).ended == FINISHED
+    assert judge_solution(case, GOOD, REST).ended == FINISHED
 
 
 @pytest.mark.parametrize(
@@ -189,27 +191,27 @@ def test_a_true_motion_is_finished(case):
     ids=["far", "not a number", "energy out of nothing", "late", "one event too many"],
 )
 def test_a_plausible_wrong_motion_is_wrong(case, changed, said):
-    row = finished(case, replace(GOOD, **changed), REST)
+    row = judge_solution(case, replace(GOOD, **changed), REST)
     assert row.ended == WRONG
-    assert not row.well
+    assert not row.passed
     assert said in row.text
 
 
 def test_a_refusal_says_the_words_and_leaves_no_numbers(case):
-    expecting = replace(case, finish=None, refuse="mu_d is")
-    assert refused(expecting, RefusedRun("mu_d is 1.0, above", all_nan=True)).ended == REFUSED
+    expecting = replace(case, max_error=None, expected_message="mu_d is")
+    assert judge_refusal(expecting, RefusedRun("mu_d is 1.0, above", all_nan=True)).ended == REFUSED
     for wrong in (RefusedRun("", True), RefusedRun("mu_d is 1.0", False), RefusedRun("something else", True)):
-        assert refused(expecting, wrong).ended == WRONG
-    assert refused(case, RefusedRun("mu_d is 1.0", True)).ended == WRONG
-    assert all_refused(expecting, RefusalSummary(6, ("m = nan was taken",))).ended == WRONG
+        assert judge_refusal(expecting, wrong).ended == WRONG
+    assert judge_refusal(case, RefusedRun("mu_d is 1.0", True)).ended == WRONG
+    assert judge_injections(expecting, RefusalSummary(6, ("m = nan was taken",))).ended == WRONG
 
 
 def test_the_slope_is_that_of_the_stiff_end(case):
     rows = [
-        Ending(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=RunCounts(0, n, 0, 0)))
+        CaseOutcome(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=RunCounts(0, n, 0, 0)))
         for x, n in ((1e-4, 1000), (1e-3, 100), (1e-2, 50))
     ]
-    (found,) = regions(rows)
+    (found,) = stability_regions(rows)
     assert found.slope == pytest.approx(-1.0)
     assert found.steps.tolist() == [50, 100, 1000]
 
@@ -218,7 +220,7 @@ def test_the_slope_is_that_of_the_stiff_end(case):
 
 
 def test_every_scene_says_how_it_ends_for_a_model_that_there_is():
-    found, finish = scenes()
+    found, finish = load_scenes()
     assert set(finish) == {"exact", "tolerances", "least"}
     assert {scene["model"] for scene in found} == set(MODELS)
     for scene in found:
@@ -228,7 +230,7 @@ def test_every_scene_says_how_it_ends_for_a_model_that_there_is():
 
 def test_a_scene_is_spread_over_models_and_values():
     scene = {"title": "rtol = {}", "models": ["smd", "coulomb"], "each": {"rtol": [0.1, 0.2]}}
-    assert [(one["model"], one["title"], one["rtol"]) for one in spread(scene)] == [
+    assert [(one["model"], one["title"], one["rtol"]) for one in expand_scene(scene)] == [
         ("smd", "rtol = 0.1", 0.1),
         ("smd", "rtol = 0.2", 0.2),
         ("coulomb", "rtol = 0.1", 0.1),
@@ -238,8 +240,8 @@ def test_a_scene_is_spread_over_models_and_values():
 
 def test_a_part_of_the_table_ends_as_it_should(place, tmp_path, monkeypatch):
     monkeypatch.chdir(place)
-    rows, (*_, region) = survey(tmp_path, silent, all_cases(each_once()))
-    assert [f"{row.case.label}: {row.text}" for row in rows if not row.well] == []
+    rows, (*_, region) = run_stability(tmp_path, silent, grouped_cases(each_once()))
+    assert [f"{row.case.label}: {row.text}" for row in rows if not row.passed] == []
     assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas"}
     assert {row.case.model for row in rows} == set(MODELS)
     with (tmp_path / "stability" / "stability.csv").open(encoding="utf-8", newline="") as file:
@@ -248,9 +250,9 @@ def test_a_part_of_the_table_ends_as_it_should(place, tmp_path, monkeypatch):
     assert told["pendulum: theta0"]["unit"] == "rad"
     assert {name.partition(":")[0] for name in told} == set(MODELS)
     assert region.method == "rodas"
-    assert region.stiff.tolist() == [0.1, 0.03]
-    assert endings(rows).row_count > 20
-    assert refusals(rows).row_count > 5
+    assert region.stiffness.tolist() == [0.1, 0.03]
+    assert error_table(rows).row_count > 20
+    assert refusal_table(rows).row_count > 5
     assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as they should.")
 
 
@@ -258,7 +260,8 @@ def test_a_long_path_of_temporary_files_is_no_hindrance(tmp_path):
     """The socket of a server that processes are forked from has room for 107 bytes."""
     folder = tmp_path / ("long" * 25)
     folder.mkdir()
-    code = "from harness.studies.stability.bounded import bounded\nprint(bounded(60.0, len, 'three'))"
+    name = "run_with_timeout"
+    code = f"from harness.studies.stability.{name} import {name}\nprint({name}(60.0, len, 'three'))"
     asked = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(folder)}
     done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, timeout=120)
     assert (done.stdout, done.stderr) == ("5\n", "")
@@ -271,11 +274,11 @@ def test_a_file_of_a_user_meets_the_usual_scenes_by_its_path(tmp_path, name):
     (path,) = (path for path in (*AUTHORED, *LARGER) if path.stem == name)
     file = of_file(path) / f"{name}.fmu"
     few = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")
-    chosen = [[case for case in group if case.title.startswith(few)] for group in all_cases(models=[str(file)])]
-    rows, _ = survey(tmp_path, silent, [group for group in chosen if group])
+    chosen = [[case for case in group if case.title.startswith(few)] for group in grouped_cases(models=[str(file)])]
+    rows, _ = run_stability(tmp_path, silent, [group for group in chosen if group])
     assert {row.case.name for row in rows} == {name}
     assert {row.case.title for row in rows} >= {"as it comes", "rtol = 1e-09"}
-    assert [f"{row.case.label}: {row.text}" for row in rows if not row.well] == []
+    assert [f"{row.case.label}: {row.text}" for row in rows if not row.passed] == []
     bound = [row for row in rows if row.case.title == "T_d = 3"]
     assert {row.ended for row in bound} <= {REFUSED}
     assert all("T_d is 3.0, above T_s = 0.5" in row.text for row in bound)
@@ -309,8 +312,8 @@ def test_what_has_no_position_and_speed_is_refused_by_stability_and_studied_by_p
 
 def test_a_motion_of_a_file_that_is_not_what_two_methods_agree_about_is_wrong():
     file = str(of_file(AUTHORED[0]) / f"{AUTHORED[0].stem}.fmu")
-    group = next(group for group in all_cases(models=[file]) if group[0].title == "as it comes")
-    one = replace(group[0], finish=1e-300)
-    (row,) = judged([one])
-    assert (row.well, row.ended) == (False, WRONG)
+    group = next(group for group in grouped_cases(models=[file]) if group[0].title == "as it comes")
+    one = replace(group[0], max_error=1e-300)
+    (row,) = run_group([one])
+    assert (row.passed, row.ended) == (False, WRONG)
     assert "more than 1e-300" in row.text

@@ -13,8 +13,8 @@ from sweeps import folder_of, opened
 pandas = pytest.importorskip("pandas", reason="the extra 'sweep' is not installed")
 
 from harness.errors import SceneError  # noqa: E402
-from harness.studies.sweep.rerun import Runs, ready  # noqa: E402
-from harness.studies.sweep.space import Points, axis  # noqa: E402
+from harness.studies.sweep.runner import SweepSpec, open_runner  # noqa: E402
+from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
 
 MAP = ("sweep", "stickslip", "--vary", "mu_d=0.5:0.8:4", "--vary", "v_driver=0.02,0.05,0.1", "--measure", "final,slips")
 
@@ -28,15 +28,15 @@ def harness(fmus, tmp_path):
 
 
 def test_a_grid_has_every_combination_and_a_sample_every_stratum():
-    grid = Points((axis("a=1:3:3", False), axis("b=1:100:3:log", False)))
+    grid = SweepPoints((parse_axis("a=1:3:3", False), parse_axis("b=1:100:3:log", False)))
     every = np.array([[a, b] for a in (1, 2, 3) for b in (1, 10, 100)])
-    assert grid.between(0, len(grid)) == pytest.approx(every)
-    assert grid.between(2, 7) == pytest.approx(every[2:7])
-    spread = (axis("a=1:2", True), axis("b=1:100:log", True))
-    sample = Points(spread, 20, 1).between(0, 20)
+    assert grid.coordinates(0, len(grid)) == pytest.approx(every)
+    assert grid.coordinates(2, 7) == pytest.approx(every[2:7])
+    spread = (parse_axis("a=1:2", True), parse_axis("b=1:100:log", True))
+    sample = SweepPoints(spread, 20, 1).coordinates(0, 20)
     assert sorted(np.floor(20 * (sample[:, 0] - 1))) == list(range(20))
     assert sorted(np.floor(20 * np.log(sample[:, 1]) / np.log(100))) == list(range(20))
-    assert (sample[5:9] == Points(spread, 20, 1).between(5, 9)).all()
+    assert (sample[5:9] == SweepPoints(spread, 20, 1).coordinates(5, 9)).all()
 
 
 @pytest.mark.parametrize(
@@ -57,20 +57,20 @@ def test_a_grid_has_every_combination_and_a_sample_every_stratum():
 )
 def test_an_axis_that_is_none_is_refused(text, random):
     with pytest.raises(SceneError):
-        axis(text, random)
+        parse_axis(text, random)
 
 
 def test_the_instance_that_is_reset_gives_what_a_fresh_one_gives(fmus):
     """Also after a run that failed."""
     measures = ("final", "events", "slips", "period", "peak_speed", "stuck")
-    runs = Runs("stickslip", ("mu_d", "v_driver"), (), measures)
+    runs = SweepSpec("stickslip", ("mu_d", "v_driver"), (), measures)
     spots = [[0.6, 0.034], [0.95, 0.034], [0.3, 0.1], [0.6, 0.034]]
-    with ready(runs, fmus / "stickslip.fmu") as rerun:
+    with open_runner(runs, fmus / "stickslip.fmu") as rerun:
         rows = [rerun.run(spot) for spot in spots]
     assert rows[0] == rows[3]
     assert rows[1].startswith("mu_d is 0.95, above mu_s = 0.9")
     for spot, row in zip(spots, rows, strict=True):
-        with ready(runs, fmus / "stickslip.fmu") as rerun:
+        with open_runner(runs, fmus / "stickslip.fmu") as rerun:
             assert rerun.run(spot) == row
     omega, x_d = sqrt(742.5 / 12.5), 0.3 * 12.5 * 9.81 / 742.5
     peak = 0.034 + omega * sqrt(x_d**2 + (0.034 / omega) ** 2)
@@ -78,11 +78,11 @@ def test_the_instance_that_is_reset_gives_what_a_fresh_one_gives(fmus):
 
 
 def test_decay_measures_are_those_of_the_parameters(fmus):
-    with ready(Runs("coulomb", ("f",), (), ("rest", "f_over_k")), fmus / "coulomb.fmu") as rerun:
+    with open_runner(SweepSpec("coulomb", ("f",), (), ("rest", "f_over_k")), fmus / "coulomb.fmu") as rerun:
         rest, ratio = rerun.run([2.0])
     assert ratio == pytest.approx(2 / 157.9, rel=1e-3)
     assert abs(rest) <= 2 / 157.9
-    with ready(Runs("smd", ("c",), (), ("zeta",)), fmus / "smd.fmu") as rerun:
+    with open_runner(SweepSpec("smd", ("c",), (), ("zeta",)), fmus / "smd.fmu") as rerun:
         assert rerun.run([1.0]) == pytest.approx([1 / (2 * sqrt(157.9))], rel=1e-5)
 
 

@@ -20,9 +20,9 @@ distributed = pytest.importorskip("distributed", reason="the extra 'sweep' is no
 from harness.errors import HarnessError  # noqa: E402
 from harness.studies.sweep import study  # noqa: E402
 from harness.studies.sweep.journal import Journal  # noqa: E402
-from harness.studies.sweep.rerun import Runs  # noqa: E402
-from harness.studies.sweep.space import Points, axis  # noqa: E402
-from harness.studies.sweep.study import DIED, Sweep  # noqa: E402
+from harness.studies.sweep.runner import SweepSpec  # noqa: E402
+from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
+from harness.studies.sweep.study import WORKER_DIED, Sweep  # noqa: E402
 
 LONG = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measure", "peak_speed", "--workers", "1")
 NOTE = """
@@ -110,7 +110,7 @@ def test_what_a_kill_left_is_kept_and_only_the_rest_is_run_and_no_worker_outlive
     while living(tmp_path) and time.monotonic() < late:
         time.sleep(0.05)
     assert living(tmp_path) == []
-    first = Journal(journal(tmp_path), 100, 1).done
+    first = Journal(journal(tmp_path), 100, 1).n_done
     with journal(tmp_path).open("a") as file:
         file.write("[299, [0.1")
 
@@ -120,7 +120,7 @@ def test_what_a_kill_left_is_kept_and_only_the_rest_is_run_and_no_worker_outlive
     assert process.returncode == 130
     assert said.startswith("Error: interrupted: ")
     assert said.count("\n") == 1
-    kept = Journal(journal(tmp_path), 100, 1).done
+    kept = Journal(journal(tmp_path), 100, 1).n_done
     assert 0 < first < kept < 100
 
     done = harness(*LONG)
@@ -147,7 +147,7 @@ def test_a_cluster_one_of_whose_workers_is_killed_does_the_same(harness, whole, 
             def end():
                 while blocks(tmp_path) < 2 and worker.poll() is None:
                     time.sleep(0.02)
-                before.append(Journal(journal(tmp_path), 100, 1).done)
+                before.append(Journal(journal(tmp_path), 100, 1).n_done)
                 worker.kill()
 
             thread = threading.Thread(target=end)
@@ -166,18 +166,18 @@ def test_a_scheduler_that_does_not_answer_is_told(monkeypatch):
     """After 10 s, of which a test waits for one."""
     client, address = distributed.Client, "tcp://127.0.0.1:1"
     monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=timeout / 10))
-    with pytest.raises(HarnessError, match=f"no scheduler answers at {address}"), study.crew(address, 1, 1):
+    with pytest.raises(HarnessError, match=f"no scheduler answers at {address}"), study.open_workers(address, 1, 1):
         pass
 
 
 def test_a_run_that_kills_its_worker_is_found_and_told_and_the_others_are_done(monkeypatch):
     """Whatever block it is in, and whatever else was under way meanwhile."""
-    monkeypatch.setattr(study, "work", deadly.work)
-    sweep = Sweep(Runs("deadly", ("a",), (), ()), Points((axis("a=0:39:40", False),)), b"", 1)
+    monkeypatch.setattr(study, "run_block", deadly.run_block)
+    sweep = Sweep(SweepSpec("deadly", ("a",), (), ()), SweepPoints((parse_axis("a=0:39:40", False),)), b"", 1)
     found = {}
-    with study.crew(None, 2, 40) as hands:
-        for block in study.Shift(sweep, hands, [(0, 40)]).finished():
+    with study.open_workers(None, 2, 40) as hands:
+        for block in study.Dispatcher(sweep, hands, [(0, 40)]).completed_blocks():
             for i, value in enumerate(block.values[:, 0]):
                 assert block.first + i not in found
-                found[block.first + i] = block.sentences.get(i, value)
-    assert found == {i: DIED if i in (7, 30) else 2.0 * i for i in range(40)}
+                found[block.first + i] = block.messages.get(i, value)
+    assert found == {i: WORKER_DIED if i in (7, 30) else 2.0 * i for i in range(40)}

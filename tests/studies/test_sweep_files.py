@@ -12,11 +12,11 @@ from harness.errors import HarnessError
 from harness.results.netcdf import NetCDFVariable, NetCDFWriter
 from harness.running.description import read_description
 from harness.studies.sweep import figure
-from harness.studies.sweep import file as writing
-from harness.studies.sweep.boundaries import known
+from harness.studies.sweep import result_files as writing
+from harness.studies.sweep.boundaries import read_boundaries
 from harness.studies.sweep.journal import Block
-from harness.studies.sweep.rerun import Runs
-from harness.studies.sweep.space import Points, axis
+from harness.studies.sweep.runner import SweepSpec
+from harness.studies.sweep.sampling import SweepPoints, parse_axis
 from harness.studies.sweep.study import Sweep
 
 
@@ -25,17 +25,17 @@ def test_what_is_held_in_memory_does_not_grow_with_the_runs(monkeypatch, tmp_pat
     monkeypatch.setattr(figure, "draw", lambda *arguments: None)
     peaks = []
     for many in (20, 200):
-        axes = axis(f"a=0:1:{many}", False), axis("b=0:1:100", False)
-        sweep = Sweep(Runs("many", ("a", "b"), (), ()), Points(axes), b"", 1)
+        axes = parse_axis(f"a=0:1:{many}", False), parse_axis("b=0:1:100", False)
+        sweep = Sweep(SweepSpec("many", ("a", "b"), (), ()), SweepPoints(axes), b"", 1)
         labels = dict.fromkeys(("a", "b"), ("m", ""))
-        about = writing.About(labels, (writing.Column("c", "s", "some"),), {}, 1.0, ())
+        about = writing.SweepDescription(labels, (writing.MeasureColumn("c", "s", "some"),), {}, 1.0, ())
         folder = tmp_path / str(many)
         folder.mkdir()
         tracemalloc.start()
         kept = sweep.journal(folder)
         with kept.open():
             for first in range(0, len(sweep.points), 200):
-                kept.add(Block(first, sweep.points.between(first, first + 200)[:, :1], {3: f"failed at {first}"}))
+                kept.add(Block(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"}))
         (failure,) = writing.save(sweep, kept, about, folder)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
@@ -78,7 +78,7 @@ def test_a_netcdf_file_written_piece_by_piece_is_read_as_it_was_meant(tmp_path):
 )
 def test_an_axis_is_logarithmic_where_its_values_lie_over_decades(values, spread, kind):
     data = xarray.Dataset({"a": ("n", np.array(values), {"scale": spread})})
-    assert figure.scale(data, "a") == kind
+    assert figure.axis_scale(data, "a") == kind
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -89,11 +89,11 @@ def test_known_boundaries_travel_in_the_fmu_and_depend_on_its_parameters(fmus, n
         for variable in read_description(fmus / f"{name}.fmu").modelVariables
         if variable.causality == "parameter" and variable.type == "Real"
     }
-    found = known(fmus / f"{name}.fmu", tuple(values), {})
+    found = read_boundaries(fmus / f"{name}.fmu", tuple(values), {})
     assert found
     for each in found:
         assert each.parameters <= set(values)
-        assert np.isfinite(each.at(values, 1.0))
+        assert np.isfinite(each.evaluate(values, 1.0))
 
 
 @pytest.mark.parametrize(
@@ -104,4 +104,4 @@ def test_a_boundary_that_is_more_than_arithmetic_is_refused(tmp_path, quantity):
         table = f'[[boundaries]]\ntext = "a"\nbelow = "b"\nquantity = "{quantity}"\n'
         archive.writestr("documentation/boundaries.toml", table)
     with pytest.raises(HarnessError, match=r"odd\.fmu: documentation/boundaries\.toml is not understood"):
-        known(tmp_path / "odd.fmu", ("m",), {})
+        read_boundaries(tmp_path / "odd.fmu", ("m",), {})

@@ -9,8 +9,8 @@ import pytest
 
 from harness.errors import HarnessError
 from harness.studies.sweep.journal import Block, Journal
-from harness.studies.sweep.rerun import Runs
-from harness.studies.sweep.space import Axis, Points, axis
+from harness.studies.sweep.runner import SweepSpec
+from harness.studies.sweep.sampling import SweepAxis, SweepPoints, parse_axis
 from harness.studies.sweep.study import Sweep
 
 
@@ -23,14 +23,14 @@ def harness(fmus, tmp_path):
 
 
 def test_the_fmu_belongs_to_what_tells_a_sweep_from_any_other():
-    runs = Runs("smd", ("m",), (), ("final",))
-    one, two = (Sweep(runs, Points((Axis("m", (1.0, 2.0)),)), fmu, 2) for fmu in (b"a", b"b"))
+    runs = SweepSpec("smd", ("m",), (), ("final",))
+    one, two = (Sweep(runs, SweepPoints((SweepAxis("m", (1.0, 2.0)),)), fmu, 2) for fmu in (b"a", b"b"))
     assert one.key != two.key
     assert one.key == replace(two, fmu=b"a").key
 
 
-def line(first, values, sentences):
-    return Block(first, np.array(values), sentences).line()
+def line(first, values, messages):
+    return Block(first, np.array(values), messages).to_line()
 
 
 GOOD = line(3, [[0.5, np.nan], [1.0, 2.0]], {0: "failed"})
@@ -48,24 +48,24 @@ def test_a_damaged_line_of_a_journal_is_left_out_and_counted(tmp_path, damaged):
     file = tmp_path / "journal"
     file.write_bytes(GOOD + damaged + b"\n" + line(7, [[3.0, 4.0]], {}))
     kept = Journal(file, 10, 2)
-    assert (kept.done, kept.damaged, kept.left) == (3, 1, [(0, 3), (5, 7), (8, 10)])
+    assert (kept.n_done, kept.damaged, kept.missing_spans) == (3, 1, [(0, 3), (5, 7), (8, 10)])
     with kept.open():
         kept.add(Block(0, np.zeros((3, 2)), {}))
     again = Journal(file, 10, 2)
-    assert (again.done, again.damaged) == (6, 1)
-    assert [(block.first, block.sentences) for block in again.blocks()] == [(0, {}), (3, {0: "failed"}), (7, {})]
+    assert (again.n_done, again.damaged) == (6, 1)
+    assert [(block.first, block.messages) for block in again.blocks()] == [(0, {}), (3, {0: "failed"}), (7, {})]
     file.write_bytes(GOOD + line(7, [[3.0, 4.0]], {})[:-5])
     kept = Journal(file, 10, 2)
-    assert (kept.done, kept.damaged) == (2, 0)  # a kill cut it off
+    assert (kept.n_done, kept.damaged) == (2, 0)  # a kill cut it off
 
 
 def test_a_damaged_journal_is_told_and_the_runs_are_done_again(harness, tmp_path):
     arguments = ("sweep", "smd", "--vary", "m=1:2:4", "--workers", 1, "--name", "mine")
     assert harness(*arguments, "--out", "whole", blank=True).returncode == 0
     (tmp_path / "results/sweep").mkdir(parents=True)
-    points = Points((axis("m=1:2:4", False),))
+    points = SweepPoints((parse_axis("m=1:2:4", False),))
     usual = ("exchange", False), ("lenient", False), ("stop", None), ("timeout", 60.0), ("tolerance", 1e-6)
-    sweep = Sweep(Runs("smd", ("m",), (), (), usual), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
+    sweep = Sweep(SweepSpec("smd", ("m",), (), (), usual), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
     sweep.journal(tmp_path / "results/sweep").path.write_bytes(b"garbage\n" + line(0, [[1.0]], {}))
     done = harness(*arguments, blank=True)
     assert (done.returncode, done.stderr) == (0, "")

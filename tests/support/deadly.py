@@ -3,11 +3,11 @@
 import os
 import signal
 
-from harness.studies.sweep.hands import Work
+from harness.studies.sweep.worker import BlockResult
 
 
-def work(points, runs, digest, fmu):
+def run_block(points, runs, digest, fmu):
     """Twice the first coordinate; the process dies at 7 and at 30."""
     if {7.0, 30.0} & set(points[:, 0]):
         os.kill(os.getpid(), signal.SIGKILL)
-    return Work(points * 2, {}, 1e-3)
+    return BlockResult(points * 2, {}, 1e-3)

@@ -5,7 +5,7 @@ import numpy as np
 from harness.analyses.decay.law import LAWS, TERMS, unknown_indices
 from harness.analyses.decay.signal_model import SignalModel
 from harness.records.record import Record
-from harness.studies.decay.table import sentences
+from harness.studies.decay.table import summary_lines
 
 T = np.linspace(0.0, 4.0, 1000)
 OMEGA = 12.566
@@ -16,7 +16,7 @@ def values(estimates):
 
 
 def said(found):
-    return " ".join(sentences(found))
+    return " ".join(summary_lines(found))
 
 
 def swung(

@@ -19,7 +19,7 @@ from fmus.packaging.web.model_json import list_bodies
 from harness.running.fmi2 import simulate
 from harness.running.run_spec import spec_from_scene
 from harness.scenes.scene import load_scene, shipped_scenes
-from harness.studies.run.job import ANALYSE
+from harness.studies.run.study import ANALYSES
 
 WIDTHS = (360, 768, 1280)
 CONTROLS = {"button", "checkbox", "combobox", "radio", "slider", "spinbutton", "textbox", "link", "DisclosureTriangle"}
@@ -406,7 +406,7 @@ def test_every_published_case_measures_what_the_terminal_does(page):
             "app.session.presets.get(app.state().preset).title"
         )
         rows = iter(page.table(scene.title).values())
-        quantities = {each.name: each for kind in scene.analyses for each in ANALYSE[kind](run, scene).quantities}
+        quantities = {each.name: each for kind in scene.analyses for each in ANALYSES[kind](run, scene).quantities}
         for figure, published in scene.published.items():
             if figure == "source":
                 continue

@@ -17,25 +17,32 @@ from ...references.reference_trajectory import CommunicationGrid, compute_refere
 from ...running.embedded_model import EmbeddedModel, load_model_class
 from ...running.fmu_session import CompletedRun, FmuInfo, InitialValues, read_info, run_steps
 from ...scenes.fmu_files import find_fmu
-from .measure import NUMBERS, Beside, Measure
+from .benchmark import SETTINGS, Baseline, Benchmark
 
 POINTS = 1600
-CLOSED = Beside("closed form in 120 digits")
+CLOSED = Baseline("closed form in 120 digits")
 
 
-def accuracy() -> list[Callable[[], Measure]]:
+def accuracy_benchmarks() -> list[Callable[[], Benchmark]]:
     """What to measure, in the order of the design's table."""
     cards = {model: read_info(model) for model in MODELS}
     closed = [model for model in MODELS if "exact" in cards[model].methods]
     return [
-        *(partial(exact, model, cards[model]) for model in closed),
-        *(partial(late, model, cards[model]) for model in closed if "friction" in cards[model].enumerations),
-        partial(last, "coulomb", {"f": 1e-7}, 300_000, swings),
-        partial(last, "stickslip", {}, 200_000, slips),
-        *(partial(default, "pendulum", cards["pendulum"], "pin_load", load, 1e-9) for load in ("weight", "reaction")),
-        *(partial(default, "pacejka", cards["pacejka"], "x_m", 10.0**-n, 1e-6) for n in range(2, 7)),
+        *(partial(exact_run_error, model, cards[model]) for model in closed),
+        *(
+            partial(event_time_error, model, cards[model])
+            for model in closed
+            if "friction" in cards[model].enumerations
+        ),
+        partial(last_event_error, "coulomb", {"f": 1e-7}, 300_000, swings),
+        partial(last_event_error, "stickslip", {}, 200_000, slips),
+        *(
+            partial(default_run_error, "pendulum", cards["pendulum"], "pin_load", load, 1e-9)
+            for load in ("weight", "reaction")
+        ),
+        *(partial(default_run_error, "pacejka", cards["pacejka"], "x_m", 10.0**-n, 1e-6) for n in range(2, 7)),
         *(partial(between_grids, model, cards[model]) for model in MODELS),
-        *(partial(drift, model, cards[model], values) for model, values in NUMBERS["stuck"].items()),
+        *(partial(stuck_drift, model, cards[model], values) for model, values in SETTINGS["stuck"].items()),
     ]
 
 
@@ -55,27 +62,27 @@ def error(model: str, its: FmuInfo, chosen: dict[str, float | str]) -> float:
     return answer.error(motion.x, motion.v)
 
 
-def exact(model: str, its: FmuInfo) -> Measure:
-    return Measure(f"{model}, exact: whole run", error(model, its, {}), "1", 1e-13, (CLOSED,))
+def exact_run_error(model: str, its: FmuInfo) -> Benchmark:
+    return Benchmark(f"{model}, exact: whole run", error(model, its, {}), "1", 1e-13, (CLOSED,))
 
 
-def default(model: str, its: FmuInfo, name: str, value: float | str, reach: float) -> Measure:
+def default_run_error(model: str, its: FmuInfo, name: str, value: float | str, reach: float) -> Benchmark:
     """A model with its own method and tolerance."""
-    beside = Beside("scipy Radau at 1e-11" if problem(model).is_stiff else "scipy DOP853 at 1e-13")
-    return Measure(f"{model}, default, {name} {value}", error(model, its, {name: value}), "1", reach, (beside,))
+    beside = Baseline("scipy Radau at 1e-11" if problem(model).is_stiff else "scipy DOP853 at 1e-13")
+    return Benchmark(f"{model}, default, {name} {value}", error(model, its, {name: value}), "1", reach, (beside,))
 
 
-def late(model: str, its: FmuInfo) -> Measure:
+def event_time_error(model: str, its: FmuInfo) -> Benchmark:
     """The largest error of the time of an event, relative to it."""
     answer = compute_reference(model, [(0.0, its.stop, its.start_values)], CommunicationGrid(0.0, its.stop, 1))
     found = EmbeddedModel.create(load_model_class(find_fmu(model)), {}, "exact", 0.0).find_mode_changes(its.stop)
     if [mode for _, mode in found] != [mode for _, mode in answer.events]:
         raise HarnessError(f"{model}: the modes after its events are not the true ones")
     off = max(abs(t / true - 1) for (t, _), (true, _) in zip(found, answer.events, strict=True))
-    return Measure(f"{model}, exact: times of {len(found)} events", off, "1", 1e-14, (CLOSED,))
+    return Benchmark(f"{model}, exact: times of {len(found)} events", off, "1", 1e-14, (CLOSED,))
 
 
-def last(model: str, values: dict[str, float], number: int, law: Callable[[Any, int], Any]) -> Measure:
+def last_event_error(model: str, values: dict[str, float], number: int, law: Callable[[Any, int], Any]) -> Benchmark:
     """How far off the time of the last of many events is, in units of its last place."""
     inside = EmbeddedModel.create(load_model_class(find_fmu(model)), values, "exact", 0.0)
     true, next_one = (law(inside.model, n) for n in (number, number + 1))
@@ -87,7 +94,7 @@ def last(model: str, values: dict[str, float], number: int, law: Callable[[Any, 
         raise HarnessError(f"{model}: {events.count} events, not {number}")
     off = float(abs(events.t_last - true)) / ulp(events.t_last)
     what = f"{model}, exact: the last of {number} events, units in the last place"
-    return Measure(what, off, "1", 4.0, (CLOSED,))
+    return Benchmark(what, off, "1", 4.0, (CLOSED,))
 
 
 def swings(model: Any, number: int) -> Any:
@@ -106,7 +113,7 @@ def slips(model: Any, number: int) -> Any:
     return h / u + (number - 1) // 2 * (slip + stick) + (0 if number % 2 else slip)
 
 
-def between_grids(model: str, its: FmuInfo) -> Measure:
+def between_grids(model: str, its: FmuInfo) -> Benchmark:
     """The largest difference at shared times between an even grid and a random one, as a share of the largest."""
     even = [its.stop * i / 200 for i in range(201)]
     draw = Random(model)
@@ -116,15 +123,15 @@ def between_grids(model: str, its: FmuInfo) -> Measure:
     shared = np.searchsorted(both, even)
     parts = ((one.x, other.x), (one.v, other.v))
     off = max(float(np.abs(a - b[shared]).max() / np.abs(a).max()) for a, b in parts)
-    return Measure(f"{model}, default: difference between two grids", off, "1", 1e-12, (Beside("each other"),))
+    return Benchmark(f"{model}, default: difference between two grids", off, "1", 1e-12, (Baseline("each other"),))
 
 
-def drift(model: str, its: FmuInfo, chosen: dict[str, float]) -> Measure:
+def stuck_drift(model: str, its: FmuInfo, chosen: dict[str, float]) -> Benchmark:
     """How far a stuck body gets."""
     setting = InitialValues(model, {**its.start_values, **chosen}, stop=1e6)
     x = moved(setting, [1e4 * i for i in range(101)]).x
     off = float(np.abs(x - x[0]).max())
-    return Measure(f"{model}, stuck for 1e6 s: displacement", off, problem(model).unit, 0.0, ())
+    return Benchmark(f"{model}, stuck for 1e6 s: displacement", off, problem(model).unit, 0.0, ())
 
 
 def problem(model: str) -> OdeProblem:

@@ -20,28 +20,30 @@ from ...running.embedded_model import EmbeddedModel, load_model_class
 from ...running.stepping_loops import COMMUNICATION_STEPS
 from ...running.timing import time_call, time_fastest_call
 from ...scenes.fmu_files import find_fmu
-from . import empty as bench_empty
-from .measure import Beside, Measure
+from .benchmark import Baseline, Benchmark
+from .empty_fmu import build_empty_fmu
 
 RTOL, ATOL = 1e-6, 1e-9
 RUNS = 10_000
 STEPS = 500  # of a peer, to take the mean of
 
 
-def speed() -> list[Callable[[], Measure]]:
+def speed_benchmarks() -> list[Callable[[], Benchmark]]:
     """What to measure, in the order of the design's table."""
     sled = load_model_class(find_fmu("stickslip"))
-    pacejka = partial(inside_python, "pacejka", load_model_class(find_fmu("pacejka")), "rodas", 8e-3, ("Radau", "BDF"))
+    pacejka = partial(
+        time_in_process, "pacejka", load_model_class(find_fmu("pacejka")), "rodas", 8e-3, ("Radau", "BDF")
+    )
     return [
-        partial(inside_python, "stickslip", sled, "exact", 0.5e-3, ("RK23", "Adams"), Stickslip(), {}),
+        partial(time_in_process, "stickslip", sled, "exact", 0.5e-3, ("RK23", "Adams"), Stickslip(), {}),
         *(partial(pacejka, Pacejka(x_m), {"x_m": x_m}) for x_m in (1e-2, 1e-3)),
-        partial(step, load_model_class(find_fmu("smd"))),
-        *(partial(communication_step, model) for model in MODELS),
-        partial(many_runs, sled),
+        partial(time_one_step, load_model_class(find_fmu("smd"))),
+        *(partial(time_communication_step, model) for model in MODELS),
+        partial(time_many_runs, sled),
     ]
 
 
-def inside_python(
+def time_in_process(
     model: str,
     carried: type,
     method: str,
@@ -49,7 +51,7 @@ def inside_python(
     rivals: tuple[str, str],
     problem: OdeProblem,
     values: dict[str, float],
-) -> Measure:
+) -> Benchmark:
     """One run with 1600 points, without fmpy; `rivals` are methods of scipy and of CVODE."""
     times = np.linspace(0.0, problem.stop, COMMUNICATION_STEPS + 1)
     mine = EmbeddedModel.create(carried, values, method, RTOL, ATOL)
@@ -57,12 +59,12 @@ def inside_python(
     beside = []
     for peer, name in zip(("scipy", "cvode"), rivals, strict=True):
         if peer in peer_solvers.missing_packages():
-            beside.append(Beside(f"{peer} {name}: {peer_solvers.missing_packages()[peer]} is not installed"))
+            beside.append(Baseline(f"{peer} {name}: {peer_solvers.missing_packages()[peer]} is not installed"))
         else:
             ask = partial(peer_solvers.solve, peer, name, problem, times, RTOL, ATOL)
-            beside.append(Beside(f"{peer} {name} at {RTOL:g}", time_fastest_call(ask, 3)))
+            beside.append(Baseline(f"{peer} {name} at {RTOL:g}", time_fastest_call(ask, 3)))
     setting = ", ".join([model, *(f"{name} {value:g}" for name, value in values.items()), method])
-    return Measure(
+    return Benchmark(
         f"{setting}: {problem.stop:g} s, {COMMUNICATION_STEPS} points, inside Python",
         seconds,
         "s",
@@ -71,7 +73,7 @@ def inside_python(
     )
 
 
-def step(carried: type) -> Measure:
+def time_one_step(carried: type) -> Benchmark:
     """One step of ode23 on the smooth model, and one of scipy's RK23."""
     from scipy.integrate import RK23
 
@@ -86,11 +88,11 @@ def step(carried: type) -> Measure:
         for _ in range(STEPS):
             rival.step()
 
-    peer = Beside("scipy RK23", time_fastest_call(steps, 5) / STEPS)
-    return Measure("smd, ode23: one step", seconds / (solver.steps + solver.rejected), "s", 2e-6, (peer,))
+    peer = Baseline("scipy RK23", time_fastest_call(steps, 5) / STEPS)
+    return Benchmark("smd, ode23: one step", seconds / (solver.steps + solver.rejected), "s", 2e-6, (peer,))
 
 
-def communication_step(model: str) -> Measure:
+def time_communication_step(model: str) -> Benchmark:
     """A communication step through fmpy with all outputs recorded, as a multiple of that of an empty FMU."""
     mine = find_fmu(model)
     with TemporaryDirectory(prefix="fmu-") as folder:
@@ -99,7 +101,7 @@ def communication_step(model: str) -> Measure:
         variables = found.modelVariables
         kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
         traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
-        nothing = bench_empty.build(f"Empty{model.capitalize()}", traits, stop, Path(folder))
+        nothing = build_empty_fmu(f"Empty{model.capitalize()}", traits, stop, Path(folder))
         ways = [
             (loop, fmu)
             for loop in (stepping_loops.time_fmpy_loop, stepping_loops.time_direct_loop)
@@ -112,16 +114,16 @@ def communication_step(model: str) -> Measure:
             )
     usual, empty, lean, lean_empty = map(min, zip(*turns, strict=True))
     beside = (
-        Beside("this FMU", usual),
-        Beside("empty pythonfmu FMU", empty),
-        Beside("this FMU in the harness's loop", lean),
-        Beside("empty pythonfmu FMU there", lean_empty),
+        Baseline("this FMU", usual),
+        Baseline("empty pythonfmu FMU", empty),
+        Baseline("this FMU in the harness's loop", lean),
+        Baseline("empty pythonfmu FMU there", lean_empty),
     )
     what = f"{model}: communication step through fmpy, ratio to an empty one"
-    return Measure(what, usual / empty, "1", 1.25, beside)
+    return Benchmark(what, usual / empty, "1", 1.25, beside)
 
 
-def many_runs(carried: type) -> Measure:
+def time_many_runs(carried: type) -> Benchmark:
     """10 000 runs of the sled with as many speeds of the driver: final state and number of events."""
     model = carried()
     solver = model.solver
@@ -137,5 +139,5 @@ def many_runs(carried: type) -> Measure:
     seconds = time_call(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
     problem = Stickslip()
     ask = partial(peer_solvers.solve, "scipy", "RK23", problem, np.array([0.0, problem.stop]), RTOL, ATOL)
-    rival = Beside(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * time_fastest_call(ask, 5))
-    return Measure(f"stickslip, exact: {RUNS} runs of {problem.stop:g} s, one core", seconds, "s", 10.0, (rival,))
+    rival = Baseline(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * time_fastest_call(ask, 5))
+    return Benchmark(f"stickslip, exact: {RUNS} runs of {problem.stop:g} s, one core", seconds, "s", 10.0, (rival,))

@@ -7,10 +7,10 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from .measure import Beside, Measure
+from .benchmark import Baseline, Benchmark
 
 
-def numbers(found: Iterable[Measure]) -> Table:
+def benchmark_table(found: Iterable[Benchmark]) -> Table:
     """Measured, to reach, reached or not, and what stands beside it."""
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     table.add_column("what")
@@ -20,22 +20,22 @@ def numbers(found: Iterable[Measure]) -> Table:
     table.add_column("beside")
     for measure in found:
         missed = Text("not measured", style="dim") if isnan(measure.value) else Text("missed", style="bold red")
-        verdict = Text("reached") if measure.reached else missed
-        beside = "\n".join(words(measure, each) for each in measure.beside)
-        figures = (figure(number, measure.unit) for number in (measure.value, measure.reach))
-        table.add_row(measure.what, *figures, verdict, beside)
+        verdict = Text("reached") if measure.is_met else missed
+        beside = "\n".join(format_baseline(measure, each) for each in measure.baselines)
+        figures = (format_quantity(number, measure.unit) for number in (measure.value, measure.target))
+        table.add_row(measure.name, *figures, verdict, beside)
     return table
 
 
-def words(measure: Measure, beside: Beside) -> str:
+def format_baseline(measure: Benchmark, beside: Baseline) -> str:
     """What stands beside, and how many times the measured number it is."""
     if beside.value is None:
         return beside.name
     ratio = "" if measure.unit == "1" or not measure.value else f", {beside.value / measure.value:.3g} times"
-    return f"{beside.name}: {figure(beside.value, 's')}{ratio}"
+    return f"{beside.name}: {format_quantity(beside.value, 's')}{ratio}"
 
 
-def figure(value: float, unit: str) -> str:
+def format_quantity(value: float, unit: str) -> str:
     """A number in its unit, seconds in one of a handy size; nothing for what was not measured."""
     if isnan(value):
         return ""

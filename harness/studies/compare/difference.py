@@ -8,10 +8,10 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...running.signals import Signals
-from .between import Motion, Sides
-from .pairs import Pairs, paired
-from .trajectory import common
-from .units import size
+from .event_pairs import EventPairs, match_events
+from .interpolation import Interpolant, ValueBounds
+from .trajectory_sources import common_span
+from .units import conversion_factor
 
 ENOUGH = 0.5  # share of the coarser one's times that are common, which makes interpolation needless
 SAME = 1e-9  # share of the stretch: times this close are one
@@ -45,14 +45,14 @@ class Comparison:
     interpolated: bool
     differences: tuple[Difference, ...]
     left_out: tuple[str, ...]
-    pairs: Pairs | None
+    pairs: EventPairs | None
 
     @property
     def worst(self) -> float:
         """The largest relative difference; NaN if any is."""
         return float(np.max([each.relative for each in self.differences]))
 
-    def beyond(self, rtol: float, atol: float) -> list[str]:
+    def violations(self, rtol: float, atol: float) -> list[str]:
         """What differs by more than atol, in the unit of each, and rtol of its largest value together; a sentence each,
         and one about events that do not match."""
         said = [
@@ -70,7 +70,7 @@ class Comparison:
     @property
     def events(self) -> str:
         """What is to be said of them; nothing where they are not known."""
-        return self.pairs.sentence((self.one.name, self.two.name)) if self.pairs else ""
+        return self.pairs.summary((self.one.name, self.two.name)) if self.pairs else ""
 
 
 def compare(one: Signals, two: Signals) -> Comparison:
@@ -79,7 +79,7 @@ def compare(one: Signals, two: Signals) -> Comparison:
     if not shared:
         has = [f"{each.name} ({', '.join(each.columns)})" for each in (one, two)]
         raise HarnessError(f"{' and '.join(has)} have no variable in common")
-    begin, end = common(one, two)
+    begin, end = common_span(one, two)
     time, interpolated = times(one, two, begin, end)
     pairs, jumps = events(one, two, begin, end)
     motions, differences, left_out = tuple(coded(one, two)), [], []
@@ -87,16 +87,16 @@ def compare(one: Signals, two: Signals) -> Comparison:
         unit, factor, differs = units(one, two, name)
         left_out += [differs] if differs else []
         if unit is not None:
-            ours, theirs = (each.sides(name, time, at) for each, at in zip(motions, jumps, strict=True))
-            left, right = nearest(ours, Sides(factor * theirs.low, factor * theirs.high))
+            ours, theirs = (each.bounds_at(name, time, at) for each, at in zip(motions, jumps, strict=True))
+            left, right = nearest(ours, ValueBounds(factor * theirs.low, factor * theirs.high))
             if textual(one, name):
                 left, right = np.zeros(len(time)), (left != right).astype(float)
             differences.append(difference(name, unit, time, left, right))
     if not differences:
         raise HarnessError(f"nothing to compare: {'; '.join(left_out)}")
     for each, other in ((one, two), (two, one)):
-        alone = [name for name in each.columns if name not in other.columns]
-        left_out += [f"only in {each.name}: {', '.join(alone)}"] if alone else []
+        is_isolated = [name for name in each.columns if name not in other.columns]
+        left_out += [f"only in {each.name}: {', '.join(is_isolated)}"] if is_isolated else []
     return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs)
 
 
@@ -110,7 +110,7 @@ def units(one: Signals, two: Signals, name: str) -> tuple[str | None, float, str
     if bool(left) != bool(right):
         lacks = (two if left else one).name
         return left or right, 1.0, f"{name} has no unit in {lacks}; it is taken to be in {left or right}"
-    factor = size(right, left)
+    factor = conversion_factor(right, left)
     if factor is None:
         return None, 1.0, f"{name} is in {left} in {one.name} and in {right} in {two.name}, and is left out"
     return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; it is compared in {left}"
@@ -120,16 +120,16 @@ def textual(path: Signals, name: str) -> bool:
     return path.columns[name].dtype.kind == "U"
 
 
-def coded(one: Signals, two: Signals) -> Iterator[Motion]:
+def coded(one: Signals, two: Signals) -> Iterator[Interpolant]:
     """Both motions, of a text in both the place among all that either says."""
     texts = [name for name in one.columns if name in two.columns and textual(one, name) and textual(two, name)]
     known = {name: np.unique(np.concatenate([each.columns[name] for each in (one, two)])) for name in texts}
     for each in (one, two):
         places = {name: np.searchsorted(known[name], each.columns[name]).astype(float) for name in texts}
-        yield Motion(replace(each, columns=each.columns | places))
+        yield Interpolant(replace(each, columns=each.columns | places))
 
 
-def nearest(left: Sides, right: Sides) -> tuple[np.ndarray, np.ndarray]:
+def nearest(left: ValueBounds, right: ValueBounds) -> tuple[np.ndarray, np.ndarray]:
     """Of all values (n,) that either side may have, the two that are nearest to each other."""
     one = np.clip(np.maximum(left.low, right.low), left.low, left.high)
     return one, np.clip(one, right.low, right.high)
@@ -161,15 +161,17 @@ def times(one: Signals, two: Signals, begin: float, end: float) -> tuple[np.ndar
     return coarser, True
 
 
-def events(one: Signals, two: Signals, begin: float, end: float) -> tuple[Pairs | None, tuple[np.ndarray, np.ndarray]]:
+def events(
+    one: Signals, two: Signals, begin: float, end: float
+) -> tuple[EventPairs | None, tuple[np.ndarray, np.ndarray]]:
     """The events of both in pairs, and the stretches of time in s in which each of the two jumps (k, 2): from the
     earlier to the later of a pair, and where one alone has an event."""
     known = [np.zeros((1, 2)) if each.events is None else each.events for each in (one, two)]
     first, second = (rows[1:][(rows[1:, 0] >= begin) & (rows[1:, 0] <= end)] for rows in known)
     if one.events is None or two.events is None:
         return None, (first[:, [0, 0]], second[:, [0, 0]])
-    pairs = paired(first, second)
-    near = pairs.stretches[pairs.alone(np.sort(np.concatenate([first[:, 0], second[:, 0]])))]
+    pairs = match_events(first, second)
+    near = pairs.intervals[pairs.is_isolated(np.sort(np.concatenate([first[:, 0], second[:, 0]])))]
     own = [rows[~np.isin(rows[:, 0], near)][:, [0, 0]] for rows in (first, second)]
     left, right = (np.vstack([near, rows]) for rows in own)
     return pairs, (left, right)

@@ -39,7 +39,7 @@ def draw(found: Comparison, path: Path) -> None:
             unit, size = display_unit(each.unit)
             for side, style in ((found.one, {"color": BLUE}), (found.two, {"color": ORANGE, "linestyle": "--"})):
                 values = mask_undrawable(side.columns[each.name]) * (
-                    units.size(side.units[each.name], each.unit) or 1.0
+                    units.conversion_factor(side.units[each.name], each.unit) or 1.0
                 )
                 both.plot(side.time, values / size, label=f"{side.name} ", **style)
             both.set_ylabel(axis_label(each.name, unit))

@@ -11,7 +11,7 @@ FACTOR = re.compile(r"([^\W\d_]+|°|%)(-?\d+)?|1")
 ALIAS = {"Nm": "N.m", "degree": "deg", "degrees": "deg", "°": "deg", "sec": "s", "μ": "u"}
 
 
-def spelled(unit: str) -> frozenset[tuple[str, int]] | str:
+def parse_unit(unit: str) -> frozenset[tuple[str, int]] | str:
     """The powers of its factors; the text itself where it is no product of powers."""
     text = unit.strip()
     for old, new in SAME:
@@ -30,9 +30,9 @@ def spelled(unit: str) -> frozenset[tuple[str, int]] | str:
     return frozenset((name, power) for name, power in powers.items() if power)
 
 
-def size(unit: str, other: str) -> float | None:
+def conversion_factor(unit: str, other: str) -> float | None:
     """How large a unit is in another; None if they do not measure the same thing, as far as is known here."""
-    if spelled(unit) == spelled(other):
+    if parse_unit(unit) == parse_unit(other):
         return 1.0
     one, two = find_unit(unit), find_unit(other)
     if one and two and (one.order, one.base) == (two.order, two.base):
@@ -41,11 +41,11 @@ def size(unit: str, other: str) -> float | None:
 
 
 @cache
-def is_rate(unit: str, of: str) -> bool:
+def is_rate_unit(unit: str, of: str) -> bool:
     """Whether a unit is another one per second; where neither is known, it may be."""
-    powers = spelled(of)
+    powers = parse_unit(of)
     if isinstance(powers, str) or not (unit and of):
         return unit == of == ""
     slower = Counter(dict(powers))
     slower["s"] -= 1
-    return frozenset((name, power) for name, power in slower.items() if power) == spelled(unit)
+    return frozenset((name, power) for name, power in slower.items() if power) == parse_unit(unit)

@@ -5,10 +5,10 @@ import sys
 from pathlib import Path
 
 from ...process.subprocess_runner import serve_request
-from .engine import Request
+from .engine import EngineRequest
 
 
-def run(asked: Request) -> list[list[float]]:
+def run(asked: EngineRequest) -> list[list[float]]:
     """The rows of a run."""
     if sys.platform == "linux":
         ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
@@ -26,4 +26,4 @@ def run(asked: Request) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    serve_request(Request, run)
+    serve_request(EngineRequest, run)

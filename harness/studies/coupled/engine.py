@@ -7,9 +7,9 @@ from pathlib import Path
 from ...errors import HarnessError
 from ...process.subprocess_runner import SubprocessTimeoutError, run_module
 
-PATIENCE = 300.0  # s, for one run
+ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
-MAIN = "Ecos"
+MAIN_ENGINE = "Ecos"
 ENGINES = {  # module of each
     "Ecos": f"{__package__}.ecos",
     "libcosim": f"{__package__}.libcosim",
@@ -18,7 +18,7 @@ ENGINES = {  # module of each
 
 
 @dataclass(frozen=True)
-class Request:
+class EngineRequest:
     """Run an archive in so many (`count`) equal communication steps of `step` s, with a set of `values` in it, and read
     after each some variables: element, variable, value reference."""
 
@@ -29,12 +29,12 @@ class Request:
     values: str = "initialValues"
 
 
-def rows(engine: str, asked: Request) -> list[list[float]]:
+def run_engine(engine: str, asked: EngineRequest) -> list[list[float]]:
     """A row for each communication point, without the start where an engine does not show it; HarnessError with the
     last words of the engine if it gives none."""
     failed = f"{engine} could not run {Path(asked.archive).name}"
     try:
-        done = run_module(ENGINES[engine], json.dumps(asdict(asked)), timeout=PATIENCE)
+        done = run_module(ENGINES[engine], json.dumps(asdict(asked)), timeout=ENGINE_TIMEOUT)
     except SubprocessTimeoutError as late:
         raise HarnessError(f"{failed}: {late}") from None
     if done.returncode or not done.stdout:

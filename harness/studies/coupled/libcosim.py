@@ -1,12 +1,12 @@
 """Runs an SSP archive with libcosim (package libcosimpy), whose first values are those after the first step."""
 
 from ...process.subprocess_runner import serve_request
-from .engine import Request
+from .engine import EngineRequest
 
 NANO = 1e9  # libcosim counts time in whole ns
 
 
-def run(asked: Request) -> list[list[float]]:
+def run(asked: EngineRequest) -> list[list[float]]:
     """The rows of a run."""
     from libcosimpy.CosimEnums import CosimVariableType
     from libcosimpy.CosimExecution import CosimExecution
@@ -27,4 +27,4 @@ def run(asked: Request) -> list[list[float]]:
 
 
 if __name__ == "__main__":
-    serve_request(Request, run)
+    serve_request(EngineRequest, run)

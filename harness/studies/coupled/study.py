@@ -23,7 +23,7 @@ from ...running.fmi2 import ProgressCallback
 from ...scenes.coupled.scene import CoupledScene, load_coupled_scene
 from ...scenes.fmu_files import find_fmu
 from .convergence import Convergence
-from .engine import ENGINES, EXTRA, MAIN, Request, rows
+from .engine import ENGINES, EXTRA, MAIN_ENGINE, EngineRequest, run_engine
 
 FOLDER = "coupled"
 FILES = ("trajectory.csv", "error.csv", "engines.csv", "figure.svg")
@@ -32,11 +32,11 @@ SPRING = PROJECT_ROOT / "fmus" / "more" / "spring.py"
 Starts = dict[str, dict[str, float]]  # start values of the real parameters of each model
 
 
-def perform(source: str, out: Path, stop: float | None, report: ProgressCallback) -> tuple[Convergence, Path]:
+def run_coupled(source: str, out: Path, stop: float | None, report: ProgressCallback) -> tuple[Convergence, Path]:
     """Run a coupled scene or an archive at each communication step, compare, and write out/coupled/<name>; a stop, in
     s, stands above its own."""
     try:
-        from . import archive, theirs
+        from . import archive, external_archive
     except ImportError as error:
         raise HarnessError(f"a coupled scene needs {error.name}: {EXTRA}") from None
     from .figure import draw
@@ -44,23 +44,25 @@ def perform(source: str, out: Path, stop: float | None, report: ProgressCallback
     with temporary_directory("ssp-") as plain:
         if source.endswith(".ssp"):
             name, file = Path(source).stem, plain / "theirs.ssp"
-            asked, fmus, scene = theirs.asked(Path(source), file, stop), [Path(source)], None
+            asked, fmus, scene = external_archive.read_archive(Path(source), file, stop), [Path(source)], None
         else:
             scene = load_coupled_scene(source, BODY_MODELS, stop)
-            defaults = {model: starts(find_fmu(model)) for model in BODY_MODELS}
+            defaults = {model: start_values(find_fmu(model)) for model in BODY_MODELS}
             check(scene, defaults)
             name, file = scene.name, plain / f"{scene.identifier}.ssp"
-            asked, fmus = blank(scene), [part.fmu for part in scene.parts]
+            asked, fmus = unsolved_study(scene), [part.fmu for part in scene.parts]
         folder = out / FOLDER / name
         with replace_folder(folder, (*FILES, file.name), describe_sources(source)) as fresh:
             if scene:
-                archive.write(scene, values(scene, defaults), built(scene, plain), file)
+                archive.write(scene, values(scene, defaults), element_fmus(scene, plain), file)
             copy(file, fresh)
             found = study(asked, file, solver(scene, defaults) if scene else None, report)
             save(found, fresh)
             draw(found, fresh / "figure.svg")
             told = {"stop": found.stop} | (vars(scene) if scene else {})
-            write_provenance(fresh, fmus, theirs.in_force(file), told, source=describe_sources(source))
+            write_provenance(
+                fresh, fmus, external_archive.effective_parameters(file), told, source=describe_sources(source)
+            )
     return found, folder
 
 
@@ -72,7 +74,7 @@ def check(scene: CoupledScene, defaults: Starts) -> None:
             raise HarnessError(f"scene {scene.name}: part {part.name} ({part.model}) has no parameter {unknown[0]}")
 
 
-def starts(fmu: Path) -> dict[str, float]:
+def start_values(fmu: Path) -> dict[str, float]:
     """The start values of an FMU's real parameters."""
     return {
         variable.name: float(variable.start)
@@ -91,7 +93,7 @@ def values(scene: CoupledScene, defaults: Starts) -> Starts:
     return found
 
 
-def built(scene: CoupledScene, folder: Path) -> dict[str, Path]:
+def element_fmus(scene: CoupledScene, folder: Path) -> dict[str, Path]:
     """The FMU of each element; that of the springs is built for the occasion."""
     fmus = {part.name: part.fmu for part in scene.parts}
     if scene.springs:
@@ -101,7 +103,7 @@ def built(scene: CoupledScene, folder: Path) -> dict[str, Path]:
     return fmus | {each.name: folder / "spring.fmu" for each in scene.springs}
 
 
-def blank(scene: CoupledScene) -> Convergence:
+def unsolved_study(scene: CoupledScene) -> Convergence:
     """What is to be run: the positions of the parts."""
     read = tuple((part.name, "x", reference(part.fmu, "x")) for part in scene.parts)
     labels = tuple(f"{part.name} ({part.model})" for part in scene.parts)
@@ -126,7 +128,7 @@ def study(
     too."""
     runs = []
     for i, step in enumerate(asked.steps):
-        runs.append(np.array(rows(MAIN, request(asked, archive, step))))
+        runs.append(np.array(run_engine(MAIN_ENGINE, request(asked, archive, step))))
         report((i + 1) / (len(asked.steps) + len(ENGINES)))
     finest = runs[-1]
     times = [np.arange(len(x)) * step for step, x in zip(asked.steps, runs, strict=True)]
@@ -142,7 +144,11 @@ def study(
     others = {}
     for engine in ENGINES:
         try:
-            x = finest if engine == MAIN else np.array(rows(engine, request(asked, archive, asked.steps[-1])))
+            x = (
+                finest
+                if engine == MAIN_ENGINE
+                else np.array(run_engine(engine, request(asked, archive, asked.steps[-1])))
+            )
             late = len(truths[-1]) - len(x)
             others[engine] = tuple(x[-1].tolist()), float(np.abs(x - truths[-1][late:]).max()), ""
         except HarnessError as error:
@@ -150,8 +156,8 @@ def study(
     return replace(asked, time=times[-1], x=finest, truth=truths[-1], errors=tuple(errors), engines=others)
 
 
-def request(asked: Convergence, archive: Path, step: float) -> Request:
-    return Request(str(archive), step, round(asked.stop / step), list(asked.read), asked.values)
+def request(asked: Convergence, archive: Path, step: float) -> EngineRequest:
+    return EngineRequest(str(archive), step, round(asked.stop / step), list(asked.read), asked.values)
 
 
 def save(found: Convergence, folder: Path) -> None:

@@ -12,7 +12,7 @@ from ...results.quantity import display_unit
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, Axes, axis_label, open_figure
 
 MARGINS = {"left": 0.105, "right": 0.985, "bottom": 0.055, "top": 0.97, "hspace": 0.35}
-MOST = 4000  # points of a line: more are not seen
+MAX_POINTS = 4000  # points of a line: more are not seen
 COLOURS: dict[Terms, str] = {("zeta",): GREEN, ("r",): BLUE, ("b",): "#CC79A7"}  # of the laws of one term
 
 
@@ -35,7 +35,7 @@ def signal(axes: Axes, found: DecayIdentification) -> None:
     points(axes, t, found.x / size, color=BLUE, label="record")
     if not used.all():
         points(axes, record.t[~used], record.x[~used] / size, color=GREY, label="left out")
-    fine = np.linspace(t[0], t[-1], MOST) if len(t) < MOST else t[extremes(found.x)]
+    fine = np.linspace(t[0], t[-1], MAX_POINTS) if len(t) < MAX_POINTS else t[extremes(found.x)]
     axes.plot(
         fine, found.signal(found.best, fine) / size, color=ORANGE, linewidth=0.9, label=f"fit: {found.best.description}"
     )
@@ -58,9 +58,9 @@ def points(axes: Axes, t: np.ndarray, x: np.ndarray, **style: Any) -> None:
 def extremes(x: np.ndarray) -> np.ndarray:
     """All samples of x (n,), or of many the first, the lowest and the highest of each of MOST/2 stretches: what is left
     out lies between those, whatever its period."""
-    if len(x) <= MOST:
+    if len(x) <= MAX_POINTS:
         return np.arange(len(x))
-    size = -(-2 * len(x) // MOST)
+    size = -(-2 * len(x) // MAX_POINTS)
     places = np.minimum(np.arange(0, len(x), size)[:, None] + np.arange(size), len(x) - 1)
     low, high = x[places].argmin(axis=1), x[places].argmax(axis=1)
     return np.unique(places[:, 0] + [np.zeros_like(low), low, high])

@@ -8,7 +8,7 @@ from ...analyses.decay.identification import DecayIdentification
 from ...results.quantity import format_interval
 
 
-def table(found: DecayIdentification) -> Table:
+def decay_table(found: DecayIdentification) -> Table:
     """Value and half of its 95 % interval, by the whole signal, by its turning points, and by two of them."""
     shown = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0), title=found.record.name, title_justify="left")
     shown.add_column("", min_width=14)
@@ -18,18 +18,18 @@ def table(found: DecayIdentification) -> Table:
     turns = {each.name: each for each in found.extrema_estimates}
     peaks = {each.name: each for each in found.two_peak_estimates}
     for each in found.estimates:
-        cells = [told(by[each.name]) if each.name in by else "" for by in (turns, peaks)]
+        cells = [format_estimate(by[each.name]) if each.name in by else "" for by in (turns, peaks)]
         unit = "" if each.unit == "1" else each.unit
-        shown.add_row(f"{each.text}, {each.name}", told(each), *cells, unit)
+        shown.add_row(f"{each.text}, {each.name}", format_estimate(each), *cells, unit)
     return shown
 
 
-def told(each: Estimate) -> str:
+def format_estimate(each: Estimate) -> str:
     """As every result tells it."""
     return format_interval(each.value, each.low, each.high)
 
 
-def sentences(found: DecayIdentification) -> list[str]:
+def summary_lines(found: DecayIdentification) -> list[str]:
     """What is to be read below the table."""
     said = [found.sentence]
     said += [f"No {name}: {why}." for name, why in found.unavailable.items() if why]

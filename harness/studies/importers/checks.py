@@ -17,12 +17,12 @@ from ...errors import HarnessError
 from ...process.subprocess_runner import SubprocessTimeoutError, run_module
 from ...running.c_host import COMPILER, PYTHON_LIBRARY
 from ...running.description import read_description
-from . import by_c
-from .request import END, Reply, Request
+from . import c_adapter
+from .request import END, ImporterReply, ImporterRequest
 
-AGREE = 1e-6
-PATIENCE = 300  # s, for a process
-LIVES = 100
+TOLERANCE = 1e-6
+TIMEOUT = 300  # s, for a process
+RESET_CYCLES = 100
 POINTS = 200  # communication steps of a run
 DIVERGED = "the motion leaves the range of numbers"
 EXCHANGE = "fmi2EnterEventMode"
@@ -37,25 +37,25 @@ class Importer:
     whatever it runs."""
 
     name: str
-    player: str
+    adapter: str
     packages: tuple[str, ...]
-    logs: bool
-    heeds: bool
-    ends: bool = False
-    exchange: bool = False
+    shows_log: bool
+    checks_status: bool
+    exits_on_error: bool = False
+    needs_model_exchange: bool = False
 
 
 IMPORTERS = (
-    Importer("fmpy", "by_fmpy", ("fmpy",), True, True),
-    Importer("C, cc", "by_c", (), True, True),
-    Importer("fmuloader", "by_fmuloader", ("fmuloader",), True, True, exchange=True),
-    Importer("FMUContainer", "by_fmucontainer", ("fmu-manipulation-toolbox",), True, True),
-    Importer("Ecos", "by_ecos", ("ecospy", "tbb"), False, False),
-    Importer("libcosim", "by_libcosim", ("libcosimpy",), True, True, ends=True),
+    Importer("fmpy", "fmpy_adapter", ("fmpy",), True, True),
+    Importer("C, cc", "c_adapter", (), True, True),
+    Importer("fmuloader", "fmuloader_adapter", ("fmuloader",), True, True, needs_model_exchange=True),
+    Importer("FMUContainer", "fmucontainer_adapter", ("fmu-manipulation-toolbox",), True, True),
+    Importer("Ecos", "ecos_adapter", ("ecospy", "tbb"), False, False),
+    Importer("libcosim", "libcosim_adapter", ("libcosimpy",), True, True, exits_on_error=True),
 )
 
 
-ELSEWHERE = {  # why some are not driven
+NOT_RUN = {  # why some are not driven
     "OMSimulator": "its pip package fetches its programs from elsewhere when it is installed",
     "PyFMI": "conda has it; what pip has of it is of 2018, and wants libraries that pip has not",
     "fmusim, FMU Compliance Checker, libfmi4c": "neither pip nor Debian has them",
@@ -63,95 +63,99 @@ ELSEWHERE = {  # why some are not driven
 
 
 @dataclass(frozen=True)
-class Played:
+class AdapterResult:
     """An answer, and what the process said on standard error meanwhile."""
 
-    answer: Reply
-    said: str
+    reply: ImporterReply
+    stderr: str
 
 
-class Wrong(Exception):
+class CheckFailedError(Exception):
     """A check that failed, in a few words."""
 
 
-ANSWERS: dict[tuple[str, str], Played | Wrong] = {}  # of each player to each request, in JSON
+RESULTS: dict[tuple[str, str], AdapterResult | CheckFailedError] = {}  # of each player to each request, in JSON
 
 
-def absent(importer: Importer, fmu: Path | None = None) -> str:
+def unavailable_reason(importer: Importer, fmu: Path | None = None) -> str:
     """Why an importer cannot be asked here, of an FMU if one is named, or nothing."""
     for package in importer.packages:
         try:
             version(package)
         except PackageNotFoundError:
             return f"{package} is not installed: pip install -e '.[importers]'"
-    if importer.player == "by_c":
+    if importer.adapter == "c_adapter":
         if COMPILER is None:
             return "there is no C compiler here"
         if not PYTHON_LIBRARY.is_file():
             return "this Python has no shared library that a C program could load"
-    if importer.exchange and fmu and not exports(fmu, EXCHANGE):
+    if importer.needs_model_exchange and fmu and not has_function(fmu, EXCHANGE):
         return f"it opens only FMUs whose library has all functions of FMI, and {fmu.name} has none of model exchange"
     return ""
 
 
-def exports(fmu: Path, function: str) -> bool:
+def has_function(fmu: Path, function: str) -> bool:
     """Whether the library of an FMU for this machine names a function."""
     with ZipFile(fmu) as archive:
         names = [name for name in archive.namelist() if name.startswith("binaries/linux64/") and name.endswith(".so")]
         return any(function.encode() in archive.read(name) for name in names)
 
 
-def play(importer: Importer, request: Request) -> Played:
+def run_request(importer: Importer, request: ImporterRequest) -> AdapterResult:
     """The answer of an importer, from another process than this; Wrong if that crashes or hangs."""
     prepare(importer, [request])
-    answer = ANSWERS[importer.player, json.dumps(asdict(request))]
-    if isinstance(answer, Wrong):
+    answer = RESULTS[importer.adapter, json.dumps(asdict(request))]
+    if isinstance(answer, CheckFailedError):
         raise answer
     return answer
 
 
-def prepare(importer: Importer, requests: list[Request]) -> None:
+def prepare(importer: Importer, requests: list[ImporterRequest]) -> None:
     """Ask an importer what it was not asked yet: a process all, and where it crashes or hangs, another one the rest."""
     texts = [json.dumps(asdict(request)) for request in requests]
-    texts = [text for text in dict.fromkeys(texts) if (importer.player, text) not in ANSWERS]
+    texts = [text for text in dict.fromkeys(texts) if (importer.adapter, text) not in RESULTS]
     while texts:
-        answers = asked(importer.player, texts)
-        ANSWERS.update(((importer.player, text), answer) for text, answer in zip(texts, answers, strict=False))
+        answers = run_adapter(importer.adapter, texts)
+        RESULTS.update(((importer.adapter, text), answer) for text, answer in zip(texts, answers, strict=False))
         texts = texts[len(answers) :]
 
 
-def asked(player: str, texts: list[str]) -> list[Played | Wrong]:
+def run_adapter(adapter: str, texts: list[str]) -> list[AdapterResult | CheckFailedError]:
     """The answers to as many of these requests as a process carries out, and of the next one how it crashed or hung."""
     text, hung = "\n".join(texts), ""
     try:
-        in_c = player == "by_c"
-        done = by_c.ran(text, PATIENCE) if in_c else run_module(f"{__package__}.{player}", text, timeout=PATIENCE)
+        in_c = adapter == "c_adapter"
+        done = (
+            c_adapter.run_requests(text, TIMEOUT)
+            if in_c
+            else run_module(f"{__package__}.{adapter}", text, timeout=TIMEOUT)
+        )
     except SubprocessTimeoutError as late:
-        done, hung = late.process, f"hangs for {PATIENCE} s"
+        done, hung = late.process, f"hangs for {TIMEOUT} s"
     *said, rest = done.stderr.split(END)
-    replies = [Reply(**json.loads(line)) for line in done.stdout.splitlines()]
-    found: list[Played | Wrong] = [Played(*each) for each in zip(replies, said, strict=False)]
+    replies = [ImporterReply(**json.loads(line)) for line in done.stdout.splitlines()]
+    found: list[AdapterResult | CheckFailedError] = [AdapterResult(*each) for each in zip(replies, said, strict=False)]
     if done.returncode or rest or len(found) < len(texts):
         last = rest.strip().splitlines()[-1:] or ["nothing said"]
-        found[len(texts) - 1 :] = [Wrong(hung or f"exit status {done.returncode}: {last[0]}")]
+        found[len(texts) - 1 :] = [CheckFailedError(hung or f"exit status {done.returncode}: {last[0]}")]
     return found
 
 
 @dataclass(frozen=True)
-class Subject:
+class FmuUnderTest:
     """An FMU and what the checks need to know of it."""
 
     fmu: Path
-    basis: Request  # the default experiment, its first two outputs and acceleration read
-    wire: list[str]  # an output, and the input, which is of the same unit
-    change: dict[str, float]  # a tunable and its new value in mid-run
+    base_request: ImporterRequest  # the default experiment, its first two outputs and acceleration read
+    connection: list[str]  # an output, and the input, which is of the same unit
+    midrun_changes: dict[str, float]  # a tunable and its new value in mid-run
 
 
-class Unfit(HarnessError):
+class UnsuitableFmuError(HarnessError):
     """An FMU that the checks cannot be made with."""
 
 
-def subject(fmu: Path) -> Subject:
+def describe_fmu(fmu: Path) -> FmuUnderTest:
     """Read the description of an FMU of this project."""
     if not fmu.is_file():
         raise HarnessError(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another folder")
@@ -163,100 +167,108 @@ def subject(fmu: Path) -> Subject:
     entry = next((name for name, v in reals.items() if v.causality == "input"), "")
     source = next((name for name in outputs if entry and reals[name].unit == reals[entry].unit), "")
     if not source or "m" not in reals:
-        raise Unfit("the checks want a mass m, an input, and an output of its unit")
-    change = {name: FACTOR * float(v.start) for name, v in reals.items() if name in ("k", "r")}
-    basis = Request(
+        raise UnsuitableFmuError("the checks want a mass m, an input, and an output of its unit")
+    midrun_changes = {name: FACTOR * float(v.start) for name, v in reals.items() if name in ("k", "r")}
+    base_request = ImporterRequest(
         fmu=str(fmu.resolve()),
         references={name: v.valueReference for name, v in reals.items()},
         step=float(found.defaultExperiment.stopTime) / POINTS,
         steps=POINTS,
-        read=outputs[:2],
+        outputs=outputs[:2],
     )
-    return Subject(fmu, basis, [source, entry], change)
+    return FmuUnderTest(fmu, base_request, [source, entry], midrun_changes)
 
 
-def agreement(importer: Importer, request: Request) -> str:
+def check_agreement(importer: Importer, request: ImporterRequest) -> str:
     """The largest difference from fmpy, as a share of the largest value of the variable."""
-    mine = play(importer, request)
-    if mine.said:
-        raise Wrong(f"it says: {mine.said.splitlines()[0]}")
-    if not all(isfinite(value) for row in mine.answer.rows for value in row):
-        raise Wrong("it answers what is not a number")
-    expected = play(IMPORTERS[0], request).answer.rows
-    worst = difference(mine.answer.rows, expected)
+    mine = run_request(importer, request)
+    if mine.stderr:
+        raise CheckFailedError(f"it says: {mine.stderr.splitlines()[0]}")
+    if not all(isfinite(value) for row in mine.reply.rows for value in row):
+        raise CheckFailedError("it answers what is not a number")
+    expected = run_request(IMPORTERS[0], request).reply.rows
+    worst = largest_difference(mine.reply.rows, expected)
     return f"{worst:.0e}" if importer is not IMPORTERS[0] else "runs"
 
 
-def difference(rows: list[list[float]], expected: list[list[float]]) -> float:
+def largest_difference(rows: list[list[float]], expected: list[list[float]]) -> float:
     """The same as a number, from the first step on: libcosim shows nothing before it; Wrong if too large."""
     if len(rows) != len(expected):
-        raise Wrong(f"{len(rows)} points instead of {len(expected)}")
+        raise CheckFailedError(f"{len(rows)} points instead of {len(expected)}")
     worst = 0.0
     for mine, right in zip(zip(*rows[1:], strict=True), zip(*expected[1:], strict=True), strict=True):
         size = max(abs(value) for value in right) or 1.0
         worst = max(worst, *(abs(a - b) / size if a == a else 1.0 for a, b in zip(mine, right, strict=True)))
-    if not worst <= AGREE:
-        raise Wrong(f"differs from fmpy by {worst:.0e}")
+    if not worst <= TOLERANCE:
+        raise CheckFailedError(f"differs from fmpy by {worst:.0e}")
     return worst
 
 
-def failure(importer: Importer, request: Request) -> str:
+def check_failure(importer: Importer, request: ImporterRequest) -> str:
     """A run that fails: said once on standard error and in the log, no number afterwards, all well after a reset."""
-    sentence = refusal(request)
+    sentence = expected_message(request)
     try:
-        played = play(importer, request)
-    except Wrong as wrong:
-        if importer.ends and request.values and sentence in str(wrong):
+        run_instances = run_request(importer, request)
+    except CheckFailedError as wrong:
+        if importer.exits_on_error and request.values and sentence in str(wrong):
             return "told, ends"
         raise
     kind = request.instances[0]
-    lines = [line for line in played.said.splitlines() if sentence in line]
+    lines = [line for line in run_instances.stderr.splitlines() if sentence in line]
     names = f"({kind}): ", f"{Path(request.fmu).name}): ", f"({kind}.0.fmu): "  # the last one in a container
     own = [line for line in lines if any(name in line for name in names)]
     if len(own) != 1:
-        raise Wrong(f"{len(own)} lines on standard error instead of one")
-    if importer.logs and len(lines) != 2:
-        raise Wrong("the log says nothing")
-    rows, accepted = played.answer.rows, played.answer.accepted
-    if importer.heeds and accepted == request.steps:
-        raise Wrong("every step is accepted")
-    if not (all(isnan(value) for value in rows[-1]) or (importer.heeds and rows[-1] == rows[accepted])):
-        raise Wrong(f"answers {rows[-1][0]!r} after it failed")
-    fresh = play(IMPORTERS[0], replace(request, values={}, change={}, instances=["a"], again=False)).answer.rows
-    difference(played.answer.again, fresh)
+        raise CheckFailedError(f"{len(own)} lines on standard error instead of one")
+    if importer.shows_log and len(lines) != 2:
+        raise CheckFailedError("the log says nothing")
+    rows, accepted = run_instances.reply.rows, run_instances.reply.accepted
+    if importer.checks_status and accepted == request.steps:
+        raise CheckFailedError("every step is accepted")
+    if not (all(isnan(value) for value in rows[-1]) or (importer.checks_status and rows[-1] == rows[accepted])):
+        raise CheckFailedError(f"answers {rows[-1][0]!r} after it failed")
+    fresh = run_request(
+        IMPORTERS[0], replace(request, values={}, midrun_changes={}, instances=["a"], rerun=False)
+    ).reply.rows
+    largest_difference(run_instances.reply.rerun, fresh)
     return "told"
 
 
-def refusal(request: Request) -> str:
+def expected_message(request: ImporterRequest) -> str:
     """What is to be said of its values: of several, that the motion diverges."""
-    (name, value), *more = [*request.values.items(), *request.change.items()]
+    (name, value), *more = [*request.values.items(), *request.midrun_changes.items()]
     return DIVERGED if more else f"{name} = {value!r}"
 
 
-def failing(subject: Subject, **changes: Any) -> Request:
+def failing_request(subject: FmuUnderTest, **changes: Any) -> ImporterRequest:
     """A request that fails, and then one that does not."""
-    return replace(subject.basis, steps=10, again=True, **changes)
+    return replace(subject.base_request, steps=10, rerun=True, **changes)
 
 
-def lives(importer: Importer, request: Request) -> str:
+def check_reset_cycles(importer: Importer, request: ImporterRequest) -> str:
     """Runs, saves, runs on, restores, runs on, resets, runs and frees, in one process; then unloads the library."""
-    if importer.player != "by_c":
+    if importer.adapter != "c_adapter":
         return "-"
-    rows = play(importer, request).answer.rows
-    if len(rows) != 3 * LIVES or any(row != rows[0] for row in rows):
-        raise Wrong("the lives differ")
-    difference([[], rows[0]], [[], play(IMPORTERS[0], replace(request, lives=0)).answer.rows[-1]])
+    rows = run_request(importer, request).reply.rows
+    if len(rows) != 3 * RESET_CYCLES or any(row != rows[0] for row in rows):
+        raise CheckFailedError("the lives differ")
+    largest_difference([[], rows[0]], [[], run_request(IMPORTERS[0], replace(request, reset_cycles=0)).reply.rows[-1]])
     return "alike"
 
 
-Judge = Callable[[Importer, Request], str]  # returns what the table shows, or raises Wrong
-CHECKS: dict[str, tuple[Judge, Callable[[Subject], Request]]] = {
-    "default run": (agreement, lambda its: its.basis),
-    "tunable changed": (agreement, lambda its: replace(its.basis, change=its.change)),
-    "two connected": (agreement, lambda its: replace(its.basis, instances=["a", "b"], connect=its.wire)),
-    "100 lives": (lives, lambda its: replace(its.basis, steps=10, lives=LIVES)),
-    "bad parameter": (failure, lambda its: failing(its, values=NEGATIVE)),
-    "bad input": (failure, lambda its: failing(its, change={its.wire[1]: nan})),
-    "diverging run": (failure, lambda its: failing(its, change={**TINY, its.wire[1]: 1e308})),
-    "% in a name": (failure, lambda its: failing(its, instances=["100%s%n"], values=NEGATIVE)),
+Judge = Callable[[Importer, ImporterRequest], str]  # returns what the table shows, or raises Wrong
+CHECKS: dict[str, tuple[Judge, Callable[[FmuUnderTest], ImporterRequest]]] = {
+    "default run": (check_agreement, lambda its: its.base_request),
+    "tunable changed": (check_agreement, lambda its: replace(its.base_request, midrun_changes=its.midrun_changes)),
+    "two connected": (
+        check_agreement,
+        lambda its: replace(its.base_request, instances=["a", "b"], connection=its.connection),
+    ),
+    "100 lives": (check_reset_cycles, lambda its: replace(its.base_request, steps=10, reset_cycles=RESET_CYCLES)),
+    "bad parameter": (check_failure, lambda its: failing_request(its, values=NEGATIVE)),
+    "bad input": (check_failure, lambda its: failing_request(its, midrun_changes={its.connection[1]: nan})),
+    "diverging run": (
+        check_failure,
+        lambda its: failing_request(its, midrun_changes={**TINY, its.connection[1]: 1e308}),
+    ),
+    "% in a name": (check_failure, lambda its: failing_request(its, instances=["100%s%n"], values=NEGATIVE)),
 }

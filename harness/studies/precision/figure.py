@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from ...references.certified_reference import ReferenceCase
 from ...results.style import GREY, METHOD_COLOURS, WIDTH, open_figure
-from .laws import Shortcut
+from .law_deviations import LawDeviation
 from .study import CS, FMPY, FMU, ME, Study
 
 TOOLS: dict[str, dict[str, Any]] = {
@@ -30,7 +30,7 @@ LEGEND = (
 FLOOR = 2.0**-53  # errors below what a double can tell are drawn there
 
 
-def draw(study: Study, laws: Sequence[Shortcut], path: Path) -> None:
+def draw(study: Study, laws: Sequence[LawDeviation], path: Path) -> None:
     """Save the figure of a study: run time and right-hand sides over the error, a row for each law.
 
     Laws that chatter are drawn in the row of true stick and slip, by their error beside that.

@@ -30,26 +30,26 @@ from ...running.solution import Solution
 from ...running.timing import time_call
 from ...scenes.fmu_files import find_fmu
 
-MOST = 20  # timed runs of one point
+MAX_REPEATS = 20  # timed runs of one point
 
 FMU, FMPY = "FMU", "fmpy"  # the FMU's own code in this process; the FMU through fmpy
 CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # the FMI 3.0 FMU through fmpy, in co-simulation and in model exchange
-WAYS = {CS: fmi3.CO_SIMULATION, ME: fmi3.MODEL_EXCHANGE}
+FMI3_INTERFACES = {CS: fmi3.CO_SIMULATION, ME: fmi3.MODEL_EXCHANGE}
 
 
 @dataclass(frozen=True)
-class Extent:
+class SweepSettings:
     """How far a sweep goes: `timeout` in s is for one run, and where one takes longer tighter ones are not tried;
     `budget` in s is for the timed runs of one point; solvers are told apart by run times that differ `clear` times."""
 
     tolerances: tuple[float, ...]
     timeout: float
     budget: float
-    clear: float = 0.0
+    min_ratio: float = 0.0
 
 
-FULL = Extent(tuple(float(f"1e-{n}") for n in range(2, 13)), 0.5, 0.04)
-QUICK = Extent((1e-3, 1e-6, 1e-9), 0.1, 0.005, clear=1.5)
+FULL = SweepSettings(tuple(float(f"1e-{n}") for n in range(2, 13)), 0.5, 0.04)
+QUICK = SweepSettings((1e-3, 1e-6, 1e-9), 0.1, 0.005, min_ratio=1.5)
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Job:
+class SolverJob:
     """How one solver is asked: `run(rtol, extent)` gives its answer and the run time in s, None if there is nothing
     to ask.  `absolute` is atol as a share of rtol, NaN for the FMU's own choice; to fail is an error where `must` is
     set, else a gap.  Where it is not `swept` it is asked once, with rtol 0."""
@@ -82,9 +82,9 @@ class Job:
     tool: str
     method: str
     absolute: float
-    run: Callable[[float, Extent], tuple[Solution, float] | None]
-    must: bool = False
-    swept: bool = True
+    run: Callable[[float, SweepSettings], tuple[Solution, float] | None]
+    must_succeed: bool = False
+    is_swept: bool = True
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Study:
         """Tool and method of every curve of a case, in order."""
         return list(dict.fromkeys((point.tool, point.method) for point in self.points if point.case == case.name))
 
-    def exchanged(self) -> dict[float, dict[str, float]]:
+    def exchange_errors(self) -> dict[float, dict[str, float]]:
         """By relative tolerance, the largest error of every case in model exchange, NaN where that failed; nothing
         where the FMI 3.0 FMU is not built."""
         found: dict[float, dict[str, float]] = {}
@@ -114,21 +114,21 @@ class Study:
         return found
 
 
-def study(model: str, extent: Extent, report: Callable[[float], None]) -> Study:
+def study_model(model: str, extent: SweepSettings, report: Callable[[float], None]) -> Study:
     """Sweep every case of a model, of ours by its name or of anybody by the path of its file; told how far it is as a
     share."""
     file = find_fmu(model)
     carried = load_model_class(file)
-    cases = tuple(case for case in CASES if case.model == model) or (default(model, file, carried),)
-    work = [(case, job) for case in cases for job in jobs(case, carried, file)]
+    cases = tuple(case for case in CASES if case.model == model) or (default_case(model, file, carried),)
+    work = [(case, job) for case in cases for job in solver_jobs(case, carried, file)]
     points: list[Point] = []
     for done, (case, job) in enumerate(work):
-        points += sweep(case, job, extent)
+        points += sweep_tolerances(case, job, extent)
         report((done + 1) / len(work))
     return Study(file.stem, cases, tuple(points))
 
 
-def default(model: str, file: Path, carried: Any) -> ReferenceCase:
+def default_case(model: str, file: Path, carried: Any) -> ReferenceCase:
     """The default run of a model that nobody has written a second time: its certified result lies beside the file, or
     two methods agree about it."""
     beside = file.with_suffix(".csv").is_file()
@@ -138,7 +138,7 @@ def default(model: str, file: Path, carried: Any) -> ReferenceCase:
 
 
 @dataclass(frozen=True)
-class Asking:
+class CaseRunner:
     """The ways to ask about a case: the model that its FMU carries, that FMU in a file, its sibling, and peers.  Each
     takes rtol and an extent, and gives the answer with the run time in s."""
 
@@ -150,15 +150,17 @@ class Asking:
     def times(self) -> np.ndarray:
         return self.case.reference.times
 
-    def inside(self, method: str, taken: dict[float, float], rtol: float, extent: Extent) -> tuple[Solution, float]:
+    def run_inside(
+        self, method: str, taken: dict[float, float], rtol: float, extent: SweepSettings
+    ) -> tuple[Solution, float]:
         """The FMU's own code, in this process."""
         run, times = EmbeddedModel.create(self.carried, self.case.values, method, rtol), self.times.tolist()
         answer = run.solve(times, extent.timeout)
-        taken[rtol] = best(partial(run.compute_states, times), extent.budget)
+        taken[rtol] = best_time(partial(run.compute_states, times), extent.budget)
         return answer, taken[rtol]
 
-    def through_fmpy(
-        self, method: str, taken: dict[float, float], rtol: float, extent: Extent
+    def run_through_fmpy(
+        self, method: str, taken: dict[float, float], rtol: float, extent: SweepSettings
     ) -> tuple[Solution, float] | None:
         """The FMU through fmpy, states recorded; only where it did not fail without fmpy, then it must not."""
         if rtol not in taken:
@@ -171,38 +173,38 @@ class Asking:
         columns = np.column_stack([run.columns[name] for name in outputs])
         return Solution(columns, None, run.statistics.evaluations), run.statistics.seconds
 
-    def by_importer(self, tool: str, rtol: float, extent: Extent) -> tuple[Solution, float]:
+    def run_fmi3(self, tool: str, rtol: float, extent: SweepSettings) -> tuple[Solution, float]:
         """The FMI 3.0 FMU through fmpy, states recorded, and in model exchange every change of mode; the run time is
         that of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
         outputs, stop, step = self.case.outputs, float(self.times[-1]), float(self.times[1])
         marks = tuple(self.carried.contacts) if tool == ME and self.case.reference.modes else ()
-        with fmi3.open_fmi3_instance(fmi3.fmi3_path(self.file), WAYS[tool]) as fmu:
+        with fmi3.open_fmi3_instance(fmi3.fmi3_path(self.file), FMI3_INTERFACES[tool]) as fmu:
             run = partial(fmu.simulate, self.case.values, outputs + marks, stop, step, rtol or None)
             found = run(extent.timeout)
-            seconds = best(run, extent.budget)
+            seconds = best_time(run, extent.budget)
         events = found.find_changes(*marks) if marks else None
         return Solution(found.sample_at(self.times, outputs), events, found.evaluations), seconds
 
-    def by_peer(self, peer: str, method: str, rtol: float, extent: Extent) -> tuple[Solution, float]:
+    def run_peer(self, peer: str, method: str, rtol: float, extent: SweepSettings) -> tuple[Solution, float]:
         """Somebody else's solver."""
         problem = self.case.problem
         ask = partial(peer_solvers.solve, peer, method, problem, self.times, rtol, problem.atol_factor * rtol)
-        return ask(peer_solvers.limit_run_time(extent.timeout)), best(ask, extent.budget)
+        return ask(peer_solvers.limit_run_time(extent.timeout)), best_time(ask, extent.budget)
 
 
-def jobs(case: ReferenceCase, carried: Any, file: Path) -> Iterator[Job]:
+def solver_jobs(case: ReferenceCase, carried: Any, file: Path) -> Iterator[SolverJob]:
     """Every solver that is asked about a case."""
-    ask, absolute = Asking(case, carried, file), case.problem.atol_factor
+    ask, absolute = CaseRunner(case, carried, file), case.problem.atol_factor
     for method in method_numbers(carried):
         if not (method == "exact" and case.is_chattering):
             taken: dict[float, float] = {}  # run time in s by rtol, from the first of the two for the second
-            swept = method != "exact"
-            yield Job(FMU, method, nan, partial(ask.inside, method, taken), swept=swept)
-            yield Job(FMPY, method, nan, partial(ask.through_fmpy, method, taken), True, swept)
+            is_swept = method != "exact"
+            yield SolverJob(FMU, method, nan, partial(ask.run_inside, method, taken), is_swept=is_swept)
+            yield SolverJob(FMPY, method, nan, partial(ask.run_through_fmpy, method, taken), True, is_swept)
     if not case.is_chattering:
         usual = {number: name for name, number in method_numbers(carried).items()}[carried().solver.method]
-        for tool, method, swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3.fmi3_path(file).is_file())):
-            yield Job(tool, method, nan, partial(ask.by_importer, tool), swept=swept)
+        for tool, method, is_swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3.fmi3_path(file).is_file())):
+            yield SolverJob(tool, method, nan, partial(ask.run_fmi3, tool), is_swept=is_swept)
         absent = (
             peer_solvers.PACKAGES if isinstance(case.problem, UnspecifiedProblem) else peer_solvers.missing_packages()
         )
@@ -211,14 +213,14 @@ def jobs(case: ReferenceCase, carried: Any, file: Path) -> Iterator[Job]:
             ("cvode", ("BDF",) if case.problem.is_stiff else ("Adams",)),
         ):
             for method in methods if peer not in absent else ():
-                yield Job(peer, method, absolute, partial(ask.by_peer, peer, method))
+                yield SolverJob(peer, method, absolute, partial(ask.run_peer, peer, method))
 
 
-def sweep(case: ReferenceCase, job: Job, extent: Extent) -> Iterator[Point]:
+def sweep_tolerances(case: ReferenceCase, job: SolverJob, extent: SweepSettings) -> Iterator[Point]:
     """One solver over all tolerances, from loose to tight."""
     truth, dry = case.reference, load_reference(case.dry_friction_reference) if case.dry_friction_reference else None
     given_up = ""
-    for rtol in extent.tolerances if job.swept else (nan,):
+    for rtol in extent.tolerances if job.is_swept else (nan,):
         point = partial(Point, case.name, job.tool, job.method, rtol, job.absolute * rtol)
         if given_up:
             yield point(failure=f"not tried: {given_up}")
@@ -227,7 +229,7 @@ def sweep(case: ReferenceCase, job: Job, extent: Extent) -> Iterator[Point]:
         try:
             found = job.run(0.0 if isnan(rtol) else rtol, extent)
         except HarnessError as error:
-            if job.must:
+            if job.must_succeed:
                 raise
             if perf_counter() - begun > 0.5 * extent.timeout:
                 given_up = f"at rtol {rtol:g} it was only {error}"
@@ -240,7 +242,7 @@ def sweep(case: ReferenceCase, job: Job, extent: Extent) -> Iterator[Point]:
         yield point(seconds, answer.evaluations, **vars(compute_errors(answer, truth)), beside_dry=beside_dry)
 
 
-def best(call: Callable[[], object], budget: float) -> float:
+def best_time(call: Callable[[], object], budget: float) -> float:
     """The time of the fastest of several calls, in s."""
     found = [time_call(call)]
     found += [time_call(call) for _ in range(repeats(found[0], budget) - 1)]
@@ -249,4 +251,4 @@ def best(call: Callable[[], object], budget: float) -> float:
 
 def repeats(once: float, budget: float) -> int:
     """How often to run what takes `once` s within the budget in s."""
-    return 1 if once > 4 * budget else max(2, min(MOST, int(budget / once)))
+    return 1 if once > 4 * budget else max(2, min(MAX_REPEATS, int(budget / once)))

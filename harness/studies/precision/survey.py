@@ -15,78 +15,84 @@ from ...results.provenance import write_provenance
 from ...running.description import declared_parameters
 from ...running.embedded_model import load_model_class
 from ...scenes.fmu_files import check_built, find_fmu
-from . import anchors, laws
-from .advice import advise
-from .study import QUICK, Extent, Point, Study, study
+from . import law_deviations, literature_problems
+from .advice import recommend
+from .study import QUICK, Point, Study, SweepSettings, study_model
 
 FOLDER = "precision"
-QUICKLY = "a quick run"  # which takes no other's place
+QUICK_RUN = "a quick run"  # which takes no other's place
 UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and rad/s
     **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry"), "1"),
     **dict.fromkeys(("seconds", "events", "period"), "s"),
     **dict.fromkeys(("atol", "error"), "SI"),
     "creep": "m/s",
 }
-EXCHANGED = "model exchange by fmpy's CVode: largest error at rtol [1]"
-ENDS = (".csv", ".json", ".svg", ".png", ".txt", "-exchange.csv", "-laws.csv")  # earlier versions drew .png
+EXCHANGE_HEADING = "model exchange by fmpy's CVode: largest error at rtol [1]"
+FILE_SUFFIXES = (".csv", ".json", ".svg", ".png", ".txt", "-exchange.csv", "-laws.csv")  # earlier versions drew .png
 
 
 @dataclass(frozen=True)
-class Survey:
+class PrecisionSurvey:
     """All that was found; what to use, in a sentence for each study; and what is missing, a sentence each."""
 
     studies: tuple[Study, ...]
-    laws: tuple[laws.Shortcut, ...]
-    anchors: tuple[anchors.AnchorRun, ...]
+    deviations: tuple[law_deviations.LawDeviation, ...]
+    literature: tuple[literature_problems.LiteratureRun, ...]
     advice: tuple[str, ...]
     missing: tuple[str, ...]
 
 
-def survey(models: Sequence[str], extent: Extent, out: Path, report: Callable[[str, float], None]) -> Survey:
+def run_survey(
+    models: Sequence[str], extent: SweepSettings, out: Path, report: Callable[[str, float], None]
+) -> PrecisionSurvey:
     """Study the models and write results to out/precision; what is there on other models stays."""
     files = list(map(find_fmu, models))
     for file in files:
         check_built(file)
         if extent == QUICK:
-            check_same_source(out / FOLDER, QUICKLY, f"{file.stem}.json")
-    kept = [path.name for path in (out / FOLDER).glob("*") if path.name.endswith(ENDS)]
+            check_same_source(out / FOLDER, QUICK_RUN, f"{file.stem}.json")
+    kept = [path.name for path in (out / FOLDER).glob("*") if path.name.endswith(FILE_SUFFIXES)]
     with replace_folder(out / FOLDER, ["anchors.csv", *kept]) as folder:
         if (out / FOLDER).exists():
             stale = ignore_patterns(*(f"{file.stem}[.-]*" for file in files))
             copytree(out / FOLDER, folder, ignore=stale, dirs_exist_ok=True)
-        found = gather(models, extent, report)
-        write(found, files, folder, QUICKLY if extent == QUICK else "")
+        found = run_studies(models, extent, report)
+        write_results(found, files, folder, QUICK_RUN if extent == QUICK else "")
     return found
 
 
-def gather(models: Iterable[str], extent: Extent, report: Callable[[str, float], None]) -> Survey:
+def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[str, float], None]) -> PrecisionSurvey:
     """Run everything."""
-    studies = tuple(study(model, extent, partial(report, model)) for model in models)
+    studies = tuple(study_model(model, extent, partial(report, model)) for model in models)
     carried = {model: load_model_class(find_fmu(model)) for model in models}
     told = [
-        laws.analyse(case, carried[case.model])
+        law_deviations.compare_with_dry_friction(case, carried[case.model])
         for case in CASES
         if case.dry_friction_reference and case.model in models
     ]
     report("anchors", 0.0)
-    rows = tuple(anchors.analyse()) if told or any(case.model in models for case in CASES) else ()
-    said = tuple(advise(each, [law for law in told if law.model == each.model], extent.clear) for each in studies)
+    rows = tuple(literature_problems.solve_all()) if told or any(case.model in models for case in CASES) else ()
+    said = tuple(
+        recommend(each, [law for law in told if law.model == each.model], extent.min_ratio) for each in studies
+    )
     absent = (f"{peer} is left out: pip install {package}" for peer, package in missing_packages().items())
-    return Survey(studies, tuple(told), rows, said, (*map(gaps, studies), *reasons(studies), *absent))
+    return PrecisionSurvey(
+        studies, tuple(told), rows, said, (*map(count_failures, studies), *failure_reasons(studies), *absent)
+    )
 
 
-def gaps(found: Study) -> str:
+def count_failures(found: Study) -> str:
     """How many runs failed."""
     failed = sum(bool(point.failure) for point in found.points)
     return f"{found.model}: {failed} of {len(found.points)} runs are gaps; {found.model}.csv has the reasons"
 
 
-def reasons(found: Iterable[Study]) -> Iterable[str]:
+def failure_reasons(found: Iterable[Study]) -> Iterable[str]:
     """Why what is asked once has no answer."""
     return dict.fromkeys(p.failure for study in found for p in study.points if p.failure and isnan(p.rtol))
 
 
-def write(found: Survey, files: Sequence[Path], folder: Path, source: str) -> None:
+def write_results(found: PrecisionSurvey, files: Sequence[Path], folder: Path, source: str) -> None:
     """Tables and figures of what was found about the FMUs in these files, and whether they come from a quick run."""
     from .figure import draw
 
@@ -95,17 +101,17 @@ def write(found: Survey, files: Sequence[Path], folder: Path, source: str) -> No
         write_provenance(folder, [file], declared_parameters(file), values, f"{each.model}.json", source)
         (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
         save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
-        exchanged = each.exchanged()
-        if exchanged:
-            cases = next(iter(exchanged.values()))
-            rows = [[rtol, *errors.values()] for rtol, errors in exchanged.items()]
-            save(folder / f"{each.model}-exchange.csv", [EXCHANGED, *(f"{case} [1]" for case in cases)], rows)
-        mine = [law for law in found.laws if law.model == each.model]
+        exchange_errors = each.exchange_errors()
+        if exchange_errors:
+            cases = next(iter(exchange_errors.values()))
+            rows = [[rtol, *errors.values()] for rtol, errors in exchange_errors.items()]
+            save(folder / f"{each.model}-exchange.csv", [EXCHANGE_HEADING, *(f"{case} [1]" for case in cases)], rows)
+        mine = [law for law in found.deviations if law.model == each.model]
         draw(each, mine, folder / f"{each.model}.svg")
         if mine:
-            save(folder / f"{each.model}-laws.csv", heads(laws.Shortcut), map(astuple, mine))
-    if found.anchors:
-        save(folder / "anchors.csv", heads(anchors.AnchorRun), map(astuple, found.anchors))
+            save(folder / f"{each.model}-laws.csv", heads(law_deviations.LawDeviation), map(astuple, mine))
+    if found.literature:
+        save(folder / "anchors.csv", heads(literature_problems.LiteratureRun), map(astuple, found.literature))
 
 
 def heads(kind: type) -> list[str]:

@@ -46,7 +46,7 @@ Results = dict[str, Any]  # by the name of the analysis
 
 
 @dataclass(frozen=True)
-class Drawn:
+class PlottedRun:
     """A run with points enough for smooth curves, the `results` of its analyses, and the `published` figures."""
 
     run: Trajectory
@@ -82,7 +82,7 @@ def draw(
     columns = [names for right in (False, True) if (names := [name for name in chosen if (name in BESIDE) == right])]
     if not columns:
         return
-    shown = Drawn(smooth(run), results, published or {})
+    shown = PlottedRun(smooth(run), results, published or {})
     height = HEIGHT * max(2, *map(len, columns), 2)
     with open_figure(path, WIDTH * len(columns), height) as figure:
         figure.suptitle(f"{title}\n{run.settings_label}".strip(), fontsize=11)
@@ -114,7 +114,7 @@ def smooth(run: Trajectory) -> Trajectory:
     return replace(run, time=time, columns=columns)
 
 
-def history(axes: Axes, shown: Drawn, name: str) -> None:
+def history(axes: Axes, shown: PlottedRun, name: str) -> None:
     """One output over time, or what plays its role."""
     run, role = shown.run, name
     name = run.spec.motion_outputs.get(role, role)
@@ -150,7 +150,7 @@ def modes(axes: Axes, run: Trajectory) -> None:
         axes.plot(t, y, color=GREY, linewidth=0.5, linestyle=":", label="reversal", transform=place)
 
 
-def position(axes: Axes, shown: Drawn) -> None:
+def position(axes: Axes, shown: PlottedRun) -> None:
     """Position over time, with the driver's if it is recorded, and the turning points if they were measured."""
     run, results = shown.run, shown.results
     if "x_driver" in run.columns:
@@ -195,7 +195,7 @@ def legend(axes: Axes) -> None:
             axes.set_title(title, pad=LIFTED)
 
 
-def phase(axes: Axes, shown: Drawn) -> None:
+def phase(axes: Axes, shown: PlottedRun) -> None:
     """Velocity over position."""
     motion = shown.run.spec.motion_outputs
     x, v = motion["position"], motion["velocity"]
@@ -205,7 +205,7 @@ def phase(axes: Axes, shown: Drawn) -> None:
     axes.set_ylabel(axis_label(v, shown.unit(v)[0]))
 
 
-def steps(axes: Axes, shown: Drawn) -> None:
+def steps(axes: Axes, shown: PlottedRun) -> None:
     """Size of the solver's own steps over the time where they begin, with the mean if it was measured."""
     run = shown.run
     assert run.steps is not None  # the scene was checked for it
@@ -226,5 +226,5 @@ def steps(axes: Axes, shown: Drawn) -> None:
     axes.set_ylabel("h [s]")
 
 
-Panel = Callable[[Axes, Drawn], None]
+Panel = Callable[[Axes, PlottedRun], None]
 PANELS: dict[str, Panel] = {"position": position, "phase": phase, "steps": steps}

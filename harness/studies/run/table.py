@@ -14,12 +14,12 @@ from ...results.quantity import Quantity, format_number
 from ...running.trajectory import Trajectory
 from ...scenes.scene import Scene
 
-ELSEWHERE = "elsewhere: the published run time is that of another machine"
-ALWAYS = ("steps", "mean_step", "run_time")  # shown in the main job even where nothing was published
+OTHER_MACHINE = "elsewhere: the published run time is that of another machine"
+ALWAYS_SHOWN = ("steps", "mean_step", "run_time")  # shown in the main job even where nothing was published
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SceneOutcome:
     """What became of a scene: its measured quantities, or the sentence that says why there are none."""
 
     name: str
@@ -29,7 +29,7 @@ class Outcome:
     error: str | None
 
 
-def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
+def results_table(outcomes: Iterable[SceneOutcome], everything: bool) -> Table:
     """One table for all outcomes; `everything`: also what has no published figure."""
     outcomes = list(outcomes)
     width = 5 if any(outcome.scene and outcome.scene.published for outcome in outcomes) else 3  # columns
@@ -49,10 +49,10 @@ def comparison(outcomes: Iterable[Outcome], everything: bool) -> Table:
         title = Text.assemble((outcome.name, "bold"), f"\n  {outcome.run.settings_label}")
         table.add_row(title, *("", "", Text("\n" + figures.get("source", ""), style="italic"))[: width - 1])
         for quantity in outcome.quantities:
-            if everything or quantity.name in figures or quantity.name in ALWAYS:
+            if everything or quantity.name in figures or quantity.name in ALWAYS_SHOWN:
                 cells = row(quantity, figures.get(quantity.name))
                 table.add_row(*map(Text, cells[:width]))
-                table.caption = ELSEWHERE if cells[-1] == "elsewhere" else table.caption
+                table.caption = OTHER_MACHINE if cells[-1] == "elsewhere" else table.caption
     return table
 
 
@@ -72,7 +72,7 @@ def row(quantity: Quantity, figure: object) -> tuple[str, str, str, str, str]:
     return text, measured, "" if unit == "1" else unit, published, difference
 
 
-def save(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) -> None:
+def write_quantities(quantities: Iterable[Quantity], published: dict[str, Any], path: Path) -> None:
     """Write what the table shows of a scene as CSV, with the source of the published figures in its heading."""
     told = [(text.strip(), *cells) for text, *cells in (row(each, published.get(each.name)) for each in quantities)]
     if not published:

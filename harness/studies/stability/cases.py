@@ -19,7 +19,7 @@ OWN = ("start", "stop", "rtol", "calls")  # what `each` may vary besides a value
 
 
 @dataclass(frozen=True)
-class Trial:
+class StabilityCase:
     """One scene with one method: `finish` is the largest error allowed, `refuse` the words to be refused with."""
 
     title: str
@@ -30,14 +30,14 @@ class Trial:
     spans: list[ParameterSpan]
     calls: list[tuple[float, float]] | None = None
     changes: dict[float, dict[str, float]] = field(default_factory=dict)
-    finish: float | None = None
-    refuse: str | None = None
-    poison: bool = False
+    max_error: float | None = None
+    expected_message: str | None = None
+    inject_nonfinite: bool = False
     events: str = "all"  # which methods must find every event: all, exact or none
     region: float | None = None  # where the scene stands on the axis of the region figure
-    either: bool = False  # a sentence will do, whatever it says
-    driven: bool = False  # energy may come in
-    place: int = 0  # in the table
+    may_be_refused: bool = False  # a sentence will do, whatever it says
+    is_driven: bool = False  # energy may come in
+    order: int = 0  # in the table
 
     @property
     def name(self) -> str:
@@ -53,10 +53,10 @@ class Trial:
         return self.setting.values["solver.rtol"]
 
 
-def scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
+def load_scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
     """Every scene with one model and one value, and the largest errors allowed where a scene says nothing."""
     table = tomllib.loads(file.read_text(encoding="utf-8"))
-    return [one for scene in table["scene"] for one in spread(scene)], table["finish"]
+    return [one for scene in table["scene"] for one in expand_scene(scene)], table["finish"]
 
 
 def usual(model: str, card: FmuInfo, settled: bool) -> list[dict[str, Any]]:
@@ -73,12 +73,16 @@ def usual(model: str, card: FmuInfo, settled: bool) -> list[dict[str, Any]]:
         for name, value in numbers.items()
         for share in (0.1, 10.0)
     ]
-    poison = {"title": "NaN, inf, -inf in every Real, before and in mid-run", "poison": True, "methods": ["default"]}
+    poison = {
+        "title": "NaN, inf, -inf in every Real, before and in mid-run",
+        "inject_nonfinite": True,
+        "methods": ["default"],
+    }
     within = {"exact": 1e-6, "other": LOOSE}
     return [{**of_all, "pattern": one["title"], "finish": within, **one} for one in [*found, poison]]
 
 
-def spread(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def expand_scene(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """A scene for each of its models and for each value that it varies."""
     for model in scene.get("models", [scene.get("model")]):
         if "each" not in scene:
@@ -92,7 +96,7 @@ def spread(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
             yield {**scene, **new, "model": model, **told}
 
 
-def cases(scene: dict[str, Any], card: FmuInfo, finish: dict[str, float]) -> list[Trial]:
+def cases(scene: dict[str, Any], card: FmuInfo, finish: dict[str, float]) -> list[StabilityCase]:
     """The cases of one scene: the methods that it names, of those that its FMU offers."""
     methods = scene.get("methods", card.methods)
     methods = [card.default_method if method == "default" else method for method in methods]
@@ -111,7 +115,7 @@ def largest_error(scene: dict[str, Any], method: str, finish: dict[str, float]) 
     return own.get("other", max(finish["tolerances"] * scene.get("rtol", RTOL), finish["least"]))
 
 
-def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> Trial:
+def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> StabilityCase:
     """A scene with a method."""
     chosen = {"solver.rtol": scene.get("rtol", RTOL), **scene.get("values", {}), "solver.method": method}
     values = card.resolve_labels({**card.start_values, **chosen})
@@ -120,23 +124,23 @@ def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> Tr
         row["t"]: card.resolve_labels({k: v for k, v in row.items() if k != "t"}) for row in scene.get("changes", ())
     }
     points = round((stop - start) / scene["step"]) if "step" in scene else scene.get("points", POINTS)
-    ends = not ("refuse" in scene or "poison" in scene)
-    return Trial(
+    ends = not ("refuse" in scene or "inject_nonfinite" in scene)
+    return StabilityCase(
         title=scene["title"],
         model=scene["model"],
         method=method,
         setting=InitialValues(scene["model"], values, start, stop),
         grid=CommunicationGrid(start, stop, points, tuple(changes), scene.get("at_events", False)),
-        spans=spans(start, stop, values, changes),
+        spans=value_spans(start, stop, values, changes),
         calls=[(t, h) for t, h in scene["calls"]] if "calls" in scene else None,
         changes=changes,
-        finish=finish if ends else None,
-        refuse=scene.get("refuse"),
-        poison=scene.get("poison", False),
+        max_error=finish if ends else None,
+        expected_message=scene.get("refuse"),
+        inject_nonfinite=scene.get("inject_nonfinite", False),
         events=scene.get("events", "all"),
         region=scene["varied"] if scene.get("region") else None,
-        either=scene.get("either", False),
-        driven=scene.get("driven", False) or bool(changes) or any(values.get(name) for name in DRIVING),
+        may_be_refused=scene.get("either", False),
+        is_driven=scene.get("driven", False) or bool(changes) or any(values.get(name) for name in DRIVING),
     )
 
 

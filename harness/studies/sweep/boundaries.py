@@ -52,14 +52,14 @@ class Boundary:
         names = {node.id for node in ast.walk(self.tree) if isinstance(node, ast.Name)}
         return names - {*FUNCTIONS, STOP}
 
-    def at(self, space: Mapping[str, Any], stop: float) -> Any:
+    def evaluate(self, space: Mapping[str, Any], stop: float) -> Any:
         """The quantity where the parameters are these, numbers or arrays."""
         scope = {"__builtins__": {}} | FUNCTIONS | {STOP: stop} | dict(space)
         with np.errstate(all="ignore"):
             return eval(compile(self.tree, "boundary", "eval"), scope)
 
 
-def known(fmu: Path, varied: tuple[str, ...], there: Mapping[str, Any]) -> tuple[Boundary, ...]:
+def read_boundaries(fmu: Path, varied: tuple[str, ...], there: Mapping[str, Any]) -> tuple[Boundary, ...]:
     """The boundaries that run through the space of the varied parameters, of those there are; HarnessError if the FMU
     tells them in another form."""
     try:

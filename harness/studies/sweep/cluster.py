@@ -10,11 +10,11 @@ from typing import Any
 from ...errors import HarnessError, first_line
 from ...process.interruptible_wait import wait_for_any
 
-PATIENCE = 60.0  # s without a worker
+WORKER_TIMEOUT = 60.0  # s without a worker
 EXTRA = "python -m pip install 'friction-fmus[sweep]'"
 
 
-class Cluster:
+class DaskCluster:
     """The workers that a client knows.  Dask gives the task of a worker that died to others, until it has taken too
     many of them along."""
 
@@ -24,15 +24,15 @@ class Cluster:
         self.client, self.address = client, address
         self.pool = client.get_executor(pure=False)
         self.death_errors: tuple[type[Exception], ...] = (KilledWorker,)
-        self.seen = monotonic()
+        self.last_seen = monotonic()
 
     @property
     def size(self) -> int:
         """How many tasks they do at a time; HarnessError once there has been no worker for long."""
         size = sum(self.client.nthreads().values())
         if size:
-            self.seen = monotonic()
-        elif monotonic() > self.seen + PATIENCE:
+            self.last_seen = monotonic()
+        elif monotonic() > self.last_seen + WORKER_TIMEOUT:
             raise HarnessError(f"the scheduler at {self.address} has lost its workers; the same command does the rest")
         return size
 
@@ -45,7 +45,7 @@ class Cluster:
 
 
 @contextmanager
-def cluster(address: str, unload: Callable[[], None]) -> Iterator[Cluster]:
+def connect_cluster(address: str, unload: Callable[[], None]) -> Iterator[DaskCluster]:
     """The cluster whose scheduler is at an address; in the end each worker is told to `unload`."""
     try:
         from distributed import Client
@@ -58,7 +58,7 @@ def cluster(address: str, unload: Callable[[], None]) -> Iterator[Cluster]:
     except (OSError, ValueError) as error:
         raise HarnessError(f"no scheduler answers at {address}: {first_line(error)}") from None
     with client:
-        found = Cluster(client, address)
+        found = DaskCluster(client, address)
         if not found.size:
             raise HarnessError(f"the scheduler at {address} has no workers; start one: dask worker {address}")
         try:

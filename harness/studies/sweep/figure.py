@@ -43,10 +43,10 @@ def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) ->
         if scattered:
             for row, measure in zip(panels, measures, strict=True):
                 for axes, name in zip(row, varied, strict=True):
-                    scatter(axes, data, measure, name)
+                    plot_scatter(axes, data, measure, name)
         else:
             for axes, measure in zip(panels.flat, measures, strict=False):
-                (curve if len(varied) == 1 else chart)(axes, data, measure, boundaries)
+                (plot_curve if len(varied) == 1 else draw_map)(axes, data, measure, boundaries)
             for axes in panels.flat[len(measures) :]:
                 axes.remove()
         shown: dict[str, Artist] = {}
@@ -56,18 +56,23 @@ def draw(file: Path, path: Path, boundaries: Sequence[Boundary], failed: int) ->
             figure.legend(handles=list(shown.values()), labels=list(shown), loc="outside lower center", ncols=2)
 
 
-def named(axes: Axes, data: xarray.Dataset, across: str, up: str) -> None:
+def label_axes(axes: Axes, data: xarray.Dataset, across: str, up: str) -> None:
     """Name what the axes show, and spread it as it is spread."""
-    axes.set(xscale=scale(data, across), yscale=scale(data, up), xlabel=words(data, across), ylabel=words(data, up))
+    axes.set(
+        xscale=axis_scale(data, across),
+        yscale=axis_scale(data, up),
+        xlabel=label_with_unit(data, across),
+        ylabel=label_with_unit(data, up),
+    )
 
 
-def words(data: xarray.Dataset, name: str) -> str:
+def label_with_unit(data: xarray.Dataset, name: str) -> str:
     """A name with its unit."""
     unit = data[name].attrs["units"]
     return axis_label(name, "" if unit == "1" else unit)
 
 
-def scale(data: xarray.Dataset, name: str) -> str:
+def axis_scale(data: xarray.Dataset, name: str) -> str:
     """The kind of axis for the values of a parameter or measure: linear or log."""
     values = data[name].to_numpy()
     values = values[np.isfinite(values)]
@@ -75,18 +80,18 @@ def scale(data: xarray.Dataset, name: str) -> str:
     return "log" if decades or data[name].attrs.get("scale") == "log" else "linear"
 
 
-def spread(data: xarray.Dataset, name: str) -> np.ndarray:
+def sampled_range(data: xarray.Dataset, name: str) -> np.ndarray:
     """Many values over the range of a parameter."""
     low, high = float(data[name].min()), float(data[name].max())
-    return np.geomspace(low, high, FINE) if scale(data, name) == "log" else np.linspace(low, high, FINE)
+    return np.geomspace(low, high, FINE) if axis_scale(data, name) == "log" else np.linspace(low, high, FINE)
 
 
-def curve(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
+def plot_curve(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
     """A measure over the one parameter; a failed run is a gap."""
     (name,) = map(str, data.dims)
     axes.plot(data[name], data[measure], color=BLUE, marker="." if data.sizes[name] < 100 else None)
-    named(axes, data, name, measure)
-    fine = spread(data, name)
+    label_axes(axes, data, name, measure)
+    fine = sampled_range(data, name)
     for each, color in zip(boundaries, COLOURS, strict=False):
         below = quantity(each, data, {name: fine}) < 1
         for at in fine[1:][np.diff(below)]:
@@ -97,7 +102,7 @@ def curve(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[B
     axes.set_title(data[measure].attrs["long_name"])
 
 
-def chart(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
+def draw_map(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[Boundary]) -> None:
     """A measure over two parameters, the first to the right; failed runs are grey, known boundaries are dashed, and the
     side below is hatched."""
     across, up = map(str, data.dims)
@@ -107,10 +112,10 @@ def chart(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[B
         data[measure].to_numpy().T,
         shading="nearest",
         cmap="viridis",
-        norm=scale(data, measure),
+        norm=axis_scale(data, measure),
     )
-    axes.figure.colorbar(image, ax=axes, label=words(data, measure))
-    plane = dict(zip((across, up), np.meshgrid(spread(data, across), spread(data, up)), strict=True))
+    axes.figure.colorbar(image, ax=axes, label=label_with_unit(data, measure))
+    plane = dict(zip((across, up), np.meshgrid(sampled_range(data, across), sampled_range(data, up)), strict=True))
     for each, color, hatch in zip(boundaries, COLOURS, HATCHES, strict=False):
         found = quantity(each, data, plane)
         if np.nanmin(found) < 1 < np.nanmax(found):
@@ -119,20 +124,20 @@ def chart(axes: Axes, data: xarray.Dataset, measure: str, boundaries: Sequence[B
             shade.set_edgecolor(color)
             axes.plot([], [], color=color, linestyle="--", label=each.text)
             axes.fill([], [], facecolor="none", edgecolor=color, hatch=hatch, linewidth=0, label=each.below)
-    named(axes, data, across, up)
+    label_axes(axes, data, across, up)
     axes.grid(visible=False)
     axes.set_title(data[measure].attrs["long_name"])
 
 
-def scatter(axes: Axes, data: xarray.Dataset, measure: str, name: str) -> None:
+def plot_scatter(axes: Axes, data: xarray.Dataset, measure: str, name: str) -> None:
     """A measure over one of the parameters, every run a point."""
     where = data[name].broadcast_like(data[measure]).to_numpy()
     axes.plot(where.ravel(), data[measure].to_numpy().ravel(), ".", color=BLUE, markersize=3, alpha=0.6)
-    named(axes, data, name, measure)
+    label_axes(axes, data, name, measure)
 
 
 def quantity(boundary: Boundary, data: xarray.Dataset, varied: dict[str, np.ndarray]) -> np.ndarray:
     """That of a boundary, where the varied parameters are these, of one shape."""
     (shape,) = {each.shape for each in varied.values()}
     held = json.loads(data.attrs["parameters"])
-    return np.broadcast_to(boundary.at(held | varied, float(data.attrs["stop_time"])), shape)
+    return np.broadcast_to(boundary.evaluate(held | varied, float(data.attrs["stop_time"])), shape)

@@ -24,16 +24,16 @@ class Block:
 
     first: int
     values: np.ndarray
-    sentences: dict[int, str]
+    messages: dict[int, str]
 
     @property
     def last(self) -> int:
         """The number behind that of its last run."""
         return self.first + len(self.values)
 
-    def line(self) -> bytes:
+    def to_line(self) -> bytes:
         values = b64encode(self.values.astype("<f8").tobytes()).decode()
-        text = json.dumps([self.first, len(self.values), values, self.sentences])
+        text = json.dumps([self.first, len(self.values), values, self.messages])
         return f"{crc32(text.encode()):08x} {text}\n".encode()
 
 
@@ -43,11 +43,11 @@ def block(line: bytes, columns: int) -> Block | None:
     if checksum != f"{crc32(text):08x}".encode():
         return None
     try:
-        first, count, values, sentences = json.loads(text)
+        first, count, values, messages = json.loads(text)
         table = np.frombuffer(b64decode(values), "<f8").reshape(count, columns)
     except (ValueError, TypeError):  # of a journal that somebody else wrote
         return None
-    return Block(first, table, {int(place): sentence for place, sentence in sentences.items()})
+    return Block(first, table, {int(place): sentence for place, sentence in messages.items()})
 
 
 class Journal:
@@ -60,11 +60,11 @@ class Journal:
         self.path, self.runs, self.columns = path, runs, columns
         self.places: list[tuple[int, int, int]] = []  # of each block in order: its first and last number, where it is
         self.damaged = self.end = 0
-        with self.told():
+        with self.os_errors_reported():
             self.read()
 
     @contextmanager
-    def told(self) -> Iterator[None]:
+    def os_errors_reported(self) -> Iterator[None]:
         """What the file system refuses becomes one sentence."""
         try:
             yield
@@ -94,11 +94,11 @@ class Journal:
         return low <= found.first < found.last <= high
 
     @property
-    def done(self) -> int:
+    def n_done(self) -> int:
         return sum(last - first for first, last, _ in self.places)
 
     @property
-    def left(self) -> list[tuple[int, int]]:
+    def missing_spans(self) -> list[tuple[int, int]]:
         """The spans of runs, first and last, that no block holds."""
         edges = [0, *(edge for first, last, _ in self.places for edge in (first, last)), self.runs]
         return [(first, last) for first, last in zip(edges[::2], edges[1::2], strict=True) if first < last]
@@ -106,11 +106,11 @@ class Journal:
     @contextmanager
     def open(self) -> Iterator[None]:
         """Keep the file open for writing, without the line that was cut off."""
-        with self.told():
+        with self.os_errors_reported():
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self.file = self.path.open("ab")
         try:
-            with self.told():
+            with self.os_errors_reported():
                 self.file.truncate(self.end)
             yield
         finally:
@@ -118,8 +118,8 @@ class Journal:
                 self.file.close()
 
     def add(self, new: Block) -> None:
-        line = new.line()
-        with self.told():
+        line = new.to_line()
+        with self.os_errors_reported():
             self.file.write(line)
             self.file.flush()
         insort(self.places, (new.first, new.last, self.end))
@@ -127,7 +127,7 @@ class Journal:
 
     def blocks(self) -> Iterator[Block]:
         """All blocks, in the order of their runs."""
-        with self.told(), self.path.open("rb") as file:
+        with self.os_errors_reported(), self.path.open("rb") as file:
             for *_, at in self.places:
                 file.seek(at)
                 found = block(file.readline(), self.columns)
@@ -135,6 +135,6 @@ class Journal:
                     raise HarnessError(f"the journal {self.path} was changed meanwhile; the same command does the rest")
                 yield found
 
-    def forget(self) -> None:
+    def delete(self) -> None:
         """Remove the file."""
         self.path.unlink(missing_ok=True)

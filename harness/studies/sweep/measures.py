@@ -17,11 +17,11 @@ from ...running.trajectory import Trajectory
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
 
-PIECES = 400  # communication steps along a path; the ends of the solver's own steps come on top
+N_STEPS = 400  # communication steps along a path; the ends of the solver's own steps come on top
 
 
 @dataclass(frozen=True)
-class Column:
+class MeasureColumn:
     """One measured number of each run: its name, unit and sentence."""
 
     name: str
@@ -30,7 +30,7 @@ class Column:
 
 
 @dataclass(frozen=True)
-class AlongPath:
+class TrajectoryMeasure:
     """A measure along the path.  It needs the variables named, a law with modes if it is of `modes`, and no driver if
     it is of a `decay`; `like`: the role of the output whose unit it has."""
 
@@ -96,69 +96,71 @@ def decayed(run: Trajectory, law: Callable[[float, float, float], float]) -> flo
 zeta = partial(decayed, law=damping_ratio)
 f_over_k = partial(decayed, law=partial(friction_from_envelope, stiffness=1.0))
 
-AT_END = {  # and the variable that tells it
-    "events": (Column("events", "", "changes of mode"), "events.count"),
-    "steps": (Column("steps", "", "steps of the solver"), "solver.steps"),
-    "evaluations": (Column("evaluations", "", "right-hand sides"), "solver.evaluations"),
+FINAL_MEASURES = {  # and the variable that tells it
+    "events": (MeasureColumn("events", "", "changes of mode"), "events.count"),
+    "steps": (MeasureColumn("steps", "", "steps of the solver"), "solver.steps"),
+    "evaluations": (MeasureColumn("evaluations", "", "right-hand sides"), "solver.evaluations"),
 }
 DRIVER = "v_driver"
 SWING = "swing of the speed in the later half, over that of the driver"
 ENVELOPE = "friction over stiffness by linear envelope"
-ON_PATH = {
-    "slips": AlongPath((DRIVER,), "", "slips", lambda run: float(len(starts(run)))),
-    "period": AlongPath((DRIVER,), "s", "slip period", period),
-    "unsteady": AlongPath((DRIVER,), "1", SWING, unsteady),
-    "peak_speed": AlongPath((), "", "peak speed", peak_speed, like="velocity"),
-    "stuck": AlongPath(("mode",), "s", "time stuck", stuck, modes=True),
-    "rest": AlongPath(("mode",), "", "rest position", rest, modes=True, like="position"),
-    "zeta": AlongPath(("c",), "1", "damping ratio by logarithmic decrement", zeta, decay=True),
-    "f_over_k": AlongPath(("mode",), "", ENVELOPE, f_over_k, decay=True, like="position"),
+TRAJECTORY_MEASURES = {
+    "slips": TrajectoryMeasure((DRIVER,), "", "slips", lambda run: float(len(starts(run)))),
+    "period": TrajectoryMeasure((DRIVER,), "s", "slip period", period),
+    "unsteady": TrajectoryMeasure((DRIVER,), "1", SWING, unsteady),
+    "peak_speed": TrajectoryMeasure((), "", "peak speed", peak_speed, like="velocity"),
+    "stuck": TrajectoryMeasure(("mode",), "s", "time stuck", stuck, modes=True),
+    "rest": TrajectoryMeasure(("mode",), "", "rest position", rest, modes=True, like="position"),
+    "zeta": TrajectoryMeasure(("c",), "1", "damping ratio by logarithmic decrement", zeta, decay=True),
+    "f_over_k": TrajectoryMeasure(("mode",), "", ENVELOPE, f_over_k, decay=True, like="position"),
 }
-OF_OUTPUTS: dict[
+OUTPUT_MEASURES: dict[
     str, tuple[Callable[[np.ndarray], Any], str]
 ] = {  # of every output that is recorded: its measure, and in words
     "final": (lambda column: column[-1], "at the end"),
     "smallest": (np.min, "smallest at the points of the run"),
     "largest": (np.max, "largest at the points of the run"),
 }
-USUAL = ("final", "events")
+DEFAULT_MEASURES = ("final", "events")
 
 
-def offered(variables: Collection[str], ours: bool, values: Mapping[str, object]) -> list[str]:
+def available_measures(variables: Collection[str], ours: bool, values: Mapping[str, object]) -> list[str]:
     """The measures that an FMU with these variables gives, with these values set; one that is not ours shows neither
     its steps nor its modes."""
-    found = [*OF_OUTPUTS, "run_time"]
+    found = [*OUTPUT_MEASURES, "run_time"]
     if not ours:
         return found
-    found += [name for name, (_, variable) in AT_END.items() if variable in variables]
+    found += [name for name, (_, variable) in FINAL_MEASURES.items() if variable in variables]
     if {"position", "velocity"} <= set(find_roles(variables)):
-        for name, path in ON_PATH.items():
+        for name, path in TRAJECTORY_MEASURES.items():
             lawful = not path.modes or values.get("friction", "hybrid") in ("hybrid", 1)
             if lawful and set(path.needs) <= set(variables) and not (path.decay and DRIVER in variables):
                 found.append(name)
     return found
 
 
-def columns(measures: Iterable[str], variables: Mapping[str, Any], recorded: Iterable[str]) -> tuple[Column, ...]:
+def columns(
+    measures: Iterable[str], variables: Mapping[str, Any], recorded: Iterable[str]
+) -> tuple[MeasureColumn, ...]:
     """The columns of measures that are offered, of an FMU with these variables, of which some are recorded."""
-    found: list[Column] = []
+    found: list[MeasureColumn] = []
     for measure in measures:
-        if measure in OF_OUTPUTS:
+        if measure in OUTPUT_MEASURES:
             for name in recorded:
                 variable = variables.get(name) or variables[name.partition("[")[0]]  # of an element of an array
-                text = f"{variable.description or name} {OF_OUTPUTS[measure][1]}"
-                found.append(Column(f"{measure}_{name}", variable_unit(variable), text))
+                text = f"{variable.description or name} {OUTPUT_MEASURES[measure][1]}"
+                found.append(MeasureColumn(f"{measure}_{name}", variable_unit(variable), text))
         elif measure == "run_time":
-            found.append(Column("run_time", "s", "run time"))
-        elif measure in AT_END:
-            found.append(AT_END[measure][0])
+            found.append(MeasureColumn("run_time", "s", "run time"))
+        elif measure in FINAL_MEASURES:
+            found.append(FINAL_MEASURES[measure][0])
         else:
-            path = ON_PATH[measure]
+            path = TRAJECTORY_MEASURES[measure]
             like = find_roles(variables).get(path.like) if not path.unit else None
-            found.append(Column(measure, variable_unit(variables[like]) if like else path.unit, path.text))
+            found.append(MeasureColumn(measure, variable_unit(variables[like]) if like else path.unit, path.text))
     return tuple(found)
 
 
-def of_outputs(measure: str, outputs: Mapping[str, np.ndarray]) -> list[float]:
+def measure_outputs(measure: str, outputs: Mapping[str, np.ndarray]) -> list[float]:
     """A measure of every output."""
-    return [float(OF_OUTPUTS[measure][0](column)) for column in outputs.values()]
+    return [float(OUTPUT_MEASURES[measure][0](column)) for column in outputs.values()]

@@ -33,7 +33,7 @@ class {name}(Fmi2Slave):
 """
 
 
-def build(name: str, variables: list[tuple[str, str, str, str]], stop: float, folder: Path) -> Path:
+def build_empty_fmu(name: str, variables: list[tuple[str, str, str, str]], stop: float, folder: Path) -> Path:
     """Build <name>.fmu with variables (Real or Integer, name, causality, variability) into a folder; its path."""
     script = folder / f"{name.lower()}.py"
     script.write_text(SCRIPT.format(name=name, stop=stop, variables=variables), encoding="utf-8")

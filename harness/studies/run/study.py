@@ -21,9 +21,16 @@ from ...running.signals import Signals, signals_from_trajectory
 from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import check_built
 from ...scenes.scene import Scene, default_plots, load_scene, shipped_scenes
-from .table import Outcome, save
+from .table import SceneOutcome, write_quantities
 
-FILES = ("trajectory.csv", "steps.csv", "events.csv", "figures.csv", "figure.svg")  # all that a result folder may hold
+FILES = (
+    "trajectory.csv",
+    "steps.csv",
+    "events.csv",
+    "quantities.csv",
+    "figure.svg",
+    "figures.csv",
+)  # a result folder may hold; earlier versions wrote figures.csv
 
 
 def decay(run: Trajectory, scene: Scene) -> Any:
@@ -44,26 +51,26 @@ def steps(run: Trajectory, scene: Scene) -> Any:
     return analyse(run)
 
 
-ANALYSE = {"decay": decay, "slip": slip, "steps": steps}
+ANALYSES = {"decay": decay, "slip": slip, "steps": steps}
 
 
-def perform(scene: Scene, out: Path, report: Callable[[float], None]) -> Outcome:
+def run_scene(scene: Scene, out: Path, report: Callable[[float], None]) -> SceneOutcome:
     """Run, analyse and write results to out/<scene>; HarnessError leaves older results as they are."""
     try:
         with replace_folder(out / scene.name, FILES, scene.source) as folder:
-            return fill(scene, folder, report)
+            return run_and_write(scene, folder, report)
     except HarnessError as error:
         raise type(error)(f"scene {scene.name}: {error}") from None
 
 
-def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome:
+def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -> SceneOutcome:
     """Run and analyse a scene, and write its results into an empty folder."""
     check_built(scene.file)
     run = runner.run(spec_from_scene(scene), report)
     check_steps(scene, run)
     results: dict[str, Any] = {}
     for name in () if run.failure else scene.analyses:
-        results[name] = ANALYSE[name](run, scene)
+        results[name] = ANALYSES[name](run, scene)
     quantities = tuple(quantity for result in results.values() for quantity in result.quantities)
     quantities += run.statistics.quantities if run.statistics else ()
     if not run.failure:
@@ -74,12 +81,12 @@ def fill(scene: Scene, folder: Path, report: Callable[[float], None]) -> Outcome
     as_run = replace(scene, start=float(run.time[0]), stop=stop, grid=run.spec.grid, follow=follow)
     write_provenance(folder, [scene.file], run.effective_parameters, as_run, source=scene.source)
     if results:
-        save(quantities, scene.published, folder / "figures.csv")
+        write_quantities(quantities, scene.published, folder / "quantities.csv")
     if scene.plots:
         from .figure import draw
 
         draw(scene.title, scene.plots, run, results, folder / "figure.svg", scene.published)
-    return Outcome(scene.name, scene, run, quantities, run.failure or None)
+    return SceneOutcome(scene.name, scene, run, quantities, run.failure or None)
 
 
 def check_steps(scene: Scene, run: Trajectory) -> None:
@@ -108,7 +115,7 @@ def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
                 ) from None
 
 
-def published() -> list[str]:
+def published_scene_names() -> list[str]:
     """The names of the shipped scenes that have figures to stand beside; HarnessError if an FMU is not built."""
     scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
     for scene in scenes:
@@ -116,18 +123,18 @@ def published() -> list[str]:
     return [scene.name for scene in scenes]
 
 
-def main_job(names: Iterable[str], out: Path, report: Callable[[str, float], None]) -> Iterator[Outcome]:
+def run_scenes(names: Iterable[str], out: Path, report: Callable[[str, float], None]) -> Iterator[SceneOutcome]:
     """The outcome of each scene; one that fails does not lose the others."""
     for name in names:
         check_interrupt()
         try:
-            yield perform(load_scene(name), out, partial(report, name))
+            yield run_scene(load_scene(name), out, partial(report, name))
         except HarnessError as error:
             check_interrupt()  # an FMU in Python may have swallowed the interrupt that made it fail
-            yield Outcome(name, None, None, (), str(error))
+            yield SceneOutcome(name, None, None, (), str(error))
 
 
-def perform_run(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Signals, Path]:
+def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Signals, Path]:
     """Run an FMU of any origin, and write its outputs to out/<name of the file>."""
     from .figure import draw
 

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from ...running.signals import Signals
-from .units import is_rate
+from .units import is_rate_unit
 
 LARGE, REDUCED = 1e150, 2.0**-600  # differences of larger values have no number: they are reckoned in a smaller unit
 ALIKE = 0.02  # share of its way by which a variable may miss the integral of its rate
@@ -21,7 +21,7 @@ PARTS, FILTER = 32, 1.01  # a sum over parts misses no more than that over steps
 
 
 @dataclass(frozen=True)
-class Sides:
+class ValueBounds:
     """Values between `low` and `high` (n,): equal where nothing jumps."""
 
     low: np.ndarray
@@ -29,19 +29,19 @@ class Sides:
 
 
 @dataclass(frozen=True)
-class Motion:
+class Interpolant:
     """What a trajectory is between its samples."""
 
     path: Signals
 
-    def sides(self, name: str, at: np.ndarray, jumps: np.ndarray) -> Sides:
+    def bounds_at(self, name: str, at: np.ndarray, jumps: np.ndarray) -> ValueBounds:
         """A variable at the times `at` (n,), which the trajectory covers; `jumps` (k, 2) are the stretches of time in
         each of which it jumps once, in s."""
         t, y = self.path.time, self.path.columns[name]
         if not np.isfinite(y).all():
             held = y[np.searchsorted(t, at, "right") - 1]
             held = np.where(np.isin(at, t), held, np.nan)  # nobody knows what lies between
-            return Sides(held, held)
+            return ValueBounds(held, held)
         if np.isin(at, t).all() or (y == np.rint(y)).all():
             smooth = y[np.searchsorted(t, at, "right") - 1]
         else:
@@ -60,7 +60,7 @@ class Motion:
             widen(np.nextafter(min(begin, t[first]), np.inf), max(end, np.nextafter(t[last], -np.inf)), first, last)
         for before in np.flatnonzero(np.diff(t) == 0).tolist():
             widen(t[before], t[before], before, before + 1)
-        return Sides(low, high)
+        return ValueBounds(low, high)
 
     def rate(self, name: str, scale: float) -> np.ndarray | None:
         """The recorded rate (n,) of a variable: of a unit per second, with an integral that is the variable's own way;
@@ -71,7 +71,7 @@ class Motion:
         far, ways = ALIKE * np.abs(way).sum(), np.add.reduceat(way, self.parts)
         found = {}
         for other, integrals in self.integrals.items():
-            if is_rate(units[other], units[name]) and not np.abs(ways - scale * integrals).sum() > FILTER * far:
+            if is_rate_unit(units[other], units[name]) and not np.abs(ways - scale * integrals).sum() > FILTER * far:
                 slope = scale * columns[other]
                 missed = np.abs(way - h * (slope[1:] + slope[:-1]) / 2).sum()
                 if missed <= far:

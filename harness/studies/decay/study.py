@@ -25,10 +25,10 @@ FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
 
 
-Loaded = tuple[Record, KnownParameters, dict[str, Any]]  # and what their account tells: files, parameters, scene
+LoadedRecord = tuple[Record, KnownParameters, dict[str, Any]]  # and what their account tells: files, parameters, scene
 
 
-def perform(
+def identify_decay(
     source: str,
     columns: ColumnOptions,
     known: KnownParameters,
@@ -44,13 +44,13 @@ def perform(
     named = provenance.describe_sources(source)
     with replace_folder(folder, FILES, named) as fresh:  # before the fit: what is in the way is told at once
         found = fit_decay(record, force, drag, drift, report)
-        save(found, fresh)
+        write_results(found, fresh)
         provenance.write_provenance(fresh, **told, scene=scene, source=named)
     return found, folder
 
 
 @contextmanager
-def uncollected() -> Iterator[None]:
+def gc_paused() -> Iterator[None]:
     """Without the collection of cycles: importing, fitting and drawing leave few, and to look for them, also when the
     process ends, takes a quarter of a short command."""
     gc.disable()
@@ -61,7 +61,9 @@ def uncollected() -> Iterator[None]:
         gc.enable()
 
 
-def load_record(source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]) -> Loaded:
+def load_record(
+    source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]
+) -> LoadedRecord:
     """The record of a file, or of a run of a scene together with the stiffness that its model has."""
     path = Path(source)
     if source == "-":
@@ -71,10 +73,12 @@ def load_record(source: str, columns: ColumnOptions, known: KnownParameters, rep
         return read_record(source, columns, name), known, {"files": (path,)}
     if path.is_dir():
         raise SceneError(f"{source} is a folder; name a file in it")
-    return recorded(source, columns, known, report)
+    return record_of_scene(source, columns, known, report)
 
 
-def recorded(source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]) -> Loaded:
+def record_of_scene(
+    source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]
+) -> LoadedRecord:
     """The positions in a run of a scene."""
     from ...running.fmi2 import simulate
     from ...running.run_spec import spec_from_scene
@@ -99,13 +103,13 @@ def recorded(source: str, columns: ColumnOptions, known: KnownParameters, report
     return record, known, told
 
 
-def save(found: DecayIdentification, folder: Path) -> None:
+def write_results(found: DecayIdentification, folder: Path) -> None:
     """Write numbers, turning points, the fitted motion and the figure."""
     from .figure import draw
 
     unit = found.record.unit
     loss = measure_energy_loss(found)
-    (folder / "decay.json").write_text(to_json(numbers(found, loss)) + "\n", encoding="utf-8")
+    (folder / "decay.json").write_text(to_json(identified_as_json(found, loss)) + "\n", encoding="utf-8")
     write_csv(
         folder / "turning-points.csv",
         ["t [s]", column_heading("x", found.record.base)],
@@ -118,7 +122,7 @@ def save(found: DecayIdentification, folder: Path) -> None:
     draw(found, loss, folder / "figure.svg")
 
 
-def numbers(found: DecayIdentification, loss: EnergyLoss | None = None) -> dict[str, Any]:
+def identified_as_json(found: DecayIdentification, loss: EnergyLoss | None = None) -> dict[str, Any]:
     """Everything found, for JSON."""
     problem, record, best = found.problem, found.record, found.best
     loss = loss or measure_energy_loss(found)

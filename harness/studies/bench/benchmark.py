@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-NUMBERS: dict[str, dict[str, Any]] = tomllib.loads(Path(__file__).with_name("reach.toml").read_text(encoding="utf-8"))
+SETTINGS: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("targets.toml").read_text(encoding="utf-8")
+)
 
 
 @dataclass(frozen=True)
-class Beside:
+class Baseline:
     """What a number is compared with, measured in the same run; `value` is None where it is what the error is from."""
 
     name: str
@@ -17,15 +19,15 @@ class Beside:
 
 
 @dataclass(frozen=True)
-class Measure:
+class Benchmark:
     """`value` in `unit`, to be at most `reach`."""
 
-    what: str
+    name: str
     value: float
     unit: str
-    reach: float
-    beside: tuple[Beside, ...]
+    target: float
+    baselines: tuple[Baseline, ...]
 
     @property
-    def reached(self) -> bool:
-        return self.value <= self.reach
+    def is_met(self) -> bool:
+        return self.value <= self.target

@@ -19,33 +19,35 @@ from ...process.temporary_directory import temporary_directory
 from ...running.cached_by_mtime import cached_by_mtime
 from ...running.description import read_description
 from ...running.unpacking import PROCESS_RESOURCES
-from . import by_fmpy
-from .request import Reply, Request, serve
+from . import fmpy_adapter
+from .request import ImporterReply, ImporterRequest, serve
 
 
-def play(request: Request) -> Reply:
+def run_request(request: ImporterRequest) -> ImporterReply:
     path, files = Path(request.fmu), tuple(f"{i}.fmu" for i in range(len(request.instances)))
     reals = [variable for variable in read_description(path).modelVariables if variable.type == "Real"]
     settable = [each.name for each in reals if each.causality == "input" or each.variability == "tunable"]
-    entries = dict.fromkeys([*settable, *request.values, *request.change])  # for most requests the same
+    entries = dict.fromkeys([*settable, *request.values, *request.midrun_changes])  # for most requests the same
     told: dict[str, Any] = {
         "name": "container.fmu",
         "fmu": files,
         "step_size": request.step,
         "input": [[name, files[0], name] for name in entries],
-        "output": [[file, name, f"{name}_{i}"] for i, file in enumerate(files) for name in request.read],
-        "link": [[files[0], request.connect[0], files[1], request.connect[1]]] if request.connect else [],
+        "output": [[file, name, f"{name}_{i}"] for i, file in enumerate(files) for name in request.outputs],
+        "link": [[files[0], request.connection[0], files[1], request.connection[1]]] if request.connection else [],
     }
     fmu = built(path, files, json.dumps(told))
     inside = replace(
         request,
         fmu=str(fmu),
         references={variable.name: variable.valueReference for variable in read_description(fmu).modelVariables},
-        read=[name for _, _, name in told["output"]],
+        outputs=[name for _, _, name in told["output"]],
         instances=request.instances[:1],
-        connect=[],
+        connection=[],
     )
-    return replace(by_fmpy.play(inside, ("0.fmu: ", "1.fmu: ")), version=version("fmu-manipulation-toolbox"))
+    return replace(
+        fmpy_adapter.run_request(inside, ("0.fmu: ", "1.fmu: ")), version=version("fmu-manipulation-toolbox")
+    )
 
 
 @cached_by_mtime
@@ -63,4 +65,4 @@ def built(fmu: Path, files: tuple[str, ...], told: str) -> Path:
 
 
 if __name__ == "__main__":
-    serve(play)
+    serve(run_request)

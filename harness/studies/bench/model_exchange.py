@@ -20,63 +20,80 @@ from ...references.models import MODELS
 from ...running.c_host import Library, MissingToolError, compile_source, load_library
 from ...running.fmi3 import CO_SIMULATION, MODEL_EXCHANGE, RecordedRun, fmi3_path, open_fmi3_instance
 from ...scenes.fmu_files import find_fmu
-from .measure import NUMBERS, Beside, Measure
-from .native import CASE, REACH, Figures, cvode, fmu, of_cvode, off, played, row
-from .scene import Scene
+from .benchmark import SETTINGS, Baseline, Benchmark
+from .native import (
+    CASES_BY_NAME,
+    RUN_TIME_TARGETS,
+    Measured,
+    build_cvode_fmu,
+    fmu,
+    largest_error,
+    measure_or_skip,
+    run_host,
+    time_cvode,
+)
+from .scenario import Scenario
 
 TOLERANCES = (1e-6, 1e-8, 1e-10)
-REFERENCES = Path("Reference-FMUs")  # a clone in the folder that one is in
-THEIRS, START = (2, 1), {"h": 0.175, "v": 0.3}  # states and indicators of BouncingBall, and where it starts
-PLAIN = [Scene(case) for case in REACH]
-LED = [Scene(case, *its) for case in REACH for its in NUMBERS["led"][CASE[case].model].items()]
-LATE = [Scene(each.case, each.what, each.values, 1000.0) for each in LED]
-TIES = [Scene(model, *its) for model, ties in NUMBERS["ties"].items() for its in ties.items()]
-BOTH_WAYS = [scene for scene in (*PLAIN, *LED, *TIES) if not scene.ramps]  # which fmpy holds in co-simulation
+REFERENCE_FMUS = Path("Reference-FMUs")  # a clone in the folder that one is in
+BOUNCING_BALL_SIZES, BOUNCING_BALL_START = (
+    (2, 1),
+    {"h": 0.175, "v": 0.3},
+)  # states and indicators of BouncingBall, and where it starts
+DEFAULT_SCENARIOS = [Scenario(case) for case in RUN_TIME_TARGETS]
+DRIVEN_SCENARIOS = [
+    Scenario(case, *its) for case in RUN_TIME_TARGETS for its in SETTINGS["led"][CASES_BY_NAME[case].model].items()
+]
+LATE_SCENARIOS = [Scenario(each.case, each.name, each.values, 1000.0) for each in DRIVEN_SCENARIOS]
+TIE_SCENARIOS = [Scenario(model, *its) for model, ties in SETTINGS["ties"].items() for its in ties.items()]
+COMPARED_SCENARIOS = [
+    scene for scene in (*DEFAULT_SCENARIOS, *DRIVEN_SCENARIOS, *TIE_SCENARIOS) if not scene.has_ramps
+]  # which fmpy holds in co-simulation
 CALLS = ("the time", "the states", "the derivatives", "the indicators")
-TURNS = 20_000
+REPEATS = 20_000
 
 
-def exchange() -> list[Callable[[], Measure]]:
+def exchange_benchmarks() -> list[Callable[[], Benchmark]]:
     """What to measure: errors, answers, and calls."""
     return [
-        *(partial(by_cvode, scene) for scene in (*PLAIN, *LED, *LATE)),
-        *(partial(beside_co_simulation, scene) for scene in BOTH_WAYS),
-        *(partial(calls, model) for model in MODELS),
+        *(partial(error_ratio_to_cvode, scene) for scene in (*DEFAULT_SCENARIOS, *DRIVEN_SCENARIOS, *LATE_SCENARIOS)),
+        *(partial(difference_from_cosimulation, scene) for scene in COMPARED_SCENARIOS),
+        *(partial(call_overhead, model) for model in MODELS),
     ]
 
 
-def by_cvode(scene: Scene, tolerances: tuple[float, ...] = TOLERANCES) -> Measure:
+def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERANCES) -> Benchmark:
     """The largest error through importers' CVode, as a multiple of that of CVODE on the same equations with the events
     written by hand in C: both by BDF with a Jacobian by differences, the position of the driver being a state."""
 
-    def figures() -> Figures:
+    def figures() -> Measured:
         ratio, told, lacks = 0.0, [], set()
         for rtol in tolerances:
             errors = {"CVODE by hand": error(scene, hand(scene, rtol)), "fmpy": error(scene, fmpy(scene, rtol))}
             try:
                 errors["fmusim"] = error(scene, fmusim(scene, rtol))
             except MissingToolError as why:
-                lacks.add(Beside(str(why)))
+                lacks.add(Baseline(str(why)))
             by_hand, *theirs = errors.values()
             ratio = max(ratio, *(each / by_hand for each in theirs))
-            if scene.is_plain:
-                errors["CVODE at its best"] = off(scene.case, of_cvode(scene.case, rtol))
+            if scene.is_default:
+                errors["CVODE at its best"] = largest_error(scene.case, time_cvode(scene.case, rtol))
             words = ", ".join(f"{name} {each:.1e}" for name, each in errors.items())
-            told.append(Beside(f"errors at rtol {rtol:.0e}: {words}"))
+            told.append(Baseline(f"errors at rtol {rtol:.0e}: {words}"))
         return ratio, 3.0, (*told, *lacks)
 
-    return row(f"{scene}, model exchange: largest error, ratio to CVODE's by hand", "1", figures)
+    return measure_or_skip(f"{scene}, model exchange: largest error, ratio to CVODE's by hand", "1", figures)
 
 
-def error(scene: Scene, found: RecordedRun | np.ndarray) -> float:
+def error(scene: Scenario, found: RecordedRun | np.ndarray) -> float:
     """The largest at the common times, of a recording or of position and speed (n, 2)."""
-    motion = found.sample_at(scene.times, scene.its.outputs) if isinstance(found, RecordedRun) else found
-    return float(relative_errors(motion, scene.truth).max())
+    motion = found.sample_at(scene.times, scene.reference_case.outputs) if isinstance(found, RecordedRun) else found
+    return float(relative_errors(motion, scene.reference_motion).max())
 
 
-def hand(scene: Scene, rtol: float) -> np.ndarray:
+def hand(scene: Scenario, rtol: float) -> np.ndarray:
     """Position and speed (n, 2) at the common times, by CVODE."""
-    its, library = scene.its, cvode(scene.its.model, plain=True)
+    its, library = scene.reference_case, build_cvode_fmu(scene.reference_case.model, plain=True)
 
     def put(**values: float) -> list[str]:
         return [f"0 setr {library.references[name]} {value!r}" for name, value in values.items()]
@@ -88,27 +105,27 @@ def hand(scene: Scene, rtol: float) -> np.ndarray:
     calls += [*led.pop(scene.start), f"0 begin {scene.start!r}", read]
     for t, ahead in pairwise(sorted(common | led.keys())):
         calls += [*led.get(t, []), f"0 step {t!r} {ahead - t!r}", *[read] * (ahead in common)]
-    answers = played(library, "\n".join([*calls, "0 free\n"])).splitlines()
+    answers = run_host(library, "\n".join([*calls, "0 free\n"])).splitlines()
     if {answer for answer in answers if answer.startswith("status")} != {"status 0"}:
         raise HarnessError(f"{scene}: CVODE by hand gives up")
     return np.array([answer.split()[1:] for answer in answers if answer.startswith("values")], dtype=float)
 
 
-def fmpy(scene: Scene, rtol: float, way: str = MODEL_EXCHANGE) -> RecordedRun:
+def fmpy(scene: Scenario, rtol: float, way: str = MODEL_EXCHANGE) -> RecordedRun:
     """A run of the FMI 3.0 FMU through fmpy, its events counted."""
-    its = scene.its
+    its = scene.reference_case
     outputs = (*its.outputs, *["events.count"] * its.problem.has_dry_friction)
     span = scene.stop, scene.interval, rtol, None, scene.start
-    with open_fmi3_instance(three(its.model), way) as fmu:
-        return fmu.simulate(scene.numbers, outputs, *span, signals=scene.signals, drive_inputs=scene.ramps)
+    with open_fmi3_instance(fmi3_fmu(its.model), way) as fmu:
+        return fmu.simulate(scene.numbers, outputs, *span, signals=scene.signals, drive_inputs=scene.has_ramps)
 
 
-def fmusim(scene: Scene, rtol: float) -> RecordedRun:
+def fmusim(scene: Scenario, rtol: float) -> RecordedRun:
     """A run of the FMI 3.0 FMU through fmusim."""
-    program, its = shutil.which("fmusim"), scene.its
+    program, its = shutil.which("fmusim"), scene.reference_case
     if program is None:
         raise MissingToolError("not installed: fmusim")
-    if scene.ramps:
+    if scene.has_ramps:
         raise MissingToolError("fmusim holds an input within its steps")
     if scene.start:
         raise MissingToolError("fmusim takes times for the same that differ by 1e-5 of them")
@@ -122,62 +139,69 @@ def fmusim(scene: Scene, rtol: float) -> RecordedRun:
             heads = ",".join(scene.signals.dtype.names or ())
             np.savetxt(led, scene.signals, "%.17g", ",", header=heads, comments="")
             command += ["--input-file", str(led)]
-        done = run_subprocess([*command, str(three(its.model))])
+        done = run_subprocess([*command, str(fmi3_fmu(its.model))])
         if done.returncode:
             raise HarnessError(" ".join((done.stderr or done.stdout).split()) or "fmusim gives no reason")
         return RecordedRun(np.genfromtxt(file, delimiter=",", names=True), 0)
 
 
-def beside_co_simulation(scene: Scene) -> Measure:
+def difference_from_cosimulation(scene: Scenario) -> Benchmark:
     """The largest difference of model exchange and co-simulation at common times, as a share of the largest value of
     each output; without bound if they count different events."""
 
-    def figures() -> Figures:
+    def figures() -> Measured:
         one, other = (fmpy(scene, 1e-10, way) for way in (MODEL_EXCHANGE, CO_SIMULATION))
         counts = [
-            int(found.rows["events.count"][-1]) if scene.its.problem.has_dry_friction else 0 for found in (one, other)
+            int(found.rows["events.count"][-1]) if scene.reference_case.problem.has_dry_friction else 0
+            for found in (one, other)
         ]
-        told = Beside("{} events in model exchange, {} in co-simulation".format(*counts))
-        apart = relative_errors(*(found.sample_at(scene.times, scene.its.outputs) for found in (one, other))).max()
+        told = Baseline("{} events in model exchange, {} in co-simulation".format(*counts))
+        apart = relative_errors(
+            *(found.sample_at(scene.times, scene.reference_case.outputs) for found in (one, other))
+        ).max()
         return float(apart) if counts[0] == counts[1] else inf, 1e-6, (told,)
 
-    return row(f"{scene}: model exchange at rtol 1e-10, difference from co-simulation", "1", figures)
+    return measure_or_skip(f"{scene}: model exchange at rtol 1e-10, difference from co-simulation", "1", figures)
 
 
-def calls(model: str) -> Measure:
+def call_overhead(model: str) -> Benchmark:
     """A call each of setting the time, the states, and of asking the derivatives and the event indicators, as a
     multiple of those of BouncingBall with the acceleration of the model written by hand."""
 
-    def figures() -> Figures:
-        library, equation = load_library(fmu(model, "native")), NUMBERS["acceleration"][model]
+    def figures() -> Measured:
+        library, equation = load_library(fmu(model, "native")), SETTINGS["acceleration"][model]
         root = ElementTree.parse(library.file.parents[2] / "modelDescription.xml").getroot()
         states = len(root.findall("ModelStructure/Derivatives/Unknown"))
         indicators = int(root.attrib["numberOfEventIndicators"])
-        plain, theirs = (seconds(bouncing_ball(of), *THEIRS, START) for of in ("force", equation))
-        mine = seconds(library, states, indicators, NUMBERS["moving"].get(model, {}))
-        told = [Beside(f"BouncingBall so, {call}", its) for call, its in zip(CALLS, theirs, strict=True)]
-        told += [Beside(f"this FMU, {call}", its) for call, its in zip(CALLS, mine, strict=True)]
-        told.append(Beside(f"ratio to BouncingBall as it is {sum(mine) / sum(plain):.3g}"))
+        plain, theirs = (
+            seconds(build_bouncing_ball(of), *BOUNCING_BALL_SIZES, BOUNCING_BALL_START) for of in ("force", equation)
+        )
+        mine = seconds(library, states, indicators, SETTINGS["moving"].get(model, {}))
+        told = [Baseline(f"BouncingBall so, {call}", its) for call, its in zip(CALLS, theirs, strict=True)]
+        told += [Baseline(f"this FMU, {call}", its) for call, its in zip(CALLS, mine, strict=True)]
+        told.append(Baseline(f"ratio to BouncingBall as it is {sum(mine) / sum(plain):.3g}"))
         return sum(mine) / sum(theirs), 1.1, tuple(told)
 
-    return row(f"{model}, model exchange: a call of each kind in C, ratio to a Reference FMU's by hand", "1", figures)
+    return measure_or_skip(
+        f"{model}, model exchange: a call of each kind in C, ratio to a Reference FMU's by hand", "1", figures
+    )
 
 
 def seconds(library: Library, states: int, indicators: int, values: dict[str, float]) -> list[float]:
     """How long each of the calls takes, in s, with values set."""
     sets = [f"setr {library.references[name]} {value!r}" for name, value in values.items()]
-    lines = ["new bench quiet exchange", *sets, "begin", f"calls {states} {indicators} {TURNS}", "free"]
-    done = played(library, "".join(f"0 {line}\n" for line in lines))
+    lines = ["new bench quiet exchange", *sets, "begin", f"calls {states} {indicators} {REPEATS}", "free"]
+    done = run_host(library, "".join(f"0 {line}\n" for line in lines))
     return [float(word) for word in done.split()[1:]]
 
 
 @cache
-def bouncing_ball(acceleration: str) -> Library:
+def build_bouncing_ball(acceleration: str) -> Library:
     """That of a Reference FMU, compiled from its sources, with an acceleration in C."""
-    clone = REFERENCES.absolute()
+    clone = REFERENCE_FMUS.absolute()
     model, source = clone / "BouncingBall", clone / "src"
     if not model.is_dir():
-        raise MissingToolError(f"not here: {REFERENCES} (git clone https://github.com/modelica/Reference-FMUs)")
+        raise MissingToolError(f"not here: {REFERENCE_FMUS} (git clone https://github.com/modelica/Reference-FMUs)")
     (guid,) = re.findall(r'INSTANTIATION_TOKEN "(.*)"', (model / "config.h").read_text(encoding="utf-8"))
     options = ("-std=gnu99", "-DFMI_VERSION=2", "-DDISABLE_PREFIX", f"-I{clone / 'include'}", f"-I{model}")
     others = (str(source / name) for name in ("fmi2Functions.c", "cosimulation.c"))
@@ -187,7 +211,7 @@ def bouncing_ball(acceleration: str) -> Library:
     return Library(file, {"h": 1, "v": 3}, guid)
 
 
-def three(model: str) -> Path:
+def fmi3_fmu(model: str) -> Path:
     """The FMI 3.0 FMU of a model."""
     file = fmi3_path(find_fmu(model))
     if not file.is_file():

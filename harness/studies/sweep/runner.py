@@ -30,11 +30,20 @@ from ...running.run_spec import RunSpec
 from ...running.settings import resolve_settings
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
-from .measures import AT_END, OF_OUTPUTS, ON_PATH, PIECES, USUAL, columns, of_outputs, offered
+from .measures import (
+    DEFAULT_MEASURES,
+    FINAL_MEASURES,
+    N_STEPS,
+    OUTPUT_MEASURES,
+    TRAJECTORY_MEASURES,
+    available_measures,
+    columns,
+    measure_outputs,
+)
 
 
 @dataclass(frozen=True)
-class Runs:
+class SweepSpec:
     """What the runs of a sweep share: the `varied` names, the `values` of others, `measures` (none: the usual ones),
     and what else a Specification holds, by name."""
 
@@ -45,36 +54,42 @@ class Runs:
     options: tuple[tuple[str, Any], ...] = ()
 
 
-class Ours:
+class OwnFmuRunner:
     """An instance of an FMU of ours.  The library is called as it stands: fmpy's own calls take as long as a run.
 
     `columns` are what is measured in a run; `stop` is the time in s at which one stops.
     """
 
-    def __init__(self, runs: Runs, found: Any, fmu: Any, heard: LogCapture, wanted: RunSpec) -> None:
+    def __init__(self, runs: SweepSpec, found: Any, fmu: Any, heard: LogCapture, wanted: RunSpec) -> None:
         self.fmu, self.component, self.heard = fmu, c_void_p(fmu.component), heard
         self.variables = {variable.name: variable for variable in found.modelVariables}
-        measures = chosen(runs, self.variables, ours=True)
+        measures = select_measures(runs, self.variables, ours=True)
         motion = find_roles(self.variables)
         outputs = tuple(motion[role] for role in ("position", "velocity") if role in motion)
         if len(outputs) < 2:
             outputs = tuple(name for name in runner.default_outputs(found) if self.variables[name].type == "Real")
         self.plan = plan_run(replace(wanted, outputs=outputs), found)
         self.stop = self.plan.stop
-        ends = [name for name in measures if name in AT_END]
-        self.along = [name for name in measures if name in ON_PATH or (name in OF_OUTPUTS and name != "final")]
+        ends = [name for name in measures if name in FINAL_MEASURES]
+        self.along = [
+            name for name in measures if name in TRAJECTORY_MEASURES or (name in OUTPUT_MEASURES and name != "final")
+        ]
         if self.along:
-            grid = (self.stop - self.plan.start) / PIECES
+            grid = (self.stop - self.plan.start) / N_STEPS
             self.plan = plan_run(replace(self.plan.spec, grid=grid, follow=True), found)
         self.n_real, self.real_at, self.real = make_buffer(self.variables, list(outputs), c_double)
-        self.n_whole, self.whole_at, self.whole = make_buffer(self.variables, [AT_END[name][1] for name in ends], c_int)
+        self.n_whole, self.whole_at, self.whole = make_buffer(
+            self.variables, [FINAL_MEASURES[name][1] for name in ends], c_int
+        )
         self.columns = columns(measures, self.variables, outputs)
         read = [each.name for each in columns(["final", *ends, "run_time", *self.along], self.variables, outputs)]
         self.order = [read.index(column.name) for column in self.columns]
         self.slots: list[tuple[Any, int, type]] = []
-        self.calls = self.prepared(resolve_settings(self.plan.spec, self.variables), runs.varied)
+        self.calls = self.prepare_calls(resolve_settings(self.plan.spec, self.variables), runs.varied)
 
-    def prepared(self, fixed: list[tuple[Any, float]], varied: Sequence[str]) -> list[tuple[str, Any, tuple[Any, ...]]]:
+    def prepare_calls(
+        self, fixed: list[tuple[Any, float]], varied: Sequence[str]
+    ) -> list[tuple[str, Any, tuple[Any, ...]]]:
         """The calls that reset, set and initialise; `slots` tells where they take each varied value from, as what."""
         values = {variable.name: value for variable, value in fixed}
         calls: list[tuple[Any, ...]] = [("fmi2Reset",)]
@@ -94,29 +109,33 @@ class Ours:
         """The measures at a point of the varied values, or the sentence why there are none."""
         self.heard.clear()
         try:
-            return self.measured(point)
+            return self.measure_run(point)
         except FMICallException as error:
             return self.heard.error_message or str(error)
         except HarnessError as error:
             return str(error)
 
-    def measured(self, point: Sequence[float]) -> list[float]:
+    def measure_run(self, point: Sequence[float]) -> list[float]:
         """The measures; an exception if the run fails."""
         for (held, i, number), value in zip(self.slots, point, strict=True):
             held[i] = number(value)
         for name, function, arguments in self.calls:
-            heed(name, function(*arguments))
+            check_status(name, function(*arguments))
         start, dll = self.plan.start, self.fmu.dll
         begun, along = perf_counter(), []
         if self.along:
             run = build_trajectory(self.plan, self.fmu, record_run(self.plan, self.fmu, lambda share: None, 0), 0.0)
             for name in self.along:
-                along += of_outputs(name, run.columns) if name in OF_OUTPUTS else [ON_PATH[name].measure(run)]
+                along += (
+                    measure_outputs(name, run.columns)
+                    if name in OUTPUT_MEASURES
+                    else [TRAJECTORY_MEASURES[name].measure(run)]
+                )
         else:
-            heed("fmi2DoStep", dll.fmi2DoStep(self.component, start, self.stop - start, 1))
+            check_status("fmi2DoStep", dll.fmi2DoStep(self.component, start, self.stop - start, 1))
         seconds = perf_counter() - begun
-        heed("fmi2GetReal", dll.fmi2GetReal(self.component, self.real_at, self.n_real, self.real))
-        heed("fmi2GetInteger", dll.fmi2GetInteger(self.component, self.whole_at, self.n_whole, self.whole))
+        check_status("fmi2GetReal", dll.fmi2GetReal(self.component, self.real_at, self.n_real, self.real))
+        check_status("fmi2GetInteger", dll.fmi2GetInteger(self.component, self.whole_at, self.n_whole, self.whole))
         read = [*self.real, *self.whole, seconds, *along]
         return [read[i] for i in self.order]
 
@@ -128,18 +147,18 @@ class Ours:
         }
 
 
-def heed(function: str, status: int) -> None:
+def check_status(function: str, status: int) -> None:
     if status > WARNING:
         raise FMICallException(function, status)
 
 
-class Theirs:
+class ExternalFmuRunner:
     """The same of an FMU that does not show its steps; each run is in a process of its own, whole or a sentence."""
 
-    def __init__(self, runs: Runs, found: Any, wanted: RunSpec) -> None:
+    def __init__(self, runs: SweepSpec, found: Any, wanted: RunSpec) -> None:
         self.varied, self.stop = runs.varied, 0.0
         self.variables = {variable.name: variable for variable in found.modelVariables}
-        self.measures = chosen(runs, self.variables, ours=False)
+        self.measures = select_measures(runs, self.variables, ours=False)
         texts = {name for name, variable in self.variables.items() if variable.type == "String"}
         outputs = tuple(name for name in runner.default_outputs(found) if name not in texts)
         self.wanted = replace(wanted, outputs=outputs)
@@ -159,35 +178,35 @@ class Theirs:
         self.told, self.stop = found.effective_parameters, float(found.time[-1])
         row: list[float] = []
         for name in self.measures:
-            row += [seconds] if name == "run_time" else of_outputs(name, found.columns)
+            row += [seconds] if name == "run_time" else measure_outputs(name, found.columns)
         return row
 
     def constants(self) -> dict[str, tuple[object, str]]:
         return self.told
 
 
-Runner = Ours | Theirs
+Runner = OwnFmuRunner | ExternalFmuRunner
 
 
-def chosen(runs: Runs, variables: dict[str, Any], ours: bool) -> tuple[str, ...]:
+def select_measures(runs: SweepSpec, variables: dict[str, Any], ours: bool) -> tuple[str, ...]:
     """The measures of an FMU; SceneError if it cannot give one."""
-    there = offered(variables, ours, dict(runs.values))
+    there = available_measures(variables, ours, dict(runs.values))
     check_names(f"measure of {runs.model}", runs.measures, there)
-    return runs.measures or tuple(name for name in USUAL if name in there)
+    return runs.measures or tuple(name for name in DEFAULT_MEASURES if name in there)
 
 
-def specified(runs: Runs, file: Path) -> RunSpec:
+def run_spec_of(runs: SweepSpec, file: Path) -> RunSpec:
     """What all of them run."""
     return RunSpec(file, values=dict(runs.values), follow=False, **dict(runs.options))
 
 
 @contextmanager
-def ready(runs: Runs, file: Path) -> Iterator[Runner]:
+def open_runner(runs: SweepSpec, file: Path) -> Iterator[Runner]:
     """The FMU in a file, ready to run."""
-    wanted = specified(runs, file)
+    wanted = run_spec_of(runs, file)
     found = read_description(file, wanted.lenient)
     if runner.exposes_solver_steps(found):
         with open_instance(wanted) as (_, fmu, heard):
-            yield Ours(runs, found, fmu, heard, wanted)
+            yield OwnFmuRunner(runs, found, fmu, heard, wanted)
     else:
-        yield Theirs(runs, found, replace(wanted, follow=True))
+        yield ExternalFmuRunner(runs, found, replace(wanted, follow=True))

@@ -8,12 +8,12 @@ import numpy as np
 
 from ...errors import MAX_VALUE_LENGTH, SceneError
 
-MOST = 10_000_000  # runs
-HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --random, m=1:2"
+MAX_RUNS = 10_000_000  # runs
+VARY_HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --random, m=1:2"
 
 
 @dataclass(frozen=True)
-class Axis:
+class SweepAxis:
     """A parameter and its `values` on the axis, or, for a random sample, its two bounds; `log`: evenly in ratio."""
 
     name: str
@@ -21,11 +21,11 @@ class Axis:
     log: bool = False
 
 
-def axis(text: str, random: bool) -> Axis:
+def parse_axis(text: str, random: bool) -> SweepAxis:
     """The axis that a text names; SceneError if it does not name one."""
     name, _, span = text.partition("=")
     name = name.strip()
-    wrong = SceneError(f"--vary {text[:MAX_VALUE_LENGTH]} is not understood; write it {HELP}")
+    wrong = SceneError(f"--vary {text[:MAX_VALUE_LENGTH]} is not understood; write it {VARY_HELP}")
     words = span.split(":")
     ratio = words[-1] == "log"
     words = words[: len(words) - ratio]
@@ -35,7 +35,7 @@ def axis(text: str, random: bool) -> Axis:
         elif len(words) == 2 and random:
             values = (float(words[0]), float(words[1]))
         elif len(words) == 3 and not random:
-            values = spread(float(words[0]), float(words[1]), int(words[2]), ratio)
+            values = evenly_spaced(float(words[0]), float(words[1]), int(words[2]), ratio)
         else:
             raise wrong
     except (ValueError, OverflowError):
@@ -46,12 +46,12 @@ def axis(text: str, random: bool) -> Axis:
         raise SceneError(f"--vary {text}: a logarithmic axis needs bounds above 0")
     if len(set(values)) < len(values):
         raise SceneError(f"--vary {text} names a value twice")
-    return Axis(name, values, ratio)
+    return SweepAxis(name, values, ratio)
 
 
-def spread(low: float, high: float, count: int, ratio: bool) -> tuple[float, ...]:
+def evenly_spaced(low: float, high: float, count: int, ratio: bool) -> tuple[float, ...]:
     """`count` values from low to high, both included."""
-    if not 1 <= count <= MOST:
+    if not 1 <= count <= MAX_RUNS:
         raise ValueError
     if ratio and low > 0 and high > 0:
         return tuple(np.geomspace(low, high, count).tolist())
@@ -60,25 +60,25 @@ def spread(low: float, high: float, count: int, ratio: bool) -> tuple[float, ...
 
 
 @dataclass(frozen=True)
-class Points:
+class SweepPoints:
     """The points of a sweep: the grid of its axes with the last one fastest, made where it is asked for, or `random`
     points of a Latin hypercube, which are all held.
 
     M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979).
     """
 
-    axes: tuple[Axis, ...]
+    axes: tuple[SweepAxis, ...]
     random: int | None = None
     seed: int = 1
 
     def __post_init__(self) -> None:
-        if len(self) > MOST:
-            raise SceneError(f"{len(self)} runs are more than {MOST}; take fewer values")
+        if len(self) > MAX_RUNS:
+            raise SceneError(f"{len(self)} runs are more than {MAX_RUNS}; take fewer values")
 
     def __len__(self) -> int:
         return prod(len(each.values) for each in self.axes) if self.random is None else self.random
 
-    def between(self, first: int, last: int) -> np.ndarray:
+    def coordinates(self, first: int, last: int) -> np.ndarray:
         """Those from number `first` to before `last`, (last - first, axes)."""
         if self.random is not None:
             return self.sample[first:last]

@@ -13,8 +13,8 @@ from fmuloader.fmi2 import Fmi2Error, Fmi2Slave, Fmi2Status, Fmi2Type
 from ...running.description import read_description
 from ...running.fmi2 import FMICallException
 from ...running.unpacking import unpack_once
-from .by_fmpy import played
-from .request import Reply, Request, serve
+from .fmpy_adapter import run_instances
+from .request import ImporterReply, ImporterRequest, serve
 
 
 class Instance:
@@ -51,11 +51,11 @@ def hear(environment: Any, name: bytes, status: int, category: bytes, text: byte
     print(f"log: {text.decode()}", file=sys.stderr, flush=True)
 
 
-def play(request: Request) -> Reply:
+def run_request(request: ImporterRequest) -> ImporterReply:
     found = read_description(Path(request.fmu))
     instances = [Instance(unpack_once(Path(request.fmu)), found, name) for name in request.instances]
-    return played(request, instances, version("fmuloader"))
+    return run_instances(request, instances, version("fmuloader"))
 
 
 if __name__ == "__main__":
-    serve(play)
+    serve(run_request)

@@ -20,7 +20,7 @@ TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True)
-class Shortcut:
+class LawDeviation:
     """One law beside dry friction: the errors of its true solution, as in reference.Errors; where dry friction holds
     the sled, the median speed `creep` in m/s; the slip `period` in s; and `asymmetry`, the largest forward over the
     largest backward acceleration, which is 1 for dry friction.  None for what does not occur or is not in question."""
@@ -36,13 +36,13 @@ class Shortcut:
     asymmetry: float | None
 
 
-def analyse(case: ReferenceCase, model: type) -> Shortcut:
+def compare_with_dry_friction(case: ReferenceCase, model: type) -> LawDeviation:
     """The law of a case beside dry friction; `model` is the class inside the FMU."""
     assert case.dry_friction_reference is not None
     truth, dry = load_reference(case.reference_source), load_reference(case.dry_friction_reference)
     off = compute_errors(Solution(truth.motion, None, 0), dry)
-    law = partial(Shortcut, case.model, case.name, case.law, off.final, off.rms, off.largest)
-    held = stuck(dry)
+    law = partial(LawDeviation, case.model, case.name, case.law, off.final, off.rms, off.largest)
+    held = stuck_points(dry)
     if not held.any():
         return law(None, None, None)
     creep = float(np.median(np.abs(truth.motion[held, 1])))
@@ -57,7 +57,7 @@ def analyse(case: ReferenceCase, model: type) -> Shortcut:
     return law(creep, float(np.mean(np.diff(slips))), max(a) / -min(a))
 
 
-def stuck(truth: CertifiedReference) -> np.ndarray:
+def stuck_points(truth: CertifiedReference) -> np.ndarray:
     """Which of the common points (n,) find the body stuck."""
     starts, modes = zip(*truth.modes, strict=True)
     return np.array(modes)[np.searchsorted(starts, truth.times, side="right") - 1] == 0

@@ -8,19 +8,21 @@ from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from .request import Reply, Request, serve
+from .request import ImporterReply, ImporterRequest, serve
 
 NANO = 1e9  # libcosim counts time in whole ns
 
 
-def play(request: Request) -> Reply:
+def run_request(request: ImporterRequest) -> ImporterReply:
     log_output_level(CosimLogLevel.ERROR)
-    rows, accepted = run(request, request.values, request.change)
-    again = run(request, {}, {})[0] if request.again else []
-    return Reply(version("libcosimpy"), rows, again, accepted)
+    rows, accepted = run(request, request.values, request.midrun_changes)
+    rerun = run(request, {}, {})[0] if request.rerun else []
+    return ImporterReply(version("libcosimpy"), rows, rerun, accepted)
 
 
-def run(request: Request, values: dict[str, float], change: dict[str, float]) -> tuple[list[list[float]], int]:
+def run(
+    request: ImporterRequest, values: dict[str, float], midrun_changes: dict[str, float]
+) -> tuple[list[list[float]], int]:
     """The rows of one run, the last one repeated where libcosim refuses to go on, and how many steps it took."""
     references = request.references
     execution = CosimExecution.from_step_size(round(request.step * NANO))
@@ -31,18 +33,18 @@ def run(request: Request, values: dict[str, float], change: dict[str, float]) ->
     execution.add_manipulator(manipulator)
     for name, value in values.items():
         execution.real_initial_value(places[0], references[name], value)
-    if request.connect:
-        source, sink = (references[name] for name in request.connect)
+    if request.connection:
+        source, sink = (references[name] for name in request.connection)
         execution.connect_real_variables(places[0], source, places[1], sink)
-    wanted = [references[name] for name in request.read]
+    wanted = [references[name] for name in request.outputs]
 
     def row() -> list[float]:
         return [value for place in places for value in observer.last_real_values(place, wanted)]
 
     rows, accepted = [row()], 0
     for i in range(request.steps):
-        if i == request.steps // 2 and change:
-            names, new = list(change), list(change.values())
+        if i == request.steps // 2 and midrun_changes:
+            names, new = list(midrun_changes), list(midrun_changes.values())
             manipulator.slave_real_values(places[0], [references[name] for name in names], new)
         accepted += execution.step(1)
         rows.append(row())
@@ -50,4 +52,4 @@ def run(request: Request, values: dict[str, float], change: dict[str, float]) ->
 
 
 if __name__ == "__main__":
-    serve(play)
+    serve(run_request)

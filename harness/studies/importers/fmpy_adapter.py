@@ -13,10 +13,10 @@ from fmpy.logging import addLoggerProxy
 
 from ...running.description import read_description
 from ...running.unpacking import unpack_once
-from .request import Reply, Request, serve
+from .request import ImporterReply, ImporterRequest, serve
 
 
-def play(request: Request, logged: tuple[str, ...] = ("",)) -> Reply:
+def run_request(request: ImporterRequest, logged: tuple[str, ...] = ("",)) -> ImporterReply:
     """The answer; of the log what begins so."""
     found = read_description(Path(request.fmu))
     callbacks = logging(logged)
@@ -28,28 +28,28 @@ def play(request: Request, logged: tuple[str, ...] = ("",)) -> Reply:
     instances = [fmi2.FMU2Slave(instanceName=name, **about) for name in request.instances]
     for instance in instances:
         instance.instantiate(callbacks=callbacks, loggingOn=True)
-    return played(request, instances, fmpy.__version__)
+    return run_instances(request, instances, fmpy.__version__)
 
 
-def played(request: Request, instances: list[Any], version: str) -> Reply:
+def run_instances(request: ImporterRequest, instances: list[Any], version: str) -> ImporterReply:
     """The answer of instances, which are freed; `version` of the tool."""
-    rows, accepted = run(request, instances, request.values, request.change)
-    again: list[list[float]] = []
-    if request.again:
+    rows, accepted = run(request, instances, request.values, request.midrun_changes)
+    rerun: list[list[float]] = []
+    if request.rerun:
         for instance in instances:
             instance.reset()
-        again, _ = run(request, instances, {}, {})
+        rerun, _ = run(request, instances, {}, {})
     for instance in instances:
         instance.freeInstance()
-    return Reply(version, rows, again, accepted)
+    return ImporterReply(version, rows, rerun, accepted)
 
 
 def run(
-    request: Request, instances: list[Any], values: dict[str, float], change: dict[str, float]
+    request: ImporterRequest, instances: list[Any], values: dict[str, float], midrun_changes: dict[str, float]
 ) -> tuple[list[list[float]], int]:
     """The rows of one run, and how many steps were accepted."""
     references = request.references
-    wanted = [references[name] for name in request.read]
+    wanted = [references[name] for name in request.outputs]
 
     def write(instance: Any, new: dict[str, float]) -> None:
         instance.setReal([references[name] for name in new], list(new.values()))
@@ -58,8 +58,8 @@ def run(
         return [value for instance in instances for value in instance.getReal(wanted)]
 
     def transfer() -> None:
-        if request.connect:
-            source, sink = request.connect
+        if request.connection:
+            source, sink = request.connection
             write(instances[1], {sink: instances[0].getReal([references[source]])[0]})
 
     write(instances[0], values)
@@ -72,7 +72,7 @@ def run(
     for i in range(request.steps):
         transfer()
         if i == request.steps // 2:
-            write(instances[0], change)
+            write(instances[0], midrun_changes)
         try:
             for instance in instances:
                 instance.doStep(request.step * i, request.step)
@@ -99,4 +99,4 @@ def logging(logged: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:
 
 
 if __name__ == "__main__":
-    serve(play)
+    serve(run_request)

@@ -30,11 +30,11 @@ from ...running.description import read_description
 from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.assignments import parse_assignment
 from ...scenes.fmu_files import check_built, find_fmu
-from .boundaries import Boundary, known
+from .boundaries import Boundary, read_boundaries
 from .journal import Block, Journal
-from .measures import Column
-from .rerun import Runs, ready, specified
-from .space import Points, axis
+from .measures import MeasureColumn
+from .runner import SweepSpec, open_runner, run_spec_of
+from .sampling import SweepPoints, parse_axis
 from .study import Sweep, perform
 
 FOLDER = "sweep"
@@ -44,7 +44,7 @@ NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
 
 
 @dataclass(frozen=True)
-class Asked:
+class SweepRequest:
     """What the user asks for; `vary` and `values` as texts like m=1:2:11 and k=100, `options` of a Specification."""
 
     model: str
@@ -58,7 +58,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Failure:
+class FailureGroup:
     """Runs that failed alike, but for the numbers in the `sentence` of the first of them."""
 
     runs: int
@@ -67,15 +67,15 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Swept:
+class SweepResult:
     """The finished sweep: its runs, where its files are, how many runs were done before, how many lines about them
     were damaged, how the others failed, the most frequent first, and the seconds that the new ones took."""
 
     runs: int
     folder: Path
-    before: int
+    n_resumed: int
     damaged: int
-    failures: tuple[Failure, ...]
+    failures: tuple[FailureGroup, ...]
     seconds: float
 
     @property
@@ -84,47 +84,49 @@ class Swept:
 
 
 @dataclass(frozen=True)
-class About:
+class SweepDescription:
     """What an FMU says of a sweep: unit and sentence of what is varied, the columns, value and unit of the parameters
     that are not, the stop time in s, and the known boundaries."""
 
     varied: dict[str, tuple[str, str]]
-    columns: tuple[Column, ...]
+    columns: tuple[MeasureColumn, ...]
     constants: dict[str, tuple[object, str]]
     stop: float
     boundaries: tuple[Boundary, ...]
 
 
-def carry_out(asked: Asked, out: Path, scheduler: str | None, workers: int, report: Callable[[float], None]) -> Swept:
+def run_sweep(
+    asked: SweepRequest, out: Path, scheduler: str | None, workers: int, report: Callable[[float], None]
+) -> SweepResult:
     """Run the sweep and write its files to out/sweep/<name>; HarnessError in one sentence."""
     check_built(file := find_fmu(asked.model))
-    axes = tuple(axis(text, asked.random is not None) for text in asked.vary)
+    axes = tuple(parse_axis(text, asked.random is not None) for text in asked.vary)
     names = tuple(each.name for each in axes)
     if len(set(names)) < len(names):
         raise SceneError("--vary names a parameter twice")
-    points = Points(axes, asked.random, asked.seed)
+    points = SweepPoints(axes, asked.random, asked.seed)
     values, options = map(parse_assignment, asked.values), sorted(asked.options.items())
-    runs = Runs(file.stem, names, tuple(values), asked.measures, tuple(options))
+    runs = SweepSpec(file.stem, names, tuple(values), asked.measures, tuple(options))
     about = describe(runs, points, file)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
     kept = sweep.journal(out / FOLDER)
-    before = kept.done
+    before = kept.n_done
     folder = out / FOLDER / (asked.name or "-".join((runs.model, *names, sweep.key[:8])))
     source = describe_sources(str(file))
     with replace_folder(folder, FILES, source) as fresh:  # from before the runs on: what is in the way is told at once
         seconds = perform(sweep, kept, scheduler, workers, report)
         failures = save(sweep, kept, about, fresh)
         write_provenance(fresh, [file], about.constants, asked, source=source)
-    kept.forget()
-    return Swept(len(points), folder, before, kept.damaged, failures, seconds)
+    kept.delete()
+    return SweepResult(len(points), folder, before, kept.damaged, failures, seconds)
 
 
-def describe(runs: Runs, points: Points, file: Path) -> About:
+def describe(runs: SweepSpec, points: SweepPoints, file: Path) -> SweepDescription:
     """What the FMU says of the sweep; SceneError where it cannot be done.
 
     Some first runs show what is wrong with it before workers are started.
     """
-    said = read_description(file, specified(runs, file).lenient)
+    said = read_description(file, run_spec_of(runs, file).lenient)
     variables = {variable.name: variable for variable in said.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
     check_names("parameter to vary", runs.varied, settable)
@@ -133,9 +135,9 @@ def describe(runs: Runs, points: Points, file: Path) -> About:
             raise SceneError(f"{each.name} is both varied and set: leave one out")
         if variables[each.name].type not in REAL_TYPES and any(value % 1 for value in each.values):
             raise SceneError(f"{each.name} is a choice: vary it over whole numbers, as in {each.name}=1,2")
-    with ready(runs, file) as runner:
+    with open_runner(runs, file) as runner:
         for number in (len(points) - 1, len(points) // 2, 0):
-            (spot,) = points.between(number, number + 1).tolist()
+            (spot,) = points.coordinates(number, number + 1).tolist()
             measured = runner.run(spot)
             if not isinstance(measured, str):
                 break
@@ -144,7 +146,9 @@ def describe(runs: Runs, points: Points, file: Path) -> About:
         constants = {name: value for name, value in runner.constants().items() if name not in runs.varied}
         varied = {name: (variable_unit(variables[name]), variables[name].description or name) for name in runs.varied}
         numbers = {name: value for name, (value, _) in constants.items() if isinstance(value, float)}
-        return About(varied, runner.columns, constants, runner.stop, known(file, runs.varied, numbers))
+        return SweepDescription(
+            varied, runner.columns, constants, runner.stop, read_boundaries(file, runs.varied, numbers)
+        )
 
 
 def is_settable(variable: Any) -> bool:
@@ -152,7 +156,7 @@ def is_settable(variable: Any) -> bool:
     return variable.causality in ("parameter", "input") and variable.type not in NOT_NUMBERS and not variable.dimensions
 
 
-def save(sweep: Sweep, kept: Journal, about: About, folder: Path) -> tuple[Failure, ...]:
+def save(sweep: Sweep, kept: Journal, about: SweepDescription, folder: Path) -> tuple[FailureGroup, ...]:
     """Write the netCDF file, the table and the figure; returns how runs failed."""
     from .figure import draw
 
@@ -189,18 +193,18 @@ def save(sweep: Sweep, kept: Journal, about: About, folder: Path) -> tuple[Failu
         for each in sweep.points.axes if grid else ():
             data.write_values(each.name, 0, np.array(each.values))
         for block in kept.blocks():
-            spots = sweep.points.between(block.first, block.last)
+            spots = sweep.points.coordinates(block.first, block.last)
             for name, column in zip(names, () if grid else spots.T, strict=not grid):
                 data.write_values(name, block.first, column)
             for column, values in zip(about.columns, block.values.T, strict=True):
                 data.write_values(column.name, block.first, values)
-            data.write_values("error", block.first, np.array([sentence.encode() for sentence in sentences(block)]))
+            data.write_values("error", block.first, np.array([sentence.encode() for sentence in messages(block)]))
             table.writerows(rows(spots, block))
     draw(folder / "sweep.nc", folder / "figure.svg", about.boundaries, sum(each.runs for each in failures))
     return failures
 
 
-def labels(sweep: Sweep, about: About) -> dict[str, dict[str, str]]:
+def labels(sweep: Sweep, about: SweepDescription) -> dict[str, dict[str, str]]:
     """The attributes of what is varied."""
     found = {}
     for each in sweep.points.axes:
@@ -209,29 +213,29 @@ def labels(sweep: Sweep, about: About) -> dict[str, dict[str, str]]:
     return found
 
 
-def sentences(block: Block) -> list[str]:
+def messages(block: Block) -> list[str]:
     """Why each run of a block failed."""
-    return [block.sentences.get(i, "") for i in range(len(block.values))]
+    return [block.messages.get(i, "") for i in range(len(block.values))]
 
 
 def rows(spots: np.ndarray, block: Block) -> Any:
     """The rows of a block in the table; what there is not is empty."""
     values = np.column_stack([spots, block.values]).astype(object)
     values[values != values] = None
-    return ([*row, sentence] for row, sentence in zip(values, sentences(block), strict=True))
+    return ([*row, sentence] for row, sentence in zip(values, messages(block), strict=True))
 
 
-def counted(sweep: Sweep, kept: Journal) -> tuple[tuple[Failure, ...], int]:
+def counted(sweep: Sweep, kept: Journal) -> tuple[tuple[FailureGroup, ...], int]:
     """How runs failed, the most frequent first, and the bytes of the longest sentence, one at least."""
     runs: Counter[str] = Counter()
-    first: dict[str, Failure] = {}
+    first: dict[str, FailureGroup] = {}
     longest = 1
     for block in kept.blocks():
-        for place, sentence in block.sentences.items():
+        for place, sentence in block.messages.items():
             kind = NUMBER.sub("#", sentence)
             runs[kind] += 1
             longest = max(longest, len(sentence.encode()))
             if kind not in first:
-                (spot,) = sweep.points.between(block.first + place, block.first + place + 1)
-                first[kind] = Failure(0, sentence, dict(zip(sweep.runs.varied, spot.tolist(), strict=True)))
+                (spot,) = sweep.points.coordinates(block.first + place, block.first + place + 1)
+                first[kind] = FailureGroup(0, sentence, dict(zip(sweep.runs.varied, spot.tolist(), strict=True)))
     return tuple(replace(first[kind], runs=count) for kind, count in runs.most_common()), longest

@@ -19,7 +19,7 @@ from .convergence import Convergence
 COARSEST, HALVINGS = 100, 4  # communication steps of the first run
 
 
-def asked(source: Path, file: Path, stop: float | None) -> Convergence:
+def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
     """What is to be run: every real output that the archive names, of every component; `file` becomes a copy that any
     library can read."""
     if not source.is_file():
@@ -76,7 +76,7 @@ def bound(part: Any, folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
         yield str(table.name), {f"{binding.prefix or ''}{name}": value for name, value in values.items()}
 
 
-def in_force(file: Path) -> dict[str, tuple[object, str]]:
+def effective_parameters(file: Path) -> dict[str, tuple[object, str]]:
     """Every parameter of the components of an archive, as its sets say, those of the whole last, and its unit."""
     with SSP(file, mode="r") as archive, archive.system_structure as structure:
         folder, parts = archive.unpacked_path, components(structure.system)

@@ -14,18 +14,18 @@ from ...running.runner import DEFAULT_COMMUNICATION_STEPS, run
 from ...running.signals import Signals, signals_from_trajectory
 from ...scenes.fmu_files import check_built, find_fmu
 from ...scenes.scene import load_scene
-from .files import read
+from .trajectory_files import read_trajectory
 
 FILES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
 SUFFIXES = (".fmu", ".py", ".toml")  # of what is run
 
 
-def both(sources: tuple[str, str], how: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
+def load_both(sources: tuple[str, str], how: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
     """The trajectories of two folders, files, FMUs' paths or scenes.  What can be run is run to the same times, those
     of the other one if that is recorded or is a scene with a grid, and to the same stop; `how` says the rest."""
-    found = [recorded(source) for source in sources]
-    runs = [None if each else wanted(source, how) for each, source in zip(found, sources, strict=True)]
-    grids = [spacing(each.time) for each in found if each] + [each.grid for each in runs if each]
+    found = [read_recorded(source) for source in sources]
+    runs = [None if each else run_spec_for(source, how) for each, source in zip(found, sources, strict=True)]
+    grids = [grid_spacing(each.time) for each in found if each] + [each.grid for each in runs if each]
     grid = next(filter(None, grids), None)
     ends = [resolve_stop(each, read_description(each.fmu, each.lenient)) for each in runs if each]
     stops = {*ends, *(float(each.time[-1]) for each in found if each)}
@@ -42,7 +42,7 @@ def both(sources: tuple[str, str], how: RunSpec, report: ProgressCallback) -> tu
     return sides[0], sides[1]
 
 
-def names(sources: tuple[str, str]) -> list[str]:
+def display_names(sources: tuple[str, str]) -> list[str]:
     """What two sources are called; where they are called alike, with the folders or endings in which they differ."""
     paths = [Path(abspath(each)) if Path(each).exists() else Path("scene", each) for each in sources]
     plain = [each if each.is_dir() or each.parts[0] == "scene" else each.with_suffix("") for each in paths]
@@ -52,7 +52,7 @@ def names(sources: tuple[str, str]) -> list[str]:
     return ["/".join(parts[-apart:]) for parts in (one, two)]
 
 
-def wanted(source: str, how: RunSpec) -> RunSpec:
+def run_spec_for(source: str, how: RunSpec) -> RunSpec:
     """What runs an FMU by its path or by that of its model, or a scene."""
     if Path(source).suffix in (".fmu", ".py"):
         return replace(how, fmu=find_fmu(source))
@@ -61,17 +61,17 @@ def wanted(source: str, how: RunSpec) -> RunSpec:
     return spec_from_scene(scene)
 
 
-def recorded(source: str) -> Signals | None:
+def read_recorded(source: str) -> Signals | None:
     """The trajectory of a folder or a file; None for what has to be run."""
     path = Path(source)
     if path.exists() and path.suffix not in SUFFIXES:
-        return read(path)
+        return read_trajectory(path)
     if path.suffix in FILES:
         raise SceneError(f"there is no {path}: name a file or folder of results that is here, an FMU, or a scene")
     return None
 
 
-def spacing(time: np.ndarray) -> float | None:
+def grid_spacing(time: np.ndarray) -> float | None:
     """The communication step in s of which the times (n,) are multiples, but for some that lie between, as of events;
     None if there is none."""
     h = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
@@ -80,7 +80,7 @@ def spacing(time: np.ndarray) -> float | None:
     return h if even.mean() > 0.5 else None
 
 
-def common(one: Signals, two: Signals) -> tuple[float, float]:
+def common_span(one: Signals, two: Signals) -> tuple[float, float]:
     """The stretch of time in s that both cover; HarnessError if there is none."""
     begin, end = max(one.time[0], two.time[0]), min(one.time[-1], two.time[-1])
     if not end > begin:

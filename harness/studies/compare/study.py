@@ -13,25 +13,26 @@ from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, prefix_parameters, write_provenance
 from ...running.fmi2 import ProgressCallback
 from ...running.run_spec import RunSpec
-from . import trajectory
+from . import trajectory_sources
 from .difference import Comparison, compare
 
 
-def perform_compare(
+def run_comparison(
     sources: tuple[str, str], how: RunSpec, out: Path, report: ProgressCallback
 ) -> tuple[Comparison, Path]:
     """Compare two FMUs, scenes, result folders or CSV files, and write the differences to out/compare/<one>-<two>;
     `how` says how FMUs are run."""
     from .figure import draw
 
-    names = trajectory.names(sources)
+    names = trajectory_sources.display_names(sources)
     folder = out / "compare" / "-".join(names).replace("/", "-")
     with replace_folder(folder, ("compare.json", "figure.svg"), describe_sources(*sources)) as fresh:
         one, two = (
-            replace(each, name=name) for each, name in zip(trajectory.both(sources, how, report), names, strict=True)
+            replace(each, name=name)
+            for each, name in zip(trajectory_sources.load_both(sources, how, report), names, strict=True)
         )
         found = compare(one, two)
-        (fresh / "compare.json").write_text(to_json(numbers(found)) + "\n", encoding="utf-8")
+        (fresh / "compare.json").write_text(to_json(comparison_as_json(found)) + "\n", encoding="utf-8")
         draw(found, fresh / "figure.svg")
         values = prefix_parameters({"one": one.parameters, "two": two.parameters})
         write_provenance(
@@ -40,7 +41,7 @@ def perform_compare(
     return found, folder
 
 
-def numbers(found: Comparison) -> dict[str, Any]:
+def comparison_as_json(found: Comparison) -> dict[str, Any]:
     """Everything found, for JSON."""
     return {
         "one": {"name": found.one.name, "note": found.one.note},
@@ -64,13 +65,13 @@ def events(found: Comparison) -> dict[str, Any]:
     return {
         "events": found.events,
         "event_shift": pairs.shift,
-        "matched": {"one": pairs.one.tolist(), "two": pairs.two.tolist(), "shift": pairs.apart},
-        "only_one": pairs.only[0].tolist(),
-        "only_two": pairs.only[1].tolist(),
+        "matched": {"one": pairs.one.tolist(), "two": pairs.two.tolist(), "shift": pairs.largest_shift},
+        "only_one": pairs.unmatched[0].tolist(),
+        "only_two": pairs.unmatched[1].tolist(),
     }
 
 
-def table(found: Comparison) -> Table:
+def difference_table(found: Comparison) -> Table:
     """The differences, a row for each variable."""
     shown = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     shown.add_column("")
@@ -83,7 +84,7 @@ def table(found: Comparison) -> Table:
     return shown
 
 
-def sentences(found: Comparison) -> list[str]:
+def summary_lines(found: Comparison) -> list[str]:
     """How the two came about, what was compared, and what their events say."""
     how = "those of the coarser one; the other lies between its samples" if found.interpolated else "common to both"
     said = [f"{each.name}: {each.note}" for each in (found.one, found.two) if each.note]

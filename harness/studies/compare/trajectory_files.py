@@ -19,18 +19,18 @@ from ...running.signals import Signals
 
 LATEST = 1e100  # s, either way
 ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # of an array; its brackets hold no unit
-TRUTHS = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
+BOOLEANS = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 
 Columns = dict[str, np.ndarray]
 
 
-def read(path: Path) -> Signals:
+def read_trajectory(path: Path) -> Signals:
     """The trajectory in a file or a result folder; SceneError in one sentence if there is none."""
     file = path / "trajectory.csv" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
         raise SceneError(f"{path} is no result folder: it has no trajectory.csv")
-    (clock, time), *others = (modelica(file) or plain(file) or table(file)).items()
-    unit = parted(clock)[1] or "s"
+    (clock, time), *others = (read_modelica(file) or read_csv(file) or table(file)).items()
+    unit = parse_heading(clock)[1] or "s"
     if unit not in TIMES:
         raise SceneError(f"{file.name}: the first column must be the time, and its unit is '{unit}'")
     if time.dtype.kind == "U":
@@ -40,8 +40,8 @@ def read(path: Path) -> Signals:
         raise SceneError(f"{file.name}: the time in its first column must rise, within {LATEST:g} s")
     columns, units = Columns(), dict[str, str]()
     for head, column in others:
-        name, unit = parted(head)
-        if name in columns or name == parted(clock)[0]:
+        name, unit = parse_heading(head)
+        if name in columns or name == parse_heading(clock)[0]:
             raise SceneError(f"{file.name}: two columns are named {format_value(name)}")
         columns[name], units[name] = column, unit
     return Signals(path.stem, time, columns, units, events(path), file=file)
@@ -58,7 +58,7 @@ def events(path: Path) -> np.ndarray | None:
     return known
 
 
-def parted(head: str) -> tuple[str, str]:
+def parse_heading(head: str) -> tuple[str, str]:
     """Name and unit of a heading."""
     if ELEMENT.fullmatch(head):
         return head, ""
@@ -75,7 +75,7 @@ def table(file: Path) -> Columns:
     return dict(zip(heads, numbers.T, strict=True))
 
 
-def plain(file: Path) -> Columns | None:
+def read_csv(file: Path) -> Columns | None:
     """The columns by heading of a CSV file with commas, a heading and nothing but rows of its width; numbers, truths,
     texts, and, as fmpy writes them, arrays with blanks between; None if it is something else."""
     try:
@@ -108,12 +108,12 @@ def column(head: str, cells: list[str]) -> Columns:
 def numbers(cells: Sequence[str]) -> np.ndarray | None:
     """The numbers that the cells hold, None where one holds something else."""
     try:
-        return np.array([TRUTHS[cell] if cell in TRUTHS else float(cell or "nan") for cell in cells])
+        return np.array([BOOLEANS[cell] if cell in BOOLEANS else float(cell or "nan") for cell in cells])
     except ValueError:
         return None
 
 
-def modelica(file: Path) -> Columns | None:
+def read_modelica(file: Path) -> Columns | None:
     """The columns of a result of OpenModelica or Dymola, which is a MATLAB file of version 4, also where it was saved
     anew as 5; None if it is none."""
     data = read_content(file)

@@ -5,7 +5,7 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-from .request import Reply, Request, serve
+from .request import ImporterReply, ImporterRequest, serve
 
 if sys.platform == "linux":
     ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libtbb.so.12"), ctypes.RTLD_GLOBAL)
@@ -13,39 +13,41 @@ if sys.platform == "linux":
 from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure
 
 
-def play(request: Request) -> Reply:
+def run_request(request: ImporterRequest) -> ImporterReply:
     EcosLib.set_log_level("warn")
     first = request.instances[0]
     with EcosSimulationStructure() as structure:
         for name in request.instances:
             structure.add_model(name, request.fmu)
-        if request.connect:
-            source, sink = request.connect
+        if request.connection:
+            source, sink = request.connection
             structure.make_real_connection(f"{first}::{source}", f"{request.instances[1]}::{sink}")
         structure.add_parameter_set("values", {f"{first}::{name}": value for name, value in request.values.items()})
         with EcosSimulation(structure=structure, step_size=request.step) as simulation:
-            rows = run(simulation, request, "values", request.change)
-            again: list[list[float]] = []
-            if request.again:
+            rows = run(simulation, request, "values", request.midrun_changes)
+            rerun: list[list[float]] = []
+            if request.rerun:
                 simulation.reset()
-                again = run(simulation, request, None, {})
+                rerun = run(simulation, request, None, {})
             # Ecos does not look at the status of a step, so it accepts all.
-            return Reply(version("ecospy"), rows, again, request.steps)
+            return ImporterReply(version("ecospy"), rows, rerun, request.steps)
 
 
 def run(
-    simulation: EcosSimulation, request: Request, values: str | None, change: dict[str, float]
+    simulation: EcosSimulation, request: ImporterRequest, values: str | None, midrun_changes: dict[str, float]
 ) -> list[list[float]]:
     """The rows of one run."""
 
     def row() -> list[float]:
-        return [simulation.get_real(f"{instance}::{name}") for instance in request.instances for name in request.read]
+        return [
+            simulation.get_real(f"{instance}::{name}") for instance in request.instances for name in request.outputs
+        ]
 
     simulation.init(parameter_set=values)
     rows = [row()]
     for i in range(request.steps):
         if i == request.steps // 2:
-            for name, value in change.items():
+            for name, value in midrun_changes.items():
                 simulation.set_real(f"{request.instances[0]}::{name}", value)
         simulation.step(1)
         rows.append(row())
@@ -53,4 +55,4 @@ def run(
 
 
 if __name__ == "__main__":
-    serve(play)
+    serve(run_request)

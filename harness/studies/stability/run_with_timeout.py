@@ -22,14 +22,14 @@ PRELOAD = [f"{__package__}.study", "harness.references.piecewise_linear", "scipy
 CONTEXT: Any = process_context(PRELOAD)
 
 
-class Bounded(Worker):
+class TimedWorker(Worker):
     """A process with a folder of its own."""
 
     def __init__(self) -> None:
         self.held = ExitStack()
         super().__init__(CONTEXT, self.held.enter_context(temporary_directory("bounded-")))
 
-    def within(self, limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
+    def run(self, limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
         """As `bounded`; only who answers is asked again."""
         late = monotonic() + limit
         try:
@@ -52,21 +52,21 @@ class Bounded(Worker):
         self.held.close()
 
 
-IDLE: list[Bounded] = []
+IDLE: list[TimedWorker] = []
 
 
 @atexit.register
-def dismiss() -> None:
+def end_idle_workers() -> None:
     """End those that wait."""
     while IDLE:
         IDLE.pop().kill()
 
 
-def bounded(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
+def run_with_timeout(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
     """function(*arguments) within `limit` s; HarnessError if it hangs, crashes or raises one itself.
 
     The function must be known to pickle by name; any other exception of its comes through.
     """
     with suppress(IndexError, WorkerDiedError):  # where none waits, or what was asked of it before has killed it
-        return IDLE.pop().within(limit, function, *arguments)
-    return Bounded().within(limit, function, *arguments)
+        return IDLE.pop().run(limit, function, *arguments)
+    return TimedWorker().run(limit, function, *arguments)

@@ -34,7 +34,7 @@ RUNTIME, EVENTS = "this runtime", "events"
 
 
 @dataclass(frozen=True)
-class AnchorRun:
+class LiteratureRun:
     """One solver: `error` is the larger of those of position (m) and speed (m/s) at the end; or the failure."""
 
     problem: str
@@ -53,10 +53,10 @@ CLASSIC = (sqrt(125.0) - 10.0, 0.0)  # x = -10 + 10 cos t + 5 sin t up to its fi
 TIGHT = {"RK23": 1e-6, "ode23": 1e-6, "DOP853": 1e-10, "dop853": 1e-10}  # and 1e-8 for the others
 
 
-def analyse() -> Iterator[AnchorRun]:
+def solve_all() -> Iterator[LiteratureRun]:
     """Both anchors with every method of the runtime, then with the peers."""
     name = "block on a belt"
-    yield from runtime(name, block(), {}, BeltBlock.stop, BLOCK)
+    yield from runtime(name, block_model(), {}, BeltBlock.stop, BLOCK)
     yield from others(
         name, BeltBlock(), BLOCK, EVENTS, {"scipy": ("RK23", "RK45", "DOP853", "LSODA"), "cvode": ("Adams",)}
     )
@@ -70,7 +70,7 @@ def analyse() -> Iterator[AnchorRun]:
 
 
 @cache
-def block() -> type:
+def block_model() -> type:
     """The model of the block, inside the FMU that is built of block.py on the spot."""
     with temporary_directory("block-") as folder:
         done = run_module("build_fmus", "", str(Path(__file__).with_name("block.py")), "--out", str(folder))
@@ -81,17 +81,17 @@ def block() -> type:
 
 def runtime(
     name: str, model: type, values: dict[str, float], stop: float, end: tuple[float, float]
-) -> Iterator[AnchorRun]:
+) -> Iterator[LiteratureRun]:
     """Every method that the runtime offers for a model, up to the stop in s."""
     for method in method_numbers(model):
         rtol = TIGHT.get(method, 1e-8)
         run = EmbeddedModel.create(model, values, method, rtol, 1e-3 * rtol)
-        yield row(partial(AnchorRun, name, RUNTIME, method, rtol), partial(run.solve, [0.0, stop]), end)
+        yield row(partial(LiteratureRun, name, RUNTIME, method, rtol), partial(run.solve, [0.0, stop]), end)
 
 
 def others(
     name: str, problem: OdeProblem, end: tuple[float, float], way: str, methods: dict[str, tuple[str, ...]]
-) -> Iterator[AnchorRun]:
+) -> Iterator[LiteratureRun]:
     """The peers that are installed."""
     times = np.array([0.0, problem.stop])
     for peer in (peer for peer in methods if peer not in peer_solvers.missing_packages()):
@@ -107,10 +107,10 @@ def others(
                 1e-3 * rtol,
                 peer_solvers.limit_evaluations(LIMIT),
             )
-            yield row(partial(AnchorRun, name, f"{peer}, {way}", method, rtol), solve, end)
+            yield row(partial(LiteratureRun, name, f"{peer}, {way}", method, rtol), solve, end)
 
 
-def row(begin: Callable[..., AnchorRun], solve: Callable[[], Solution], end: tuple[float, float]) -> AnchorRun:
+def row(begin: Callable[..., LiteratureRun], solve: Callable[[], Solution], end: tuple[float, float]) -> LiteratureRun:
     """One line of the table."""
     try:
         answer = solve()
