@@ -11,23 +11,23 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     atexit.register(os._exit, 0)
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as a command has it: before what follows loads numpy
 
-import builds
-import forked
+import build_cache
+import fork_server
 import native_fmus
 import pytest
 from browser import CHROMIUM, Browser
-from driver import Worker, processes
+from worker_client import Worker, worker_fixtures
 
 
 def pytest_configure(config):
     """Open the room of what is built, or enter the one that the first process of this run has opened."""
     if hasattr(config, "workerinput"):
-        builds.room = Path(config.workerinput["room"])
+        build_cache.shared_folder = Path(config.workerinput["shared_folder"])
     else:
         folder = TemporaryDirectory()
         config.add_cleanup(folder.cleanup)
-        builds.room = Path(folder.name)
-    forked.room = builds.room
+        build_cache.shared_folder = Path(folder.name)
+    fork_server.temporary_folder = build_cache.shared_folder
 
 
 def pytest_collection_finish():
@@ -44,30 +44,30 @@ def pytest_unconfigure():
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist
 def pytest_configure_node(node):
     """Tell another process of this run where the room is."""
-    node.workerinput["room"] = str(builds.room)
+    node.workerinput["shared_folder"] = str(build_cache.shared_folder)
 
 
 @pytest.fixture(scope="session")
 def fmus():
     """The folder of the built FMUs."""
-    return builds.once("fmi2")
+    return build_cache.build_once("fmi2")
 
 
 @pytest.fixture(params=["python", "native"])
-def kind(request, fmus):
+def backend_fmus(request, fmus):
     """The folder of the FMUs of a kind."""
-    return fmus if request.param == "python" else native_fmus.built()
+    return fmus if request.param == "python" else native_fmus.build_native_fmus()
 
 
 @pytest.fixture(scope="module")
-def place(fmus, tmp_path_factory):
+def user_folder(fmus, tmp_path_factory):
     """A folder with the built FMUs in it, as a user's would be."""
     folder = tmp_path_factory.mktemp("place")
     (folder / "fmus").symlink_to(fmus)
     return folder
 
 
-_workers, worker, fresh = processes(Worker, "session")
+_workers, worker, fresh_worker = worker_fixtures(Worker, "session")
 
 
 @pytest.fixture(scope="session")

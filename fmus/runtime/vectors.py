@@ -2,7 +2,7 @@
 
 A vector runs over the states of a model or over its contacts.  Sources that speak of vectors are written out in scalars
 before they travel (packaging/written), so this file stays at home.  One model at a time runs on arrays, that of the
-places below: tests/support/on_arrays.py sets them.
+places below: tests/support/array_model.py sets them.
 """
 
 from functools import wraps

@@ -33,7 +33,7 @@ SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
     ("share", "begin", "noise"),
     [(s, b, (0.0, 1e-4)[(i + j) % 2]) for i, s in enumerate(SHARES) for j, b in enumerate(BEGINS)],
 )
-def test_a_pause_of_any_length_leaves_the_answer_right(begin, share, noise):
+def test_a_pause_of_any_length_does_not_bias_the_fit(begin, share, noise):
     """Without the laws with drag, which take most of a fit and come after a pause; below are some with them."""
     found = {
         each.name: each for each in fit_decay(paused(begin, share, noise), KnownParameters(), drag=False).estimates
@@ -44,13 +44,13 @@ def test_a_pause_of_any_length_leaves_the_answer_right(begin, share, noise):
 
 
 @pytest.mark.parametrize("share", [0.35, 0.55, 0.7])
-def test_a_pause_in_which_no_turning_point_is_lost_costs_no_other_sample(share):
+def test_a_pause_without_a_turning_point_costs_no_other_samples(share):
     found = fit_decay(paused(0.55, share), KnownParameters())
     assert found.t[0] == 0.0
     assert found.remarks == ()
 
 
-def test_too_few_swings_before_a_pause_are_left_out_and_said():
+def test_half_cycles_before_a_pause_are_skipped_and_reported_if_too_few():
     found = fit_decay(paused(0.55, 1.3), KnownParameters())
     assert found.t[0] > 0.55
     assert "Before the gap that ends at t = 0.8760 s are too few swings" in " ".join(found.remarks)
@@ -68,7 +68,7 @@ def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
 
 
 @pytest.mark.parametrize("kept", [0, 3, 11])
-def test_a_window_with_fewer_samples_than_a_fit_needs_is_told(kept):
+def test_a_window_with_too_few_samples_is_reported(kept):
     """Whatever has taken the others away."""
     record = paused(2.03, 0.95)
     problem, _ = prepare_problem(record, find_extrema(record, False), False, False)

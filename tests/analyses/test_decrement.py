@@ -37,7 +37,7 @@ def rubbed(loss, n=4001):
 
 @pytest.mark.parametrize("zeta", [1e-4, 0.0796, 0.3])
 @pytest.mark.parametrize("cycles", [0.5, 2, 2.5, 5])
-def test_the_damping_ratio_of_an_exact_signal_comes_back(zeta, cycles):
+def test_the_damping_ratio_of_an_exact_signal_is_recovered(zeta, cycles):
     times, positions = find_extrema_from_velocity(*damped(zeta))
     _, positions, used = select_cycles(times, positions, 0, cycles)
     assert used == cycles
@@ -45,7 +45,7 @@ def test_the_damping_ratio_of_an_exact_signal_comes_back(zeta, cycles):
 
 
 @pytest.mark.parametrize("n", [100, 200, 400])
-def test_turning_points_between_samples_converge_with_the_fourth_power(n):
+def test_interpolated_turning_points_converge_with_order_four(n):
     """Twice the samples, a sixteenth of the error; here bounded by the error of a cubic, h^4/384 x''''."""
     t, x, v = damped(0.0, n)
     h = t[1]
@@ -53,27 +53,27 @@ def test_turning_points_between_samples_converge_with_the_fourth_power(n):
     assert np.abs(np.abs(positions) - 1).max() <= 1.01 * h**4 / 384
 
 
-def test_turning_points_are_on_both_sides_and_half_a_cycle_apart():
+def test_turning_points_alternate_and_are_half_a_cycle_apart():
     times, positions = find_extrema_from_velocity(*damped(0.1))
     assert np.diff(times) == pytest.approx(pi / sqrt(1 - 0.01), abs=1e-7)
     assert positions == pytest.approx([(-1) ** i * exp(-0.1 * times[i]) for i in range(len(times))], abs=1e-7)
 
 
 @pytest.mark.parametrize("cycles", [0.5, 1, 1.5, 3])
-def test_the_friction_of_an_exact_signal_comes_back(cycles):
+def test_the_friction_of_an_exact_signal_is_recovered(cycles):
     """With k = 2 the loss of 0.1 per half cycle, 2 f/k, means f = 0.1."""
     times, positions = find_extrema_from_velocity(*rubbed(0.1))
     _, positions, used = select_cycles(times, positions, 1, cycles)
     assert friction_from_envelope(abs(positions[0]), abs(positions[-1]), used, 2.0) == pytest.approx(0.1, abs=1e-4)
 
 
-def test_rest_ends_the_turning_points():
+def test_turning_points_end_at_rest():
     times, positions = find_extrema_from_velocity(*rubbed(0.3))
     assert np.abs(positions) == pytest.approx([1.0, 0.7, 0.4, 0.1], abs=1e-4)
     assert times == pytest.approx([0.0, pi, 2 * pi, 3 * pi], abs=1e-2)
 
 
-def test_a_rest_between_two_motions_of_one_direction_is_no_turning_point():
+def test_a_rest_between_two_motions_in_one_direction_is_not_a_turning_point():
     t = np.arange(7.0)
     x = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 1.5, 2.0])
     v = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0])
@@ -91,7 +91,7 @@ def test_too_few_turning_points_are_refused(first, cycles, sentence):
 
 
 @pytest.mark.parametrize(("x_0", "x_n"), [(1.0, 1.0), (1.0, 1.1), (1.0, 0.0), (0.0, 0.0)])
-def test_what_does_not_decay_is_refused(x_0, x_n):
+def test_a_signal_without_decay_is_refused(x_0, x_n):
     with pytest.raises(HarnessError, match="do not decay"):
         damping_ratio(x_0, x_n, 1)
     with pytest.raises(HarnessError, match="do not decay"):

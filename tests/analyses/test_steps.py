@@ -12,7 +12,7 @@ def test_the_published_mean_counts_the_last_step_twice():
     assert published_mean_step(np.array([1.0, 2.0, 6.0])) == (1 + 2 + 6 + 6) / 4
 
 
-def test_collapse_compares_the_median_step_with_the_smallest_at_reversals():
+def test_step_collapse_compares_the_median_step_with_the_smallest_at_reversals():
     h = np.full(60, 0.1)
     h[[20, 40]] = 0.001
     h[30] = 1e-6  # far from any reversal
@@ -21,7 +21,7 @@ def test_collapse_compares_the_median_step_with_the_smallest_at_reversals():
     assert step_collapse(ends, h, ends, v) == pytest.approx(100.0)
 
 
-def test_a_motion_without_reversal_has_no_collapse():
+def test_a_motion_without_reversal_has_no_step_collapse():
     ends = np.arange(5.0)
     assert step_collapse(ends, np.diff(ends), ends, np.array([0.0, 1.0, 0.0, 0.0, 1.0])) is None
 
@@ -41,11 +41,11 @@ def test_slips_last_from_stick_to_stick(mode, starts, durations):
     assert [list(values) for values in found] == [starts, durations]
 
 
-def test_crossings_rise_through_zero_between_samples():
+def test_upward_zero_crossings_are_interpolated():
     assert list(upward_crossings(np.arange(6.0), np.array([-1.0, 1.0, -3.0, 1.0, 0.0, 2.0]))) == [0.5, 2.75]
 
 
-def test_the_crest_of_a_parabola_is_found_between_uneven_samples():
+def test_the_vertex_of_a_parabola_is_interpolated_between_uneven_samples():
     t = np.array([0.0, 1.0, 1.5, 3.0])
     y = 7 - 2 * (t - 1.3) ** 2
     assert peak_value(t, y, np.full(4, True)) == pytest.approx(7.0, abs=1e-12)

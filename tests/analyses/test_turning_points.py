@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from decays import said, swung, values
+from decays import decay_record, remarks_text, values
 
 from harness.analyses.decay.decrement import damping_ratio, friction_from_envelope
 from harness.analyses.decay.estimates import KnownParameters
@@ -11,8 +11,10 @@ from harness.analyses.decay.law import TERMS
 
 
 @pytest.mark.parametrize(("sine", "a"), [(False, 0.1), (True, 0.1), (True, 2.0)])
-def test_the_turning_points_alone_tell_the_same(sine, a):
-    found = fit_decay(swung(0.02, 0.003, 0.02, sine, a=a, t=np.linspace(0, 5, 2001)), KnownParameters(pendulum=sine))
+def test_turning_points_alone_give_the_same_estimates(sine, a):
+    found = fit_decay(
+        decay_record(0.02, 0.003, 0.02, sine, a=a, t=np.linspace(0, 5, 2001)), KnownParameters(pendulum=sine)
+    )
     expected = {"zeta": 0.02, "r": 0.003, "b": 0.02, "rest": 0.02}
     tolerance = {"rel": 0.02, "abs": 0.01 if a < 1 else 1e-3}
     assert values(found.extrema_estimates) == pytest.approx(
@@ -23,28 +25,28 @@ def test_the_turning_points_alone_tell_the_same(sine, a):
 
 @pytest.mark.parametrize("a", [0.1, 2.5])
 @pytest.mark.parametrize("term", TERMS)
-def test_two_peaks_of_a_pendulum_tell_its_only_loss(term, a):
+def test_two_peaks_of_a_pendulum_identify_a_single_loss(term, a):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.05}[term]}
     found = fit_decay(
-        swung(**truth, sine=True, a=a, t=np.linspace(0, 4, 401), noise=1e-5 * a), KnownParameters(pendulum=True)
+        decay_record(**truth, sine=True, a=a, t=np.linspace(0, 4, 401), noise=1e-5 * a), KnownParameters(pendulum=True)
     )
     assert values(found.two_peak_estimates)[term] == pytest.approx(truth[term], rel=5e-3)
     assert set(found.best.terms) == {term}
 
 
-def test_the_published_peaks_give_the_published_figures():
+def test_the_published_peaks_give_the_published_values():
     assert damping_ratio(0.06031, 0.01323, 3) == pytest.approx(0.0802, abs=5e-5)
     assert friction_from_envelope(0.08703, 0.04837, 3, 157.9) == pytest.approx(0.509, abs=5e-4)
 
 
-def test_a_column_that_does_not_apply_says_why():
-    found = fit_decay(swung(0.02, 0.003, order=1), KnownParameters(), drag=False)
+def test_an_inapplicable_column_states_the_reason():
+    found = fit_decay(decay_record(0.02, 0.003, order=1), KnownParameters(), drag=False)
     assert found.extrema_estimates == found.two_peak_estimates == ()
-    assert "No turning points: a record of velocity shows no turning points of the position." in said(found)
+    assert "No turning points: a record of velocity shows no turning points of the position." in remarks_text(found)
 
 
-def test_two_peaks_beside_a_mixed_law_say_that_they_take_all_of_the_loss():
-    assert "Two peaks take all of the loss for one kind" in said(
-        fit_decay(swung(0.02, 0.003, noise=1e-4), KnownParameters())
+def test_two_peaks_of_a_mixed_law_report_the_assumed_loss():
+    assert "Two peaks take all of the loss for one kind" in remarks_text(
+        fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters())
     )
-    assert "Two peaks take" not in said(fit_decay(swung(0.02, noise=1e-4), KnownParameters()))
+    assert "Two peaks take" not in remarks_text(fit_decay(decay_record(0.02, noise=1e-4), KnownParameters()))

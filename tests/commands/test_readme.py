@@ -10,13 +10,13 @@ import time
 from math import atan2, pi, sqrt
 from pathlib import Path
 
-import fmi3_hosts
-import foreign
+import external_fmus
+import fmi3_fixtures
 import numpy as np
 import pytest
-from builds import ROOT, published
+from build_cache import ROOT, run_published_cases
 from commands import UNPLOTTED, build, harness
-from decays import swung
+from decays import decay_record
 from fmpy.validation import validate_fmu
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -31,10 +31,10 @@ ELSEWHERE = {  # what takes long, or another machine, and the tests that have it
     "python -m harness bench": "studies/test_bench.py",
     "python -m harness importers": "hosts/test_importers.py",
     "python -m harness couple two-masses": "studies/test_coupled.py",
-    "python build_fmus.py --fmi 3": "support/fmi3_hosts.py",
+    "python build_fmus.py --fmi 3": "support/fmi3_fixtures.py",
     "python build_fmus.py --native": "support/native_fmus.py",
     "python build_fmus.py --web": "support/web_page.py",
-    "python build_fmus.py pacejka --method rodas --platform linux64": "packaging/test_lean.py",
+    "python build_fmus.py pacejka --method rodas --platform linux64": "packaging/test_feature_selection.py",
     "python -m build_fmus stickslip": "packaging/test_wheel.py",
     "fmpy simulate fmus/stickslip.fmu": "models/test_conformance.py",
     "fmpy compile": "native/test_native_packaging.py",
@@ -56,7 +56,7 @@ SCRIPTS = [block[2] for block in BLOCKS if block[1] == "python" and block[2] != 
 
 
 @pytest.fixture
-def here(fmus, tmp_path):
+def workspace(fmus, tmp_path):
     """A folder with all that the commands name."""
     (tmp_path / "fmus").mkdir()
     for file in fmus.glob("*.fmu"):
@@ -64,7 +64,7 @@ def here(fmus, tmp_path):
     for name, file in (("a.fmu", "smd.fmu"), ("b.fmu", "coulomb.fmu")):
         shutil.copy(fmus / file, tmp_path / name)
     (tmp_path / "build_fmus.py").symlink_to(ROOT / "build_fmus.py")
-    (tmp_path / "theirs.fmu").symlink_to(foreign.built() / "Midpoint.fmu")
+    (tmp_path / "theirs.fmu").symlink_to(external_fmus.build_external_fmus() / "Midpoint.fmu")
     (tmp_path / "my_scene.toml").write_text(SCENE)
     (tmp_path / "cart.py").write_text(MODEL_FILE)
     return tmp_path
@@ -72,7 +72,7 @@ def here(fmus, tmp_path):
 
 def recorded(head, size, **how):
     """The rows of a record of a known decay, under a heading, in a unit of that size."""
-    record = swung(**TRUTH, noise=1e-5 * (12.566**2 if how.get("order") else 1), **how)
+    record = decay_record(**TRUTH, noise=1e-5 * (12.566**2 if how.get("order") else 1), **how)
     return [head, *zip(record.t.tolist(), (record.x / size).tolist(), strict=True)]
 
 
@@ -112,7 +112,7 @@ def typed(line, folder, **environment):
     return done.stdout
 
 
-def test_what_is_typed_elsewhere_stands_in_the_readme_and_the_rest_is_typed_here():
+def test_commands_tested_elsewhere_are_in_the_readme_and_all_others_run_here():
     assert len(HERE) > 10
     assert len(MODEL) == 3
     for line, file in ELSEWHERE.items():
@@ -121,18 +121,18 @@ def test_what_is_typed_elsewhere_stands_in_the_readme_and_the_rest_is_typed_here
 
 
 @pytest.mark.parametrize("line", HERE)
-def test_a_command_does_what_the_readme_says(here, line):
+def test_a_command_does_what_the_readme_says(workspace, line):
     for name in shlex.split(line):
         if name in RECORDS:
-            RECORDS[name](here / name)
+            RECORDS[name](workspace / name)
         elif name.startswith("fmus/native/fmi3/"):
-            (here / "fmus" / "native").mkdir()
-            (here / "fmus" / "native" / "fmi3").symlink_to(fmi3_hosts.built())
+            (workspace / "fmus" / "native").mkdir()
+            (workspace / "fmus" / "native" / "fmi3").symlink_to(fmi3_fixtures.build_fmi3_fmus())
     if line.endswith(("report", "results/stickslip")):
-        shutil.copytree(published() / "results/stickslip", here / "results/stickslip")
-    said = typed(line, here)
+        shutil.copytree(run_published_cases() / "results/stickslip", workspace / "results/stickslip")
+    said = typed(line, workspace)
     if " -m harness " in line and not line.endswith(" list"):
-        place = here / said.split("Report in " if line.endswith("report") else "Results in ")[1].strip()
+        place = workspace / said.split("Report in " if line.endswith("report") else "Results in ")[1].strip()
         assert place.is_file() or (place / "provenance.json").is_file()
     if " decay " in line:
         found = json.loads((place / "decay.json").read_text())
@@ -141,9 +141,9 @@ def test_a_command_does_what_the_readme_says(here, line):
                 assert each["value"] == pytest.approx(TRUTH[each["name"]], abs=5 * each["error"]), each["name"]
 
 
-def test_the_first_line_draws_in_a_browser(here):
-    page = here / "page.html"
-    assert typed(FIRST, here, BROWSER=BROWSER) == ""
+def test_the_first_line_renders_in_a_browser(workspace):
+    page = workspace / "page.html"
+    assert typed(FIRST, workspace, BROWSER=BROWSER) == ""
     for _ in range(600):
         text = page.read_text(encoding="utf-8") if page.exists() else ""
         if text.rstrip().endswith("</html>"):
@@ -152,38 +152,40 @@ def test_the_first_line_draws_in_a_browser(here):
     assert "F_friction [N]" in text
 
 
-def test_the_model_is_built_run_and_certified(here):
+def test_the_model_is_built_run_and_certified(workspace):
     for line in MODEL:
-        typed(line, here)
-    assert validate_fmu(str(here / "cart.fmu")) == []
-    assert (here / "cart.csv").is_file()
-    heads, (_, first), *_, (_, last) = (line.split(",") for line in (here / "cart-events.csv").read_text().splitlines())
+        typed(line, workspace)
+    assert validate_fmu(str(workspace / "cart.fmu")) == []
+    assert (workspace / "cart.csv").is_file()
+    heads, (_, first), *_, (_, last) = (
+        line.split(",") for line in (workspace / "cart-events.csv").read_text().splitlines()
+    )
     assert (heads, first, last) == (["t [s]", "mode"], "-1", "0")  # it is let go in front, and comes to rest
-    assert (here / "results/cart/trajectory.csv").is_file()
+    assert (workspace / "results/cart/trajectory.csv").is_file()
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
-def test_the_lines_in_python_run_on_what_they_name(here, script):
+def test_the_python_lines_run(workspace, script):
     pytest.importorskip("xarray", reason="extra sweep")
     names = set(re.findall(r"results/sweep/(\w+)/", script))
     for name in names:
-        typed(f"python -m harness sweep smd --vary c=1,2 --workers 1 --name {name}", here)
-    (here / "lines.py").write_text(script)
-    typed("python lines.py", here, MPLBACKEND="agg")
+        typed(f"python -m harness sweep smd --vary c=1,2 --workers 1 --name {name}", workspace)
+    (workspace / "lines.py").write_text(script)
+    typed("python lines.py", workspace, MPLBACKEND="agg")
 
 
-def test_the_scene_is_measured_and_drawn(here):
+def test_the_scene_is_measured_and_drawn(workspace):
     """Against its closed form: break-away, then the arc of a circle about where friction and spring balance."""
     m, k, mu_s, mu_d, g, driver = 12.5, 742.5, 0.3, 0.2, 9.81, 0.034
     omega, d = sqrt(k / m), (mu_s - mu_d) * 12.5 * g / k
     amplitude, slip = sqrt(d * d + (driver / omega) ** 2), 2 * (pi - atan2(d * omega, driver)) / omega
     assert OWN in LISTED
-    done = harness(here, *shlex.split(OWN)[3:], "--json")
+    done = harness(workspace, *shlex.split(OWN)[3:], "--json")
     found = {each["name"]: each["value"] for each in json.loads(done.stdout)["quantities"]}
     assert found["first_slip"] == pytest.approx(mu_s * m * g / (k * driver), rel=1e-12)
     assert found["slip_time"] == pytest.approx(slip, rel=1e-9)
     assert found["period"] == pytest.approx(slip + 2 * d / driver, rel=1e-9)
     assert found["peak_speed"] == pytest.approx(driver + omega * amplitude, rel=1e-5)
-    table = np.loadtxt(here / "results/my_scene/trajectory.csv", delimiter=",", skiprows=1)
+    table = np.loadtxt(workspace / "results/my_scene/trajectory.csv", delimiter=",", skiprows=1)
     assert np.diff(table[:, 0]).max() < 0.02 * found["slip_time"]
-    assert (here / "results/my_scene/figure.svg").stat().st_size > 10_000
+    assert (workspace / "results/my_scene/figure.svg").stat().st_size > 10_000

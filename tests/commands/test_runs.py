@@ -13,7 +13,7 @@ from types import SimpleNamespace
 import commands
 import numpy as np
 import pytest
-from builds import ROOT, published
+from build_cache import ROOT, run_published_cases
 from models import MODELS, outputs
 
 BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
@@ -32,13 +32,13 @@ def python(folder, *arguments):
 
 
 @pytest.fixture
-def scene(place, tmp_path):
+def scene(user_folder, tmp_path):
     """scene(text, option, ...): the finished process, and the folder of results."""
 
     def run(text, *options, **environment):
         (tmp_path / "mine.toml").write_text(text)
         arguments = ("run", tmp_path / "mine.toml", "--out", tmp_path / "out", *options)
-        return harness(place, *arguments, **environment), tmp_path / "out/mine"
+        return harness(user_folder, *arguments, **environment), tmp_path / "out/mine"
 
     return run
 
@@ -53,8 +53,8 @@ def table(path):
 @pytest.fixture(scope="module")
 def main_job():
     """The finished main job and its results."""
-    folder = published()
-    said = json.loads((folder / "said.json").read_text())
+    folder = run_published_cases()
+    said = json.loads((folder / "process.json").read_text())
     return SimpleNamespace(**dict(zip(("returncode", "stdout", "stderr"), said, strict=True))), folder / "results"
 
 
@@ -85,20 +85,20 @@ def test_the_main_job_runs_every_published_case(main_job):
         ("pendulum", "joint torque, 5 cycles", "0.011522"),
     ],
 )
-def test_the_table_shows_what_is_known(main_job, case, quantity, measured):
+def test_the_table_shows_the_published_values(main_job, case, quantity, measured):
     block = main_job[0].stdout.split(f"\n{case} ")[1].split("\n   ")[0]
     line = next(line for line in block.splitlines() if line.strip().startswith(quantity))
     assert line.replace(quantity, "", 1).replace("(time points)", "").split()[0] == measured
 
 
-def test_the_table_of_all_cases_fits_into_80_columns_with_no_word_cut(main_job):
+def test_the_table_of_all_cases_fits_into_80_columns_without_truncation(main_job):
     lines = main_job[0].stdout.splitlines()
     assert lines[0].split() == ["measured", "published", "difference"]
     assert max(map(len, lines)) <= 80
     assert not [line for line in lines if re.search(r"\belsewh?e?r?$|[+-][\d.e-]+$", line)]
 
 
-def test_a_trajectory_reads_back_to_the_last_bit_and_in_order(main_job):
+def test_a_trajectory_is_read_back_bit_for_bit_and_in_order(main_job):
     head, columns = table(main_job[1] / "stickslip/trajectory.csv")
     assert head == ["t [s]", "x [m]", "v [m/s]", "a [m/s2]", "x_driver [m]", "mode"]
     assert (np.diff(columns[0]) > 0).all()
@@ -107,7 +107,7 @@ def test_a_trajectory_reads_back_to_the_last_bit_and_in_order(main_job):
     assert [repr(float(number)) for number in text[:-1]] == text[:-1]
 
 
-def test_events_are_listed_where_friction_is_dry(main_job):
+def test_events_are_listed_for_dry_friction(main_job):
     head, (times, modes) = table(main_job[1] / "stickslip/events.csv")
     assert head == ["t [s]", "mode"]
     assert list(modes) == [0, 1, 0, 1, 0, 1, 0, 1, 0]
@@ -124,7 +124,7 @@ def test_steps_add_up_to_the_run(main_job):
     assert rejected.sum() > 100  # it chatters at every reversal
 
 
-def test_a_scene_leaves_only_what_it_names(scene):
+def test_a_scene_writes_only_the_files_it_requests(scene):
     done, results = scene(BASE + "grid = 0.25\nstop = 2")
     assert (done.returncode, done.stderr) == (0, "")
     assert {path.name for path in results.iterdir()} == {"trajectory.csv", "figure.svg", "provenance.json"}
@@ -133,13 +133,13 @@ def test_a_scene_leaves_only_what_it_names(scene):
     assert list(columns[0]) == [0.25 * i for i in range(9)]
 
 
-def test_a_scene_that_wants_no_plots_has_none(scene):
+def test_a_scene_without_plots_has_no_figure(scene):
     _, results = scene(BASE + "grid = 1\nplots = []")
     assert {path.name for path in results.iterdir()} == {"trajectory.csv", "provenance.json"}
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_a_scene_without_a_grid_is_dense_enough_to_draw_and_has_the_steps_of_its_solver(scene, model):
+def test_a_scene_without_a_grid_is_densely_sampled_and_keeps_the_solver_steps(scene, model):
     text = f"title = 'a title'\nmodel = '{model}'\noutputs = {outputs(model)[:2]}\nplots = []\n"
     _, results = scene(text)
     times = table(results / "trajectory.csv")[1][0]
@@ -167,7 +167,7 @@ END = 'plots = []\n[decay]\ngives = "zeta"\n'
         (SWING, "grid = 0.04\n", "zeta", 0.0796),
     ],
 )
-def test_a_measure_that_its_samples_cannot_support_is_refused_and_the_remedy_helps(scene, text, coarse, name, value):
+def test_a_measure_unsupported_by_its_samples_is_refused_and_the_remedy_works(scene, text, coarse, name, value):
     text = 'title = "a title"\n' + text
     text += "" if text.endswith(SLIP[-20:]) or "law" in text else END
     done, _ = scene(text.replace("\nanalyses", f"\n{coarse}analyses"))
@@ -185,7 +185,7 @@ def test_slips_are_measured_without_the_acceleration(scene):
     assert "peak_acceleration" not in names
 
 
-def test_a_grid_that_follows_has_the_grid_points_and_the_steps(scene):
+def test_a_following_grid_contains_the_grid_points_and_the_steps(scene):
     _, results = scene(BASE + "grid = 0.1\nfollow = true")
     times = table(results / "trajectory.csv")[1][0]
     steps = table(results / "steps.csv")[1][0]
@@ -193,7 +193,7 @@ def test_a_grid_that_follows_has_the_grid_points_and_the_steps(scene):
     assert len(times) == 161 + len(steps) - 1  # the stop is both
 
 
-def test_the_grid_does_not_change_the_steps_of_the_solver(scene):
+def test_the_grid_does_not_change_the_solver_steps(scene):
     text = BASE + 'stop = 6\nmethod = "ode23"\nlaw = "hybrid"\nrtol = 1e-5\n'
     _, results = scene(text)
     free = table(results / "steps.csv")[1]
@@ -225,7 +225,7 @@ def test_the_grid_does_not_change_the_steps_of_the_solver(scene):
         (BASE.replace("model", "fmu"), 1, "there is no "),
     ],
 )
-def test_what_a_scene_gets_wrong_is_one_sentence_and_leaves_the_older_result(scene, tmp_path, text, status, sentence):
+def test_an_invalid_scene_is_one_sentence_and_keeps_the_previous_result(scene, tmp_path, text, status, sentence):
     older = tmp_path / "out/mine/trajectory.csv"
     older.parent.mkdir(parents=True)
     older.write_text("older")
@@ -241,9 +241,9 @@ def test_what_a_scene_gets_wrong_is_one_sentence_and_leaves_the_older_result(sce
 
 def test_a_failing_case_does_not_lose_the_others(fmus, tmp_path):
     (tmp_path / "fmus").symlink_to(fmus)
-    published = "\n[published]\nsource = 'me'\nrun_time = 1\n"
+    run_published_cases = "\n[published]\nsource = 'me'\nrun_time = 1\n"
     for name, extra in (("bad", "[values]\nmu_d = 0.95"), ("good", "stop = 1")):
-        (tmp_path / f"{name}.toml").write_text(BASE + extra + published)
+        (tmp_path / f"{name}.toml").write_text(BASE + extra + run_published_cases)
     (tmp_path / "shipped.py").write_text(
         "from pathlib import Path; import harness.scenes.scene as scene; from harness.__main__ import main\n"
         f"scene.SHIPPED = Path({str(tmp_path)!r}); main()"
@@ -256,7 +256,7 @@ def test_a_failing_case_does_not_lose_the_others(fmus, tmp_path):
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["good"]
 
 
-def test_a_missing_fmu_says_how_to_build_it(tmp_path):
+def test_a_missing_fmu_error_explains_how_to_build_it(tmp_path):
     (tmp_path / "fmus").mkdir()
     (tmp_path / "fmus/absent.py").write_text("")
     (tmp_path / "mine.toml").write_text(BASE.replace("stickslip", "absent"))
@@ -282,7 +282,7 @@ PAIR = (
         ["report", "--help"],
     ],
 )
-def test_a_process_that_is_forked_answers_as_a_fresh_one(fmus, tmp_path, arguments):
+def test_a_forked_process_behaves_like_a_fresh_one(fmus, tmp_path, arguments):
     def done(fresh):
         shutil.rmtree(tmp_path / "results", ignore_errors=True)  # else the second says that it is the same again
         return harness(tmp_path, *arguments, fresh=fresh)
@@ -301,8 +301,8 @@ def test_a_process_that_is_forked_answers_as_a_fresh_one(fmus, tmp_path, argumen
 
 
 @pytest.mark.parametrize("arguments", [["runn"], ["run"], ["run", "nosuch"], ["--nosuch"]])
-def test_wrong_usage_has_status_two(place, arguments):
-    done = harness(place, *arguments)
+def test_wrong_usage_has_exit_status_two(user_folder, arguments):
+    done = harness(user_folder, *arguments)
     assert done.returncode == 2
     assert "Error: " in done.stderr
     assert "Traceback" not in done.stderr
@@ -314,13 +314,13 @@ def test_quiet_prints_nothing(scene):
     assert results.exists()
 
 
-def test_list_shows_every_scene(place):
-    done = harness(place, "list")
+def test_list_shows_every_scene(user_folder):
+    done = harness(user_folder, "list")
     for path in (ROOT / "harness/scenes").glob("*.toml"):
         assert path.stem in done.stdout
 
 
-def test_a_scene_imports_only_what_it_names(place, tmp_path):
+def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
     """Scenes that name more and more, one after the other in one process."""
     optional = ["harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps", "matplotlib"]
     extras = ("plots = []", "plots = []\nanalyses = ['slip']", "plots = ['position']")
@@ -334,13 +334,13 @@ def test_a_scene_imports_only_what_it_names(place, tmp_path):
             f"run_scene(load_scene({str(tmp_path / f'{number}.toml')!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
             f"print([name for name in {optional} if name in sys.modules])\n"
         )
-    done = python(place, "-c", code)
+    done = python(user_folder, "-c", code)
     assert done.stderr == ""
     assert done.stdout == f"[]\n{optional[:1]}\n{[optional[0], optional[3]]}\n"
 
 
 @pytest.mark.parametrize(("extra", "status"), [("grid = 1", 0), ("[values]\nmu_d = 0.95", 1)])
-def test_no_files_of_an_fmu_are_left_behind(scene, tmp_path, extra, status):
+def test_no_temporary_fmu_files_remain(scene, tmp_path, extra, status):
     temporary = tmp_path / "temporary"
     temporary.mkdir()
     assert scene(BASE + extra, TMPDIR=str(temporary))[0].returncode == status

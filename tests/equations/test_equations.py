@@ -7,7 +7,7 @@ from itertools import product
 
 import mpmath
 import pytest
-from models import AUTHORED, LARGER, MODELS, ROOT
+from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, ROOT
 
 import fmus
 from fmus.packaging.equations.algebra import ARITHMETIC
@@ -15,7 +15,7 @@ from fmus.packaging.equations.expressions import FUNCTIONS, Term
 from fmus.packaging.equations.model_declaration import Choice, Contact, Model, Output, Rule, Variable
 from fmus.packaging.model_lookup import find_model
 
-SOURCES = [*MODELS, *AUTHORED]
+SOURCES = [*MODELS, *EXAMPLE_MODELS]
 EVERY_SOURCE = pytest.mark.parametrize("source", SOURCES, ids=lambda source: getattr(source, "stem", source))
 COMPARED = {"<": lambda a, b: a < b, "<=": lambda a, b: a <= b, ">": lambda a, b: a > b, ">=": lambda a, b: a >= b}
 DIGITS = 50
@@ -79,7 +79,7 @@ def same_bits(a, b):
 
 
 @EVERY_SOURCE
-def test_what_is_written_out_has_the_bits_of_the_equations_as_they_stand(source):
+def test_generated_code_has_the_bits_of_the_declared_equations(source):
     """Rates and outputs while sliding and while stuck; the load as rates that it makes zero."""
     analysis, model = find_model(source).analysis, find_model(source).model()
     modes = [m.name for m in analysis.modes]
@@ -107,7 +107,7 @@ def test_what_is_written_out_has_the_bits_of_the_equations_as_they_stand(source)
 
 
 @EVERY_SOURCE
-def test_jacobians_are_those_of_differences_in_fifty_digits(source):
+def test_jacobians_agree_with_differences_in_fifty_digits(source):
     """By time and by each state, sliding either way: of the equations as they stand."""
     analysis, model, found = find_model(source).analysis, find_model(source).model(), []
     for values, t, at, mode in situations(analysis, model, 40):
@@ -119,8 +119,8 @@ def test_jacobians_are_those_of_differences_in_fifty_digits(source):
     assert all(abs(slope - true) <= 1e-12 * abs(true) + 1e-15 * size for slope, true in found)
 
 
-@pytest.mark.parametrize("source", LARGER, ids=lambda source: source.stem)
-def test_any_states_and_contacts_are_derived(source):
+@pytest.mark.parametrize("source", LARGER_MODELS, ids=lambda source: source.stem)
+def test_any_number_of_states_and_contacts_is_derived(source):
     """Rates and Jacobian in every mode, of three states and of two contacts; what is stuck to the ground does not
     move."""
     analysis = find_model(source).analysis
@@ -192,7 +192,7 @@ def settled(analysis, law, known):
 
 
 @EVERY_SOURCE
-def test_a_model_is_written_from_the_face_alone(source):
+def test_a_model_uses_only_the_public_api(source):
     """So that a file from anywhere is like ours."""
     tree = ast.parse(find_model(source).source)
     for node in ast.walk(tree):
@@ -202,7 +202,7 @@ def test_a_model_is_written_from_the_face_alone(source):
             assert node.module == "math" or {alias.name for alias in node.names} <= set(fmus.__all__)
 
 
-def test_the_face_is_complete():
+def test_the_public_api_is_complete():
     """Every variable that can be declared, every function that has a derivative, and nothing that is not said."""
     kinds = {cls.__name__ for cls in Variable.__subclasses__()} | {Model.__name__, Rule.__name__}
     assert set(fmus.__all__) == kinds | {*FUNCTIONS, "choose", "pi", "HYBRID", "SIGN", "THRESHOLD"}
@@ -214,7 +214,7 @@ def test_the_face_is_complete():
 
 
 @EVERY_SOURCE
-def test_the_text_that_travels_is_the_same_each_time(source):
+def test_generated_source_is_deterministic(source):
     """Builds are compared by their bytes; reading a file anew changes nothing."""
     first = find_model(source)
     again = type(first)(first.path, first.source)
@@ -226,7 +226,7 @@ def test_the_text_that_travels_is_the_same_each_time(source):
     assert f"Written out from the equations in {first.path.name}" in first.generated_source
 
 
-def test_a_file_is_read_anew_when_it_has_changed(tmp_path):
+def test_a_changed_file_is_read_again(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text((ROOT / "fmus" / "smd.py").read_text())
     first = find_model(path)
@@ -235,7 +235,7 @@ def test_a_file_is_read_anew_when_it_has_changed(tmp_path):
     assert find_model(path).model().k == 158.0
 
 
-def test_an_author_may_derive_variables_of_a_kind(tmp_path):
+def test_subclassed_variable_types_behave_like_their_base(tmp_path):
     """They are of that kind."""
     path = tmp_path / "mine.py"
     text = (
@@ -246,7 +246,7 @@ def test_an_author_may_derive_variables_of_a_kind(tmp_path):
 
 
 @pytest.mark.parametrize("moved", ["x", "driver"])
-def test_what_jumps_has_no_closed_form_though_its_slopes_have(tmp_path, moved):
+def test_a_discontinuous_law_has_no_closed_form_even_with_linear_slopes(tmp_path, moved):
     """Neither a motion nor a load at rest is known from its slopes, where a condition moves."""
     text = f'''"""A model."""
 from fmus import Contact, Mode, Model, Output, Parameter, State, choose
@@ -275,7 +275,7 @@ class Jump(Model):
     assert find_model(tmp_path / "jump.py").analysis.closed_form is not None
 
 
-def test_choices_and_contacts_are_walked():
+def test_the_test_models_have_choices_and_contacts():
     """The models of these tests have what they are to try."""
     kinds = {type(e) for source in SOURCES for e in find_model(source).analysis.declared}
     assert {Choice, Contact} <= kinds

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-import fmi3_hosts
+import fmi3_fixtures
 import pytest
 from models import MODELS
 
@@ -13,10 +13,10 @@ ECOS = next(importer for importer in IMPORTERS if importer.name == "Ecos")
 
 @pytest.mark.skipif(bool(unavailable_reason(ECOS)), reason=unavailable_reason(ECOS))
 @pytest.mark.parametrize("name", MODELS)
-def test_ecos_runs_it_in_co_simulation_as_it_runs_that_of_fmi_2(name, fmus):
+def test_ecos_runs_fmi3_co_simulation_like_fmi2(name, fmus):
     """The same value references, the same grid; only the stop time, which never arrives, may move an internal step."""
     older = describe_fmu(fmus / f"{name}.fmu").base_request
-    newer = replace(older, fmu=str(fmi3_hosts.built() / f"{name}.fmu"))
+    newer = replace(older, fmu=str(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu"))
     prepare(ECOS, [older, newer])
     found, expected = run_request(ECOS, newer).reply, run_request(ECOS, older).reply
     assert len(found.rows) == len(expected.rows) > 100

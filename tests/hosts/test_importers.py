@@ -9,11 +9,11 @@ from dataclasses import asdict
 from itertools import takewhile
 from subprocess import CompletedProcess
 
-import fmi3_hosts
+import fmi3_fixtures
 import native_fmus
 import pytest
-from builds import made, of_file
-from models import AUTHORED, LARGER, MODELS
+from build_cache import build_user_model, cached_folder
+from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS
 
 from harness.errors import HarnessError
 from harness.process.subprocess_runner import SubprocessTimeoutError
@@ -29,7 +29,7 @@ ASKED = {"python": sorted({*MODELS[::2], "stickslip"}), "native": sorted({*MODEL
 @pytest.fixture(scope="module", params=ASKED)
 def asked(request, fmus, tmp_path_factory):
     """The models of a kind that are asked about, and every row of their table, which is made once a run."""
-    names, source = ASKED[request.param], fmus if request.param == "python" else native_fmus.built()
+    names, source = ASKED[request.param], fmus if request.param == "python" else native_fmus.build_native_fmus()
 
     def make(out):
         folder = tmp_path_factory.mktemp("asked")
@@ -37,7 +37,7 @@ def asked(request, fmus, tmp_path_factory):
             (folder / f"{name}.fmu").symlink_to(source / f"{name}.fmu")
         (out / "rows").write_bytes(pickle.dumps(table.run_checks(folder, lambda name, share: None)))
 
-    return names, pickle.loads((made(f"importers-{request.param}", make) / "rows").read_bytes())
+    return names, pickle.loads((cached_folder(f"importers-{request.param}", make) / "rows").read_bytes())
 
 
 @pytest.mark.parametrize("check", CHECKS)
@@ -53,27 +53,27 @@ def test_the_importer_passes(asked, importer, check):
     assert len(row.cells) + len(unfit) == len(names)
 
 
-def test_the_table_lists_every_model_and_names_the_tools_that_are_not_there(asked):
+def test_the_table_lists_every_model_and_names_missing_tools(asked):
     names, rows = asked
     unfit = [row.importer.removesuffix(".fmu") for row in rows if row.importer.endswith(".fmu")]
     assert sorted([*table.fmu_names(rows), *unfit]) == names
     assert {row.importer for row in rows if row.reason} >= set(NOT_RUN)
 
 
-def test_an_fmu_that_the_checks_cannot_be_made_with_is_left_out_with_the_reason(tmp_path, monkeypatch):
+def test_an_fmu_unsuitable_for_the_checks_is_skipped_with_a_reason(tmp_path, monkeypatch):
     """A brake has no mass m; the others are asked about, if there are any."""
     monkeypatch.setattr(table, "IMPORTERS", ())
-    path = next(path for path in AUTHORED if path.stem == "rotor_brake")
-    (tmp_path / "rotor_brake.fmu").symlink_to(of_file(path) / "rotor_brake.fmu")
+    path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
+    (tmp_path / "rotor_brake.fmu").symlink_to(build_user_model(path) / "rotor_brake.fmu")
     with pytest.raises(HarnessError, match="the checks want a mass m, an input, and an output of its unit"):
         table.run_checks(tmp_path, print)
-    path = next(path for path in LARGER if path.stem == "belt")
-    (tmp_path / "belt.fmu").symlink_to(of_file(path) / "belt.fmu")
+    path = next(path for path in LARGER_MODELS if path.stem == "belt")
+    (tmp_path / "belt.fmu").symlink_to(build_user_model(path) / "belt.fmu")
     first, *_ = table.run_checks(tmp_path, print)
     assert (first.importer, first.reason.split(",")[0]) == ("rotor_brake.fmu", "the checks want a mass m")
 
 
-def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
+def test_a_crash_or_timeout_affects_only_its_own_check(monkeypatch):
     """Whatever follows is asked in another process; a process that ends badly takes the last of its answers with it."""
     asked = []
 
@@ -111,13 +111,13 @@ def test_what_crashes_or_hangs_costs_its_own_answer_and_no_other(monkeypatch):
     assert [table.name_with_version(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]
 
 
-def test_a_tool_that_is_not_asked_is_named_with_the_reason():
+def test_an_excluded_tool_is_listed_with_the_reason():
     said = table.legend_lines(
         [table.CheckResult("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")]
     )
     assert "Ecos was not asked: it is not installed: pip install -e '.[importers]'" in said
 
 
-def test_fmus_of_another_version_of_fmi_are_refused_in_one_sentence():
+def test_fmus_of_another_fmi_version_are_refused_in_one_sentence():
     with pytest.raises(HarnessError, match=r"\.fmu is of FMI 3\.0; the importers are asked with FMUs of FMI 2\.0"):
-        table.run_checks(fmi3_hosts.built(), lambda name, share: None)
+        table.run_checks(fmi3_fixtures.build_fmi3_fmus(), lambda name, share: None)

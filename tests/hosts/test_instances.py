@@ -1,16 +1,16 @@
 """Hundreds of instances: in turn, at once, in threads and processes, in hosts that hold what could be mistaken for
 them.
 
-Both kinds of FMU; every host is a process of its own (lives.py), which must end well.  Memory is measured where
+Both kinds of FMU; every host is a process of its own (life_cycles.py), which must end well.  Memory is measured where
 glibc tells it, on Linux.
 """
 
 from functools import partial
 
-import driver
 import native_fmus
 import pytest
-from builds import ROOT
+import worker_client
+from build_cache import ROOT
 from models import MODELS
 
 KINDS = ("python", "native")
@@ -20,7 +20,7 @@ SOME = ("pacejka", "stickslip")  # smooth, and with a mode: processes know no mo
 @pytest.fixture(scope="module", params=KINDS)
 def folder(request, fmus):
     """The FMUs of one kind."""
-    return fmus if request.param == "python" else native_fmus.built()
+    return fmus if request.param == "python" else native_fmus.build_native_fmus()
 
 
 @pytest.fixture
@@ -29,12 +29,12 @@ def paths(folder):
     return [str(folder / f"{name}.fmu") for name in MODELS]
 
 
-host = partial(driver.host, "lives.py")
+run_script = partial(worker_client.run_script, "life_cycles.py")
 
 
-def test_hundreds_of_lives_leave_little_behind(paths, record_property):
+def test_hundreds_of_life_cycles_leave_little_memory(paths, record_property):
     """Seen: 2 kB a life in Python; nothing in sys.path."""
-    told = host("one_after_another", paths, 150)
+    told = run_script("run_in_turn", paths, 150)
     early, late = told["memory"]
     record_property("kB a life", (late - early) / 135)
     assert told["runs"] == [1] * len(paths)
@@ -42,16 +42,16 @@ def test_hundreds_of_lives_leave_little_behind(paths, record_property):
     assert late - early < 135 * 4.0
 
 
-def test_hundreds_of_instances_live_side_by_side(paths, record_property):
-    told = host("side_by_side", paths, 40)
+def test_hundreds_of_instances_coexist(paths, record_property):
+    told = run_script("run_interleaved", paths, 40)
     record_property("kB an instance", told["each"])
     assert told["runs"] == 1
     assert told["each"] < 90.0  # of which fmpy takes 45
 
 
-def test_an_fmu_unpacked_anew_for_every_run_is_let_go(paths, record_property):
+def test_an_fmu_unpacked_for_every_run_is_released(paths, record_property):
     """As fmpy's simulate_fmu does: memory and libraries of earlier runs are given back."""
-    told = host("unpacked_anew", paths[-1], 30)
+    told = run_script("unpack_for_every_run", paths[-1], 30)
     early, late = told["memory"]
     record_property("kB a run", (late - early) / 27)
     assert told["libraries"] <= 2
@@ -59,23 +59,23 @@ def test_an_fmu_unpacked_anew_for_every_run_is_let_go(paths, record_property):
     assert late - early < 27 * 20.0
 
 
-def test_threads_do_not_feel_each_other(paths):
-    assert host("in_threads", paths, 8, 5) == {"runs": [1] * len(paths), "errors": []}
+def test_threads_do_not_interfere(paths):
+    assert run_script("run_in_threads", paths, 8, 5) == {"runs": [1] * len(paths), "errors": []}
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_children_carry_on_what_they_were_given_and_begin_anew(folder, method):
-    told = host("in_processes", [folder / f"{name}.fmu" for name in SOME], method)
+def test_child_processes_continue_instances_and_create_new_ones(folder, method):
+    told = run_script("run_in_processes", [folder / f"{name}.fmu" for name in SOME], method)
     assert (told["same"], {*told["codes"]}) == (True, {0})
 
 
-def test_a_host_that_holds_the_sources_and_a_pythonfmu_changes_nothing(paths):
-    told = host("beside_sources", str(ROOT), paths)
+def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(paths):
+    told = run_script("run_beside_sources", str(ROOT), paths)
     assert told["foreign"] == []
-    assert told["rows"] == host("one_by_one", paths)
+    assert told["rows"] == run_script("run_each", paths)
 
 
-def test_a_folder_may_have_spaces_in_its_name(paths, tmp_path):
+def test_a_folder_name_may_contain_spaces(paths, tmp_path):
     """As the layer finds it, which is that of all models."""
     path = paths[-1]
-    assert host("in_folder", path, str(tmp_path / "with  two")) == host("in_folder", path, None)
+    assert run_script("run_in_folder", path, str(tmp_path / "with  two")) == run_script("run_in_folder", path, None)

@@ -61,7 +61,7 @@ def starts(name, wanted):
     return {v: d.start for v, d in declared(name).items() if wanted(d) and "." not in v and not isinstance(d, Choice)}
 
 
-def test_there_are_the_five_models():
+def test_there_are_five_models():
     """A sixth has a contract of its own."""
     assert {*TUNABLE} <= {*MODELS}
 
@@ -81,7 +81,7 @@ def test_outputs_have_their_names(name):
 
 
 @pytest.mark.parametrize("name", TUNABLE)
-def test_the_solver_has_its_settings_and_counts(name):
+def test_the_solver_has_its_settings_and_counters(name):
     settings = {v: d.start for v, d in declared(name).items() if v.startswith("solver.") and isinstance(d, Parameter)}
     default = {"pacejka": "rodas", "pendulum": "dop853"}.get(name, "exact")
     assert settings == {"solver.method": METHODS[default], "solver.rtol": 0.0, "solver.atol": 0.0, "solver.h_max": 0.0}
@@ -92,7 +92,7 @@ def test_the_solver_has_its_settings_and_counts(name):
     assert sorted(counts) == sorted(wanted.split())
 
 
-def test_the_laws_offered_are_those_of_each_model():
+def test_each_model_offers_its_friction_laws():
     laws = {name: declared(name)["friction"] for name in TUNABLE if "friction" in declared(name)}
     offered = {name: [item[:2] for item in law.items] for name, law in laws.items()}
     both = [("hybrid", 1), ("sign", 2)]
@@ -102,7 +102,7 @@ def test_the_laws_offered_are_those_of_each_model():
 
 
 @pytest.mark.parametrize("name", TUNABLE)
-def test_units_are_those_of_the_quantities(name):
+def test_units_match_the_quantities(name):
     special = {"a": "m" if name == "pendulum" else "m/s2", "solver.atol": declared(name)["solver.atol"].unit}
     for v, d in declared(name).items():
         if d.type == "Real":
@@ -113,13 +113,13 @@ def test_units_are_those_of_the_quantities(name):
 
 
 @pytest.mark.parametrize("name", TUNABLE)
-def test_masses_are_above_zero_and_nothing_else_starts_out_of_range(name):
+def test_masses_are_positive_and_all_start_values_are_in_range(name):
     assert declared(name)["m"].above == 0.0
     assert not declared(name)["m"].accepts(0.0)
     assert all(d.accepts(d.start) for d in declared(name).values() if isinstance(d, Parameter))
 
 
-def test_a_declaration_says_what_it_allows():
+def test_a_declaration_states_its_allowed_range():
     class Sample(VariableOwner):
         free = Parameter(1.0, "1", "a number")
         mass = Parameter(1.0, "kg", "mass", above=0.0)
@@ -141,7 +141,7 @@ def test_a_declaration_says_what_it_allows():
 
 
 @pytest.mark.parametrize("name", TUNABLE)
-def test_a_rate_says_whose_it_is_so_that_a_motion_is_found_by_its_roles(fmus, name):
+def test_a_rate_names_its_state_so_that_motion_is_identified_by_role(fmus, name):
     variables = {v.name: v for v in read_model_description(fmus / f"{name}.fmu").modelVariables}
     whose = {v.name: v.derivative.name for v in variables.values() if v.derivative is not None}
     assert whose == ({"omega": "theta", "alpha": "omega"} if name == "pendulum" else {"v": "x", "a": "v"})

@@ -8,7 +8,7 @@ from math import isfinite
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
-import fmi3_hosts
+import fmi3_fixtures
 import pytest
 from models import MODELS, ROOT, declared, model_class, outputs, push
 
@@ -72,7 +72,7 @@ def situation(name, known, draw):
 
 
 @EVERY_MODEL
-def test_outputs_follow_at_the_start_what_the_dependencies_say_and_nothing_else(worker, fmus, at_the_start, name):
+def test_initial_dependencies_are_exactly_as_declared(worker, fmus, at_the_start, name):
     """Each known changed on its own: only those follow that are said to, and each of them does in some situation."""
     draw, told = random.Random(name), at_the_start(name)
     known = [v for v, d in declared(name).items() if d.causality in ("parameter", "input")]
@@ -80,7 +80,7 @@ def test_outputs_follow_at_the_start_what_the_dependencies_say_and_nothing_else(
     fmu = worker.instantiate(fmus / f"{name}.fmu")
     for _ in range(SITUATIONS):
         values = situation(name, known, draw)
-        before, *rows = fmu.each(values, {v: some(name, v, draw) for v in known}, list(told))
+        before, *rows = fmu.vary_each(values, {v: some(name, v, draw) for v in known}, list(told))
         for v, after in zip(known, rows, strict=True):
             if all(map(isfinite, before + after)):  # else values do not go together
                 for output, old, new in zip(told, before, after, strict=True):
@@ -90,7 +90,7 @@ def test_outputs_follow_at_the_start_what_the_dependencies_say_and_nothing_else(
 
 
 @EVERY_MODEL
-def test_no_output_follows_the_input_at_the_start_that_does_not_always(fmus, at_the_start, name):
+def test_initial_feedthrough_implies_permanent_feedthrough(fmus, at_the_start, name):
     """Two FMUs that are coupled by such outputs close no algebraic loop, then or ever."""
     entry = push(name)[0]
     always = followed(structure(fmus / f"{name}.fmu").findall("Outputs/Unknown"), list(declared(name)))
@@ -98,10 +98,10 @@ def test_no_output_follows_the_input_at_the_start_that_does_not_always(fmus, at_
 
 
 @EVERY_MODEL
-def test_fmi_3_says_the_same_and_of_the_driver_that_it_follows_its_speed(at_the_start, name):
+def test_fmi3_declares_the_same_and_the_driver_depends_on_its_speed(at_the_start, name):
     """The declared variables have the same places, which FMI 3.0 counts from 0."""
     names, told = list(declared(name)), {}
-    for unknown in structure(fmi3_hosts.built() / f"{name}.fmu").findall("InitialUnknown"):
+    for unknown in structure(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu").findall("InitialUnknown"):
         told[int(unknown.get("valueReference"))] = {names[int(i)] for i in unknown.get("dependencies").split()}
     expected = {names.index(v): known for v, known in at_the_start(name).items()}
     beside = {place: known for place, known in told.items() if place not in expected}
@@ -109,9 +109,9 @@ def test_fmi_3_says_the_same_and_of_the_driver_that_it_follows_its_speed(at_the_
     assert list(beside.values()) == [{"v_driver"}] * model_class(name).has_driver
 
 
-def test_what_shows_in_few_situations_only_is_told_too(tmp_path):
+def test_rare_dependencies_are_declared_too(tmp_path):
     """A stop beyond the start; a logarithm behind a condition that does not hold there."""
-    text = (ROOT / "tests" / "authored" / "bumper.py").read_text(encoding="utf-8")
+    text = (ROOT / "tests" / "example_models" / "bumper.py").read_text(encoding="utf-8")
     more = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
     (tmp_path / "bumper.py").write_text(text + more, encoding="utf-8")
     model = lowered_model(tmp_path / "bumper.py")

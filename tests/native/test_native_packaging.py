@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from struct import unpack_from
 
-import fmi3_hosts
+import fmi3_fixtures
 import pytest
 from commands import build
 from fmpy import read_model_description, simulate_fmu
@@ -18,8 +18,8 @@ from fmpy.build import build_platform_binary
 from fmpy.model_description import read_build_description
 from fmpy.validation import validate_fmu
 from models import MODELS, ROOT, model_class
-from native_fmus import built, everywhere
-from native_host import compiler, unpacked
+from native_fmus import build_for_all_platforms, build_native_fmus
+from native_host import compiler, unpack_cached
 
 from fmus.packaging import BuildError, native
 from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS, compile_and_link
@@ -37,19 +37,21 @@ SYSTEM = {
 @pytest.fixture(scope="module")
 def smd():
     """smd, with one method, for every platform, and what was printed."""
-    out = everywhere()
+    out = build_for_all_platforms()
     return out / "smd.fmu", out.with_suffix(".txt").read_text()
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_fmpy_finds_nothing_wrong(name):
-    assert validate_fmu(str(built() / f"{name}.fmu")) == []
+def test_fmpy_reports_no_problems(name):
+    assert validate_fmu(str(build_native_fmus() / f"{name}.fmu")) == []
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_the_description_is_that_of_the_python_fmu_but_for_sources_guid_and_model_exchange(fmus, name):
+def test_the_description_is_that_of_the_python_fmu_except_sources_guid_and_model_exchange(fmus, name):
     """States and derivatives, what follows from states, and the variables behind those declared."""
-    roots = [ET.fromstring(entries(folder / f"{name}.fmu")["modelDescription.xml"]) for folder in (fmus, built())]
+    roots = [
+        ET.fromstring(entries(folder / f"{name}.fmu")["modelDescription.xml"]) for folder in (fmus, build_native_fmus())
+    ]
     guids = [root.attrib.pop("guid") for root in roots]
     python, native = roots
     assert native.attrib.pop("numberOfEventIndicators") == str(2 * len(model_class(name).contacts))
@@ -76,11 +78,11 @@ def test_the_description_is_that_of_the_python_fmu_but_for_sources_guid_and_mode
 
 @pytest.mark.parametrize("name", MODELS)
 def test_fmpy_simulates_it_to_the_same_digits(fmus, name):
-    results = [simulate_fmu(str(folder / f"{name}.fmu")) for folder in (fmus, built())]
+    results = [simulate_fmu(str(folder / f"{name}.fmu")) for folder in (fmus, build_native_fmus())]
     assert results[0].tobytes() == results[1].tobytes()
 
 
-def test_what_is_in_the_file(smd):
+def test_the_archive_contents_are_complete(smd):
     fmu, printed = smd
     binaries = {f"binaries/{name}/smd{platform.suffix}" for name, platform in PLATFORMS.items()}
     assert {name for name in entries(fmu) if name.startswith("binaries/")} == binaries
@@ -94,23 +96,23 @@ def test_what_is_in_the_file(smd):
     assert printed == f"smd.fmu  {len(fmu.read_bytes()) / 1000:4.0f} kB  {digest[:16]}\n"
 
 
-def test_only_what_the_model_needs_is_compiled():
-    text = entries(built() / "smd.fmu")["sources/model.h"].decode()
+def test_only_required_code_is_compiled():
+    text = entries(build_native_fmus() / "smd.fmu")["sources/model.h"].decode()
     assert "Exact_overdamped" in text
     assert "DryFriction" not in text
-    text = entries(built() / "pacejka.fmu")["sources/model.h"].decode()
+    text = entries(build_native_fmus() / "pacejka.fmu")["sources/model.h"].decode()
     assert "Exact" not in text
 
 
-def test_methods_and_laws_can_be_chosen_as_for_the_python_fmu(tmp_path):
-    built()
+def test_methods_and_laws_can_be_selected_as_for_the_python_fmu(tmp_path):
+    build_native_fmus()
     chosen = ("stickslip", "--method", "exact", "--law", "hybrid", "--platform", "linux64")
     for folder, kind in (("python", ()), ("native", ("--native",))):
         done = build(*chosen, *kind, "--out", tmp_path / folder)
         assert done.returncode == 0, done.stderr
     lean = entries(tmp_path / "native" / "stickslip.fmu")
     text = lean["sources/model.h"].decode()
-    whole = entries(built() / "stickslip.fmu")["sources/model.h"].decode()
+    whole = entries(build_native_fmus() / "stickslip.fmu")["sources/model.h"].decode()
     others = ("Ode23_", "Ode45_", "Dop853_", "Rodas_")
     assert [name for name in others if name not in whole or name in text] == []
     assert b'name="ode45"' not in lean["modelDescription.xml"]
@@ -136,7 +138,7 @@ def binary(request, smd, lief):
     return request.param, content, parsed
 
 
-def test_every_binary_exports_fmi_and_nothing_else_needs_only_the_system(binary):
+def test_every_binary_exports_only_fmi_and_needs_only_the_system(binary):
     platform, _, libraries = binary
     assert len(libraries) == len(PLATFORMS[platform].targets)
     for place in range(len(libraries)):
@@ -153,17 +155,17 @@ def test_every_binary_exports_fmi_and_nothing_else_needs_only_the_system(binary)
 
 def functions():
     """The functions of FMI 2.0."""
-    text = (unpacked(built() / "smd.fmu") / "sources/fmi2Functions.h").read_text()
+    text = (unpack_cached(build_native_fmus() / "smd.fmu") / "sources/fmi2Functions.h").read_text()
     return {line.split()[-1].rstrip(";") for line in text.splitlines() if "FMI2_Export fmi2" in line}
 
 
-def test_no_binary_tells_where_it_was_built(binary):
+def test_no_binary_reveals_where_it_was_built(binary):
     _, content, _ = binary
     for place in (str(ROOT), os.path.expanduser("~"), "/tmp", "fmi2.c", "ziglang"):
         assert place.encode() not in content
 
 
-def test_macos_libraries_are_for_both_processors_and_the_signature_of_the_one_that_needs_it_holds(smd, lief):
+def test_macos_libraries_cover_both_processors_and_are_validly_signed(smd, lief):
     content = entries(smd[0])["binaries/darwin64/smd.dylib"]
     magic, count = unpack_from(">II", content)
     assert (magic, count) == (0xCAFEBABE, 2)
@@ -194,28 +196,30 @@ def check_signature(library, place):
 # ---- builds
 
 
-def test_without_a_platform_it_is_built_for_the_usual_three():
+def test_without_a_platform_the_usual_three_are_built():
     assert DEFAULT_PLATFORMS == ("linux64", "win64", "darwin64")
 
 
 @pytest.mark.parametrize("place", ["linux64", "x86_64-linux"])
-def test_fmpy_and_cmake_make_the_same_of_the_sources(tmp_path, place):
+def test_fmpy_and_cmake_compile_the_sources_to_the_same_results(tmp_path, place):
     """Of both versions of FMI, whose layers are the same for every model; of one a model without a contact."""
     pytest.importorskip("cmake", reason="fmpy compiles with CMake: pip install cmake")
-    fmu = built() / "stickslip.fmu" if place == "linux64" else fmi3_hosts.built() / "pacejka.fmu"
+    fmu = (
+        build_native_fmus() / "stickslip.fmu" if place == "linux64" else fmi3_fixtures.build_fmi3_fmus() / "pacejka.fmu"
+    )
     (tmp_path / "cmake").mkdir()
     same(fmu, place, tmp_path / "unpacked", lambda folder: build_platform_binary(folder, tmp_path / "cmake"))
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_any_compiler_makes_the_same_of_the_sources(tmp_path, name):
+def test_any_compiler_builds_the_sources_to_the_same_results(tmp_path, name):
     """By the system's, which is told nothing but what a library is."""
 
     def make(folder):
         command = [compiler(), "-shared", "-fPIC", "fmi2.c", "-o", f"../binaries/linux64/{name}.so", "-lm"]
         subprocess.run(command, cwd=folder / "sources", check=True)
 
-    same(built() / f"{name}.fmu", "linux64", tmp_path / "unpacked", make)
+    same(build_native_fmus() / f"{name}.fmu", "linux64", tmp_path / "unpacked", make)
 
 
 def same(fmu, place, folder, make):
@@ -234,7 +238,7 @@ def simulations(folder):
     return [simulate_fmu(str(folder), fmi_type=way).tobytes() for way in ("CoSimulation", "ModelExchange")]
 
 
-def test_the_build_description_names_the_file_that_its_description_names(smd):
+def test_the_build_description_names_the_existing_files(smd):
     fmu, _ = smd
     (configuration,) = read_build_description(fmu)
     assert configuration.modelIdentifier == "smd"
@@ -246,7 +250,7 @@ def test_the_build_description_names_the_file_that_its_description_names(smd):
 # ---- mistakes on the command line
 
 
-def test_a_mistake_is_told_in_one_sentence():
+def test_a_mistake_is_reported_in_one_sentence():
     for arguments, words in (
         (("--native", "--platform", "amiga"), "There is no platform 'amiga'; known are linux64, win64, darwin64"),
         (("--native", "unheard"), "There is no model 'unheard'"),
@@ -257,7 +261,7 @@ def test_a_mistake_is_told_in_one_sentence():
         assert "Traceback" not in done.stderr
 
 
-def test_without_a_compiler_it_says_what_to_install(tmp_path, monkeypatch):
+def test_a_missing_compiler_error_says_what_to_install(tmp_path, monkeypatch):
     """In an error that the command tells as it tells that of a platform."""
     monkeypatch.setitem(sys.modules, "ziglang", None)
     with pytest.raises(BuildError, match=r"pip install -e '\.\[native\]'"):
@@ -265,11 +269,11 @@ def test_without_a_compiler_it_says_what_to_install(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_files_of_c_travel_with_the_package():
+def test_the_c_files_are_part_of_the_package():
     assert all((Path(native.__file__).parent / file).is_file() for file in (*OWN_HEADERS, *MAIN_SOURCE.values()))
 
 
-def test_the_compiler_has_a_home_where_a_service_has_none_and_keeps_nothing_of_ours_there(monkeypatch):
+def test_the_compiler_cache_works_without_a_home_and_stays_clean(monkeypatch):
     told = {}
 
     def run(command, **options):

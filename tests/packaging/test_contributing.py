@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from builds import ROOT
+from build_cache import ROOT
 
 from fmus.packaging.model_lookup import model_names
 
@@ -52,7 +52,7 @@ PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("what", ["model", "law", "method", "command", "test"])
-def test_what_is_added_is_a_diff_of_one_file(what):
+def test_an_addition_is_a_diff_of_one_file(what):
     (part,) = (part for part in PAGE.split("\n## ") if part.startswith(f"A {what}\n"))
     assert len({name for kind, name, _ in BLOCK.findall(part) if kind != "sh"}) == 1
 

@@ -7,10 +7,10 @@ from math import inf
 from pathlib import Path
 
 import commands
-import driver
-import fmi3_hosts
+import fmi3_fixtures
 import fmpy
 import pytest
+import worker_client
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
@@ -26,7 +26,7 @@ from tests.packaging.test_packaging import (  # noqa: F401
     command,
     described,
     entries,
-    test_validation_finds_nothing,
+    test_validation_reports_no_problems,
 )
 
 SCHEMA = Path(fmpy.__file__).parent / "schema/fmi3"
@@ -40,7 +40,7 @@ PARAMETERS = {"coulomb": {"c": 0.7, "k": 1.0}, "pendulum": {"r": 0.5}}
 
 @pytest.fixture(scope="module")
 def fmu():
-    return lambda name: fmi3_hosts.built() / f"{name}.fmu"
+    return lambda name: fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu"
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def look(fmu, tmp_path_factory):
         ("nominals", "pacejka", "x_m", 1e-5)
     ]
     calls = [(function, fmu(name), *more) for function, name, *more in asked]
-    answers = driver.host("fmi3_look.py", "each", calls, folder=tmp_path_factory.mktemp("look"))
+    answers = worker_client.run_script("fmi3_inspection.py", "call_each", calls, folder=tmp_path_factory.mktemp("look"))
     return lambda *call: answers[asked.index(call)]
 
 
@@ -85,7 +85,7 @@ def test_one_fmu_offers_model_exchange_and_co_simulation(fmu, name):
 
 
 @EVERY_MODEL
-def test_the_declared_variables_keep_their_references_and_what_is_said_of_them(fmu, fmus, name):
+def test_declared_variables_keep_their_references_and_attributes(fmu, fmus, name):
     two = read_model_description(fmus / f"{name}.fmu").modelVariables
     three = [each for each in read_model_description(fmu(name)).modelVariables if each.alias is None]
     for variable, as_before in zip(three, two, strict=False):
@@ -98,7 +98,7 @@ def test_the_declared_variables_keep_their_references_and_what_is_said_of_them(f
     assert [variable.valueReference for variable in three] == list(range(len(three)))
 
 
-def test_an_alias_is_another_name_for_what_is_set(fmu, tmp_path):
+def test_an_alias_is_a_second_name_of_a_settable_variable(fmu, tmp_path):
     """It is in the XML, importers set it, and what a run tells of its parameters holds under both names."""
     sled = fmu("stickslip")
     (one,) = [each for each in read_model_description(sled).modelVariables if each.name == "mu_k"]
@@ -112,7 +112,7 @@ def test_an_alias_is_another_name_for_what_is_set(fmu, tmp_path):
 
 
 @EVERY_MODEL
-def test_every_number_has_a_unit_and_every_enumeration_its_items(fmu, name):
+def test_every_real_has_a_unit_and_every_enumeration_its_items(fmu, name):
     root = described(fmu(name))
     units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
     assert {element.get("unit") for element in root.iterfind("ModelVariables/Float64")} == units
@@ -125,20 +125,20 @@ def test_every_number_has_a_unit_and_every_enumeration_its_items(fmu, name):
 
 
 @EVERY_MODEL
-def test_every_derivative_names_its_state_and_stands_in_the_order_of_the_states(fmu, name):
+def test_derivatives_name_their_states_and_follow_the_order_of_the_states(fmu, name):
     description = read_model_description(fmu(name))
     rates = [unknown.variable for unknown in description.derivatives]
     outputs = [variable.name for variable in description.modelVariables if variable.causality == "output"]
-    driver = ["x_driver"] if name in DRIVEN else []
-    assert [rate.derivative.name for rate in rates] == [*outputs[:2], *driver]
-    assert [rate.name for rate in rates] == [*outputs[1:3], *(f"der({state})" for state in driver)]
+    worker_client = ["x_driver"] if name in DRIVEN else []
+    assert [rate.derivative.name for rate in rates] == [*outputs[:2], *worker_client]
+    assert [rate.name for rate in rates] == [*outputs[1:3], *(f"der({state})" for state in worker_client)]
     assert [variable for variable in description.modelVariables if variable.derivative] == sorted(
         rates, key=lambda rate: rate.valueReference
     )
 
 
 @EVERY_MODEL
-def test_the_structure_lists_all_unknowns_in_the_order_of_the_schema(fmu, name):
+def test_the_structure_lists_all_unknowns_in_schema_order(fmu, name):
     root = described(fmu(name))
     kinds = [element.tag for element in root.find("ModelStructure")]
     assert kinds == sorted(kinds, key=STRUCTURE.index)
@@ -148,7 +148,7 @@ def test_the_structure_lists_all_unknowns_in_the_order_of_the_schema(fmu, name):
 
 
 @EVERY_MODEL
-def test_only_the_speed_may_jump_and_only_where_friction_is_dry(fmu, name):
+def test_only_the_speed_may_jump_and_only_with_dry_friction(fmu, name):
     jumping = [element.get("name") for element in described(fmu(name)).findall("ModelVariables/*[@reinit='true']")]
     _, speed, *_ = [
         variable for variable, meaning in variables(find_model(name).model()) if meaning.causality == "output"
@@ -157,7 +157,7 @@ def test_only_the_speed_may_jump_and_only_where_friction_is_dry(fmu, name):
 
 
 @EVERY_MODEL
-def test_nominal_values_are_the_sizes_that_our_own_solver_takes(fmu, name):
+def test_nominal_values_are_the_error_scales_of_the_own_solver(fmu, name):
     model = model_exchange_instance(model_class(name))
     nominals = model.model_exchange.nominals
     model.prepare()
@@ -169,14 +169,14 @@ def test_nominal_values_are_the_sizes_that_our_own_solver_takes(fmu, name):
     assert nominals == sizes == [float(rate.derivative.nominal) for rate in rates]
 
 
-def test_a_finer_creep_makes_the_nominal_speed_smaller_and_the_event_tells(look):
+def test_a_finer_creep_lowers_the_nominal_speed_and_the_event_reports_it(look):
     usual, fine = [1e-3, 1e-3, 1e-3], [1e-3, 1e-5, 1e-3]
     told = look("nominals", "pacejka", "x_m", 1e-5)
     assert told == [[False, usual], [True, fine], [False, fine]]
 
 
 @EVERY_MODEL
-def test_what_follows_from_what_is_true(fmu, look, name):
+def test_declared_dependencies_are_true(fmu, look, name):
     """A nudge shows in nothing that is not said to follow; all that rates and indicators follow from shows, too."""
     root = described(fmu(name))
     told = {kind: structure(root, kind) for kind in ("Output", "ContinuousStateDerivative", "EventIndicator")}
@@ -193,7 +193,7 @@ def test_what_follows_from_what_is_true(fmu, look, name):
 
 
 @EVERY_MODEL
-def test_factors_are_told_where_they_are_known_and_are_the_same_at_every_point(fmu, look, name):
+def test_constant_factors_are_declared_and_are_constant(fmu, look, name):
     rates = structure(described(fmu(name)), "ContinuousStateDerivative")
     expected = {"smd": ["constant", "tunable tunable tunable"], "pacejka": ["constant", None, None]}
     assert [kinds for _, _, kinds in rates] == expected.get(name, [None] * len(rates))
@@ -205,7 +205,7 @@ def test_factors_are_told_where_they_are_known_and_are_the_same_at_every_point(f
 
 
 @EVERY_MODEL
-def test_an_instance_starts_with_the_values_of_the_xml_and_takes_others(fmu, look, name):
+def test_an_instance_starts_with_the_values_of_the_xml_and_accepts_others(fmu, look, name):
     told = look("variables", name)
     elements = described(fmu(name)).find("ModelVariables")
     starts = {e.get("name"): e.get("start") for e in elements if e.get("start") is not None}
@@ -223,7 +223,7 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_takes_others(fmu, loo
 
 
 @EVERY_MODEL
-def test_the_files_are_those_of_fmi_3(fmu, name):
+def test_the_files_are_those_of_fmi3(fmu, name):
     content = entries(fmu(name))
     assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
     certified = {"fmi-ls-manifest.xml", f"{name}_out.csv"}
@@ -244,7 +244,7 @@ def test_the_files_are_those_of_fmi_3(fmu, name):
 
 
 @EVERY_MODEL
-def test_the_flange_is_that_of_the_body_valid_and_drawn(fmu, name):
+def test_the_terminal_describes_the_body_and_is_valid_and_drawn(fmu, name):
     files = entries(fmu(name))
     content = files["terminalsAndIcons/terminalsAndIcons.xml"]
     schema = etree.XMLSchema(etree.parse(str(SCHEMA / "fmi3TerminalsAndIcons.xsd")))
@@ -261,7 +261,7 @@ def test_the_flange_is_that_of_the_body_valid_and_drawn(fmu, name):
 
 
 @EVERY_MODEL
-def test_the_page_shows_the_icon_where_it_is_and_tells_of_model_exchange(fmu, name):
+def test_the_page_shows_the_icon_and_describes_model_exchange(fmu, name):
     content, found = entries(fmu(name)), []
 
     class Reader(HTMLParser):
@@ -282,7 +282,7 @@ def test_the_page_shows_the_icon_where_it_is_and_tells_of_model_exchange(fmu, na
         (("--law", "sign"), 1, "smd has no friction law 'sign'; it has none to choose."),
     ],
 )
-def test_what_is_not_there_is_refused_in_one_sentence_and_nothing_is_built(arguments, status, sentence, tmp_path):
+def test_an_unavailable_option_is_refused_in_one_sentence_and_nothing_is_built(arguments, status, sentence, tmp_path):
     run = command("--fmi", "3", *arguments, "smd", "--out", tmp_path)
     assert (run.returncode, run.stdout) == (status, "")
     assert sentence is None or run.stderr == f"Error: {sentence}\n"
@@ -293,8 +293,8 @@ def test_what_is_not_there_is_refused_in_one_sentence_and_nothing_is_built(argum
     ("name", "gone"),
     [("stickslip", {"Exact", "Ode45", "Dop853", "Rodas"}), ("coulomb", {"Exact", "Ode45", "Dop853"})],
 )
-def test_a_lean_fmu_carries_what_it_offers_and_runs_both_ways(name, gone):
-    path = fmi3_hosts.lean(name)
+def test_a_reduced_fmu_carries_only_its_selection_and_runs_both_ways(name, gone):
+    path = fmi3_fixtures.build_reduced_fmu(name)
     assert validate_fmu(str(path)) == []
     text = entries(path)["sources/model.h"].decode()
     assert not [word for word in gone if f"struct {word}" in text]

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import pytest
-from builds import ROOT
+from build_cache import ROOT
 from commands import build as command
 from fmpy.validation import validate_fmu
 
@@ -100,12 +100,12 @@ def test_the_command_prints_name_size_import_time_and_digest_of_every_model(buil
 
 
 @EVERY_MODEL
-def test_validation_finds_nothing(fmu, name):
+def test_validation_reports_no_problems(fmu, name):
     assert validate_fmu(str(fmu(name))) == []
 
 
 @EVERY_MODEL
-def test_the_xml_says_what_is_declared(fmu, name):
+def test_the_xml_matches_the_declarations(fmu, name):
     scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
     for place, (scalar, (variable, meaning)) in enumerate(
         zip(scalars, variables(find_model(name).model()), strict=True)
@@ -124,7 +124,7 @@ def test_the_xml_says_what_is_declared(fmu, name):
 
 
 @EVERY_MODEL
-def test_every_real_has_a_unit_every_angle_is_shown_in_degrees(fmu, name):
+def test_every_real_has_a_unit_and_every_angle_is_displayed_in_degrees(fmu, name):
     root = described(fmu(name))
     shown = {unit.get("name"): unit.find("DisplayUnit") for unit in root.findall("UnitDefinitions/Unit")}
     for real in root.iterfind("ModelVariables/ScalarVariable/Real"):
@@ -162,7 +162,7 @@ def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name)
 
 
 @EVERY_MODEL
-def test_capabilities_and_experiment_are_those_of_the_contract(fmu, name):
+def test_capabilities_and_experiment_match_the_contract(fmu, name):
     root, model = described(fmu(name)), find_model(name).model
     able = root.find("CoSimulation").attrib
     assert able["modelIdentifier"] == root.get("modelName") == name
@@ -183,7 +183,7 @@ def probed(fmu, tmp_path_factory):
 
 
 @EVERY_MODEL
-def test_an_instance_starts_with_the_values_of_the_xml_and_loads_all_that_travels(fmu, name, probed):
+def test_an_instance_starts_with_the_values_of_the_xml_and_imports_every_packed_module(fmu, name, probed):
     told = probed[name]
     scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
     assert told["starts"] == {s.get("name"): s[0].get("start") for s in scalars if s[0].get("start") is not None}
@@ -193,7 +193,7 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_loads_all_that_travel
 
 
 @EVERY_MODEL
-def test_what_travels_needs_the_standard_library_only(fmu, name):
+def test_packed_code_needs_the_standard_library_only(fmu, name):
     for path, content in entries(fmu(name)).items():
         if path.count("/") > 1 and path.endswith(".py"):
             for node in ast.walk(ast.parse(content)):
@@ -203,7 +203,7 @@ def test_what_travels_needs_the_standard_library_only(fmu, name):
                 assert {module.split(".")[0] for module in modules} <= sys.stdlib_module_names, path
 
 
-def test_a_model_carries_no_method_or_mode_that_it_does_not_offer(fmu):
+def test_a_model_carries_no_unavailable_method_or_mode(fmu):
     assert "runtime/stick_slip.py" not in modules_of(fmu("smd")) | modules_of(fmu("pacejka"))
     assert "runtime/linear_closed_form.py" not in modules_of(fmu("pacejka")) | modules_of(fmu("pendulum"))
     assert modules_of(fmu("stickslip")) >= {"stickslip.py", "runtime/stick_slip.py", "runtime/linear_closed_form.py"}
@@ -220,20 +220,20 @@ def test_entry_script_and_package_carry_the_digest_of_their_content(fmu, name):
 
 
 @EVERY_MODEL
-def test_nothing_tells_where_it_was_built(fmu, name):
+def test_no_file_reveals_where_it_was_built(fmu, name):
     places = [str(place).encode() for place in (ROOT, fmu(name).parents[1], installed_package("pythonfmu"))]
     for path, content in entries(fmu(name)).items():
         assert not [place for place in places if place in content], path
 
 
 @EVERY_MODEL
-def test_both_licences_travel(fmu, name):
+def test_both_licences_are_packed(fmu, name):
     content = entries(fmu(name))
     assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
     assert b"NTNU" in content["documentation/licenses/pythonfmu.txt"]
 
 
-def test_the_source_date_changes_the_date_and_nothing_else(fmu, tmp_path):
+def test_the_source_date_changes_only_the_date(fmu, tmp_path):
     name, moment = model_names()[0], datetime(2024, 2, 29, 12, 30, 14, tzinfo=UTC)
     assert command(name, "--out", tmp_path, SOURCE_DATE_EPOCH=str(int(moment.timestamp()))).returncode == 0
     dated, plain = tmp_path / f"{name}.fmu", fmu(name)
@@ -245,7 +245,7 @@ def test_the_source_date_changes_the_date_and_nothing_else(fmu, tmp_path):
 
 
 @pytest.mark.parametrize("arguments", [("bogus",), ("smd", "bogus")])
-def test_an_unknown_name_is_refused_with_the_known_ones_before_anything_is_built(arguments, tmp_path):
+def test_an_unknown_name_is_refused_with_the_known_ones_before_any_build(arguments, tmp_path):
     run = command(*arguments, "--out", tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
     known = ", ".join(model_names())
@@ -253,7 +253,7 @@ def test_an_unknown_name_is_refused_with_the_known_ones_before_anything_is_built
     assert list(tmp_path.iterdir()) == []
 
 
-def test_two_models_of_one_name_are_refused_before_one_takes_the_place_of_the_other(tmp_path):
+def test_two_models_of_one_name_are_refused_before_any_build(tmp_path):
     for folder in ("one", "two"):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "smd.py").write_bytes((ROOT / "fmus/smd.py").read_bytes())
@@ -264,7 +264,7 @@ def test_two_models_of_one_name_are_refused_before_one_takes_the_place_of_the_ot
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_that_cannot_be_written_is_named_in_one_sentence(tmp_path):
+def test_an_unwritable_folder_is_named_in_one_sentence(tmp_path):
     (tmp_path / "file").write_text("")
     run = command("smd", "--out", tmp_path / "file")
     assert (run.returncode, run.stdout) == (1, "")
@@ -273,13 +273,13 @@ def test_a_folder_that_cannot_be_written_is_named_in_one_sentence(tmp_path):
 
 
 @pytest.mark.parametrize("epoch", ["yesterday", "-1", "1e9", "", "99999999999"])
-def test_a_bad_source_date_is_refused(epoch, tmp_path):
+def test_an_invalid_source_date_is_refused(epoch, tmp_path):
     run = command("smd", "--out", tmp_path, SOURCE_DATE_EPOCH=epoch)
     assert run.returncode == 1
     assert run.stderr == f"Error: SOURCE_DATE_EPOCH is {epoch!r}; allowed are whole seconds from 0 to 4354732800.\n"
 
 
-def test_without_pythonfmu_the_command_says_what_to_install(tmp_path):
+def test_a_missing_pythonfmu_error_says_what_to_install(tmp_path):
     hidden = "import runpy, sys; sys.modules['pythonfmu'] = None; runpy.run_path(sys.argv.pop(1), run_name='__main__')"
     call = [sys.executable, "-c", hidden, str(ROOT / "build_fmus.py"), "smd", "--out", str(tmp_path)]
     run = subprocess.run(call, capture_output=True, text=True, cwd=ROOT, timeout=60)
@@ -289,7 +289,7 @@ def test_without_pythonfmu_the_command_says_what_to_install(tmp_path):
     assert run.stderr.count("\n") == 1
 
 
-def test_a_failed_write_leaves_the_older_fmu_and_nothing_else(tmp_path, monkeypatch):
+def test_a_failed_write_leaves_the_previous_fmu_and_nothing_else(tmp_path, monkeypatch):
     older = tmp_path / "smd.fmu"
     older.write_bytes(b"older")
 
@@ -317,12 +317,12 @@ ODD = SimpleNamespace(name="odd", class_name="Odd")
         ("def late():\n    import math", "imports inside a block in line 2"),
     ],
 )
-def test_an_import_that_no_fmu_can_serve_stops_the_build(line, sentence, tmp_path):
+def test_an_import_that_no_fmu_can_provide_stops_the_build(line, sentence, tmp_path):
     with pytest.raises(BuildError, match=re.escape(f"odd.py {sentence}")):
         embedded_files(ODD, {"odd.py": line}, tmp_path)
 
 
-def test_imports_are_followed_through_packages_and_line_ends_do_not_matter(tmp_path):
+def test_imports_are_followed_through_packages_for_any_line_ends(tmp_path):
     (tmp_path / "runtime/deep").mkdir(parents=True)
     files = {
         "odd.py": b"from .runtime import helper\r\nfrom .runtime.deep.well import water\r\n",
@@ -364,7 +364,7 @@ def sketch(**declared):
     return describe(made, "sketch", "code", datetime(2024, 1, 1, tzinfo=UTC)).decode()
 
 
-def test_start_values_survive_the_xml_to_the_last_bit():
+def test_start_values_survive_the_xml_bit_for_bit():
     text = sketch(m=Parameter(0.1 + 0.2, "kg", "A sum <&> 'more'."))
     root = ElementTree.parse(BytesIO(text.encode())).getroot()
     assert root.find("ModelVariables/ScalarVariable/Real").get("start") == "0.30000000000000004"

@@ -7,10 +7,10 @@ from html.parser import HTMLParser
 from io import StringIO
 from xml.etree import ElementTree
 
-import fmi3_hosts
+import fmi3_fixtures
 import native_fmus
 import pytest
-from builds import ROOT
+from build_cache import ROOT
 from models import MODELS, declared, model_class, outputs
 
 from fmus.packaging.documentation_page import documentation_page, typeset
@@ -35,9 +35,9 @@ def content(fmus):
 
 
 @EVERY_MODEL
-def test_a_native_fmu_tells_the_same_and_the_ways_to_run_it(content, name):
+def test_a_native_fmu_has_the_same_page_and_states_how_to_run_it(content, name):
     told = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
-    native = entries(native_fmus.built() / f"{name}.fmu")
+    native = entries(native_fmus.build_native_fmus() / f"{name}.fmu")
     assert len(told) == 1 + (name in WITH["png"]) + 2 * (name in WITH["csv"])
     native[PAGE] = native[PAGE].replace(USAGE_NOTE.encode(), b"", 1)
     assert told == {path: native.get(path) for path in told}
@@ -61,11 +61,14 @@ TOLD = {  # by what a model description says it, where an attribute is not false
 }
 
 
-def test_what_each_kind_offers_is_true_and_stands_on_every_page_as_in_the_readme(content):
+def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_readme(content):
     """Of a model in closed form, which can all of it."""
     kinds = [
         content("stickslip"),
-        *(entries(built() / "stickslip.fmu") for built in (native_fmus.built, fmi3_hosts.built)),
+        *(
+            entries(built() / "stickslip.fmu")
+            for built in (native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus)
+        ),
     ]
     for files in kinds:
         (table,) = re.findall(r"<table class='offered'>.*?</table>", files[PAGE].decode())
@@ -118,7 +121,7 @@ class Reader(HTMLParser):
 
 
 @EVERY_MODEL
-def test_the_page_tells_every_variable_law_and_method(content, name):
+def test_the_page_lists_every_variable_law_and_method(content, name):
     reader = Reader(content(name)[PAGE].decode())
     assert reader.open == []
     for variable, d in declared(name).items():
@@ -133,7 +136,7 @@ def test_the_page_tells_every_variable_law_and_method(content, name):
 
 
 @EVERY_MODEL
-def test_the_page_needs_nothing_but_what_the_fmu_carries(content, name):
+def test_the_page_is_self_contained(content, name):
     carried = content(name)
     text = carried[PAGE].decode()
     assert "http" not in text.lower()
@@ -152,7 +155,7 @@ def test_the_icon_is_a_square_picture_of_some_size(content, name):
 
 
 @pytest.mark.parametrize("name", WITH["csv"])
-def test_the_manifest_names_the_certified_result_and_where_it_comes_from(content, name):
+def test_the_manifest_names_the_certified_result_and_its_origin(content, name):
     carried = content(name)
     root = ElementTree.fromstring(carried[f"{EXTRA}fmi-ls-manifest.xml"])
     assert root.tag == "fmiReferences"
@@ -165,7 +168,7 @@ def test_the_manifest_names_the_certified_result_and_where_it_comes_from(content
 
 
 @pytest.mark.parametrize("name", WITH["csv"])
-def test_the_fmu_reproduces_the_result_that_it_carries(content, launch, name):
+def test_the_fmu_reproduces_its_certified_result(content, launch, name):
     """Position and speed of the default run: the share of the largest that the contract allows."""
     text = content(name)[f"{EXTRA}{name}_out.csv"].decode()
     heads, *rows = csv.reader(StringIO(text))
@@ -180,14 +183,14 @@ def test_the_fmu_reproduces_the_result_that_it_carries(content, launch, name):
         assert max(abs(a - b) for a, b in zip(column, expected, strict=True)) <= allowed * largest
 
 
-def test_a_model_without_a_certified_result_has_a_page_all_the_same():
+def test_a_model_without_a_certified_result_has_a_page():
     model = model_class("smd")
     reader = Reader(documentation_page(model, "sixth", declared_variables(model), None, "model.png", "").decode())
     assert "Default run" not in reader.headings
     assert "sixth" in reader.text
 
 
-def test_names_are_set_as_people_write_them_and_nothing_becomes_markup():
+def test_names_are_typeset_and_escaped():
     assert typeset("a < b & mu_s^2 - k x") == "a &lt; b &amp; &mu;<sub>s</sub><sup>2</sup> &minus; k x"
 
 
@@ -208,4 +211,4 @@ def test_no_page_is_wider_than_the_window(content, name, tmp_path, browser):
     for width in (360, 1200):
         browser.size(width)
         assert browser.run("document.documentElement.scrollWidth") <= width
-    assert browser.said == []
+    assert browser.console == []

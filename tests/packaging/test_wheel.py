@@ -11,7 +11,7 @@ from zipfile import ZipFile
 import numpy
 import pytest
 from models import ROOT
-from native_fmus import everywhere
+from native_fmus import build_for_all_platforms
 
 from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS
 from tests.packaging.test_packaging import entries
@@ -73,7 +73,7 @@ def content(place):
     return {path: sha256(path.read_bytes()).digest() for path in place.rglob("*") if path.is_file()}
 
 
-def test_the_wheel_holds_the_sources_and_their_data_and_no_fmu(wheel):
+def test_the_wheel_holds_sources_and_data_and_no_fmu(wheel):
     with ZipFile(wheel) as archive:
         found = {path for path in archive.namelist() if ".dist-info/" not in path}
     folders = [path for part in ("fmus", "harness") for path in (ROOT / part).rglob("*") if path.is_file()]
@@ -81,13 +81,13 @@ def test_the_wheel_holds_the_sources_and_their_data_and_no_fmu(wheel):
     assert found == {"build_fmus.py", *kept}
 
 
-def test_the_licence_travels_in_the_wheel(wheel):
+def test_the_licence_is_in_the_wheel(wheel):
     with ZipFile(wheel) as archive:
         (carried,) = [path for path in archive.namelist() if Path(path).name == "LICENSE"]
         assert archive.read(carried) == (ROOT / "LICENSE").read_bytes()
 
 
-def test_it_builds_byte_for_byte_what_the_sources_build_and_runs_it_in_an_empty_folder(run, fmus, tmp_path):
+def test_it_builds_the_same_bytes_as_the_sources_and_runs_them_in_an_empty_folder(run, fmus, tmp_path):
     """From files of another place and time; a model without a contact and one with one."""
     printed = run("build_fmus pacejka stickslip", PYTHONHASHSEED="7", TZ="Pacific/Auckland")
     assert [line.split()[0] for line in printed.splitlines()] == ["pacejka.fmu", "stickslip.fmu"]
@@ -98,10 +98,10 @@ def test_it_builds_byte_for_byte_what_the_sources_build_and_runs_it_in_an_empty_
     assert (tmp_path / "results" / "stickslip" / "trajectory.csv").is_file()
 
 
-def test_it_freezes_to_c_as_the_sources_do_with_another_cache_and_at_a_date_but_for_the_date(run, tmp_path):
+def test_native_builds_differ_from_those_of_the_sources_only_in_the_date(run, tmp_path):
     """For the usual platforms.  The date reaches the description and the zip only; what the compiler brings, as the
     stubs of the C libraries, is not made anew, which takes long."""
-    there = entries(everywhere() / "smd.fmu")
+    there = entries(build_for_all_platforms() / "smd.fmu")
     run("build_fmus --native smd --method exact", ZIG_LOCAL_CACHE_DIR=tmp_path / "own", SOURCE_DATE_EPOCH="1700000000")
     again = entries(tmp_path / "fmus" / "native" / "smd.fmu")
     assert {f"binaries/{platform}/smd{PLATFORMS[platform].suffix}" for platform in DEFAULT_PLATFORMS} <= set(again)

@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 from itertools import groupby
 
 import pytest
-from builds import published
+from build_cache import run_published_cases
 from commands import harness
 
 EMPTY = {"meta", "link", "img", "br"}
@@ -18,7 +18,7 @@ def made(fmus, tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
     (folder / "fmus").symlink_to(fmus)
     for scene in ("coulomb", "coulomb-sign"):
-        shutil.copytree(published() / "results" / scene, folder / "results" / scene)
+        shutil.copytree(run_published_cases() / "results" / scene, folder / "results" / scene)
     for command in (
         ("decay", "coulomb"),
         ("compare", "results/coulomb", "results/coulomb-sign"),
@@ -53,7 +53,7 @@ class Tags(HTMLParser):
         return [attributes for name, attributes in self.found if name == tag]
 
 
-def test_what_is_there_is_shown_and_what_is_not_is_named_with_its_command(made, page):
+def test_existing_results_are_shown_and_missing_ones_listed_with_their_command(made, page):
     done = made[1]
     assert (done.returncode, done.stderr) == (0, "")
     assert "Missing: smd; make it with `python -m harness run smd`" in done.stdout
@@ -64,7 +64,7 @@ def test_what_is_there_is_shown_and_what_is_not_is_named_with_its_command(made, 
     assert "Best described by dry friction" in page
 
 
-def test_every_picture_has_its_text_and_nothing_comes_from_elsewhere(page):
+def test_every_picture_has_alternative_text_and_nothing_is_loaded_from_elsewhere(page):
     tags = Tags(page)
     pictures = tags.of("img")
     assert len(pictures) == 4
@@ -76,7 +76,7 @@ def test_every_picture_has_its_text_and_nothing_comes_from_elsewhere(page):
     assert tags.of("script") == []
 
 
-def test_every_link_leads_to_a_place_of_the_page_or_to_a_file_beside_it(made, page):
+def test_every_link_leads_to_an_existing_anchor_or_file(made, page):
     tags = Tags(page)
     places = {attributes.get("id") for _, attributes in tags.found}
     links = {link["href"] for link in tags.of("a")}
@@ -86,7 +86,7 @@ def test_every_link_leads_to_a_place_of_the_page_or_to_a_file_beside_it(made, pa
     assert all((made[0] / "results" / file).is_file() for file in files)
 
 
-def test_text_from_results_is_text(made):
+def test_text_from_results_is_escaped(made):
     """A name with mark-up in it stays a name."""
     folder = made[0] / "results/decay/coulomb"
     kept = (folder / "decay.json").read_text()
@@ -105,18 +105,18 @@ def test_without_results_there_is_no_report(tmp_path):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_a_browser_shows_it_without_complaint_and_without_scrolling_sideways(made, browser, dark):
+def test_a_browser_shows_it_without_errors_or_horizontal_scrolling(made, browser, dark):
     browser.dark(dark)
     browser.open((made[0] / "results/report.html").as_uri())
     for width in (360, 1200):
         browser.size(width)
         assert browser.run("document.documentElement.scrollWidth") <= width
         assert browser.run("[...document.images].filter(i => i.naturalWidth && i.width <= innerWidth).length") == 4
-    assert browser.said == []
+    assert browser.console == []
     assert browser.pdf().startswith(b"%PDF")
 
 
-def test_it_begins_with_a_picture_of_the_motion_that_was_computed(made, page):
+def test_it_begins_with_a_plot_of_the_computed_motion(made, page):
     """The first drawing of the page is the position over time: it has as many turning points."""
     first = re.search(r'<svg viewBox="0 0 (\d+) (\d+)".*?<polyline points="([^"]+)"', page, re.S)
     points = [tuple(map(float, pair.split(","))) for pair in first[3].split()]
@@ -127,7 +127,7 @@ def test_it_begins_with_a_picture_of_the_motion_that_was_computed(made, page):
     assert turns == 15  # of the 16 half swings
 
 
-def test_a_figure_is_as_light_or_dark_as_the_screen_and_its_letters_are_letters(made, browser):
+def test_figures_follow_the_colour_scheme_and_keep_text_as_text(made, browser):
     """The ground, an axis and a text of the file itself, on a light screen and on a dark one."""
     look = "[...document.querySelectorAll('#patch_1 path, text')].slice(0, 2).map(e => getComputedStyle(e).fill)"
     seen = []
@@ -140,7 +140,7 @@ def test_a_figure_is_as_light_or_dark_as_the_screen_and_its_letters_are_letters(
     assert "position of the mass" in (made[0] / "results/coulomb/figure.svg").read_text(encoding="utf-8")
 
 
-def test_where_the_page_that_runs_has_been_built_the_report_carries_it_and_every_picture_leads_to_it(tmp_path, made):
+def test_an_existing_interactive_page_is_included_and_every_picture_links_to_it(tmp_path, made):
     shutil.copytree(made[0] / "results", tmp_path / "results")
     (tmp_path / "fmus/web").mkdir(parents=True)
     bench = '<!doctype html><title>it\'s "here" &amp; <b></title><script>"x"</script>'

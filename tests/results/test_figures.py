@@ -17,7 +17,7 @@ def drawn(path, **style):
     return path.read_text(encoding="utf-8")
 
 
-def test_whatever_a_name_holds_the_file_is_xml_and_says_what_can_be_said(tmp_path):
+def test_any_name_gives_valid_xml_with_readable_text(tmp_path):
     root = fromstring(drawn(tmp_path / "a.svg"))
     assert "a<b & \ufffd\ufffd\ufffd\ufffd $x_" in [each.text for each in root.iter("{http://www.w3.org/2000/svg}text")]
 
@@ -29,7 +29,7 @@ def test_very_many_points_make_a_file_of_hundreds_of_kilobytes_at_most(tmp_path)
     assert drawn(tmp_path / "c.svg") == line
 
 
-def test_a_name_that_is_longer_than_its_panel_goes_on_in_the_next_line(tmp_path):
+def test_a_name_longer_than_its_panel_is_wrapped(tmp_path):
     """As of a model in Modelica: without a blank, and told from the next by its end alone."""
     name = "mechanics.axis1.bearing.friction.plate[12].frame_a.angular_acceleration_of_the_inner_ring.relative.x[{}]"
     with open_figure(tmp_path / "a.svg", 5.0, 6.0) as figure:

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from builds import ROOT
+from build_cache import ROOT
 
 from harness.errors import HarnessError
 from harness.results import folder as folders
@@ -28,7 +28,7 @@ def older(tmp_path):
     return folder
 
 
-def test_a_new_result_takes_the_place_of_the_old_one(older):
+def test_a_new_result_replaces_the_previous_one(older):
     with replace_folder(older, OURS) as fresh:
         (fresh / "b.csv").write_text("new")
         assert contents(older) == {"a.csv": "old"}
@@ -37,7 +37,7 @@ def test_a_new_result_takes_the_place_of_the_old_one(older):
 
 
 @pytest.mark.parametrize("reason", [HarnessError("no"), KeyboardInterrupt()])
-def test_what_fails_half_way_leaves_the_old_result_and_nothing_else(older, reason):
+def test_a_failure_half_way_keeps_the_previous_result_and_leaves_nothing_else(older, reason):
     def fail():
         with replace_folder(older, OURS) as fresh:
             (fresh / "b.csv").write_text("half")
@@ -49,7 +49,7 @@ def test_what_fails_half_way_leaves_the_old_result_and_nothing_else(older, reaso
     assert list(older.parent.iterdir()) == [older]
 
 
-def test_what_fails_leaves_no_folder_that_was_made_for_it(older):
+def test_a_failure_leaves_no_folder_created_for_it(older):
     def fail():
         with replace_folder(older.parent / "new/place/case", OURS):
             raise HarnessError("no")
@@ -66,7 +66,7 @@ def test_a_folder_with_other_files_is_not_replaced(older):
     assert contents(older) == {"a.csv": "old", "notes.txt": "mine"}
 
 
-def test_a_file_in_the_way_is_told(tmp_path):
+def test_a_file_in_the_way_is_reported(tmp_path):
     (tmp_path / "results").write_text("a file")
     with pytest.raises(HarnessError, match="cannot write below"), replace_folder(tmp_path / "results/case", OURS):
         pass
@@ -80,14 +80,14 @@ def steps(request, monkeypatch):
     return request.param
 
 
-def test_whichever_way_folders_are_exchanged_nothing_is_left_beside(older, steps):
+def test_no_exchange_method_leaves_a_folder_behind(older, steps):
     with replace_folder(older, OURS) as fresh:
         (fresh / "b.csv").write_text("new")
     assert contents(older) == {"b.csv": "new"}
     assert list(older.parent.iterdir()) == [older]
 
 
-def test_an_exchange_that_fails_half_way_leaves_the_old_result(older, monkeypatch):
+def test_an_exchange_that_fails_half_way_keeps_the_previous_result(older, monkeypatch):
     monkeypatch.setattr(folders, "exchange_folders", lambda one, two: False)
     rename = Path.rename
 
@@ -148,7 +148,7 @@ print(json.dumps(seen))
 
 
 @pytest.mark.parametrize("steps", ["one", "two"])
-def test_a_kill_at_any_moment_leaves_the_old_result_or_the_new_one_to_be_found(older, steps):
+def test_a_kill_at_any_moment_keeps_the_previous_or_the_new_result(older, steps):
     """Before and after every call of the system, from the end of the writing on; the next run clears what was left."""
     command = [sys.executable, "-c", KILLED, str(older), steps]
     seen = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True, timeout=120).stdout)
@@ -163,7 +163,7 @@ def test_a_kill_at_any_moment_leaves_the_old_result_or_the_new_one_to_be_found(o
     assert ([] in [at_once for at_once, _, _ in seen]) == (steps == "two")
 
 
-def test_what_a_killed_run_left_is_removed_but_neither_another_ones_nor_what_is_not_ours(older):
+def test_leftovers_of_a_killed_run_are_removed_but_no_other_files(older):
     beside = [older.with_name(name) for name in (".case-abcdefgh.new", ".case-abcdefgi.old", ".case-sign-abcdefgh.new")]
     foreign = older.with_name(".case-abcdefgk.new")
     for folder in (*beside, foreign):
@@ -181,7 +181,7 @@ def test_what_a_killed_run_left_is_removed_but_neither_another_ones_nor_what_is_
 
 
 @pytest.mark.parametrize("target", ["elsewhere", "nowhere"])
-def test_a_result_folder_that_is_a_link_is_refused_and_stays(tmp_path, target):
+def test_a_result_folder_that_is_a_link_is_refused_and_kept(tmp_path, target):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "case").symlink_to(tmp_path / target)
     with pytest.raises(HarnessError, match="case is a link"), replace_folder(tmp_path / "case", OURS):
@@ -190,14 +190,14 @@ def test_a_result_folder_that_is_a_link_is_refused_and_stays(tmp_path, target):
     assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
-def test_a_result_folder_that_is_a_file_is_refused_and_stays(tmp_path):
+def test_a_result_folder_that_is_a_file_is_refused_and_kept(tmp_path):
     (tmp_path / "case").write_text("mine")
     with pytest.raises(HarnessError, match="case holds a file of that name"), replace_folder(tmp_path / "case", OURS):
         pass
     assert (tmp_path / "case").read_text() == "mine"
 
 
-def test_a_full_disk_is_told_and_the_old_result_stays(older):
+def test_a_full_disk_is_reported_and_the_previous_result_kept(older):
     def fill():
         with replace_folder(older, OURS) as fresh:
             (fresh / "b.csv").write_text("half")

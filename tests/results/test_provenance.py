@@ -10,7 +10,7 @@ from hashlib import sha256
 import commands
 import numpy as np
 import pytest
-from builds import published
+from build_cache import run_published_cases
 from commands import UNPLOTTED
 from fmpy import read_model_description
 from models import MODELS
@@ -29,7 +29,7 @@ harness = partial(commands.harness, blank=UNPLOTTED)  # each of these is plotted
 
 
 @pytest.fixture
-def here(fmus, tmp_path):
+def workspace(fmus, tmp_path):
     """A folder with the built FMUs."""
     (tmp_path / "fmus").symlink_to(fmus)
     return tmp_path
@@ -38,39 +38,39 @@ def here(fmus, tmp_path):
 @pytest.fixture(scope="module", params=COMMANDS)
 def made(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""
-    here, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]
-    (here / "fmus").symlink_to(fmus)
-    done = commands.harness(here, *arguments, blank=folder != DRAWN and UNPLOTTED)
+    workspace, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]
+    (workspace / "fmus").symlink_to(fmus)
+    done = commands.harness(workspace, *arguments, blank=folder != DRAWN and UNPLOTTED)
     assert (done.returncode, done.stderr) == (0, "")
-    return here, arguments, here / "results" / folder
+    return workspace, arguments, workspace / "results" / folder
 
 
 @pytest.fixture(scope="module")
-def swung(place):
+def swung(user_folder):
     """A folder in which the first scene was run."""
-    assert harness(place, "run", "smd").returncode == 0
-    return place
+    assert harness(user_folder, "run", "smd").returncode == 0
+    return user_folder
 
 
 def told(folder):
     return json.loads((folder / "provenance.json").read_text())
 
 
-def test_a_result_names_its_files_by_digest_and_the_versions_that_made_it(made):
-    here, arguments, folder = made
+def test_a_result_records_the_digests_of_its_files_and_all_versions(made):
+    workspace, arguments, folder = made
     found = told(folder)
     assert found["command"] == " ".join(("python -m harness", *arguments))
     assert {"python", "friction-fmus", "fmpy", "numpy"} <= set(found["versions"])
     assert found["files"]
     for file, digest in found["files"].items():
-        assert digest == sha256((here / file).read_bytes()).hexdigest()
+        assert digest == sha256((workspace / file).read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_every_parameter_in_force_is_told_with_its_unit(here, model):
-    assert harness(here, "run", "--fmu", f"fmus/{model}.fmu", "--set", "m=1.5", "--stop", "0.5").returncode == 0
-    found = told(here / "results" / model)["parameters"]
-    variables = read_model_description(str(here / f"fmus/{model}.fmu")).modelVariables
+def test_every_effective_parameter_is_recorded_with_its_unit(workspace, model):
+    assert harness(workspace, "run", "--fmu", f"fmus/{model}.fmu", "--set", "m=1.5", "--stop", "0.5").returncode == 0
+    found = told(workspace / "results" / model)["parameters"]
+    variables = read_model_description(str(workspace / f"fmus/{model}.fmu")).modelVariables
     parameters = [each for each in variables if each.causality == "parameter"]
     assert set(found) == {each.name for each in parameters}
     for each in parameters:
@@ -79,23 +79,23 @@ def test_every_parameter_in_force_is_told_with_its_unit(here, model):
     assert found["m"] == {"value": 1.5, "unit": "kg"}
 
 
-def test_a_comparison_tells_the_parameters_of_both_sides(here):
-    assert harness(here, "compare", "fmus/smd.fmu", "smd").returncode == 0
-    found = told(here / "results/compare/fmus-smd-scene-smd")["parameters"]
+def test_a_comparison_records_the_parameters_of_both_sides(workspace):
+    assert harness(workspace, "compare", "fmus/smd.fmu", "smd").returncode == 0
+    found = told(workspace / "results/compare/fmus-smd-scene-smd")["parameters"]
     assert found["one: c"] == found["two: c"] == {"value": 2.0, "unit": "N.s/m"}
 
 
-def test_the_scene_is_kept_as_it_was_run(here):
-    (here / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\n[values]\nc = 3.0\n')
-    assert harness(here, "run", "mine.toml").returncode == 0
-    scene = told(here / "results/mine")["scene"]
+def test_the_scene_is_stored_as_it_was_run(workspace):
+    (workspace / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\n[values]\nc = 3.0\n')
+    assert harness(workspace, "run", "mine.toml").returncode == 0
+    scene = told(workspace / "results/mine")["scene"]
     assert (scene["name"], scene["title"], scene["outputs"], scene["values"]) == ("mine", "a title", ["x"], {"c": 3.0})
-    with (here / "results/mine/trajectory.csv").open() as file:
+    with (workspace / "results/mine/trajectory.csv").open() as file:
         times = [float(row[0]) for row in list(csv.reader(file))[1:]]
     assert (scene["start"], scene["stop"]) == (times[0], times[-1])
 
 
-def test_the_report_says_what_its_results_were_made_from(swung):
+def test_the_report_shows_the_provenance_of_its_results(swung):
     assert harness(swung, "report").returncode == 0
     page = (swung / "results/report.html").read_text()
     digest = sha256((swung / "fmus/smd.fmu").read_bytes()).hexdigest()
@@ -103,27 +103,27 @@ def test_the_report_says_what_its_results_were_made_from(swung):
     assert "k = 157.9 N/m" in page
 
 
-def test_the_report_shows_whatever_was_run(here):
+def test_the_report_shows_every_run(workspace):
     """Each FMU and each scene of one's own, by its first and last values where nothing else was asked."""
-    (here / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = ["position"]\n')
+    (workspace / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = ["position"]\n')
     for arguments in (("--fmu", "fmus/pacejka.fmu"), ("mine.toml",)):
-        assert harness(here, "run", *arguments).returncode == 0
-    assert harness(here, "report").returncode == 0
-    page = (here / "results/report.html").read_text()
+        assert harness(workspace, "run", *arguments).returncode == 0
+    assert harness(workspace, "report").returncode == 0
+    page = (workspace / "results/report.html").read_text()
     assert "Other runs" in page
     assert all(f"<h3>{name}</h3>" in page for name in ("pacejka", "mine"))
     assert re.search(r"<td[^>]*>x \[m\]</td>\s*<td[^>]*>0.1</td>", page)
     assert "mine: the plots that its scene names" in page
 
 
-def test_a_damaged_account_is_told_in_the_page(here, swung):
+def test_a_damaged_provenance_file_is_reported_in_the_page(workspace, swung):
     damaged = ("", "[]", "{}", '{"files": 1}', '{"files": {}, "versions": {}}')
     for model, content in zip(MODELS, damaged, strict=True):
-        shutil.copytree(swung / "results/smd", here / "results" / model)
-        (here / "results" / model / "provenance.json").write_text(content)
-    done = harness(here, "report")
+        shutil.copytree(swung / "results/smd", workspace / "results" / model)
+        (workspace / "results" / model / "provenance.json").write_text(content)
+    done = harness(workspace, "report")
     assert (done.returncode, done.stderr) == (0, "")
-    page = (here / "results/report.html").read_text()
+    page = (workspace / "results/report.html").read_text()
     assert [model for model in MODELS if f"results/{model} cannot be shown" not in page] == []
 
 
@@ -136,54 +136,56 @@ def files(folder):
     }
 
 
-def test_a_result_is_made_again_by_its_folder_and_to_the_last_bit(made):
-    here, (command, *_), folder = made
+def test_a_result_is_reproduced_from_its_folder_bit_for_bit(made):
+    workspace, (command, *_), folder = made
     before, account = files(folder), told(folder)
-    done = commands.harness(here, "run", folder.relative_to(here), blank=not folder.match(DRAWN) and UNPLOTTED)
+    done = commands.harness(
+        workspace, "run", folder.relative_to(workspace), blank=not folder.match(DRAWN) and UNPLOTTED
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == before
     for key in ("files", "parameters", "scene", "source"):
         assert told(folder)[key] == account[key]
     if command == "run":
         assert "the same, bit for bit" in done.stdout
-        assert harness(here, "run", folder.relative_to(here), "--quiet").returncode == 0  # and again
+        assert harness(workspace, "run", folder.relative_to(workspace), "--quiet").returncode == 0  # and again
 
 
 @pytest.mark.parametrize(
     "scene", [path.stem for path in shipped_scenes() if path.stem not in ("coulomb", "pacejka-0.001")]
 )
-def test_every_shipped_scene_is_run_again_to_the_last_bit(here, scene):
-    shutil.copytree(published() / "results" / scene, here / "results" / scene)
-    assert "the same, bit for bit" in harness(here, "run", f"results/{scene}").stdout
+def test_every_shipped_scene_is_reproduced_bit_for_bit(workspace, scene):
+    shutil.copytree(run_published_cases() / "results" / scene, workspace / "results" / scene)
+    assert "the same, bit for bit" in harness(workspace, "run", f"results/{scene}").stdout
 
 
 MINE = 'title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = []\nstop = 1.0\ngrid = 0.1\n[values]\nc = 3.0\n'
 
 
-def test_a_result_is_made_again_though_its_scene_is_gone_and_goes_where_it_is_wanted(here):
-    (here / "mine.toml").write_text(MINE)
-    assert harness(here, "run", "mine.toml", "--out", "there").returncode == 0
-    before = files(here / "there/mine")
-    (here / "mine.toml").unlink()
+def test_a_result_is_reproduced_without_its_scene_and_into_any_folder(workspace):
+    (workspace / "mine.toml").write_text(MINE)
+    assert harness(workspace, "run", "mine.toml", "--out", "there").returncode == 0
+    before = files(workspace / "there/mine")
+    (workspace / "mine.toml").unlink()
     for out in ((), ("--out", "elsewhere")):
-        assert harness(here, "run", "there/mine", *out).returncode == 0
-    assert files(here / "there/mine") == files(here / "elsewhere/mine") == before
-    assert sorted(path.name for path in here.iterdir()) == ["elsewhere", "fmus", "there"]
+        assert harness(workspace, "run", "there/mine", *out).returncode == 0
+    assert files(workspace / "there/mine") == files(workspace / "elsewhere/mine") == before
+    assert sorted(path.name for path in workspace.iterdir()) == ["elsewhere", "fmus", "there"]
 
 
-def test_a_result_whose_fmu_has_changed_or_gone_is_not_made_again_as_if_it_were_the_same(here, fmus):
-    shutil.copy(fmus / "smd.fmu", here / "mine.fmu")
-    (here / "mine.toml").write_text(MINE.replace('model = "smd"', 'fmu = "mine.fmu"'))
-    assert harness(here, "run", "mine.toml").returncode == 0
-    before = files(here / "results/mine")
-    shutil.copy(fmus / "coulomb.fmu", here / "mine.fmu")
-    done = harness(here, "run", "results/mine")
+def test_a_result_whose_fmu_changed_or_vanished_is_not_reproduced(workspace, fmus):
+    shutil.copy(fmus / "smd.fmu", workspace / "mine.fmu")
+    (workspace / "mine.toml").write_text(MINE.replace('model = "smd"', 'fmu = "mine.fmu"'))
+    assert harness(workspace, "run", "mine.toml").returncode == 0
+    before = files(workspace / "results/mine")
+    shutil.copy(fmus / "coulomb.fmu", workspace / "mine.fmu")
+    done = harness(workspace, "run", "results/mine")
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert "mine.fmu has changed since this was made from it" in done.stderr
     assert "`python -m harness run mine.toml`" in done.stderr
-    (here / "mine.fmu").unlink()
-    assert "mine.fmu, from which this was made, is not here" in harness(here, "run", "results/mine").stderr
-    assert files(here / "results/mine") == before
+    (workspace / "mine.fmu").unlink()
+    assert "mine.fmu, from which this was made, is not here" in harness(workspace, "run", "results/mine").stderr
+    assert files(workspace / "results/mine") == before
 
 
 def swinging(file):
@@ -208,31 +210,31 @@ ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
         (("sweep", "a/smd.fmu", *ONCE), ("sweep", "b/smd.fmu", *ONCE), "sweep/c"),
     ],
 )
-def test_a_result_of_something_else_is_replaced_only_by_the_word_for_it(here, fmus, first, second, folder):
-    for place in ("a", "b", "b/a"):
-        (here / place).mkdir()
-        (here / place / "mine.toml").write_text(MINE)
-        shutil.copy(fmus / "smd.fmu", here / place)
-    swinging(here / "a/coulomb.csv")
-    assert harness(here, *first).returncode == 0
-    before = files(here / "results" / folder)
-    done = harness(here, *second)
+def test_a_result_of_another_scene_is_replaced_only_with_overwrite(workspace, fmus, first, second, folder):
+    for user_folder in ("a", "b", "b/a"):
+        (workspace / user_folder).mkdir()
+        (workspace / user_folder / "mine.toml").write_text(MINE)
+        shutil.copy(fmus / "smd.fmu", workspace / user_folder)
+    swinging(workspace / "a/coulomb.csv")
+    assert harness(workspace, *first).returncode == 0
+    before = files(workspace / "results" / folder)
+    done = harness(workspace, *second)
     assert (done.returncode, done.stderr.count("\n"), done.stdout) == (1, 1, "")
     assert f"results/{folder} holds the result of `python -m harness {' '.join(first)}`" in done.stderr
     assert "name another --out, or replace it with --overwrite" in done.stderr
-    assert files(here / "results" / folder) == before
-    source = told(here / "results" / folder)["source"]
-    assert harness(here, *second, "--overwrite").returncode == 0
-    now = told(here / "results" / folder)
+    assert files(workspace / "results" / folder) == before
+    source = told(workspace / "results" / folder)["source"]
+    assert harness(workspace, *second, "--overwrite").returncode == 0
+    now = told(workspace / "results" / folder)
     assert now["command"] == " ".join(("python -m harness", *second, "--overwrite"))
     assert now["source"] != source
 
 
-def test_a_result_of_other_values_is_not_replaced_in_silence(here):
-    (here / "mine.toml").write_text(MINE)
-    assert "place" not in harness(here, "run", "mine.toml").stdout
-    (here / "mine.toml").write_text(MINE.replace("3.0", "4.0").replace("1.0", "2.0"))
-    said = harness(here, "run", "mine.toml", COLUMNS="200").stdout
+def test_a_result_with_other_values_is_not_replaced_silently(workspace):
+    (workspace / "mine.toml").write_text(MINE)
+    assert "place" not in harness(workspace, "run", "mine.toml").stdout
+    (workspace / "mine.toml").write_text(MINE.replace("3.0", "4.0").replace("1.0", "2.0"))
+    said = harness(workspace, "run", "mine.toml", COLUMNS="200").stdout
     assert re.search(r"It takes the place of the result of [-\dT:+]+, which had c = 3.0 N.s/m, .*stop = 1.0", said)
 
 
@@ -245,24 +247,24 @@ def test_a_result_of_other_values_is_not_replaced_in_silence(here):
         (("sweep", "smd", *ONCE), ("--set", "m=2"), (), "m = 2.0 kg"),
     ],
 )
-def test_a_result_of_other_options_is_not_replaced_in_silence(here, arguments, older, newer, had):
-    swinging(here / "swing.csv")
-    assert harness(here, *arguments, *older).returncode == 0
-    done = harness(here, *arguments, *newer, COLUMNS="200")
+def test_a_result_with_other_options_is_not_replaced_silently(workspace, arguments, older, newer, had):
+    swinging(workspace / "swing.csv")
+    assert harness(workspace, *arguments, *older).returncode == 0
+    done = harness(workspace, *arguments, *newer, COLUMNS="200")
     assert (done.returncode, done.stderr) == (0, "")
     assert re.search(rf"It takes the place of the result of [-\dT:+]+, which had {had}\b", done.stdout)
 
 
-def test_a_folder_that_does_not_say_what_made_it_is_not_run(here, swung):
-    account = here / "results/smd/provenance.json"
-    shutil.copytree(swung / "results/smd", here / "results/smd")
+def test_a_folder_without_provenance_is_not_run_again(workspace, swung):
+    account = workspace / "results/smd/provenance.json"
+    shutil.copytree(swung / "results/smd", workspace / "results/smd")
     for content in ("[]", "{}", '{"command": 1}', "", None):
         if content is None:
             account.unlink()
         else:
             account.write_text(content)
-        done = harness(here, "run", "results/smd")
+        done = harness(workspace, "run", "results/smd")
         assert (done.returncode, done.stderr.count("\n")) == (1, 1)
         assert "results/smd holds no result that tells what made it" in done.stderr
         if not content:
-            assert harness(here, "run", "smd").returncode == 0
+            assert harness(workspace, "run", "smd").returncode == 0

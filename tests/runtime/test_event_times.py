@@ -21,7 +21,7 @@ def close(t, true):
 
 
 LITTLE, LESS, OTHER = 1e-6, 1e-7, {"m": 0.7, "k": 1233.1}
-SWINGS = [  # every two of friction, values and kind meet in one
+SWINGS = [  # every two of friction, values and backend_fmus meet in one
     (LITTLE, {}, "native"),
     (LITTLE, OTHER, "python"),
     (LESS, {}, "python"),
@@ -29,15 +29,15 @@ SWINGS = [  # every two of friction, values and kind meet in one
 ]
 
 
-@pytest.mark.parametrize(("f", "values", "kind"), SWINGS, indirect=["kind"], ids=str)
-def test_half_swings_of_a_mass_with_little_friction(worker, kind, f, values):
+@pytest.mark.parametrize(("f", "values", "backend_fmus"), SWINGS, indirect=["backend_fmus"], ids=str)
+def test_half_cycles_of_a_mass_with_little_friction_end_on_time(worker, backend_fmus, f, values):
     """Each lasts half a period and loses 2 f/k."""
     with workdps(DIGITS):
         number = int(0.03 / f)
         m, k = mpf(values.get("m", 1.0)), mpf(values.get("k", 157.9))
         half, loss = pi * sqrt(m / k), 2 * mpf(f) / k
         stop = float((number + mpf("0.25")) * half)
-        fmu = worker.instantiate(kind / "coulomb.fmu")
+        fmu = worker.instantiate(backend_fmus / "coulomb.fmu")
         count, t, x = late(fmu, {"f": f, **values}, 0.0, stop)
         fmu.free()
         assert count == number
@@ -50,7 +50,7 @@ def test_half_swings_of_a_mass_with_little_friction(worker, kind, f, values):
 SLEDS = {"default": {}, "to the other limit": {"mu_d": 0.0}, "backward": {"mu_s": 0.7, "mu_d": 0.3, "v_driver": -0.5}}
 
 
-RUNS = [  # every two of sled, start and kind meet in one
+RUNS = [  # every two of sled, start and backend_fmus meet in one
     ("default", 0.0, "python"),
     ("default", -77.7, "native"),
     ("to the other limit", 0.0, "native"),
@@ -60,8 +60,8 @@ RUNS = [  # every two of sled, start and kind meet in one
 ]
 
 
-@pytest.mark.parametrize(("sled", "start", "kind"), RUNS, indirect=["kind"])
-def test_slips_of_the_sled(worker, kind, sled, start):
+@pytest.mark.parametrize(("sled", "start", "backend_fmus"), RUNS, indirect=["backend_fmus"])
+def test_slips_of_the_sled_end_on_time(worker, backend_fmus, sled, start):
     """It sticks while the spring is stretched from d - (h - d) to h, and slips through the angle 2 (pi - phi) with
     tan(phi) = w (h - d)/u, where h and d are the stretches that friction holds, and that it slides at."""
     with workdps(DIGITS):
@@ -73,7 +73,7 @@ def test_slips_of_the_sled(worker, kind, sled, start):
         first = mpf(start) + h / u
         last = first + (number - 1) * (slip + stick)
         stop = float(last + slip + stick / 2)
-        fmu = worker.instantiate(kind / "stickslip.fmu")
+        fmu = worker.instantiate(backend_fmus / "stickslip.fmu")
         count, t, x = late(fmu, SLEDS[sled], start, stop)
         fmu.free()
         assert count == 2 * number

@@ -4,8 +4,8 @@ import random
 from math import cos, inf, nextafter, sin
 
 import pytest
-from compare import close, identical
 from models import CASES, EXACT, counts, declared, label, outputs, parameters, push, tunable
+from row_comparison import assert_close, assert_identical
 
 CHATTER = 1e-6  # m/s: below it the threshold law calls the mass stuck
 SLED = [case for case in CASES if "x_driver" in outputs(case[0])]
@@ -42,7 +42,7 @@ def test_any_two_communication_grids_agree(launch, following, case, pushed):
     def solve(*extra):
         times = sorted({*shared, *extra})
         fmu = launch(name, values, stop=stop)
-        rows = fmu.through(times, names, changes)
+        rows = fmu.run_with_changes(times, names, changes)
         fmu.free()
         return [row for t, row in zip(times, rows, strict=True) if t in set(shared)]
 
@@ -53,9 +53,9 @@ def test_any_two_communication_grids_agree(launch, following, case, pushed):
     ]
     between = [stop * i / 97 for i in range(97)] + [draw.uniform(0.0, stop) for _ in range(200)]
     for extra in (internal, [*straddling, *between]):
-        close(solve(*extra), expected, names, 1e-12)
+        assert_close(solve(*extra), expected, names, 1e-12)
     if not pushed:
-        close(launch(name, values, stop=stop).run([0.0, stop], names)[-1:], expected[-1:], names, 1e-12)
+        assert_close(launch(name, values, stop=stop).run([0.0, stop], names)[-1:], expected[-1:], names, 1e-12)
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
@@ -73,13 +73,13 @@ def test_reading_changes_nothing_at_any_time(worker, fmus, case):
     curious.get(*everything)
     curious.init()
     rows = [row[: len(names)] for row in curious.run(times, [*names, *reversed(everything), "solver.t_next"])]
-    identical(rows, expected, names)
+    assert_identical(rows, expected, names)
     silent.free()
     curious.free()
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_a_change_at_the_end_of_an_internal_step_forgets_what_was_looked_at_beyond(launch, following, case):
+def test_a_change_at_the_end_of_an_internal_step_discards_the_lookahead(launch, following, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
     internal, _ = following(case)
@@ -92,11 +92,11 @@ def test_a_change_at_the_end_of_an_internal_step_forgets_what_was_looked_at_beyo
             fmu.get("solver.t_next")
         fmu.set({force: size})
         runs.append(fmu.run([t, t + 0.001, t + 0.05 * (stop - t)], names))
-    identical(runs[1], runs[0], names)
+    assert_identical(runs[1], runs[0], names)
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_the_step_in_force_is_finite_and_the_same_after_a_look_ahead_and_a_setting(launch, case):
+def test_the_effective_step_size_is_finite_and_unaffected_by_lookahead_and_setting(launch, case):
     name, values, stop = case
     force, size = push(name)
     for share in (0.0, 0.3, 0.7):
@@ -111,14 +111,14 @@ def test_the_step_in_force_is_finite_and_the_same_after_a_look_ahead_and_a_setti
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_setting_a_value_to_what_it_is_changes_nothing(launch, case):
+def test_setting_a_value_to_itself_changes_nothing(launch, case):
     name, values, stop = case
     names = outputs(name) + counts(name)
     times = [stop * i / 60 for i in range(61)]
     expected = launch(name, values, stop=stop).run(times, names)
     fmu = launch(name, values, stop=stop)
     same = dict(zip(tunable(name), fmu.get(*tunable(name)), strict=True))
-    identical(fmu.through(times, names, dict.fromkeys(times[1:-1], same)), expected, names)
+    assert_identical(fmu.run_with_changes(times, names, dict.fromkeys(times[1:-1], same)), expected, names)
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
@@ -130,7 +130,7 @@ def test_following_t_next_shows_every_internal_step(following, case):
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction") == 1], ids=label)
-def test_a_step_that_ends_within_rounding_of_an_event_ends_at_it(launch, case):
+def test_a_step_ending_within_rounding_of_an_event_ends_at_it(launch, case):
     name, values, stop = case
     fmu, t, ulp = launch(name, values, stop=stop), 0.0, 0
     while t < stop:
@@ -143,18 +143,18 @@ def test_a_step_that_ends_within_rounding_of_an_event_ends_at_it(launch, case):
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction", 1) == 1], ids=label)
-def test_a_later_start_shifts_the_motion_and_nothing_else(launch, case):
+def test_a_later_start_time_only_shifts_the_motion(launch, case):
     """Laws that chatter are left out: there rounding of the time decides."""
     name, values, stop = case
     names = outputs(name)[:2]
     times = [stop * i / 80 for i in range(81)]
     early = launch(name, values, stop=stop).run(times, names)
     late = launch(name, values, start=7.3, stop=7.3 + stop).run([7.3 + t for t in times], names)
-    close(late, early, names, 1e-12 if values["solver.method"] == EXACT else 1e-5)
+    assert_close(late, early, names, 1e-12 if values["solver.method"] == EXACT else 1e-5)
 
 
 @pytest.mark.parametrize("case", SLED, ids=label)
-def test_a_changed_driver_speed_moves_nothing_suddenly(launch, case):
+def test_a_changed_driver_speed_causes_no_jump(launch, case):
     name, values, _stop = case
     fmu = launch(name, values, start=7.3, stop=23.3)
     names = [v for v in outputs(name) if v in ("x", "v", "x_driver", "F_spring", "energy")]
@@ -169,18 +169,18 @@ def test_a_changed_driver_speed_moves_nothing_suddenly(launch, case):
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_a_run_without_stop_time_goes_on(launch, case):
+def test_a_run_without_stop_time_continues(launch, case):
     name, values, stop = case
     names = outputs(name)[:2]
     times = [stop * i / 40 for i in range(41)]
     rows = launch(name, values).run(times, names)
     if values["solver.method"] == EXACT:
-        close(rows, launch(name, values, stop=stop).run(times, names), names, 1e-12)
+        assert_close(rows, launch(name, values, stop=stop).run(times, names), names, 1e-12)
     assert all(value == value for row in rows for value in row)
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_outputs_balance(launch, case):
+def test_outputs_satisfy_force_and_energy_balance(launch, case):
     """The forces make the acceleration and the energy is of the state, at every point: also before the first step."""
     name, values, stop = case
     force, size = push(name)

@@ -90,7 +90,7 @@ def test_every_method_of_the_runtime_is_tested_here():
     assert {file.stem for file in files if "\nSTAGES" in file.read_text()} == set(METHODS)
 
 
-def test_a_number_that_another_method_has_is_refused(monkeypatch):
+def test_a_duplicate_method_number_is_refused(monkeypatch):
     monkeypatch.setattr(method_registry.methods[1][1], "NUMBER", method_registry.methods[0][1].NUMBER)
     with pytest.raises(ValueError, match=r"^ode23\.py: the number 2 is taken; the next is 6$"):
         method_registry.find_methods()
@@ -138,14 +138,14 @@ def test_the_estimated_error_falls_as_the_step_control_assumes(solver):
 
 
 @every_method
-def test_the_interpolant_meets_both_ends(solver):
+def test_the_interpolant_matches_both_ends(solver):
     x, v, *_ = solver.step(Motion(), 0.2, 0.4, -1.7, solver.h)
     assert solver.inside.evaluate(0.0) == (0.4, -1.7)
     assert solver.inside.evaluate(solver.h) == pytest.approx((x, v), abs=1e-14)
 
 
 @every_method
-def test_the_work_is_what_the_numbers_say_and_the_last_slope_is_the_first_of_the_next(solver):
+def test_the_evaluation_count_matches_the_declaration_and_the_last_stage_is_reused(solver):
     model = Linear(1.0, 2, -3.0, -0.5)
     x, v, a, _, _ = solver.step(model, 0.0, 0.3, 0.2, 0.1)
     assert len(model.calls) == 1 + solver.numbers.STAGES + solver.numbers.EXTRA
@@ -154,7 +154,7 @@ def test_the_work_is_what_the_numbers_say_and_the_last_slope_is_the_first_of_the
 
 
 @every_method
-def test_row_sums_every_stage_stands_where_a_body_of_constant_speed_is(solver):
+def test_row_sums_place_every_stage_on_a_motion_of_constant_speed(solver):
     model = Linear()
     solver.step(model, 0.0, 0.0, 1.0, 1.0)
     assert len({t for t, _, _ in model.calls}) > 2
@@ -163,7 +163,7 @@ def test_row_sums_every_stage_stands_where_a_body_of_constant_speed_is(solver):
 
 
 @every_method
-def test_a_motion_that_is_a_polynomial_of_the_methods_degree_is_exact(solver):
+def test_a_polynomial_of_the_degree_of_the_method_is_exact(solver):
     """x = t^(n + 2)/((n + 1)(n + 2)), from the acceleration t^n."""
 
     def truth(n, s):
@@ -190,13 +190,13 @@ def test_one_step_of_a_damped_oscillator_agrees_with_exp(solver):
 
 
 @every_method
-def test_what_is_not_a_number_is_refused_and_rest_is_no_error(solver):
+def test_nan_is_refused_and_rest_has_no_error(solver):
     assert all(isnan(e) for e in solver.step(Linear(nan, 1), 0.0, 1.0, 1.0, 0.1)[3:])
     assert solver.step(Linear(), 0.0, 0.0, 0.0, 0.1) == (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("name", PEERS)
-def test_a_step_its_inside_and_its_estimated_error_are_those_of_scipy(solver, name):
+def test_a_step_its_interpolant_and_its_error_estimate_agree_with_scipy(solver, name):
     motion = Motion()
     x, v, _, e_x, e_v = solver.step(motion, 0.3, 0.5, 0.7, 0.4)
     peer = getattr(scipy.integrate, PEERS[name])(
@@ -228,13 +228,13 @@ def test_rodas_is_l_stable():
     assert left[-1] < 1e-12
 
 
-def test_rodas_never_lets_an_undamped_oscillator_grow():
+def test_rodas_never_amplifies_an_undamped_oscillator():
     for w in np.geomspace(1e-2, 1e6, 60):
         x, v, *_ = Solver("rodas").step(Linear(spring=-w * w), 0.0, 1.0, 0.0, 1.0)
         assert x * x + (v / w) ** 2 <= 1.0 + 1e-12
 
 
-def test_rodas_keeps_its_accuracy_on_a_slow_motion_however_stiff():
+def test_rodas_is_accurate_on_a_slow_motion_however_stiff():
     """v' = -damper (v - cos t) - sin t, v(0) = 1: v = cos t (A. Prothero, A. Robinson, Math. Comp. 28 (1974))."""
 
     class Slow(Linear):
@@ -278,7 +278,7 @@ def test_rodas_meets_the_conditions_of_order_four_with_an_error_estimate_of_orde
     assert all(fabs(embedded @ tree - 1.0 / n) > 1e-3 for tree, n in four)
 
 
-def test_rodas_refuses_the_one_step_whose_equations_have_no_solution():
+def test_rodas_refuses_a_step_with_a_singular_system():
     assert isnan(Solver("rodas").step(Linear(damper=4.0), 0.0, 0.0, 1.0, 1.0)[4])
 
 

@@ -2,10 +2,10 @@
 
 import itertools
 
-import evidence
-import evidence_pendulum
+import independent_pendulum
+import independent_solution
 import pytest
-from evidence import Trajectory
+from independent_solution import ClosedFormMotion
 from models import EXACT, HYBRID, ODE23, SIGN, THRESHOLD
 
 MATLAB = {"solver.method": ODE23, "solver.rtol": 1e-3, "solver.atol": 1e-6}
@@ -61,10 +61,10 @@ def test_the_threshold_law_chatters_and_shows_the_published_slips(launch):
 
 
 @pytest.mark.parametrize(("name", "values"), [("smd", {}), ("coulomb", {}), ("coulomb", {"c": 2.0}), ("stickslip", {})])
-def test_tighter_tolerance_comes_closer_to_the_closed_form(launch, name, values):
+def test_a_tighter_tolerance_comes_closer_to_the_closed_form(launch, name, values):
     """Located events keep the method's order: the error falls with the tolerance, and is of its size."""
     stop, x0 = (16.0, 0.0) if name == "stickslip" else (4.0, 0.1)
-    motion = Trajectory([(0.0, getattr(evidence, name)(**values))], x0, 0.0, stop)
+    motion = ClosedFormMotion([(0.0, getattr(independent_solution, name)(**values))], x0, 0.0, stop)
     times = [stop * i / 40 for i in range(41)]
     truth = [motion.at(t) for t in times]
     errors = []
@@ -80,7 +80,7 @@ def test_tighter_tolerance_comes_closer_to_the_closed_form(launch, name, values)
     assert errors[2] < 1e-6
 
 
-def test_counts_are_of_work_that_was_done(launch):
+def test_counters_count_the_work_done(launch):
     """Three right-hand sides a step, accepted or refused (first same as last); two more to begin, one at each event."""
     for name, law in (("smd", {}), ("coulomb", {"friction": SIGN}), ("pacejka", {})):
         fmu = launch(name, {**MATLAB, **law}, stop=4.0)
@@ -90,14 +90,16 @@ def test_counts_are_of_work_that_was_done(launch):
 
 
 @pytest.mark.parametrize("load", [1, 2], ids=["weight", "reaction"])
-def test_the_pendulum_agrees_with_its_second_route(launch, load):
+def test_the_pendulum_agrees_with_its_independent_solution(launch, load):
     cases = [
-        ({}, evidence_pendulum.THETA0, 0.0, 1e-7),
+        ({}, independent_pendulum.THETA0, 0.0, 1e-7),
         ({"mu": 0.3, "T_ext": 0.03}, -1.0, 2.0, 1e-6),
         ({"mu": 0.02, "a": 0.05, "g": 9.81}, 3.0, 4.0, 1e-5),  # over the top, almost at rest there
     ]
     for values, theta0, omega0, bound in cases:
-        swing = evidence_pendulum.Swing([(0.0, evidence_pendulum.Pendulum(load == 2, **values))], theta0, omega0, 5.0)
+        swing = independent_pendulum.PendulumMotion(
+            [(0.0, independent_pendulum.Pendulum(load == 2, **values))], theta0, omega0, 5.0
+        )
         choice = {**values, "theta0": theta0, "omega0": omega0, "pin_load": load, "friction": HYBRID}
         fmu = launch("pendulum", {**choice, "solver.method": ODE23, "solver.rtol": 1e-10}, stop=5.0)
         times = [0.05 * i for i in range(101)]

@@ -56,7 +56,7 @@ def inside(function):
 
 
 @pytest.mark.parametrize("name", sorted(NUMERICS))
-def test_numerics_keep_to_what_can_be_frozen_to_c(name):
+def test_the_numerics_stay_within_the_c_subset(name):
     tree = ast.parse(NUMERICS[name])
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and not node.level:
@@ -77,7 +77,7 @@ def test_numerics_keep_to_what_can_be_frozen_to_c(name):
 
 
 @pytest.mark.parametrize("name", sorted(NUMERICS))
-def test_no_while_relies_on_its_condition_alone(name):
+def test_every_while_loop_is_bounded_by_a_counter(name):
     """A NaN or a stall would keep it going: something inside must count, and return or break."""
     for function in functions(ast.parse(NUMERICS[name])):
         for loop in [node for node in inside(function) if isinstance(node, ast.While)]:
@@ -125,7 +125,7 @@ def shape(thing, path, seen):
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_every_attribute_is_born_with_the_model_and_keeps_its_type(case):
+def test_attributes_are_created_in_init_and_keep_their_type(case):
     """So that a flat copy of the numbers is the whole state."""
     name, values, stop = case
     made = slave(name, values, stop)
@@ -180,7 +180,7 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_run_whose_initialisation_ends_twice_goes_on(name):
+def test_a_run_whose_initialisation_ends_twice_continues(name):
     once, twice = slave(name), slave(name)
     for made in once, twice:
         assert made.do_step(0.0, 0.1)
@@ -191,7 +191,7 @@ def test_a_run_whose_initialisation_ends_twice_goes_on(name):
     assert read(twice, *outputs(name)) == pytest.approx(read(once, *outputs(name)), rel=1e-4)
 
 
-def test_lists_of_references_that_never_come_again_take_no_memory():
+def test_cached_reference_lists_are_bounded():
     """Where an importer asks for others all the time: what reads them is kept for some."""
     made, draw = slave("stickslip"), random.Random(1)
     reals = [i for i, d in enumerate(declared("stickslip").values()) if d.type == "Real"]
@@ -212,7 +212,7 @@ def test_lists_of_references_that_never_come_again_take_no_memory():
     assert after - before < 200_000  # as much as those that are kept; 500 would take 650_000
 
 
-def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
+def test_an_endless_run_is_stopped_with_a_message(monkeypatch, capfd):
     monkeypatch.setattr(runtime("pacejka", "integrator"), "MAX_BATCHES", 2)
     made = slave("pacejka", {"solver.method": 2}, stop=16.0)
     assert made.do_step(0.0, 16.0) is False
@@ -220,7 +220,7 @@ def test_a_run_without_end_is_ended_with_a_sentence(monkeypatch, capfd):
     assert isnan(read(made, "x")[0])
 
 
-def test_what_many_events_cost_is_bounded_too(monkeypatch, capfd):
+def test_the_cost_of_many_events_is_bounded(monkeypatch, capfd):
     """A swing of the pendulum takes as many looks for its events as right-hand sides."""
     integrator = runtime("pendulum", "integrator")
     monkeypatch.setattr(integrator, "MAX_EVALUATIONS", 20 * integrator.BATCH_STEPS)
@@ -232,7 +232,7 @@ def test_what_many_events_cost_is_bounded_too(monkeypatch, capfd):
     assert step.interpolant.n_event_evals > 0
 
 
-def test_a_solver_that_makes_no_headway_is_stopped_with_a_sentence(capfd):
+def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
     """At the tightest tolerances the sign law asks for steps below the rounding of the time."""
     made = slave("coulomb", {"friction": SIGN, "solver.method": 2, "solver.rtol": 1e-15})
     assert made.do_step(0.0, 4.0) is False
@@ -241,7 +241,7 @@ def test_a_solver_that_makes_no_headway_is_stopped_with_a_sentence(capfd):
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_what_runs_all_the_time_has_fewer_attributes_than_cpython_keeps_at_hand(name, fmus):
+def test_hot_objects_have_fewer_attributes_than_the_inline_limit_of_cpython(name, fmus):
     """Thirty of them, and a step takes a tenth longer (3.11)."""
     solver = load_model_class(fmus / f"{name}.fmu")().solver
     sizes = {type(each).__name__: len(vars(each)) for each in (solver, solver.step, solver.step.interpolant)}

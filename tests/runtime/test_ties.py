@@ -8,13 +8,13 @@ import random
 from itertools import pairwise, product
 from operator import methodcaller
 
-import evidence
+import independent_solution
 import pytest
-from evidence import Trajectory
+from independent_solution import ClosedFormMotion
 from models import DOP853, EXACT, ODE23, ODE45, RODAS
-from native_fmus import built
+from native_fmus import build_native_fmus
 
-from tests.runtime.test_exact import EVENTS, PLACES
+from tests.runtime.test_exact_method import EVENTS, PLACES
 
 
 def number(draw, low, high):
@@ -56,7 +56,7 @@ def case(name, seed):
 @pytest.fixture
 def pair(worker, fmus):
     """The process that runs them, with the folder of the FMUs of each kind."""
-    return [(worker, fmus), (worker, built())]
+    return [(worker, fmus), (worker, build_native_fmus())]
 
 
 def answers(pair, name, values, start, stop, read):
@@ -79,10 +79,10 @@ def events(fmu, start, stop):
 
 
 @pytest.mark.parametrize(("name", "seed"), [*product(["coulomb", "stickslip"], range(40))])
-def test_every_tie_ends_as_the_closed_form_says(pair, name, seed):
+def test_every_tie_ends_as_in_the_closed_form(pair, name, seed):
     values, start, stop = case(name, seed)
     given = {key: value for key, value in values.items() if key not in ("x0", "v0")}
-    motion = Trajectory([(start, getattr(evidence, name)(**given))], values["x0"], values["v0"], stop)
+    motion = ClosedFormMotion([(start, getattr(independent_solution, name)(**given))], values["x0"], values["v0"], stop)
     seen = answers(pair, name, values, start, stop, lambda fmu: events(fmu, start, stop))
     assert [mode for _, mode in seen] == [mode for _, mode in motion.events]
     for (t, _), (true, _) in zip(seen, motion.events, strict=True):
@@ -126,7 +126,7 @@ def any_sled(draw):
     return values, start, start + held + 20.3 * 6.283185307179586 * (values["m"] / values["k"]) ** 0.5
 
 
-def test_speeds_that_touch_zero_go_on_whatever_the_values(pair):
+def test_speeds_that_touch_zero_continue_for_any_values(pair):
     draw = random.Random(1)
     for _ in range(150):
         values, start, stop = any_sled(draw)
@@ -136,7 +136,7 @@ def test_speeds_that_touch_zero_go_on_whatever_the_values(pair):
         assert mode == (1 if values["v_driver"] > 0.0 else -1)
 
 
-def test_a_slide_that_only_touches_zero_sticks_where_static_friction_is_larger(pair):
+def test_a_slide_that_touches_zero_sticks_where_static_friction_is_larger(pair):
     """v = u (1 + 0.6 cos y + 0.8 sin y) with y = w t: whether rounding puts its least value above zero or below."""
     draw, touch = random.Random(3), 3.141592653589793 + 0.9272952180016122
     for _ in range(60):
@@ -150,16 +150,18 @@ def test_a_slide_that_only_touches_zero_sticks_where_static_friction_is_larger(p
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("direction", [-1, 1])
-def test_a_slip_that_ends_at_the_other_limit_sticks_as_the_load_moves_inward(pair, method, direction):
+def test_a_slip_ending_at_the_opposite_limit_sticks_as_the_load_decreases(pair, method, direction):
     values = {"mu_d": 0.0, "v_driver": 0.034 * direction, "solver.method": method, "solver.rtol": 1e-7}
     _, rows = answers(pair, "stickslip", values, 0.0, 32.0, lambda fmu: fmu.follow(0.0, 32.0, ["x", "events.count"]))
-    motion = Trajectory([(0.0, evidence.stickslip(mu_d=0.0, v_driver=0.034 * direction))], 0.0, 0.0, 32.0)
+    motion = ClosedFormMotion(
+        [(0.0, independent_solution.stickslip(mu_d=0.0, v_driver=0.034 * direction))], 0.0, 0.0, 32.0
+    )
     assert rows[-1][1] == len(motion.events) == 7
     assert rows[-1][0] == pytest.approx(float(motion.at(32.0)[0]), rel=1e-12 if method == EXACT else 1e-5)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_start_beyond_the_limit_slides_however_loose_the_method(pair, method):
+def test_a_start_beyond_the_limit_slides_at_any_tolerance(pair, method):
     """What is given has no error; a slide that came there would have."""
     values = {"x0": 1.001 * 0.9 * 12.5 * 9.81 / 742.5, "solver.method": method, "solver.rtol": 1e-3}
     assert answers(pair, "stickslip", values, 0.0, 1.0, methodcaller("get", "mode")) == -1
@@ -167,7 +169,7 @@ def test_a_start_beyond_the_limit_slides_however_loose_the_method(pair, method):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("seed", range(3))
-def test_a_mass_that_only_a_damper_slows_down_never_stops(pair, method, seed):
+def test_a_mass_slowed_only_by_a_damper_never_stops(pair, method, seed):
     draw = random.Random(seed)
     m, c = 10.0 ** draw.uniform(-2.0, 2.0), 10.0 ** draw.uniform(-2.0, 2.0)
     values = {"m": m, "c": c, "k": 0.0, "f": 0.0, "x0": 0.0, "v0": draw.choice([-3.0, 2.0]), "solver.method": method}
@@ -178,7 +180,7 @@ def test_a_mass_that_only_a_damper_slows_down_never_stops(pair, method, seed):
 
 
 @pytest.mark.parametrize("values", FRICTIONLESS, ids=str)
-def test_values_that_are_renewed_at_a_touch_make_no_event_either(pair, values):
+def test_values_set_again_at_a_touch_cause_no_event(pair, values):
     """The communication points fall beside and upon the touches; each sets an input anew, to another value and back."""
     given = {"mu_s": 0.9, "g": 9.81, **values}
     first, period = given["mu_s"] * 12.5 * given["g"] / (742.5 * 0.034), 6.283185307179586 * (12.5 / 742.5) ** 0.5

@@ -26,13 +26,13 @@ def test_every_shipped_scene_loads_and_names_its_source(path):
     assert scene.published["source"]
 
 
-def test_what_a_scene_leaves_out_is_left_to_the_fmu(tmp_path):
+def test_omitted_keys_are_left_to_the_fmu(tmp_path):
     scene = load_scene(write(tmp_path))
     assert {scene.method, scene.law, scene.rtol, scene.start, scene.stop, scene.grid} == {None}
     assert (scene.analyses, scene.values, scene.follow, scene.follows_solver_steps) == ((), {}, None, True)
 
 
-def test_a_grid_does_not_follow_the_solver_unless_asked(tmp_path):
+def test_a_grid_follows_the_solver_only_on_request(tmp_path):
     assert not load_scene(write(tmp_path, grid="0.1")).follows_solver_steps
     assert load_scene(write(tmp_path, grid="0.1", follow="true")).follows_solver_steps
 
@@ -46,7 +46,7 @@ def test_a_grid_does_not_follow_the_solver_unless_asked(tmp_path):
         ('["x", "v", "a", "mode", "energy", "F_spring", "F_friction"]', 6),
     ],
 )
-def test_a_scene_that_names_no_plots_has_those_of_its_outputs(tmp_path, outputs, plots):
+def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
     found = load_scene(write(tmp_path, outputs=outputs)).plots
     assert found == plots if isinstance(plots, tuple) else len(found) == plots + 1
     assert load_scene(write(tmp_path, outputs=outputs, plots="[]")).plots == ()
@@ -81,7 +81,7 @@ def test_a_scene_that_names_no_plots_has_those_of_its_outputs(tmp_path, outputs,
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_a_wrong_scene_is_told_in_one_sentence(tmp_path, keys, sentence):
+def test_an_invalid_scene_is_reported_in_one_sentence(tmp_path, keys, sentence):
     with pytest.raises(SceneError) as caught:
         load_scene(write(tmp_path, **keys))
     assert str(caught.value).startswith("scene mine: ")
@@ -119,24 +119,24 @@ PAIR = {
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_whatever_is_wrong_its_place_is_told_however_deep_it_is(wrong, sentence):
+def test_an_error_names_its_location_at_any_depth(wrong, sentence):
     parse_table(PAIR, CoupledKeys)
     with pytest.raises(SceneError) as caught:
         parse_table(PAIR | wrong, CoupledKeys)
     assert str(caught.value).startswith(sentence)
 
 
-def test_an_unknown_scene_is_told_the_shipped_names():
+def test_an_unknown_scene_error_lists_the_shipped_names():
     with pytest.raises(SceneError, match=r"unknown scene 'pendulm' \(nearest: 'pendulum'\); allowed: coulomb, "):
         load_scene("pendulm")
 
 
-def test_a_missing_file_is_told():
+def test_a_missing_file_is_reported():
     with pytest.raises(SceneError, match=r"cannot read the scene nowhere\.toml: No such file"):
         load_scene("nowhere.toml")
 
 
-def test_quantities_change_their_unit_but_not_what_they_measure():
+def test_quantities_change_their_unit_but_not_their_dimension():
     assert Quantity("T_f", 0.1129848290276167, "N.m", "").to_unit("lbf.in") == pytest.approx(1.0, rel=1e-15)
     with pytest.raises(KeyError):
         Quantity("period", 1.0, "s", "").to_unit("deg")

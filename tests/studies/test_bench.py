@@ -7,9 +7,9 @@ from dataclasses import replace
 from functools import partial
 from math import atan, inf, nan, sin
 
-import fmi3_hosts
+import fmi3_fixtures
 import pytest
-from native_fmus import built as native_built
+from native_fmus import build_native_fmus as native_built
 
 from harness.errors import HarnessError
 from harness.results.provenance import load_provenance
@@ -33,9 +33,9 @@ FAST = Benchmark("a step", 2e-6, "s", 3e-6, (Baseline("theirs", 5e-6), Baseline(
 
 
 @pytest.fixture
-def all_measures(place, monkeypatch):
+def all_measures(user_folder, monkeypatch):
     """What the benchmark measures."""
-    monkeypatch.chdir(place)
+    monkeypatch.chdir(user_folder)
     monkeypatch.setattr(bench_speed, "RUNS", 20)
     return all_benchmarks()
 
@@ -49,7 +49,7 @@ def both_kinds(fmus, tmp_path, monkeypatch):
     (tmp_path / "fmus" / "native").mkdir()
     for file in native_built().glob("*.fmu"):
         (tmp_path / "fmus" / "native" / file.name).symlink_to(file)
-    (tmp_path / "fmus" / "native" / "fmi3").symlink_to(fmi3_hosts.built())
+    (tmp_path / "fmus" / "native" / "fmi3").symlink_to(fmi3_fixtures.build_fmi3_fmus())
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(native, "REPEAT", 3)
     monkeypatch.setattr(stepping_loops, "REPEATS", 5)
@@ -68,7 +68,7 @@ def of(all_measures, function):
     return [measure for measure in all_measures if measure.func is function]
 
 
-def test_exact_and_its_events_and_the_pendulum_reach_their_numbers_and_a_stuck_body_stays(all_measures):
+def test_exact_events_and_the_pendulum_meet_their_targets_and_a_stuck_body_stays(all_measures):
     chosen = [
         call
         for function in (exact_run_error, event_time_error, last_event_error, stuck_drift)
@@ -80,7 +80,7 @@ def test_exact_and_its_events_and_the_pendulum_reach_their_numbers_and_a_stuck_b
     assert [measure.name for measure in found if not measure.is_met] == []
 
 
-def test_an_accuracy_that_is_missed_is_told(all_measures):
+def test_a_missed_accuracy_target_is_reported(all_measures):
     model, card, *rest = of(all_measures, default_run_error)[0].args
     loose = replace(card, start_values={**card.start_values, "solver.method": 2, "solver.rtol": 1e-3})
     measure = default_run_error(model, loose, *rest)
@@ -88,7 +88,7 @@ def test_an_accuracy_that_is_missed_is_told(all_measures):
     assert 1e-4 < measure.value < 0.1
 
 
-def test_the_fmus_own_code_is_faster_than_python_peers(all_measures):
+def test_the_own_code_is_faster_than_python_peers(all_measures):
     for call in (
         of(all_measures, time_in_process)[0],
         *of(all_measures, time_one_step),
@@ -98,7 +98,7 @@ def test_the_fmus_own_code_is_faster_than_python_peers(all_measures):
         assert 0.0 < measure.value < measure.baselines[0].value
 
 
-def test_a_communication_step_is_measured_beside_that_of_an_empty_fmu_with_the_same_outputs(all_measures, monkeypatch):
+def test_a_communication_step_is_timed_against_an_empty_fmu_with_the_same_outputs(all_measures, monkeypatch):
     monkeypatch.setattr(stepping_loops, "REPEATS", 2)
     measure = of(all_measures, time_communication_step)[2]()
     usual, empty, lean, lean_empty = (beside.value for beside in measure.baselines)
@@ -107,18 +107,18 @@ def test_a_communication_step_is_measured_beside_that_of_an_empty_fmu_with_the_s
     assert 0.0 < lean < 10 * lean_empty
 
 
-def test_the_best_run_counts_after_one_to_warm_up():
+def test_the_best_run_after_a_warm_up_counts():
     calls = []
     assert 0.0 <= time_fastest_call(partial(calls.append, 1), 4) < inf
     assert len(calls) == 5
 
 
 @pytest.mark.parametrize(("value", "reached"), [(1.0, True), (1.1, False), (nan, False)])
-def test_a_number_is_reached_up_to_its_bound(value, reached):
+def test_a_target_is_met_up_to_its_bound(value, reached):
     assert Benchmark("a number", value, "1", 1.0, ()).is_met is reached
 
 
-def test_a_peer_is_told_as_a_multiple_and_a_missing_one_by_name():
+def test_a_peer_is_reported_as_a_ratio_and_a_missing_one_by_name():
     assert [format_baseline(FAST, beside) for beside in FAST.baselines] == [
         "theirs: 5 µs, 2.5 times",
         "absent is not installed",
@@ -126,8 +126,8 @@ def test_a_peer_is_told_as_a_multiple_and_a_missing_one_by_name():
     assert benchmark_table([FAST]).row_count == 1
 
 
-def test_the_csv_holds_every_number_and_the_account_every_parameter(tmp_path, place, monkeypatch):
-    monkeypatch.chdir(place)
+def test_the_csv_holds_every_value_and_the_provenance_every_parameter(tmp_path, user_folder, monkeypatch):
+    monkeypatch.chdir(user_folder)
     run_benchmarks([lambda: FAST], tmp_path, lambda name, share: None)
     assert load_provenance(tmp_path / FOLDER)["parameters"]["smd: c"] == {"value": 2.0, "unit": "N.s/m"}
     with (tmp_path / FOLDER / FILE).open(encoding="utf-8", newline="") as file:
@@ -136,7 +136,7 @@ def test_the_csv_holds_every_number_and_the_account_every_parameter(tmp_path, pl
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_one_in_python(both_kinds):
+def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_python_one(both_kinds):
     for _ in range(3):  # a busy machine may spoil a measurement, hardly three
         forget()
         found = [native.run_in_c("stickslip"), native.step_in_c("stickslip")]
@@ -150,7 +150,7 @@ def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_one_in_python(bot
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 @pytest.mark.parametrize("case", native.RUN_TIME_TARGETS)
-def test_the_cvode_fmu_gets_better_with_its_tolerance_and_the_native_one_is_better_still(case, both_kinds):
+def test_the_cvode_fmu_improves_with_its_tolerance_and_the_native_one_is_better(case, both_kinds):
     try:
         errors = [native.largest_error(case, native.time_cvode(case, rtol)) for rtol in (1e-4, 1e-6, 1e-8)]
     except c_host.MissingToolError as error:
@@ -161,7 +161,7 @@ def test_the_cvode_fmu_gets_better_with_its_tolerance_and_the_native_one_is_bett
     assert len(measure.baselines) == 4
 
 
-def test_what_a_machine_lacks_is_told_in_its_row_and_fails_nothing(both_kinds, monkeypatch):
+def test_missing_tools_are_reported_in_their_row_and_fail_nothing(both_kinds, monkeypatch):
     monkeypatch.setattr(c_host, "COMPILER", None)
     shutil.rmtree(both_kinds / "native")
     c_host.build_host.cache_clear()
@@ -178,7 +178,7 @@ def test_what_a_machine_lacks_is_told_in_its_row_and_fails_nothing(both_kinds, m
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-def test_a_run_that_an_fmu_refuses_in_c_gives_its_sentence(both_kinds):
+def test_a_run_refused_by_an_fmu_in_c_reports_its_message(both_kinds):
     library = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
     with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
         native.time_runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
@@ -196,7 +196,7 @@ LATE = [
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 @pytest.mark.parametrize("scene", [*model_exchange.DEFAULT_SCENARIOS, *LED, *LATE], ids=str)
-def test_model_exchange_errs_as_cvode_does_with_its_events_by_hand(scene, both_kinds):
+def test_model_exchange_errors_match_cvode_with_explicit_events(scene, both_kinds):
     """At most three times as much, also where the input jumps or ramps, and from a late start: the solver errs, not the
     FMU."""
     measure = model_exchange.error_ratio_to_cvode(scene, model_exchange.TOLERANCES if scene.is_default else (1e-8,))
@@ -213,7 +213,7 @@ def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene,
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-def test_a_call_of_model_exchange_is_measured_beside_that_of_a_reference_fmu(both_kinds, tmp_path, monkeypatch):
+def test_a_model_exchange_call_is_timed_against_that_of_a_reference_fmu(both_kinds, tmp_path, monkeypatch):
     """An FMU of ours stands for theirs, whose sources are not here: that is told."""
     assert model_exchange.call_overhead("smd").baselines[0].name.startswith("not here: Reference-FMUs")
     sled = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
@@ -259,7 +259,7 @@ __attribute__((visibility("default"))) double ask(double x, double v, double for
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-def test_a_reference_fmu_is_given_the_acceleration_of_each_model(tmp_path, monkeypatch):
+def test_a_reference_fmu_gets_the_acceleration_of_each_model(tmp_path, monkeypatch):
     for file, text in THEIRS.items():
         (tmp_path / file).parent.mkdir(exist_ok=True)
         (tmp_path / file).write_text(text + "\n")

@@ -5,10 +5,10 @@ from itertools import combinations
 from math import cos, sqrt
 
 import commands
-import foreign
+import external_fmus
 import numpy as np
 import pytest
-from builds import published
+from build_cache import run_published_cases
 from scipy.io import savemat
 
 from harness.errors import HarnessError
@@ -18,9 +18,9 @@ from harness.studies.compare.trajectory_files import read_trajectory
 
 
 @pytest.fixture(scope="module")
-def theirs():
+def external_fmu_folder():
     """The folder of FMUs that are not ours, built with plain pythonfmu."""
-    return foreign.built()
+    return external_fmus.build_external_fmus()
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def harness(fmus, tmp_path):
     return run
 
 
-def test_one_of_ours_is_run_at_its_own_steps(harness, tmp_path):
+def test_a_project_fmu_is_run_at_its_internal_steps(harness, tmp_path):
     values = ("--set", "f=1", "--set", "solver.method=ode45")
     done = harness("run", "--fmu", "fmus/coulomb.fmu", *values)
     assert (done.returncode, done.stderr) == (0, "")
@@ -41,8 +41,8 @@ def test_one_of_ours_is_run_at_its_own_steps(harness, tmp_path):
     assert (tmp_path / "results/coulomb/trajectory.csv").exists()
 
 
-def test_a_run_as_json_is_json_and_nothing_else(harness, theirs):
-    done = harness("run", "--fmu", theirs / "Midpoint.fmu", "--tolerance", 1e-3, "--json")
+def test_a_run_as_json_prints_only_json(harness, external_fmu_folder):
+    done = harness("run", "--fmu", external_fmu_folder / "Midpoint.fmu", "--tolerance", 1e-3, "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["final"]["x"] == pytest.approx(cos(sqrt(40)), abs=2e-3)
     done = harness("run", "coulomb", "--json")
@@ -51,10 +51,10 @@ def test_a_run_as_json_is_json_and_nothing_else(harness, theirs):
     assert found["f"] == pytest.approx(0.5, rel=1e-12)
 
 
-def test_two_fmus_are_compared_as_their_closed_forms_differ(harness, theirs, tmp_path):
+def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, tmp_path):
     stiffer = {"resources/Midpoint.py": lambda text: text.replace("40.0", "40.4")}
-    other = foreign.edited(theirs / "Midpoint.fmu", tmp_path / "Other.fmu", stiffer)
-    arguments = (theirs / "Midpoint.fmu", other, "--tolerance", 1e-4)
+    other = external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "Other.fmu", stiffer)
+    arguments = (external_fmu_folder / "Midpoint.fmu", other, "--tolerance", 1e-4)
     done = harness("compare", *arguments, "--json", blank=False)
     assert (done.returncode, done.stderr) == (0, "")
     found = json.loads(done.stdout)
@@ -75,12 +75,12 @@ def test_two_fmus_are_compared_as_their_closed_forms_differ(harness, theirs, tmp
 def results(tmp_path):
     """The folder of results, with those of the published cases in it."""
     (tmp_path / "results").mkdir()
-    for folder in (published() / "results").iterdir():
+    for folder in (run_published_cases() / "results").iterdir():
         (tmp_path / "results" / folder.name).symlink_to(folder)
     return tmp_path / "results"
 
 
-def test_a_result_agrees_with_a_new_run_of_its_fmu_events_included(harness, results):
+def test_a_result_agrees_with_a_new_run_of_its_fmu_including_events(harness, results):
     done = harness("compare", "results/stickslip", "fmus/stickslip.fmu", "--within", 1e-12, blank=False)
     assert (done.returncode, done.stderr) == (0, "")
     assert "8 changes of mode in both, at most 0 s apart" in done.stdout
@@ -101,7 +101,7 @@ def test_a_scene_and_its_fmu_are_run_to_the_same_times(harness):
         (["nosuch", "fmus/smd.fmu"], 2, "unknown scene 'nosuch'"),
     ],
 )
-def test_what_cannot_be_compared_is_one_sentence(harness, arguments, status, sentence):
+def test_an_impossible_comparison_is_one_sentence(harness, arguments, status, sentence):
     done = harness("compare", *arguments)
     assert done.returncode == status
     assert sentence in done.stderr
@@ -115,7 +115,7 @@ def path(name, times, events=None, **columns):
     return Signals(name, times, columns, {name: UNITS.get(name, "") for name in columns}, events)
 
 
-def test_between_samples_a_variable_follows_its_rate_or_stays_between_its_neighbours():
+def test_interpolation_follows_the_rate_or_stays_between_neighbours():
     one, two = np.linspace(0, 6, 1001), np.linspace(0.0005, 5.9, 400)
     found = compare(*(path("x and v", t, x=np.sin(t), v=np.cos(t)) for t in (one, two)))
     assert found.interpolated
@@ -128,7 +128,7 @@ def test_between_samples_a_variable_follows_its_rate_or_stays_between_its_neighb
     assert found.differences[0].largest == 5.25  # no spline swings beyond the stairs
 
 
-def test_a_variable_follows_its_own_rate_among_the_many_of_an_fmu_without_units():
+def test_a_variable_uses_its_own_rate_in_an_fmu_without_units():
     pace = np.linspace(1, 3, 60)
     one, two = np.linspace(0, 6, 1001), np.linspace(0.0005, 5.9, 400)
     motions = [
@@ -163,7 +163,7 @@ def test_a_jump_is_compared_as_a_jump(late):
     assert found.pairs.shift == pytest.approx(late, rel=1e-6, abs=1e-15)
 
 
-def test_a_time_that_stands_twice_has_both_sides_of_a_jump(tmp_path):
+def test_a_repeated_time_holds_both_sides_of_a_jump(tmp_path):
     (tmp_path / "twice.csv").write_text("t [s],x [m]\n0,1\n1,1\n1,5\n2,5\n")
     for value, apart in ((1, 4.0), (3, 2.0), (5, 4.0), (6, 5.0)):
         (tmp_path / "other.csv").write_text(f"t [s],x [m]\n0,{value}\n1,{value}\n2,{value}\n")
@@ -173,7 +173,7 @@ def test_a_time_that_stands_twice_has_both_sides_of_a_jump(tmp_path):
         assert abs(x.left[1] - x.right[1]) == (0 if 1 <= value <= 5 else 1)
 
 
-def test_what_only_one_side_has_and_what_has_no_unit_is_said():
+def test_unmatched_variables_and_missing_units_are_reported():
     t = np.arange(20.0)
     one = Signals("one", t, {"x": t, "a": t, "F": t}, {"x": "m", "a": "m/s²", "F": "N"})
     two = Signals("two", t, {"x": t, "a": t, "E": t}, {"x": "", "a": "m/s^2", "E": "J"})
@@ -186,7 +186,7 @@ def test_what_only_one_side_has_and_what_has_no_unit_is_said():
     )
 
 
-def test_the_first_example_of_the_help_shows_no_more_than_the_curves_have(harness, results):
+def test_the_first_help_example_shows_no_more_than_the_curves_contain(harness, results):
     done = harness("compare", "results/stickslip", "results/stickslip-threshold", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     (a,) = (each for each in json.loads(done.stdout)["variables"] if each["name"] == "a")
@@ -199,7 +199,7 @@ def test_modes_are_not_interpolated():
     assert found.differences[0].largest in (0.0, 1.0)
 
 
-def test_what_shares_no_variable_is_refused():
+def test_results_without_a_common_variable_are_refused():
     t = np.arange(20.0)
     with pytest.raises(HarnessError, match="have no variable in common"):
         compare(path("one", t, x=t), path("two", t, y=t))
@@ -235,7 +235,7 @@ def test_events_are_matched_by_kind_and_time(second, sentence, shift):
     assert pairs.shift == pytest.approx(shift, nan_ok=True)
 
 
-def test_an_event_that_is_matched_from_afar_hides_no_difference():
+def test_a_distant_event_match_hides_no_difference():
     """The other one jumps back in between, so that what lies between is no one's jump."""
     t = np.linspace(0, 3, 301)
     one = Signals("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, np.array([[0, 0], [1, 1.0]]))
@@ -282,7 +282,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("pair", [*combinations([*OTHERS, "modelica.mat"], 2)], ids=" and ".join)
-def test_results_of_other_tools_compare(tmp_path, pair):
+def test_results_of_other_tools_can_be_compared(tmp_path, pair):
     for name, text in OTHERS.items():
         (tmp_path / name).write_text(text)
     modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4], [2, 3, 1, 5, 6]]))
@@ -319,7 +319,7 @@ def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version
     assert found.columns["minus"].tolist() == [-1.0, -2.0]
 
 
-def test_texts_are_compared_as_texts(tmp_path):
+def test_strings_are_compared_as_strings(tmp_path):
     (tmp_path / "one.csv").write_text("t [s],says,x\n0,cold,1\n1,cold,1\n2,warm,1\n")
     (tmp_path / "two.csv").write_text("t [s],says,x\n0,cold,1\n1,warm,1\n2,warm,one\n")
     found = compare(*(read_trajectory(tmp_path / name) for name in ("one.csv", "two.csv")))
@@ -339,7 +339,7 @@ def test_texts_are_compared_as_texts(tmp_path):
         (["--rtol", "0.05", "--atol", "0.1"], 0),
     ],
 )
-def test_rtol_and_atol_say_what_may_differ(tmp_path, bounds, status):
+def test_rtol_and_atol_set_the_allowed_difference(tmp_path, bounds, status):
     (tmp_path / "one.csv").write_text("t [s],x [m]\n0,1\n1,4\n2,3\n")
     (tmp_path / "two.csv").write_text("t [s],x [m]\n0,1\n1,3.75\n2,3\n")
     done = commands.harness(tmp_path, "compare", "one.csv", "two.csv", *bounds, "--quiet", blank=True)
@@ -347,7 +347,7 @@ def test_rtol_and_atol_say_what_may_differ(tmp_path, bounds, status):
     assert ("x differs by 0.25 m at t = 1 s, more than" in done.stderr) == bool(status)
 
 
-def test_a_name_that_is_longer_than_its_column_stands_there_whole(tmp_path):
+def test_a_name_longer_than_its_column_is_printed_in_full(tmp_path):
     name = f"mechanics.{'axis.' * 20}position"
     (tmp_path / "one.csv").write_text(f"t [s],{name}\n0,1\n1,4\n")
     (tmp_path / "two.csv").write_text(f"t [s],{name}\n0,1\n1,3\n")
@@ -358,31 +358,31 @@ def test_a_name_that_is_longer_than_its_column_stands_there_whole(tmp_path):
 @pytest.mark.parametrize(
     ("pair", "told"),
     [
-        (("Midpoint", "Exchange"), "fmpy's CVode at rtol"),
-        (("Third", "Breaking"), "Breaking: it takes steps of its own"),
+        (("Midpoint", "ModelExchangeOnly"), "fmpy's CVode at rtol"),
+        (("Fmi3Midpoint", "NonConforming"), "NonConforming: it takes steps of its own"),
         (("FixedStep", "FixedStep"), "its own step is fixed"),
         (("Switching", "Switching"), "says"),
         (("Arrays", "Arrays"), "turn[1,2]"),
         (("Bouncing", "Bouncing"), "bounces"),
     ],
 )
-def test_fmus_that_are_not_ours_are_compared(harness, theirs, pair, told):
-    one, two = (theirs / f"{name}.fmu" for name in pair)
+def test_external_fmus_are_compared(harness, external_fmu_folder, pair, told):
+    one, two = (external_fmu_folder / f"{name}.fmu" for name in pair)
     done = harness("compare", one, two, "--tolerance", 1e-4, "--rtol", 2e-4, "--lenient")
     assert (done.returncode, done.stderr) == (0, "")
     assert told in done.stdout
 
 
-def test_fmus_that_are_run_are_run_to_the_same_stop(harness, theirs, tmp_path):
+def test_fmus_are_run_to_the_same_stop_time(harness, external_fmu_folder, tmp_path):
     shorter = {"modelDescription.xml": lambda text: text.replace('stopTime="1.0"', 'stopTime="0.75"')}
-    foreign.edited(theirs / "Breaking.fmu", tmp_path / "Shorter.fmu", shorter)
-    done = harness("compare", "Shorter.fmu", theirs / "Breaking.fmu", "--lenient", "--rtol", 0)
+    external_fmus.edited_copy(external_fmu_folder / "NonConforming.fmu", tmp_path / "Shorter.fmu", shorter)
+    done = harness("compare", "Shorter.fmu", external_fmu_folder / "NonConforming.fmu", "--lenient", "--rtol", 0)
     assert (done.returncode, done.stderr) == (0, "")
     assert "(common to both)" in done.stdout
 
 
-def test_an_fmu_that_ends_itself_is_compared_as_far_as_it_came(harness, theirs):
-    done = harness("compare", theirs / "Falling.fmu", theirs / "Falling.fmu", "--json")
+def test_an_fmu_that_terminates_is_compared_up_to_its_end(harness, external_fmu_folder):
+    done = harness("compare", external_fmu_folder / "Falling.fmu", external_fmu_folder / "Falling.fmu", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)["variables"][0]["largest"] == 0.0
     assert "it ends itself: fmi2DoStep answered Discard" in done.stderr
@@ -392,7 +392,7 @@ def test_an_fmu_that_ends_itself_is_compared_as_far_as_it_came(harness, theirs):
 @pytest.mark.parametrize("where", ["left", "right", "both"])
 @pytest.mark.parametrize("at", [1, 7, 18])
 @pytest.mark.parametrize("shift", [0.0, 0.013])
-def test_what_is_not_finite_on_either_side_is_a_difference_beyond_any_bound(lost, where, at, shift):
+def test_a_nonfinite_value_on_either_side_is_an_infinite_difference(lost, where, at, shift):
     """Also beside a variable that agrees, before and after it, and where times have to be interpolated."""
     t = np.linspace(0, 1, 20)
     good, bad = np.sin(t), np.where(np.arange(20) == at, lost, np.cos(t))
@@ -404,7 +404,7 @@ def test_what_is_not_finite_on_either_side_is_a_difference_beyond_any_bound(lost
     assert not found.worst <= 1e300
 
 
-def test_within_fails_on_what_is_not_a_number(tmp_path):
+def test_within_fails_on_nan(tmp_path):
     (tmp_path / "good.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
     (tmp_path / "bad.csv").write_text("t [s],x [m]\n0,1\n1,nan\n2,3\n")
     for pair in (("good.csv", "bad.csv"), ("bad.csv", "good.csv"), ("bad.csv", "bad.csv")):
@@ -425,7 +425,7 @@ def test_a_difference_is_relative_to_the_larger_side(turned):
     assert found.largest == 3.0
 
 
-def test_differences_near_the_end_of_the_range_of_numbers_have_a_share():
+def test_differences_near_overflow_have_a_relative_value():
     t = np.linspace(0, 1, 20)
     one, two = ({"x": np.full(20, value)} for value in (1e308, -1e308))
     found = compare(Signals("one", t, one, {"x": "m"}), Signals("two", t, two, {"x": "m"}))

@@ -10,7 +10,7 @@ from math import cos, sqrt
 import commands
 import numpy as np
 import pytest
-from builds import made
+from build_cache import cached_folder
 from fmpy.ssp.ssd import read_ssd
 
 from harness.errors import HarnessError, SceneError
@@ -51,13 +51,13 @@ def bodies(**changes):
     return CoupledBodies(**values | {name: value * one for name, value in changes.items()})
 
 
-def test_the_reference_knows_the_closed_form_of_dry_friction():
+def test_the_reference_agrees_with_the_closed_form_of_dry_friction():
     """x falls by 2 f/k in each half cycle, and rests where |x| <= f/k."""
     x = solve_bodies(bodies(hold=0.1, slide=0.1), np.array([1.0, 0.0]), np.pi * np.arange(8))[:, 0]
     assert x == pytest.approx([1.0, -0.8, 0.6, -0.4, 0.2, 0.0, 0.0, 0.0], abs=1e-9)
 
 
-def test_the_reference_knows_the_period_of_stick_slip():
+def test_the_reference_has_the_period_of_stick_slip():
     mu_s, mu_d, m, k, g, driver = 0.9, 0.6, 12.5, 742.5, 9.81, 0.034
     sled = bodies(m=m, k=k, hold=mu_s * m * g, slide=mu_d * m * g, driver=driver)
     first, period = mu_s * m * g / (k * driver), 3.345104499330
@@ -68,7 +68,7 @@ def test_the_reference_knows_the_period_of_stick_slip():
     assert x[4] - x[2] == pytest.approx(period * driver, rel=1e-9)
 
 
-def test_two_equal_masses_swing_against_each_other_as_their_closed_form_says(couple, tmp_path):
+def test_two_equal_coupled_masses_agree_with_their_closed_form(couple, tmp_path):
     """From x and -x both feel the stiffness k + 2 k_spring; the error falls in proportion to the step."""
     done = couple(PAIR, "--stop", "0.5", "--json")
     assert (done.returncode, done.stderr) == (0, "")
@@ -97,7 +97,7 @@ def run(fmus):
             done = commands.harness(folder, "couple", scene, blank=scene != SCENES[0])
             assert (done.returncode, done.stderr) == (0, "")
 
-        return made(f"coupled-{scene}", make) / "results/coupled" / scene
+        return cached_folder(f"coupled-{scene}", make) / "results/coupled" / scene
 
     return run
 
@@ -112,7 +112,7 @@ def engines(folder):
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_a_shipped_scene_tends_to_its_reference_in_every_engine(run, scene):
+def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
     """The error falls as the step does; Ecos and libcosim do the same, fmpy passes the first forces a step later."""
     steps, errors = np.loadtxt(run(scene) / "error.csv", delimiter=",", skiprows=1).T
     assert np.log(errors[0] / errors[-1]) / np.log(steps[0] / steps[-1]) == pytest.approx(1.0, abs=0.25)
@@ -125,7 +125,7 @@ def test_a_shipped_scene_tends_to_its_reference_in_every_engine(run, scene):
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_an_archive_asks_of_a_tool_neither_factors_nor_values_in_line_nor_odd_names(run, scene):
+def test_an_archive_avoids_factors_inline_values_and_unusual_names(run, scene):
     (file,) = run(scene).glob("*.ssp")
     system = read_ssd(str(file)).system  # which checks it against the schema
     names = [system.name, *(element.name for element in system.elements)]
@@ -140,22 +140,22 @@ def test_an_archive_asks_of_a_tool_neither_factors_nor_values_in_line_nor_odd_na
     assert len(bound) > 1
 
 
-def test_an_archive_of_anyone_s_is_run_beside_its_own_finest_run(run, place):
+def test_an_external_archive_is_compared_with_its_finest_run(run, user_folder):
     done = commands.harness(
-        place, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json", blank=True
+        user_folder, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json", blank=True
     )
     assert (done.returncode, done.stderr) == (0, "")
     told = json.loads(done.stdout)
     assert told["order"] > 0.8
     assert {name: each["why not"] for name, each in told["engines"].items()} == dict.fromkeys(ENGINES, "")
-    table = np.loadtxt(place / "theirs/coupled/driven/trajectory.csv", delimiter=",", skiprows=1)
+    table = np.loadtxt(user_folder / "theirs/coupled/driven/trajectory.csv", delimiter=",", skiprows=1)
     ours = np.loadtxt(run("driven") / "trajectory.csv", delimiter=",", skiprows=1)
-    heads = (place / "theirs/coupled/driven/trajectory.csv").read_text().splitlines()[0].split(",")
+    heads = (user_folder / "theirs/coupled/driven/trajectory.csv").read_text().splitlines()[0].split(",")
     column = heads.index("shaken.x [m]")
     assert table[-1, column] == pytest.approx(np.interp(0.5, ours[:, 0], ours[:, 4]), abs=1e-3)
 
 
-def test_what_is_no_archive_is_told(couple, tmp_path):
+def test_an_invalid_archive_is_reported(couple, tmp_path):
     (tmp_path / "no.ssp").write_text("no archive")
     for name, sentence in (("no.ssp", "no.ssp cannot be read"), ("gone.ssp", "there is no gone.ssp")):
         done = couple(name)
@@ -184,7 +184,7 @@ def test_what_is_no_archive_is_told(couple, tmp_path):
         (PAIR + 'connections = [{ from = "a.mode", to = "b", factor = 1.0 }]\n', 2, "unknown output 'mode'"),
     ],
 )
-def test_what_a_coupled_scene_gets_wrong_is_one_sentence(couple, tmp_path, text, status, sentence):
+def test_an_invalid_coupled_scene_is_one_sentence(couple, tmp_path, text, status, sentence):
     done = couple(text)
     assert done.returncode == status
     assert sentence in done.stderr
@@ -192,14 +192,14 @@ def test_what_a_coupled_scene_gets_wrong_is_one_sentence(couple, tmp_path, text,
     assert not (tmp_path / "results/coupled/mine").exists()
 
 
-def test_a_scene_is_read_before_any_fmu_is(monkeypatch, tmp_path):
+def test_a_scene_is_checked_before_any_fmu(monkeypatch, tmp_path):
     """A slip of the pen is told as such where nothing is built."""
     monkeypatch.setattr(study, "start_values", lambda fmu: pytest.fail("an FMU was read"))
     with pytest.raises(SceneError, match="unknown coupled scene 'two-mases'"):
         study.run_coupled("two-mases", tmp_path, None, lambda share: None)
 
 
-def test_an_engine_that_hangs_is_told_by_its_name(monkeypatch, tmp_path):
+def test_an_engine_that_hangs_is_reported_by_name(monkeypatch, tmp_path):
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(100)\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setitem(ENGINES, "Sleeper", "sleeps")

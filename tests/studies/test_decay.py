@@ -10,8 +10,8 @@ from dataclasses import replace
 import commands
 import numpy as np
 import pytest
-from builds import ROOT
-from decays import swung
+from build_cache import ROOT
+from decays import decay_record
 from matplotlib.figure import Figure
 
 from harness.analyses.decay.energy_loss import measure_energy_loss
@@ -24,12 +24,12 @@ from harness.studies.decay.table import decay_table
 
 
 def test_the_table_has_a_row_for_every_value():
-    found = fit_decay(swung(0.02, 0.003, noise=1e-4), KnownParameters(k=157.9))
+    found = fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters(k=157.9))
     assert decay_table(found).row_count == len(found.estimates) == 8
 
 
-def test_the_numbers_keep_their_names():
-    found = identified_as_json(fit_decay(swung(0.02, 0.003, noise=1e-4), KnownParameters()))
+def test_the_quantities_keep_their_names():
+    found = identified_as_json(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
     assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(found)
     assert {each["name"] for each in found["fit"]} == {"omega", "zeta", "r", "b", "rest"}
     assert all({"value", "error", "low", "high", "unit"} <= set(each) for each in found["fit"])
@@ -37,12 +37,12 @@ def test_the_numbers_keep_their_names():
     assert set(found["loss"]["laws"]) == {"+".join(law) for law in LAWS}
 
 
-def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(tmp_path, monkeypatch):
+def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples(tmp_path, monkeypatch):
     """Of a record whose clock counts from 1970."""
     figures = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
     t = np.linspace(0.0, 9.0, 3001)
-    record = swung(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
+    record = decay_record(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
     found = fit_decay(replace(record, t=record.t + 1.7e9), KnownParameters(pendulum=True))
     draw(found, measure_energy_loss(found), tmp_path / "figure.svg")
     signal, residuals, shares = figures[0].get_axes()
@@ -55,7 +55,7 @@ def test_a_figure_shows_angles_in_degrees_and_leaves_out_only_what_was_left_out(
 
 
 @pytest.mark.parametrize("count", [3000, 120_000])
-def test_of_many_samples_those_are_drawn_that_show_how_far_they_reach(count):
+def test_downsampling_keeps_the_extremes(count):
     x = np.sin(np.arange(count)) + np.random.default_rng(1).standard_normal(count)
     some, wide = extremes(x), -(-2 * count // MAX_POINTS)
     assert len(some) <= min(count, 3 * MAX_POINTS // 2)
@@ -81,7 +81,7 @@ def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_pa
     assert found["c"] == pytest.approx(0.3, rel=1e-9)
 
 
-def test_a_scene_leaves_numbers_turning_points_fit_and_figure(fmus, tmp_path):
+def test_a_scene_writes_quantities_turning_points_fit_and_figure(fmus, tmp_path):
     (tmp_path / "fmus").symlink_to(fmus)
     done = harness(tmp_path, "decay", "coulomb")
     assert (done.returncode, done.stderr) == (0, "")
@@ -95,15 +95,15 @@ def test_a_scene_leaves_numbers_turning_points_fit_and_figure(fmus, tmp_path):
         assert next(csv.reader(file)) == ["t [s]", "x [m]", "fit [m]", "residual [m]"]
 
 
-def test_standard_input_is_a_record_too(tmp_path):
-    record = swung(0.02, noise=1e-4)
+def test_standard_input_is_accepted_as_a_record(tmp_path):
+    record = decay_record(0.02, noise=1e-4)
     text = "t [s],x [m]\n" + "\n".join(f"{t:.9g},{x:.9g}" for t, x in zip(record.t, record.x, strict=True))
     done = harness(tmp_path, "decay", "-", "--json", text=text)
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["record"] == "stdin"
 
 
-def test_a_record_waits_for_nothing_that_it_does_not_need(tmp_path):
+def test_a_record_needs_no_fmu_modules_and_one_drawing(tmp_path):
     """Nothing that runs FMUs is imported; the figure is drawn once."""
     program = """
 import sys
@@ -140,7 +140,7 @@ print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harnes
         (["decay", "x.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: one column is fitted"),
     ],
 )
-def test_what_the_command_line_gets_wrong_is_one_sentence(fmus, tmp_path, arguments, status, sentence):
+def test_a_wrong_command_line_is_one_sentence(fmus, tmp_path, arguments, status, sentence):
     (tmp_path / "fmus").symlink_to(fmus)
     done = harness(tmp_path, *arguments)
     assert done.returncode == status

@@ -9,8 +9,8 @@ from time import sleep
 import commands
 import numpy as np
 import pytest
-from builds import of_file
-from models import AUTHORED
+from build_cache import build_user_model
+from models import EXAMPLE_MODELS
 
 from harness.errors import HarnessError
 from harness.references import peer_solvers
@@ -40,13 +40,13 @@ CASE = {case.name: case for case in CASES}
 SMOOTH = [case for case in CASES if not case.is_chattering]
 
 
-def command(place, *arguments):
+def command(user_folder, *arguments):
     """The finished process of `python -m harness precision` in a folder."""
-    return commands.harness(place, "precision", *arguments, base={}, PATH="", COLUMNS="100")
+    return commands.harness(user_folder, "precision", *arguments, base={}, PATH="", COLUMNS="100")
 
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "stickslip"])
-def test_exact_is_within_1e_13_of_the_truth_and_1e_14_of_every_event(fmus, name):
+def test_exact_is_within_1e_13_of_the_reference_and_1e_14_of_every_event(fmus, name):
     truth = load_reference(name)
     answer = EmbeddedModel.create(load_model_class(fmus / f"{name}.fmu"), {}, "exact", 0.0).solve(truth.times.tolist())
     found = compute_errors(answer, truth)
@@ -55,7 +55,7 @@ def test_exact_is_within_1e_13_of_the_truth_and_1e_14_of_every_event(fmus, name)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_every_method_of_the_fmu_comes_near_the_truth_of_its_law(fmus, case):
+def test_every_method_of_the_fmu_approaches_the_reference_of_its_law(fmus, case):
     truth, model = load_reference(case.reference_source), load_model_class(fmus / f"{case.model}.fmu")
     within = (
         0.02 if case.reference_source == "stickslip-threshold" else 2e-3
@@ -69,7 +69,7 @@ def test_every_method_of_the_fmu_comes_near_the_truth_of_its_law(fmus, case):
 
 
 @pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
-def test_every_peer_that_is_installed_comes_near_the_truth_and_its_events(case):
+def test_every_installed_peer_approaches_the_reference_and_its_events(case):
     truth = load_reference(case.reference_source)
     for peer, methods in {"scipy": ("DOP853", "LSODA", "Radau"), "cvode": ("Adams", "BDF")}.items():
         for method in methods:
@@ -83,14 +83,14 @@ def test_every_peer_that_is_installed_comes_near_the_truth_and_its_events(case):
             assert answer.evaluations > 100
 
 
-def test_a_peer_that_is_not_installed_is_named_and_left_out(fmus, monkeypatch):
+def test_a_missing_peer_is_listed_and_skipped(fmus, monkeypatch):
     monkeypatch.setitem(peer_solvers.PACKAGES, "cvode", ("no_such_module", "scikit-sundae"))
     assert peer_solvers.missing_packages()["cvode"] == "scikit-sundae"
     file = fmus / "smd.fmu"
     assert "cvode" not in [job.tool for job in solver_jobs(CASE["smd"], load_model_class(file), file)]
 
 
-def test_a_run_is_watched_in_steps_and_in_time():
+def test_a_run_is_limited_in_steps_and_in_time():
     ask = partial(peer_solvers.solve, "scipy", "RK23", CASE["smd"].problem, load_reference("smd").times, 1e-9, 1e-12)
     with pytest.raises(HarnessError, match=r"^at t = .* s after 500 right-hand sides$"):
         ask(peer_solvers.limit_evaluations(500))
@@ -98,7 +98,7 @@ def test_a_run_is_watched_in_steps_and_in_time():
         ask(peer_solvers.limit_run_time(1e-3))
 
 
-def test_a_failed_run_is_a_gap_and_after_a_slow_one_tighter_ones_are_not_tried():
+def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped():
     asked = []
 
     def run(rtol, extent):
@@ -135,7 +135,7 @@ def point(method, seconds, largest, tool=FMU, case="stickslip", **more):
     return Point(case, tool, method, 1e-6, 1e-9, seconds=seconds, evaluations=1, largest=largest, **more)
 
 
-def test_the_advice_is_read_off_the_points():
+def test_the_advice_is_derived_from_the_points():
     points = (
         point("ode23", 1e-3, 1e-3),
         point("ode23", 8e-3, 1e-7),
@@ -154,7 +154,7 @@ def test_the_advice_is_read_off_the_points():
     assert advice.recommend(nothing, []) == "stickslip: no method of the FMU gets there."
 
 
-def test_advice_is_not_given_where_the_figures_do_not_carry_it():
+def test_no_advice_is_given_without_sufficient_evidence():
     """Of a quick run, where another solver comes near or before the best method; of a whole one, a peer that is before
     it is named as one."""
     own, slower = point("rodas", 2e-3, 1e-7), point("ode23", 4e-3, 1e-7)
@@ -169,8 +169,8 @@ def test_advice_is_not_given_where_the_figures_do_not_carry_it():
     assert advice.recommend(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.min_ratio) == untold
 
 
-def test_a_quick_run_does_not_take_the_place_of_a_whole_one(place, tmp_path, monkeypatch):
-    monkeypatch.chdir(place)
+def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(user_folder)
     folder = tmp_path / "precision"
     folder.mkdir()
     write_provenance(folder, [], name="smd.json")
@@ -196,17 +196,19 @@ def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
     assert soft.rms > steep.rms
 
 
-def test_stuck_points_are_those_between_a_stop_and_the_next_break_away():
+def test_stuck_points_lie_between_a_stop_and_the_next_breakaway():
     truth = load_reference("stickslip")
     stuck = law_deviations.stuck_points(truth)
     assert np.array_equal(stuck, truth.motion[:, 1] == 0.0)
     assert not law_deviations.stuck_points(load_reference("coulomb"))[1:].any()
 
 
-@pytest.mark.parametrize(("path", "ending"), [*zip(AUTHORED, cycle((".py", ".fmu")))], ids=lambda one: Path(one).name)
-def test_a_file_of_a_user_is_studied_by_its_path_or_that_of_its_fmu_as_ours_are(path, ending):
+@pytest.mark.parametrize(
+    ("path", "ending"), [*zip(EXAMPLE_MODELS, cycle((".py", ".fmu")))], ids=lambda one: Path(one).name
+)
+def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
     """Every way that needs no equations but those of the file; two of its methods agree about what is true."""
-    name = (of_file(path) / path.name).with_suffix(ending)
+    name = (build_user_model(path) / path.name).with_suffix(ending)
     found = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), lambda share: None)
     assert found.model == path.stem
     assert {tool for tool, _ in found.solvers(found.cases[0])} == {FMU, FMPY, *FMI3_INTERFACES}
@@ -214,8 +216,8 @@ def test_a_file_of_a_user_is_studied_by_its_path_or_that_of_its_fmu_as_ours_are(
     assert best[FMU] == best[FMPY] < 1e-3
 
 
-def test_an_unknown_model_is_one_sentence(place, tmp_path):
-    done = command(place, "stikslip", "--out", tmp_path)
+def test_an_unknown_model_is_one_sentence(user_folder, tmp_path):
+    done = command(user_folder, "stikslip", "--out", tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("Error: unknown model 'stikslip' (nearest: 'stickslip'); allowed: coulomb, ")
     assert not list(tmp_path.iterdir())

@@ -8,7 +8,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from builds import ROOT, made
+from build_cache import ROOT, cached_folder
 
 SCENES = {path.stem: tomllib.loads(path.read_text()) for path in sorted((ROOT / "harness/scenes").glob("*.toml"))}
 SCENES.pop("pacejka-0.001")
@@ -69,7 +69,7 @@ def drawn(fmus):
         assert done.returncode == 0, done.stderr
         (folder / "told.json").write_text(done.stdout)
 
-    return json.loads((made("drawn", make) / "told.json").read_text())
+    return json.loads((cached_folder("drawn", make) / "told.json").read_text())
 
 
 def curves(scene):
@@ -79,19 +79,19 @@ def curves(scene):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_curve_has_no_corners_though_steps_are_large(drawn, name):
+def test_a_curve_is_smooth_despite_large_steps(drawn, name):
     for _, t, _ in curves(drawn[name]).values():
         assert np.diff(t).max() < 2.01 * (t[-1] - t[0]) / 1000
 
 
-def test_it_is_the_solver_that_is_shown_and_not_who_looks(drawn):
+def test_the_plotted_steps_are_those_of_the_solver(drawn):
     """The steps are those of the run that was measured, the curve has more points than it."""
     _, t, _ = drawn["smd"]["panels"]["step size of the solver"]["lines"][0]
     assert len(t) + 1 == drawn["smd"]["samples"] < 300 < len(curves(drawn["smd"])["position of the mass"][1])
 
 
 @pytest.mark.parametrize("name", MODAL)
-def test_every_stick_is_shaded_from_where_it_begins(drawn, name):
+def test_every_stick_phase_is_shaded_from_its_start(drawn, name):
     for title in curves(drawn[name]):
         stuck = drawn[name]["panels"][title]["stuck"]
         assert stuck == pytest.approx(drawn[name]["sticks"][: len(stuck)])
@@ -120,7 +120,7 @@ def test_angles_are_in_degrees(drawn):
         ("stickslip-threshold", "speed of the sled", ["peak_speed"]),
     ],
 )
-def test_a_published_figure_stands_beside_ours(drawn, name, title, figures):
+def test_a_published_figure_is_shown_for_comparison(drawn, name, title, figures):
     published = [SCENES[name]["published"][figure] for figure in figures]
     lines = drawn[name]["panels"][title]["lines"]
     found = [y[0] for text, _, y in lines if text.startswith("published") and len(set(y)) == 1]
@@ -128,14 +128,14 @@ def test_a_published_figure_stands_beside_ours(drawn, name, title, figures):
 
 
 @pytest.mark.parametrize("name", ["smd", "stickslip-threshold", "pacejka-0.01"])
-def test_the_published_mean_step_stands_beside_ours(drawn, name):
+def test_the_published_mean_step_is_shown_for_comparison(drawn, name):
     value, unit = SCENES[name]["published"]["mean_step"]
     found = {text: y[0] for text, _, y in drawn[name]["panels"]["step size of the solver"]["lines"]}
     assert found[f"published {value:.5g} {unit}"] == pytest.approx(1e-3 * value)
 
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "pendulum"])
-def test_the_envelope_of_the_published_loss_goes_through_the_turning_points(drawn, name):
+def test_the_envelope_of_the_published_loss_passes_through_the_turning_points(drawn, name):
     """To what the published value differs from ours."""
     lines = next(iter(drawn[name]["panels"].values()))["lines"]
     turning = next(np.abs(y) for text, _, y in lines if text == "turning points")

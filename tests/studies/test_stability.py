@@ -10,12 +10,12 @@ from dataclasses import replace
 from math import nan
 
 import commands
-import evidence
-import evidence_pendulum
+import independent_pendulum
+import independent_solution
 import numpy as np
 import pytest
-from builds import of_file
-from models import AUTHORED, LARGER, MODELS, ROOT, declared
+from build_cache import build_user_model
+from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, ROOT, declared
 
 from harness.errors import HarnessError
 from harness.references.models.pacejka import MagicFormula
@@ -89,39 +89,46 @@ LINEAR = {
 
 
 @pytest.mark.parametrize("case", LINEAR.values(), ids=LINEAR)
-def test_the_closed_form_is_that_of_the_evidence(case):
+def test_the_closed_form_agrees_with_the_independent_one(case):
     name, chosen = case
     values, stop = {**defaults(name), **chosen}, 16.0 if name == "stickslip" else 4.0
     found = compute_reference(name, [(0.0, stop, values)], CommunicationGrid(0.0, stop, 60))
     traits = {k: v for k, v in chosen.items() if k not in ("x0", "v0")}
-    motion = evidence.Trajectory([(0.0, getattr(evidence, name)(**traits))], values["x0"], values["v0"], stop)
+    motion = independent_solution.ClosedFormMotion(
+        [(0.0, getattr(independent_solution, name)(**traits))], values["x0"], values["v0"], stop
+    )
     expected = np.array([[float(value) for value in motion.at(t)] for t in found.times]).T
     np.testing.assert_allclose([found.x, found.v], expected, rtol=1e-15, atol=1e-18)
     assert [mode for _, mode in found.events] == [mode for _, mode in motion.events]
     assert [t for t, _ in found.events] == pytest.approx([float(t) for t, _ in motion.events], rel=1e-15)
 
 
-def test_a_change_of_values_starts_a_new_piece():
+def test_a_change_of_values_starts_a_new_segment():
     values = defaults("stickslip")
     changes = {2.0: {"F_ext": 90.0}, 2.1: {"F_ext": -50.0}}
     found = compute_reference(
         "stickslip", value_spans(0.0, 16.0, values, changes), CommunicationGrid(0.0, 16.0, 40, (2.0, 2.1))
     )
-    parts = [(0.0, evidence.stickslip()), *((t, evidence.stickslip(**change)) for t, change in changes.items())]
-    motion = evidence.Trajectory(parts, 0.0, 0.0, 16.0)
+    parts = [
+        (0.0, independent_solution.stickslip()),
+        *((t, independent_solution.stickslip(**change)) for t, change in changes.items()),
+    ]
+    motion = independent_solution.ClosedFormMotion(parts, 0.0, 0.0, 16.0)
     assert list(found.x) == pytest.approx([float(motion.at(t)[0]) for t in found.times], rel=1e-15, abs=1e-18)
 
 
 @pytest.mark.parametrize("reaction", [False, True], ids=["weight", "reaction"])
-def test_the_pendulum_is_that_of_the_evidence(reaction):
+def test_the_pendulum_agrees_with_the_independent_one(reaction):
     values = {**defaults("pendulum"), "pin_load": 1 + reaction}
     found = compute_reference("pendulum", [(0.0, 5.0, values)], CommunicationGrid(0.0, 5.0, 60))
-    swing = evidence_pendulum.Swing([(0.0, evidence_pendulum.Pendulum(reaction))], values["theta0"], 0.0, 5.0)
+    swing = independent_pendulum.PendulumMotion(
+        [(0.0, independent_pendulum.Pendulum(reaction))], values["theta0"], 0.0, 5.0
+    )
     assert list(found.x) == pytest.approx([swing.at(t)[0] for t in found.times], abs=1e-11)
     assert [mode for _, mode in found.events] == [mode for _, mode in swing.events]
 
 
-def test_the_smooth_sled_makes_no_energy_of_its_own():
+def test_the_smooth_sled_creates_no_energy():
     """Radau against the balance of power: d(kinetic energy) is the work of pull and friction."""
     values = defaults("pacejka")
     found = compute_reference("pacejka", [(0.0, 8.0, values)], CommunicationGrid(0.0, 8.0, 8000))
@@ -134,22 +141,22 @@ def test_the_smooth_sled_makes_no_energy_of_its_own():
 # ---- the bounds
 
 
-def test_a_hang_is_a_sentence():
+def test_a_hang_is_one_sentence():
     with pytest.raises(HarnessError, match=r"no answer after 0\.5 s"):
         run_with_timeout(0.5, time.sleep, 60)
 
 
-def test_a_crash_is_a_sentence():
+def test_a_crash_is_one_sentence():
     with pytest.raises(HarnessError, match="the process died with exit code 7"):
         run_with_timeout(30.0, os._exit, 7)
 
 
-def test_what_is_raised_comes_through():
+def test_an_exception_is_passed_on():
     with pytest.raises(ValueError, match="invalid literal"):
         run_with_timeout(30.0, int, "x")
 
 
-def test_a_process_is_asked_again_and_a_new_one_the_same_where_what_came_before_kills_it(tmp_path, monkeypatch):
+def test_a_worker_process_is_reused_and_replaced_after_a_crash(tmp_path, monkeypatch):
     """Each call is made where it is asked."""
     first = run_with_timeout(30.0, os.getpid)
     monkeypatch.chdir(tmp_path)
@@ -175,7 +182,7 @@ def case():
     return replace(CASE, setting=type("Setting", (), {"values": {}})())
 
 
-def test_a_true_motion_is_finished(case):
+def test_a_correct_motion_is_finished(case):
     assert judge_solution(case, GOOD, REST).ended == FINISHED
 
 
@@ -197,7 +204,7 @@ def test_a_plausible_wrong_motion_is_wrong(case, changed, said):
     assert said in row.text
 
 
-def test_a_refusal_says_the_words_and_leaves_no_numbers(case):
+def test_a_refusal_needs_its_message_and_no_values(case):
     expecting = replace(case, max_error=None, expected_message="mu_d is")
     assert judge_refusal(expecting, RefusedRun("mu_d is 1.0, above", all_nan=True)).ended == REFUSED
     for wrong in (RefusedRun("", True), RefusedRun("mu_d is 1.0", False), RefusedRun("something else", True)):
@@ -219,7 +226,7 @@ def test_the_slope_is_that_of_the_stiff_end(case):
 # ---- the table
 
 
-def test_every_scene_says_how_it_ends_for_a_model_that_there_is():
+def test_every_scene_states_its_expected_ending_for_an_existing_model():
     found, finish = load_scenes()
     assert set(finish) == {"exact", "tolerances", "least"}
     assert {scene["model"] for scene in found} == set(MODELS)
@@ -228,7 +235,7 @@ def test_every_scene_says_how_it_ends_for_a_model_that_there_is():
         assert "{" not in scene["title"], scene["title"]
 
 
-def test_a_scene_is_spread_over_models_and_values():
+def test_a_scene_is_expanded_over_models_and_values():
     scene = {"title": "rtol = {}", "models": ["smd", "coulomb"], "each": {"rtol": [0.1, 0.2]}}
     assert [(one["model"], one["title"], one["rtol"]) for one in expand_scene(scene)] == [
         ("smd", "rtol = 0.1", 0.1),
@@ -238,8 +245,8 @@ def test_a_scene_is_spread_over_models_and_values():
     ]
 
 
-def test_a_part_of_the_table_ends_as_it_should(place, tmp_path, monkeypatch):
-    monkeypatch.chdir(place)
+def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(user_folder)
     rows, (*_, region) = run_stability(tmp_path, silent, grouped_cases(each_once()))
     assert [f"{row.case.label}: {row.text}" for row in rows if not row.passed] == []
     assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas"}
@@ -256,7 +263,7 @@ def test_a_part_of_the_table_ends_as_it_should(place, tmp_path, monkeypatch):
     assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as they should.")
 
 
-def test_a_long_path_of_temporary_files_is_no_hindrance(tmp_path):
+def test_a_long_path_of_temporary_files_is_supported(tmp_path):
     """The socket of a server that processes are forked from has room for 107 bytes."""
     folder = tmp_path / ("long" * 25)
     folder.mkdir()
@@ -268,11 +275,11 @@ def test_a_long_path_of_temporary_files_is_no_hindrance(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["rotor_brake", "sleds", "belt"])
-def test_a_file_of_a_user_meets_the_usual_scenes_by_its_path(tmp_path, name):
+def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     """Its values, its tolerances and what is no number, by every method; what binds two values may refuse them, and a
     belt puts energy in."""
-    (path,) = (path for path in (*AUTHORED, *LARGER) if path.stem == name)
-    file = of_file(path) / f"{name}.fmu"
+    (path,) = (path for path in (*EXAMPLE_MODELS, *LARGER_MODELS) if path.stem == name)
+    file = build_user_model(path) / f"{name}.fmu"
     few = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")
     chosen = [[case for case in group if case.title.startswith(few)] for group in grouped_cases(models=[str(file)])]
     rows, _ = run_stability(tmp_path, silent, [group for group in chosen if group])
@@ -298,7 +305,7 @@ class Relax(Model):
 '''
 
 
-def test_what_has_no_position_and_speed_is_refused_by_stability_and_studied_by_precision(tmp_path):
+def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_precision(tmp_path):
     (tmp_path / "relax.py").write_text(RELAX)
     assert commands.build("relax.py", folder=tmp_path).returncode == 0
     done = commands.harness(tmp_path, "stability", "relax.py")
@@ -310,8 +317,8 @@ def test_what_has_no_position_and_speed_is_refused_by_stability_and_studied_by_p
     assert (tmp_path / "results/precision/relax.csv").is_file()
 
 
-def test_a_motion_of_a_file_that_is_not_what_two_methods_agree_about_is_wrong():
-    file = str(of_file(AUTHORED[0]) / f"{AUTHORED[0].stem}.fmu")
+def test_a_motion_that_differs_from_two_agreeing_methods_is_wrong():
+    file = str(build_user_model(EXAMPLE_MODELS[0]) / f"{EXAMPLE_MODELS[0].stem}.fmu")
     group = next(group for group in grouped_cases(models=[file]) if group[0].title == "as it comes")
     one = replace(group[0], max_error=1e-300)
     (row,) = run_group([one])

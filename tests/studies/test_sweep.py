@@ -5,10 +5,10 @@ from functools import partial
 from math import sqrt
 
 import commands
-import foreign
+import external_fmus
 import numpy as np
 import pytest
-from sweeps import folder_of, opened
+from sweep_results import open_sweep, sweep_folder
 
 pandas = pytest.importorskip("pandas", reason="the extra 'sweep' is not installed")
 
@@ -55,12 +55,12 @@ def test_a_grid_has_every_combination_and_a_sample_every_stratum():
         ("a=1,2", True),
     ],
 )
-def test_an_axis_that_is_none_is_refused(text, random):
+def test_an_invalid_axis_is_refused(text, random):
     with pytest.raises(SceneError):
         parse_axis(text, random)
 
 
-def test_the_instance_that_is_reset_gives_what_a_fresh_one_gives(fmus):
+def test_a_reset_instance_gives_the_same_results_as_a_fresh_one(fmus):
     """Also after a run that failed."""
     measures = ("final", "events", "slips", "period", "peak_speed", "stuck")
     runs = SweepSpec("stickslip", ("mu_d", "v_driver"), (), measures)
@@ -77,7 +77,7 @@ def test_the_instance_that_is_reset_gives_what_a_fresh_one_gives(fmus):
     assert rows[0][2:] == pytest.approx([8, 4, 3.34510449933, peak, 16 - 3 * 0.430665996656 - 0.430665996656], rel=1e-4)
 
 
-def test_decay_measures_are_those_of_the_parameters(fmus):
+def test_decay_measures_match_the_parameters(fmus):
     with open_runner(SweepSpec("coulomb", ("f",), (), ("rest", "f_over_k")), fmus / "coulomb.fmu") as rerun:
         rest, ratio = rerun.run([2.0])
     assert ratio == pytest.approx(2 / 157.9, rel=1e-3)
@@ -86,17 +86,17 @@ def test_decay_measures_are_those_of_the_parameters(fmus):
         assert rerun.run([1.0]) == pytest.approx([1 / (2 * sqrt(157.9))], rel=1e-5)
 
 
-def test_a_map_is_labelled_for_xarray_and_pandas_the_same_for_any_number_of_workers(harness, tmp_path):
+def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(harness, tmp_path):
     for workers in (1, 4):
         done = harness(*MAP, "--workers", workers, "--out", f"out{workers}", blank=workers == 1)
         assert (done.returncode, done.stderr) == (0, "")
         assert "12 runs, 0 of them done before, 0 failed" in done.stdout
-    one, four = (folder_of(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 4))
+    one, four = (sweep_folder(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 4))
     for file in ("sweep.nc", "sweep.csv"):
         assert (one / file).read_bytes() == (four / file).read_bytes()
     assert {file.name for file in four.iterdir()} == {"sweep.nc", "sweep.csv", "figure.svg", "provenance.json"}
     assert [file.name for file in one.parent.iterdir()] == [one.name]
-    data = opened(one)
+    data = open_sweep(one)
     assert data["slips"].dims == ("mu_d", "v_driver")
     assert data["v_driver"].attrs["units"] == data["final_v"].attrs["units"] == "m/s"
     assert len(data.attrs["fmu_sha256"]) == 64
@@ -106,7 +106,7 @@ def test_a_map_is_labelled_for_xarray_and_pandas_the_same_for_any_number_of_work
     assert (table["slips"].to_numpy().reshape(4, 3) == data["slips"].to_numpy()).all()
 
 
-def test_failed_runs_leave_their_sentence_on_the_screen_in_the_files_and_in_the_exit_status(harness, tmp_path):
+def test_failed_runs_are_reported_on_screen_in_files_and_in_the_exit_status(harness, tmp_path):
     vary = ("--vary", "mu_d=0.5:1:5", "--vary", "m=-1,2")
     done = harness("sweep", "stickslip", *vary, "--set", "k=100", "--workers", 1, "--name", "mine")
     assert done.returncode == 1
@@ -116,7 +116,7 @@ def test_failed_runs_leave_their_sentence_on_the_screen_in_the_files_and_in_the_
     assert [kind.partition(":")[0] for kind in kinds] == ["5 like mu_d = 0.5, m = -1.0", "1 like mu_d = 1.0, m = 2.0"]
     assert "m = -1.0" in kinds[0].partition(":")[2]
     assert kinds[1].endswith("lower mu_d or raise mu_s")
-    data = opened(tmp_path / "results/sweep/mine")
+    data = open_sweep(tmp_path / "results/sweep/mine")
     assert [bool(text) for text in data["error"].sel(m=2).to_numpy()] == [False, False, False, False, True]
     assert "above mu_s = 0.9" in str(data["error"].to_numpy()[4, 1])
     assert np.isnan(data["final_x"].to_numpy()[4, 1])
@@ -126,14 +126,14 @@ def test_failed_runs_leave_their_sentence_on_the_screen_in_the_files_and_in_the_
 
 TOLD = {  # why some have no run to show
     "Falling": "it ends itself: fmi2DoStep answered Discard",
-    "Breaking": "breaks the FMI standard in 2 places",
+    "NonConforming": "breaks the FMI standard in 2 places",
 }
 
 
-@pytest.mark.parametrize("name", foreign.VARY)
-def test_an_fmu_of_anyone_is_swept_or_says_why_not(harness, tmp_path, name):
+@pytest.mark.parametrize("name", external_fmus.SWEEP_AXES)
+def test_an_external_fmu_is_swept_or_refused_with_a_reason(harness, tmp_path, name):
     """Numbers alone are measured: of arrays each element, of texts nothing."""
-    fmu, vary = foreign.built() / f"{name}.fmu", foreign.VARY[name].replace(":3", ":2")
+    fmu, vary = external_fmus.build_external_fmus() / f"{name}.fmu", external_fmus.SWEEP_AXES[name].replace(":3", ":2")
     done = harness(
         "sweep", fmu, "--vary", vary, "--measure", "final,largest", "--name", "a", "--tolerance", 1e-3, blank=True
     )
@@ -141,35 +141,35 @@ def test_an_fmu_of_anyone_is_swept_or_says_why_not(harness, tmp_path, name):
         assert (done.returncode, TOLD[name] in done.stderr) == (1, True)
         return
     assert (done.returncode, done.stderr) == (0, "")
-    data = opened(tmp_path / "results/sweep/a").drop_vars("error")
+    data = open_sweep(tmp_path / "results/sweep/a").drop_vars("error")
     assert len(data.data_vars) >= 2
     for measured in data.data_vars.values():
         assert np.isfinite(measured.to_numpy()).all()
     assert any(len(set(measured.to_numpy().tolist())) == 2 for measured in data.data_vars.values())
 
 
-def test_runs_of_anyone_s_fmu_that_crash_or_fail_are_sentences_among_many(harness, tmp_path):
+def test_crashing_and_failing_runs_of_an_external_fmu_are_reported_individually(harness, tmp_path):
     """With kind 0 it does well, with 2 it crashes, with 6 it fails."""
-    trouble = foreign.built() / "Trouble.fmu"
+    trouble = external_fmus.build_external_fmus() / "Faulty.fmu"
     done = harness("sweep", trouble, "--vary", "kind=2,6,0", "--name", "a", "--workers", 2, blank=True)
     assert done.returncode == 1
     assert done.stderr.startswith("Error: 2 of 3 runs failed")
     assert "its binary has crashed" in done.stderr
-    error = opened(tmp_path / "results/sweep/a")["error"].to_numpy().tolist()
+    error = open_sweep(tmp_path / "results/sweep/a")["error"].to_numpy().tolist()
     assert [bool(sentence) for sentence in error] == [True, True, False]
 
 
-def test_sweeps_of_different_ranges_have_folders_of_their_own(harness, tmp_path):
+def test_sweeps_of_different_ranges_have_separate_folders(harness, tmp_path):
     for vary in ("m=1:2:2", "m=1:3:2"):
         assert harness("sweep", "smd", "--vary", vary, "--workers", 1, blank=True).returncode == 0
-    found = [opened(folder)["m"].to_numpy().tolist() for folder in (tmp_path / "results/sweep").iterdir()]
+    found = [open_sweep(folder)["m"].to_numpy().tolist() for folder in (tmp_path / "results/sweep").iterdir()]
     assert sorted(found) == [[1.0, 2.0], [1.0, 3.0]]
 
 
 def test_a_sample_has_a_row_for_each_run(harness, tmp_path):
     done = harness("sweep", "coulomb", "--vary", "f=0.1:2", "--vary", "k=50:500:log", "--random", 7, "--workers", 1)
     assert (done.returncode, done.stderr) == (0, "")
-    data = opened(folder_of(tmp_path / "results", "coulomb-f-k"))
+    data = open_sweep(sweep_folder(tmp_path / "results", "coulomb-f-k"))
     assert data.sizes == {"run": 7}
     assert data["k"].dims == ("run",)
     assert set(data.coords) == {"f", "k"}
@@ -179,7 +179,7 @@ def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(harness, 
     """Its slope is positive there, so that it damps; beyond it the sled sticks and slips."""
     arguments = ("--vary", "x_m=0.03,0.06", "--vary", "v_driver=0.02,0.04,0.08", "--measure", "unsteady", "--stop", 40)
     assert harness("sweep", "pacejka", *arguments, "--workers", 2, blank=True).returncode == 0
-    steady = opened(folder_of(tmp_path / "results", "pacejka-x_m-v_driver"))["unsteady"].to_numpy() < 0.1
+    steady = open_sweep(sweep_folder(tmp_path / "results", "pacejka-x_m-v_driver"))["unsteady"].to_numpy() < 0.1
     assert steady.tolist() == [[True, False, False], [True, True, False]]
 
 
@@ -210,7 +210,7 @@ def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(harness, 
         (["stickslip", "--vary", "friction=1.5,2"], 2, "friction is a choice"),
     ],
 )
-def test_what_a_sweep_gets_wrong_is_one_sentence(harness, tmp_path, arguments, status, sentence):
+def test_an_invalid_sweep_is_one_sentence(harness, tmp_path, arguments, status, sentence):
     done = harness("sweep", *arguments)
     assert done.returncode == status
     assert sentence in done.stderr

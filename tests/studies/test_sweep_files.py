@@ -6,7 +6,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 from models import MODELS
-from sweeps import opened, xarray
+from sweep_results import open_sweep, xarray
 
 from harness.errors import HarnessError
 from harness.results.netcdf import NetCDFVariable, NetCDFWriter
@@ -20,7 +20,7 @@ from harness.studies.sweep.sampling import SweepPoints, parse_axis
 from harness.studies.sweep.study import Sweep
 
 
-def test_what_is_held_in_memory_does_not_grow_with_the_runs(monkeypatch, tmp_path):
+def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path):
     """The parts of a sweep that touch every run, on ten times as many of them."""
     monkeypatch.setattr(figure, "draw", lambda *arguments: None)
     peaks = []
@@ -40,13 +40,13 @@ def test_what_is_held_in_memory_does_not_grow_with_the_runs(monkeypatch, tmp_pat
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert failure.runs == len(sweep.points) // 200
-        data = opened(folder)
+        data = open_sweep(folder)
         assert (data["c"] == data["a"]).all()
         assert (data["error"] != "").sum() == failure.runs
     assert peaks[1] < 1.5 * peaks[0]
 
 
-def test_a_netcdf_file_written_piece_by_piece_is_read_as_it_was_meant(tmp_path):
+def test_a_netcdf_file_written_in_blocks_is_read_correctly(tmp_path):
     values = np.arange(12.0).reshape(3, 4) / 7
     texts = np.array(["", "a", "four", "\u00e9\u00e9", "b"])
     with (tmp_path / "a.nc").open("wb") as stream:
@@ -76,13 +76,13 @@ def test_a_netcdf_file_written_piece_by_piece_is_read_as_it_was_meant(tmp_path):
         ((np.nan, np.nan), "linear", "linear"),
     ],
 )
-def test_an_axis_is_logarithmic_where_its_values_lie_over_decades(values, spread, kind):
+def test_an_axis_spanning_decades_is_logarithmic(values, spread, kind):
     data = xarray.Dataset({"a": ("n", np.array(values), {"scale": spread})})
     assert figure.axis_scale(data, "a") == kind
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_known_boundaries_travel_in_the_fmu_and_depend_on_its_parameters(fmus, name):
+def test_known_boundaries_are_packed_in_the_fmu_and_depend_on_its_parameters(fmus, name):
     """At its own values each quantity is a number; what it depends on is declared."""
     values = {
         variable.name: float(variable.start)
@@ -99,7 +99,7 @@ def test_known_boundaries_travel_in_the_fmu_and_depend_on_its_parameters(fmus, n
 @pytest.mark.parametrize(
     "quantity", ["m.real", "__import__('os')", "9**9**9", "(lambda: m)()", "m[0]", "'m'", "(", "abs(x=m)"]
 )
-def test_a_boundary_that_is_more_than_arithmetic_is_refused(tmp_path, quantity):
+def test_a_boundary_beyond_arithmetic_is_refused(tmp_path, quantity):
     with ZipFile(tmp_path / "odd.fmu", "w") as archive:
         table = f'[[boundaries]]\ntext = "a"\nbelow = "b"\nquantity = "{quantity}"\n'
         archive.writestr("documentation/boundaries.toml", table)

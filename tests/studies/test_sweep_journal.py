@@ -22,7 +22,7 @@ def harness(fmus, tmp_path):
     return partial(commands.harness, tmp_path)
 
 
-def test_the_fmu_belongs_to_what_tells_a_sweep_from_any_other():
+def test_the_fmu_is_part_of_the_identity_of_a_sweep():
     runs = SweepSpec("smd", ("m",), (), ("final",))
     one, two = (Sweep(runs, SweepPoints((SweepAxis("m", (1.0, 2.0)),)), fmu, 2) for fmu in (b"a", b"b"))
     assert one.key != two.key
@@ -44,7 +44,7 @@ DAMAGED = (
 
 
 @pytest.mark.parametrize("damaged", DAMAGED)
-def test_a_damaged_line_of_a_journal_is_left_out_and_counted(tmp_path, damaged):
+def test_a_damaged_journal_line_is_skipped_and_counted(tmp_path, damaged):
     file = tmp_path / "journal"
     file.write_bytes(GOOD + damaged + b"\n" + line(7, [[3.0, 4.0]], {}))
     kept = Journal(file, 10, 2)
@@ -59,7 +59,7 @@ def test_a_damaged_line_of_a_journal_is_left_out_and_counted(tmp_path, damaged):
     assert (kept.n_done, kept.damaged) == (2, 0)  # a kill cut it off
 
 
-def test_a_damaged_journal_is_told_and_the_runs_are_done_again(harness, tmp_path):
+def test_a_damaged_journal_is_reported_and_its_runs_are_repeated(harness, tmp_path):
     arguments = ("sweep", "smd", "--vary", "m=1:2:4", "--workers", 1, "--name", "mine")
     assert harness(*arguments, "--out", "whole", blank=True).returncode == 0
     (tmp_path / "results/sweep").mkdir(parents=True)
@@ -75,7 +75,7 @@ def test_a_damaged_journal_is_told_and_the_runs_are_done_again(harness, tmp_path
     assert (tmp_path / "results" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
 
 
-def test_a_journal_that_cannot_be_used_is_told(tmp_path):
+def test_an_unusable_journal_is_reported(tmp_path):
     (tmp_path / "folder").mkdir()
     with pytest.raises(HarnessError, match=r"journal .*folder cannot be used: Is a directory"):
         Journal(tmp_path / "folder", 1, 1)

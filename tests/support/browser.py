@@ -21,21 +21,21 @@ class Browser:
     """The process; `said` collects what its pages write to the console, `asked` the addresses that they load."""
 
     def __init__(self):
-        self.room = TemporaryDirectory(ignore_cleanup_errors=True)  # chromium's last child may still write
+        self.temporary_folder = TemporaryDirectory(ignore_cleanup_errors=True)  # chromium's last child may still write
         ours, theirs = zip(*(self.pipe(i) for i in (1, 0)), strict=True)
 
         def place():
             os.dup2(theirs[0], READS)
             os.dup2(theirs[1], WRITES)
 
-        own = (f"--user-data-dir={self.room.name}/profile", "--remote-debugging-pipe", "about:blank")
+        own = (f"--user-data-dir={self.temporary_folder.name}/profile", "--remote-debugging-pipe", "about:blank")
         quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         self.process = subprocess.Popen([CHROMIUM, *FLAGS, *own], pass_fds=(READS, WRITES), preexec_fn=place, **quiet)
         for each in theirs:
             os.close(each)
         self.out, self.into = os.fdopen(ours[0], "wb", 0), os.fdopen(ours[1], "rb")
         self.numbers, self.buffer = itertools.count(1), b""
-        self.said, self.asked, self.session = [], [], None
+        self.console, self.requested_urls, self.session = [], [], None
         targets = self.call("Target.getTargets")["targetInfos"]
         target = next(each["targetId"] for each in targets if each["type"] == "page")
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
@@ -75,13 +75,13 @@ class Browser:
         parameters = found.get("params", {})
         match found.get("method"):
             case "Runtime.consoleAPICalled":
-                self.said.append(str([each.get("value") for each in parameters["args"]]))
+                self.console.append(str([each.get("value") for each in parameters["args"]]))
             case "Runtime.exceptionThrown":
-                self.said.append(parameters["exceptionDetails"].get("exception", {}).get("description", "?"))
+                self.console.append(parameters["exceptionDetails"].get("exception", {}).get("description", "?"))
             case "Log.entryAdded":
-                self.said.append(parameters["entry"]["text"])
+                self.console.append(parameters["entry"]["text"])
             case "Network.requestWillBeSent":
-                self.asked.append(parameters["request"]["url"])
+                self.requested_urls.append(parameters["request"]["url"])
             case "Page.loadEventFired":
                 self.loaded = True
         return found
@@ -89,7 +89,7 @@ class Browser:
     def open(self, address):
         """Load an address, until it has loaded; the page before is left first, so that it is loaded whatever it was."""
         for each in ("about:blank", address):
-            self.loaded, self.said, self.asked = False, [], []
+            self.loaded, self.console, self.requested_urls = False, [], []
             self.call("Page.navigate", url=each)
             while not self.loaded:
                 self.receive()
@@ -125,4 +125,4 @@ class Browser:
         self.process.wait(30)
         self.out.close()
         self.into.close()
-        self.room.cleanup()
+        self.temporary_folder.cleanup()

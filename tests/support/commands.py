@@ -30,9 +30,13 @@ from types import SimpleNamespace
 
 SUPPORT = Path(__file__).parent
 ROOT = SUPPORT.parents[1]
-PATIENCE = 300.0  # s
-LATE = ("dask.array", "fmpy.validation", "rich.progress", "scipy.io", "xarray")  # imported where they are used
-ASKED = ("build_fmus", "harness.running.", "harness.studies.coupled.")  # modules that answer in processes of their own
+TIMEOUT = 300.0  # s
+LAZY_IMPORTS = ("dask.array", "fmpy.validation", "rich.progress", "scipy.io", "xarray")  # imported where they are used
+FORKED_MODULES = (
+    "build_fmus",
+    "harness.running.",
+    "harness.studies.coupled.",
+)  # modules that answer in processes of their own
 UNPLOTTED = "unplotted"
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg"><style></style></svg>'
 
@@ -43,7 +47,7 @@ def harness(folder, *arguments, base=os.environ, fresh=False, blank=False, text=
     if not fresh:
         return _server().run(module, words, str(folder), environment, text, blank)
     command = [sys.executable, "-m", module, *words]
-    options = {"cwd": folder, "env": environment, "capture_output": True, "text": True, "timeout": PATIENCE}
+    options = {"cwd": folder, "env": environment, "capture_output": True, "text": True, "timeout": TIMEOUT}
     return subprocess.run(command, input=text, **options)
 
 
@@ -54,21 +58,27 @@ def build(*arguments, folder=ROOT, **environment):
 
 @cache
 def _server():
-    server = Server()
+    server = ForkServer()
     atexit.register(server.close)
     return server
 
 
-class Server:
+class ForkServer:
     """The process from which the others are forked."""
 
     def __init__(self):
-        self.room = tempfile.TemporaryDirectory()
-        self.files = [Path(self.room.name, name) for name in ("in", "out", "err")]
+        self.temporary_folder = tempfile.TemporaryDirectory()
+        self.files = [Path(self.temporary_folder.name, name) for name in ("in", "out", "err")]
         command, environment = [sys.executable, __file__], os.environ | {"PYTHONPATH": str(ROOT)}
         pipe = subprocess.PIPE
         self.process = subprocess.Popen(
-            command, stdin=pipe, stdout=pipe, text=True, env=environment, cwd=self.room.name, start_new_session=True
+            command,
+            stdin=pipe,
+            stdout=pipe,
+            text=True,
+            env=environment,
+            cwd=self.temporary_folder.name,
+            start_new_session=True,
         )
 
     def run(self, module, words, folder, environment, text, blank):
@@ -76,10 +86,10 @@ class Server:
             file.write_text(text if file.name == "in" else "")
         asked = {"words": words, "folder": folder, "environment": environment, "files": [*map(str, self.files)]}
         print(json.dumps([module, blank, asked]), file=self.process.stdin, flush=True)
-        if not select.select([self.process.stdout], [], [], PATIENCE)[0]:
+        if not select.select([self.process.stdout], [], [], TIMEOUT)[0]:
             os.killpg(self.process.pid, signal.SIGKILL)
             _server.cache_clear()
-            raise AssertionError(f"{module} {' '.join(words)} did not end within {PATIENCE:.0f} s")
+            raise AssertionError(f"{module} {' '.join(words)} did not end within {TIMEOUT:.0f} s")
         status = int(self.process.stdout.readline())
         return subprocess.CompletedProcess(words, status, *(file.read_bytes().decode() for file in self.files[1:]))
 
@@ -87,7 +97,7 @@ class Server:
         self.process.stdin.close()
         self.process.wait(30)
         self.process.stdout.close()
-        self.room.cleanup()
+        self.temporary_folder.cleanup()
 
 
 def serve():
@@ -96,7 +106,7 @@ def serve():
     crew.process_context = lambda preload: multiprocessing.get_context("fork")  # no server has to load it all once more
     resource_tracker.ensure_running()  # nor has each command to start one
     packages = [(import_module(name).__path__, f"{name}.") for name in ("harness", "fmus.packaging")]
-    for name in (*(module.name for package in packages for module in walk_packages(*package)), *LATE):
+    for name in (*(module.name for package in packages for module in walk_packages(*package)), *LAZY_IMPORTS):
         with suppress(ImportError):  # an extra that is not installed
             if not name.endswith("__main__"):
                 import_module(name)
@@ -105,7 +115,7 @@ def serve():
     from harness.results import provenance, style
 
     provenance.write_provenance(Path(), ())  # what packages and the system are is looked up once
-    asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": Forked})
+    asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": ForkedPopen})
     with style.open_figure(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
         figure.subplots().set_title("a title")
     drawing = [each for each in sys.modules.values() if getattr(each, "open_figure", None) is style.open_figure]
@@ -114,16 +124,16 @@ def serve():
         child = os.fork()
         if not child:
             module, blank, asked = json.loads(line)
-            become(**asked)
+            set_process_state(**asked)
             if blank:
                 for each in drawing:
-                    each.open_figure = partial(unseen, None if blank == UNPLOTTED else style.Figure)
+                    each.open_figure = partial(stub_sheet, None if blank == UNPLOTTED else style.Figure)
             run(module)
             return
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 
 
-class Unplotted(Exception):
+class SkipPlotting(Exception):
     """The end of what is done to a figure of no kind."""
 
     def __getattr__(self, name):
@@ -131,14 +141,14 @@ class Unplotted(Exception):
 
 
 @contextmanager
-def unseen(kind, path, width, height, layout=None):
+def stub_sheet(kind, path, width, height, layout=None):
     """In the place of a sheet: what is plotted is neither laid out nor drawn; without a `kind`, it is not plotted."""
-    with suppress(Unplotted):
-        yield kind((width, height)) if kind else Unplotted()
+    with suppress(SkipPlotting):
+        yield kind((width, height)) if kind else SkipPlotting()
     path.write_text(BLANK)
 
 
-class Forked(subprocess.Popen):
+class ForkedPopen(subprocess.Popen):
     """In the place of Popen: a module of ours is run by a fork of whoever asks it, who has loaded it."""
 
     def __init__(self, command, env, **how):
@@ -150,7 +160,7 @@ class Forked(subprocess.Popen):
                 signal.signal(number, usual)
             sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
             try:
-                become(words, os.getcwd(), env, ())
+                set_process_state(words, os.getcwd(), env, ())
                 sys.modules.pop(module, None)
                 run(module)
             except BaseException:
@@ -159,11 +169,11 @@ class Forked(subprocess.Popen):
             os._exit(1)
 
         module, words = command[2] if command[1:2] == ["-m"] else "", command[3:]
-        ours = module.startswith(ASKED)
+        ours = module.startswith(FORKED_MODULES)
         super().__init__(command, env=env, preexec_fn=answer if ours else None, **how)
 
 
-def become(words, folder, environment, files):
+def set_process_state(words, folder, environment, files):
     """What a process has that was started with these."""
     os.chdir(folder)
     os.environ.clear()

@@ -15,11 +15,11 @@ def values(estimates):
     return {each.name: each.value for each in estimates}
 
 
-def said(found):
+def remarks_text(found):
     return " ".join(summary_lines(found))
 
 
-def swung(
+def decay_record(
     zeta=0.0,
     r=0.0,
     b=0.0,
@@ -73,7 +73,7 @@ def random_record(seed, law=None, sine=None, quantised=None, samples=None, order
     rest = rng.normal() * size
     if sine and a > 2:
         turn = abs(turn)  # nothing is made up beyond what was seen
-    record = swung(
+    record = decay_record(
         **truth,
         sine=sine,
         omega=omega,

@@ -102,7 +102,7 @@ def _atan2(y, x):
 FUNCTIONS = {"sqrt": _sqrt, "fabs": _fabs, "copysign": _copysign, "atan2": _atan2}
 
 
-def teach(monkeypatch):
+def patch_functions(monkeypatch):
     """Let the models that have been written out, and their runtime, take roots and magnitudes of quantities."""
     for name, module in list(sys.modules.items()):
         if name.startswith("written_"):

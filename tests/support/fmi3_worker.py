@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
 
 import worker
-from fmi3_slave import Model, Slave
+from fmi3_as_fmi2 import Model, Slave
 
 FLAGS = ("again", "terminate", "nominals", "states")  # of fmi3UpdateDiscreteStates, in its order
 
@@ -37,10 +37,10 @@ class CoSimulation(worker.Instance):
             unzipDirectory=directory,
             instanceName=name,
         )
-        self.slave.instantiate(loggingOn=True, logMessage=self._note)
+        self.slave.instantiate(loggingOn=True, logMessage=self._on_log_fmi3)
 
-    def _note(self, environment, status, category, message):
-        self._hear(environment, None, status, category, message)
+    def _on_log_fmi3(self, environment, status, category, message):
+        self._on_log(environment, None, status, category, message)
 
 
 class ModelExchange(CoSimulation):
@@ -57,17 +57,17 @@ class ModelExchange(CoSimulation):
         get(values, size)
         return list(values)
 
-    def at(self, t):
+    def set_time(self, t):
         self.slave.setTime(t)
 
-    def put(self, states):
+    def set_states(self, states):
         self.slave.setContinuousStates((c_double * len(states))(*states), len(states))
 
-    def place(self, t, states):
-        self.at(t)
-        self.put(states)
+    def set_point(self, t, states):
+        self.set_time(t)
+        self.set_states(states)
 
-    def where(self):
+    def get_states(self):
         return self._vector(self.slave.getContinuousStates, self.sizes()[0])
 
     def rates(self):
@@ -79,20 +79,20 @@ class ModelExchange(CoSimulation):
     def nominals(self):
         return self._vector(self.slave.getNominalsOfContinuousStates, self.sizes()[0])
 
-    def event(self):
+    def enter_event_mode(self):
         self.slave.enterEventMode()
 
-    def update(self):
+    def update_discrete_states(self):
         """The flags that are raised."""
         *flags, timed, due = self.slave.updateDiscreteStates()
         self.ahead = due if timed else None
         return [name for name, flag in zip(FLAGS, flags, strict=True) if flag]
 
-    def due(self):
+    def next_event_time(self):
         """When the next event will be, as the last update told; None where it did not."""
         return self.ahead
 
-    def go_on(self):
+    def enter_continuous_time(self):
         self.slave.enterContinuousTimeMode()
 
     def solve(self, times, names, method, rtol, ramp):
@@ -105,7 +105,7 @@ class ModelExchange(CoSimulation):
 
         def place(t, y):
             self.set({name: value + rate * t for name, (value, rate) in ramp.items()})
-            self.place(t, list(y))
+            self.set_point(t, list(y))
 
         def rates(t, y):
             place(t, y)
@@ -123,7 +123,7 @@ class ModelExchange(CoSimulation):
         absolute = [rtol * nominal for nominal in self.nominals()]
         for _ in range(500):  # more events than any run has
             options = {"rtol": rtol, "atol": absolute, "events": roots, "dense_output": True}
-            run = solve_ivp(rates, (t, times[-1]), self.where(), method, **options)
+            run = solve_ivp(rates, (t, times[-1]), self.get_states(), method, **options)
             evaluations += run.nfev
             ahead = run.t[-1]
             if run.status == 1:  # at the root, give or take the last digits
@@ -136,9 +136,9 @@ class ModelExchange(CoSimulation):
                 return rows, evaluations
             t = ahead
             place(t, run.sol(t))
-            self.event()
-            self.update()
-            self.go_on()
+            self.enter_event_mode()
+            self.update_discrete_states()
+            self.enter_continuous_time()
         raise RuntimeError(f"events without end near t = {t!r} s")
 
 

@@ -5,7 +5,7 @@ from itertools import combinations as choose
 from itertools import product
 
 import pytest
-from builds import ROOT
+from build_cache import ROOT
 
 from fmus.packaging.lowering import lowered_model, sibling_module
 from fmus.packaging.model_lookup import find_model
@@ -15,8 +15,8 @@ MODELS = sorted(path.stem for path in (ROOT / "fmus").glob("*.py") if path.stem 
 BODIES = [
     name for name in MODELS if len(find_model(name).model().states) == 2
 ]  # position and speed are all their states
-AUTHORED = sorted((ROOT / "tests" / "authored").glob("*.py"))  # as users write them, in files of their own
-LARGER = sorted((ROOT / "tests" / "authored" / "larger").glob("*.py"))  # of more states, or more contacts
+EXAMPLE_MODELS = sorted((ROOT / "tests" / "example_models").glob("*.py"))  # as users write them, in files of their own
+LARGER_MODELS = sorted((ROOT / "tests" / "example_models" / "larger").glob("*.py"))  # of more states, or more contacts
 EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
 HYBRID, SIGN, THRESHOLD = 1, 2, 3
 
@@ -62,7 +62,7 @@ def tunable(name):
     return {v: d for v, d in parameters(name).items() if d.variability != "fixed"}
 
 
-def allowed(choices):
+def is_allowed(choices):
     """Whether a combination of choices makes sense: the closed form needs the hybrid law."""
     return not (choices.get("solver.method") == EXACT and choices.get("friction", HYBRID) != HYBRID)
 
@@ -71,7 +71,9 @@ def combinations(name):
     """Every allowed combination of a model's choices, as values to set."""
     choices = {v: d for v, d in declared(name).items() if isinstance(d, Choice)}
     items = [[value for _, value, _ in declaration.items] for declaration in choices.values()]
-    return [values for values in (dict(zip(choices, row, strict=True)) for row in product(*items)) if allowed(values)]
+    return [
+        values for values in (dict(zip(choices, row, strict=True)) for row in product(*items)) if is_allowed(values)
+    ]
 
 
 def experiment(name, values):
@@ -87,7 +89,7 @@ def experiment(name, values):
     return name, {**values, "solver.rtol": 1e-3, "solver.atol": 1e-6}, 0.4 * stop
 
 
-def meeting(name, many=2):
+def pairwise_cases(name, many=2):
     """A few combinations in which every so many choices meet: every two, though not every three."""
     groups = [(values, {*choose(values.items(), min(many, len(values)))}) for values in combinations(name)]
     kept, missing = [], set().union(*(each for _, each in groups))
@@ -98,7 +100,7 @@ def meeting(name, many=2):
     return kept
 
 
-CASES = [experiment(name, values) for name in MODELS for values in meeting(name)]
+CASES = [experiment(name, values) for name in MODELS for values in pairwise_cases(name)]
 
 
 def label(case):
@@ -122,10 +124,10 @@ def push(name):
     return entry, {"pendulum": 0.02}.get(name, 200.0)
 
 
-def growing(folder):
+def write_growing_friction_model(folder):
     """A file of the two sleds, in which the first one's sliding friction is not known beforehand: it grows with its
     way."""
-    (sleds,) = (path for path in LARGER if path.stem == "sleds")
+    (sleds,) = (path for path in LARGER_MODELS if path.stem == "sleds")
     text = sleds.read_text().replace("import Contact", "import fabs, Contact")
     text = text.replace("    x1 =", '    wear = Parameter(1.0, "N/m", "how friction grows")\n    x1 =')
     (folder / "growing.py").write_text(

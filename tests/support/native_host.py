@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from xml.etree.ElementTree import fromstring
 
-import builds
+import build_cache
 import fmpy
 import pytest
 from models import declared, model_class, outputs
@@ -16,11 +16,11 @@ from models import declared, model_class, outputs
 from fmus.packaging.native.compiler import STRICT
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
-SOURCE = Path(__file__).with_name("host.c")
-SOURCE3 = SOURCE.with_name("fmi3_host.c")
+HOST_SOURCE = Path(__file__).with_name("fmi2_host.c")
+FMI3_HOST_SOURCE = HOST_SOURCE.with_name("fmi3_host.c")
 SANITIZERS = "address,undefined,float-cast-overflow"
 # The line of what was undefined, which ends in a trap; of what was freed 32 MB are watched, for new memory takes long.
-TELLING = os.environ | {"ASAN_OPTIONS": "handle_sigill=1:quarantine_size_mb=32"}
+SANITIZER_ENVIRONMENT = os.environ | {"ASAN_OPTIONS": "handle_sigill=1:quarantine_size_mb=32"}
 
 
 def compiler():
@@ -30,7 +30,7 @@ def compiler():
 
 
 @cache
-def compiled(name, *words, sanitizers=""):
+def compile_cached(name, *words, sanitizers=""):
     """The file that the compiler makes of these words; to optimise what is sanitized takes longer than to run it."""
     words = [*words, "-ldl", "-lpthread", "-lm"]
     if sanitizers:
@@ -40,44 +40,44 @@ def compiled(name, *words, sanitizers=""):
         command = [compiler(), *STRICT, "-g1", *map(str, words), "-o", str(folder / "made")]
         subprocess.run(command, check=True)
 
-    return builds.made(f"{name} {sanitizers}".strip(), make) / "made"
+    return build_cache.cached_folder(f"{name} {sanitizers}".strip(), make) / "made"
 
 
-def host(sanitizers="", source=SOURCE):
+def host_program(sanitizers="", source=HOST_SOURCE):
     """The host, as a program."""
-    return compiled(source.stem, f"-I{HEADERS}", source, sanitizers=sanitizers)
+    return compile_cached(source.stem, f"-I{HEADERS}", source, sanitizers=sanitizers)
 
 
-def sanitized(source, fmu, *how, sanitizers=SANITIZERS):
+def compile_sanitized(source, fmu, *how, sanitizers=SANITIZERS):
     """The program `source` of tests/support over the sources in an FMU, which it includes, linked `how` it is told."""
-    name, sources = f"{source} {fmu.stem}", unpacked(fmu) / "sources"
+    name, sources = f"{source} {fmu.stem}", unpack_cached(fmu) / "sources"
     dry = ["-DDRY"] if "mode" in declared(fmu.stem) else []
-    words = ["-c", "-fPIC", "-fvisibility=hidden", *dry, f"-I{sources}", SOURCE.with_name(source)]
-    whole = compiled(name, *words, sanitizers=sanitizers)
-    return compiled(" ".join([name, "linked", *how]), *how, whole, sanitizers=sanitizers)
+    words = ["-c", "-fPIC", "-fvisibility=hidden", *dry, f"-I{sources}", HOST_SOURCE.with_name(source)]
+    whole = compile_cached(name, *words, sanitizers=sanitizers)
+    return compile_cached(" ".join([name, "linked", *how]), *how, whole, sanitizers=sanitizers)
 
 
 @cache
-def unpacked(fmu):
+def unpack_cached(fmu):
     """The folder of an extracted FMU."""
 
     def make(folder):
         with zipfile.ZipFile(fmu) as archive:
             archive.extractall(folder)
 
-    return builds.made(f"{fmu.parent.name} {fmu.stem}", make)
+    return build_cache.cached_folder(f"{fmu.parent.name} {fmu.stem}", make)
 
 
 def guid(fmu):
-    return fromstring((unpacked(fmu) / "modelDescription.xml").read_bytes()).attrib["guid"]
+    return fromstring((unpack_cached(fmu) / "modelDescription.xml").read_bytes()).attrib["guid"]
 
 
-def lives(program, fmu, library, number, steps, **options):
+def run_life_cycles(program, fmu, library, number, steps, **options):
     """What fmi3_host.c, started by `program`, tells of lives of an FMI 3.0 FMU: the last position and speed in
     co-simulation and in model exchange, and the lines that it says."""
-    name, place = fmu.stem, unpacked(fmu)
+    name, place = fmu.stem, unpack_cached(fmu)
     token = fromstring((place / "modelDescription.xml").read_bytes()).attrib["instantiationToken"]
-    read = [references(name)[variable] for variable in (*outputs(name)[:2], "m")]
+    read = [value_references(name)[variable] for variable in (*outputs(name)[:2], "m")]
     words = [place / "binaries" / library, token, f"{place / 'resources'}{os.sep}", number, model_class(name).stop_time]
     command = [*program, *map(str, (*words, steps, *read))]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
@@ -87,19 +87,21 @@ def lives(program, fmu, library, number, steps, **options):
     ], done.stderr.splitlines()
 
 
-def play(fmu, script, threads=1, sanitizers=""):
+def run_host_script(fmu, script, threads=1, sanitizers=""):
     """What the script answers, line by line, and what went to standard error; under sanitizers of the sources."""
-    library = unpacked(fmu) / "binaries" / "linux64" / f"{fmu.stem}.so"
+    library = unpack_cached(fmu) / "binaries" / "linux64" / f"{fmu.stem}.so"
     if sanitizers:
-        library = sanitized("abuse.c", fmu, "-shared", sanitizers=sanitizers)
-    command = [str(host(sanitizers)), str(library), guid(fmu), str(threads)]
-    done = subprocess.run(command, input="\n".join(script), capture_output=True, text=True, timeout=120, env=TELLING)
+        library = compile_sanitized("fmi2_stress.c", fmu, "-shared", sanitizers=sanitizers)
+    command = [str(host_program(sanitizers)), str(library), guid(fmu), str(threads)]
+    done = subprocess.run(
+        command, input="\n".join(script), capture_output=True, text=True, timeout=120, env=SANITIZER_ENVIRONMENT
+    )
     assert done.returncode == 0, done.stderr[-3000:]
     return done.stdout.splitlines(), done.stderr
 
 
 @cache
-def references(name):
+def value_references(name):
     """The value reference of every variable of a model."""
     return {variable: place for place, variable in enumerate(declared(name))}
 

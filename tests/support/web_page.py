@@ -2,7 +2,7 @@
 
 import json
 
-import builds
+import build_cache
 import commands
 import pytest
 
@@ -12,7 +12,7 @@ FOLLOWED = "new Promise(done => { const { runs } = app.session; location.hash = 
 FOLLOWED += "const look = () => app.session.runs === runs ? setTimeout(look, 1) : done(true); look() })"
 
 
-def built(name, *words):
+def build_page(name, *words):
     """The page of a room of its own."""
     pytest.importorskip("ziglang", reason="the page is compiled by the package ziglang: pip install -e '.[native]'")
 
@@ -20,7 +20,7 @@ def built(name, *words):
         done = commands.build("--web", *words, "--out", folder)
         assert done.returncode == 0, done.stderr
 
-    return builds.made(name, make) / "index.html"
+    return build_cache.cached_folder(name, make) / "index.html"
 
 
 class Page:
@@ -43,12 +43,12 @@ class Page:
     def run(self, script):
         return self.browser.run(script)
 
-    def settled(self, script):
+    def when_done(self, script):
         """The value of an expression after something has been done and every run has ended."""
         self.run(READY)
         return self.run(script)
 
-    def put(self, name, text):
+    def type_number(self, name, text):
         """Type into a number field."""
         field = json.dumps(f"field-{name}")
         change = "e.dispatchEvent(new Event('change'))"

@@ -1,4 +1,4 @@
-"""The far end of driver.py: built FMUs in a process of their own that never sees the sources.
+"""The far end of worker_client.py: built FMUs in a process of their own that never sees the sources.
 
 One request a line: [instance or null, function, arguments].  One answer a line: {"value": ...}, or {"refused": [FMI
 function, status]} when an FMI call does not return OK, or {"failed": traceback}.
@@ -45,7 +45,7 @@ class Instance:
         self.variables = {v.name: (v.valueReference, v.type) for v in description.modelVariables}
         self.states, self.log = [], []
         self.callbacks = fmi2CallbackFunctions()
-        self.callbacks.logger = fmi2CallbackLoggerTYPE(self._hear)
+        self.callbacks.logger = fmi2CallbackLoggerTYPE(self._on_log)
         self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
         addLoggerProxy(ctypes.byref(self.callbacks))
@@ -55,7 +55,7 @@ class Instance:
         )
         self.slave.instantiate(callbacks=self.callbacks, loggingOn=True)
 
-    def _hear(self, environment, instance, status, category, message):
+    def _on_log(self, environment, instance, status, category, message):
         self.log.append([status, (category or b"").decode(), (message or b"").decode()])
 
     def messages(self):
@@ -71,7 +71,7 @@ class Instance:
     def get(self, names):
         return self._reader(names)()
 
-    def each(self, values, changes, names):
+    def vary_each(self, values, changes, names):
         """A row of the values of names with `values` set, and one with each of the changes alone beside them."""
         self.set(values)
         read = self._reader(names)
@@ -104,11 +104,11 @@ class Instance:
         values = getattr(self.slave, f"get{kind}")(references)
         return [value.decode() if isinstance(value, bytes) else value for value in values]
 
-    def ask(self, kind, reference):
+    def read_one(self, kind, reference):
         """The same for one."""
         return self.read(kind, [reference])[0]
 
-    def tell(self, kind, reference, value):
+    def write_one(self, kind, reference, value):
         """Write it likewise."""
         getattr(self.slave, f"set{kind}")([reference], [value])
 
@@ -188,8 +188,8 @@ class Instance:
 class Worker:
     """The extracted FMUs and their instances."""
 
-    def __init__(self, room):
-        self.room, self.fmus, self.instances = room, {}, []
+    def __init__(self, temporary_folder):
+        self.temporary_folder, self.fmus, self.instances = temporary_folder, {}, []
 
     def instantiate(self, path, name):
         self.instances.append(Instance(self.unpacked(path), name))
@@ -198,7 +198,7 @@ class Worker:
     def unpacked(self, path):
         """The folder of an FMU and its description."""
         if path not in self.fmus:
-            directory = extract(path, tempfile.mkdtemp(dir=self.room))
+            directory = extract(path, tempfile.mkdtemp(dir=self.temporary_folder))
             self.fmus[path] = directory, read_model_description(path)
         return self.fmus[path]
 
@@ -210,29 +210,29 @@ class Worker:
     def directory(self, path):
         return str(self.fmus[path][0])
 
-    def several(self, requests):
+    def batch(self, requests):
         """The answers to requests none of which is refused."""
-        return [self.answer(*request) for request in requests]
+        return [self.handle(*request) for request in requests]
 
-    def answer(self, number, function, arguments):
+    def handle(self, number, function, arguments):
         return getattr(self if number is None else self.instances[number], function)(*arguments)
 
 
 def main():
-    room = tempfile.mkdtemp()
+    temporary_folder = tempfile.mkdtemp()
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # what an FMU prints must not look like an answer
-    worker = Worker(room)
+    worker = Worker(temporary_folder)
     for line in sys.stdin:
         try:
-            answer = {"value": worker.answer(*json.loads(line))}
+            answer = {"value": worker.handle(*json.loads(line))}
         except FMICallException as refusal:
             answer = {"refused": [refusal.function, refusal.status]}
         except Exception:
             answer = {"failed": traceback.format_exc()}
         sys.stderr.flush()
         print(json.dumps(answer), file=answers, flush=True)
-    shutil.rmtree(room)
+    shutil.rmtree(temporary_folder)
 
 
 if __name__ == "__main__":

@@ -6,4 +6,4 @@ import web_page
 
 @pytest.fixture(scope="session")
 def page(browser):
-    return web_page.Page(browser, web_page.built("web"))
+    return web_page.Page(browser, web_page.build_page("web"))

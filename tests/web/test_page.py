@@ -9,9 +9,9 @@ from math import pi, sqrt
 import native_fmus
 import pytest
 import web_page
-from builds import ROOT
+from build_cache import ROOT
 from commands import build
-from models import AUTHORED, LARGER, MODELS, declared, parameters
+from models import EXAMPLE_MODELS, LARGER_MODELS, MODELS, declared, parameters
 
 from fmus.packaging.model_lookup import find_model
 from fmus.packaging.web.html_page import HERE, MODULES
@@ -28,18 +28,18 @@ CONTROLS = {"button", "checkbox", "combobox", "radio", "slider", "spinbutton", "
 @pytest.fixture(autouse=True)
 def quiet(browser):
     """No test may leave a word in the console, or ask for anything but the page itself."""
-    browser.said.clear()
+    browser.console.clear()
     yield
-    assert browser.said == []
-    assert {address.split("#")[0] for address in browser.asked if not address.startswith(("data:", "blob:"))} <= {
-        address.split("#")[0] for address in browser.asked[:1]
-    }
+    assert browser.console == []
+    assert {
+        address.split("#")[0] for address in browser.requested_urls if not address.startswith(("data:", "blob:"))
+    } <= {address.split("#")[0] for address in browser.requested_urls[:1]}
 
 
 # ---- the file
 
 
-def test_five_models_take_less_than_600_kb_and_may_load_nothing(page):
+def test_five_models_take_less_than_600_kb_and_load_nothing(page):
     text = page.file.read_text(encoding="utf-8")
     assert len(text.encode()) < 600_000
     assert "default-src 'none'" in text
@@ -47,12 +47,12 @@ def test_five_models_take_less_than_600_kb_and_may_load_nothing(page):
     page.open(anew=True)
     refused = "fetch('data:text/plain,x').then(() => 'came', () => 'refused')"
     assert page.run(refused) == "refused"
-    assert page.browser.said.pop()  # the policy says so
-    assert len(page.browser.said) <= 1
-    page.browser.said.clear()
+    assert page.browser.console.pop()  # the policy says so
+    assert len(page.browser.console) <= 1
+    page.browser.console.clear()
 
 
-def test_what_cannot_be_made_into_a_page_is_told_in_a_sentence(tmp_path):
+def test_a_model_unsuitable_for_the_page_is_reported_in_one_sentence(tmp_path):
     for words, sentence in (
         (("--web", "--native"), "--web makes a page and no FMU: leave out --native, --platform and --fmi 3."),
         (("--web", "nobody"), "There is no model 'nobody'"),
@@ -65,7 +65,7 @@ def test_what_cannot_be_made_into_a_page_is_told_in_a_sentence(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_every_module_imports_what_is_there_and_only_from_those_before_it():
+def test_every_module_imports_existing_names_from_earlier_modules_only():
     exports = {}
     assert {path.stem for path in (HERE / "script").glob("*.js")} == set(MODULES)
     for name in MODULES:
@@ -98,7 +98,7 @@ def test_no_width_makes_it_scroll_sideways_and_every_control_has_a_name(page, na
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_every_parameter_has_a_slider_and_a_field_that_show_its_start_and_its_unit(page, name):
+def test_every_parameter_has_a_slider_and_a_field_with_its_start_value_and_unit(page, name):
     page.open(f".model={name}")
     for variable, meaning in parameters(name).items():
         if variable == "solver.rtol":  # a list
@@ -112,20 +112,20 @@ def test_every_parameter_has_a_slider_and_a_field_that_show_its_start_and_its_un
         )
         assert page.run(f"{field}.closest('.field').querySelector('input[type=range]').max") == "400"
         if meaning.display:
-            page.put(variable, "10.0")
+            page.type_number(variable, "10.0")
             assert page.run(f"app.state().values[{variable!r}]") == pytest.approx(10.0 / factor)
 
 
 # ---- what is done
 
 
-def test_a_slider_changes_the_run_and_what_it_says_is_what_is_run(page):
+def test_a_slider_changes_the_run_and_shows_the_value_used(page):
     page.open(".model=stickslip")
     page.run(
         "(() => { const e = document.querySelector('#field-mu_d').closest('.field').querySelector('input[type=range]');"
         "e.value = 100; e.dispatchEvent(new Event('input')) })()"
     )
-    mu = page.settled("app.state().values.mu_d")
+    mu = page.when_done("app.state().values.mu_d")
     assert 0 < mu < 0.6
     assert page.run("Number(document.getElementById('field-mu_d').value)") == mu
     d = {name: meaning.start for name, meaning in declared("stickslip").items()}
@@ -134,7 +134,7 @@ def test_a_slider_changes_the_run_and_what_it_says_is_what_is_run(page):
     assert page.run("Math.max(...app.session.runs.main.columns.v)") == pytest.approx(peak, rel=1e-3)
 
 
-def test_the_very_next_frame_shows_a_changed_parameter(page):
+def test_the_next_frame_shows_a_changed_parameter(page):
     page.open(".model=coulomb")
     shown = page.run(
         "new Promise(done => { const before = app.plots.get('x').plot.paints;"
@@ -147,7 +147,7 @@ def test_the_very_next_frame_shows_a_changed_parameter(page):
     assert shown[1] == shown[2] > 0.1
 
 
-def test_of_a_slow_method_the_next_frame_shows_the_motion_by_the_quick_one_and_then_its_own(page):
+def test_a_slow_method_is_previewed_with_a_fast_one(page):
     """However long a run takes: a slider that is pulled is answered by the last value, to the end of the run."""
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001")
     seen = page.run(
@@ -160,11 +160,11 @@ def test_of_a_slow_method_the_next_frame_shows_the_motion_by_the_quick_one_and_t
     done, k, quick, reached, own = seen
     assert (done, quick) == (False, {"x_m": 0.001, "k": k})
     assert own < reached <= 16
-    assert page.settled("app.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [16, 16]
+    assert page.when_done("app.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [16, 16]
     assert page.run("app.session.runs.main.setting.values.k") == k
 
 
-def test_until_the_first_picture_one_model_is_compiled(page):
+def test_only_one_model_is_compiled_before_the_first_picture(page):
     count = "const { instantiate } = WebAssembly; globalThis.compiled = 0;"
     count += "WebAssembly.instantiate = (...all) => (compiled++, instantiate(...all))"
     script = page.browser.call("Page.addScriptToEvaluateOnNewDocument", source=count)
@@ -174,16 +174,16 @@ def test_until_the_first_picture_one_model_is_compiled(page):
     assert page.run("app.plots.get('x').plot.paints") > 0
 
 
-def test_of_two_models_chosen_at_once_the_last_is_shown(page):
+def test_the_last_of_two_models_chosen_at_once_is_shown(page):
     page.open(".model=coulomb")
     for first, last in (("pacejka", "smd"), ("smd", "pendulum"), ("stickslip", "smd")):  # known, and not yet compiled
         page.run(f"for (const name of [{first!r}, {last!r}]) document.querySelector(`input[value=${{name}}]`).click()")
         page.wait(f"app.state().model === {last!r}")
         page.run("new Promise(done => setTimeout(done, 100))")
-        assert page.settled("app.state().model") == last == page.run("document.querySelector(':checked').value")
+        assert page.when_done("app.state().model") == last == page.run("document.querySelector(':checked').value")
 
 
-def test_a_law_beside_another_shows_the_difference_and_the_counts(page):
+def test_comparing_two_laws_shows_the_difference_and_the_counters(page):
     page.open(".model=coulomb")
     page.choose("comparison", "coulomb")
     assert page.run("app.session.runs.comparison.setting.values.friction") == 2
@@ -201,32 +201,32 @@ def test_a_law_beside_another_shows_the_difference_and_the_counts(page):
     assert not page.run("document.getElementById('panel-error').hidden")
 
 
-def test_another_model_takes_the_values_of_the_same_names(page):
+def test_another_model_keeps_values_of_the_same_names(page):
     page.open(".model=stickslip&k=500&.compare=pacejka&.compare.x_m=0.005")
     assert page.run("app.session.runs.comparison.setting.values.k") == 500
     assert page.run("app.session.runs.comparison.setting.values.x_m") == 0.005
     assert page.run("app.session.runs.comparison.columns.v.some((v, i) => i > 99 && v > 0 && v < 0.01)")  # it creeps
 
 
-def test_a_change_while_it_plays_acts_from_there_on_and_not_before(page):
+def test_a_change_during_playback_acts_from_then_on_only(page):
     page.open(".model=smd")
     whole = page.run("[...app.session.runs.main.columns.x]")
     page.click("#play")
     page.wait("app.state().t > 0.2")
-    page.put("c", "20")
+    page.type_number("c", "20")
     page.click("#play")
     (change,) = page.run("app.state().changes")
     assert change["name"] == "c"
     assert 0.2 < change["t"] < 4
     assert page.run("app.state().values") == {}
-    now = page.settled("({ t: app.session.runs.main.time, x: app.session.runs.main.columns.x })")
+    now = page.when_done("({ t: app.session.runs.main.time, x: app.session.runs.main.columns.x })")
     before = [x for t, x in zip(now["t"], now["x"], strict=True) if t < change["t"]]
     assert before == whole[: len(before)]
     assert max(map(abs, now["x"][-200:])) < 0.1 * max(map(abs, whole[-200:]))
     assert page.run("app.session.runs.unchanged.columns.x.length") == len(whole)
 
 
-def test_playing_paints_no_curve_anew_and_a_curve_is_no_more_points_than_pixels_allow(page):
+def test_playback_repaints_no_curve_and_a_curve_is_limited_by_the_pixels(page):
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=1")
     assert page.run("app.session.runs.main.time.length") > 60000
     painted = "[...app.plots.values()].reduce((sum, { plot }) => sum + plot.paints, 0)"
@@ -246,7 +246,7 @@ def test_playing_paints_no_curve_anew_and_a_curve_is_no_more_points_than_pixels_
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_dragged_body_begins_where_it_is_let_go(page, name):
+def test_a_dragged_body_starts_where_it_is_released(page, name):
     page.browser.size(1280)
     page.open(f".model={name}")
     body = page.run("app.session.models.get(app.state().model).bodies[0]")
@@ -260,11 +260,11 @@ def test_a_dragged_body_begins_where_it_is_let_go(page, name):
     page.wait("app.state().t > 0")
     page.click("#play")
     assert start > declared(name)[body["start"]].start
-    assert page.settled(f"app.session.runs.main.columns[{body['position']!r}][0]") == start
+    assert page.when_done(f"app.session.runs.main.columns[{body['position']!r}][0]") == start
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_body_pulled_while_it_runs_feels_a_force_until_it_is_let_go(page, name):
+def test_dragging_a_moving_body_applies_a_force_until_release(page, name):
     page.browser.size(1280)
     page.open(f".model={name}&.t=0.3")
     body = page.run("app.session.models.get(app.state().model).bodies[0]")
@@ -274,7 +274,7 @@ def test_a_body_pulled_while_it_runs_feels_a_force_until_it_is_let_go(page, name
     page.wait("app.state().changes.length > 0")
     page.browser.mouse("Released", x + 80, y, buttons=0)
     page.click("#play")
-    changes = page.settled("app.state().changes")
+    changes = page.when_done("app.state().changes")
     assert {change["name"] for change in changes} == {body["input"]}
     assert any(change["value"] for change in changes)
     assert changes[-1]["value"] == 0
@@ -282,7 +282,7 @@ def test_a_body_pulled_while_it_runs_feels_a_force_until_it_is_let_go(page, name
     assert page.run(f"(p => {apart})({body['position']!r})")
 
 
-def test_a_pull_on_a_slow_method_never_goes_back_in_time(page):
+def test_dragging_with_a_slow_method_never_goes_back_in_time(page):
     """The next force waits for the run of the last one."""
     page.browser.size(1280)
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=8")
@@ -293,27 +293,27 @@ def test_a_pull_on_a_slow_method_never_goes_back_in_time(page):
     page.wait("app.state().changes.length > 1")
     page.browser.mouse("Released", x + 120, y, buttons=0)
     page.click("#play")
-    first, *_, last = page.settled("app.state().changes")
+    first, *_, last = page.when_done("app.state().changes")
     assert 8 <= first["t"] < last["t"] <= page.run("app.state().t") + 0.1
     assert (first["name"], last["value"]) == ("F_ext", 0)
 
 
-def test_a_kick_is_a_push_that_ends(page):
+def test_a_kick_is_a_push_of_finite_duration(page):
     page.open(".model=stickslip&.t=1")
     page.click("#kick")
-    first, last = page.settled("app.state().changes")
+    first, last = page.when_done("app.state().changes")
     assert (first["name"], first["t"], last["value"]) == ("F_ext", 1, 0)
     assert 1 < last["t"] < 2
     assert page.run("Math.max(...app.session.runs.main.columns.v.slice(100, 300))") > 0
 
 
-def test_a_link_carries_everything(page):
+def test_a_link_stores_the_complete_setup(page):
     page.open(".model=stickslip")
-    page.put("mu_d", "0.45")
+    page.type_number("mu_d", "0.45")
     page.choose("comparison", "pacejka")
     page.seek(5.0)
     page.check("live", True)
-    page.put("v_driver", "0.05")
+    page.type_number("v_driver", "0.05")
     page.wait("location.hash.includes('v_driver')")
     hash, state = page.run("location.hash.slice(1)"), page.run("app.state()")
     end = page.run("Object.values(app.session.runs).map(run => run.columns.x.at(-1))")
@@ -334,14 +334,14 @@ def test_a_link_carries_everything(page):
     page.wait(f"{told}.includes('The link is in the address bar')")
 
 
-def test_a_link_followed_while_the_address_is_written_is_not_lost(page):
+def test_a_link_opened_while_the_address_is_written_is_not_lost(page):
     page.open(".model=smd")
     page.wait("location.hash.includes('stop')")
     page.run("(own => { location.hash = '.model=coulomb'; history.replaceState(null, '', own) })(location.href)")
     page.wait("app.state().model === 'coulomb'")
 
 
-def test_within_another_page_it_runs_and_has_no_address_to_carry(page, tmp_path):
+def test_an_embedded_page_runs_without_an_address(page, tmp_path):
     outer = tmp_path / "outer.html"
     outer.write_text(f'<iframe srcdoc="{escape(page.file.read_text(encoding="utf-8"))}"></iframe>', encoding="utf-8")
     page.browser.open(outer.as_uri())
@@ -349,30 +349,30 @@ def test_within_another_page_it_runs_and_has_no_address_to_carry(page, tmp_path)
     assert page.run("[frames[0].location.hash, frames[0].document.getElementById('link').hidden]") == ["", True]
 
 
-def test_what_the_fmu_refuses_is_told_in_its_own_sentence(page):
+def test_a_refused_value_shows_the_message_of_the_fmu(page):
     page.open(".model=stickslip")
-    page.put("mu_d", "0.95")
+    page.type_number("mu_d", "0.95")
     alert = "document.getElementById('alert')"
     assert "mu_d is 0.95, above mu_s = 0.9" in page.run(f"{alert}.textContent")
-    page.put("mu_d", "0.5")
+    page.type_number("mu_d", "0.5")
     assert page.run(f"{alert}.hidden")
-    page.put("m", "-1")
+    page.type_number("m", "-1")
     assert "m = -1.0 kg is refused: mass of the sled must be above 0.0 kg" in page.run(f"{alert}.textContent")
 
 
-def test_what_is_no_number_is_told_and_changes_nothing(page):
+def test_an_invalid_number_is_reported_and_changes_nothing(page):
     page.open(".model=stickslip&m=20")
     field, alert = "document.getElementById('field-m').value", "document.getElementById('alert')"
     for name, text, sentence in (("m", "", "m takes a number: it stays 20 kg."), (".stop", "-1", "stays 16 s long")):
-        page.put(name, text)
+        page.type_number(name, text)
         assert sentence in page.run(f"{alert}.textContent")
         assert page.run(f"[{field}, app.state().values, app.state().stop]") == ["20", {"m": 20}, 16]
-    page.put("m", "21")
+    page.type_number("m", "21")
     assert page.run(f"{alert}.hidden")
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_numbers_at_the_end_of_their_range_are_told_or_drawn_and_never_as_no_number(page, name):
+def test_extreme_numbers_are_reported_or_drawn_and_never_shown_as_nan(page, name):
     page.open(f".model={name}")
     body = page.run("app.session.models.get(app.state().model).bodies[0]")
     drawn = "document.getElementById('mechanism').innerHTML + document.querySelector('#panels').textContent"
@@ -383,15 +383,15 @@ def test_numbers_at_the_end_of_their_range_are_told_or_drawn_and_never_as_no_num
         ("input", "-1e308"),
         ("input", "0"),
     ):
-        page.put(body[variable], text)
-        assert not re.search("NaN|Infinity|undefined", page.settled(drawn)), (variable, text)
+        page.type_number(body[variable], text)
+        assert not re.search("NaN|Infinity|undefined", page.when_done(drawn)), (variable, text)
     assert page.run("document.getElementById('alert').hidden")
 
 
 # ---- what was published
 
 
-def test_every_published_case_measures_what_the_terminal_does(page):
+def test_every_published_case_measures_the_same_as_the_terminal(page):
     """To a per mille, but where chatter makes the steps hang on rounding; and beside the same figures."""
     page.open()
     names = page.run("[...app.session.presets.keys()]")
@@ -399,7 +399,9 @@ def test_every_published_case_measures_what_the_terminal_does(page):
     assert sorted(names) == sorted(scenes)
     for name, scene in scenes.items():
         page.choose("preset", name)
-        native = native_fmus.built() / f"{scene.model}.fmu"  # which runs while the page waits for more to be done
+        native = (
+            native_fmus.build_native_fmus() / f"{scene.model}.fmu"
+        )  # which runs while the page waits for more to be done
         run = simulate(replace(spec_from_scene(scene), fmu=native, repeat=1))
         page.wait(
             f"app.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
@@ -442,7 +444,7 @@ def test_the_csv_file_holds_the_run_and_the_picture_is_a_png(page):
     assert page.run("blob.size") > 20000
 
 
-def test_paper_is_white_and_everything_is_on_it(page):
+def test_a_printout_is_white_and_complete(page):
     """But the cursor: its canvas would cover the curves beneath it in a PDF file."""
     page.browser.dark()
     page.open(".model=stickslip")
@@ -462,9 +464,9 @@ def test_paper_is_white_and_everything_is_on_it(page):
 # ---- of anybody
 
 
-def test_what_moves_in_any_model_is_read_from_its_declaration():
+def test_moving_bodies_of_any_model_are_read_from_its_declaration():
     """Of every model that users might write: what kind each body is, and what acts on it."""
-    drawn = {path.stem: list_bodies(find_model(path).analysis) for path in (*AUTHORED, *LARGER)}
+    drawn = {path.stem: list_bodies(find_model(path).analysis) for path in (*EXAMPLE_MODELS, *LARGER_MODELS)}
     kinds = {name: [body["kind"] for body in found] for name, found in drawn.items()}
     assert kinds["viscous_pendulum"] == ["pendulum"]
     assert kinds["rotor_brake"] == ["rotor"]
@@ -475,9 +477,9 @@ def test_what_moves_in_any_model_is_read_from_its_declaration():
     assert drawn["viscous_pendulum"][0]["dampers"] == ["d"]
 
 
-def test_models_of_users_run_in_a_page_of_their_own(browser):
-    files = [ROOT / "tests" / "authored" / name for name in ("rotor_brake.py", "larger/blocks.py")]
-    page = web_page.Page(browser, web_page.built("users", *map(str, files), "--method", "ode45"))
+def test_user_models_run_on_a_page_of_their_own(browser):
+    files = [ROOT / "tests" / "example_models" / name for name in ("rotor_brake.py", "larger/blocks.py")]
+    page = web_page.Page(browser, web_page.build_page("users", *map(str, files), "--method", "ode45"))
     for path, count in zip(files, (1, 2), strict=True):
         page.open(f".model={path.stem}")
         assert page.run("[...document.getElementById('method').options].map(each => each.text)") == ["ode45"]
@@ -488,4 +490,4 @@ def test_models_of_users_run_in_a_page_of_their_own(browser):
     page.choose("body", 1)  # of its diagrams those of the motion stand first, too
     shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
     second = page.run("app.session.models.get('blocks').bodies[1]")
-    assert page.settled(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]
+    assert page.when_done(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]

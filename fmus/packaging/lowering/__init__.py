@@ -21,7 +21,7 @@ calculated from vectors is one; y, f and modes, with a number or without, are ve
 A loop over contact_indices, state_indices or velocity_indices is unrolled; a function with a parameter
 `i: ContactIndex` is written once for each contact.  A loop over the methods is unrolled for those that
 are offered; one that tests each of them becomes a chain.
-The guard of all this is that arrays, scalars and C give the same bits (tests/written/test_written.py).
+The guard of all this is that arrays, scalars and C give the same bits (tests/lowering/test_lowering.py).
 """
 
 from .feature_selection import LAWS, METHODS, select_features

@@ -1,0 +1,56 @@
+"""The intervals of what cannot be negative, and of few samples."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+from scipy.stats import t as student_t
+
+from harness.analyses.decay.intervals import student_t_quantile
+from harness.analyses.decay.nonnegative_intervals import nonnegative_interval
+
+
+def test_nonnegative_intervals_cover_95_percent():
+    """By the shares of a normal distribution, of each mean and of each thing measured."""
+    step = 0.04
+    z = np.arange(-4.0, 9.0, step)
+    low, high = np.array([nonnegative_interval(np.array([each]), np.eye(1)) for each in z]).T
+    for mean in (0.0, 0.3, 1.0, 2.0, 3.0, 5.0):
+        share = step * np.sum(norm.pdf(z - mean)[(low <= mean) & (mean <= high)])
+        assert share == pytest.approx(0.95, abs=0.004), mean
+
+
+@pytest.mark.parametrize(
+    ("rho", "means"),
+    [
+        (-0.98, (0.0, 0.0)),
+        (-0.98, (0.0, 5.0)),
+        (-0.98, (2.0, 0.0)),
+        (0.5, (0.0, 1.0)),
+        (0.5, (0.3, 0.0)),
+        (0.5, (2.0, 2.0)),
+    ],
+)
+def test_joint_nonnegative_intervals_cover_95_percent(means, rho):
+    """Of 200 draws; more only where both are zero, and there the interval is the shorter for it."""
+    correlation = np.array([[1.0, rho], [rho, 1.0]])
+    z = np.random.default_rng(1).multivariate_normal(means, correlation, 200)
+    low, high = np.array([nonnegative_interval(each, correlation) for each in z]).T
+    assert 0.9 < np.mean((low <= means[0]) & (means[0] <= high)) < (1.0 if means == (0.0, 0.0) else 0.985)
+    if means == (0.0, 0.0) and rho < 0:
+        alone = np.array([nonnegative_interval(each[:1], np.eye(1)) for each in z])
+        assert np.mean(high) < 0.5 * np.mean(alone[:, 1])
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, -0.98])
+def test_an_interval_is_continuous_in_the_correlation(rho):
+    """On which the signs of its axes may hang, and of equal ones the axes themselves."""
+    correlation = np.array([[1.0, rho, 0.0], [rho, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    intervals = []
+    for last in np.random.default_rng(1).uniform(-4e-16, 4e-16, (8, 3, 3)):
+        intervals.append(nonnegative_interval(np.array([0.5, 1.0, 0.3]), correlation + last + last.T))
+    assert np.ptp(intervals, axis=0).max() < 1e-9
+
+
+def test_student_t_quantiles_agree_with_scipy():
+    freedom = range(1, 200)
+    assert [student_t_quantile(n) for n in freedom] == pytest.approx(student_t.ppf(0.975, list(freedom)), rel=3e-4)

@@ -1,0 +1,116 @@
+"""What is in doubt is told, and what is no answer is refused, with what would mend it."""
+
+import contextlib
+
+import numpy as np
+import pytest
+from decays import OMEGA, T, decay_record, remarks_text
+
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
+from harness.errors import HarnessError
+from harness.records.record import Record
+
+
+def test_drift_is_reported_and_fitted_on_request():
+    record = decay_record(0.01, 0.001, drift=0.002, noise=1e-4)
+    assert "--drift" in remarks_text(fit_decay(record, KnownParameters()))
+    found = fit_decay(record, KnownParameters(), drift=True)
+    each = {one.name: one for one in found.estimates}
+    assert each["drift"].value == pytest.approx(0.002, rel=2e-2)
+    assert each["zeta"].low < 0.01 < each["zeta"].high
+    assert found.remarks == ()
+
+
+def test_correlated_noise_is_reported_and_widens_the_intervals():
+    record = decay_record(0.01, 0.001, noise=1e-3)
+    white = fit_decay(record, KnownParameters(), drag=False)
+    noise = np.convolve(np.random.default_rng(3).standard_normal(1019), np.ones(20), "valid") * 2e-4
+    alike = fit_decay(Record("alike", record.t, decay_record(0.01, 0.001).x + noise), KnownParameters(), drag=False)
+    assert "not independent" in remarks_text(alike)
+    zeta = [next(each for each in found.estimates if each.name == "zeta") for found in (white, alike)]
+    assert zeta[1].low < 0.01 < zeta[1].high
+    assert zeta[1].error > zeta[0].error
+
+
+@pytest.mark.parametrize(("r", "alike"), [(2e-3, True), (1.999e-3, True), (2.13e-3, False), (1.8e-3, False)])
+def test_a_loss_in_phase_with_the_sensor_resolution_is_reported(r, alike):
+    """Of 1 mm, at which a half swing takes 2 r."""
+    side = 1.0 if r > 1.9995e-3 else -1.0
+    found = fit_decay(
+        decay_record(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), KnownParameters(), drag=False
+    )
+    assert ("rounds all turning points alike" in remarks_text(found)) == alike
+
+
+def test_a_second_oscillation_is_reported():
+    x = decay_record(0.02).x + 0.004 * np.sin(50 * T)
+    assert "something else acts" in remarks_text(fit_decay(Record("two", T, x), KnownParameters()))
+
+
+@pytest.mark.parametrize(
+    ("x", "sentence"),
+    [
+        (
+            decay_record(0.01, noise=1e-4).x + 0.04 * np.sin(7.3 * T),
+            "not a free decay of one oscillator|grows, from a swing",
+        ),
+        (0.05 * np.cos(OMEGA * T) + 0.05 * np.exp(-T) * np.cos(9 * T), "not a free decay of one oscillator"),
+        (np.random.default_rng(1).standard_normal(1000), "all noise"),
+        (np.zeros(1000), "does not move"),
+        (np.exp(-T), "turning points"),
+        (np.cos(T), "turning points"),
+        (np.exp(0.1 * T) * np.cos(12 * T), "grows, from a swing of"),
+    ],
+)
+def test_a_record_without_decay_is_refused_in_one_sentence(x, sentence):
+    with pytest.raises(HarnessError, match=sentence) as refusal:
+        fit_decay(Record("bad", T, x), KnownParameters())
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("sine", "order", "drift", "drag"),
+    [
+        (False, 0, 0.05, True),
+        (False, 0, 1.0, False),
+        (True, 0, 0.05, True),
+        (False, 2, 0.05, False),
+        (False, 2, 1.0, False),
+    ],
+)
+def test_a_drift_too_large_to_fit_is_reported_with_a_remedy(sine, order, drift, drag):
+    size = 0.1 * OMEGA**order
+    record = decay_record(
+        0.01, sine=sine, drift=drift * size, noise=1e-3 * size, order=order, turn=0.0, t=np.linspace(0, 5, 450)
+    )
+    with pytest.raises(HarnessError, match="over the record: --drift fits that as well") as refusal:
+        fit_decay(record, KnownParameters(pendulum=sine), drag)
+    over = float(str(refusal.value).split("drifts, by ")[1].split()[0])
+    assert over == pytest.approx(5 * drift * size, rel=0.02)
+
+
+@pytest.mark.parametrize("a", [2.8, 3.0])
+def test_double_peaks_of_angular_acceleration_are_reported_with_a_remedy(a):
+    record = decay_record(0.01, sine=True, a=a, omega=6.0, noise=0.05, order=2, turn=0.0, t=np.linspace(0, 5, 500))
+    with pytest.raises(HarnessError, match="two peaks a swing: record the angle or its rate"):
+        fit_decay(record, KnownParameters(pendulum=True), drag=a < 3.0)
+
+
+def test_a_probable_pendulum_is_suggested():
+    record = decay_record(0.005, 0.001, sine=True, a=1.5, noise=1e-3, t=np.linspace(0, 5, 700))
+    with pytest.raises(HarnessError, match="say --pendulum"):
+        fit_decay(record, KnownParameters())
+
+
+def test_a_pendulum_is_identified_from_its_angle():
+    with pytest.raises(HarnessError, match="measured by its angle"):
+        fit_decay(decay_record(0.02), KnownParameters(pendulum=True))
+
+
+@pytest.mark.parametrize("seed", [3, 11, 29, 30])
+def test_any_record_ends_in_a_fit_or_one_sentence(seed):
+    """A walk at random, on which fits may try anything."""
+    walk = np.random.default_rng(seed).standard_normal(60).cumsum()
+    with contextlib.suppress(HarnessError):
+        assert fit_decay(Record("walk", np.linspace(0, 1, 60), walk), KnownParameters())

@@ -1,0 +1,24 @@
+"""The intervals of an identified decay are of 95 %, of the errors that are really made."""
+
+import numpy as np
+import pytest
+from decays import random_record
+
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
+
+RECORDS = 40
+
+
+def test_intervals_cover_95_percent_and_standard_errors_match_the_scatter():
+    """Values that may be zero are left out, for their intervals end there and make those beside them shorter."""
+    widths, misses = [], []
+    for seed in range(RECORDS):
+        record, truth, _ = random_record(seed, ("zeta", "r"), False, False, 600)
+        for each in fit_decay(record, KnownParameters(), drag=False).estimates:
+            if each.name in ("omega", "zeta", "r") and each.low > 0.0:
+                widths.append((each.high - each.low) / (2.0 * each.error))
+                misses.append((truth[each.name] - (each.high + each.low) / 2) / each.error)
+    assert len(widths) > 2 * RECORDS
+    assert np.median(widths) == pytest.approx(1.96, abs=0.03)  # of the normal distribution; 1.64 would be 90 %
+    assert 0.8 < np.sqrt(np.mean(np.square(misses))) < 1.2

@@ -1,0 +1,349 @@
+"""No text makes a command end in a traceback: every input ends well, or in one sentence with a status of its own."""
+
+import io
+import os
+import random
+import re
+import subprocess
+import sys
+import threading
+from contextlib import chdir, redirect_stderr, redirect_stdout
+from functools import partial
+from itertools import zip_longest
+from math import cos, exp
+from pathlib import Path
+
+import pytest
+from build_cache import ROOT
+from commands import stub_sheet
+
+from harness.commands import commands
+from harness.errors import HarnessError
+from harness.results.style import Figure
+from harness.scenes.scene import SceneKeys
+from harness.scenes.schema import field_names
+
+SCENE = {"title": '"a title"', "model": '"smd"', "outputs": '["x", "v"]', "stop": "0.1", "plots": "[]"}
+TIMES = ("start", "stop", "follow", "h_max")
+PLOTS = '["position", "phase", "steps"]'
+HUGE = "9" * 400
+VALUES = (  # as TOML writes them
+    *("0", "-1", "1e308", "-1e308", "1e-300", "5e-324", "inf", "nan", HUGE, "9" * 5000, "true", "1979-05-27", "{}"),
+    *('""', '"x"', '"$x_{$"', '"\\u0000"', '"\\uFFFF\\U0001F600"', '"%s%n"', '"../../x"', '"' + "t" * 200_000 + '"'),
+    *("[]", "[1]", '["x", "x"]', '["x", "$_{"]', "[[1]]", "[" * 3000 + "]" * 3000, '[1, "s"]', '["gives"]', "["),
+    *(
+        '{gives = "f"}',
+        '{source = "me", steps = 1e308}',
+        '{"solver.method" = [1]}',
+        '{m = "a\\u0000b"}',
+        f"{{k = {HUGE}}}",
+    ),
+)
+FILES = (  # whole scenes
+    *(b"\xef\xbb\xbf", b"\xff\xfe", b"\0", b"title", b"[[[[", b"=" * 10_000, b'title = """', b"[values", b"a.b.c = 1"),
+    *(b"[values]\n" * 2, b"\xc3\x28 = 1", b"title = 'a'\rmodel = 'smd'", b"{" * 100_000, b"#" * 2_000_000),
+)
+TABLES = (  # of CSV
+    *(
+        "",
+        ",",
+        "t\n",
+        "t,x\n",
+        "t,x\n0\n",
+        "t,x\n0,1\n",
+        '"t,x\n0,1\n1,2\n',
+        't,"x\n0,1\n1,2\n',
+        "t,x,x\n0,1,1\n1,2,2\n",
+    ),
+    *(
+        "t,x\n0,1e308\n1,-1e308\n2,1e308\n",
+        "t,x\n0,nan\n1,2\n2,3\n",
+        "t,x\n0,inf\n1,-inf\n2,0\n",
+        "t,x\nnan,1\nnan,2\n",
+    ),
+    *(f"t,x\n0,{HUGE}\n1,1\n", "t,x\n1,1\n0,2\n", "t,x\n0,1\n0,2\n", "t,x\n-1e308,1\n1e308,2\n", "t,$x_{$\n0,1\n1,2\n"),
+    *("t [ms],x [%s]\n0,1\n1,2\n", "t [\0],x\n0,1\n1,2\n", "t,x\n0,0\n1,0\n2,0\n", "t;x\n0;1,5\n1;2,5\n", "\0\0\0"),
+    *("t,x\n" + "0,1\n" * 3, f"t,{'x' * 200_000}\n0,1\n1,2\n", "t,x,y\n0,1,2\n1,1,2\n", "t,\n0,1\n1,2\n"),
+)
+WORDS = (
+    "",
+    " ",
+    "=",
+    "m",
+    "m=",
+    "=1",
+    "m=x",
+    "m=1e999",
+    "m=nan",
+    f"m={HUGE}",
+    "m=1=2",
+    "x=1",
+    "solver.method=2.5",
+    "$",
+    "%s",
+)
+SPANS = (
+    *("m=1:2", "m=1:2:0", "m=1:2:-1", "m=1:2:999999999999", f"m=1:2:{HUGE}", "m=::", "m=:log", "m=0:1:2:log", "m=a,b"),
+    *(
+        "m=1,1",
+        "m=1e308:-1e308:3",
+        "m=nan:1:2",
+        "m=1:2:3:4:5",
+        "m=,",
+        "=1:2:3",
+        "m=1:2:3:log:log",
+        "m=" + "1," * 50_000,
+    ),
+)
+
+
+def ended(*arguments):
+    """The status of a command in this process, and what it said; any exception but these is what must not be."""
+    said, answered = io.StringIO(), io.StringIO()
+    with redirect_stderr(said), redirect_stdout(answered):
+        try:
+            commands.main([*map(str, arguments)], standalone_mode=True)
+        except HarnessError as error:
+            return error.status, str(error)
+        except SystemExit as end:
+            return end.code or 0, said.getvalue()
+    raise AssertionError("it does not end")
+
+
+@pytest.fixture
+def workspace(user_folder, tmp_path):
+    """A folder with the built FMUs, which is the present one."""
+    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
+    with chdir(tmp_path):
+        yield tmp_path
+
+
+def written(scene):
+    """A scene as its file holds it."""
+    return "".join(f"{name} = {told}\n" for name, told in scene.items())
+
+
+def check(status, said, shown):
+    assert status in (0, 1, 2), shown
+    assert len(said) < 3000, shown
+    assert "Traceback" not in said, shown
+    if status:
+        assert said.strip(), shown
+
+
+@pytest.mark.parametrize("key", [*field_names(SceneKeys), "nosuch"])
+def test_any_scene_content_runs_or_is_refused(workspace, key):
+    usual = SCENE if key in TIMES else SCENE | {"grid": "0.01"}  # else there are 4096 points, which tell no more
+    for value in VALUES:
+        text = written(usual | {key: value})
+        (workspace / "mine.toml").write_text(text, encoding="utf-8")
+        check(*ended("run", "mine.toml", "--quiet"), text[:300])
+
+
+def test_any_file_content_is_a_scene_or_is_refused(workspace):
+    for content in FILES:
+        (workspace / "mine.toml").write_bytes(content)
+        for command in ("run", "couple"):
+            status, said = ended(command, "mine.toml")
+            check(status, said, content[:100])
+            assert status == 2, content[:100]
+    (workspace / "folder.toml").mkdir()
+    (workspace / "null.toml").symlink_to(os.devnull)
+    for user_folder in ("folder.toml", "null.toml", os.devnull, "nosuch.toml", "x" * 1000 + ".toml", "\udcff.toml", ""):
+        for command in ("run", "couple"):
+            try:
+                status, said = ended(command, user_folder)
+            except OSError as error:  # which main tells in a sentence
+                status, said = 1, str(error)
+            check(status, said, user_folder[:100])
+            assert status, user_folder[:100]
+
+
+@pytest.mark.parametrize("title", ["$x_{$", "$", "\\$", "a_{b^c", "\u5b57\u0378", "%d {0} {x}"])
+def test_a_title_is_drawn_literally(workspace, title):
+    text = written(SCENE | {"title": f"'{title}'", "plots": '["position"]'})
+    (workspace / "mine.toml").write_text(text, encoding="utf-8")
+    assert ended("run", "mine.toml", "--quiet") == (0, "")
+    assert (workspace / "results/mine/figure.svg").stat().st_size > 1000
+
+
+def test_extreme_numbers_are_drawn_or_refused(workspace):
+    for values in ("x0 = 1e308", "x0 = 1e-308", "k = 1e300", "v0 = -1e300", "x0 = 5e-324\nv0 = 1e250", "m = 1e308"):
+        (workspace / "mine.toml").write_text(f"{written(SCENE | {'plots': PLOTS})}[values]\n{values}\n")
+        check(*ended("run", "mine.toml", "--quiet"), values)
+
+
+def test_any_table_content_is_compared_or_refused(workspace, monkeypatch):
+    names = []
+    for i, text in enumerate(TABLES):
+        (workspace / f"{i}.csv").write_text(text, encoding="utf-8", newline="")
+        names.append(f"{i}.csv")
+    (workspace / "good.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
+    (workspace / "\udcff$_{.csv").write_text("t [s],x [m]\n0,1\n1,2.5\n2,3\n")
+    for name in (*names, "\udcff$_{.csv"):
+        check(*ended("compare", name, "good.csv", "--quiet"), (name, Path(name).read_text()[:200]))
+    monkeypatch.setattr(
+        "harness.studies.compare.figure.open_figure", partial(stub_sheet, Figure)
+    )  # the same tables are drawn
+    for name in names:
+        for pair in (("good.csv", name), (name, name)):
+            check(*ended("compare", *pair, "--quiet"), (pair, Path(name).read_text()[:200]))
+    check(*ended("report", "--quiet"), "the report on all of these")
+    assert (workspace / "results/report.html").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("option", ["--set", "--vary"])
+def test_an_invalid_sweep_is_refused_before_a_worker_starts(workspace, option):
+    vary = () if option == "--vary" else ("--vary", "m=1:2:2")
+    for text in (*WORDS, *(SPANS if option == "--vary" else ())):
+        status, said = ended("sweep", "smd", *vary, option, text)
+        check(status, said, text[:100])
+        assert status, text[:100]
+    for more in (
+        ("--seed", "-1"),
+        ("--random", "9" * 30),
+        ("--workers", "0"),
+        ("--workers", "9" * 9),
+        ("--name", "../x"),
+    ):
+        status, said = ended("sweep", "smd", "--vary", "m=1:2", "--random", "2", more)
+        check(status, said, more)
+        assert status == 2, more
+    assert not list(workspace.glob("results/sweep/*"))
+
+
+@pytest.mark.parametrize("word", ["nan", "inf", "-inf", "1e999", "", "x", HUGE, "0x10", "-0"])
+@pytest.mark.parametrize("option", ["--stop", "--tolerance", "--within"])
+def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, word):
+    (workspace / "a.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
+    check(*ended("compare", "a.csv", "a.csv", option, word, "--quiet"), word)
+    if option != "--within":
+        check(*ended("run", "--fmu", "fmus/smd.fmu", option, word, "--quiet"), word)
+
+
+def test_randomly_mutated_scenes_run_or_are_refused(workspace):
+    """The shipped ones, changed at a few places each; the same ones every time."""
+    dice = random.Random(10)
+    for file in sorted((ROOT / "harness/scenes/coupled").glob("*.toml")):
+        for _ in range(60):
+            text = list(file.read_text())
+            for _ in range(dice.randint(1, 4)):
+                text[dice.randrange(len(text))] = dice.choice('"[]{}=.,#\\\n0-e$\0\u00e9 ')
+            (workspace / "mine.toml").write_text("".join(text), encoding="utf-8")
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(
+                    "harness.studies.coupled.study.element_fmus", refuse
+                )  # what comes after reading takes long
+                check(*ended("couple", "mine.toml", "--quiet"), "".join(text))
+    base = written(SCENE) + "grid = 0.01\n[values]\nm = 1.5\n"
+    for _ in range(150):
+        text = list(base)
+        for _ in range(dice.randint(1, 4)):
+            text[dice.randrange(len(text))] = dice.choice('"[]{}=.,#\\\n0-e$\0\u00e9 ')
+        (workspace / "mine.toml").write_text("".join(text), encoding="utf-8")
+        check(*ended("run", "mine.toml", "--quiet"), "".join(text))
+
+
+def refuse(*arguments):
+    raise HarnessError("read")
+
+
+UNREADABLE = "\udcff\udcfe"
+RESULTS = {
+    "smd/quantities.csv": ["", "a,b\n1\n", '"', "\0"],
+    "smd/steps.csv": ["", "t,h,rejected\n", "t,h,rejected\nx,y,z\n", "t\n0\n"],
+    "decay/mine/decay.json": ["", "{}", "[]", "[" * 100_000, '{"fit": 1, "turning_points": [1], "published": null}'],
+    "compare/a-b/compare.json": ["", "null", '{"variables": [{}]}', '{"variables": [], "one": 1}'],
+    "stability/stability.csv": ["", "a,b\n", "model,method,ended\nnosuch,exact,finished\n"],
+    "importers/importers.csv": ["", "a,b\n1\n"],
+    "sweep/mine/sweep.csv": ["", "a\n1\n", "error\n\n"],
+    "coupled/mine/error.csv": ["", '"'],
+    "bench/bench.csv": ["", "x"],
+    "precision/anchors.csv": [""],
+    "precision/smd.svg": ["", "no picture"],
+}
+
+
+def test_the_report_survives_any_content_of_a_result(tmp_path):
+    """The first content of each file, then the second of each, and so on; in the end each is a folder."""
+    good = tmp_path / "coulomb/quantities.csv"
+    good.parent.mkdir(parents=True)
+    good.write_text(",measured\nright hand,42.5\n")
+    for file in RESULTS:
+        (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+    for contents in (*zip_longest(*RESULTS.values(), fillvalue=""), [UNREADABLE] * len(RESULTS), None):
+        for file, content in zip(RESULTS, contents or RESULTS, strict=True):
+            (tmp_path / file).unlink(missing_ok=True)
+            if contents is None:
+                (tmp_path / file).mkdir()
+            else:
+                (tmp_path / file).write_bytes(content.encode("utf-8", "surrogateescape"))
+        assert ended("report", "--out", tmp_path, "--quiet") == (0, ""), contents
+        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert "right hand" in page
+        if contents and contents[0] == UNREADABLE:
+            told = re.findall(f"{re.escape(str(tmp_path))}/([^ ]+) cannot be shown", page)
+            assert all(file.startswith((*told,)) for file in RESULTS), told
+            assert told.count("smd") == 2  # its figures and its steps
+
+
+def python(folder, *arguments, shell=None, **environment):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)} | environment
+    command = " ".join([sys.executable, "-m", "harness", *map(str, arguments), shell or ""])
+    return subprocess.run(
+        ["sh", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, timeout=120
+    )
+
+
+FULL = "Error: No space left on device\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "shell", "status", "said"),
+    [
+        (("list",), "| head -1", 0, ""),
+        (("list",), ">&- 2>&-", 0, ""),
+        (("list", "--json"), "| true", 0, ""),
+        (("list", "--json"), "> /dev/full", 1, FULL),
+        (("run", "mine.toml"), ">&-", 0, ""),
+        (("run", "mine.toml"), "> /dev/full", 1, FULL),
+    ],
+)
+def test_an_unwritable_standard_output_is_no_crash(workspace, command, shell, status, said):
+    (workspace / "mine.toml").write_text(written(SCENE))
+    done = python(workspace, *command, shell=shell)
+    assert (done.returncode, done.stderr) == (status, said)
+
+
+def test_a_closed_standard_input_is_empty(user_folder, tmp_path):
+    done = python(user_folder, "decay", "-", "--out", tmp_path, shell="<&-")
+    assert (done.returncode, done.stderr) == (2, "Error: standard input is empty\n")
+
+
+def test_a_record_is_read_from_a_named_pipe(tmp_path):
+    """As a shell makes of `decay <(zcat swing.gz)`."""
+    os.mkfifo(tmp_path / "63")
+    writer = threading.Thread(target=(tmp_path / "63").write_text, args=("t [s],x [m]\n0.5,1\n1.5,2\n",))
+    writer.start()
+    assert ended("decay", tmp_path / "63") == (2, "63 has 2 samples in this stretch; 12 or more are needed")
+    writer.join()
+
+
+ASCII, C = {"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
+@pytest.mark.parametrize(
+    ("command", "coding"),
+    [
+        (("decay", "swing.csv", "--no-drag"), C),  # draws
+        (("run", "mine.toml"), ASCII),
+        (("sweep", "--help"), C),
+    ],
+)
+def test_an_ascii_standard_output_is_no_crash(workspace, command, coding):
+    rows = [f"{0.04 * i},{exp(-0.04 * i) * cos(0.48 * i)}" for i in range(50)]
+    (workspace / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
+    (workspace / "mine.toml").write_text(written(SCENE))
+    done = python(workspace, *command, **coding)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.isascii()

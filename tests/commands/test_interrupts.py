@@ -1,0 +1,259 @@
+"""Ctrl-C and SIGTERM end every command at once: status, one line, nothing left behind, nothing begun anew."""
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Future
+from contextlib import contextmanager, suppress
+from functools import partial
+from itertools import count, product
+from pathlib import Path
+
+import pytest
+from build_cache import ROOT
+
+import harness.process.interruptible_wait
+from harness.commands.terminal import progress
+from harness.process import interrupt
+from harness.process.interrupt import CommandInterruptedError, check_interrupt, defer_signals, interruptible
+from harness.process.interruptible_wait import wait_for_any
+from harness.process.subprocess_runner import SubprocessTimeoutError, run_subprocess
+from harness.process.worker_pool import WorkerDiedError, WorkerPool
+
+SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
+COMMANDS = {  # and a file or folder that is there once it is under way
+    "main": ([], "out/.*"),
+    "run": (["run", "slow.toml"], "temporary/fmu-*"),
+    "precision": (["precision", "pacejka"], "out/.precision-*"),
+    "stability": (["stability"], "temporary/bounded-*"),
+    "bench": (["bench"], "out/.bench-*"),
+    "importers": (["importers"], "temporary/child-*"),
+    "sweep": (["sweep", "pacejka", "--vary", "x_m=0.001:0.1:3000", "--workers", "1"], "out/sweep/.*.journal"),
+}
+
+
+@pytest.fixture(autouse=True)
+def logging_goes_on():
+    yield
+    logging.disable(logging.NOTSET)
+
+
+@pytest.mark.parametrize(
+    ("command", "number"), [*product(COMMANDS, [signal.SIGINT]), ("run", signal.SIGTERM), ("sweep", signal.SIGTERM)]
+)
+def test_a_signal_ends_a_command_and_leaves_nothing_behind(user_folder, tmp_path, command, number):
+    """To the whole group, as a terminal sends it."""
+    (tmp_path / "temporary").mkdir()
+    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
+    (tmp_path / "slow.toml").write_text(SLOW)
+    arguments, sign = COMMANDS[command]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path / "temporary")}
+    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a test run in the background ignores it
+    process = subprocess.Popen(
+        [sys.executable, "-m", "harness", *arguments, "--out", "out"],
+        cwd=tmp_path,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=heard,
+    )
+    while process.poll() is None and not list(tmp_path.glob(sign)):
+        time.sleep(0.01)
+    os.killpg(process.pid, number)
+    answered, said = process.communicate(timeout=60)
+    assert (process.returncode, answered, said.count("\n")) == (128 + number, "", 1), said
+    assert said.startswith(("Error: interrupted", "Error: terminated"))
+    assert list((tmp_path / "temporary").iterdir()) == []
+    left = [path.name for path in (tmp_path / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
+    if command == "sweep":
+        assert [name for name in left if not name.endswith(".journal")] == []  # what it has done is kept
+    elif command == "main":
+        assert [name for name in left if name.startswith(".")] == []  # scenes that were finished are whole
+        assert len(list((tmp_path / "out").glob("*"))) < 8
+    else:
+        assert left == []
+
+
+def test_a_context_is_exited_if_a_signal_arrives_during_entry():
+    left = []
+
+    @contextmanager
+    def folder():
+        try:
+            yield
+        finally:
+            left.append("folder")
+
+    def entered():
+        held = folder()
+        held.__enter__()
+        raise KeyboardInterrupt
+
+    with pytest.raises(CommandInterruptedError) as told, interruptible():
+        entered()
+    assert told
+    assert left == ["folder"]
+
+
+def test_an_interrupt_swallowed_by_a_callee_still_ends_the_command(monkeypatch):
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+
+    def swallowed():
+        with interruptible():
+            with suppress(KeyboardInterrupt):  # as an FMU in Python may
+                signal.raise_signal(signal.SIGINT)
+            raise RuntimeError("a step failed, for what it is worth")
+
+    usual = signal.default_int_handler, signal.SIG_DFL  # a shell lets what it starts in the background ignore Ctrl-C
+    before = [signal.signal(number, handler) for number, handler in zip(interrupt.SIGNALS, usual, strict=True)]
+    try:
+        with pytest.raises(CommandInterruptedError, match="interrupted") as told:
+            swallowed()
+        assert told.value.status == 130
+        with pytest.raises(KeyboardInterrupt):
+            check_interrupt()
+    finally:
+        for number, handler in zip(interrupt.SIGNALS, before, strict=True):
+            signal.signal(number, handler)
+
+
+def test_a_signal_during_a_protected_section_is_deferred_to_its_end(monkeypatch):
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
+    before = signal.signal(signal.SIGTERM, interrupt.handle_signal)
+    begun = []
+
+    def begin():
+        with defer_signals():
+            signal.raise_signal(signal.SIGTERM)
+            begun.append("whole")
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            begin()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert begun == ["whole"]
+
+
+def test_a_signal_during_a_wait_leaves_no_lock_held(monkeypatch):
+    """At whatever line of the waiting it comes, of ours or of the library's: else what is awaited could never end."""
+    monkeypatch.setattr(harness.process.interruptible_wait, "POLL_INTERVAL", 1e-4)
+    before, trace = signal.signal(signal.SIGINT, interrupt.handle_signal), sys.gettrace()
+
+    def interrupted(line):
+        """Whether the waiting has so many lines; it is interrupted at the last."""
+        monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
+        pending, lines = Future(), iter(range(line))
+
+        def look(frame, event, _):
+            if event == "line" and not interrupt.RECEIVED_SIGNALS and next(lines, None) is None:
+                signal.raise_signal(signal.SIGINT)
+            return look
+
+        with suppress(KeyboardInterrupt):
+            sys.settrace(look)
+            wait_for_any([pending])
+            sys.settrace(trace)  # before suppress, which is Python, too, goes on
+        sys.settrace(trace)
+        other = threading.Thread(target=pending.cancel, daemon=True)
+        other.start()
+        other.join(timeout=10)
+        assert not other.is_alive()
+        return bool(interrupt.RECEIVED_SIGNALS)
+
+    try:
+        assert next(line for line in count() if not interrupted(line)) > 100
+    finally:
+        sys.settrace(trace)
+        signal.signal(signal.SIGINT, before)
+
+
+def test_messages_larger_than_a_pipe_buffer_arrive_at_a_slow_reader():
+    done = run_subprocess(["sh", "-c", "sleep 0.3; wc -c"], "a" * 200_000, timeout=60.0)
+    assert (done.returncode, done.stdout.strip()) == (0, "200000")
+
+
+def test_a_program_that_times_out_ends_with_all_its_children(tmp_path):
+    script = "sleep 100 & echo $! > pid; wait"
+    with pytest.raises(SubprocessTimeoutError, match=r"no answer after 0\.5 s") as late:
+        run_subprocess(["sh", "-c", f"cd '{tmp_path}'; echo so far; {script}"], timeout=0.5)
+    assert late.value.process.stdout == "so far\n"
+    state = Path("/proc", (tmp_path / "pid").read_text().strip(), "stat")
+    for _ in range(100):
+        if not state.exists() or state.read_text().split()[2] == "Z":  # nobody asks for its status
+            return
+        time.sleep(0.05)
+    raise AssertionError("what it started lives on")
+
+
+def test_a_program_awaited_by_a_thread_ends_with_the_command(tmp_path, monkeypatch):
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
+    ended = []
+
+    def wait():
+        try:
+            run_subprocess(["sleep", "100"])
+        except KeyboardInterrupt:
+            ended.append("here")
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    interrupt.RECEIVED_SIGNALS.append(signal.SIGINT)
+    thread.join(timeout=30)
+    assert ended == ["here"]
+
+
+def test_a_worker_killed_while_it_receives_data_is_replaced(tmp_path):
+    crew = WorkerPool(1, tmp_path, [])
+    try:
+        pid = result(crew, os.getpid)
+        os.kill(pid, signal.SIGSTOP)  # it reads no more
+        threading.Timer(0.2, os.kill, [pid, signal.SIGKILL]).start()
+        with pytest.raises(WorkerDiedError, match="exit code -9"):
+            result(crew, len, bytes(10_000_000))
+        assert result(crew, len, bytes(10_000_000)) == 10_000_000
+    finally:
+        crew.kill()
+
+
+def result(crew, function, *arguments):
+    future = crew.submit(function, *arguments)
+    while not crew.wait_for_any([future]):
+        pass
+    return future.result()
+
+
+def test_the_interrupt_message_survives_cleanup(monkeypatch):
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [signal.SIGTERM])
+    before = signal.signal(signal.SIGTERM, interrupt.handle_signal)
+
+    def told():
+        try:
+            raise CommandInterruptedError("half of it is kept")
+        finally:
+            with defer_signals():
+                pass
+
+    try:
+        with pytest.raises(CommandInterruptedError, match="half of it is kept") as ended:
+            told()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert ended.value.status == 143
+
+
+@pytest.mark.parametrize("quiet", [True, False])
+def test_progress_reporting_raises_a_swallowed_interrupt(monkeypatch, quiet):
+    monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
+    with progress(quiet, 2) as report:
+        report("one", 0.5)
+        interrupt.RECEIVED_SIGNALS.append(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt):
+            report("one", 1.0)

@@ -1,0 +1,266 @@
+"""What stands on the screen: it fits, keeps its brackets, and says of a quantity what every file and the page say."""
+
+import csv
+import html
+import json
+import os
+import re
+import subprocess
+import sys
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from zipfile import ZipFile
+
+import commands as processes
+import numpy as np
+import pytest
+from build_cache import ROOT
+from rich.console import Console
+
+from harness.commands import commands
+from harness.errors import HarnessError
+from harness.references.models import CASES, MODELS
+from harness.scenes.coupled import scene as coupled
+from harness.scenes.scene import load_scene, shipped_scenes
+from harness.studies.bench.benchmark import Baseline, Benchmark
+from harness.studies.bench.table import benchmark_table
+from harness.studies.importers import table as importers
+from harness.studies.importers.checks import CHECKS
+from harness.studies.precision import law_deviations, table
+from harness.studies.precision.literature_problems import LiteratureRun
+from harness.studies.precision.study import FMU, ME, Point, Study
+
+WIDTH = 80
+PLAIN = {"COLUMNS": str(WIDTH), "PATH": ""}
+harness = partial(processes.harness, blank=processes.UNPLOTTED)
+
+
+@pytest.fixture
+def workspace(fmus, tmp_path):
+    (tmp_path / "fmus").symlink_to(fmus)
+    return tmp_path
+
+
+def fits(said, *headings):
+    """Whether lines are short enough, nothing is cut, and the headings are there."""
+    lines = said.splitlines()
+    assert max(map(len, lines)) <= WIDTH, max(lines, key=len)
+    assert "\u2026" not in said
+    for heading in headings:
+        assert heading in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "headings"),
+    [
+        (("list",), ("scene", "couple")),
+        (("run", "stickslip"), ("measured", "0.430665996656 s     0.430665996656")),
+        (("run", "coulomb-sign"), ("ms   half of smd's",)),
+        (("decay", "coulomb"), ("two peaks",)),
+        (("compare", "fmus/coulomb.fmu", "fmus/smd.fmu"), ("at t [s]",)),
+    ],
+)
+def test_command_tables_fit_into_80_columns(workspace, arguments, headings):
+    done = harness(workspace, *arguments, **PLAIN)
+    assert (done.returncode, done.stderr) == (0, "")
+    fits(done.stdout, *headings)
+
+
+POINTS = [
+    Point(case.name, tool, "dop853", 1e-6, 1e-9, 0.4567, 123456, largest=1.23e-7)
+    for case in CASES
+    for tool in (FMU, ME)
+]
+TABLES = {  # whose commands take long, filled with long words
+    "precision": (
+        [table.work_precision_table(Study(m, tuple(c for c in CASES if c.model == m), tuple(POINTS))) for m in MODELS],
+        "1e-3:",
+    ),
+    "laws": (
+        [
+            table.deviation_table(
+                [
+                    law_deviations.LawDeviation(
+                        "stickslip", "stickslip-threshold", "threshold", *(1.2e-5,) * 4, 3.3451, 0.877
+                    )
+                ]
+            )
+        ],
+        "creep [m/s]",
+    ),
+    "anchors": (
+        [
+            table.literature_table(
+                [LiteratureRun("block on a belt", "scipy, arctan(1e6 v)", "DOP853", 1e-10, 123456, 1.2e-5)]
+            )
+        ],
+        "error [SI]",
+    ),
+    "bench": (
+        [
+            benchmark_table(
+                [Benchmark("16 s of " + 9 * "words ", 0.0123, "s", 0.02, (Baseline("an empty FMU in Python", 0.1),))]
+            )
+        ],
+        "to reach",
+    ),
+    "importers": (
+        [
+            importers.importer_table(
+                [
+                    importers.CheckResult("libcosim 0.0.6", check, ("1.23e-16",) * 5, fmus=tuple(MODELS))
+                    for check in CHECKS
+                ]
+            )
+        ],
+        "pendulum",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_of_long_commands_fit_into_80_columns(name):
+    shown, heading = TABLES[name]
+    for each in shown:
+        console = Console(width=WIDTH, markup=False, highlight=False)
+        with console.capture() as said:
+            console.print(each)
+        fits(said.get(), heading)
+
+
+@pytest.mark.parametrize("command", ["", *commands.commands])
+def test_help_text_is_not_truncated(tmp_path, command):
+    done = harness(tmp_path, *command.split(), "--help", **PLAIN)
+    assert (done.returncode, done.stderr) == (0, "")
+    prose = [line for line in done.stdout.splitlines() if "-m harness" not in line]  # a command is one line
+    fits("\n".join(prose), "Example")
+    assert not [line for line in prose if re.search(r"\w\.\.\.$", line)]
+    assert "None" not in done.stdout
+
+
+def test_names_with_brackets_are_printed_literally(tmp_path):
+    for name, off in (("one", 0.0), ("two", 0.5)):
+        (tmp_path / f"{name}.csv").write_text(f"t [s],x[1] [m],[bold] [m]\n0,0,1\n1,{1 + off},2\n2,3,4\n")
+    said = harness(tmp_path, "compare", "one.csv", "two.csv", **PLAIN).stdout
+    assert "\nx[1] " in said
+    assert "\n[bold] " in said
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *("", "run stickslip", "decay coulomb", "compare smd coulomb", "sweep smd --vary c=1,2", "couple two-masses"),
+        *("precision smd", "bench", "importers"),
+    ],
+)
+def test_a_command_without_its_fmus_explains_how_to_build_them(tmp_path, monkeypatch, arguments):
+    (tmp_path / "fmus").mkdir()
+    for name in MODELS:
+        (tmp_path / f"fmus/{name}.py").write_text("")
+    monkeypatch.setattr("harness.scenes.fmu_files.FOLDERS", (Path("fmus"),))
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(HarnessError, match=r"there is no .*fmus.*: build .* with `python build_fmus\.py`"):
+        commands.main(arguments.split(), standalone_mode=False)
+
+
+@pytest.mark.parametrize("arguments", [("run", "--fmu"), ("sweep", "--vary", "k=1,2", "--workers", "1")])
+def test_an_fmu_failure_of_either_backend_is_reported_once(backend_fmus, tmp_path, arguments):
+    """A native one tells it to the process's standard error, too, past Python."""
+    done = harness(tmp_path, *arguments, backend_fmus / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")
+    assert done.returncode == 1
+    assert re.fullmatch(r"Error: .*the motion leaves the range of numbers after t = 0.0 s.*\n", done.stderr)
+
+
+@pytest.mark.parametrize(
+    ("package", "extra", "status", "arguments"),
+    [
+        ("xarray", "sweep", 1, ("sweep", "smd", "--vary", "c=1,2")),
+        ("pyssp_standard", "coupled", 1, ("couple", "two-masses")),
+        ("python_calamine", "records", 2, ("decay", "mine.xlsx")),
+        ("h5py", "records", 2, ("decay", "mine.mat")),
+    ],
+)
+def test_a_missing_optional_package_is_named_before_any_run(workspace, package, extra, status, arguments):
+    with ZipFile(workspace / "mine.xlsx", "w") as archive:
+        archive.writestr("xl/workbook.xml", "")
+    (workspace / "mine.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n")
+    (workspace / "sitecustomize.py").write_text(f"import sys; sys.modules[{package!r}] = None")
+    command = [sys.executable, "-m", "harness", *arguments]
+    path = os.pathsep.join([str(workspace), str(ROOT)])
+    done = subprocess.run(command, cwd=workspace, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (status, "", 1), done.stderr
+    assert package in done.stderr
+    assert f"pip install 'friction-fmus[{extra}]'" in done.stderr
+    assert not (workspace / "results").exists()
+
+
+def test_an_fmu_given_as_a_scene_is_run(workspace, tmp_path):
+    told = [
+        harness(workspace, "run", *way, "fmus/smd.fmu", "--set", "k=50", "--out", tmp_path / str(len(way)))
+        for way in ((), ("--fmu",))
+    ]
+    assert [done.returncode for done in told] == [0, 0]
+    assert told[0].stdout.splitlines()[:-1] == told[1].stdout.splitlines()[:-1] != []
+
+
+def test_the_versions_are_printed(tmp_path):
+    own = f"friction-fmus {version('friction-fmus')}"
+    said = harness(tmp_path, "--version").stdout
+    assert said.startswith(f"{own}, fmpy {version('fmpy')}, ")
+    assert processes.build("--version", folder=tmp_path).stdout == f"{own}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_json_list_is_accepted_by_the_commands(workspace):
+    found = json.loads(harness(workspace, "list", "--json").stdout)
+    assert [each["scene"] for each in found if each["command"] == "run"] == [file.stem for file in shipped_scenes()]
+    assert [each["scene"] for each in found if each["command"] == "couple"] == [
+        file.stem for file in coupled.shipped_coupled_scenes()
+    ]
+    for each in found:
+        if each["command"] == "run":
+            scene = load_scene(each["scene"])
+            assert (each["title"], each["model"]) == (scene.title, scene.file.stem)
+
+
+def page_of(workspace):
+    """The report, whose cells say nothing of their look."""
+    text = html.unescape((workspace / "results/report.html").read_text(encoding="utf-8"))
+    return re.sub("<td[^>]*>", "<td>", text)
+
+
+@pytest.mark.parametrize("scene", ["stickslip-threshold", "pendulum", "smd"])
+def test_a_quantity_is_formatted_alike_in_terminal_file_and_page(workspace, scene):
+    """Every one that is measured: the same digits and the same unit."""
+    said = harness(workspace, "run", scene, **PLAIN).stdout
+    assert harness(workspace, "report").returncode == 0
+    page = page_of(workspace)
+    with (workspace / f"results/{scene}/quantities.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) > 10
+    for row in rows:
+        told = re.search(
+            rf"  {re.escape(row[''])} +{re.escape(row['measured'])}(?= ) *.*{re.escape(row['unit'])}", said
+        )
+        assert told, row
+        cells = f"<td>{row['']}</td><td>{row['measured']}</td>"
+        assert cells in page, row
+    steps = page.split('<section id="steps">')[1].split("</section>")[0]
+    told = dict(zip(*(re.findall(f"<{tag}[^>]*>([^<]*)</{tag}>", steps) for tag in ("th", "td")), strict=True))
+    for row in rows:
+        if row[""] in told:
+            assert told[row[""]] == f"{row['measured']} {row['unit']}".strip()
+    assert len(told) == 6
+
+
+def test_an_interval_is_formatted_alike_in_terminal_and_page(workspace):
+    t = np.linspace(0.0, 10.0, 800)
+    x = np.exp(-0.2 * t) * np.cos(12 * t) + 1e-3 * np.random.default_rng(1).standard_normal(800)
+    np.savetxt(workspace / "mine.csv", np.column_stack([t, x]), header="t [s],x [m]", delimiter=",", comments="")
+    said = harness(workspace, "decay", "mine.csv", COLUMNS="200", PATH="").stdout
+    assert harness(workspace, "report").returncode == 0
+    page = page_of(workspace)
+    told = re.findall(r"\S+ \u00b1 \S+|\S+ \(\S+ to \S+\)|< \S+", said.split("Best")[0])
+    assert len(told) > 4
+    assert all(f"<td>{each}</td>" in page for each in told)

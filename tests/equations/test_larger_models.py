@@ -1,0 +1,134 @@
+"""Models of more states or contacts, from files as users write them: right by physics written a second time."""
+
+import commands
+import numpy as np
+import pytest
+from build_cache import build_user_model
+from contact_references import CONTACT_REFERENCES, reference_events
+from fmpy import read_model_description
+from models import LARGER_MODELS, write_growing_friction_model
+from row_comparison import assert_identical
+from scipy.integrate import solve_ivp
+from worker_client import FmiError
+
+STOP, DOP853 = 8.0, 4
+
+
+def built(name, kind):
+    """The FMU of one of the files, in a folder outside the project."""
+    (file,) = (file for file in LARGER_MODELS if file.stem == name)
+    return build_user_model(file, *(["--native", "--platform", "linux64"] if kind else [])) / kind / f"{name}.fmu"
+
+
+def lugre(t, y):
+    """The bristles by hand."""
+    x, v, z = y
+    u = v - 1e4 * abs(v) * z / (73.56 + (110.34 - 73.56) * np.exp(-((v / 0.01) ** 2)))
+    return [v, (742.5 * (0.034 * t - x) - (1e4 * z + 300.0 * u + 0.4 * v)) / 12.5, u]
+
+
+def bristled(stop):
+    """Its position, speed and bristles at the end, by a method that ours have nothing of."""
+    return solve_ivp(lugre, (0.0, stop), (0.0, 0.0, 0.0), "LSODA", rtol=1e-12, atol=1e-14).y[:, -1]
+
+
+def test_three_states_agree_with_an_independent_formulation(worker):
+    """LuGre: position, speed and bristles, within 1e-9 of their sizes."""
+    fmu = worker.instantiate(built("lugre", "")).begin({"solver.rtol": 1e-11}, stop=STOP)
+    (found,) = fmu.run([0.0, STOP], ["x", "v", "z"])[-1:]
+    fmu.free()
+    assert np.abs(found - bristled(STOP)).max() < 1e-9
+
+
+def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
+    """LuGre, by its own name for every column."""
+    folder = built("lugre", "").parent
+    for file in ("lugre.py", "lugre.fmu"):
+        (tmp_path / file).write_bytes((folder / file).read_bytes())
+    done = commands.harness(tmp_path, "references", "lugre.py")
+    assert (done.returncode, done.stderr) == (0, "")
+    _, heads, *rows = (tmp_path / "lugre.csv").read_text().splitlines()
+    assert heads == "t [s],x [m],v [m/s],z [m]"
+    table = np.array([row.split(",") for row in rows], float)
+    assert np.abs(table[-1, 1:] - bristled(table[-1, 0])).max() < 1e-9
+    done = commands.harness(tmp_path, "precision", "lugre.py", "--quick", blank=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    kept = {"lugre.csv", "lugre.json", "lugre.svg", "lugre.txt"}
+    assert {file.name for file in (tmp_path / "results/precision").iterdir()} == kept
+
+
+def run(fmu, physics, changes):
+    """Time and modes of the events, and the last state, in steps to every internal one, with values changed on the
+    way."""
+    t, events = 0.0, []
+
+    def look():
+        count, *event = fmu.get("events.count", "events.t_last", *physics.modes)
+        if count > len(events):
+            events.append(event)
+
+    for end, name, value in (*changes, (physics.stop, "", 0.0)):
+        while t < end:
+            ahead = min(fmu.get("solver.t_next"), end)
+            fmu.step(t, ahead - t)
+            t = ahead
+            look()
+        if name:
+            fmu.set({name: value})
+            look()
+    return events, fmu.get(*physics.states)
+
+
+RUNS = [(name, ()) for name in CONTACT_REFERENCES] + [
+    (name, one.changes) for name, one in CONTACT_REFERENCES.items() if one.changes
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"), RUNS, ids=lambda one: one if isinstance(one, str) else f"changed{len(one)}"
+)
+def test_contacts_stick_and_slip_as_in_an_independent_formulation(worker, name, changes):
+    """On a belt, in a clutch, each on its own body or both on one: every event, and the state at the end; also where
+    a belt is set to another speed, and a clutch opened, on the way."""
+    physics = CONTACT_REFERENCES[name]()
+    true, end = reference_events(name, changes)
+    fmu = worker.instantiate(built(name, ""))
+    fmu.begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=physics.stop)
+    events, found = run(fmu, physics, changes)
+    fmu.free()
+    assert [modes for _, *modes in events] == [modes for _, *modes in true]
+    assert np.abs(np.array([t for t, *_ in events]) - [t for t, *_ in true]).max() < 1e-9
+    assert np.abs(np.array(found) - end).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", [path.stem for path in LARGER_MODELS])
+def test_python_and_native_agree_bit_for_bit(worker, name):
+    """Outputs and counts at every internal step, by every method."""
+    variables = {v.name: v for v in read_model_description(built(name, "")).modelVariables}
+    wanted = [v.name for v in variables.values() if v.causality == "output"]
+    wanted += ["solver.steps", "solver.evaluations", "events.count"][: 3 if name in CONTACT_REFERENCES else 2]
+    methods = [int(item.value) for item in variables["solver.method"].declaredType.items]
+    assert len(methods) > 3
+    for method in methods:
+        runs = []
+        for kind in ("", "native"):
+            fmu = worker.instantiate(built(name, kind)).begin({"solver.rtol": 1e-5, "solver.method": method}, stop=STOP)
+            runs.append(fmu.follow(0.0, STOP, wanted))
+            fmu.free()
+        (times, rows), (same, others) = runs
+        assert times == same
+        assert_identical(rows, others, wanted)
+
+
+@pytest.mark.parametrize("kind", ["", "native"])
+def test_a_sled_with_more_sliding_than_static_friction_is_reported_in_one_sentence(tmp_path, worker, kind):
+    words = ["--native", "--platform", "linux64", "--method", "ode45"] if kind else []
+    fmu = worker.instantiate(
+        build_user_model(write_growing_friction_model(tmp_path), *words) / kind / "growing.fmu"
+    ).begin({"slide1": 200.0}, stop=STOP)
+    with pytest.raises(FmiError):
+        fmu.step(0.0, STOP)
+    ((_, _, sentence),) = [message for message in fmu.messages() if message[0] != 0]
+    assert sentence.startswith("the contacts can neither hold nor slip: one of them slides with a larger force than")
+    assert np.isnan(fmu.get("x1"))
+    fmu.free()

@@ -1,0 +1,337 @@
+"""A model in a file anywhere, as a user writes it: built by its path, in every kind, and right."""
+
+import subprocess
+import sys
+from zipfile import ZipFile
+
+import commands
+import numpy as np
+import pytest
+from build_cache import ROOT, build_user_model
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
+from models import EXAMPLE_MODELS, model_class
+from row_comparison import assert_identical
+from scipy.integrate import solve_ivp
+from worker_client import FmiError
+
+from fmus.packaging import BuildError
+from fmus.packaging.archive import build
+from fmus.packaging.model_lookup import find_model
+
+EVERY_FILE = pytest.mark.parametrize("path", EXAMPLE_MODELS, ids=lambda path: path.stem)
+KINDS = {
+    "": [],
+    "native/fmi3": ["--fmi", "3", "--platform", "linux64"],
+    "native": ["--native", "--platform", "linux64"],
+}
+
+
+def command(*arguments, cwd):
+    """The build command, in a folder of the user's."""
+    return commands.build(*arguments, folder=cwd)
+
+
+def built(path, kind):
+    """The FMU, beside a copy of the file in a folder outside the project; of FMI 3.0, whose numerics are those of the
+    native FMU, with its usual method."""
+    usual = ["--method", find_model(path).analysis.method] if kind == "native/fmi3" else []
+    return build_user_model(path, *KINDS[kind], *usual) / kind / f"{path.stem}.fmu"
+
+
+@EVERY_FILE
+@pytest.mark.parametrize("kind", KINDS)
+def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(path, kind):
+    fmu = built(path, kind)
+    assert validate_fmu(str(fmu)) == []
+    assert read_model_description(fmu).modelName == path.stem
+    folder, *_ = [*kind.split("/"), ""]
+    left = {file.name for file in fmu.parents[len(kind.split("/")) if kind else 0].iterdir()}
+    assert left == {path.name, folder or f"{path.stem}.fmu"}
+    with ZipFile(fmu) as archive:
+        names = archive.namelist()
+        assert "documentation/index.html" in names
+        assert not [name for name in names if name == "model.png" or "fmi-ls-ref" in name]
+
+
+@EVERY_FILE
+def test_python_and_native_agree_bit_for_bit(path, worker):
+    """Outputs and counts, up to the stop time of its default run."""
+    described = read_model_description(built(path, ""))
+    wanted = [v.name for v in described.modelVariables if v.causality == "output" or v.name == "solver.steps"]
+    stop = float(described.defaultExperiment.stopTime)
+    times = [stop * i / 50 for i in range(51)]
+    rows = []
+    for kind in ("", "native"):
+        fmu = worker.instantiate(built(path, kind)).begin({}, stop=stop)
+        rows.append(fmu.run(times, wanted))
+        fmu.free()
+    assert_identical(*rows, wanted)
+
+
+def viscous_pendulum(t, y):
+    phi, omega = y
+    return [omega, -9.81 / 0.5 * np.sin(phi) - 0.05 / 0.25 * omega]
+
+
+def bumper(t, y):
+    x, v = y
+    w, p = v / 0.05, (x - 0.02) / 0.01
+    drag = 3.0 * np.tanh(w) * (1.0 - 0.4 * np.cos(w) * np.exp(-(w**2)))
+    push = 3.0 * (np.sinh(p) + np.log(1.0 + p)) if p > 0.0 else 0.0
+    return [v, (8.0 - drag - push) / 2.0]
+
+
+@pytest.mark.parametrize(("law", "start"), [(viscous_pendulum, (0.3, 0.0)), (bumper, (0.0, 0.1))])
+def test_its_motion_agrees_with_an_independent_formulation(law, start):
+    """Within 1e-9, by scipy's DOP853."""
+    path = next(path for path in EXAMPLE_MODELS if path.stem == law.__name__)
+    stop = model_class(path).stop_time
+    values = {"solver.rtol": 1e-11, "solver.method": 4}
+    found = simulate_fmu(built(path, "native"), stop_time=stop, output_interval=stop / 100, start_values=values)
+    x, v = (s.name for s in find_model(path).analysis.states)
+    true = solve_ivp(law, (0.0, stop), start, "DOP853", t_eval=found["time"], rtol=1e-12, atol=1e-13).y
+    assert np.abs(found[x] - true[0]).max() < 1e-9
+    assert np.abs(found[v] - true[1]).max() < 1e-8
+
+
+def rotor_brake(stop):
+    """Turns of the brake from stick to slip and back: times and angles, by scipy with events."""
+    J, k, c, T_s, T_d, omega_s, turn = 0.02, 3.0, 0.01, 0.5, 0.3, 0.5, 0.4
+    t, phi, found = 0.0, 0.0, []
+
+    def slide(t, y):
+        drag = T_d + (T_s - T_d) * np.exp(-((y[1] / omega_s) ** 2))
+        return [y[1], (k * (turn * t - y[0]) - c * y[1] - drag) / J]
+
+    def rest(t, y):
+        return y[1]
+
+    rest.terminal, rest.direction = True, -1
+    while True:
+        t = (T_s / k + phi) / turn
+        if t > stop:
+            return found
+        found.append((t, phi))
+        run = solve_ivp(slide, (t, stop), (phi, 0.0), "DOP853", events=rest, rtol=1e-12, atol=1e-13)
+        if run.status != 1:
+            return found
+        t, (phi, _) = run.t[-1], run.y[:, -1]
+        found.append((t, phi))
+
+
+def test_its_friction_sticks_and_slips_when_the_equations_require(worker):
+    """The events of the brake, and a rest that is one."""
+    path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
+    stop = model_class(path).stop_time
+    for kind in ("", "native"):
+        fmu = worker.instantiate(built(path, kind)).begin({"solver.rtol": 1e-11, "solver.method": 4}, stop=stop)
+        t, events = 0.0, []
+        while t < stop:
+            ahead = fmu.get("solver.t_next")
+            fmu.step(t, ahead - t)
+            t = ahead
+            count, last, phi, omega, grip = fmu.get("events.count", "events.t_last", "phi", "omega", "grip")
+            if count > len(events):
+                events.append((last, phi))
+            if grip == 0:
+                assert omega == 0.0
+        fmu.free()
+        true = rotor_brake(stop)
+        assert len(events) == len(true) > 6
+        assert np.abs(np.array(events) - np.array(true)).max() < 1e-8
+
+
+def test_methods_laws_and_folders_are_selected_for_a_file_as_for_a_name(tmp_path):
+    path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
+    run = command(path, "--method", "rodas", "--law", "hybrid", "--platform", "linux64", "--out", "lean", cwd=tmp_path)
+    assert (run.returncode, run.stderr) == (0, "")
+    chosen = {v.name: v for v in read_model_description(tmp_path / "lean" / "rotor_brake.fmu").modelVariables}
+    assert [item.name for item in chosen["solver.method"].declaredType.items] == ["rodas"]
+    assert [item.name for item in chosen["friction"].declaredType.items] == ["hybrid"]
+    refused = command(path, "--method", "exact", cwd=tmp_path)
+    assert refused.stderr == "Error: rotor_brake has no method 'exact'; it has ode23, ode45, dop853, rodas.\n"
+
+
+@pytest.fixture
+def oil(tmp_path):
+    """A folder with the file of a model in it, under the name of one of ours."""
+    path = next(path for path in EXAMPLE_MODELS if path.stem == "viscous_pendulum")
+    (tmp_path / "pendulum.py").write_text(path.read_text())
+    return tmp_path
+
+
+TABLE = "# series and DOP853, relative difference 1e-13\nt [s],phi [rad],omega [rad/s]\n0.0,0.3,0.0\n4.0,0.1,-0.2\n"
+
+
+def test_files_of_the_same_stem_are_packed_and_no_others(oil):
+    """Icon and certified result; neither is needed, whatever the name."""
+    assert command("pendulum.py", cwd=oil).returncode == 0
+    with ZipFile(oil / "pendulum.fmu") as archive:
+        assert not [name for name in archive.namelist() if name == "model.png" or "fmi-ls-ref" in name]
+    icon = (ROOT / "fmus" / "smd.png").read_bytes()
+    (oil / "pendulum.png").write_bytes(icon)
+    (oil / "pendulum.csv").write_text(TABLE)
+    assert command("pendulum.py", cwd=oil).returncode == 0
+    with ZipFile(oil / "pendulum.fmu") as archive:
+        assert archive.read("model.png") == icon
+        result = archive.read("extra/org.fmi-standard.fmi-ls-ref/pendulum_out.csv").decode()
+        page = archive.read("documentation/index.html").decode()
+    assert result.splitlines() == ["time,phi,omega", "0.0,0.3,0.0", "4.0,0.1,-0.2"]
+    assert "Certified result of the default experiment: series and DOP853, relative difference 1e-13." in page
+
+
+def test_a_model_file_may_be_named_like_a_python_module(oil):
+    """As math.py, fmus.py: none of them is taken for the module, where the commands are run by their names."""
+    folder = oil / "Modelle für später"
+    folder.mkdir()
+    for name in ("math.py", "fmus.py", "random.py"):
+        (folder / name).write_bytes(b"\xef\xbb\xbf" + (oil / "pendulum.py").read_bytes().replace(b"\n", b"\r\n"))
+    for words in ("build_fmus", "fmus.py"), ("harness", "run", "--fmu", "fmus.fmu"):
+        done = subprocess.run([sys.executable, "-m", *words], cwd=folder, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+
+
+def harness(*arguments, cwd):
+    """A command of the harness, in a folder of the user's; at its figures nobody looks."""
+    return commands.harness(cwd, *arguments, blank=True)
+
+
+def test_a_result_is_certified_by_two_agreeing_methods_and_packed_by_the_next_build(oil):
+    assert harness("references", "pendulum.py", cwd=oil).stderr == (
+        "Error: there is no pendulum.fmu: build it with `python build_fmus.py pendulum.py`\n"
+    )
+    assert command("pendulum.py", cwd=oil).returncode == 0
+    made = harness("references", "pendulum.py", cwd=oil)
+    assert (made.returncode, made.stderr) == (0, "")
+    how, heads, *rows = (oil / "pendulum.csv").read_text().splitlines()
+    assert how.startswith("# dop853 and rodas, relative difference ")
+    assert float(how.rsplit(" ", 1)[1]) < 1e-10
+    assert heads == "t [s],phi [rad],omega [rad/s]"
+    t, phi, omega = np.array([row.split(",") for row in rows], float).T
+    true = solve_ivp(viscous_pendulum, (0.0, t[-1]), (0.3, 0.0), "DOP853", t_eval=t, rtol=1e-12, atol=1e-13).y
+    assert np.abs(true - [phi, omega]).max() < 1e-9
+    assert command("pendulum.py", "--method", "rodas", cwd=oil).returncode == 0
+    with ZipFile(oil / "pendulum.fmu") as archive:
+        assert "extra/org.fmi-standard.fmi-ls-ref/pendulum_out.csv" in archive.namelist()
+    assert (
+        "pendulum.fmu does not offer dop853: build it with all" in harness("references", "pendulum.py", cwd=oil).stderr
+    )
+
+
+DUFFING = '''
+from fmus import Model, Output, Parameter, State, cos
+
+class Duffing(Model):
+    """Forced mass between two wells."""
+
+    w = Parameter(1.2, "rad/s", "frequency of the force")
+    u = Parameter(1.0, "1/s", "unit of rates")
+    x = State("1", "position", start=0.1)
+    v = State("1/s", "speed", rate_of=x)
+    phase = State("rad", "phase of the force", rate=w)
+    a = Output("1/s2", "acceleration", u * (u * (x - x * x * x + 0.5 * cos(phase)) - 0.3 * v), rate_of=v)
+    stop_time, method = 250.0, "dop853"
+'''
+
+
+def test_a_run_on_which_two_methods_disagree_is_not_certified(oil):
+    """An oscillator that forgets where it started."""
+    (oil / "duffing.py").write_text(DUFFING)
+    assert command("duffing.py", cwd=oil).returncode == 0
+    run = harness("references", "duffing.py", cwd=oil)
+    assert run.returncode == 1
+    assert run.stderr.startswith("Error: duffing.py: dop853 and rodas differ by ")
+    assert not (oil / "duffing.csv").exists()
+
+
+def test_an_invalid_result_is_refused(oil):
+    tables = ["", "t,x\n0,1\n", TABLE.replace("# ", ""), TABLE.replace(",0.3,", ",nan,"), TABLE.replace(",-0.2", "")]
+    for table in tables:
+        (oil / "pendulum.csv").write_text(table)
+        with pytest.raises(
+            BuildError, match=r"pendulum\.csv is no certified result: its first line tells after a # how"
+        ):
+            build(oil / "pendulum.py", oil)
+    run = command("pendulum.py", cwd=oil)
+    assert run.returncode == 1
+    assert run.stderr.startswith("Error: pendulum.csv is no certified result: ")
+    assert run.stderr.count("\n") == 1
+
+
+def test_a_run_shows_events_whatever_the_name_of_the_mode(tmp_path):
+    fmu = built(next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake"), "")
+    (tmp_path / "brake.toml").write_text(f'title = "Brake"\nfmu = "{fmu}"\noutputs = ["phi", "omega", "alpha"]\n')
+    run = harness("run", "brake.toml", "--out", "results", cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    header, *rows = (tmp_path / "results" / "brake" / "events.csv").read_text().splitlines()
+    assert header == "t [s],mode"
+    assert [int(row.split(",")[1]) for row in rows[:4]] == [0, 1, 0, 1]
+
+
+@pytest.mark.parametrize("words", [["run"], ["precision"], ["stability"], ["references"], ["compare", "brake.py"]])
+def test_every_command_takes_its_path_and_explains_how_to_build_it(tmp_path, words):
+    (tmp_path / "brake.py").write_text("")
+    done = harness(*words, "brake.py", cwd=tmp_path)
+    assert done.returncode
+    assert done.stderr.count("\n") == 1
+    assert "there is no brake.fmu: build it with `python build_fmus.py brake.py`" in done.stderr
+
+
+def test_it_is_run_and_compared_by_its_path_like_its_fmu(tmp_path):
+    source = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
+    for path in (source, built(source, "")):
+        (tmp_path / path.name).symlink_to(path)
+    harness("run", "rotor_brake.py", cwd=tmp_path)
+    assert "the same, bit for bit" in harness("run", "--fmu", "rotor_brake.fmu", cwd=tmp_path).stdout
+    done = harness("compare", "rotor_brake.py", "rotor_brake.fmu", "--atol", "0", "--stop", "1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+PUCK = '''
+from fmus import Contact, Mode, Model, Output, Parameter, State
+
+
+class Puck(Model):
+    """Puck on ice, of which nobody asks where it is: m a = -F."""
+
+    m = Parameter(2.0, "kg", "mass", above=0.0)
+    f = Parameter(3.0, "N", "force of dry friction", low=0.0)
+    grip = Parameter(4.0, "N", "what holds")
+    v = State("m/s", "speed", start=1.0)
+    mode = Mode()
+    F = Contact("N", "friction, against the motion", mode=mode, slip=v, slide=f, hold=grip)
+    a = Output("m/s2", "acceleration", -F / m, rate_of=v)
+'''
+
+
+@pytest.fixture
+def puck(tmp_path):
+    """The file with it."""
+    (tmp_path / "puck.py").write_text(PUCK)
+    return tmp_path / "puck.py"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_model_may_have_one_state(puck, kind):
+    """It slows by f / m, and comes to rest after m / f."""
+    run = simulate_fmu(
+        str(built(puck, kind)), stop_time=1.0, output_interval=0.25, output=["v", "mode", "events.t_last"]
+    )
+    assert np.abs(run["v"] - np.maximum(0.0, 1.0 - 1.5 * run["time"])).max() < 1e-12
+    assert (run["mode"][-1], run["events.t_last"][-1]) == (0, pytest.approx(2.0 / 3.0, abs=1e-12))
+
+
+@pytest.mark.parametrize("kind", ["", "native"])
+def test_sliding_friction_above_static_friction_is_refused_before_the_run(puck, worker, kind):
+    """It could neither stay nor go: as built, and when a value is set."""
+    sentence = "F slides with more than it holds (f = {}, grip = {}): lower what slides, or raise what holds"
+    fmu = worker.instantiate(built(puck, kind))
+    puck.write_text(PUCK.replace("(4.0", "(2.0"))
+    done = command("puck.py", cwd=puck.parent)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert sentence.format(3.0, 2.0) in done.stderr
+    with pytest.raises(FmiError):
+        fmu.begin({"f": 5.0}, stop=1.0).step(0.0, 1.0)
+    assert sentence.format(5.0, 4.0) in str(fmu.messages())
+    fmu.free()

@@ -1,0 +1,39 @@
+"""The FMI 3.0 FMUs in a host written in C, without Python: fmi3_host.c, by the system's compiler."""
+
+import fmi3_fixtures
+import pytest
+from models import MODELS, model_class, outputs
+from native_host import FMI3_HOST_SOURCE, host_program, run_life_cycles
+
+LIVES, STEPS = 100, 20
+fmus, worker, _workers = fmi3_fixtures.FIXTURES
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_hundred_life_cycles_in_a_host_without_python(worker, fmus, name):
+    """Its last values are those that fmpy gets, to the last bit."""
+    program, library = [host_program(source=FMI3_HOST_SOURCE)], f"x86_64-linux/{name}.so"
+    (solving, solved), said = run_life_cycles(program, fmus / f"{name}.fmu", library, LIVES, STEPS)
+    stop, (x, v, *_) = model_class(name).stop_time, outputs(name)
+    h = stop / STEPS
+    times = [i * h for i in range(STEPS)]
+    fmu = worker.instantiate(fmus / f"{name}.fmu").begin()
+    for t in times:
+        fmu.step(t, h)
+    assert fmu.get(x, v) == solving
+    fmu.free()
+    fmu = worker.exchange(fmus / f"{name}.fmu").begin()
+    fmu.update_discrete_states()
+    fmu.enter_continuous_time()
+    for t in times:
+        states = [a + h * rate for a, rate in zip(fmu.get_states(), fmu.rates(), strict=True)]
+        fmu.set_point(t + h, states)
+        fmu.enter_event_mode()
+        fmu.update_discrete_states()
+        fmu.enter_continuous_time()
+    assert fmu.get(x, v) == solved
+    fmu.free()
+
+    assert [line for line in said if not line.startswith("log")] != []
+    assert all("m = -1.0" in line for line in said)
+    assert len(said) == 2  # in the log and on standard error

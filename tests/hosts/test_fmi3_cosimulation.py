@@ -1,0 +1,58 @@
+"""What the FMI 2.0 FMUs promise for co-simulation, the FMI 3.0 FMUs keep: the same claims, word for word."""
+
+import fmi3_fixtures
+import numpy as np
+import pytest
+from models import MODELS, model_class, outputs
+
+from harness.references.certified_reference import POINTS, load_reference, relative_errors
+from tests.references.test_references import test_the_built_fmu_agrees_with_the_reference  # noqa: F401
+from tests.runtime.test_exact_method import test_a_stuck_mass_does_not_move_in_a_million_seconds  # noqa: F401
+from tests.runtime.test_free_running import (  # noqa: F401
+    test_a_changed_driver_speed_causes_no_jump,
+    test_a_later_start_time_only_shifts_the_motion,
+    test_a_run_without_stop_time_continues,
+    test_outputs_satisfy_force_and_energy_balance,
+    test_reading_changes_nothing_at_any_time,
+    test_setting_a_value_to_itself_changes_nothing,
+)
+from tests.runtime.test_parameter_changes import (  # noqa: F401
+    test_a_changed_value_acts_from_its_communication_point_on,
+    test_a_pendulum_twisted_in_motion_and_at_rest_agrees_with_the_reference,
+    test_a_sled_with_randomly_changing_values_agrees_with_the_closed_form,
+)
+from tests.runtime.test_saved_state import (  # noqa: F401
+    test_a_restored_state_continues_bit_for_bit,
+    test_a_restored_state_recovers_from_a_failure_and_restores_a_pending_one,
+    test_a_state_includes_parameters_not_yet_effective,
+)
+
+fmus, worker, _workers = fmi3_fixtures.FIXTURES
+REACH = dict.fromkeys(MODELS, 1e-13) | {"pendulum": 1e-9, "pacejka": 1e-6}  # by default, relative
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_default_experiment_in_fmpy_reaches_the_reference(worker, fmus, name):
+    truth = load_reference(name)
+    interval = model_class(name).stop_time / (POINTS - 1)
+    columns = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
+    assert columns["time"] == truth.times.tolist()
+    motion = np.array([columns[v] for v in outputs(name)[:2]]).T
+    assert relative_errors(motion, truth.motion).max() < REACH[name]
+    if "mode" in columns:
+        assert columns["mode"][-1] == truth.modes[-1][1]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_time_and_indicators_are_readable_in_co_simulation(launch, name):
+    """The indicators of model exchange tell in co-simulation too how far the next event is."""
+    fmu, stop, dry = launch(name), model_class(name).stop_time, "mode" in outputs(name)
+    names = ["time", *(["mode", outputs(name)[1], "events.to_rest", "events.to_break_away"] if dry else [])]
+    times = [stop * i / 200 for i in range(201)]
+    for t, row in zip(times, fmu.run(times, names), strict=True):
+        assert row[0] == t
+        if dry:
+            mode, v, to_rest, to_break_away = row[1:]
+            assert to_rest == (mode * v + 1e-300 if mode else 1.0)  # never zero once an event is handled
+            assert to_break_away > 0.0
+            assert mode == 0 or to_break_away == 1.0

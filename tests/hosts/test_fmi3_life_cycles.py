@@ -1,0 +1,113 @@
+"""Many lives of FMI 3.0 FMUs, for co-simulation and for model exchange, in turn, at once, in threads and processes,
+beside those of FMI 2.0; each host is a separate process (fmi3_life_cycles.py) that must exit cleanly."""
+
+from functools import partial
+
+import fmi3_fixtures
+import pytest
+import worker_client
+from build_cache import ROOT
+from models import CASES, MODELS, counts, declared, label, outputs
+from row_comparison import assert_identical
+
+run_script = partial(worker_client.run_script, "fmi3_life_cycles.py")
+
+
+fresh_worker = fmi3_fixtures.fresh_worker
+
+
+@pytest.fixture(scope="module")
+def each():
+    """Every FMI 3.0 FMU twice: it is taken for co-simulation, then for model exchange."""
+    return [str(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu") for name in MODELS for _ in range(2)]
+
+
+@pytest.fixture(scope="module")
+def older(fmus):
+    """The FMI 2.0 FMUs."""
+    return [str(fmus / f"{name}.fmu") for name in MODELS]
+
+
+def test_successive_life_cycles_leave_little_memory(each, record_property):
+    """Fifteen for each of ten, each with a reset: seen is 0.2 kB a life, and nothing in sys.path."""
+    told = run_script("run_in_turn", each, 150)
+    early, late = told["memory"]
+    record_property("kB a life", (late - early) / 135)
+    assert told["runs"] == [1] * len(each)
+    assert told["path"] == []
+    assert late - early < 135 * 4.0
+
+
+def test_instances_of_both_interfaces_and_both_versions_coexist(each, older):
+    """All alive at once and stepped in turns: every instance of an FMU gives the same run."""
+    assert run_script("run_interleaved", each + older, 1)["runs"] == 1
+
+
+def test_an_fmu_unpacked_for_every_run_is_released(each, record_property):
+    """As fmpy's simulate_fmu does: memory and libraries of earlier runs are given back."""
+    told = run_script("unpack_for_every_run", each[0], 30)
+    early, late = told["memory"]
+    record_property("kB a run", (late - early) / 27)
+    assert told["libraries"] <= 2
+    assert told["path"] == []
+    assert late - early < 27 * 20.0
+
+
+def test_threads_do_not_interfere(each, older):
+    paths = each + older
+    assert run_script("run_in_threads", paths, 4, 2) == {"runs": [1] * len(paths), "errors": []}
+
+
+@pytest.mark.parametrize("method", ["fork", "spawn"])
+def test_child_processes_continue_instances_and_create_new_ones(method):
+    """In co-simulation the sled, in model exchange the pendulum."""
+    paths = [fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu" for name in ("stickslip", "pendulum")]
+    told = run_script("run_in_processes", paths, method)
+    assert (told["same"], {*told["codes"]}) == (True, {0})
+
+
+def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(each):
+    told = run_script("run_beside_sources", str(ROOT), each)
+    assert told["foreign"] == []
+    assert told["rows"] == run_script("run_each", each)
+
+
+def test_a_folder_may_have_any_name(each, tmp_path):
+    """But one with %20, which the native layer takes for a space."""
+    expected = run_script("run_in_folder", each[0], None)
+    for folder in ("with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200):
+        (tmp_path / folder).parent.mkdir(exist_ok=True)
+        assert run_script("run_in_folder", each[0], str(tmp_path / folder)) == expected, folder
+
+
+def test_a_process_may_end_with_live_instances(fresh_worker):
+    """The fixture asks for a good end; so that is not luck, of all FMUs at once."""
+    for name in MODELS:
+        for make in (fresh_worker.instantiate, fresh_worker.exchange, fresh_worker.instantiate):
+            make(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu").begin().get(outputs(name)[0])
+
+
+# ---- the two versions of FMI in one process
+
+
+@pytest.fixture(scope="module")
+def process():
+    """A process that must end well."""
+    worker = fmi3_fixtures.Worker()
+    yield worker
+    assert worker.close() == 0
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_co_simulation_agrees_with_fmi2_bit_for_bit(process, fmus, case):
+    """On the same grid, with a change of input in mid-run, where neither knows a stop time."""
+    name, values, stop = case
+    names, times = outputs(name) + counts(name), [stop * i / 100 for i in range(101)]
+    force = next(v for v, d in declared(name).items() if d.causality == "input")
+    changes = {times[30]: {force: 0.004 if name == "pendulum" else 3.0}, times[60]: {force: 0.0}}
+    rows = []
+    for folder in (fmi3_fixtures.build_fmi3_fmus(), fmus):
+        fmu = process.instantiate(folder / f"{name}.fmu").begin(values)
+        rows.append(fmu.run_with_changes(times, names, changes))
+        fmu.free()
+    assert_identical(*rows, names)

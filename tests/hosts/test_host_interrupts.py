@@ -1,0 +1,56 @@
+"""An interrupt is the host's: it ends the step, and reaches the host when the call is over; in a clean process."""
+
+import json
+import subprocess
+import zipfile
+
+import pytest
+from build_cache import SUPPORT
+from interrupted_host import HANDLERS
+from worker_client import run_script_with_stderr
+
+from tests.hosts.test_python_hosts import PYTHONS, interpreter
+
+
+@pytest.fixture
+def fmu(fmus):
+    return fmus / "smd.fmu"
+
+
+@pytest.mark.parametrize("handler", HANDLERS)
+def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
+    """As the very exception that the handler of the host has raised, once, and no later than the call is over."""
+    answer, said = run_script_with_stderr("interrupted_host.py", "interrupt_long_step", fmu, handler)
+    arguments = {"KeyboardInterrupt": [], "SystemExit": [143], "Stop": ["enough", 3]}
+    assert answer["reached"] == [handler, arguments[handler]]
+    ((status, category, sentence),) = answer["log"]
+    assert (status, category) == (3, "logStatusError")
+    assert sentence == "the run was interrupted after t = 0.0 s; reset the FMU to run again"
+    assert said == f"Smd (interrupted): {sentence}\n"
+    assert answer["x"]
+    assert answer["recovers"]
+
+
+def test_an_interrupt_during_any_call_reaches_the_host(fmu):
+    """Also where it is handled as a function of the FMU is entered, before its first line."""
+    answer, said = run_script_with_stderr("interrupted_host.py", "interrupt_short_steps", fmu, 150)
+    assert answer == [["KeyboardInterrupt"], 150]
+    assert all("was interrupted" in line for line in said.splitlines())
+
+
+@pytest.mark.parametrize("version", PYTHONS)
+def test_every_entry_point_is_protected_from_its_first_instruction(fmu, tmp_path, version):
+    python = interpreter(version)
+    if python is None:
+        pytest.skip(f"there is no Python {version} here")
+    with zipfile.ZipFile(fmu.with_name("stickslip.fmu")) as archive:
+        archive.extractall(tmp_path)
+    script = SUPPORT / "interrupted_embedded.py"
+    command = [python, "-I", script, tmp_path / "resources"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    answers = json.loads(done.stdout)
+    assert len(answers) >= 7
+    for entry, (error, arguments, sentence) in answers.items():
+        assert (error, arguments) == ("Stop", ["enough", 3]), entry
+        assert "the run was interrupted" in sentence, entry

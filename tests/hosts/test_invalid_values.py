@@ -1,0 +1,330 @@
+"""Whatever cannot be used is refused in one sentence, and answers NaN; the process lives on and reset recovers."""
+
+import itertools
+from math import inf, isfinite, isnan, nan, nextafter
+
+import pytest
+from models import CASES, EXACT, MODELS, ODE23, SIGN, Choice, counts, declared, label, outputs, parameters, push
+from row_comparison import assert_identical
+from worker_client import FmiError
+
+ERROR, DISCARD = 3, 2
+REFUSED = ("fmi2DoStep", DISCARD)  # function and status of a refused step
+REALS = {name: [v for v in outputs(name) if declared(name)[v].type == "Real"] for name in MODELS}
+
+
+def bad_values(declaration):
+    """Values just outside the range, far outside it, and no numbers at all."""
+    yield from (nan, inf, -inf)
+    if isfinite(declaration.low):
+        yield from (nextafter(declaration.low, -inf), declaration.low - 1e9)
+    if isfinite(declaration.high):
+        yield from (nextafter(declaration.high, inf), declaration.high + 1e9)
+    yield from (bound for bound in (declaration.above, declaration.below) if isfinite(bound))
+
+
+def refuses(fmu, name, t, h, *words):
+    """The step from t fails, all outputs read NaN, and one sentence says `words`: in the log and on standard error."""
+    with pytest.raises(FmiError) as refusal:
+        fmu.step(t, h)
+    assert (refusal.value.function, refusal.value.status) == REFUSED
+    assert all(isnan(value) for value in fmu.get(*REALS[name], "solver.t_next"))
+    ((status, category, sentence),) = [message for message in fmu.messages() if message[0] != 0]
+    assert (status, category) == (ERROR, "logStatusError")
+    assert [w for w in words if w not in sentence] == [], sentence
+    (line,) = fmu.worker.read_stderr().splitlines()
+    assert line.endswith(sentence)
+    assert "Traceback" not in line
+
+
+def ranges():
+    return [(name, v) for name in MODELS for v in parameters(name)]
+
+
+@pytest.mark.parametrize(("name", "variable"), ranges(), ids=lambda part: part)
+def test_a_value_out_of_range_is_refused_by_name(launch, name, variable):
+    declaration = declared(name)[variable]
+    for value in bad_values(declaration):
+        fmu = launch(name, {variable: value})
+        assert all(isnan(v) for v in fmu.get(*REALS[name]))
+        refuses(fmu, name, 0.0, 0.1, variable, repr(value), declaration.allowed)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_a_value_that_becomes_invalid_during_a_run_stops_it_and_reset_recovers(launch, case):
+    name, values, stop = case
+    times, names = [stop * i / 20 for i in range(21)], outputs(name) + counts(name)
+    expected = launch(name, values, stop=stop).run(times, names)
+    for variable, value in ((push(name)[0], nan), ("m", 0.0), (outputs(name)[0] + "0", 0.5)):
+        fmu = launch(name, values, stop=stop)
+        fmu.run(times[:11], [])
+        fmu.set({variable: value})
+        refuses(fmu, name, times[10], 0.01, variable, repr(value))
+        with pytest.raises(FmiError):
+            fmu.step(times[10], 0.01)
+        fmu.reset()
+        assert_identical(fmu.begin(values, stop=stop).run(times, names), expected, names)
+        fmu.worker.read_stderr()
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_invalid_value_may_be_corrected_before_it_is_used(launch, name):
+    fmu = launch(name, stop=1.0)
+    expected = fmu.run([0.0, 0.3, 0.6], outputs(name))
+    fmu = launch(name, stop=1.0)
+    force, _ = push(name)
+    fmu.set({force: nan, "m": -1.0})
+    fmu.set({force: 0.0, "m": declared(name)["m"].start})
+    assert_identical(fmu.run([0.0, 0.3, 0.6], outputs(name)), expected, outputs(name))
+
+
+def choices():
+    found = [(name, v) for name in MODELS for v, d in declared(name).items() if isinstance(d, Choice)]
+    return [(name, v, value) for name, v in found for value in (0, 99, -1, 2**31 - 1)]
+
+
+@pytest.mark.parametrize(("name", "choice", "value"), choices(), ids=str)
+def test_an_unknown_choice_is_refused_with_the_available_ones(launch, name, choice, value):
+    labels = [item[0] for item in declared(name)[choice].items]
+    refuses(launch(name, {choice: value}), name, 0.0, 0.1, choice, repr(value), *labels)
+
+
+RULES = {
+    "coulomb, exact with sign": (
+        "coulomb",
+        {"friction": SIGN, "solver.method": EXACT},
+        ("friction = 2", "exact", "hybrid"),
+    ),
+    "sled, exact with threshold": (
+        "stickslip",
+        {"friction": 3, "solver.method": EXACT},
+        ("friction = 3", "exact", "hybrid"),
+    ),
+    "sled, mu_d above mu_s": ("stickslip", {"mu_d": 1.0}, ("mu_d", "1.0", "mu_s", "0.9")),
+    "pacejka, mu_d above mu_s": ("pacejka", {"mu_d": 1.0}, ("mu_d", "1.0", "mu_s", "0.9")),
+    "pacejka, mu_d equal to mu_s": (
+        "pacejka",
+        {"mu_d": 0.9},
+        ("mu_d = mu_s", "the factor C is 1", "no finite E", "x_m"),
+    ),
+}
+
+
+@pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
+def test_inconsistent_values_are_refused(launch, rule):
+    name, values, words = rule
+    refuses(launch(name, values), name, 0.0, 0.1, *words)
+
+
+def test_friction_may_become_invalid_during_a_run_only_as_a_pair(launch):
+    fmu = launch("stickslip")
+    fmu.step(0.0, 1.0)
+    fmu.set({"mu_s": 0.5})
+    fmu.set({"mu_d": 0.4})
+    fmu.step(1.0, 1.0)
+    fmu.set({"mu_d": 0.7})
+    refuses(fmu, "stickslip", 2.0, 0.1, "mu_d", "0.7", "mu_s", "0.5")
+
+
+STEPS = {
+    "of no size": (1.0, 0.0),
+    "backwards": (1.0, -0.5),
+    "of NaN": (1.0, nan),
+    "without end": (1.0, inf),
+    "from the past": (0.5, 0.1),
+    "from the future": (1.5, 0.1),
+    "from nowhere": (nan, 0.1),
+    "past the stop": (1.0, 3.2),
+    "past the stop by a little": (1.0, 3.0 + 3e-5),
+    "from a little too late": (1.0 + 3e-7, 0.1),
+    "from a little too early": (1.0 - 3e-7, 0.1),
+}
+
+
+@pytest.mark.parametrize("step", STEPS.values(), ids=STEPS)
+@pytest.mark.parametrize("name", MODELS)
+def test_an_impossible_step_is_refused(launch, name, step):
+    fmu = launch(name, stop=4.0)
+    fmu.step(0.0, 1.0)
+    refuses(fmu, name, *step, "step", *(repr(part) for part in step), "1.0 s", "4.0 s")
+
+
+ARITHMETICS = {  # of hosts: what they take for the time of the n-th step, and for its size
+    "products": lambda start, h: lambda n: (start + n * h, h),
+    "quotients": lambda start, h: lambda n: (start + n / (1.0 / h), h),
+    "differences": lambda start, h: lambda n: (start + n * h, start + (n + 1) * h - (start + n * h)),
+    "an even grid": lambda start, h: lambda n: (start + n * ((start + 1000 * h - start) / 1000), h),
+    "ticks": lambda start, h: lambda n: ((round(start * 1e12) + n * round(h * 1e12)) * 1e-12, round(h * 1e12) / 1e12),
+}
+
+
+@pytest.mark.parametrize("start", [-2.0, -0.3, 0.0, 1.0, 1e6])
+@pytest.mark.parametrize("arithmetic", ARITHMETICS.values(), ids=ARITHMETICS)
+def test_step_times_within_rounding_are_accepted_wherever_zero_lies(launch, arithmetic, start):
+    """Near t = 0 times carry the rounding of the start; sizes down to 1e-10 s, around the start, 0 and 1e-5."""
+    for h in (0.1, 1e-3, 7e-6, 1e-10):
+        if h < 1e-12 * abs(start):
+            continue
+        step = arithmetic(start, h)
+        for place in {start, 0.0, 1e-5} if start <= 0.0 else {start}:
+            first = max(0, round((place - start) / h) - 5)
+            fmu = launch("smd", start=start)
+            if first:
+                fmu.step(start, step(first)[0] - start)
+            fmu.worker.call(None, "batch", [[fmu.number, "step", step(n)] for n in range(first, first + 12)])
+            fmu.free()
+
+
+def test_a_million_accumulated_steps_may_end_at_the_stop_time(launch):
+    """They end 7.9e-12 beyond it, eight millionths of a step."""
+    t, h = 0.0, 1e-6
+    for _ in range(999_999):
+        t += h
+    fmu = launch("smd", stop=1.0)
+    fmu.step(0.0, t)
+    assert t + h > 1.0
+    fmu.step(t, h)
+    assert fmu.get("x") == launch("smd", stop=1.0).run([0.0, 1.0], ["x"])[1][0]
+
+
+@pytest.mark.parametrize("late", [3e-6, -3e-6])
+def test_a_step_that_begins_elsewhere_is_refused_even_at_zero(launch, late):
+    fmu = launch("smd", start=-2.0)
+    fmu.step(-2.0, 2.0)
+    refuses(fmu, "smd", late * 0.01, 0.01, "t = 0.0 s")
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1.0, 2.0, nan, inf])
+def test_an_invalid_tolerance_is_ignored(worker, backend_fmus, tolerance):
+    """As the solver shows, whose error would be as large as the motion."""
+    names, times = ["x", "solver.steps"], [0.0, 1.0, 2.0]
+
+    def run(given):
+        fmu = worker.instantiate(backend_fmus / "smd.fmu")
+        rows = fmu.begin({"solver.method": ODE23}, stop=2.0, tolerance=given).run(times, names)
+        fmu.free()
+        return rows
+
+    assert_identical(run(tolerance), run(None), names)
+    assert run(0.9) != run(None)
+
+
+def test_a_stop_before_the_start_and_a_nonfinite_start_are_refused(launch):
+    refuses(launch("smd", start=2.0, stop=1.0), "smd", 2.0, 0.1, "stop time", "1.0", "2.0")
+    refuses(launch("smd", start=nan), "smd", 0.0, 0.1, "start time", "nan")
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("smd", {"x0": 1e300, "k": 1e300}),
+        ("smd", {"x0": 1e300, "k": 1e300, "solver.method": ODE23}),
+        ("coulomb", {"F_ext": 1e308, "m": 1e-308}),
+        ("stickslip", {"F_ext": 1e308, "m": 1e-308}),
+        ("stickslip", {"F_ext": 1e308, "m": 1e-308, "solver.method": ODE23}),
+        ("pacejka", {"F_ext": 1e308, "m": 1e-300}),
+        ("pendulum", {"omega0": 1e150}),
+        ("pendulum", {"T_ext": 1e308}),
+    ],
+)
+def test_a_diverging_motion_fails_in_one_sentence_or_stays_finite(launch, name, values):
+    fmu = launch(name, values, stop=4.0)
+    try:
+        fmu.step(0.0, 1e-3)
+        fmu.step(1e-3, 1.0)
+    except FmiError:
+        assert all(isnan(value) for value in fmu.get(*REALS[name]))
+        ((status, _, sentence),) = fmu.messages()
+        assert status == ERROR
+        assert "Traceback" not in sentence
+        assert len(fmu.worker.read_stderr().splitlines()) == 1
+    else:
+        assert all(isfinite(value) for value in fmu.get(*REALS[name]))
+
+
+@pytest.mark.parametrize("name", [name for name in MODELS if "k" in parameters(name)])
+def test_overflowing_outputs_of_a_finite_motion_are_reported(launch, name):
+    fmu = launch(name, {"k": 1e300, "m": 1e300, "x0": 1e20, "solver.rtol": 1e-3})
+    assert all(isnan(value) for value in fmu.get(*REALS[name]))
+    assert "leaves the range of numbers" in fmu.worker.read_stderr()
+    with pytest.raises(FmiError):
+        fmu.step(0.0, 1e-3)
+    fmu.reset()
+    fmu.begin().step(0.0, 0.1)
+    assert all(isfinite(value) for value in fmu.get(*REALS[name]))
+
+
+def test_a_calculated_value_cannot_be_set(launch):
+    fmu = launch("smd")
+    fmu.set({"x": 1.0})
+    refuses(fmu, "smd", 0.0, 0.1, "x", "calculated")
+
+
+WRONG_TYPES = ("Integer", "Boolean", "String")  # for a Real
+EVERY_TYPE = ("Real", *WRONG_TYPES)
+FIRST = {"Boolean": True, "String": "1"}  # a value of a type; 1 of the others
+
+
+def wrong_calls(types, wrong):
+    """Type and reference: no variable at all, or one that is not of the type; in the sled 0 is the mass."""
+    assert next(iter(declared("stickslip"))) == "m"
+    return [(kind, reference) for kind in types for reference in (10**6, 2**31, 2**32 - 1)] + [(k, 0) for k in wrong]
+
+
+@pytest.fixture(params=wrong_calls(EVERY_TYPE, WRONG_TYPES), ids=str)
+def wrong(request):
+    return request.param
+
+
+def test_a_wrong_read_fails_without_ending_the_instance(launch, wrong):
+    """It answers nothing that could be taken for a value, says so once a call, and all else reads and runs on."""
+    kind, reference = wrong
+    times, names = [0.0, 0.1, 0.2, 0.3], list(declared("stickslip"))
+    expected, fmu = launch("stickslip").run(times, names), launch("stickslip")
+    rows = [fmu.get(*names)]
+    for t, ahead in itertools.pairwise(times):
+        value = fmu.read_one(kind, reference)
+        assert isnan(value) if kind in ("Real", "Float64") else not value
+        ((status, category, sentence),) = fmu.messages()
+        assert (status, category) == (ERROR, "logStatusError")
+        assert f"value reference {reference} is refused" in sentence
+        assert fmu.worker.read_stderr().splitlines() == [f"Stickslip (test): {sentence}"]
+        fmu.step(t, ahead - t)
+        rows.append(fmu.get(*names))
+    assert_identical(rows, expected, names)
+
+
+def test_a_wrong_write_is_refused_by_the_next_step(launch, wrong):
+    kind, reference = wrong
+    fmu = launch("stickslip")
+    fmu.step(0.0, 0.1)
+    mass = fmu.get("m")
+    fmu.write_one(kind, reference, FIRST.get(kind, 1))
+    assert fmu.get("m") == mass
+    assert all(isnan(value) for value in fmu.get(*REALS["stickslip"]))
+    refuses(fmu, "stickslip", 0.1, 0.1, "value reference", "type")
+    fmu.reset()
+    fmu.begin().step(0.0, 0.1)
+
+
+def test_an_invalid_reference_reads_as_nan_among_valid_ones(launch):
+    fmu = launch("stickslip")
+    a, nothing, b = fmu.read("Real", [0, 10**6, 1])
+    assert [a, b] == fmu.get(*list(declared("stickslip"))[:2])
+    assert isnan(nothing)
+
+
+def test_percent_signs_in_an_instance_name_are_harmless(worker, fmus):
+    fmu = worker.instantiate(fmus / "smd.fmu", "50 %s %n %d sled")
+    fmu.begin({"m": -1.0})
+    with pytest.raises(FmiError):
+        fmu.step(0.0, 0.1)
+    assert "50 %s %n %d sled" in worker.read_stderr()
+    assert [status for status, _, _ in fmu.messages()] == [ERROR]
+    fmu.free()
+
+
+def test_t_next_announces_a_run_that_will_fail(launch):
+    fmu = launch("smd", {"x0": 1e300, "k": 1e300, "solver.method": ODE23}, stop=4.0)
+    assert isnan(fmu.get("solver.t_next"))
+    refuses(fmu, "smd", 0.0, 4.0)

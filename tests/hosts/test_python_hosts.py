@@ -1,0 +1,138 @@
+"""What a host may do with the FMUs: load several, in several versions, often, and with any Python from 3.9 on."""
+
+import json
+import re
+import shutil
+import subprocess
+import zipfile
+from itertools import chain, pairwise
+from pathlib import Path
+
+import commands
+import independent_solution
+import pytest
+from build_cache import ROOT, SUPPORT
+from fmpy import read_model_description
+from independent_solution import ClosedFormMotion
+from models import CASES, MODELS, counts, declared, label, outputs
+from row_comparison import assert_close, assert_identical
+from worker_client import FmiError, Worker
+
+PYTHONS = ["3.9", "3.10", "3.11", "3.12", "3.13"]
+
+
+def test_the_running_code_is_the_code_in_the_fmu(fresh_worker, fmus):
+    """Not the sources, and not the pythonfmu of the host."""
+    before = set(fresh_worker.modules())
+    for name in MODELS:
+        path = fmus / f"{name}.fmu"
+        instance = fresh_worker.instantiate(path).begin()
+        instance.step(0.0, 0.1)
+        files, own = set(fresh_worker.modules()), fresh_worker.directory(path)
+        assert len([file for file in files if file.startswith(own)]) >= 4
+        assert not [file for file in files if file.startswith(str(ROOT / "fmus"))]
+        strangers = [file for file in files - before if not file.startswith(own)]
+        assert not [file for file in strangers if "pythonfmu" in file or "friction" in file]
+        before = files
+        instance.free()
+
+
+def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, tmp_path):
+    """The sled edited, rebuilt and run beside the one it was made from."""
+    source = (ROOT / "fmus" / "stickslip.py").read_text()
+    edited, number = re.subn(r"(\n    k = Parameter\()[^,]+", r"\g<1>900.0", source)
+    assert number == 1
+    (tmp_path / "stickslip.py").write_text(edited)
+    done = commands.build("stickslip.py", folder=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    paths = [fmus / "stickslip.fmu", tmp_path / "stickslip.fmu"]
+    assert len({read_model_description(path).guid for path in paths}) == 2
+    times = [0.1 * i for i in range(161)]
+    for path, k in [*zip(paths, (742.5, 900.0), strict=True)] * 2:
+        fmu = worker.instantiate(path).begin(stop=16.0)
+        assert fmu.get("k") == k
+        motion = ClosedFormMotion([(0.0, independent_solution.stickslip(k=k))], 0.0, 0.0, 17.0)
+        for t, (x,) in zip(times, fmu.run(times, ["x"]), strict=True):
+            assert abs(x - motion.at(t)[0]) < 1e-12
+        fmu.free()
+
+
+def test_concurrent_instances_do_not_interfere(launch, worker):
+    """All models, laws and methods at once, stepped in turns."""
+    times = [0.02 * i for i in range(50)]
+    alone = [launch(name, values, stop=stop).run(times, outputs(name)) for name, values, stop in CASES]
+    fleet = [(launch(name, values, stop=stop), outputs(name)) for name, values, stop in CASES]
+    rows = [[fmu.get(*names)] for fmu, names in fleet]
+    for t, ahead in pairwise(times):
+        turns = [[[fmu.number, "step", [t, ahead - t]], [fmu.number, "get", [names]]] for fmu, names in fleet]
+        told = worker.call(None, "batch", [*chain(*turns)])
+        for mine, row in zip(rows, told[1::2], strict=True):
+            mine.append(row)
+    for (_, names), mine, expected in zip(fleet, rows, alone, strict=True):
+        assert_identical(mine, expected, names)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_twenty_life_cycles_in_one_process_end_alike_and_cleanly(fresh_worker, fmus, name):
+    """Created, run, reset, run again, failed and freed."""
+    first, names = None, outputs(name) + counts(name)
+    for _ in range(20):
+        fmu = fresh_worker.instantiate(fmus / f"{name}.fmu").begin(stop=0.3)
+        rows = fmu.run([0.0, 0.1, 0.2, 0.3], names)
+        first = first or rows
+        assert_identical(rows, first, names)
+        fmu.terminate()
+        fmu.reset()
+        assert_identical(fmu.begin(stop=0.3).run([0.0, 0.1, 0.2, 0.3], names), first, names)
+        with pytest.raises(FmiError):
+            fmu.step(0.3, 1.0)
+        fmu.free()
+
+
+def interpreter(version):
+    """An interpreter of this version, or None."""
+    installed = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
+    return str(installed[-1]) if installed else shutil.which(f"python{version}")
+
+
+def request(resources, name, values, stop):
+    """What run_embedded.py is asked to run."""
+    references = {v: i for i, v in enumerate(declared(name))}
+    real = {v: declared(name)[v].type == "Real" for v in references}
+    return {
+        "resources": str(resources / name / "resources"),
+        "reals": {references[v]: x for v, x in values.items() if real[v]},
+        "integers": {references[v]: x for v, x in values.items() if not real[v]},
+        "times": [stop * i / 40 for i in range(41)],
+        "outputs": [references[v] for v in outputs(name) if real[v]],
+    }
+
+
+@pytest.fixture(scope="module")
+def requests(fmus, tmp_path_factory):
+    """One run of every case on the unpacked FMUs: what is asked, the names of what is read, and the rows here."""
+    resources, worker, found = tmp_path_factory.mktemp("resources"), Worker(), []
+    for name in MODELS:
+        with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
+            archive.extractall(resources / name)
+    for case in CASES:
+        name, values, stop = case
+        asked, names = request(resources, *case), [v for v in outputs(name) if declared(name)[v].type == "Real"]
+        fmu = worker.instantiate(fmus / f"{name}.fmu").begin(values, stop=stop)
+        found.append((asked, [f"{label(case)}: {v}" for v in names], fmu.run(asked["times"], names)))
+        fmu.free()
+    assert worker.close() == 0
+    return found
+
+
+@pytest.mark.parametrize("version", [PYTHONS[0], PYTHONS[-1]])
+def test_the_embedded_code_behaves_alike_on_the_oldest_and_newest_python(requests, version):
+    """And, as all of these tests show, on one between."""
+    python = interpreter(version)
+    if python is None:
+        pytest.skip(f"there is no Python {version} here")
+    command, asked = [python, "-I", SUPPORT / "run_embedded.py"], json.dumps([asked for asked, _, _ in requests])
+    done = subprocess.run(command, input=asked, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    for (_, names, expected), rows in zip(requests, json.loads(done.stdout), strict=True):
+        assert_close(rows, expected, names, 1e-14)

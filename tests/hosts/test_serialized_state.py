@@ -1,0 +1,271 @@
+"""The bytes of a saved state are trusted no further than they can be checked: refused, or taken to the last bit.
+
+Most claims are made of the classes that travel inside the FMUs, which take a thousand forgeries a second; those that
+could do harm are made of built FMUs in a clean process.
+"""
+
+import json
+import random
+from math import nan
+from zlib import crc32
+
+import pytest
+from models import MODELS, declared, model_class, outputs, runtime
+from row_comparison import assert_identical
+from worker_client import FmiError, Worker
+
+from fmus.packaging.lowering import sibling_module
+
+TIMES = 10_000 // len(MODELS)
+EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+REFUSAL = (
+    "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
+    "save a state anew and pass it on unchanged"
+)
+
+
+def running(name):
+    """The class of slaves of a model, and one of them in mid-run."""
+    made = runtime(name, "slave").make_slave_class(model_class(name))
+    one = made(instance_name="saved")
+    one.exit_initialization_mode()
+    assert one.do_step(0.0, 0.3)
+    return made, one
+
+
+def own(made, one):
+    """The bytes of its state."""
+    return made._fmu_state_to_bytes(one._get_fmu_state())
+
+
+def sealed(text):
+    """With a checksum that is right."""
+    return b"%08x" % crc32(text) + text
+
+
+def forged(content, change):
+    """The bytes after a change of what they hold, with a checksum that is right."""
+    state = json.loads(content[8:])
+    change(state)
+    return sealed(json.dumps(state).encode())
+
+
+def taken(made, content):
+    """Whether the bytes are taken for a state."""
+    try:
+        made._fmu_state_from_bytes(content)
+    except sibling_module(made.Model, "runtime.saved_state").InvalidStateError:
+        return False
+    return True
+
+
+def leaves(state, path=()):
+    """The path of every member that holds no others."""
+    for name, value in state.items():
+        if isinstance(value, dict) and value:
+            yield from leaves(value, (*path, name))
+        else:
+            yield (*path, name)
+
+
+def alike(one, other):
+    """Whether two values differ as one state does from the next."""
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other)
+    return type(one) is type(other) and one != 10**30
+
+
+def at(state, path):
+    """What owns the member at the end of a path, and the name of that."""
+    for name in path[:-1]:
+        state = state[name]
+    return state, path[-1]
+
+
+@EVERY_MODEL
+def test_own_bytes_are_accepted_and_reproduced(name):
+    made, one = running(name)
+    heir = made(instance_name="heir")
+    for spoil in ([], ["set"], ["set", "step"]):  # healthy, with a value that cannot be used, failed
+        if spoil == ["set"]:
+            one.set_invalid("m", "m = nan kg is refused: a sentence with a · and brackets [{")
+        if "step" in spoil:
+            one.do_step(0.3, 0.1)
+            assert one.run.has_failed
+        heir._set_fmu_state(made._fmu_state_from_bytes(own(made, one)))
+        assert own(made, heir) == own(made, one)
+
+
+@EVERY_MODEL
+def test_flipped_truncated_or_extended_bytes_are_refused(name, capsys):
+    """Ten thousand times in all."""
+    made, one = running(name)
+    content, draw = own(made, one), random.Random(name)
+    for i in range(TIMES):
+        place, bit = draw.randrange(len(content)), 1 << draw.randrange(8)
+        flipped = bytes([*content[:place], content[place] ^ bit, *content[place + 1 :]]) if i % 4 == 0 else b""
+        foreign = [flipped, content[:place], content + draw.randbytes(1 + i % 9), draw.randbytes(place)][i % 4]
+        assert not taken(made, foreign)
+    said = capsys.readouterr().err.splitlines()
+    assert set(said) == {f"{made.__name__}: {REFUSAL}"}
+    assert len(said) == TIMES
+
+
+@EVERY_MODEL
+def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys):
+    """Each is exchanged for something that it is not, and the first of each type and length, which are read alike, for
+    all of it."""
+    made, one = running(name)
+    content, draw = own(made, one), random.Random(name)
+    assert taken(made, forged(content, lambda state: None))
+    state = json.loads(content[8:])
+    others, met = [None, "1", [], {}, [0.0] * 3, True, 1, 1.5, 10**30], set()
+    for path in leaves(state):
+        value = at(state, path)[0][path[-1]]
+
+        def drop(state, path=path):
+            thing, last = at(state, path)
+            del thing[last]
+
+        def rename(state, path=path):
+            thing, last = at(state, path)
+            thing["__class__"] = thing.pop(last)
+
+        def add(state, path=path):
+            at(state, path)[0]["compute_outputs"] = 1.0
+
+        changes, kind = [drop, rename, add], (type(value), type(value) is list and len(value))
+        wrong = [other for other in others if not alike(other, value)]
+        for other in wrong if kind not in met else [draw.choice(wrong)]:
+
+            def replace(state, path=path, other=other):
+                thing, last = at(state, path)
+                thing[last] = other
+
+            changes.append(replace)
+        met.add(kind)
+        for change in changes:
+            assert not taken(made, forged(content, change)), (path, change)
+
+
+@EVERY_MODEL
+def test_every_setting_must_be_in_range(name, capsys):
+    made, one = running(name)
+    content = own(made, one)
+    settable = {v: d for v, d in declared(name).items() if d.causality in ("parameter", "input")}
+    for variable, declaration in settable.items():
+        for wrong in (nan, declaration.low - 1.0, declaration.high + 1.0) if declaration.type == "Real" else (0, 99):
+
+            def change(state, variable=variable, wrong=wrong):
+                thing, last = at(state["model"], variable.split("."))
+                thing[last] = wrong
+
+            if not declaration.accepts(wrong):
+                assert not taken(made, forged(content, change)), (variable, wrong)
+
+
+SENTENCES = {
+    "of a variable that is not there": {"rules": "a"},
+    "that is no text": {"m": 1},
+    "that is a list": {"m": ["a"]},
+    "with half a letter": {"m": "\ud800"},
+    "with an end in C": {"m": "a\0b"},
+}
+SETTINGS = {"origin": "elsewhere", "invalid_values": [["m", "a"]], "run": {}}
+RUN = {
+    "phase": 7,
+    "interface": 3,
+    "start_time": 1,
+    "tolerance": 1.0,
+    "n_invalid_values": 1,
+    "has_pending_changes": 0,
+    "outputs_current": True,
+}
+SPELLINGS = {
+    "a space more": lambda text: text + b" ",
+    "no spaces": lambda text: text.replace(b" ", b""),
+    "a name twice": lambda text: text.replace(b'{"phase": ', b'{"phase": 0, "phase": ', 1),
+    "another number of the same value": lambda text: text.replace(b": 0.0,", b": 0.00,", 1),
+    "another order": lambda text: json.dumps(dict(reversed(json.loads(text).items()))).encode(),
+    "letters for digits": lambda text: text.replace(b"phase", b"\\u0070hase", 1),
+    "a number of a million digits": lambda text: text.replace(b'{"phase": ', b'{"phase": ' + b"9" * 1_000_000, 1),
+    "nested without end": lambda text: b"[" * 200_000,
+    "nested objects": lambda text: b'{"a":' * 200_000,
+    "nested in a member": lambda text: text.replace(
+        b'"invalid_values": {}', b'"invalid_values": ' + b"[" * 300 + b"]" * 300
+    ),
+    "very long": lambda text: text.replace(b'"origin": "', b'"origin": "' + b"a" * 2_000_000),
+    "a list": lambda text: b"[]",
+    "a number": lambda text: b"NaN",
+    "nothing": lambda text: b"",
+    "no UTF-8": lambda text: b"\xff\xfe",
+    "UTF-16": lambda text: text.decode().encode("utf-16"),
+}
+FORGERIES = {
+    **{
+        f"sentence {what}": lambda content, s=s: forged(content, lambda state: state.update(invalid_values=s))
+        for what, s in SENTENCES.items()
+    },
+    **{
+        f"setting {what}": lambda content, n=what, v=v: forged(content, lambda state: state.update({n: v}))
+        for what, v in SETTINGS.items()
+    },
+    **{
+        f"run with {what}": lambda content, n=what, v=v: forged(content, lambda state: state["run"].update({n: v}))
+        for what, v in RUN.items()
+    },
+    **{what: lambda content, spell=spell: sealed(spell(content[8:])) for what, spell in SPELLINGS.items()},
+    "mass of -5": lambda content: forged(content, lambda state: state["model"].update(m=-5.0)),
+    "a class": lambda content: forged(content, lambda state: state["model"].update(__class__={"rules": ["a"]})),
+    "rules": lambda content: forged(content, lambda state: state["model"].update(rules=["a"], compute_outputs=1.0)),
+    "no bytes": lambda content: b"",
+    "a checksum alone": lambda content: sealed(b"")[:8],
+}
+
+
+@pytest.fixture
+def fmu(fmus):
+    """A process of its own, which must end well, and the path of an FMU for it."""
+    worker = Worker()
+    yield worker, fmus / "stickslip.fmu"
+    assert worker.close() == 0
+
+
+def test_forged_bytes_change_neither_instance_nor_neighbour_nor_process(fmu):
+    """In the built FMU, one after the other: an error status, a sentence, and all go on as they were."""
+    worker, path = fmu
+    times, names = [0.1 * i for i in range(len(FORGERIES) + 1)], outputs("stickslip")
+    expected = worker.instantiate(path).begin().run(times, names)
+    neighbour, one = worker.instantiate(path).begin(), worker.instantiate(path).begin()
+    rows = [neighbour.get(*names)], [one.get(*names)]
+    worker.read_stderr()
+    for (what, forge), t, ahead in zip(FORGERIES.items(), times[:-1], times[1:], strict=True):
+        foreign = forge(bytes.fromhex(one.serialize(one.save())))
+        with pytest.raises(FmiError) as refusal:
+            one.deserialize(foreign.hex())
+        assert refusal.value.status >= 3, what
+        assert worker.read_stderr() == f"Stickslip: {REFUSAL}\n"
+        assert REFUSAL in one.messages()[-1][2]
+        for instance, seen in zip((neighbour, one), rows, strict=True):
+            instance.step(t, ahead - t)
+            seen.append(instance.get(*names))
+    for seen in rows:
+        assert_identical(seen, expected, names)
+    for instance in (neighbour, one):
+        instance.reset()
+        assert_identical(instance.begin().run(times[:3], names), expected[:3], names)
+        instance.free()
+
+
+def test_a_state_of_another_fmu_is_refused_and_the_instance_continues(fmu):
+    worker, path = fmu
+    other = worker.instantiate(path.with_name("pacejka.fmu")).begin()
+    one = worker.instantiate(path).begin()
+    names = outputs("stickslip")
+    before = one.get(*names)
+    with pytest.raises(FmiError):
+        one.deserialize(other.serialize(other.save()))
+    assert one.get(*names) == before
+    one.step(0.0, 0.1)
+    one.free()
+    other.free()

@@ -1,0 +1,114 @@
+"""The numerics written out: the same bits as the sources on arrays, what is gone, and what is refused."""
+
+import ast
+import re
+import traceback
+
+import pytest
+from internal_steps import array_steps, scalar_steps
+from models import CASES, MODELS, ROOT, label, model_class
+
+from fmus.packaging.lowering import LoweringError, lowered_files, lowered_model
+from fmus.packaging.lowering.emit_source import SourceEmitter
+from fmus.packaging.lowering.layout import ModelLayout
+from fmus.packaging.lowering.source_symbols import SourceSymbols
+from fmus.packaging.model_lookup import find_model
+
+NUMERICS = ("step_control.py", "stick_slip.py", "integrator.py")
+STEPS = 150  # of a run, enough for some events
+EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_arrays_and_scalars_give_the_same_bits_at_every_step(case):
+    name, values, stop = case
+    scalars = scalar_steps(model_class(name)(), values, stop, STEPS)
+    assert scalars == array_steps(find_model(name).model(), values, stop, STEPS)
+    assert scalars
+
+
+@EVERY_MODEL
+def test_emitted_code_has_no_vectors_names_its_source_and_keeps_the_line_length(name):
+    for path, text in lowered_files(name).items():
+        tree = ast.parse(text)
+        names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
+        assert not names & {
+            "StateVector",
+            "RateVector",
+            "ContactVector",
+            "contact_indices",
+            "slip_index",
+            "velocity_indices",
+        }, path
+        source = ROOT / "fmus" / path
+        if path != f"{name}.py" and source.read_text() != text:
+            states = ", ".join(model_class(name).states)
+            first, *_ = text.splitlines()
+            assert first.startswith(f"# Written out for {states}")
+            assert f" from fmus/{path} of" in first
+        if path != f"{name}.py":
+            assert [line for line in text.splitlines() if len(line) > 120] == [], path
+
+
+def test_unreachable_code_is_removed():
+    """A smooth model has no modes, one without closed forms none of theirs, and an offer no more than it says."""
+    smooth, dry = (
+        "\n".join(text for path, text in lowered_files(name).items() if path.split("/")[-1] in NUMERICS)
+        for name in ("pacejka", "coulomb")
+    )
+    for word in (
+        "def update_end_modes",
+        "def advance_stuck",
+        ".is_hybrid",
+        ".has_consistent_modes",
+        "mode0",
+        "def advance_linear_segment",
+    ):
+        assert word not in smooth
+        assert word in dry
+    assert "class RoundoffCompensation" not in smooth  # of closed forms
+    for word in ("from .contact_lcp", "model.is_coupled"):  # of a contact that is stuck while something moves
+        assert word not in dry
+
+
+@EVERY_MODEL
+def test_a_traceback_points_into_the_source(name):
+    model = model_class(name)()
+    model.prepare()
+    with pytest.raises(TypeError) as caught:
+        model.solver.start(model, 0.0, *model.initial_state(0.0), "never", 1e-6)
+    frame = traceback.extract_tb(caught.value.__traceback__)[-1]
+    assert frame.filename == str(ROOT / "fmus" / "runtime" / "integrator.py")
+    assert frame.line == "run = t_end - t if t_end < inf else model.stop_time"
+
+
+HEAD = "class Some:\n    def step(self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h):\n        "
+BODIES = {
+    "f3 = model.rates(t, y, modes)": "must call the rates at y2 f2",
+    "y2 = y + h * model.rates(t, y, modes)": "give it a name on a line of its own",
+    "e = magnitude(y + f)": "would work something out twice",
+    "e = y + f\n        e += y": "write c = c + ...",
+    "if y > 0.0:\n            t = 0.0": "is a vector where a number is wanted",
+    "j = 1\n        t = y[j]": "is an index that is not known",
+    "e = y + modes": "loop over contact_indices",
+    "y = y + h * f": "changes under f",
+    "y2 = y + h * f\n        v2 = t": "uses v2 for a number",
+}
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_an_unsupported_construct_is_refused_with_file_line_and_remedy(body):
+    text = HEAD + body + "\n"
+    spec = ModelLayout({"x": "v", "v": "a"}, {"mode": "v"})
+    with pytest.raises(LoweringError, match=re.escape(BODIES[body])) as caught:
+        SourceEmitter(spec, SourceSymbols([text]), "runtime/some.py", text, True)
+    assert re.match(r"runtime/some\.py:[234]: ", str(caught.value))
+
+
+def test_colliding_stage_names_are_refused():
+    with pytest.raises(Exception, match="take another name"):
+        ModelLayout({"x": "v", "x2": "v2", "v": "a", "v2": "b"}, {})
+
+
+def test_a_model_is_lowered_only_once():
+    assert lowered_model("smd") is lowered_model("smd")

@@ -1,0 +1,90 @@
+"""Three states, and two contacts on bodies of their own: numerics of more than our five need, by independent routes."""
+
+from functools import cache
+from math import exp, fabs
+
+import numpy as np
+import pytest
+from contact_references import CONTACT_REFERENCES, reference_events
+from internal_steps import array_steps, bits, prepared_model, scalar_steps, start, state_values
+from models import DOP853, LARGER_MODELS, ODE23, ODE45, RODAS
+from scipy.integrate import solve_ivp
+
+from fmus.packaging.lowering import lowered_model
+from fmus.packaging.model_lookup import find_model
+
+FILES = {path.stem: path for path in LARGER_MODELS}
+STOPS = {"lugre": 4.0} | {name: physics.stop for name, physics in CONTACT_REFERENCES.items()}
+RTOL = {ODE23: 1e-6, ODE45: 1e-9, DOP853: 1e-11, RODAS: 1e-8}
+EVERY_METHOD = pytest.mark.parametrize("method", RTOL)
+STEPS = 200
+
+
+@EVERY_METHOD
+@pytest.mark.parametrize("name", STOPS)
+def test_arrays_and_scalars_give_the_same_bits_at_every_step(name, method):
+    file, stop = FILES[name], STOPS[name]
+    values = {"solver.method": method, "solver.rtol": 1e-5}
+    scalars = scalar_steps(lowered_model(file)(), values, stop, STEPS)
+    assert scalars == array_steps(find_model(file).model(), values, stop, STEPS)
+    assert len(scalars) > 15
+
+
+def run(name, method):
+    """A run of the written-out model: the state at the stop, and time and modes of every event."""
+    one, stop = lowered_model(FILES[name])(), STOPS[name]
+    prepared_model(
+        one, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]}, stop
+    )
+    start(one, one.initial_state(0.0), stop)
+    step, events = one.solver.step, []
+    while step.t1 < stop:
+        assert step.compute_next(one) == 0
+        if step.event_at_end:
+            events.append((step.t1, *state_values(step, one.contacts)))
+    return state_values(step, one.states), events
+
+
+@cache
+def bristles():
+    """Where they are at the end, by a method that ours have nothing of."""
+
+    def rates(t, y):
+        x, v, z = y
+        u = v - 1e4 * fabs(v) * z / (122.6 * (0.6 + 0.3 * exp(-((v / 1e-2) ** 2))))
+        return v, (742.5 * (0.034 * t - x) - 1e4 * z - 300.0 * u - 0.4 * v) / 12.5, u
+
+    return solve_ivp(rates, (0.0, 4.0), [0.0] * 3, method="Radau", rtol=1e-12, atol=1e-15).y[:, -1]
+
+
+@EVERY_METHOD
+def test_bristles_agree_with_an_independent_solver(method):
+    truth = bristles()
+    found, _ = run("lugre", method)
+    assert np.abs(np.array(found) - truth).max() < max(2e3 * RTOL[method] * np.abs(truth).max(), 1e-11)
+
+
+@EVERY_METHOD
+@pytest.mark.parametrize("name", CONTACT_REFERENCES)
+def test_contacts_stick_and_slip_as_in_an_independent_solver(name, method):
+    events, end = reference_events(name)
+    found, seen = run(name, method)
+    assert [modes for _, *modes in seen] == [modes for _, *modes in events]
+    assert seen
+    room = max(2e3 * RTOL[method], 1e-10)
+    assert [t for t, *_ in seen] == pytest.approx([t for t, *_ in events], abs=room)
+    assert np.abs(np.array(found) - end).max() < room
+
+
+def test_a_stuck_sled_keeps_zero_speed_while_the_other_moves():
+    one = lowered_model(FILES["sleds"])()
+    prepared_model(one, {"solver.method": DOP853, "solver.rtol": 1e-9}, 16.0)
+    start(one, one.initial_state(0.0), 16.0)
+    step, seen = one.solver.step, 0
+    while step.t1 < 16.0:
+        assert step.compute_next(one) == 0
+        for mode, speed in ("mode1", "v1"), ("mode2", "v2"):
+            if getattr(step, f"{mode}_0") == 0:
+                assert bits([getattr(step, f"{speed}_0"), getattr(step, f"{speed}_1")]) == bits([0.0, 0.0])
+                seen += 1
+    assert seen > 10

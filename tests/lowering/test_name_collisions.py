@@ -1,0 +1,96 @@
+"""Whatever an author calls the variables of a model, its numbers are the same."""
+
+import pytest
+from internal_steps import prepared_model, start
+from models import DOP853, LARGER_MODELS, RODAS
+
+from fmus.packaging.lowering import LAWS, METHODS, lowered_model, select_features, sibling_module
+from fmus.packaging.model_lookup import find_model
+from fmus.packaging.native.model_header import render_model_header
+from fmus.runtime.variable_declarations import variables
+
+BELT = '''"""A model."""
+from fmus import Contact, Mode, Model, Output, Parameter, State
+
+
+class Mine(Model):
+    """Sled on a belt."""
+
+    m = Parameter(1.3, "kg", "mass", above=0.0)
+    k = Parameter(100.0, "N/m", "stiffness")
+    f = Parameter(1.0, "N", "friction", low=0.0)
+    u = Parameter(0.3, "m/s", "speed of a driver")
+    POSITION = State("m", "position", start=0.1)
+    SPEED = State("m/s", "speed", rate_of=POSITION)
+    driver = State("m", "driver", rate=u)
+    MODE = Mode()
+    F = Contact("N", "friction", mode=MODE, slip=SPEED - 0.5 * u, slide=f, hold=1.3 * f)
+    RATE = Output("m/s2", "acceleration", (k * (driver - POSITION) - F) / m, rate_of=SPEED)
+'''
+SLED = BELT.replace(" - 0.5 * u", "")
+# Of position, speed, rate and mode: local names, attributes, constants, stages of each other, what the C has.
+NAMES = {
+    SLED: [("y", "v", "e", "modes"), ("x", "x1", "x0", "x_1")],
+    BELT: [("h", "size", "end", "i"), ("OVERFLOW_LIMIT", "d_x", "to", "tie_tolerance")],
+}
+CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
+
+
+def numbers(path, model, names):
+    """Ends of steps, and what these names are there, by two methods."""
+    found, rules = [], sibling_module(lowered_model(path), "runtime.call_sequence")
+    for method in DOP853, RODAS:
+        prepared_model(model, {"solver.method": method, "solver.rtol": 1e-6}, 2.0)
+        start(model, model.initial_state(0.0), 2.0)
+        solver = model.solver
+        while solver.t < 1.5:
+            solver.update_t_next(model)
+            assert solver.advance(model, solver.t_next) == 0
+            rules.set_outputs(rules.RunState(1e-6), model)
+            found.append((solver.t, *(getattr(model, name) for name in names)))
+    return found
+
+
+@pytest.mark.parametrize("text", NAMES, ids=["sled", "belt"])
+def test_names_used_inside_the_numerics_change_nothing(tmp_path, text):
+    plain, path = ("POSITION", "SPEED", "RATE", "MODE"), tmp_path / "mine.py"
+    path.write_text(text)
+    expected = numbers(path, lowered_model(path)(), plain)
+    assert len(expected) > 20
+    for names in NAMES[text]:
+        changed = text
+        for old, new in zip(plain, names, strict=True):
+            changed = changed.replace(old, new)
+        path.write_text(changed)
+        assert numbers(path, lowered_model(path)(), names) == expected, names
+    assert text == SLED or "typedef struct Mine Model;" in render_model_header(
+        lowered_model(path), "3"
+    )  # with a slope of d_x
+
+
+def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_path):
+    path, labels = tmp_path / "mine.py", [*METHODS, *LAWS]
+    items, cases = (", ".join(each.format(*pair) for pair in zip(labels, "12345678", strict=True)) for each in CHOSEN)
+    text = SLED.replace("import Contact", "import Choice, Contact").replace("- F)", f"* kind.choose({cases}) - F)")
+    path.write_text(text.replace("    m =", f'    kind = Choice("kind", {items})\n    m ='))
+    source = find_model(path)
+    model = lowered_model(source, select_features(source, ["ode45"], ["hybrid"]))()
+    offered = {name: [label for label, _, _ in meaning.items] for name, meaning in variables(model) if meaning.items}
+    assert offered == {"kind": labels, "friction": ["hybrid"], "solver.method": ["ode45"]}
+    rates = set()
+    for model.kind in range(1, 9):
+        assert model.prepare() == 0
+        rates.add(model.rates(0.0, 0.1, 0.0, 1))
+    assert len(rates) == 8
+
+
+def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
+    """Two blocks, whose modes are called like entries of their matrix."""
+    (blocks,) = (path for path in LARGER_MODELS if path.stem == "blocks")
+    path, rates = tmp_path / "blocks.py", []
+    for names in ("mode1", "mode2"), ("A_F1_F2", "A_F2_F1"):
+        path.write_text(blocks.read_text().replace("mode1", names[0]).replace("mode2", names[1]))
+        model = find_model(path).model()
+        assert model.prepare() == 0
+        rates.append([model.rates(0.3, 0.1, 0.2, -0.1, 0.1, *modes) for modes in ((0, 0), (0, 1), (1, 0), (1, -1))])
+    assert rates[0] == rates[1]

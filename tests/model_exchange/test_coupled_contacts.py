@@ -1,0 +1,100 @@
+"""Several contacts in the hands of an importer's solver: the events that the equations have, by the numerics alone."""
+
+import numpy as np
+import pytest
+from contact_references import CONTACT_REFERENCES, integrate_events
+from internal_steps import prepared_model, start
+from models import DOP853, LARGER_MODELS, write_growing_friction_model
+from scipy.integrate import solve_ivp
+
+from fmus.packaging.fmi_variables import model_exchange_instance
+from fmus.packaging.lowering import lowered_model, sibling_module
+
+FILES = {path.stem: path for path in LARGER_MODELS}
+
+
+def integrated(name, stop):
+    """Time and modes of each event, and the last state, by scipy with the indicators for events."""
+    cls = lowered_model(FILES[name])
+    model, exchange, run = (
+        model_exchange_instance(cls),
+        sibling_module(cls, "runtime.model_exchange"),
+        sibling_module(cls, "runtime.call_sequence").RunState(1e-10),
+    )
+    prepared_model(model, {"solver.method": DOP853, "solver.rtol": 1e-10}, stop)
+    start(model, model.initial_state(0.0), stop)
+    solver = model.solver
+    exchange.begin(model)
+
+    def at(t, y):
+        exchange.set_time(run, model, t)
+        model.model_exchange.states[:] = map(float, y)
+        exchange.set_continuous_states(run, model)
+
+    def rates(t, y):
+        at(t, y)
+        exchange.update_rates(model)
+        return list(model.model_exchange.rates)
+
+    def states():
+        exchange.update_states(model)
+        return list(model.model_exchange.states)
+
+    def indicator(i):
+        def left(t, y):
+            at(t, y)
+            exchange.update_indicators(model)
+            return model.model_exchange.indicators[i]
+
+        left.terminal, left.direction = True, -1
+        return left
+
+    t, y, events = 0.0, states(), []
+    indicators = [indicator(i) for i in range(2 * len(model.contacts))]
+    while True:
+        found = solve_ivp(rates, (t, stop), y, "DOP853", events=indicators, rtol=1e-11, atol=1e-14, max_step=0.05)
+        t, y = found.t[-1], found.y[:, -1]
+        if found.status != 1:
+            return events, y
+        assert len(events) < 99
+        beyond = 1e-12 * (1.0 + t)  # where an importer's solver ends a step: the root lies behind it
+        t, y = t + beyond, y + beyond * np.array(rates(t, y))
+        at(t, y)
+        before = [getattr(solver, mode) for mode in model.contacts]
+        exchange.update_modes(model, solver)
+        assert not exchange.update_modes(model, solver)
+        y = states()
+        modes = [getattr(solver, mode) for mode in model.contacts]
+        if modes != before:
+            events.append((t, *modes))
+
+
+@pytest.mark.parametrize("name", CONTACT_REFERENCES)
+def test_modes_follow_at_the_events_located_by_an_importer(name):
+    """Nothing changes the second time that it is asked for."""
+    true, end = integrate_events(CONTACT_REFERENCES[name]())
+    events, found = integrated(name, CONTACT_REFERENCES[name].stop)
+    assert [modes for _, *modes in events] == [modes for _, *modes in true]
+    assert np.abs(np.array([t for t, *_ in events]) - [t for t, *_ in true]).max() < 1e-7
+    assert np.abs(np.array(found)[: len(end)] - end).max() < 1e-6
+
+
+def test_states_are_nan_where_no_modes_are_consistent(tmp_path):
+    """A sled whose sliding friction is above the static one, when the driver has pulled far enough."""
+    cls = lowered_model(write_growing_friction_model(tmp_path))
+    model, exchange, run = (
+        model_exchange_instance(cls),
+        sibling_module(cls, "runtime.model_exchange"),
+        sibling_module(cls, "runtime.call_sequence").RunState(1e-10),
+    )
+    prepared_model(model, {"slide1": 200.0}, 8.0)
+    start(model, model.initial_state(0.0), 8.0)
+    exchange.begin(model)
+    exchange.set_time(run, model, 4.0)
+    model.x_base = 0.034 * 4.0
+    assert not exchange.update_modes(model, model.solver)
+    exchange.set_time(run, model, 5.0)
+    model.x_base = 0.034 * 5.0
+    exchange.update_modes(model, model.solver)
+    exchange.update_states(model)
+    assert np.isnan(model.model_exchange.states[:4]).all()

@@ -1,0 +1,236 @@
+"""FMI 3.0 co-simulation with event mode, early return and a look inside: a master sees stick and slip in time."""
+
+from contextlib import contextmanager
+from math import inf
+
+import fmi3_fixtures
+import fmpy
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Slave
+from models import MODELS, declared, model_class, outputs, push
+
+from harness.references.certified_reference import load_reference
+
+COUNTED = [name for name in MODELS if "mode" in outputs(name)]
+BREAKAWAY_TIME = 0.9 * 12.5 * 9.81 / (742.5 * 0.034)  # of the sled
+
+
+@pytest.fixture(scope="module")
+def unpacked(tmp_path_factory):
+    """unpacked(name): the folder of an FMU, and its description."""
+    room, found = tmp_path_factory.mktemp("unpacked"), {}
+
+    def unpacked(name):
+        if name not in found:
+            path = fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu"
+            folder = fmpy.extract(path, room / name)
+            found[name] = str(folder), fmpy.read_model_description(path)
+        return found[name]
+
+    return unpacked
+
+
+@contextmanager
+def master(unpacked, name, values=None, **options):
+    """An initialised instance, and functions that read and write its variables by name."""
+    folder, description = unpacked(name)
+    there = {variable.name: variable for variable in description.modelVariables}
+    fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=folder, modelIdentifier=name)
+    fmu.instantiate(**options)
+
+    def read(variable):
+        get = fmu.getFloat64 if there[variable].type == "Float64" else fmu.getInt64
+        return get([there[variable].valueReference])[0]
+
+    def write(variable, value):
+        (fmu.setFloat64 if there[variable].type == "Float64" else fmu.setInt64)(
+            [there[variable].valueReference], [value]
+        )
+
+    for variable, value in (values or {}).items():
+        write(variable, value)
+    fmu.enterInitializationMode(startTime=0.0)
+    fmu.exitInitializationMode()
+    yield fmu, read, write
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def handle(fmu):
+    """An event, from step mode back to it."""
+    fmu.enterEventMode()
+    again, terminate, *_ = fmu.updateDiscreteStates()
+    assert (again, terminate) == (False, False)
+    fmu.enterStepMode()
+
+
+def through(fmu, stop, h, at_event):
+    """Steps of h; `at_event(t, handled)` is called where one returned for an event.  The time of every return."""
+    t, times = 0.0, []
+    while t < stop:
+        ahead = min(h * (int(t / h + 1e-9) + 1), stop)
+        event, terminate, early, reached = fmu.doStep(t, ahead - t)
+        assert not terminate
+        assert early == (reached < ahead)
+        assert event or not early
+        t = reached
+        times.append(t)
+        if event:
+            at_event(t)
+    return times
+
+
+@pytest.mark.parametrize("method", ["default", "ode45"])
+@pytest.mark.parametrize("name", COUNTED)
+def test_a_master_with_long_steps_sees_every_event_at_its_time(unpacked, name, method):
+    """The mode is that before the event until event mode is entered, and the other one from then on."""
+    true, seen = load_reference(name).events, []
+    stop = model_class(name).stop_time
+    values = {} if method == "default" else {"solver.method": 3, "solver.rtol": 1e-10}
+    with master(unpacked, name, values, eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
+        fmu.updateDiscreteStates()
+        fmu.enterStepMode()
+
+        def at_event(t):
+            before, counted = read("mode"), read("events.count")
+            handle(fmu)
+            seen.append((t, read("mode")))
+            assert read("mode") != before
+            assert read("events.count") == counted + 1 == len(seen)
+            assert read("events.t_last") == t == read("time")
+
+        through(fmu, stop, 1.0, at_event)
+    assert [mode for _, mode in seen] == [mode for _, mode in true]
+    off = max(abs(t - then) for (t, _), (then, _) in zip(seen, true, strict=True))
+    assert off < (1e-12 if name == "stickslip" and method == "default" else 1e-6)
+
+
+def test_the_sled_breaks_away_at_the_closed_form_time(unpacked):
+    with master(unpacked, "stickslip", eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
+        fmu.updateDiscreteStates()
+        fmu.enterStepMode()
+        *_, early, reached = fmu.doStep(0.0, 16.0)
+        assert early
+        assert reached == pytest.approx(BREAKAWAY_TIME, abs=1e-14)
+        assert read("mode") == 0
+        assert read("F_friction") == pytest.approx(0.9 * 12.5 * 9.81, rel=1e-14)
+        handle(fmu)
+        assert read("F_friction") == pytest.approx(0.6 * 12.5 * 9.81, rel=1e-14)
+
+
+@pytest.mark.parametrize("options", [{}, {"eventModeUsed": True}, {"earlyReturnAllowed": True}], ids=str)
+@pytest.mark.parametrize("name", MODELS)
+def test_the_motion_does_not_depend_on_the_steps_of_the_master(unpacked, name, options):
+    """To the last bit: events are handled inside, at the end of a step, or where it returned."""
+    stop, rows = model_class(name).stop_time, []
+    for chosen in ({}, options):
+        with master(unpacked, name, **chosen) as (fmu, read, _):
+            if chosen.get("eventModeUsed"):
+                fmu.updateDiscreteStates()
+                fmu.enterStepMode()
+            t, row = 0.0, []
+            for i in range(1, 33):
+                while t < i * stop / 32:
+                    _, _, early, t = fmu.doStep(t, i * stop / 32 - t)
+                    assert early <= bool(chosen.get("earlyReturnAllowed"))
+                row.append([read(variable) for variable in outputs(name)])
+            rows.append(row)
+    assert rows[0] == rows[1]
+
+
+@pytest.mark.parametrize("early", [True, False])
+@pytest.mark.parametrize("name", MODELS)
+def test_intermediate_update_shows_every_internal_step_and_can_stop_anywhere(unpacked, name, early):
+    stop, looks, began, wanted = 0.5 * model_class(name).stop_time, [], 0.0, 0.3 * model_class(name).stop_time
+    place = next(v.valueReference for v in unpacked(name)[1].modelVariables if v.name == outputs(name)[0])
+
+    def look(_, time, setting, getting, finished, may_return, request, when):
+        looks.append((time, fmu.getFloat64([place])[0]))
+        assert (setting, getting, may_return) == (True, True, early)
+        assert finished == (time > began)
+        request[0], when[0] = True, wanted
+
+    with master(unpacked, name, earlyReturnAllowed=early, intermediateUpdate=look) as (fmu, read, _):
+        t = 0.0
+        while t < wanted:  # an event is an early return as well
+            began = t
+            _, _, returned, t = fmu.doStep(t, stop - t)
+            assert returned == early
+        assert t == (pytest.approx(wanted, abs=1e-12) if early else stop)
+        assert looks[-1] == (t, read(outputs(name)[0]))
+        steps = read("solver.steps")
+    with master(unpacked, name) as (fmu, read, _):
+        times = [time for time, _ in looks]
+        assert times == sorted(times)
+        for time, x in looks:
+            here = read("time")
+            if time > here:
+                fmu.doStep(here, time - here)
+            assert read(outputs(name)[0]) == pytest.approx(x, rel=1e-12, abs=1e-14)
+    assert len(looks) > (0 if early else steps)
+
+
+def test_a_value_set_at_an_event_acts_from_then_on(unpacked):
+    """A push as the sled breaks away: as if it had been set between two steps at the same time."""
+    rows = []
+    for event_mode in (True, False):
+        with master(unpacked, "stickslip", eventModeUsed=event_mode, earlyReturnAllowed=True) as (fmu, read, write):
+            if event_mode:
+                fmu.updateDiscreteStates()
+                fmu.enterStepMode()
+            *_, t = fmu.doStep(0.0, 16.0)
+            if event_mode:
+                fmu.enterEventMode()
+            write("F_ext", 50.0)
+            if event_mode:
+                fmu.updateDiscreteStates()
+                fmu.enterStepMode()
+            fmu.doStep(t, 0.1)
+            rows.append([read(variable) for variable in (*outputs("stickslip"), "events.count", "events.t_last")])
+    assert rows[0] == rows[1]
+    assert rows[0][-2] == 1
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_input_set_during_intermediate_update_acts_from_then_on(unpacked, name):
+    """As if it had been set between two steps at the same time; of what is no input, nothing can be set there."""
+    (force, size), stop = push(name), 0.5 * model_class(name).stop_time
+    places = [next(v.valueReference for v in unpacked(name)[1].modelVariables if v.name == one) for one in (force, "m")]
+    rows, turned = [], []
+
+    def look(_, time, setting, getting, finished, may_return, request, when):
+        if time > 0.3 * stop and not turned:
+            turned.append(time)
+            fmu.setFloat64(places[:1], [size])
+            with pytest.raises(FMICallException):
+                fmu.setFloat64(places[1:], [1.0])
+
+    for options in {"intermediateUpdate": look}, {}:
+        with master(unpacked, name, {"solver.method": 3}, **options) as (fmu, read, write):
+            t = 0.0
+            if turned:
+                (t,) = turned
+                fmu.doStep(0.0, t)
+                write(force, size)
+            fmu.doStep(t, stop - t)
+            rows.append([read(variable) for variable in (*outputs(name), force)])
+    assert rows[0] == rows[1]
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_a_pending_event_survives_save_and_restore(unpacked, name):
+    with master(unpacked, name, eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
+        fmu.updateDiscreteStates()
+        fmu.enterStepMode()
+        *_, t = fmu.doStep(0.0, model_class(name).stop_time)
+        state, rows = fmu.getFMUState(), []
+        for _ in range(2):
+            fmu.setFMUState(state)
+            rows.append([read("mode"), read("events.count")])
+            handle(fmu)
+            fmu.doStep(t, 1e-3)
+            rows[-1] += [read(variable) for variable in declared(name) if variable != "solver.t_next"]
+        fmu.freeFMUState(state)
+    assert rows[0] == rows[1]
+    assert inf not in rows[0]

@@ -1,0 +1,125 @@
+"""Model exchange call by call: what a solver only tries is no failure, what was set and cannot be used is."""
+
+from math import inf, isnan, nan
+
+import model_exchange_client
+import pytest
+from model_exchange_client import BREAKAWAY_TIME, DRIVEN, DRIVER, handle_event_at, single_error
+from models import MODELS, PUSHED, declared, outputs, push
+from worker_client import FmiError
+
+fmus, worker, _workers, launch, launch_moving = model_exchange_client.FIXTURES
+EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
+
+
+@EVERY_MODEL
+@pytest.mark.parametrize("wild", [nan, inf, -inf, 1e308, -1e308, 1e200])
+def test_a_wild_trial_state_is_no_failure(launch_moving, name, wild):
+    fmu, t, states = launch_moving(name)
+    fmu.set_point(t, states)
+    before = fmu.rates(), fmu.indicators(), fmu.get(*outputs(name))
+    for trial in ([wild] * 2, [states[0], wild], [wild, states[1]]):
+        fmu.set_point(t, trial + states[2:])
+        rates, _ = fmu.rates(), fmu.indicators()
+        assert not isnan(wild) or any(isnan(rate) for rate in rates)
+        fmu.get(*declared(name))
+    fmu.set_point(nan, states)
+    fmu.rates()
+    fmu.indicators()
+    fmu.set_point(t, states)
+    assert (fmu.rates(), fmu.indicators(), fmu.get(*outputs(name))) == before
+    assert single_error(fmu) == ""
+    fmu.enter_event_mode()
+    assert fmu.update_discrete_states() == []
+
+
+@EVERY_MODEL
+@pytest.mark.parametrize("wild", [nan, inf, 1e300])
+def test_an_event_at_an_invalid_state_ends_the_run(launch_moving, name, wild):
+    """The importer has come there for good; a saved state brings it back."""
+    fmu, t, states = launch_moving(name)
+    fmu.set_point(t, states)
+    expected = fmu.rates()
+    state = fmu.save()
+    with pytest.raises(FmiError, match="fmi3UpdateDiscreteStates returned status 3"):
+        handle_event_at(fmu, t, [wild, wild, *states[2:]])
+    assert "range of numbers" in single_error(fmu)
+    fmu.restore(state)
+    assert fmu.rates() == expected
+    fmu.enter_event_mode()
+    assert fmu.update_discrete_states() == []
+
+
+def bad_settings(name):
+    """Values that cannot be used once the run goes on, and what the sentence names."""
+    force, _ = push(name)
+    x = outputs(name)[0]
+    yield {force: nan}, f"{force} = nan"
+    yield {"m": 0.0}, "m = 0.0"
+    yield {f"{x}0": 0.5}, "fixed"
+    if name in DRIVEN:
+        yield {"mu_d": 2.0}, "mu_d"
+
+
+BAD = [(name, *bad) for name in PUSHED for bad in bad_settings(name)]
+
+
+@pytest.mark.parametrize("in_event", [True, False], ids=["event mode", "continuous time"])
+@pytest.mark.parametrize(("name", "values", "words"), BAD, ids=[f"{name}-{next(iter(v))}" for name, v, _ in BAD])
+def test_an_invalid_value_ends_the_run_and_reset_recovers(launch_moving, name, values, words, in_event):
+    fmu, t, states = launch_moving(name)
+    fmu.set_point(t, states)
+    expected = fmu.rates(), fmu.get(*outputs(name))
+    if in_event:
+        fmu.enter_event_mode()
+    fmu.set(values)
+    for _ in range(2):
+        with pytest.raises(FmiError):
+            fmu.update_discrete_states() if in_event else fmu.rates()
+    assert words in single_error(fmu)
+    if in_event:
+        fmu.enter_continuous_time()
+    fmu.set_point(t, states)
+    for ask in (fmu.rates, fmu.indicators, fmu.get_states):
+        with pytest.raises(FmiError):
+            ask()
+    reals = [v for v in outputs(name) if declared(name)[v].type == "Real"]
+    assert all(isnan(value) for value in fmu.get(*reals))
+    assert single_error(fmu) == ""  # once is enough
+    fmu.reset()
+    fmu.begin()
+    assert fmu.update_discrete_states() == []
+    fmu.enter_continuous_time()
+    if name == "stickslip":
+        handle_event_at(fmu, BREAKAWAY_TIME * 1.01, [0.0, 0.0, DRIVER * BREAKAWAY_TIME * 1.01])
+        fmu.enter_continuous_time()
+    fmu.set_point(t, states)
+    assert (fmu.rates(), fmu.get(*outputs(name))) == expected
+    assert single_error(fmu) == ""
+
+
+@EVERY_MODEL
+def test_an_invalid_start_value_ends_the_run_before_it_begins(launch, name):
+    fmu = launch(name)
+    fmu.reset()
+    with pytest.raises(FmiError, match="fmi3ExitInitializationMode returned status 3"):
+        fmu.begin({"m": -1.0})
+    assert "m = -1.0" in single_error(fmu)
+    with pytest.raises(FmiError):
+        fmu.rates()
+    fmu.reset()
+    assert fmu.begin().update_discrete_states() == []
+
+
+@EVERY_MODEL
+def test_an_invalid_value_may_be_corrected_before_it_is_used(launch_moving, name):
+    fmu, t, states = launch_moving(name)
+    force, _ = push(name)
+    fmu.set_point(t, states)
+    before = fmu.rates()
+    fmu.enter_event_mode()
+    fmu.set({force: nan})
+    fmu.set({force: 0.0})
+    assert fmu.update_discrete_states() == ["states"]  # what was set, and taken back
+    assert fmu.rates() == before
+    assert single_error(fmu) == ""

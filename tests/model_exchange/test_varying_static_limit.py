@@ -1,0 +1,118 @@
+"""What a contact holds, or slides with, may move: it is let go in time, and what can neither hold nor slip is told."""
+
+import numpy as np
+import pytest
+from internal_steps import prepared_model, start, state_values
+from models import DOP853, LARGER_MODELS, MODELS, ODE45, RODAS, declared
+
+from fmus.packaging.fmi_variables import model_exchange_instance
+from fmus.packaging.lowering import lowered_model, sibling_module
+from fmus.runtime.stick_slip import NO_CONSISTENT_MODES
+
+FILES = {path.stem: path for path in LARGER_MODELS}
+ULP = 2.0**-52
+SLIDER = '''"""A model."""
+from fmus import Contact, Input, Mode, Model, Output, Parameter, State
+
+
+class Slider(Model):
+    """A body that is pressed on its way: what it slides with is not known beforehand."""
+
+    m = Parameter(2.0, "kg", "mass", above=0.0)
+    grip = Parameter(4.0, "N", "what holds", low=0.0)
+    press = Input(3.0, "N", "what slides", low=0.0)
+    F_ext = Input(0.0, "N", "outer force")
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F = Contact("N", "friction", mode=mode, slip=v, slide=press, hold=grip)
+    a = Output("m/s2", "acceleration", (F_ext - F) / m, rate_of=v)
+'''
+
+
+@pytest.mark.parametrize("method", [ODE45, DOP853, RODAS])
+def test_a_constant_load_breaks_away_when_the_static_limit_drops_to_it(method):
+    """A sled under a force, lifted by its driver: when mu_s (m g - lift u t) is the force."""
+    model = prepared_model(lowered_model(FILES["lift"])(), {"solver.method": method, "k": 0.0, "F_ext": 60.0}, 16.0)
+    start(model, model.initial_state(0.0), 16.0)
+    step = model.solver.step
+    while not step.event_at_end:
+        assert step.compute_next(model) == 0
+        assert step.t1 < 16.0
+    assert step.t1 == pytest.approx((12.5 * 9.81 - 60.0 / 0.9) / (300.0 * 0.034), rel=1e-9)
+    assert state_values(step, model.contacts) == [1]
+
+
+def led(source, values):
+    """A model that an importer's solver leads, its exchange, and its run."""
+    cls = lowered_model(source)
+    model, exchange, run = (
+        model_exchange_instance(cls),
+        sibling_module(cls, "runtime.model_exchange"),
+        sibling_module(cls, "runtime.call_sequence").RunState(1e-6),
+    )
+    prepared_model(model, {"solver.method": DOP853, "solver.rtol": 1e-6} | values, 1.0)
+    start(model, model.initial_state(0.0), 1.0)
+    exchange.begin(model)
+    return model, exchange, run
+
+
+STUCK = [one for one in (*MODELS, *FILES.values()) if any(d.role == "contact" for d in declared(one).values())]
+STUCK = [one for one in STUCK if one not in (FILES["belt"], FILES["clutch"])]  # which slide at the start
+
+
+@pytest.mark.parametrize("source", STUCK, ids=lambda source: getattr(source, "stem", source))
+def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
+    """Whatever an input brings, to the last bit: an importer would never hear of it again."""
+    rest = {name: 0.0 for name, d in declared(source).items() if name in ("x0", "theta0")}
+    model, exchange, _ = led(source, rest)
+    entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
+    many, tried = len(model.contacts), 0
+    solver = model.solver
+    start_states, start_modes = ([getattr(solver, n) for n in names] for names in (model.states, model.contacts))
+
+    def push(force):
+        """The indicators before and after the event, with modes as at the start."""
+        for names, numbers in (model.states, start_states), (model.contacts, start_modes):
+            for name, number in zip(names, numbers, strict=True):
+                setattr(solver, name, number)
+        setattr(model, entry, force)
+        exchange.update_indicators(model)
+        before = min(model.model_exchange.indicators[many : 2 * many])
+        exchange.update_modes(model, solver)
+        exchange.update_indicators(model)
+        return before, min(model.model_exchange.indicators[many : 2 * many])
+
+    low, high = getattr(model, entry), 1e4
+    assert push(low)[0] > 0.0 >= push(high)[0]
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (low, middle) if push(middle)[0] <= 0.0 else (middle, high)
+    for places in range(300):
+        before, after = push(high * (1.0 + places * ULP))
+        tried += before <= 0.0
+        assert after > 0.0, places
+    assert tried == 300
+
+
+@pytest.fixture
+def slider(tmp_path):
+    path = tmp_path / "slider.py"
+    path.write_text(SLIDER)
+    return path
+
+
+def test_sliding_friction_above_static_friction_is_reported_and_stops_the_run(slider):
+    """In co-simulation by any method, in model exchange by states that are no numbers."""
+    methods = [value for _, value, _ in declared(slider)["solver.method"].items]
+    for method in methods:
+        model = prepared_model(lowered_model(slider)(), {"solver.method": method, "press": 5.0, "F_ext": 4.5}, 1.0)
+        start(model, model.initial_state(0.0), 1.0)
+        assert model.solver.step.compute_next(model) == NO_CONSISTENT_MODES
+    model, exchange, _ = led(slider, {"press": 5.0})
+    model.F_ext = 4.5
+    exchange.update_modes(model, model.solver)
+    assert np.isnan([model.solver.x, model.solver.v]).all()
+    model, exchange, _ = led(slider, {"press": 3.9})
+    model.F_ext = 4.5
+    exchange.update_modes(model, model.solver)
+    assert (model.solver.x, model.solver.v, model.solver.mode) == (0.0, 0.0, 1)

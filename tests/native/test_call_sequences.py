@@ -1,0 +1,200 @@
+"""What one kind refuses the others refuse, with the same sentence, whatever is asked for in an order that FMI allows.
+
+The same calls, as hypothesis finds them, in the Python FMU for FMI 2.0 and in another kind beside it.  After each call
+all that can be seen is compared with ==: whether it was refused, what was said in the log and on standard error, and
+the value of every variable.
+"""
+
+import json
+from math import inf, nan
+
+import fmi3_fixtures
+import native_fmus
+import pytest
+import worker_client
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
+from models import EXACT, HYBRID, MODELS, declared
+
+KINDS = {
+    "native": (worker_client.Worker, native_fmus.build_native_fmus),
+    "FMI 3.0": (fmi3_fixtures.Worker, fmi3_fixtures.build_fmi3_fmus),
+}
+OFTEN = settings(
+    max_examples=25,
+    stateful_step_count=30,
+    derandomize=True,  # the same calls every time
+    database=None,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
+
+REALS = st.sampled_from([0.0, -0.0, 0.5, 1.0, 2.0, -1.0, 1e-3, 100.0, 5e-324, 1e300, nan, inf, -inf])
+INTEGERS = st.sampled_from([0, 1, 2, 3, 4, 5, 99, -1, 2**31 - 1, -(2**31)])
+TIMES = st.sampled_from([0.0, 0.0, -3.0, 1e4, 1e-9, nan, inf, -inf])
+RUNS = st.sampled_from([None, None, 0.4, 1.0, 0.0, -1.0, nan, inf])
+SIZES = st.sampled_from([0.1, 0.1, 0.05, 0.3, 1e-3, 1e-9, 1e-17, 0.0, -0.0, -0.1, nan, inf])
+OFF = st.sampled_from([0.0] * 6 + [4e-16, -4e-16, 3e-15, -3e-15, 1e-14, 1e-11, -1e-11, 1e-8, 1e-6, -1e-3, nan, inf])
+NEW, INITIALISING, RUNNING = range(3)
+BOTH = range(2)  # places of the kinds
+
+
+class Calls(RuleBasedStateMachine):
+    """Two instances of each of two kinds, led alike."""
+
+    folders = workers = None  # of the kinds
+
+    @initialize(name=st.sampled_from(MODELS))
+    def instantiate(self, name):
+        self.declared = declared(name)
+        paths = [folder / f"{name}.fmu" for folder in self.folders]
+        self.pairs = [
+            [worker.instantiate(path, "twin") for worker, path in zip(self.workers, paths, strict=True)]
+            for _ in range(2)
+        ]
+        self.saved = []
+        self.anew()
+        self.seen = sorted(v for v in self.declared if v != "solver.t_next")  # which looks ahead
+
+    def anew(self):
+        self.phase, self.t, self.stop = NEW, 0.0, inf
+
+    def both(self, function, *arguments, of=None):
+        """The same call of both, or of what each of them has in `of`; what they answer, which must be the same."""
+        answers = []
+        for place, instance in enumerate(self.pairs[0]):
+            own = [of[place]] if of else []
+            try:
+                answers.append(getattr(instance, function)(*own, *arguments))
+            except worker_client.FmiError:
+                answers.append(worker_client.FmiError)
+        looks = [self.look(place) for place in BOTH]
+        assert looks[0] == looks[1], (function, arguments)
+        refused = [answer is worker_client.FmiError for answer in answers]
+        if function not in ("exit", "read_one"):  # which a Python FMU for FMI 2.0 cannot refuse
+            assert refused[0] == refused[1], (function, arguments, looks)
+        return answers
+
+    def look(self, place):
+        """What can be seen of one kind: its values; what was said before and while they were read in the log, where the
+        newest instance hears all; and on standard error."""
+        numbers = [pair[place].number for pair in self.pairs]
+        log = [[number, "messages", []] for number in numbers]
+        asked = [*log, [numbers[0], "get", [self.seen]], *log]
+        *before, values, one, other = self.workers[place].call(None, "batch", asked)
+        said = [[text.replace("%%", "%") for lines in heard for *_, text in lines] for heard in (before, [one, other])]
+        return json.dumps(values), said, self.workers[place].read_stderr()  # where NaN is NaN
+
+    # ---- from instantiation to the end
+
+    @precondition(lambda self: self.phase == NEW)
+    @rule(start=TIMES, run=RUNS, tolerance=st.sampled_from([None, 1e-4, 0.0, 1.0, -1.0, nan]))
+    def setup(self, start, run, tolerance):
+        self.t, self.stop = start, inf if run is None else start + run
+        for pair in self.pairs[0]:  # in FMI 3.0 it arrives with what follows
+            pair.setup(start, None if run is None else self.stop, tolerance)
+        self.enter()
+
+    @precondition(lambda self: self.phase == NEW)
+    @rule()
+    def enter(self):
+        self.both("enter")
+        self.phase = INITIALISING
+
+    @precondition(lambda self: self.phase == INITIALISING)
+    @rule()
+    def exit(self):
+        self.both("exit")
+        self.phase = RUNNING
+
+    @precondition(lambda self: self.phase == RUNNING)
+    @rule(again=st.booleans())
+    def reset(self, again):
+        self.both("reset")
+        self.anew()
+        if again:
+            self.both("enter")
+            self.both("exit")
+            self.phase = RUNNING
+
+    # ---- the run
+
+    @precondition(lambda self: self.phase == RUNNING)
+    @rule(h=SIZES, begin=OFF, end=OFF)
+    def step(self, h, begin, end):
+        """Off by a share of the time, or of 1 s."""
+        scale = max(1.0, abs(self.t))
+        at, size = self.t + begin * scale, h + end * scale if h else h
+        python, _ = self.both("step", at, size)
+        if python is not worker_client.FmiError:
+            self.t = at + size
+
+    @precondition(lambda self: self.phase == RUNNING and self.stop < inf)
+    @rule(share=st.sampled_from([0.0, 1e-12, 5e-7, 2e-6, 1e-3]))
+    def last(self, share):
+        """To the stop time, or a share of the step beyond it."""
+        self.step((self.stop - self.t) * (1.0 + share), 0.0, 0.0)
+
+    @precondition(lambda self: self.phase == RUNNING)
+    @rule(off=OFF)
+    def leap(self, off):
+        """To where the internal step ends, or beside it."""
+        (ahead, _) = self.both("get", "solver.t_next")
+        self.step(ahead - self.t, 0.0, off)
+
+    # ---- values
+
+    @rule(data=st.data(), n=st.integers(1, 3))
+    def write(self, data, n):
+        for name in data.draw(st.lists(st.sampled_from(sorted(self.declared)), min_size=n, max_size=n)):
+            is_real = self.declared[name].type == "Real"
+            self.set(name, data.draw(REALS if is_real else INTEGERS))
+
+    def set(self, name, value):
+        if name in ("friction", "solver.method") and value not in (EXACT, HYBRID, 99):
+            value = self.declared[name].start  # others may take steps without number
+        self.both("set", {name: value})
+
+    @precondition(lambda self: self.phase == RUNNING)
+    @rule(kind=st.sampled_from(["Boolean", "String"]), reference=st.sampled_from([0, 3, 2**31, 2**32 - 1]))
+    def read_what_is_not_there(self, kind, reference):
+        self.both("read_one", kind, reference)
+
+    # ---- state
+
+    @precondition(lambda self: len(self.saved) < 3)
+    @rule(as_bytes=st.booleans())
+    def save(self, as_bytes):
+        states = self.both("save")
+        if as_bytes:
+            states = self.both("deserialize", of=self.both("serialize", of=states))
+        self.saved.append((states, self.phase, self.t, self.stop))
+
+    @precondition(lambda self: self.saved)
+    @rule(data=st.data())
+    def restore(self, data):
+        states, self.phase, self.t, self.stop = data.draw(st.sampled_from(self.saved))
+        self.both("restore", of=states)
+
+    @rule()
+    def move(self):
+        """Life goes on in the other instances."""
+        states = self.both("serialize", of=self.both("save"))
+        self.pairs.reverse()
+        self.both("restore", of=self.both("deserialize", of=states))
+        self.saved = []
+
+    def teardown(self):
+        for pair in getattr(self, "pairs", []):
+            for instance in pair:
+                instance.free()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_both_backends_refuse_the_same_calls_with_the_same_message(fmus, kind):
+    process, built = KINDS[kind]
+    workers = [worker_client.Worker(), process()]
+    chosen = {"workers": workers, "folders": [fmus, built()]}
+    run_state_machine_as_test(type("Machine", (Calls,), chosen), settings=OFTEN)
+    assert [worker.close() for worker in workers] == [0, 0]

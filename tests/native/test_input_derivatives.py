@@ -1,0 +1,402 @@
+"""Native FMUs: inputs that change by themselves, up to polynomials of order 8, and the rates of outputs."""
+
+from dataclasses import replace
+from itertools import pairwise
+from math import asin, atan, inf, log2, nan, pi, sin, tan
+
+import fmi3_fixtures
+import native_fmus
+import pytest
+import worker_client
+from fmpy import read_model_description
+from models import DOP853, EXACT, MODELS, ODE23, ODE45, RODAS, outputs, push
+from power_series_body import Body, sample_motion
+from row_comparison import assert_close, assert_identical
+from scipy.integrate import solve_ivp
+from worker_client import FmiError
+
+from fmus.packaging.model_lookup import find_model
+
+DAMPING = {  # stiffness, damping
+    "none": (157.9, 0.0),
+    "under-critical": (157.9, 2.0),
+    "nearly critical": (100.0, 20.0 - 1e-7),
+    "critical": (100.0, 20.0),
+    "over-critical": (100.0, 60.0),
+    "weak spring": (1e-6, 30.0),
+    "no spring": (0.0, 3.0),
+    "no spring nor damper": (0.0, 0.0),
+}
+PIECES = ((0.0, 0.3, 2.0), (1.0, 2.3, -3.0), (2.5, -2.2, 1.7))  # from a time on a force, and its rate
+HARD = ((0.0, 0.0, 80.0), (2.0, 160.0, -120.0), (5.0, -200.0, 60.0))  # enough to drag the sled
+BENT = ((0.0, 0.3, 2.1, -9.0, 12.5), (1.0, 2.3, -3.0, 8.0), (2.5, -2.2, 1.7, 0.0, 30.0, -400.0))  # and its derivatives
+DRAGGED = ((0.0, 0.0, 20.0, 60.0, -30.0), (3.0, 60.0, -400.0, 250.0), (6.0, -150.0, 0.0, 0.0, 90.0))
+HELD, SLID = 0.9 * 12.5 * 9.81, 0.6 * 12.5 * 9.81
+POUND, INCH = 0.45359237, 0.0254
+
+_workers, worker, fresh_worker = worker_client.worker_fixtures(
+    fmi3_fixtures.Worker, "module"
+)  # which runs those of FMI 2.0, too
+
+
+@pytest.fixture(scope="module")
+def fmus():
+    return native_fmus.build_native_fmus()
+
+
+def pushed(fmu, pieces, times, names):
+    """A row of the values of names at each of the times; the input changes in pieces."""
+    rows, left = [], list(pieces)
+    for t, end in pairwise([0.0, *times]):
+        if left and left[0][0] == t:
+            _, value, *rates = left.pop(0)
+            for order in range(len(rates), 0, -1):
+                fmu.ramp("F_ext", rates[order - 1], order)
+            fmu.set({"F_ext": value})
+        fmu.step(t, end - t)
+        rows.append(fmu.get(*names))
+    return rows
+
+
+def agree(fmu, body, pieces, stop):
+    times = [stop * n / 20 for n in range(1, 21)]
+    names = ("x", "v", "events.t_last")
+    assert_close(pushed(fmu, pieces, times, names), sample_motion(body, pieces, times), names, 1e-12)
+    assert fmu.get("events.count") == len(body.events)
+    return len(body.events)
+
+
+@pytest.mark.parametrize("damping", DAMPING)
+def test_a_ramp_is_exact_for_every_damping(launch, damping):
+    k, c = DAMPING[damping]
+    fmu = launch("smd", {"k": k, "c": c, "v0": 0.2}, stop=None)
+    agree(fmu, Body(k=k, c=c, x=0.1, v=0.2), PIECES, 5.0)
+
+
+@pytest.mark.parametrize("damping", DAMPING)
+def test_a_ramp_is_exact_through_stick_and_slip_for_every_damping(launch, damping):
+    k, c = DAMPING[damping]
+    fmu = launch("coulomb", {"k": k, "c": c, "v0": 0.2}, stop=None)
+    assert agree(fmu, Body(k=k, c=c, hold=0.5, slide=0.5, x=0.1, v=0.2), PIECES, 5.0) >= 2
+
+
+@pytest.mark.parametrize(("v_driver", "k"), [(0.034, 742.5), (0.0, 742.5), (0.034, 0.0)])
+def test_a_ramp_breaks_the_sled_away_on_time_with_and_without_its_driver(launch, v_driver, k):
+    fmu = launch("stickslip", {"v_driver": v_driver, "k": k}, stop=None)
+    assert agree(fmu, Body(m=12.5, k=k, hold=HELD, slide=SLID, u=v_driver), HARD, 10.0) >= 3
+
+
+@pytest.mark.parametrize("damping", DAMPING)
+def test_a_polynomial_force_is_exact_through_stick_and_slip_for_every_damping(launch, damping):
+    """What is not set anew goes on: orders 3 and 4 of the second piece are those of the first."""
+    k, c = DAMPING[damping]
+    for name, friction in ("smd", 0.0), ("coulomb", 0.5):
+        fmu = launch(name, {"k": k, "c": c, "v0": 0.2}, stop=None)
+        body = Body(k=k, c=c, hold=friction, slide=friction, x=0.1, v=0.2)
+        assert agree(fmu, body, BENT, 5.0) >= 2 * friction
+
+
+@pytest.mark.parametrize(("v_driver", "k"), [(0.034, 742.5), (0.0, 742.5), (0.034, 0.0)])
+def test_a_polynomial_force_breaks_the_sled_away_on_time(launch, v_driver, k):
+    fmu = launch("stickslip", {"v_driver": v_driver, "k": k}, stop=None)
+    assert agree(fmu, Body(m=12.5, k=k, hold=HELD, slide=SLID, u=v_driver), DRAGGED, 10.0) >= 3
+
+
+# ---- the methods with steps
+
+STEPPING = {"ode23": 1e-8, "ode45": 1e-9, "dop853": 1e-10, "rodas": 1e-8}  # and the tolerances to ask for
+NUMBERS = {"exact": EXACT, "ode23": ODE23, "ode45": ODE45, "dop853": DOP853, "rodas": RODAS}
+
+
+def drag(t, y):
+    """The sled on the curve of the magic formula, pushed with 50 N/s at first."""
+    x, v = y
+    C = 2.0 - 2.0 * asin(0.6 / 0.9) / pi
+    peak = 2.0 / C
+    E, z = (peak - tan(0.5 * pi / C)) / (peak - atan(peak)), peak * v / 0.01
+    mu = 0.9 * sin(C * atan(z - E * (z - atan(z))))
+    return v, (50.0 * t - 30.0 * t * t + 12.0 * t**3 + 742.5 * (0.034 * t - x)) / 12.5 - mu * 9.81
+
+
+def swing(t, y):
+    """The pendulum while it turns forward, driven with 0.1 N m/s at first."""
+    theta, omega = y
+    m, a, J, g, arm = 0.46 * POUND, 3.7 * INCH, 1.5 * POUND * INCH**2, 386.0 * INCH, 0.1 * 0.25 * INCH
+    return omega, (0.1 * t + 4.0 * t * t - 20.0 * t**3 - m * g * a * sin(theta) - arm * m * g) / (J + m * a * a)
+
+
+SMOOTH = {
+    "pacejka": (drag, "F_ext", (50.0, -60.0, 72.0), {}, 2.0),
+    "pendulum": (swing, "T_ext", (0.1, 8.0, -120.0), {"omega0": 12.0}, 0.1),
+}
+
+
+@pytest.mark.parametrize("method", STEPPING)
+@pytest.mark.parametrize("name", SMOOTH)
+def test_every_method_evaluates_a_polynomial_force_at_the_stage_times(launch, name, method):
+    rates, force, derivatives, values, stop = SMOOTH[name]
+    fmu = launch(name, {"solver.method": NUMBERS[method], "solver.rtol": STEPPING[method], **values}, stop=None)
+    start, names = fmu.get(*outputs(name)[:2]), outputs(name)[:2]
+    for order, value in enumerate(derivatives, 1):
+        fmu.ramp(force, value, order)
+    fmu.step(0.0, stop)
+    right = solve_ivp(rates, (0.0, stop), start, "LSODA", rtol=1e-11, atol=1e-13).y[:, -1]
+    assert_close([fmu.get(*names)], [right.tolist()], names, 1e-6)
+
+
+@pytest.mark.parametrize("method", STEPPING)
+@pytest.mark.parametrize("name", ["coulomb", "stickslip"])
+def test_every_method_breaks_away_and_stops_under_a_polynomial_force(launch, name, method):
+    values = {"solver.method": NUMBERS[method], "solver.rtol": STEPPING[method]}
+    sled, pieces = name == "stickslip", DRAGGED if name == "stickslip" else BENT
+    fmu = launch(name, values, stop=None)
+    body = Body(m=12.5, k=742.5, hold=HELD, slide=SLID, u=0.034) if sled else Body(k=157.9, hold=0.5, slide=0.5, x=0.1)
+    times, names = [0.25 * n for n in range(1, 25)], ("x", "v", "events.t_last")
+    assert_close(pushed(fmu, pieces, times, names), sample_motion(body, pieces, times), names, 1e-5)
+    assert fmu.get("events.count") == len(body.events) >= 2
+
+
+LIMITS = {
+    "coulomb": ({"x0": 0.0}, 0.5),
+    "stickslip": ({"v_driver": 0.0}, HELD),
+    "pendulum": ({"theta0": 0.0}, 0.1 * 0.25 * INCH * 0.46 * POUND * 386.0 * INCH),
+}  # at rest without a load, and what is held
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_load_peaking_just_below_the_limit_sticks_and_breaks_away_at_the_opposite_limit(launch, name):
+    """Of what is held it is 3 t - 4 t^3, but for 1e-9: 1 at most at 0.5 s, and -1 at 1 s."""
+    values, limit = LIMITS[name]
+    fmu = launch(name, values, stop=None)
+    for order, value in (3, -24.0), (1, 3.0):
+        fmu.ramp(push(name)[0], value * limit * (1.0 - 1e-9), order)
+    fmu.step(0.0, 1.05)
+    assert fmu.get("mode", "events.count") == [-1, 1]
+    assert fmu.get("events.t_last") == pytest.approx(1.0 + 1e-9 / 9.0, rel=0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_load_equal_to_the_limit_follows_its_first_nonzero_derivative(launch, name):
+    values, limit = LIMITS[name]
+    for order, value in (2, 1.0), (3, -1.0), (4, -1.0), (5, 1.0):
+        fmu = launch(name, values, stop=None)
+        fmu.set({push(name)[0]: limit})
+        fmu.ramp(push(name)[0], value * limit, order)
+        fmu.step(0.0, 0.2)
+        assert fmu.get("mode") == (value > 0.0)
+        assert fmu.get("events.t_last") == 0.0
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_derivatives_growing_with_their_order_cost_no_extra_steps(launch, name):
+    """Those of a load that swings at 50 Hz, below what is held and above it, told every millisecond."""
+    values, limit = LIMITS[name]
+    for size in 0.9 * limit, 2.0 * limit:
+        fmu = launch(name, values, stop=None)
+        for n in range(60):
+            fmu.set({push(name)[0]: size * sin(0.1 * pi * n)})
+            for k in range(1, 9):
+                fmu.ramp(push(name)[0], size * (100.0 * pi) ** k * sin(0.1 * pi * n + 0.5 * pi * k), k)
+            fmu.step(n * 1e-3, 1e-3)
+        assert fmu.get("solver.steps") < 60 * 6
+        assert (fmu.get("events.count") > 0) == (size > limit)
+
+
+ORDERS = {"ode23": 3, "ode45": 5, "dop853": 8, "rodas": 4, "exact": 6}  # of the last any
+
+
+@pytest.mark.parametrize("method", ORDERS)
+def test_a_method_keeps_its_order_when_input_derivatives_are_set(launch, method):
+    """Without them it has order 1, with a rate order 2: one internal step for each communication step, at a loose
+    tolerance, under the force sin(3 t) N; the truth is that of steps of the exact method with all derivatives."""
+
+    def left_at(number, order, many):
+        h = 1.0 / many
+        loose = {"solver.method": number, "solver.rtol": 0.9, "solver.atol": 1e3, "solver.h_max": h}
+        fmu = launch("smd", loose | {"k": 4.0, "c": 1.0}, stop=None)
+        for n in range(many):
+            fmu.set({"F_ext": sin(3.0 * n * h)})
+            for k in range(1, order):
+                fmu.ramp("F_ext", 3.0**k * sin(3.0 * n * h + 0.5 * pi * k), k)
+            fmu.step(n * h, h)
+        return fmu.get("x")
+
+    truth, many = left_at(EXACT, 9, 64), 32 if method == "ode23" else 8
+    for order in sorted({1, 2, ORDERS[method]}):
+        coarse, fine = (abs(left_at(NUMBERS[method], order, n) - truth) for n in (many, 2 * many))
+        assert log2(coarse / fine) == pytest.approx(order, abs=0.25)
+
+
+# ---- an input that changes is as any other
+
+
+@pytest.fixture(params=MODELS)
+def ramped(request, launch):
+    """An instance whose input ramps, the names of its input and outputs, and how fast."""
+    name = request.param
+    force, size = push(name)
+    fmu = launch(name, stop=None)
+    fmu.set({force: 0.25 * size})
+    fmu.ramp(force, 0.5 * size)
+    return name, fmu, force, outputs(name), size
+
+
+def test_an_input_reads_as_set_and_its_rate_lasts_until_the_next_setting(ramped):
+    _, fmu, force, _names, size = ramped
+    fmu.step(0.0, 0.5)
+    assert fmu.get(force) == 0.5 * size
+    fmu.set({force: 0.25 * size})  # what it once was
+    assert fmu.get(force) == 0.25 * size
+    fmu.step(0.5, 1.0)
+    assert fmu.get(force) == 0.75 * size
+    fmu.ramp(force, 0.0)
+    fmu.step(1.5, 0.5)
+    assert fmu.get(force) == 0.75 * size
+
+
+def test_results_do_not_depend_on_the_grid_or_on_repeated_settings(launch, ramped):
+    name, fmu, force, names, size = ramped
+    other = launch(name, stop=None)
+    fmu.ramp(force, -2.0 * size, 3)
+    other.ramp(force, -2.0 * size, 3)
+    other.ramp(force, 0.5 * size)
+    other.set({force: 0.25 * size})
+    for n in range(64):
+        fmu.step(n / 32, 1 / 32)
+        fmu.ramp(force, -2.0 * size, 3)
+        fmu.get(*names, "solver.t_next")
+    other.step(0.0, 2.0)
+    assert_identical([fmu.get(force, *names)], [other.get(force, *names)], [force, *names])
+
+
+def test_a_ramp_is_saved_and_continues_bit_for_bit(ramped):
+    _, fmu, force, names, size = ramped
+    fmu.ramp(force, 9.0 * size, 4)
+    fmu.step(0.0, 0.3)
+    state = fmu.save()
+    fmu.step(0.3, 0.7)
+    row = fmu.get(force, *names)
+    for again in state, fmu.deserialize(fmu.serialize(state)):
+        fmu.ramp(force, -size, 2)
+        fmu.step(1.0, 0.1)
+        fmu.restore(again)
+        fmu.step(0.3, 0.7)
+        assert_identical([fmu.get(force, *names)], [row], [force, *names])
+    fmu.reset()
+    fmu.init()
+    fmu.step(0.0, 0.5)
+    assert fmu.get(force) == 0.0
+
+
+def test_a_ramp_may_begin_before_the_run(worker, fmus):
+    rows = []
+    for early in True, False:
+        fmu = worker.instantiate(fmus / "stickslip.fmu")
+        fmu.setup(0.5, None, None)
+        if early:
+            fmu.ramp("F_ext", 90.0)
+        fmu.init()
+        if not early:
+            fmu.ramp("F_ext", 90.0)
+        fmu.step(0.5, 2.0)
+        rows.append(fmu.get("F_ext", *outputs("stickslip")))
+        fmu.free()
+    assert_identical(rows[:1], rows[1:], ["F_ext", *outputs("stickslip")])
+    assert rows[0][0] == 180.0
+
+
+# ---- the rates of outputs
+
+BUILT = {"FMI 2.0": native_fmus.build_native_fmus, "FMI 3.0": fmi3_fixtures.build_fmi3_fmus}
+
+
+@pytest.mark.parametrize("version", BUILT)
+@pytest.mark.parametrize("name", MODELS)
+def test_output_derivatives_agree_with_differences(worker, name, version):
+    """Central ones of fourth order, in stick and slip; the input ramps where it may."""
+    h, (force, size), names = 1e-3, push(name), [one for one in outputs(name) if one != "mode"]
+    fmu = worker.instantiate(BUILT[version]() / f"{name}.fmu").begin({"solver.rtol": 1e-12})
+    if version == "FMI 2.0":
+        fmu.ramp(force, 0.1 * size)
+    t, found = 0.0, []
+    for middle in (0.1, 0.4, 0.6, 1.0, 2.0):
+        times = [middle + n * h for n in (-2, -1, 0, 1, 2)]
+        a, b, here = fmu.run([t, *times[:3]], names)[1:]
+        rates = fmu.output_rates(names)
+        _, d, (*e, t_last) = fmu.run(times[2:], [*names, "events.t_last"])
+        t = times[-1]
+        if not middle - 3 * h < t_last:  # else an event lies between
+            right = [(w - 8.0 * x + 8.0 * y - z) / (12.0 * h) for w, x, y, z in zip(a, b, d, e, strict=False)]
+            found.append((here, rates, right))
+    assert len(found) >= 3
+    for values, rates, right in zip(*(zip(*rows, strict=True) for rows in zip(*found, strict=True)), strict=True):
+        bound = 1e-5 * max(map(abs, right)) + 1e-8 * (10.0 + max(map(abs, values)))
+        assert rates == pytest.approx(right, rel=0.0, abs=bound)
+    fmu.free()
+
+
+# ---- what is told, and what is refused
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_the_description_declares_the_supported_orders(fmus, name):
+    two, three = (read_model_description(folder / f"{name}.fmu") for folder in (fmus, fmi3_fixtures.build_fmi3_fmus()))
+    assert two.coSimulation.canInterpolateInputs
+    assert [one.coSimulation.maxOutputDerivativeOrder for one in (two, three)] == [1, 1]
+
+
+def test_invalid_input_derivatives_are_refused_and_change_nothing(launch):
+    fmu = launch("smd")
+    fmu.step(0.0, 0.1)
+    row = fmu.get(*outputs("smd"))
+    wrong = [("m", 1.0, 1), ("x", 1.0, 1), ("solver.method", 1.0, 1)]
+    wrong += [("F_ext", value, 1) for value in (nan, inf, -inf)] + [("F_ext", 1.0, order) for order in (0, 9, -1)]
+    for arguments in wrong:
+        with pytest.raises(FmiError, match="fmi2SetRealInputDerivatives returned status 3"):
+            fmu.ramp(*arguments)
+        ((_, _, sentence),) = fmu.messages()
+        assert "an input without a range takes finite ones of the orders 1 to 8" in sentence
+    for names, order in ((["x", "m"], 1), (["F_ext"], 1), (["events.count"], 1), (["x"], 0), (["v"], 2)):
+        with pytest.raises(FmiError, match="fmi2GetRealOutputDerivatives returned status 3"):
+            fmu.output_rates(names, order)
+        ((_, _, sentence),) = fmu.messages()
+        assert "those told are of outputs, and of the order 1" in sentence
+    assert_identical([fmu.get(*outputs("smd"))], [row], outputs("smd"))
+    assert fmu.get("F_ext") == 0.0
+    fmu.terminate()
+    assert fmu.output_rates(["x"]) == fmu.get("v", "x")[:1]
+    with pytest.raises(FmiError):
+        fmu.ramp("F_ext", 1.0)
+    assert "the FMU is terminated" in fmu.messages()[0][2]
+
+
+def test_a_model_declares_which_inputs_may_ramp(tmp_path):
+    """None that has a range, or on which hangs what a contact holds, for its release would have no closed form; a
+    method with steps takes any course of a stiffness."""
+    text = """
+from fmus import Contact, Input, Mode, Model, Output, Parameter, State
+
+
+class Block(Model):
+    "Block that is pressed onto a table."
+
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    l = Parameter(1.0, "m", "a length")
+    F_ext = Input(0.0, "N", "force along the table")
+    F_n = Input(5.0, "N", "force across it")
+    F_near = Input(0.0, "N", "force of a range", low=-1.0, high=1.0)
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+    mode = Mode()
+    F_friction = Contact("N", "friction", mode=mode, slip=v, slide=0.5 * F_n)
+    a = Output("m/s2", "acceleration", (F_ext + F_near - F_friction) / m, rate_of=v)
+"""
+    (tmp_path / "block.py").write_text(text)
+    (tmp_path / "bar.py").write_text(
+        text.replace("slide=0.5 * F_n", "slide=2.0")
+        .replace("F_near -", "F_near - F_n * x / l -")
+        .replace("Block(", "Bar(")
+    )
+    for name, ramps in (("block", ["F_ext"]), ("bar", ["F_ext"])):
+        analysis = replace(find_model(tmp_path / f"{name}.py"), ramps=True).analysis
+        assert [e.name for e in analysis.ramps] == ramps

@@ -1,0 +1,220 @@
+"""The binaries for other machines, where an emulator is at hand: Wine for Windows, qemu for Linux on ARM.
+
+On Debian: apt-get install wine64 wine qemu-user libc6-arm64-cross.  Only libm's last place may differ.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import build_cache
+import fmi3_fixtures
+import pytest
+from models import CASES, HYBRID, MODELS, RODAS, declared, label, model_class, outputs
+from native_fmus import build_native_fmus, require_compiler
+from native_host import (
+    FMI3_HOST_SOURCE,
+    HEADERS,
+    HOST_SOURCE,
+    begin,
+    guid,
+    host_program,
+    run_host_script,
+    run_life_cycles,
+    unpack_cached,
+    value_references,
+)
+
+from fmus.packaging import native
+from fmus.packaging.native.compiler import PLATFORMS, compile_binaries, find_compiler
+from fmus.packaging.native.sources import MAIN_SOURCE
+
+ROWS = 50
+ARM = "/usr/aarch64-linux-gnu"  # where Debian puts the C library
+PLACES = ("usr/lib*/wine", "usr/lib/*/wine", "opt/wine*/lib*/wine")
+WINE = [path for place in PLACES for path in Path("/").glob(f"{place}/x86_64-windows")]  # and others Wine's libraries
+MACHINES = {"win64": ["wine"], "aarch64-linux": ["qemu-aarch64", "-L", ARM]}  # and what runs their programs
+PROGRAM = {  # the source that a program needs beside those of a library, and options; none of the compiler's libraries
+    "win64": (
+        [HOST_SOURCE.with_name("windows_runtime.c")],
+        [
+            "-nostdlib",
+            "-Wl,-e,mainCRTStartup",
+            *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("runtime", "time", "utility")),
+        ],
+    ),
+    "aarch64-linux": ([], ["-rtlib=none"]),
+}
+CLOSE = dict.fromkeys(MODELS, 1e-11) | {"pacejka": 1e-9}  # of an output's largest value; break-aways amplify
+
+
+def is_steady(case):
+    """Whether a last bit stays one: not with a law that chatters, nor with an explicit method on the stiff curve."""
+    name, values, _ = case
+    return values.get("friction", HYBRID) == HYBRID and (name != "pacejka" or values["solver.method"] == RODAS)
+
+
+STEADY = [case for case in CASES if is_steady(case)]
+
+
+@pytest.fixture(scope="module", params=MACHINES)
+def machine(request):
+    """A platform, the command that starts a host there, by its source, and the environment for it."""
+    emulator, *words = MACHINES[request.param]
+    if not shutil.which(emulator) or not (os.path.isdir(ARM) if words else WINE):
+        pytest.skip(f"{emulator} is not here: apt-get install wine64 wine qemu-user libc6-arm64-cross")
+    require_compiler()
+    (target,) = PLATFORMS[request.param].targets.values()
+
+    def program(source):
+        def make(folder):
+            chosen, (more, options) = PLATFORMS[request.param], PROGRAM[request.param]
+            options = [*(option.format(compiler=find_compiler()) for option in chosen.options), *options]
+            sources = [source, *more, *(Path(native.__file__).with_name(file) for file in chosen.sources)]
+            command = [sys.executable, "-m", "ziglang", "cc", "-target", target, "-O1", "-s", *options, f"-I{HEADERS}"]
+            subprocess.run([*command, *map(str, sources), "-o", str(folder / "host.exe")], check=True)
+
+        return [emulator, *words, str(build_cache.cached_folder(f"{source.stem}-{request.param}", make) / "host.exe")]
+
+    return request.param, program, os.environ | (windows() if emulator == "wine" else {})
+
+
+def windows():
+    """The environment of a Windows that is Wine's libraries in a folder: to set up all that belongs to one takes longer
+    than all that is asked of it here."""
+
+    def make(folder):
+        system = {"system32": WINE[0], "syswow64": WINE[0].with_name("i386-windows")}
+        links = {"dosdevices/c:": "../drive_c", "dosdevices/z:": "/"}
+        for link, place in (links | {f"drive_c/windows/{name}": path for name, path in system.items()}).items():
+            (folder / link).parent.mkdir(parents=True, exist_ok=True)
+            (folder / link).symlink_to(place)
+
+    here = str(build_cache.cached_folder("windows", make))
+    return {"WINEDEBUG": "-all", "WINEDLLOVERRIDES": "wineboot.exe=d", "WINEPREFIX": here, "HOME": here}
+
+
+def library(fmu, version, platform):
+    """The library for a platform, as the build command makes it of the sources that are in the FMU for any."""
+
+    def make(folder):
+        sources = {path.name: path.read_text() for path in (unpack_cached(fmu) / "sources").iterdir()}
+        for path, content in compile_binaries(fmu.stem, sources, MAIN_SOURCE[version], platform, version).items():
+            (folder / Path(path).name).write_bytes(content)
+
+    return (
+        build_cache.cached_folder(f"{fmu.stem}-{version}-{platform}", make) / f"{fmu.stem}{PLATFORMS[platform].suffix}"
+    )
+
+
+def run_host_script_there(machine, name, script):
+    """As play, there."""
+    platform, program, environment = machine
+    fmu = build_native_fmus() / f"{name}.fmu"
+    done = subprocess.run(
+        [*program(HOST_SOURCE), str(library(fmu, "2", platform)), guid(fmu), "1"],
+        input="\n".join(script),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        env=environment,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def runs(name):
+    """A script with every case of a model, each in an instance of its own, and how many rows each tells."""
+    ref, script = value_references(name), []
+    reals = " ".join(str(ref[v]) for v in outputs(name) if declared(name)[v].type == "Real")
+    for i, (_, values, stop) in enumerate(case for case in STEADY if case[0] == name):
+        sets = [f"{i} {'seti' if declared(name)[v].items else 'setr'} {ref[v]} {x!r}" for v, x in values.items()]
+        script += [f"{i} new", *sets, *begin(i, stop=stop)[1:]]
+        script += [f"{i} run {stop * k / ROWS!r} {stop * (k + 1) / ROWS!r} 1 {reals}" for k in range(ROWS)]
+    return script
+
+
+def exchange(name):
+    """A script by Euler's steps in model exchange, with an event at each; a sled begins far behind its driver."""
+    ref, driven = value_references(name), "x_driver" in declared(name)
+    states, behind = len(model_class(name).states) + driven, [(ref["x0"], -0.2)] if driven else []
+    reals = " ".join(str(ref[v]) for v in outputs(name) if declared(name)[v].type == "Real")
+    spans = [f"0 euler {states} {k / ROWS!r} {(k + 1) / ROWS!r} 40 {reals}" for k in range(ROWS)]
+    return ["0 new exchange", *begin(0, behind)[1:], *spans]
+
+
+def tables(answers):
+    """The rows of every case, column by column."""
+    rows = [[float.fromhex(word) for word in line.split()[1:]] for line in answers if line.count(" ") > 2]
+    return [list(zip(*rows[k : k + ROWS], strict=True)) for k in range(0, len(rows), ROWS)]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_results_agree_with_linux_on_x86(machine, name):
+    script = runs(name)
+    here, there = (
+        tables(run_host_script(build_native_fmus() / f"{name}.fmu", script)[0]),
+        tables(run_host_script_there(machine, name, script)),
+    )
+    cases = [case for case in STEADY if case[0] == name]
+    for case, table, other in zip(cases, here, there, strict=True):
+        print(f"{machine[0]} {label(case)}: largest difference {apart(table, other):.1e}")
+        assert apart(table, other) <= CLOSE[name]
+
+
+def apart(table, other):
+    """The largest difference of two tables, as a share of the largest value of each column."""
+    sizes = [max(map(abs, column)) or 1.0 for column in table]
+    differences = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in zip(table, other, strict=True)]
+    return max(difference / size for difference, size in zip(differences, sizes, strict=True))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_model_exchange_agrees_with_linux_on_x86(machine, name):
+    script = exchange(name)
+    (here,), (there,) = (
+        tables(run_host_script(build_native_fmus() / f"{name}.fmu", script)[0]),
+        tables(run_host_script_there(machine, name, script)),
+    )
+    assert len(set(here[0])) > 3  # it moves
+    assert apart(here, there) <= CLOSE[name]
+
+
+def test_fmi3_agrees_with_linux_on_x86(machine):
+    """Both ways to simulate the sled, its states saved, and a refusal; the numerics are those of FMI 2.0, and one
+    method is enough."""
+    platform, program, environment = machine
+    sled = fmi3_fixtures.build_reduced_fmu("stickslip")
+    ends, said = run_life_cycles(
+        program(FMI3_HOST_SOURCE), sled, library(sled, "3", platform), 2, 4000, env=environment
+    )
+    expected, sentences = run_life_cycles(
+        [host_program(source=FMI3_HOST_SOURCE)], sled, "x86_64-linux/stickslip.so", 2, 4000
+    )
+    assert ends == [pytest.approx(row, abs=1e-11) for row in expected]
+    assert said == sentences
+
+
+def test_messages_agree_with_linux_on_x86(machine):
+    ref = value_references("stickslip")
+    numbers = [
+        "0.1",
+        "1e22",
+        "5e-324",
+        "-1.7976931348623157e308",
+        "5.684341886080802e-14",
+        "123456.789",
+        "1e16",
+        "1e-5",
+    ]
+    script = ["0 new"]
+    for number in numbers:
+        script += [f"0 setr {ref['x']} {number}", "0 setup nan 0 1", "0 enter", "0 exit", "0 step 0 0.5", "0 reset"]
+    here, there = (
+        run_host_script(build_native_fmus() / "stickslip.fmu", script)[0],
+        run_host_script_there(machine, "stickslip", script),
+    )
+    assert here == there
+    assert any("x = 5.684341886080802e-14 is refused" in line for line in here)

@@ -1,0 +1,218 @@
+"""The gate: the Python FMU and the native FMU of a model answer the same to every call, bit for bit.
+
+Both go through the same random lives: parameters, tolerances and grids; inputs and tunables that change in mid-run;
+looks ahead; states saved, restored and carried over to another instance as bytes; values and steps that must be
+refused; runs that break down.  Whatever an importer can see is compared with ==: values, counts, statuses, log
+messages, standard error.
+"""
+
+import json
+import random
+from contextlib import suppress
+from math import inf, nan
+
+import pytest
+from models import HYBRID, MODELS, declared, label, model_class, pairwise_cases, parameters, tunable
+from native_fmus import build_native_fmus
+from worker_client import FmiError, Worker
+
+LIVES, EVENTS = 2, 30  # of every model, law and method; in a life
+BREAKDOWNS = 3  # of every model, law and method
+CASES = [(name, values, 0.0) for name in MODELS for values in pairwise_cases(name)]
+
+
+@pytest.fixture(scope="module")
+def natives():
+    return build_native_fmus()
+
+
+@pytest.fixture(scope="module")
+def pair():
+    """Two processes: the FMUs share nothing."""
+    workers = Worker(), Worker()
+    yield workers
+    for worker in workers:
+        worker.close()
+
+
+class LifeCycle:
+    """What one FMU answers to a list of events."""
+
+    def __init__(self, worker, path, names):
+        self.worker, self.names = worker, names
+        self.instances = [worker.instantiate(path, "twin"), worker.instantiate(path, "twin")]
+        self.kept = None
+        self.t = 0.0
+
+    def live(self, events):
+        answers = [self.answer(*event) for event in events]
+        for instance in self.instances:
+            instance.free()
+        return answers
+
+    def answer(self, what, *arguments):
+        """What comes back, is logged, printed, and read afterwards."""
+        try:
+            value = getattr(self, what)(*arguments)
+        except FmiError as refusal:
+            value = refusal.function  # the layer of a Python FMU knows Discard only
+        # fmpy's logger calls back the newest instance, whichever speaks
+        asked = [[instance.number, "messages", []] for instance in self.instances]
+        seen = self.worker.call(None, "batch", [*asked, [self.instances[0].number, "get", [self.names]]])
+        return json.dumps([value, seen, self.worker.read_stderr()])  # where NaN is NaN, and no digit is lost
+
+    def begin(self, values, start, stop, tolerance):
+        fmu = self.instances[0]
+        self.t = start
+        fmu.set(values)
+        seen = fmu.get(*self.names)
+        fmu.setup(start, stop, tolerance)
+        seen += fmu.get(*self.names)
+        with suppress(FmiError):  # which a Python FMU cannot; what is wrong is logged by both
+            fmu.init()
+        return seen
+
+    def step(self, h):
+        t, self.t = self.t, self.t + h
+        self.instances[0].step(t, h)
+
+    def leap(self):
+        """To the end of the internal step."""
+        ahead = self.instances[0].get("solver.t_next")
+        if self.t < ahead < inf or ahead != ahead:
+            self.step(ahead - self.t if ahead == ahead else 1e-6)
+        return ahead
+
+    def wrong_step(self, shift, h):
+        self.instances[0].step(self.t + shift, h)
+
+    def set(self, values):
+        self.instances[0].set(values)
+
+    def look(self):
+        return self.instances[0].get("solver.t_next")
+
+    def save(self):
+        self.kept = self.instances[0].save(), self.t
+
+    def restore(self):
+        state, self.t = self.kept
+        self.instances[0].restore(state)
+
+    def move(self):
+        """Life goes on in the other instance."""
+        fmu, other = self.instances
+        other.restore(other.deserialize(fmu.serialize(fmu.save())))
+        self.instances.reverse()
+        self.kept = other.save(), self.t
+
+    def reset(self):
+        self.instances[0].reset()
+
+
+ODD = (0.0, -1.0, 1e-300, 5e-324, 1e300, -1.7e308, nan, inf, -inf)
+
+
+def likely(draw, start):
+    """A value for a parameter that starts at `start`."""
+    return (start or 1.0) * 10.0 ** draw.uniform(-0.7, 0.7)
+
+
+def start_values(name):
+    """The start values of what takes a number in a run."""
+    numbers = {v: d.start for v, d in parameters(name).items() if not v.startswith("solver.")}
+    return numbers | {v: 0.05 for v in numbers if v in ("x0", "v0", "theta0", "omega0")}
+
+
+def beginnings(draw, name, choices, stop):
+    """The first event of a life, and of that after a reset."""
+    values = choices | {v: likely(draw, s) for v, s in start_values(name).items() if draw.random() < 0.4 and v != "x_m"}
+    is_chattering = choices.get("friction", HYBRID) != HYBRID
+    values["solver.rtol"] = draw.choice([1e-2, 1e-3] if is_chattering else [0.0, 1e-3, 1e-5, 1e-7])
+    if draw.random() < 0.3:
+        values["solver.h_max"] = stop * draw.uniform(0.001, 0.2)
+    start = draw.choice([0.0, 0.0, -3.0, 1e4])
+    end = draw.choice([start + stop, start + stop, None])
+    return [("begin", values, start, end, draw.choice([None, 1e-4, 0.0, 2.0])), ("save",)]
+
+
+def mistakes(draw, name, stop):
+    """Something that cannot be used; a step that tells it; and a way out, if that is wanted."""
+    declarations = declared(name)
+    odd = {v: draw.choice(ODD) for v in draw.sample(list(tunable(name)), 2)}
+    fixed = draw.choice([v for v, d in declarations.items() if d.variability == "fixed"])
+    calculated = draw.choice([v for v, d in declarations.items() if d.causality in ("output", "local")])
+    mistake = draw.choice(
+        [
+            ("set", odd),
+            ("set", odd),
+            ("set", {fixed: 1 if declarations[fixed].items else 0.125}),
+            ("set", {calculated: 0.125 if declarations[calculated].type == "Real" else 1}),
+            ("wrong_step", draw.choice([0.1, -0.1, nan, 1e-3]), draw.choice([0.01, -0.01, 0.0, nan, inf])),
+            ("step", draw.choice([0.0, -stop, inf])),
+        ]
+    )
+    return [mistake, ("step", 1e-6 * stop), ("leap",), ("restore",)]
+
+
+def scenario(draw, name, choices):
+    """The events of one life."""
+    stop = model_class(name).stop_time * (0.3 if choices.get("friction", HYBRID) == HYBRID else 0.02)
+    tunables = [v for v in tunable(name) if v != "x_m"]  # a stiff curve is too slow for most methods
+    starts = start_values(name)
+    drawn = {
+        "step": lambda: [("step", stop * draw.choice([1e-9, 0.003, 0.02, 0.02, 0.1]))],
+        "leap": lambda: [("leap",)],
+        "look": lambda: [("look",)],
+        "set": lambda: [("set", {v: likely(draw, starts[v]) for v in draw.sample(tunables, 2)})],
+        "save": lambda: [("save",)],
+        "restore": lambda: [("restore",)],
+        "move": lambda: [("move",)],
+        "mistake": lambda: mistakes(draw, name, stop),
+        "reset": lambda: [("reset",), *beginnings(draw, name, choices, stop)],
+    }
+    weights = {"step": 10, "leap": 5, "look": 2, "set": 3, "save": 1, "restore": 1, "move": 1, "mistake": 1, "reset": 1}
+    kinds = draw.choices(list(weights), list(weights.values()), k=EVENTS)
+    return beginnings(draw, name, choices, stop) + [event for kind in kinds for event in drawn[kind]()]
+
+
+def breakdown(draw, name, choices):
+    """A life with values far out, an internal step at a time."""
+
+    def far(start):
+        return draw.choice(
+            [start, start, likely(draw, start), start * 1e9, start * 1e-9, 10.0 ** draw.uniform(-320, 308)]
+        )
+
+    values = choices | {v: far(s) for v, s in start_values(name).items()}
+    values["solver.rtol"] = draw.choice([0.0, 1e-2, 1e-5])
+    change = {v: far(start_values(name)[v]) for v in draw.sample(list(tunable(name)), 2)}
+    stop = draw.choice([1e-3, 1.0, 1e3])
+    return [("begin", values, 0.0, stop, None), *[("leap",)] * 8, ("set", change), *[("leap",)] * 8]
+
+
+def agree(folders, pair, name, events):
+    """Live the events in a Python FMU and in a native one."""
+    names = [v for v in declared(name) if v != "solver.t_next"]  # which looks ahead: an event of its own
+    lives = [
+        LifeCycle(worker, folder / f"{name}.fmu", names).live(events)
+        for worker, folder in zip(pair, folders, strict=True)
+    ]
+    for event, python, native in zip(events, *lives, strict=True):
+        assert python == native, event
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_both_backends_respond_identically_to_every_call(fmus, natives, pair, case):
+    name, choices, _ = case
+    for number in range(LIVES):
+        draw = random.Random(f"{label(case)} {number}")
+        agree((fmus, natives), pair, name, scenario(draw, name, choices))
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_both_backends_fail_at_the_same_point_with_the_same_message(fmus, natives, pair, case):
+    name, choices, _ = case
+    for number in range(BREAKDOWNS):
+        draw = random.Random(f"{label(case)} {number}")
+        agree((fmus, natives), pair, name, breakdown(draw, name, choices))

@@ -1,0 +1,105 @@
+"""The sources of the native FMUs under the address and undefined-behaviour sanitizers, in the hands of an importer that
+does whatever it must not; tests/support/fmi2_stress.c and, for FMI 3.0, fmi3_stress.c say what it does."""
+
+import os
+import subprocess
+import sys
+
+import fmi3_fixtures
+import pytest
+from models import MODELS
+from native_fmus import build_native_fmus
+from native_host import SANITIZER_ENVIRONMENT, SANITIZERS, compile_sanitized
+
+STATES = 75_000  # damaged ones, over all models
+SENTENCE = (
+    "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
+    "save a state anew and pass it on unchanged"
+)
+
+
+def program(source, fmu, sanitizers=SANITIZERS):
+    """What runs a program over the sources in an FMU: it must end well, and tells what went to its outputs."""
+    out = compile_sanitized(source, fmu, sanitizers=sanitizers)
+
+    def run(*words, **options):
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": SANITIZER_ENVIRONMENT} | options
+        done = subprocess.run([str(out), *map(str, words)], timeout=120, **streams)
+        assert done.returncode == 0, f"{done.returncode}: {done.stdout[-300:]} {(done.stderr or b'')[-3000:]}"
+        return done.stdout, done.stderr
+
+    return run
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def abuse(request):
+    return program("fmi2_stress.c", build_native_fmus() / f"{request.param}.fmu")
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def walk(request):
+    return program("fmi3_stress.c", fmi3_fixtures.build_fmi3_fmus() / f"{request.param}.fmu")
+
+
+def test_a_corrupted_state_is_refused_and_no_instance_changes(abuse):
+    told, noise = abuse("flips")
+    assert int(told) > STATES / len(MODELS)
+    assert noise.count(SENTENCE.encode()) >= int(told)
+
+
+def test_an_impossible_state_is_refused_despite_a_valid_checksum(abuse):
+    abuse("forged")
+
+
+def test_random_calls_end_in_a_status_and_leave_other_instances_alone(abuse):
+    abuse("calls", 1, 20_000)
+
+
+def test_every_fmi3_function_in_every_state_follows_the_standard_without_leaks(walk):
+    """With null pointers and wrong lengths, in every kind of instance; the address sanitizer looks for what is left."""
+    told, _ = walk("states", 1)
+    assert int(told) > 2_500
+
+
+def test_random_fmi3_calls_end_in_a_status_and_leave_other_instances_alone(walk):
+    walk("calls", 1, 20_000)
+
+
+def test_fmi3_instances_share_nothing_between_threads():
+    program("fmi3_stress.c", fmi3_fixtures.build_fmi3_fmus() / "stickslip.fmu", "thread")("states", 4)
+
+
+NAMES = [
+    *(b"", b"100 %s %n", "na\u00efve".encode(), rb"\xff\xfe", rb"cut \xe2\x82", rb"\xed\xa0\x80", rb"\xc0\xaf"),
+    *("\U0001f30d".encode(), rb"\xf5\x80\x80\x80", b"%" * 10_000, b""),
+]
+
+
+def test_any_name_is_logged_as_utf8_and_never_as_a_format(abuse):
+    """Each name twice: of an instance, and of one that is refused."""
+    told, noise = abuse("names", env=SANITIZER_ENVIRONMENT | {"ALOUD": "1"})
+    assert [line.split(b"|")[0] for line in told.splitlines()] == [name for name in NAMES for _ in range(2)]
+    assert all(b"(" + name + b"): fmi2" in noise for name in NAMES)
+    told.decode()
+    noise.decode()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/dev/full is Linux's")
+@pytest.mark.parametrize("lost", ["closed", "full", "unread", "by the host", "not writable"])
+def test_an_error_survives_the_loss_of_standard_error(abuse, lost):
+    """The signal of a pipe that nobody reads would end a host that does not ignore it, as this one."""
+    if lost == "closed":
+        abuse("failures", preexec_fn=lambda: os.close(2), stderr=None)
+    elif lost == "full":
+        with open("/dev/full", "w") as full:
+            abuse("failures", stderr=full)
+    elif lost == "not writable":
+        with open(os.devnull) as null:
+            abuse("failures", stderr=null)
+    elif lost == "unread":
+        reader, writer = os.pipe()
+        os.close(reader)
+        abuse("failures", stderr=writer)
+        os.close(writer)
+    else:
+        abuse("failures", "closes")

@@ -1,0 +1,104 @@
+"""FMUs built with --method, --law and --platform: they offer just those, carry just their code, and run alike."""
+
+from zipfile import ZipFile
+
+import pytest
+from commands import build as command
+from fmpy import read_model_description
+from models import MODELS, counts, declared, experiment, label, outputs, pairwise_cases
+from row_comparison import assert_identical
+
+from fmus.packaging import archive
+from fmus.packaging.lowering import LAWS, METHODS
+
+LABELS = {"solver.method": "--method", "friction": "--law"}
+
+
+def chosen(name, values):
+    """The labels of the choices of a case, by the option that asks for them."""
+    found = {}
+    for variable, option in LABELS.items():
+        for item in declared(name)[variable].items if variable in values else ():
+            if item[1] == values[variable]:
+                found[option] = item[0]
+    return found
+
+
+@pytest.fixture(scope="module")
+def lean(tmp_path_factory):
+    """lean(case): the FMU that offers the method and the law of a case and nothing else, for Linux."""
+
+    def build(case):
+        options = chosen(*case[:2])
+        asked = [[options[word]] if word in options else [] for word in LABELS.values()]
+        return archive.build(case[0], tmp_path_factory.mktemp("lean"), *asked, ["linux64"])
+
+    return build
+
+
+EACH = [experiment(name, values) for name in MODELS for values in pairwise_cases(name, 1)]  # method, and each law
+
+
+@pytest.mark.parametrize("case", EACH, ids=label)
+def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, case):
+    name, values, stop = case
+    path = lean(case)
+    options = chosen(name, values)
+    description = read_model_description(path, validate_model_structure=True)
+    assert {variable.name for variable in description.modelVariables} <= {*declared(name)}  # whose letters are allowed
+    for variable in description.modelVariables:
+        if variable.name in LABELS:
+            assert [item.name for item in variable.declaredType.items] == [options[LABELS[variable.name]]]
+            assert int(variable.start) == values[variable.name]
+    with ZipFile(path) as archive:
+        files = {entry.rsplit("/", 1)[1] for entry in archive.namelist() if "/runtime/" in entry}
+        assert {entry.split("/")[1] for entry in archive.namelist() if entry.startswith("binaries")} == {"linux64"}
+        page = archive.read("documentation/index.html").decode()
+    shown = {label for label in (*METHODS, *LAWS) if f"<b>{label}</b>" in page}
+    assert shown == set(options.values())
+    methods = {"linear_closed_form.py", "ode23.py", "ode45.py", "dop853.py", "rodas.py"}
+    assert files & methods == {f"{options['--method']}.py".replace("exact", "linear_closed_form")}
+    times = [stop * i / 40 for i in range(41)]
+    names = outputs(name) + counts(name)
+    fmu = worker.instantiate(path).begin({v: x for v, x in values.items() if v not in LABELS}, stop=stop)
+    assert_identical(fmu.run(times, names), launch(name, values, stop=stop).run(times, names), names)
+    fmu.free()
+
+
+def test_several_may_be_selected_and_the_first_is_the_default(tmp_path):
+    assert command("pendulum", "--method", "rodas", "--method", "ode45", "--out", tmp_path).returncode == 0
+    (method,) = [
+        v for v in read_model_description(tmp_path / "pendulum.fmu").modelVariables if v.name == "solver.method"
+    ]
+    assert [(item.name, item.value) for item in method.declaredType.items] == [("ode45", "3"), ("rodas", "5")]
+    assert method.start == "3"
+
+
+def test_a_reduced_build_is_reproducible_and_differs_from_the_full_one(lean, tmp_path, fmus):
+    here = lean(next(case for case in EACH if label(case) == "smd-exact"))
+    assert command("smd", "--method", "exact", "--platform", "linux64", "--out", tmp_path).returncode == 0
+    assert (tmp_path / "smd.fmu").read_bytes() == here.read_bytes()
+    guids = {read_model_description(path).guid for path in (here, fmus / "smd.fmu")}
+    assert len(guids) == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("pacejka", "--method", "exact"), ("pacejka", "exact", "ode23, ode45, dop853, rodas")),
+        (("smd", "--law", "sign"), ("smd", "sign", "none")),
+        (("stickslip", "--law", "sign"), ("stickslip", "sign", "hybrid, threshold")),
+        (("coulomb", "--law", "sign", "--method", "exact"), ("coulomb", "exact", "hybrid")),
+        (("smd", "--platform", "amiga"), ("amiga", "linux64")),
+    ],
+)
+def test_an_option_that_a_model_lacks_is_refused_in_one_sentence(arguments, words, tmp_path):
+    run = command(*arguments, "--out", tmp_path)
+    assert run.returncode == 1
+    assert run.stderr.count("\n") == 1
+    assert all(word in run.stderr for word in words), run.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_every_model_is_among_the_cases():
+    assert {case[0] for case in EACH} == set(MODELS)

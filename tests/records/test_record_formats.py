@@ -1,0 +1,433 @@
+"""Records as instruments, spreadsheets and phones write them: each is read for what it is, or told what it lacks."""
+
+import contextlib
+import gzip
+import io
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+from decays import decay_record
+
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
+from harness.errors import HarnessError, SceneError
+from harness.records.columns import ColumnOptions, read_record, split_heading
+from harness.records.units import find_unit, time_unit_size
+
+T = np.arange(600) / 100
+TRUTH = {"omega": 12.566, "zeta": 0.01, "r": 0.002}
+
+
+def motion(order=0, sine=False, rest=0.0, t=T):
+    return decay_record(0.01, 0.002, sine=sine, turn=0.0, t=t, order=order, rest=rest).x
+
+
+X = motion()
+
+
+def rows(*columns, mark=",", comma=False, form="{:.9g}"):
+    """Lines of numbers, with decimal commas if asked."""
+    lines = [
+        mark.join(cell if isinstance(cell, str) else form.format(cell) for cell in row)
+        for row in zip(*columns, strict=True)
+    ]
+    return "\n".join(line.replace(".", ",") for line in lines) if comma else "\n".join(lines)
+
+
+def phone():
+    """phyphox: three accelerations and their length, quoted headings, six digits after the point."""
+    a = motion(2)
+    noise = 0.02 * np.random.default_rng(1).standard_normal((2, len(T)))
+    head = ",".join(
+        f'"{h}"'
+        for h in (
+            "Time (s)",
+            *(f"Linear Acceleration {axis} (m/s^2)" for axis in "xyz"),
+            "Absolute acceleration (m/s^2)",
+        )
+    )
+    return head + "\n" + rows(T, *noise, a, np.hypot(a, noise[0]), form="{:.9E}")
+
+
+def stamped():
+    start = np.datetime64("2026-11-21T23:59:58.000")
+    stamps = [str(start + np.timedelta64(round(1000 * t), "ms")) + "Z" for t in T]
+    return "timestamp,angle (deg)\n" + rows(stamps, np.degrees(motion(sine=True)))
+
+
+def holes():
+    cells = [f"{1e3 * x:.9g}" for x in X]
+    cells[50], cells[51], cells[200] = "", "NaN", "n/a"
+    return "t [s],x [mm]\n" + rows(T, cells)
+
+
+def gap():
+    keep = (T < 2.0) | (T > 2.7)
+    return "t [s],x [mm]\n" + rows(T[keep], 1e3 * X[keep])
+
+
+def instrument():
+    return (
+        f"Vendor Recorder 3\nSerial;0815\nDate;21.11.2026\n\nTime;Laser\ns;mm\n{rows(T, 1e3 * X, mark=';', comma=True)}"
+    )
+
+
+def logger():
+    """Times rounded to 10 ms where a sample is taken each 12.5 ms; some come twice."""
+    t = 0.0125 * np.arange(480)
+    return "t [s],x [mm]\n" + rows(np.round(t, 2), 1e3 * motion(t=t))
+
+
+def quoted():
+    return "\n".join(f'"{t:.9g}","{1e3 * x:.9g}"'.replace(".", ",") for t, x in zip(T, X, strict=True))
+
+
+def counts():
+    return np.round(np.degrees(motion(sine=True)) / 0.001)
+
+
+def text_of(text, encoding="utf-8"):
+    return text.encode(encoding)
+
+
+FILES = {
+    "commas.csv": lambda: text_of("t [s],x [mm]\n" + rows(T, 1e3 * X)),
+    "semicolons.csv": lambda: text_of("Zeit (s);Weg (mm)\n" + rows(T, 1e3 * X, mark=";", comma=True)),
+    "tabs.tsv": lambda: text_of("time\tx [m]\n" + rows(T, X, mark="\t")),
+    "tabs-commas.txt": lambda: text_of("Time (ms)\tlaser (cm)\n" + rows(1e3 * T, 100 * X, mark="\t", comma=True)),
+    "blanks.dat": lambda: text_of("t x[m]\n" + rows(T, X, mark="   ")),
+    "quoted-decimal-commas.csv": lambda: text_of('"t [s]","x [mm]"\n' + quoted()),
+    "windows-lines.csv": lambda: text_of(("t [s],x [mm]\n" + rows(T, 1e3 * X)).replace("\n", "\r\n")),
+    "utf8-mark.csv": lambda: text_of("t [s],x [µm]\n" + rows(T, 1e6 * X), "utf-8-sig"),
+    "utf16.txt": lambda: text_of("t [s]\tx [mm]\n" + rows(T, 1e3 * X, mark="\t"), "utf-16"),
+    "cp1252.csv": lambda: text_of("Zeit [s];Auslenkung [µm]\n" + rows(T, 1e6 * X, mark=";", comma=True), "cp1252"),
+    "units-row.csv": lambda: text_of("t,x\ns,mm\n" + rows(T, 1e3 * X)),
+    "instrument.csv": lambda: text_of(instrument()),
+    "comments.txt": lambda: text_of("# rig 3\n# second run\nt [s],x [mm]\n" + rows(T, 1e3 * X) + "\n# end\n"),
+    "heading-in-comment.txt": lambda: text_of("# t[s] x[mm]\n" + rows(T, 1e3 * X, mark=" ")),
+    "no-heading.csv": lambda: text_of(rows(T, 1e3 * X)),
+    "index.csv": lambda: text_of(",time,x [mm]\n" + rows([str(i) for i in range(len(T))], T, 1e3 * X)),
+    "time-second.csv": lambda: text_of("x [mm],t [s]\n" + rows(1e3 * X, T)),
+    "stamps.csv": lambda: text_of(stamped()),
+    "logger.csv": lambda: text_of(logger()),
+    "holes.csv": lambda: text_of(holes()),
+    "gap.csv": lambda: text_of(gap()),
+    "late-sensor.csv": lambda: text_of("t [s],x [mm]\nnan,nan\n,\n" + rows(T, 1e3 * X)),
+    "cut-off.csv": lambda: text_of("t [s],x [mm]\n" + rows(T, 1e3 * X) + "\n6.0"),
+    "phone.csv": lambda: text_of(phone()),
+    "gyroscope.csv": lambda: text_of('"Time (s)","Gyroscope x (rad/s)"\n' + rows(T, motion(1, sine=True))),
+    "accelerometer-in-g.csv": lambda: text_of("t [s],az [g]\n" + rows(T, 1 + motion(2) / 9.80665)),
+    "encoder.csv": lambda: text_of("t [ms],count [counts]\n" + rows(1e3 * T, counts())),
+    "status.csv": lambda: text_of("t [s],status,x [mm]\n" + rows(T, ["ok"] * len(T), 1e3 * X)),
+    "numpy.npz": lambda: npz(t=T, x=X),
+    "matlab5.mat": lambda: mat5({"t": T[:, None], "x": X[:, None]}),
+    "matlab-structure.mat": lambda: mat5({"run": {"t": T, "x": X, "note": "second"}}),
+    "matlab73.mat": lambda: mat73(t=T[None], x=X[None]),
+    "spreadsheet.xlsx": lambda: xlsx([["Laser"], [], ["t [s]", "x [mm]"], *np.stack([T, 1e3 * X], 1).tolist()]),
+}  # fmt: skip
+ASKED = {
+    "no-heading.csv": {"names": "t [s],x [mm]"},
+    "encoder.csv": {"per_count": "0.001deg"},
+    **{name: {"unit": "m"} for name in ("numpy.npz", "matlab5.mat", "matlab-structure.mat", "matlab73.mat")},
+}
+PENDULUMS = ("stamps.csv", "gyroscope.csv", "encoder.csv")
+QUANTITIES = {"phone.csv": "acceleration", "accelerometer-in-g.csv": "acceleration", "gyroscope.csv": "velocity"}
+SAID = {
+    "logger.csv": "rounded to 0.01 s; they are spread evenly, one each 0.0125004 s, which is sure to about 8e-05",
+    "holes.csv": "3 of 600 rows have a missing cell",
+    "cut-off.csv": "1 of 601 rows have a missing cell",
+    "phone.csv": "Linear Acceleration z (m/s^2)",
+}
+
+
+def npz(**arrays):
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+def mat5(arrays):
+    from scipy.io import savemat
+
+    file = io.BytesIO()
+    savemat(file, arrays)
+    return file.getvalue()
+
+
+def mat73(**arrays):
+    """As MATLAB writes it: HDF5 after a block of 512 bytes of its own."""
+    h5py = pytest.importorskip("h5py", reason="extra records")
+    file = io.BytesIO()
+    with h5py.File(file, "w", userblock_size=512) as data:
+        for name, values in arrays.items():
+            data[name] = values
+    return b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512) + file.getvalue()[512:]
+
+
+def xlsx(*sheets):
+    openpyxl = pytest.importorskip("openpyxl", reason="only tests write spreadsheets")
+    pytest.importorskip("python_calamine", reason="extra records")
+    book = openpyxl.Workbook()
+    for rows in sheets:
+        for row in rows:
+            book.worksheets[-1].append(row)
+        book.create_sheet()
+    file = io.BytesIO()
+    book.save(file)
+    return file.getvalue()
+
+
+FOUND = {}
+
+
+def found_in(record, pendulum):
+    """What a record says; of those that are the same to eight digits only the first is fitted."""
+    numbers = [np.round(each, 8).tobytes() for each in (record.t, record.x)]
+    key = (*numbers, record.unit, record.base, record.order, record.notes, pendulum)
+    if key not in FOUND:
+        FOUND[key] = fit_decay(record, KnownParameters(pendulum=pendulum), drag=False)  # whose laws take most of a fit
+    return FOUND[key]
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_common_file_format_gives_the_expected_parameters(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(FILES[name]())
+    record = read_record(str(path), ColumnOptions(**ASKED.get(name, {})), path.stem)
+    assert record.quantity == QUANTITIES.get(name, "position")
+    found = found_in(record, name in PENDULUMS)
+    values = {each.name: each for each in found.estimates}
+    for symbol, truth in TRUTH.items():
+        assert values[symbol].value == pytest.approx(truth, rel=2e-3)
+    assert SAID.get(name, "") in " ".join(found.remarks)
+
+
+MM = 1e3 * X + 500  # off rest, so that no number begins with 0
+CLOCKS = [np.datetime64("2026-11-21T23:59:58.500") + np.timedelta64(round(1000 * t), "ms") for t in T]
+
+DAY = CLOCKS[0].item().date()
+
+
+def each(line, mark="\n"):
+    """The lines of a file, from a time in s, a position in mm, and a stamp."""
+    return mark.join(line(t, x, stamp.item()) for t, x, stamp in zip(T, MM, CLOCKS, strict=True))
+
+
+def scope(i, t, x):
+    """What a Tektronix TDS writes: the settings stand beside the first rows."""
+    beside = ["Record Length,6.0e+02", "Sample Interval,1.0e-02", "", "Source,CH1"]
+    return f"{beside[i] if i < 4 and beside[i] else ','},,{t:016.12f},{x:10.5f},"
+
+
+WRITTEN = {  # and what is asked of it; in each stands the same motion
+    "names with units": (lambda: "time_ms,x_mm\n" + each(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f}"), {}),
+    "a clock named after its unit": (lambda: "millis x(mm)\n" + each(lambda t, x, s: f"{1e3 * t:.0f} {x:.6f}"), {}),
+    "units of Pasco": (
+        lambda: (
+            "Time (ms) Run #1,Position (mm) Run #1,Time (s) Run #2,Position (mm) Run #2\n"
+            + each(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f},{2 * t},{3 * x}")
+        ),
+        {},
+    ),
+    "blanks before units": (lambda: "Time (s)   x [mm]\n" + each(lambda t, x, s: f"{t:9.3f} {x:11.6f}"), {}),
+    "samples": (lambda: "Sample,x [mm]\n" + each(lambda t, x, s: f"{100 * t:.0f},{x:.6f}"), {"time_unit": "0.01s"}),
+    "day, month and year": (
+        lambda: "Zeit;Weg [mm]\n" + each(lambda t, x, s: f"{s:%d.%m.%Y %H:%M:%S,%f};{x:.6f}".replace(".6", ",6")),
+        {},
+    ),
+    "half days": (lambda: "Time,x [mm]\n" + each(lambda t, x, s: f"{s:%m/%d/%Y %I:%M:%S.%f %p},{x:.6f}"), {}),
+    "three colons": (lambda: "Time\tx [mm]\n" + each(lambda t, x, s: f"{s:%H:%M:%S:%f}\t{x:.6f}"), {}),
+    "date and time": (lambda: "Date,Time,x [mm]\n" + each(lambda t, x, s: f"{s:%Y-%m-%d,%H:%M:%S.%f},{x:.6f}"), {}),
+    "empty cells": (lambda: "t [s];x [mm];;;;\n" + each(lambda t, x, s: f"{t};{x:.6f};;;;"), {}),
+    "settings beside": (
+        lambda: "\n".join(scope(i, t, x) for i, (t, x) in enumerate(zip(T, MM, strict=True))),
+        {"names": "t [s],x [mm]"},
+    ),
+    "settings above": (
+        lambda: (
+            "Writer_Version\t2\nReader_Version\t2\n\nSamples\t600\t\nX0\t0,0E+0\t\nX_Value\tx [mm]\tComment\n"
+            + each(lambda t, x, s: f"{t}\t{x:.6f}".replace(".", ","))
+        ),
+        {},
+    ),
+    "the numbers of Fortran": (
+        lambda: "# t [s] x [mm]\n" + each(lambda t, x, s: f"  {t:.9E}  {x:.9E}".replace("E", "D")),
+        {},
+    ),
+    "a typesetter's minus": (
+        lambda: "t [s];x [mm]\n" + each(lambda t, x, s: f"{t};{x - 1000:.6f}".replace("-", "\u2212")),
+        {},
+    ),
+    "thousands": (lambda: "t [s],x [um]\n" + each(lambda t, x, s: f'{t},"{1e3 * x:,.3f}"'), {}),
+    "whole thousands": (lambda: "t [s],x [nm]\n" + each(lambda t, x, s: f'{t},"{1e6 * x:,.0f}"'), {}),
+    "thousands in Germany": (
+        lambda: "t [s];x [um]\n" + each(lambda t, x, s: f"{t};{1e3 * x:_.3f}".replace(".", ",").replace("_", ".")),
+        {},
+    ),
+    "three decimals and a gap": (
+        lambda: "t [s];x [mm]\n9;NaN\n" + each(lambda t, x, s: f"{t + 10};{x:.3f}".replace(".", ",")),
+        {},
+    ),
+    "packed": (lambda: gzip.compress(("t [s],x [mm]\n" + each(lambda t, x, s: f"{t},{x:.6f}")).encode()), {}),
+    "times of a spreadsheet": (
+        lambda: xlsx([["t", "x [mm]"], *([s.item().time(), x] for s, x in zip(CLOCKS, MM, strict=True))]),
+        {},
+    ),
+    "the longest sheet": (
+        lambda: xlsx(
+            [["k", "m"], [1, 2], [3, 4]],
+            [["date", "t [s]", "x [mm]"], *([DAY, t, x] for t, x in zip(T, MM, strict=True))],
+        ),
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_numbers_and_times_are_read_in_any_notation(tmp_path, name):
+    path, (content, asked) = tmp_path / "record", WRITTEN[name]
+    written = content()
+    path.write_bytes(written.encode() if isinstance(written, str) else written)
+    record = read_record(str(path), ColumnOptions(**asked), "record")
+    assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
+    assert record.x - record.x[0] == pytest.approx(X - X[0], abs=1e-6)
+
+
+ROWS = "\n".join(f"{i},{i}" for i in range(20))
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "sentence"),
+    [
+        (f"t,x\n{ROWS}", ColumnOptions(), "x has no unit"),
+        (f"t,a\n{ROWS}", ColumnOptions(), "as in --unit m/s2 or g"),
+        (f"millivolts,x [m]\n{ROWS}", ColumnOptions(), "millivolts has whole or huge numbers and no unit"),
+        (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", ColumnOptions(), "as in --time-unit ms, s, or 0.01s"),
+        (f"t [s],x [m]\n{ROWS}", ColumnOptions(position="y"), "unknown column 'y'"),
+        (f"t [h/m],x [m]\n{ROWS}", ColumnOptions(), "unknown unit of t 'h/m'"),
+        (f"t [s],x [m]\n{ROWS}\n20,abc", ColumnOptions(), "'abc' in row 22, column x [m], is not a number"),
+        (f"t [s],x [m]\n{ROWS}\n20,1,2", ColumnOptions(), "row 22 has 3 cells where the heading has 2"),
+        (f"t [s],x [m]\n{ROWS}\n5,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
+        (f"t [s],x [m]\n{ROWS}\n20,1e200", ColumnOptions(), "which nothing measures"),
+        (f"t [s],x [m]\n{ROWS}", ColumnOptions(begin=15), "has 5 samples"),
+        (
+            f"t [s],x [m]\n{ROWS.replace(',1', ',').replace(',3', ',')}\n20,\n21,\n22,\n23,",
+            ColumnOptions(),
+            "rows have no number",
+        ),
+        (ROWS, ColumnOptions(), "--columns 't [s],x [mm]'"),
+        (ROWS, ColumnOptions(names="t"), "--columns names 1 columns, and record.csv has 2"),
+        ("", ColumnOptions(), "is empty"),
+        ("Dear Sir,\nno table.\n", ColumnOptions(), "has no table"),
+        (f"t [s],count [counts]\n{ROWS}", ColumnOptions(), "--per-count"),
+        (f"t [s],count [counts]\n{ROWS}", ColumnOptions(per_count="half a turn"), "has a number and a unit"),
+        (f"t [s],acceleration [mm]\n{ROWS}", ColumnOptions(), "the name of an acceleration and the unit of a position"),
+        (f"t [s],a [m/s^2]\n{ROWS}", ColumnOptions(quantity="position"), "is that of an acceleration"),
+        ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, ColumnOptions(names="t,x [m]"), "is no time stamp"),
+        ('t [s],"x [m]\n' + ROWS, ColumnOptions(), "has no table"),
+    ],
+)
+def test_a_file_without_a_record_is_refused_in_one_sentence(tmp_path, text, columns, sentence):
+    path = tmp_path / "record.csv"
+    path.write_text(text)
+    with pytest.raises(SceneError) as refusal:
+        read_record(str(path), columns, "record")
+    assert sentence in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if not name.endswith((".csv", ".txt", ".tsv", ".dat"))])
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
+def test_a_damaged_file_is_refused_in_one_sentence(tmp_path, name, share):
+    path, data = tmp_path / name, FILES[name]()
+    path.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(HarnessError) as refusal:
+        read_record(str(path), ColumnOptions(unit="m"), path.stem)
+    assert name in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_no_file_content_ends_in_a_traceback(tmp_path):
+    """Files as above with bytes changed, cut out and put in: an answer or a sentence, whatever comes."""
+    rng = np.random.default_rng(5)
+    texts = [FILES[name]() for name in ("commas.csv", "instrument.csv", "stamps.csv", "utf16.txt", "phone.csv")]
+    path = tmp_path / "record.csv"
+    for data in texts * 12:
+        bytes_ = bytearray(data[: rng.integers(200, 4000)])
+        at = rng.integers(0, len(bytes_), 8)
+        bytes_[at[0] : at[0]] = bytes(rng.integers(0, 256, rng.integers(1, 200), dtype=np.uint8))
+        for place in at[1:]:
+            bytes_[place] = rng.integers(256)
+        path.write_bytes(bytes_)
+        with contextlib.suppress(HarnessError):
+            read_record(str(path), ColumnOptions(), "record")
+
+
+def test_an_archive_error_lists_its_contents(tmp_path):
+    """As phyphox exports."""
+    with ZipFile(tmp_path / "swing.zip", "w") as archive:
+        archive.writestr("Raw Data.csv", FILES["phone.csv"]())
+        archive.writestr("meta/device.csv", "property,value")
+    with pytest.raises(SceneError, match=r"swing.zip is an archive: unpack it .* 'Raw Data.csv'"):
+        read_record(str(tmp_path / "swing.zip"), ColumnOptions(), "swing")
+
+
+def test_a_missing_file_error_names_the_nearest(tmp_path):
+    (tmp_path / "swing.csv").write_text("t [s],x [m]\n" + ROWS)
+    with pytest.raises(SceneError, match=r"cannot read .*No such file or directory \(nearest: 'swing.csv'\)"):
+        read_record(str(tmp_path / "swng.csv"), ColumnOptions(), "swng")
+
+
+def test_a_heading_is_matched_literally(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("clock [s],x [mm],Laser 2 [mm]\n" + rows(T, 0 * X, 1e3 * X))
+    record = read_record(str(path), ColumnOptions(time="clock [s]", position="Laser 2 [mm]"), "record")
+    assert record.x == pytest.approx(X, abs=1e-9)
+    assert read_record(str(path), ColumnOptions(position="laser 2"), "record").x == pytest.approx(X, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("written", "order", "base", "size"),
+    [
+        ("m/s^2", 2, "m", 1.0),
+        ("m/s²", 2, "m", 1.0),
+        ("m·s⁻²", 2, "m", 1.0),
+        ("m/s/s", 2, "m", 1.0),
+        ("g", 2, "m", 9.80665),
+        ("deg/s", 1, "rad", np.pi / 180),
+        ("°/s", 1, "rad", np.pi / 180),
+        ("rpm", 1, "rad", np.pi / 30),
+        ("µm", 0, "m", 1e-6),
+        ("Degrees", 0, "rad", np.pi / 180),
+        ("inches", 0, "m", 0.0254),
+    ],
+)
+def test_a_unit_identifies_the_quantity(written, order, base, size):
+    assert find_unit(written) == (order, base, pytest.approx(size, rel=1e-15))
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        *[(f"time{mark}ms", "time", "ms") for mark in ("_", " ", " / ", " in ", ", ", ":")],
+        ("timeMs", "time", "Ms"),
+        ("gyro_z_deg_s", "gyro z", "deg/s"),
+        ("x (mm) Run #2", "x Run #2", "mm"),
+        ("Yaw [º]", "Yaw", "º"),
+        ("millis", "millis", "millis"),
+        ("mm", "mm", "mm"),
+        *[(name, name, None) for name in ("x", "x_min", "x_in", "v_x", "min", "in", "s", "T", "ch1_v", "x_rel")],
+    ],
+)
+def test_a_heading_is_a_name_and_a_unit(heading, name, unit):
+    assert split_heading(heading) == (name, unit)
+    assert unit is None or find_unit(unit) or time_unit_size(unit)
+
+
+def test_an_unknown_unit_is_kept_and_reported(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("t [s],sensor [V]\n" + rows(T, X))
+    record = read_record(str(path), ColumnOptions(), "record")
+    assert (record.unit, record.order) == ("V", 0)
+    assert "taken for a position" in record.notes[0]

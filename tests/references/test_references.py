@@ -1,0 +1,161 @@
+"""The references: certified by closed forms and solutions that were typed a second time, and reached by the FMUs."""
+
+from itertools import pairwise
+
+import independent_pendulum
+import independent_solution
+import numpy as np
+import pytest
+from independent_solution import ClosedFormMotion, LinearSegment
+from mpmath import mpf
+
+from harness.references.certified_reference import POINTS, compute_errors, event_time_error, load_reference
+from harness.references.generation import CLOSED_FORMS, evaluate_closed_form
+from harness.references.literature_problems import BeltBlock, ChatteringOscillatorSign, SmoothedBeltBlock
+from harness.references.models import CASES
+from harness.running.solution import Solution
+
+ULP = 2.0**-52
+TRUTHS = {case.reference_source: case for case in CASES}
+DOP853, RODAS = 4, 5
+
+
+@pytest.mark.parametrize("name", ["smd", "coulomb", "stickslip"])
+def test_an_exact_reference_is_the_double_nearest_to_the_closed_form(name):
+    truth, problem = load_reference(name), TRUTHS[name].problem
+    motion = ClosedFormMotion([(0.0, getattr(independent_solution, name)())], *problem.start, problem.stop)
+    for t, (x, v) in zip(truth.times, truth.motion, strict=True):
+        for value, exact in zip((x, v), motion.at(float(t)), strict=True):
+            assert abs(value - exact) <= 0.5 * ULP * abs(exact)
+    assert [mode for _, mode in truth.events] == [mode for _, mode in motion.events]
+    assert all(
+        abs(t - exact) <= 0.5 * ULP * exact for (t, _), (exact, _) in zip(truth.events, motion.events, strict=True)
+    )
+
+
+class Glide:
+    """Constant speed."""
+
+    def __init__(self, v):
+        self.v = v
+
+    def at(self, s):
+        return self.v * s, self.v
+
+
+def held_below(eps, stop):
+    """The sled of the threshold law in pieces (time, mode, position, piece), which meet at times found by bisection."""
+    sled = independent_solution.stickslip()
+    t, x, v, pieces = mpf(0), mpf(0), mpf(0), []
+
+    def pull(t, x):
+        return mpf(sled.k) * (mpf(sled.speed) * t - x)
+
+    def go(mode, piece, ended, step):
+        nonlocal t, x, v
+        pieces.append((t, mode, x, piece))
+        low, high, step = mpf(0), mpf(step), mpf(step)
+        while not ended(t + high, x + piece.at(high)[0], piece.at(high)[1]):
+            low, high = high, high + step
+        while high - low > mpf(10) ** -35:
+            middle = (low + high) / 2
+            over = ended(t + middle, x + piece.at(middle)[0], piece.at(middle)[1])
+            low, high = (low, middle) if over else (middle, high)
+        y, v = piece.at(high)
+        t, x = t + high, x + y
+
+    while True:
+        go(0, Glide(v), lambda t, x, v: pull(t, x) >= sled.hold, "0.1")
+        if t > stop:
+            return pieces
+        if not pieces[1:]:  # later it is as fast as eps already
+            go(0, LinearSegment(sled, pull(t, x) - sled.hold, v), lambda t, x, v: v >= eps, "1e-5")
+        go(1, LinearSegment(sled, pull(t, x) - sled.slide, v), lambda t, x, v: v <= eps, "1e-3")
+
+
+def test_the_threshold_reference_is_the_double_nearest_to_its_segments():
+    truth = load_reference("stickslip-threshold")
+    pieces = held_below(mpf(1e-7), 16)
+    starts = [(t, mode) for t, mode, *_ in pieces]
+    events = [after for before, after in pairwise(starts) if before[1] != after[1]]
+    assert [mode for _, mode in truth.events] == [mode for _, mode in events]
+    assert all(abs(t - exact) <= ULP * exact for (t, _), (exact, _) in zip(truth.events, events, strict=True))
+    for t, (x, v) in zip(truth.times[::5], truth.motion[::5], strict=True):
+        start, _, place, piece = [each for each in pieces if each[0] <= t][-1]
+        y, speed = piece.at(mpf(float(t)) - start)
+        assert abs(x - place - y) <= ULP * 0.5
+        assert abs(v - speed) <= ULP * 0.5
+
+
+@pytest.mark.parametrize("reaction", [False, True])
+def test_the_pendulum_references_agree_with_a_third_method(reaction):
+    truth = load_reference("pendulum-reaction" if reaction else "pendulum")
+    swing = independent_pendulum.PendulumMotion(
+        [(0.0, independent_pendulum.Pendulum(reaction))], independent_pendulum.THETA0, 0.0, 5.0
+    )
+    other = np.array([swing.at(float(t)) for t in truth.times])
+    assert compute_errors(Solution(other, swing.events, 0), truth).largest < 1e-11
+    assert event_time_error(swing.events, truth.events) < 1e-11
+
+
+@pytest.mark.parametrize(
+    "case", [case for case in CASES if case.model in ("pacejka", "pendulum")], ids=lambda case: case.name
+)
+def test_the_built_fmu_agrees_with_the_reference(launch, case):
+    truth = load_reference(case.reference_source)
+    smooth = case.model == "pacejka"
+    values = {"solver.method": RODAS if smooth else DOP853, "solver.rtol": 1e-10 if smooth else 1e-12, **case.values}
+    fmu = launch(case.model, values, stop=case.problem.stop)
+    motion = np.array(fmu.run(truth.times.tolist(), ["x", "v"] if smooth else ["theta", "omega"]))
+    assert compute_errors(Solution(motion, None, 0), truth).largest < (1e-8 if smooth else 1e-11)
+
+
+@pytest.mark.parametrize("name", TRUTHS)
+def test_every_reference_covers_its_run_and_states_its_uncertainty(name):
+    truth, problem = load_reference(name), TRUTHS[name].problem
+    assert truth.times.tolist() == np.linspace(0.0, problem.stop, POINTS).tolist()
+    assert truth.motion.shape == (POINTS, 2)
+    assert tuple(truth.motion[0]) == problem.start
+    assert bool(truth.modes) == problem.has_dry_friction
+    assert truth.method
+    assert 0.0 < truth.estimated_error < 2e-11
+
+
+@pytest.mark.parametrize("name", CLOSED_FORMS)
+def test_the_script_reproduces_the_stored_values(name):
+    truth = load_reference(name)
+    answer = evaluate_closed_form(name, truth.times)
+    assert answer.states.tolist() == truth.motion.tolist()
+    assert answer.events == truth.events
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [*(case.problem for case in CASES), BeltBlock(), ChatteringOscillatorSign(), SmoothedBeltBlock()],
+    ids=lambda p: type(p).__name__,
+)
+def test_a_jacobian_is_the_slope_of_the_rates(problem):
+    for mode in (-1, 1):
+        if problem.jacobian(mode):
+            y, h = np.array([0.03, mode * 0.02]), 1e-7
+            columns = [
+                np.subtract(problem.rates(mode)(1.0, y + d), problem.rates(mode)(1.0, y - d)) for d in h * np.eye(2)
+            ]
+            slopes = np.transpose(columns) / (2 * h)
+            assert np.allclose(problem.jacobian(mode)(1.0, y), slopes, rtol=1e-5, atol=1e-5)
+
+
+def test_errors_are_relative_to_the_largest_value_of_each_column():
+    truth = load_reference("smd")
+    off = truth.motion + np.array([1e-3 * np.abs(truth.motion[:, 0]).max(), 0.0])
+    found = compute_errors(Solution(off, None, 0), truth)
+    assert [found.final, found.rms, found.largest] == pytest.approx([1e-3] * 3, rel=1e-10)
+    assert found.events is None
+
+
+def test_event_times_are_compared_only_where_the_modes_agree():
+    truth = [(1.0, 1), (2.0, 0)]
+    assert event_time_error([(1.0, 1), (2.25, 0)], truth) == 0.25
+    assert np.isnan(event_time_error([(1.0, 1)], truth))
+    assert np.isnan(event_time_error([(1.0, -1), (2.0, 0)], truth))
+    assert event_time_error([], []) == 0.0

@@ -1,0 +1,401 @@
+"""FMUs that are not ours: each is run, or refused in one sentence; nothing hangs, nothing is lost."""
+
+import csv
+import json
+import os
+from math import cos, exp, sin, sqrt
+from types import SimpleNamespace
+from zipfile import ZipFile
+
+import commands
+import external_fmus
+import numpy as np
+import pytest
+from fmpy.model_description import Dimension, ModelVariable
+
+from harness.errors import HarnessError, SceneError
+from harness.running.description import read_description
+from harness.running.external.refinement_run import RefinementRun
+from harness.running.external.request import ExternalRunRequest
+from harness.running.external.sample_rows import RowRecorder, SampleRows
+from harness.running.external.simulation import array_shape, read_longest_rows
+from harness.running.external.step_refinement import refine
+from harness.running.variable_values import convert_value
+from harness.scenes.assignments import NumberWithText
+
+
+@pytest.fixture(scope="module")
+def external_fmu_folder():
+    """The folder of FMUs that are not ours."""
+    return external_fmus.build_external_fmus()
+
+
+@pytest.fixture
+def run(external_fmu_folder, tmp_path):
+    """run(name, ...): the finished `run --fmu`, and the rows of its result by the names of the columns; each FMU is
+    plotted once in this file."""
+
+    def run(name, *arguments, blank=commands.UNPLOTTED):
+        fmu = name if name.endswith(".fmu") else external_fmu_folder / f"{name}.fmu"
+        done = commands.harness(tmp_path, "run", "--fmu", fmu, *arguments, COLUMNS="120", blank=blank)
+        assert "Traceback" not in done.stderr
+        assert "np." not in done.stdout + done.stderr
+        return done, table(tmp_path / "results" / name.removesuffix(".fmu") / "trajectory.csv")
+
+    return run
+
+
+def table(file):
+    """The columns of a result by their headings, if there is one: numbers, or texts."""
+    if not file.is_file():
+        return None
+    with file.open(encoding="utf-8", newline="") as lines:
+        heads, *rows = csv.reader(lines)
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    return {
+        head: column if head == "says" else column.astype(float) for head, column in zip(heads, columns, strict=True)
+    }
+
+
+def fine(done):
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def refused(done, status, *sentences):
+    assert done.returncode == status
+    assert done.stderr.startswith("Error: ")
+    assert done.stderr.count("Error: ") == 1
+    for sentence in sentences:
+        assert sentence in done.stderr
+
+
+@pytest.mark.parametrize("name", ["Midpoint", "Fmi3Midpoint", "ModelExchangeOnly"])
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, tolerance):
+    done, rows = run(name, "--set", "k=50", "--tolerance", tolerance, blank=tolerance > 1e-4 or commands.UNPLOTTED)
+    fine(done)
+    assert "changes no output by more than" in done.stdout
+    time, position, *_ = rows.values()
+    assert time[-1] == 1.0
+    assert np.abs(position - np.cos(sqrt(50) * time)).max() < 2 * tolerance
+
+
+def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
+    """FMI 2.0: after bounce n the ball rises with e^n of the speed of its first fall."""
+    e, g = 0.8, 9.81
+    done, rows = run("Bouncing", "--set", f"e={e}", blank=True)
+    fine(done)
+    fall = sqrt(2 / g)
+    bounces = fall + 2 * fall * np.cumsum([0, *(e**n for n in (1, 2))])
+    since = rows["t [s]"][-1] - bounces[-1]
+    assert rows["bounces"][-1] == len(bounces)
+    assert rows["h [m]"][-1] == pytest.approx(g * fall * e**3 * since - g / 2 * since**2, abs=1e-5)
+    jumps = np.flatnonzero(np.diff(rows["bounces"]))
+    assert rows["t [s]"][jumps] == pytest.approx(bounces, abs=1e-6)
+    assert rows["v [m/s]"][jumps + 1] == pytest.approx(-e * rows["v [m/s]"][jumps], abs=1e-9)
+
+
+def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such(run):
+    done, rows = run("FixedStep", blank=True)
+    fine(done)
+    assert "its own step is fixed, at 0.1 s, its error unknown" in done.stdout
+    assert rows["x"][-1] == pytest.approx(0.9**100)  # 41 % off
+    assert abs(0.9**100 / exp(-10) - 1) > 0.4
+
+
+def test_booleans_integers_and_strings_are_recorded_drawn_and_set(run, tmp_path):
+    done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007", blank=False)
+    fine(done)
+    assert (tmp_path / "results/Switching/figure.svg").is_file()
+    assert {*rows["on"]} == {0, 1}
+    assert rows["switched"][-1] == 3
+    assert {*rows["says"]} == {"cold", "007 cold", "007 warm"}
+    assert "says: from cold to 007 " in done.stdout
+    done, rows = run("Switching", "--set", "enabled=FALSE", "--set", "most=3.0")
+    fine(done)
+    assert not rows["on"][-1]
+
+
+def test_arrays_and_enumerations_are_recorded_elementwise_and_set(run):
+    done, rows = run("Arrays", "--set", "begin=0,2", "--set", "sense=right", "--set", "omega=1.5")
+    fine(done)
+    turn = [f"turn[{i},{j}]" for i in (1, 2) for j in (1, 2)]
+    assert [*rows] == ["t [s]", *turn, "place[1]", "place[2]", "going", "says"]
+    assert rows["place[1]"][-1] == pytest.approx(2 * sin(1.5))
+    assert rows["turn[2,1]"][-1] == pytest.approx(-sin(1.5))
+    assert rows["turn[2,2]"][-1] == pytest.approx(cos(1.5))
+    assert {*rows["going"]} == {2}
+
+
+SCENE = """
+title = "Of somebody's"
+fmu = "{fmu}"
+outputs = {outputs}
+tolerance = 1e-4
+{more}
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "outputs", "more", "columns"),
+    [
+        (
+            "Fmi3Midpoint",
+            ["x", "v", "right"],
+            "stop = 3",
+            ["x [m]", "v [m/s]", "right"],
+        ),
+        ("Arrays", ["place[2]", "says", "turn"], "grid = 0.01\n[values]\nsense = 'right'\nbegin = [0, 2]", None),
+        ("NonConforming", ["up"], "lenient = true\nplots = ['up']", ["up"]),
+        ("ModelExchangeOnly", ["v"], "exchange = true", ["v"]),
+    ],
+)
+def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, more, columns):
+    (tmp_path / "mine.toml").write_text(
+        SCENE.format(fmu=external_fmu_folder / f"{name}.fmu", outputs=outputs, more=more)
+    )
+    plain = name != "Arrays"  # whose texts and elements are drawn
+    done = commands.harness(tmp_path, "run", "mine.toml", blank=plain, COLUMNS="120")
+    fine(done)
+    rows = table(tmp_path / "results/mine/trajectory.csv")
+    turn = [f"turn[{i},{j}]" for i in (1, 2) for j in (1, 2)]
+    assert [*rows][1:] == (columns or ["place[2]", "says", *turn])
+    if name == "Arrays":
+        assert len(rows["t [s]"]) == 101
+        assert rows["place[2]"][-1] == pytest.approx(2 * cos(3))
+    assert (tmp_path / "results/mine/figure.svg").is_file()
+    assert "error unknown" in done.stdout or "changes no output by more than" in done.stdout
+    assert (
+        "the same, bit for bit"
+        in commands.harness(tmp_path, "run", "results/mine", blank=commands.UNPLOTTED, COLUMNS="120").stdout
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "end", "told"),
+    [
+        (
+            "Falling",
+            ["--set", "height=1.22625"],
+            0.5,
+            "fmi2Terminated is true at t = 0.5 s: the stone is on the ground",
+        ),
+        (
+            "Fmi3Midpoint",
+            ["--set", "limit=0.5", "--tolerance", "1e-3"],
+            0.5,
+            "fmi3DoStep answered terminateSimulation at t = 0.5",
+        ),
+    ],
+)
+def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run, name, arguments, end, told):
+    done, rows = run(name, *arguments, blank=True)
+    refused(done, 1, f"{name}.fmu: it ends itself: ", told, f"until then is in results/{name}")
+    assert rows["t [s]"][-1] == pytest.approx(end, abs=1e-3)
+    assert len(rows["t [s]"]) > 60
+
+
+@pytest.mark.parametrize(
+    ("kind", "told"),
+    [
+        (1, "a call of it has not come back within 1.5 s (--timeout waits longer), after t = 0.5 s"),
+        (2, "its binary has crashed (Segmentation fault), after t = 0.5 s"),
+        (3, "fmi2DoStep answered Fatal at t = 0.5 s: "),
+        (5, "x is nan at t = 0.515625 s"),
+        (6, "it ends itself: fmi2DoStep answered Discard, and fmi2Terminated is true at t = 0.5 s"),
+    ],
+)
+def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run, kind, told):
+    done, rows = run("Faulty", "--set", f"kind={kind}", "--timeout", "1.5", blank=True)
+    refused(done, 1, f"Faulty.fmu: {told}")
+    assert done.stderr.count("\n") == 1
+    assert rows["t [s]"][-1] == 0.5
+    assert (rows["x"] == rows["t [s]"]).all()
+
+
+def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
+    x = ModelVariable("x", type="Float64", valueReference=0)
+    for number, times in enumerate(([0.0, 0.5, 1.0], [0.0, 0.25, 0.5, 0.75], [])):
+        recorder = RowRecorder(
+            SimpleNamespace(getFloat64=lambda *_: [1.5]), "3.0", [(x, ())], tmp_path / f"rows-{number}", None
+        )
+        for t in times:
+            recorder.record(t)
+        recorder.file.close()
+    with (tmp_path / "rows-0").open("ab") as file:
+        file.write(b"cut off")
+    assert read_longest_rows(tmp_path, None, [(x, ())]).time.tolist() == [0.0, 0.5, 1.0]
+    assert read_longest_rows(tmp_path, 1, [(x, ())]).columns["x"].tolist() == [1.5] * 4
+
+
+def test_the_output_of_an_fmu_is_reported_and_harmless(run):
+    done, rows = run("Faulty", "--set", "kind=4", "--json")
+    fine(done)
+    assert "it prints: I am at 1.0" in json.loads(done.stdout)["note"]
+    assert rows["x"][-1] == 1.0
+
+
+def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
+    done, rows = run("NonConforming")
+    refused(
+        done,
+        1,
+        "NonConforming.fmu breaks the FMI standard in 2 places:",
+        '"count" (line 16)',
+        '"up" (line 19)',
+        "--lenient",
+    )
+    assert rows is None
+    done, rows = run("NonConforming", "--lenient")
+    fine(done)
+    assert rows["x"][-1] == pytest.approx(cos(sqrt(40)))
+    assert (rows["up"] == (rows["x"] > 0)).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "status", "sentence"),
+    [
+        ("Midpoint", ["--set", "mass=1"], 2, "unknown variable to set 'mass'; allowed: k"),
+        ("Midpoint", ["--set", "k=abc"], 2, "k = 'abc' is outside its range; allowed: any finite number"),
+        ("Midpoint", ["--set", "k=1e999"], 2, "k = inf is outside its range"),
+        ("Midpoint", ["--stop", "-1"], 2, "stop = -1.0 s is not after start"),
+        ("Midpoint", ["--exchange"], 1, "offers co-simulation; model exchange is not among them"),
+        ("Switching", ["--set", "enabled=5"], 2, "enabled = 5.0 is no truth; allowed: true, false"),
+        ("Switching", ["--set", "most=1.5"], 2, "most = 1.5 is outside its range; allowed: any whole number"),
+        ("Switching", ["--set", "most=3000000000"], 2, "any whole number, at least -2147483648 and at most 2147483647"),
+        ("Arrays", ["--set", "begin=1,2,3"], 2, "begin = '1,2,3' has 3 elements, not 2"),
+        ("Arrays", ["--set", "begin=1,x"], 2, "begin = 'x' is outside its range; allowed: any finite number"),
+        ("Arrays", ["--set", "sense=up"], 2, "unknown value of sense 'up'; allowed: left, right"),
+    ],
+)
+def test_an_unsupported_request_is_one_sentence(run, name, arguments, status, sentence):
+    done, _ = run(name, *arguments)
+    refused(done, status, sentence)
+
+
+def test_a_scene_that_requests_invisible_steps_is_refused(external_fmu_folder, tmp_path):
+    scene = SCENE.format(fmu=external_fmu_folder / "Midpoint.fmu", outputs=["x", "v"], more="analyses = ['steps']")
+    (tmp_path / "mine.toml").write_text(scene)
+    done = commands.harness(tmp_path, "run", "mine.toml", COLUMNS="120")
+    refused(done, 2, "Midpoint.fmu does not show the steps of its solver")
+
+
+def described(change):
+    return {"modelDescription.xml": change}
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "sentence"),
+    [
+        (
+            "Midpoint",
+            described(lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"')),
+            "is an FMU of FMI 1.0",
+        ),
+        ("Midpoint", described(lambda text: text.replace('"v"', '"x"')), 'The variable name "x" (line'),
+        ("Midpoint", described(lambda text: text.replace(' start="40"', "")), 'Variable "k" (line'),
+        ("Midpoint", described(lambda text: text.replace("<ModelVariables", "<Nonsense")), "cannot be read: "),
+        ("Midpoint", described(lambda text: text.replace('stopTime="1.0"', "")), "names no stop time; name one"),
+        *[
+            (
+                "Midpoint",
+                described(lambda text, times=times: text.replace('startTime="0.0" stopTime="1.0"', times)),
+                "are no times to step to",
+            )
+            for times in ('startTime="0.0" stopTime="INF"', 'startTime="1e17" stopTime="100000000000000016"')
+        ],
+        ("Midpoint", described(lambda text: text.replace('index="1"', 'index="77"')), "lacks what it names"),
+        ("Midpoint", described(lambda text: text.replace('fmiVersion="2.0"', "")), "lacks what it names, or a version"),
+        ("Midpoint", {"modelDescription.xml": None}, 'cannot be read: "There is no item'),
+        (
+            "Midpoint",
+            {"binaries/linux64/Midpoint.so": None},
+            "has no binary linux64/Midpoint for this machine",
+        ),
+        ("Midpoint", {"binaries/linux64/Midpoint.so": b"\x7fELF"}, "needs the tool that made it"),
+        (
+            "Fmi3Midpoint",
+            {"binaries/x86_64-linux/Fmi3Midpoint.so": None},
+            "has no binary x86_64-linux/Fmi3Midpoint for this machine",
+        ),
+    ],
+)
+def test_a_damaged_file_is_one_sentence(run, external_fmu_folder, tmp_path, name, changes, sentence):
+    external_fmus.edited_copy(external_fmu_folder / f"{name}.fmu", tmp_path / "damaged.fmu", changes)
+    done, _ = run("damaged.fmu")
+    assert done.returncode in (1, 2)
+    refused(done, done.returncode, "damaged.fmu", sentence)
+
+
+def test_a_changed_file_is_read_again(external_fmu_folder, tmp_path):
+    fmu = external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "mine.fmu", {})
+    assert "x" in [variable.name for variable in read_description(fmu).modelVariables]
+    external_fmus.edited_copy(
+        external_fmu_folder / "Midpoint.fmu", fmu, described(lambda text: text.replace('name="x"', 'name="y"'))
+    )
+    os.utime(fmu, ns=(0, 1))  # however coarse the clock of the files is
+    assert "y" in [variable.name for variable in read_description(fmu).modelVariables]
+
+
+def test_unicode_names_and_missing_units_are_supported(run, external_fmu_folder, tmp_path):
+    external_fmus.edited_copy(
+        external_fmu_folder / "Midpoint.fmu",
+        tmp_path / "\u03c9.fmu",
+        described(lambda text: text.replace('name="x"', 'name="\u03c6, \u3042"')),
+    )
+    done, _ = run("\u03c9.fmu", "--tolerance", "1e-3", blank=True)
+    fine(done)
+    assert "\u03c6, \u3042: from 1 to 0.99" in done.stdout
+
+
+def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, external_fmu_folder, tmp_path):
+    with ZipFile(
+        external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "huge.fmu", {}), "a"
+    ) as archive:
+        archive.writestr("resources/huge", b"")
+        archive.infolist()[-1].file_size = 2**60
+    done, _ = run("huge.fmu")
+    refused(done, 1, "huge.fmu", "more than the temporary folder has room for")
+
+
+@pytest.mark.parametrize("values", [(1.0, 2.0), (1e308, -1e308)])
+@pytest.mark.parametrize("exchange", [False, True])
+def test_results_that_never_agree_are_kept_with_their_difference(exchange, values):
+    """A made-up FMU whose output is another in every second pass."""
+    passes = []
+
+    def run(h, tolerance):
+        time = np.linspace(0.0, 1.0, 65)
+        passes.append(RefinementRun(len(passes), SampleRows(time, {"x": np.full(65, values[len(passes) % 2])})))
+        return passes[-1]
+
+    asked = ExternalRunRequest("", "", exchange, 0.0, 1.0, tolerance=1e-6, timeout=1.0)
+    answer = refine(
+        asked, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
+    )
+    assert answer.run_number == len(passes) - 1
+    assert "of its largest value, more than the tolerance of 1e-06; raise --tolerance" in answer.failure
+    assert len(passes) < 20
+
+
+def test_an_array_has_the_size_of_its_structural_parameters():
+    n = ModelVariable("n", type="UInt64", start="3")
+    y = ModelVariable("y", type="Float64", dimensions=[Dimension(None, 1, n), Dimension(2, None)])
+    assert array_shape(y, {}) == (3, 2)
+    assert array_shape(y, {"n": 5}) == (5, 2)
+    with pytest.raises(HarnessError, match="n = -1 is outside its range; allowed: any whole number"):
+        array_shape(y, {"n": -1})
+
+
+@pytest.mark.parametrize("kind", ["Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"])
+def test_integers_of_any_width_are_exact_and_refused_beyond_their_range(kind):
+    width = int(kind.lstrip("UInt"))
+    least, most = (0, 2**width - 1) if kind[0] == "U" else (-(2 ** (width - 1)), 2 ** (width - 1) - 1)
+    n, several = ModelVariable("n", type=kind), f"{least}, {most}"
+    assert [convert_value(n, NumberWithText(str(number))) for number in (least, most)] == [least, most]
+    assert convert_value(n, several, (2,)) == [least, most]
+    for beyond in (least - 1, most + 1):
+        with pytest.raises(
+            SceneError, match=f"n = {beyond} is .* any whole number, at least {least} and at most {most}$"
+        ):
+            convert_value(n, NumberWithText(str(beyond)))

@@ -1,0 +1,81 @@
+"""What an FMU of anyone answers that cannot be is refused in a sentence, and no number comes of it."""
+
+import re
+from types import SimpleNamespace
+
+import pytest
+from fmpy.model_description import ModelVariable
+
+from harness.errors import HarnessError
+from harness.running.external.cosimulation import cosimulate
+from harness.running.external.model_exchange import update_discrete_states
+from harness.running.external.refinement_run import RefinementRun, TerminatedError, TimeGrid
+from harness.running.external.request import ExternalRunRequest
+from harness.running.external.sample_rows import RowRecorder, SampleRows, StringTable, read_rows
+from harness.running.external.step_refinement import refine
+
+NAN, HUGE = float("nan"), 1e300
+
+
+def stepped(answer):
+    """The times that are sampled of an FMU whose fmi3DoStep answers so, and what was raised."""
+    times = []
+    with pytest.raises((TerminatedError, HarnessError)) as caught:
+        cosimulate(SimpleNamespace(doStep=answer), "3.0", TimeGrid(0.0, 1.0, 0.25), times.append, lambda share: None)
+    return times, str(caught.value)
+
+
+def test_an_unauthorised_early_return_is_refused():
+    times, said = stepped(lambda t, h: (False, False, t > 0.3, t + h / 2))
+    assert times == [0.0, 0.25, 0.5]
+    assert said == "fmi3DoStep returned early, which it was not allowed"
+
+
+@pytest.mark.parametrize(
+    ("told", "last"), [(0.6, 0.6), (0.75, 0.75), (0.5, 0.5), (0.1, 0.5), (-1.0, 0.5), (NAN, 0.5), (HUGE, 0.5)]
+)
+def test_a_termination_time_lies_within_the_step(told, last):
+    times, said = stepped(lambda t, h: (False, t == 0.5, t == 0.5, told))
+    assert (times[-1], times) == (last, sorted(times))
+    assert said == "it ends itself: fmi3DoStep answered terminateSimulation"
+
+
+@pytest.mark.parametrize("told", [NAN, 1.9, -HUGE])
+def test_an_event_in_the_past_or_at_infinity_is_refused(told):
+    with pytest.raises(HarnessError, match=re.escape(f"tells its next event for {told:.9g} s, at t = 2 s")):
+        update_discrete_states(lambda: (False, False, False, False, True, told), 2.0)
+
+
+def test_an_immediate_event_is_handled_at_once_and_not_forever():
+    answers = iter([(False, False, False, False, True, 2.0), (False, False, False, False, True, 3.0)])
+    assert update_discrete_states(lambda: next(answers), 2.0) == 3.0
+    with pytest.raises(HarnessError, match="do not settle at t = 2 s"):
+        update_discrete_states(lambda: (False, False, False, False, True, 2.0), 2.0)
+
+
+@pytest.mark.parametrize("declared", ["0", "-1"])
+def test_an_impossible_step_size_is_treated_as_undeclared(declared):
+    steps = []
+
+    def run(h, tolerance):
+        steps.append(h)
+        return RefinementRun(len(steps), SampleRows([0.0], {}), "no")
+
+    found = SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=declared), defaultExperiment=None)
+    refine(ExternalRunRequest("", "", False, 0.0, 1.0, tolerance=1e-6, timeout=1.0), found, run)
+    assert min(steps) > 0.0
+
+
+@pytest.mark.parametrize(("bytes_", "text"), [(None, '""'), (b"\xff bad", '"\\ufffd bad"'), (b"good", '"good"')])
+def test_a_null_or_malformed_string_is_recorded(tmp_path, bytes_, text):
+    def answer(component, references, count, values, size):
+        values[0] = bytes_
+
+    variable = ModelVariable("said", valueReference=7, type="String")
+    fmu = SimpleNamespace(fmi3GetString=answer, component=None, getString=None)
+    texts = StringTable(tmp_path / "texts")
+    recorder = RowRecorder(fmu, "3.0", [(variable, ())], tmp_path / "rows", texts)
+    recorder.record(0.0)
+    recorder.file.close(), texts.file.close()
+    assert read_rows(tmp_path / "rows", [(variable, ())]).columns["said"].tolist() == [0]
+    assert (tmp_path / "texts").read_text() == text + "\n"

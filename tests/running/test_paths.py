@@ -1,0 +1,91 @@
+"""The harness runs wherever it is: no letter of a path, and nothing that an FMU lacks, makes it crash."""
+
+import re
+import tempfile
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+from build_cache import ROOT
+from commands import UNPLOTTED, harness
+
+from harness.errors import HarnessError
+from harness.process import temporary_directory as rooms
+from harness.process.temporary_directory import has_plain_uri, temporary_directory
+from harness.running import unpacking
+
+ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
+
+
+@pytest.fixture
+def odd(tmp_path, fmus):
+    """A user's folder with every letter that has a meaning somewhere in its path, the built FMUs in it."""
+    folder = tmp_path / ODD
+    folder.mkdir()
+    (folder / "fmus").symlink_to(fmus)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("run", "coulomb"),
+        ("run", "--fmu", "fmus/smd.fmu"),
+        ("compare", "fmus/smd.fmu", "fmus/coulomb.fmu"),
+        ("sweep", "smd", "--vary", "m=1:2:2", "--workers", "1"),
+        ("couple", "pair.toml", "--stop", "0.1"),
+    ],
+)
+def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd, command):
+    temporary = odd / "temporary"
+    temporary.mkdir()
+    scene = (ROOT / "harness/scenes/coupled/two-masses.toml").read_text()
+    (odd / "pair.toml").write_text(re.sub("(?m)^steps = .*$", "steps = [0.01]", scene))
+    done = harness(odd, *command, "--out", odd / "out", "--quiet", blank=UNPLOTTED, TMPDIR=str(temporary))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert list(temporary.iterdir()) == []
+    assert any((odd / "out").rglob("*.svg")) or any((odd / "out").rglob("*.csv"))
+
+
+def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd, fmus, monkeypatch):
+    monkeypatch.setattr(rooms, "FALLBACK_DIRECTORIES", ())
+    monkeypatch.setattr(tempfile, "tempdir", str(odd))
+    refused = pytest.raises(HarnessError, match=r"smd\.fmu is an FMU in Python, which cannot be run from .*TMPDIR")
+    with refused, unpacking.unpack(fmus / "smd.fmu"):
+        pass
+    compiled = without(fmus / "smd.fmu", odd / "c.fmu", lambda name: name.startswith("binaries/"))
+    with unpacking.unpack(compiled) as folder:
+        assert folder.parent == odd
+    assert sorted(file.name for file in odd.iterdir()) == ["c.fmu", "fmus"]
+
+
+@pytest.mark.parametrize("part", ["resources/", "resources/slavemodule.txt", "_fmu.py"])
+def test_a_python_fmu_without_the_files_of_its_library_is_refused(fmus, tmp_path, part):
+    broken = without(fmus / "smd.fmu", tmp_path / "broken.fmu", lambda name: part in name)
+    done = harness(tmp_path, "run", "--fmu", broken)
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("Error: ")
+    assert "broken.fmu lacks resources/" in done.stderr
+
+
+def test_an_unwritable_temporary_folder_is_reported(tmp_path, monkeypatch):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with pytest.raises(HarnessError, match="cannot write into the temporary folder"), temporary_directory():
+        pass
+
+
+@pytest.mark.parametrize(
+    ("path", "expected"), [("/a b/c-d.e_~", True), ("/a/%20", False), ("/é", False), ("/+", False)]
+)
+def test_a_plain_path_is_one_whose_uri_escapes_only_blanks(path, expected):
+    assert has_plain_uri(Path(path)) is expected
+
+
+def without(fmu, copy, left_out):
+    """A copy of an FMU without some of its files."""
+    with ZipFile(fmu) as whole, ZipFile(copy, "w") as part:
+        for name in whole.namelist():
+            if not left_out(name):
+                part.writestr(name, whole.read(name))
+    return copy

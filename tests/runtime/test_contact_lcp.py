@@ -1,0 +1,104 @@
+"""Which of several contacts hold: random loads, on the sources as they stand on arrays."""
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+
+from fmus.runtime import contact_lcp, vectors
+from fmus.runtime.codes import STUCK
+from fmus.runtime.contact_lcp import AT_REST, CoupledFriction
+from fmus.runtime.rounding import ROUNDOFF_MARGIN
+
+
+class Chain(CoupledFriction):
+    """n contacts at rest: each body on the ground, or each on the one before; slips accelerate with b - A F."""
+
+    def __init__(self, draw, n, jump, shared):
+        bodies = np.eye(n) - (np.eye(n, k=-1) if shared else 0.0)
+        mass = draw.uniform(0.5, 3.0, n)
+        self.A, self.b = bodies @ np.diag(1.0 / mass) @ bodies.T, bodies @ (draw.normal(0.0, 2.0, n) / mass)
+        self.slide = draw.uniform(0.2, 2.0, n)
+        self.limit, self.n = self.slide * jump, n
+        self.b_rate = np.zeros(n)
+
+    def ordered(self, order):
+        """The same problem, declared in another order."""
+        other = object.__new__(Chain)
+        other.A, other.n = self.A[np.ix_(order, order)], self.n
+        for name in ("b", "slide", "limit", "b_rate"):
+            setattr(other, name, getattr(self, name)[list(order)])
+        return other
+
+    def solved(self, modes, b, slide):
+        slides = np.array(modes) != STUCK
+        return np.linalg.solve(np.where(slides[:, None], np.eye(self.n), self.A), np.where(slides, modes * slide, b))
+
+    def contact_forces(self, t, y, modes):
+        return self.solved(modes, self.b, self.slide), self.limit, np.abs(self.b)
+
+    def contact_rates(self, t, y, modes):
+        force, rate = self.solved(modes, self.b, self.slide), self.solved(modes, self.b_rate, 0.0)
+        pulls = [(b - self.A @ f) / np.diag(self.A) for b, f in ((self.b, force), (self.b_rate, rate))]
+        return rate, np.zeros(self.n), *pulls
+
+    def answer(self):
+        """The modes, beginning with all contacts stuck, and whether they fit."""
+        vectors.contact_indices[:] = range(self.n)
+        modes, fits = self.solve_modes(0.0, None, np.zeros(self.n), np.full(self.n, AT_REST), ROUNDOFF_MARGIN)
+        return tuple(map(int, modes)), fits
+
+    def fits(self, modes):
+        """What is stuck bears no more than it holds, and what slips is not drawn back."""
+        force, pull = self.solved(modes, self.b, self.slide), self.b - self.A @ self.solved(modes, self.b, self.slide)
+        stuck = np.array(modes) == STUCK
+        return np.all(np.where(stuck, np.abs(force) <= self.limit * (1 + 1e-12), modes * pull >= -1e-12))
+
+
+PROBLEMS = [(n, jump, shared) for n in (1, 2, 3, 4, 6) for jump in (1.0, 1.3, 2.0) for shared in (False, True)]
+
+
+@pytest.mark.parametrize(("n", "jump", "shared"), PROBLEMS)
+def test_consistent_modes_are_found_for_any_order_of_contacts(n, jump, shared):
+    """If static and sliding friction are the same there is one answer; else what can be held is held."""
+    draw = np.random.default_rng([n, round(10 * jump), shared])
+    for _ in range(24 if n < 6 else 8):
+        chain = Chain(draw, n, jump, shared)
+        modes, fits = chain.answer()
+        assert fits
+        assert chain.fits(modes)
+        if jump == 1.0 and n < 5:
+            assert [one for one in product((-1, 0, 1), repeat=n) if chain.fits(one)] == [modes]
+        for order in list(permutations(range(n)))[:: 1 if n < 4 else 37]:
+            other, _ = chain.ordered(order).answer()
+            assert tuple(other[order.index(i)] for i in range(n)) == modes
+
+
+def test_sequential_updates_reach_the_same_modes(monkeypatch):
+    """Where it ends soon: as many rounds as there are."""
+    draw, found = np.random.default_rng(7), 0
+    for _ in range(100):
+        chain = Chain(draw, 4, 1.0, True)
+        monkeypatch.setattr(contact_lcp, "MAX_JOINT_ITERATIONS", 60)
+        modes = chain.answer()
+        monkeypatch.setattr(contact_lcp, "MAX_JOINT_ITERATIONS", 0)
+        assert chain.answer() == modes
+        found += modes != ((0, 0, 0, 0), True)
+    assert found > 50
+
+
+@pytest.mark.parametrize("rate", [-1.0, 0.0, 1.0])
+def test_a_load_at_the_limit_breaks_away_if_it_grows_and_sticks_otherwise(rate):
+    """Two bodies, one upon the other: both contacts are at their limits at once, but for a rounding."""
+    draw = np.random.default_rng(5)
+    for _ in range(200):
+        chain = Chain(draw, 2, 1.0, True)
+        chain.b = chain.A @ (chain.limit * [1.0, -1.0]) * (1.0 + draw.choice([-1.0, 0.0, 1.0]) * 4.0 * 2.0**-52)
+        chain.b_rate = chain.A @ ([rate, -rate])
+        assert chain.answer() == ((1, -1) if rate > 0.0 else (0, 0), True)
+
+
+def test_a_contact_with_more_sliding_than_static_friction_is_reported():
+    chain = Chain(np.random.default_rng(1), 1, 1.0, False)
+    chain.limit, chain.b = 0.5 * chain.slide, chain.A @ (0.75 * chain.slide)
+    assert chain.answer() == ((0,), False)

@@ -1,0 +1,34 @@
+"""Values set one after the other at one point are values set at once, whatever is read in between."""
+
+import pytest
+from models import CASES, counts, label, outputs, push
+from row_comparison import assert_identical
+
+WHERE = (0.0, 0.13, 0.5, 0.77)  # of the run
+
+
+@pytest.mark.parametrize("case", CASES, ids=label)
+def test_two_settings_at_one_point_act_as_one(launch, case):
+    """The first sets the body in motion, the other way or out of its rest; the second takes that back.  All begin at
+    the state that was saved there."""
+    name, values, stop = case
+    names = outputs(name) + counts(name)
+    force, size = push(name)
+    internal, rows = launch(name, values, stop=stop).follow(
+        0.0, stop, ["events.count"] if "events.count" in names else []
+    )
+    changed = [t for t, before, after in zip(internal[1:], rows, rows[1:], strict=False) if after != before]
+    fmu, now, last = launch(name, values, stop=stop), 0.0, {force: -size, "m": 0.3}
+    for t in sorted([share * stop for share in WHERE] + changed[:2]):
+        fmu.run([now, t][: 1 + (t > now)], [])
+        now, state = t, fmu.save()
+        for read in (False, True):
+            runs = []
+            for settings in [last], [{force: size}, {force: 3.0 * size}, last]:
+                for setting in settings:
+                    fmu.set(setting)
+                    if read:
+                        fmu.get(*names, "solver.t_next")
+                runs.append(fmu.run([t, t + 0.001, t + 0.05 * (stop - t), t + 0.1 * (stop - t)], names))
+                fmu.restore(state)
+            assert_identical(runs[1], runs[0], names)

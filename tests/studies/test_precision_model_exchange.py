@@ -1,0 +1,214 @@
+"""Work-precision of the FMI 3.0 FMUs through fmpy: its own solver in model exchange, and theirs in co-simulation."""
+
+import csv
+import json
+from functools import cache
+from html import unescape
+from math import isnan
+from unittest.mock import patch
+
+import commands
+import numpy as np
+import pytest
+from fmi3_fixtures import build_fmi3_fmus
+
+from harness.errors import HarnessError
+from harness.references import peer_solvers
+from harness.references.certified_reference import load_reference
+from harness.references.models import CASES
+from harness.running import fmi3
+from harness.running.embedded_model import load_model_class
+from harness.studies.precision import advice, study
+from harness.studies.precision.study import (
+    CS,
+    FMI3_INTERFACES,
+    FMPY,
+    FMU,
+    ME,
+    QUICK,
+    SweepSettings,
+    solver_jobs,
+    sweep_tolerances,
+)
+
+CASE = {case.name: case for case in CASES}
+SMOOTH = [case for case in CASES if not case.is_chattering]
+TOLERANCES = (1e-4, 1e-6, 1e-8)
+
+
+@pytest.fixture(scope="module")
+def both(fmus, tmp_path_factory):
+    """A folder as a user's would be, with the FMUs for FMI 2.0 and 3.0 in it."""
+    folder = tmp_path_factory.mktemp("both")
+    (folder / "fmus").mkdir()
+    for file in fmus.glob("*.fmu"):
+        (folder / "fmus" / file.name).symlink_to(file)
+    (folder / "fmus" / "native").mkdir()
+    (folder / "fmus" / "native" / "fmi3").symlink_to(build_fmi3_fmus())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def points(both):
+    """points(name, tool, tolerances): what the study finds about a case with a tool, but how long it takes."""
+
+    @cache
+    def points(name, tool, tolerances=TOLERANCES):
+        file = both / "fmus" / f"{CASE[name].model}.fmu"
+        asked = [job for job in solver_jobs(CASE[name], load_model_class(file), file) if job.tool == tool]
+        return [
+            point for job in asked for point in sweep_tolerances(CASE[name], job, SweepSettings(tolerances, 5.0, 0.0))
+        ]
+
+    with patch.object(study, "best_time", lambda run, budget: 0.0):
+        yield points
+
+
+def amplification(case):
+    """What an error of position at a break-away may become, relative to the motion: with it comes one in time, of its
+    size over the speed of the driver, and one in speed, that times the largest acceleration."""
+    if case.model not in ("stickslip", "pacejka"):
+        return 1.0
+    x, v = np.abs(load_reference("stickslip").motion).max(axis=0)
+    return 2.9546 / 0.034 * x / v
+
+
+@pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
+def test_model_exchange_errors_fall_with_the_tolerance_and_stay_below_the_sum_of_step_errors(points, case):
+    loose, middle, tight = found = points(case.name, ME)
+    assert [point.rtol for point in found] == list(TOLERANCES)
+    assert loose.largest > 4 * middle.largest > 16 * tight.largest
+    assert loose.evaluations < middle.evaluations < tight.evaluations  # at least one a step
+    for point in (middle, tight):
+        assert point.largest < amplification(case) * point.evaluations * point.rtol
+
+
+@pytest.mark.parametrize("case", [case for case in SMOOTH if case.problem.has_dry_friction], ids=lambda case: case.name)
+def test_every_change_of_mode_is_located_in_model_exchange(points, case):
+    *_, middle, tight = points(case.name, ME)
+    assert tight.events < 0.1 * middle.events < 1e-4
+
+
+@pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
+def test_co_simulation_is_one_point_with_the_own_method(points, case):
+    (point,) = points(case.name, CS)
+    assert isnan(point.rtol)
+    assert point.method == {"pacejka": "rodas", "pendulum": "dop853"}.get(case.model, "exact")
+    assert point.largest < {"pacejka": 1e-6, "pendulum": 1e-9}.get(case.model, 1e-13)
+    assert point.evaluations > 0
+
+
+def test_a_step_limit_of_cvode_gives_a_gap_with_the_reason_of_fmpy(points, capfd):
+    (point,) = points("pacejka-0.01", ME, (1e-12,))
+    assert point.failure.startswith("fmpy's CVode (500 steps from point to point at most): At t = ")
+    assert "mxstep steps taken" in point.failure
+    assert capfd.readouterr() == ("", "")
+
+
+def test_each_run_of_an_instance_starts_from_scratch(both):
+    with fmi3.open_fmi3_instance(both / "fmus/native/fmi3/stickslip.fmu", fmi3.MODEL_EXCHANGE) as fmu:
+        first, again = (fmu.simulate({"mu_s": 0.8}, ("x", "v", "mode"), 16.0, 0.5, 1e-6) for _ in range(2))
+        other = fmu.simulate({}, ("x", "v", "mode"), 16.0, 0.5, 1e-6)
+    assert np.array_equal(first.rows, again.rows)
+    assert first.evaluations == again.evaluations > 100
+    assert other.rows["x"][-1] != first.rows["x"][-1]
+
+
+@pytest.mark.parametrize("way", [fmi3.MODEL_EXCHANGE, fmi3.CO_SIMULATION])
+def test_a_failure_is_one_sentence(both, tmp_path, way, capfd):
+    def refused(file, values=None, timeout=None):
+        with pytest.raises(HarnessError) as error, fmi3.open_fmi3_instance(file, way) as fmu:
+            fmu.simulate(values or {}, ("x",), 16.0, 0.01, 1e-6, timeout)
+        return str(error.value)
+
+    sled, missing, broken = both / "fmus/native/fmi3/stickslip.fmu", tmp_path / "missing.fmu", tmp_path / "broken.fmu"
+    broken.write_bytes(b"no archive")
+    assert "m = -1.0 kg is refused" in refused(sled, {"m": -1.0})
+    unknown = "stickslip.fmu: The start values for the following variables could not be set: mess"
+    assert refused(sled, {"mess": 1.0}) == unknown
+    assert refused(sled, timeout=1e-3).endswith(" s after 0.001 s of run time")
+    assert refused(missing) == f"not built: {missing} (python build_fmus.py --fmi 3)"
+    assert refused(broken) == "broken.fmu cannot be unpacked: File is not a zip file"
+    out, err = capfd.readouterr()  # where the FMU itself says its sentence
+    assert (out, err.count("\n")) == ("", 1)
+    assert err.startswith("Stickslip (stickslip): m = -1.0 kg is refused")
+
+
+def harness(folder, *arguments):
+    """The finished process of a command in a folder; nobody looks at its figures."""
+    return commands.harness(folder, *arguments, base={}, blank=True, PATH="", COLUMNS="100")
+
+
+@pytest.fixture(scope="module")
+def twice(both, fmus, tmp_path_factory):
+    """A study of the smd and the page of all results, where its FMU for FMI 3.0 is built and then where it is not, the
+    second of the file, which leaves peers out, and beside results on another model: what each study said, the second as
+    JSON, the files of the first, the pages, and the folder of the second."""
+    (out, without), said, pages, files = map(tmp_path_factory.mktemp, ("out", "without")), [], [], {}
+    (without / "fmus").symlink_to(fmus)
+    for folder, *words in ((both, "precision", "smd"), (without, "--json", "precision", "fmus/smd.fmu")):
+        done = harness(folder, *words, "--quick", "--out", out)  # --json before any command
+        assert (done.returncode, done.stderr) == (0, "")
+        said.append(done.stdout)
+        files = files or {file.name: file.read_text() for file in (out / "precision").glob("*.csv")}
+        assert harness(folder, "report", "--quiet", "--out", out).returncode == 0
+        pages.append(unescape((out / "report.html").read_text(encoding="utf-8")))
+        (out / "precision/pendulum.txt").write_text("older")
+    return said, files, pages, out / "precision"
+
+
+def test_the_command_shows_both_interfaces_and_error_against_tolerance(twice):
+    (said, _), files, *_ = twice
+    assert "  FMI 3.0 CS: exact  " in said
+    assert "  FMI 3.0 ME: fmpy's CVode  " in said
+    rows = [row for row in csv.DictReader(files["smd.csv"].splitlines()) if row["tool"] in (CS, ME)]
+    assert [(row["case"], row["tool"], row["rtol [1]"]) for row in rows] == [
+        ("smd", CS, ""),
+        *(("smd", ME, rtol) for rtol in ("0.001", "1e-06", "1e-09")),
+    ]
+    for row in rows:  # on a busy machine the tightest may outlast what --quick waits, and says so
+        assert "run time" in row["failure"] if row["failure"] else float(row["seconds [s]"]) > 0
+    heads, *table = csv.reader(files["smd-exchange.csv"].splitlines())
+    assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "smd [1]"]
+    assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
+    printed = said.partition("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol")[2]
+    told = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
+    assert told == [[advice.format_power(float(number)) if number else "-" for number in row] for row in table]
+
+
+def test_json_holds_all_results(twice):
+    found = json.loads(twice[0][1])
+    assert {point["method"] for point in found["points"]["smd"]} >= {"exact", "dop853", "fmpy's CVode"}
+    assert found["advice"][0].startswith("smd: use exact")
+
+
+def test_the_page_shows_error_against_tolerance_or_the_commands_that_produce_it(twice):
+    head = "model exchange by fmpy's CVode: largest error at rtol"
+    commands = "python build_fmus.py smd --fmi 3 && python -m harness precision smd"
+    whole, lacking = twice[2]
+    assert head in whole
+    assert commands not in whole
+    assert head not in lacking  # what was there of another build is gone
+    assert commands in lacking
+
+
+def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_models(twice):
+    (said, lacking), files, _, folder = twice
+    assert "smd: use exact: " in said
+    made = {"smd.csv", "smd.json", "smd.svg", "smd.txt", "anchors.csv"}
+    assert {path.name for path in folder.iterdir()} == made | {"pendulum.txt"}
+    assert (folder / "pendulum.txt").read_text() == "older"
+    texts = files["smd.csv"], (folder / "smd.csv").read_text()
+    rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
+    tools = {FMU, FMPY, *FMI3_INTERFACES, "scipy", "cvode"} - peer_solvers.missing_packages().keys()
+    assert {row["tool"] for row in rows} == tools
+    unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
+    assert [row["failure"] for row in later if row["tool"] in FMI3_INTERFACES] == [unbuilt, unbuilt]
+    assert [told for told in json.loads(lacking)["missing"] if unbuilt in told] == [unbuilt]
+    inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
+    assert len(inside) == 1 + 4 * len(QUICK.tolerances)
+    assert float(inside[0]["largest [1]"]) < 1e-13
+    numbers = ("method", "rtol [1]", "evaluations", "largest [1]")
+    same = [[[row[name] for name in numbers] for row in each if not row["failure"]] for each in (inside, outside)]
+    assert same[0] == same[1]
+    assert all(bool(row["failure"]) == (row["seconds [s]"] == "") for row in rows + later)

@@ -1,0 +1,183 @@
+"""What happens to a sweep while it runs: it is killed, or loses those who do its runs."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from functools import partial
+from pathlib import Path
+
+import build_cache
+import commands
+import killed_worker
+import pytest
+from sweep_results import sweep_folder
+
+distributed = pytest.importorskip("distributed", reason="the extra 'sweep' is not installed")
+
+from harness.errors import HarnessError  # noqa: E402
+from harness.studies.sweep import study  # noqa: E402
+from harness.studies.sweep.journal import Journal  # noqa: E402
+from harness.studies.sweep.runner import SweepSpec  # noqa: E402
+from harness.studies.sweep.sampling import SweepPoints, parse_axis  # noqa: E402
+from harness.studies.sweep.study import WORKER_DIED, Sweep  # noqa: E402
+
+LONG = ("sweep", "stickslip", "--vary", "mu_d=0.3:0.8:100", "--measure", "peak_speed", "--workers", "1")
+NOTE = """
+import sys
+def note(event, arguments):
+    if event in ('socket.bind', 'socket.connect'):
+        print(event, type(arguments[1]).__name__, file=open('bound', 'a'))
+sys.addaudithook(note)
+"""
+
+
+@pytest.fixture
+def harness(fmus, tmp_path):
+    """harness(argument, ...): the finished process, in a folder with the built FMUs."""
+    (tmp_path / "fmus").symlink_to(fmus)
+
+    return partial(commands.harness, tmp_path, blank=True)
+
+
+@pytest.fixture
+def whole(fmus):
+    """The files of that sweep, by their name, when nothing happens to it."""
+
+    def make(folder):
+        (folder / "fmus").symlink_to(fmus)
+        assert commands.harness(folder, *LONG, blank=True).returncode == 0
+
+    return files(build_cache.cached_folder("swept", make))
+
+
+def files(place):
+    return {file.name: file.read_bytes() for file in sweep_folder(place / "results", "stickslip-mu_d").glob("sweep.*")}
+
+
+def journal(place):
+    """The journal of a sweep that has begun; None before."""
+    return next((place / "results/sweep").glob(".*.journal"), None)
+
+
+def blocks(place):
+    """How many blocks of runs are finished."""
+    found = journal(place)
+    return found.read_bytes().count(b"\n") if found else 0
+
+
+def begun(place):
+    """The long sweep in a process of its own, once it has finished two blocks of runs; how many processes it consists
+    of is told by their environment, and at what they listen, by a file `bound`."""
+    heard, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), blocks(place)
+    (place / "sitecustomize.py").write_text(NOTE)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "harness", *LONG],
+        cwd=place,
+        env=os.environ | {"PYTHONPATH": f"{place}{os.pathsep}{build_cache.ROOT}"},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=heard,  # a test run in the background ignores it
+    )
+    while process.poll() is None:
+        if blocks(place) > before + 1:
+            return process
+        time.sleep(0.02)
+    raise AssertionError(process.communicate()[1])
+
+
+def living(place):
+    """The processes of the sweeps that have begun there."""
+    found, mark = [], f"PYTHONPATH={place}{os.pathsep}".encode()
+    for file in Path("/proc").glob("[0-9]*/environ"):
+        try:
+            found += [file.parent.name] if mark in file.read_bytes() else []
+        except OSError:  # another's, or gone
+            continue
+    return found
+
+
+def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, whole, tmp_path):
+    """A kill reaches the sweep alone, Ctrl-C in a terminal its workers as well; what is written last may be cut off."""
+    process = begun(tmp_path)
+    assert len(living(tmp_path)) >= 3 or not Path("/proc/self/environ").exists()
+    process.kill()
+    process.communicate(timeout=60)
+    late = time.monotonic() + 60
+    while living(tmp_path) and time.monotonic() < late:
+        time.sleep(0.05)
+    assert living(tmp_path) == []
+    first = Journal(journal(tmp_path), 100, 1).n_done
+    with journal(tmp_path).open("a") as file:
+        file.write("[299, [0.1")
+
+    process = begun(tmp_path)
+    os.killpg(process.pid, signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert said.startswith("Error: interrupted: ")
+    assert said.count("\n") == 1
+    kept = Journal(journal(tmp_path), 100, 1).n_done
+    assert 0 < first < kept < 100
+
+    done = harness(*LONG)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"100 runs, {kept} of them done before" in done.stdout
+    assert files(tmp_path) == whole
+    assert journal(tmp_path) is None
+    bound = tmp_path / "bound"  # workers are reached through pipes; a socket that has a file for an address is no port
+    assert "tuple" not in (bound.read_text() if bound.exists() else "")
+
+
+def test_a_cluster_with_a_killed_worker_finishes(harness, whole, tmp_path):
+    """One works in this process, the other one in a process of its own, until the first blocks are finished."""
+    words = ("--no-dashboard", "--nthreads", "2", "--no-nanny")
+    options = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
+    with distributed.LocalCluster("127.0.0.1", protocol="tcp://", **options) as cluster:
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", cluster.scheduler_address, *words]
+        environment = os.environ | {"PYTHONPATH": str(build_cache.ROOT)}
+        pipe = subprocess.PIPE
+        with subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=pipe, text=True) as worker:
+            next(line for line in worker.stderr if "Registered to" in line)
+            before = []
+
+            def end():
+                while blocks(tmp_path) < 2 and worker.poll() is None:
+                    time.sleep(0.02)
+                before.append(Journal(journal(tmp_path), 100, 1).n_done)
+                worker.kill()
+
+            thread = threading.Thread(target=end)
+            thread.start()
+            try:
+                done = harness(*LONG, "--scheduler", cluster.scheduler_address)
+            finally:
+                worker.kill()
+                thread.join()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert 0 < before[0] < 100
+    assert files(tmp_path) == whole
+
+
+def test_an_unresponsive_scheduler_is_reported(monkeypatch):
+    """After 10 s, of which a test waits for one."""
+    client, address = distributed.Client, "tcp://127.0.0.1:1"
+    monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=timeout / 10))
+    with pytest.raises(HarnessError, match=f"no scheduler answers at {address}"), study.open_workers(address, 1, 1):
+        pass
+
+
+def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(monkeypatch):
+    """Whatever block it is in, and whatever else was under way meanwhile."""
+    monkeypatch.setattr(study, "run_block", killed_worker.run_block)
+    sweep = Sweep(SweepSpec("deadly", ("a",), (), ()), SweepPoints((parse_axis("a=0:39:40", False),)), b"", 1)
+    found = {}
+    with study.open_workers(None, 2, 40) as hands:
+        for block in study.Dispatcher(sweep, hands, [(0, 40)]).completed_blocks():
+            for i, value in enumerate(block.values[:, 0]):
+                assert block.first + i not in found
+                found[block.first + i] = block.messages.get(i, value)
+    assert found == {i: WORKER_DIED if i in (7, 30) else 2.0 * i for i in range(40)}

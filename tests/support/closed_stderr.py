@@ -1,0 +1,90 @@
+"""A run that is refused while nobody can be told on standard error: python closed_stderr.py run_all '[FMU, WAYS]'.
+
+Prints for each way what the log says, what is read afterwards, and what the run after a reset gives.
+"""
+
+import io
+import json
+import os
+import sys
+import tempfile
+from math import isnan
+
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
+
+import worker
+from fmpy.fmi1 import FMICallException
+
+
+class Broken:
+    """A file whose methods raise, as told."""
+
+    encoding = "utf-8"
+
+    def __init__(self, **raising):
+        self.raising = raising
+
+    def write(self, text):
+        if "write" in self.raising:
+            raise self.raising["write"]
+
+    def flush(self):
+        if "flush" in self.raising:
+            raise self.raising["flush"]
+
+
+def no_reader():
+    end, start = os.pipe()
+    os.close(end)
+    os.dup2(start, 2)
+
+
+STDERR_FAILURES = {
+    "none": lambda: setattr(sys, "stderr", None),
+    "write raises": lambda: setattr(sys, "stderr", Broken(write=RuntimeError("no"))),
+    "flush raises": lambda: setattr(sys, "stderr", Broken(flush=OSError(5, "no"))),
+    "no methods": lambda: setattr(sys, "stderr", object()),
+    "ASCII only": lambda: setattr(sys, "stderr", io.TextIOWrapper(io.BytesIO(), "ascii", "strict")),
+    "an encoding that is none": lambda: setattr(sys, "stderr", Broken(write=UnicodeError("no"))),
+    "deleted": lambda: delattr(sys, "stderr"),
+    # those that a process does not come back from
+    "closed": lambda: sys.stderr.close(),
+    "descriptor closed": lambda: os.close(2),
+    "no reader": no_reader,
+    "disk full": lambda: os.dup2(os.open("/dev/full", os.O_WRONLY), 2),
+}
+
+
+def run_all(path, ways):
+    process = worker.Worker(tempfile.mkdtemp())
+    return [run_without_stderr(way, process, path) for way in ways]
+
+
+def run_without_stderr(way, process, path):
+    fmu = process.instances[process.instantiate(path, "Prüfstand")]
+    STDERR_FAILURES[way]()
+
+    def begin():
+        fmu.setup(0.0, None, None)
+        fmu.init()
+        fmu.step(0.0, 0.1)
+        return fmu.get(["theta"])
+
+    first = begin()
+    fmu.set({"T_ext": float("nan")})
+    try:
+        fmu.step(0.1, 0.1)
+        status = 0
+    except FMICallException as refusal:
+        status = refusal.status
+    silent = all(isnan(value) for value in fmu.get(["theta", "omega", "alpha", "T_friction", "energy"]))
+    fmu.read_one("Boolean", 10**6)
+    log = fmu.messages()
+    fmu.reset()
+    answer = {"status": status, "silent": silent, "log": log, "recovered": begin() == first}
+    fmu.free()
+    return answer
+
+
+if __name__ == "__main__":
+    print(json.dumps({"run_all": run_all}[sys.argv[1]](*json.loads(sys.argv[2]))))

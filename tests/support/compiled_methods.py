@@ -1,0 +1,100 @@
+"""Methods of two floats frozen to C and called beside CPython, with values that find the edges."""
+
+import copy
+import ctypes
+import math
+import random
+import struct
+import subprocess
+from itertools import product
+from pathlib import Path
+
+from native_host import compiler
+
+import fmus.packaging.native as native
+from fmus.packaging.native.c_types import FLOAT, FloatArray, ScalarTuple, StructPointer
+from fmus.packaging.native.call_graph import CallGraph
+from fmus.packaging.native.compiler import BIT_EXACT, STRICT
+
+FAULT_EXCEPTIONS = (ArithmeticError, ValueError, IndexError)  # for which C raises the fault flag
+VALUES = [0.0, -0.0, 1.0, -1.0, 0.3, -2.5, 7.0, 1e-5, 1e5, 710.0, 5e-324, 1e-300, 1e300, math.inf, -math.inf, math.nan]
+VALUES += [random.Random(1).uniform(-4.0, 4.0) for _ in range(6)]
+PAIRS = [*product(VALUES, VALUES)]
+
+
+def flat_values(thing):
+    """All numbers of an object, in order."""
+    for value in vars(thing).values():
+        if hasattr(value, "__dict__"):
+            yield from flat_values(value)
+        elif isinstance(value, list):
+            yield from value
+        else:
+            yield value
+
+
+def c_member_paths(layout, cls, prefix):
+    """The same numbers in C."""
+    for name, kind in layout.fields[cls].items():
+        if isinstance(kind, StructPointer):
+            yield from c_member_paths(layout, kind.cls, f"{prefix}{name}.")
+        elif isinstance(kind, FloatArray):
+            yield from (f"{prefix}{name}[{i}]" for i in range(kind.length))
+        else:
+            yield prefix + name
+
+
+def bits(values):
+    """Numbers as bits; any NaN is like any other."""
+    return [struct.pack("<d", math.nan if value != value else float(value)) for value in values]
+
+
+class CompiledMethods:
+    """Methods of two floats of an object, in C: each call begins with a fresh object."""
+
+    def __init__(self, thing, methods, folder, warnings=STRICT):
+        call_graph = CallGraph(thing)
+        cls = type(thing)
+        state = list(c_member_paths(call_graph.layout, cls, "it."))
+        calls, self.widths = [], {}
+        for name in methods:
+            result = call_graph.add_model_entry_point(f"run_{name}", getattr(cls, name), FLOAT, FLOAT).result
+            parts = [f"r._{i}" for i in range(len(result.parts))] if isinstance(result, ScalarTuple) else ["r"]
+            self.widths[name] = len(parts)
+            calls.append(
+                f"int {name}(double x, double y, double *out) {{\n"
+                f"    struct {cls.__name__} it = image;\n    bool fault = false;\n"
+                f"    {result.c} r = run_{name}(&it, x, y, &fault);\n"
+                + "".join(f"    *out++ = (double){part};\n" for part in parts + state)
+                + "    return fault;\n}\n"
+            )
+        image = f"static const struct {cls.__name__} image = {call_graph.layout.initializer(thing)};\n"
+        text = '#include "python_arithmetic.h"\n' + call_graph.text() + image + "".join(calls)
+        (folder / "frozen.c").write_text(text)
+        header = Path(native.__file__).parent
+        command = [compiler(), *warnings, *BIT_EXACT, "-shared", "-fPIC", f"-I{header}"]
+        subprocess.run([*command, "frozen.c", "-o", "frozen.so", "-lm"], cwd=folder, check=True)
+        self.library, self.size = ctypes.CDLL(str(folder / "frozen.so")), 16 + len(state)
+
+    def call(self, name, x, y):
+        """Whether the fault flag was raised, and what was returned and left behind, as long as Python's answer is."""
+        out = (ctypes.c_double * self.size)()
+        fault = getattr(self.library, name)(ctypes.c_double(x), ctypes.c_double(y), out)
+        return bool(fault), list(out)
+
+
+def assert_same_as_python(frozen, thing, name, pairs):
+    """A method in C and in CPython: results, objects afterwards, and exceptions as faults."""
+    for x, y in pairs:
+        it = copy.deepcopy(thing)
+        try:
+            result = getattr(it, name)(x, y)
+        except FAULT_EXCEPTIONS as error:
+            result = error
+        fault, out = frozen.call(name, x, y)
+        assert fault == isinstance(result, Exception), f"{name}({x!r}, {y!r}): {result!r}"
+        left = list(flat_values(it))
+        values = [] if fault else [*result] if isinstance(result, tuple) else [result]
+        if fault:  # nothing is returned, but what was done before stays done
+            out = out[frozen.widths[name] :]
+        assert bits(out[: len(values) + len(left)]) == bits(values + left), f"{name}({x!r}, {y!r})"

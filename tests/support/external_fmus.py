@@ -1,0 +1,78 @@
+"""Ten FMUs that are not ours, of plain pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C; sources in tests/external_fmus.
+
+built() / "Midpoint.fmu"       built once a run
+VARY["Midpoint"]               what a sweep may vary in it, as --vary takes it
+edited(fmu, copy, {name: new}) a copy with files changed, added, or (None) left out; a function gets the old text
+"""
+
+import os
+import subprocess
+import sys
+from fcntl import LOCK_EX, flock
+from pathlib import Path
+from tempfile import mkdtemp
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import build_cache
+
+SOURCES = Path(__file__).parents[1] / "external_fmus"
+SWEEP_AXES = {
+    "Midpoint": "k=30:50:3",  # FMI 2.0: converges as its communication steps become shorter; no units
+    "FixedStep": "k=0.5:1:3",  # has a step of its own
+    "Switching": "loss=0.1:0.2:3",  # Boolean, Integer and String, as outputs and as parameters
+    "Falling": "height=1:4:3",  # ends itself
+    "NonConforming": "k=30:50:3",  # breaks the standard, and would run
+    "Faulty": "k=1:2:3",  # with kind=1 to 6 it hangs, crashes, raises, prints, gives NaN, fails
+    "Fmi3Midpoint": "k=30:50:3",  # FMI 3.0, with units; ends itself at `limit`
+    "Arrays": "omega=1:3:3",  # FMI 3.0: arrays, an enumeration, a text
+    "ModelExchangeOnly": "k=30:50:3",  # FMI 3.0, model exchange alone
+    "Bouncing": "e=0.7:0.9:3",  # FMI 2.0, model exchange alone, in C: events that change states; with units
+}
+
+
+def build_external_fmus():
+    """The folder of all ten."""
+    folder = build_cache.shared_folder / "foreign"
+    with (build_cache.shared_folder / "foreign.lock").open("w") as lock:
+        flock(lock, LOCK_EX)
+        if not folder.exists():
+            fresh = mkdtemp(dir=build_cache.shared_folder)
+            path = os.environ | {"PYTHONPATH": str(build_cache.ROOT)}
+            subprocess.run([sys.executable, __file__, fresh], check=True, capture_output=True, timeout=120, env=path)
+            Path(fresh).rename(folder)
+    return folder
+
+
+def edited_copy(fmu, copy, changes):
+    """A copy of an FMU with files changed."""
+    with ZipFile(fmu) as old, ZipFile(copy, "w", ZIP_DEFLATED) as new:
+        content = {name: old.read(name) for name in old.namelist()}
+        for name, change in changes.items():
+            content[name] = change(content[name].decode()) if callable(change) else change
+        for name, data in content.items():
+            if data is not None:
+                new.writestr(name, data)
+    return copy
+
+
+def main(out):
+    """Build them all."""
+    import pythonfmu
+    import pythonfmu3
+
+    from fmus.packaging.native.compiler import compile_binaries
+    from harness.running.c_host import HEADERS
+
+    for source in sorted(SOURCES.glob("*.py")):
+        package = pythonfmu3 if "pythonfmu3" in source.read_text() else pythonfmu
+        package.FmuBuilder.build_FMU(source, out)
+    for source in SOURCES.glob("*/*.c"):
+        files = {file.name: file.read_text() for file in (source, *HEADERS.glob("fmi2*.h"))}
+        with ZipFile(Path(out) / f"{source.stem}.fmu", "w", ZIP_DEFLATED) as archive:
+            archive.write(source.with_name("modelDescription.xml"), "modelDescription.xml")
+            for path, content in compile_binaries(source.stem, files, source.name, "linux64", "2").items():
+                archive.writestr(path, content)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,70 @@
+"""The FMI 3.0 FMUs, built once, and the processes that run them, as fixtures under the names of those for FMI 2.0.
+
+A test module takes them over by assignment: `fmus, worker, _workers = fmi3_fixtures.FIXTURES`; `launch` follows.
+"""
+
+from functools import cache
+
+import build_cache
+import commands
+import pytest
+import worker_client
+from native_fmus import require_compiler
+
+
+class Worker(worker_client.Worker):
+    """A process that runs FMI 3.0 FMUs."""
+
+    script = "fmi3_worker.py"
+
+    def exchange(self, path, name="test"):
+        """An instance for model exchange."""
+        return worker_client.Instance(self, self.call(None, "exchange", str(path), name))
+
+    def simulate(self, path, kind, **options):
+        """The columns of a run by fmpy; Failed when it raises."""
+        return self.simulate_and_count(path, kind, **options)[0]
+
+    def simulate_and_count(self, path, kind, **options):
+        """The same, and how often the derivatives were evaluated."""
+        answer = self.call(None, "simulate", str(path), {"fmi_type": kind, **options})
+        if "error" in answer:
+            raise FmpyError(answer["error"])
+        return answer["columns"], answer["evaluations"]
+
+
+class FmpyError(Exception):
+    """fmpy gave up a run."""
+
+
+@cache
+def build_fmi3_fmus():
+    """The folder of the FMI 3.0 FMUs."""
+    require_compiler()
+    return build_cache.build_once("fmi3", "--fmi", "3", "--platform", "linux64", timeout=600)
+
+
+REDUCED = {"stickslip": ("ode23", "hybrid"), "coulomb": ("rodas", "sign")}
+
+
+@cache
+def build_reduced_fmu(name):
+    """The FMI 3.0 FMU of a model with one method and one law."""
+    require_compiler()
+
+    def make(folder):
+        method, law = REDUCED[name]
+        chosen = ("--method", method, "--law", law, "--platform", "linux64")
+        done = commands.build("--fmi", "3", name, *chosen, "--out", folder)
+        assert done.returncode == 0, done.stderr
+
+    return build_cache.cached_folder(f"lean fmi3 {name}", make) / f"{name}.fmu"
+
+
+@pytest.fixture(scope="module")
+def fmus():
+    return build_fmi3_fmus()
+
+
+_workers, worker, fresh_worker = worker_client.worker_fixtures(Worker, "module")
+FIXTURES = fmus, worker, _workers

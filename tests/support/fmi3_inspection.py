@@ -1,0 +1,146 @@
+"""Look into built FMI 3.0 FMUs, in a process that never saw their sources: tests name functions here.
+
+python fmi3_inspection.py call_each '[[[FUNCTION, ARGUMENT, ...], ...]]'
+"""
+
+import json
+import random
+import sys
+from contextlib import contextmanager
+from ctypes import c_double
+from itertools import product
+from shutil import rmtree
+
+from fmpy import extract, read_model_description
+from fmpy.fmi3 import FMU3Model
+
+NUDGE = 1e-3
+
+
+@contextmanager
+def instance(path):
+    """An instance for model exchange, its description and its folder; all of it is gone afterwards."""
+    folder = str(extract(path))
+    description = read_model_description(folder)
+    fmu = FMU3Model(guid=description.guid, unzipDirectory=folder, modelIdentifier=description.modelName)
+    fmu.instantiate()
+    yield fmu, description, folder
+    fmu.freeInstance()
+    rmtree(folder)
+
+
+def read(fmu, variable):
+    get = fmu.getFloat64 if variable.type == "Float64" else fmu.getInt64
+    return get([variable.valueReference])[0]
+
+
+def write(fmu, variable, value):
+    put = fmu.setFloat64 if variable.type == "Float64" else fmu.setInt64
+    put([variable.valueReference], [value])
+
+
+def variables(path):
+    """Every variable, under its own name, as it reads before and after it is set."""
+    with instance(path) as (fmu, description, _):
+        starts, after = {}, {}
+        declared = [variable for variable in description.modelVariables if variable.alias is None]
+        for variable in declared:
+            starts[variable.name] = repr(read(fmu, variable))
+        for variable in declared:
+            if variable.causality in ("parameter", "input"):
+                value = read(fmu, variable)
+                write(fmu, variable, value if variable.type == "Enumeration" else 0.5 * value + 0.0625)
+                after[variable.name] = repr(read(fmu, variable))
+    return {"starts": starts, "after": after}
+
+
+def factors(path, parameters):
+    """How everything that is calculated between events answers to a nudge of a state or an input.
+
+    {reference of the unknown: {reference of the known: [factors, one for each point at which it answered]}}; the
+    points are some at rest and some in motion, for every choice of law that the model has.
+    """
+    found = {}
+    with instance(path) as (fmu, description, _):
+        there = {variable.name: variable for variable in description.modelVariables}
+        smooth = [v for v in description.modelVariables if v.variability == "continuous" and v.initial == "calculated"]
+        states = [rate.variable.derivative for rate in description.derivatives]
+        (push,) = [v for v in description.modelVariables if v.causality == "input"]
+        knowns = [*states, push]
+        names = [name for name in ("friction", "pin_load") if name in there]
+        choices = product(*([int(item.value) for item in there[name].declaredType.items] for name in names))
+        chance = random.Random(5)
+        for values in choices:
+            fmu.reset()
+            for name, value in zip(names, values, strict=True):
+                write(fmu, there[name], value)
+            for name, value in parameters.items():
+                write(fmu, there[name], value)
+            fmu.enterInitializationMode()
+            fmu.exitInitializationMode()
+            settle(fmu)
+            for i in range(12):
+                point = [chance.uniform(-0.3, 0.3), [0.0, 1e-8, 0.2, -0.2][i % 4], chance.uniform(-0.3, 0.3)]
+                force = chance.uniform(-0.1, 0.1)
+                put(fmu, push, [*point[: len(states)], force])
+                fmu.enterEventMode()
+                settle(fmu)  # the mode does, and the nudges do not change it
+                point = (c_double * len(states))()
+                fmu.getContinuousStates(point, len(states))
+                point = [*point, force]
+                here = answers(fmu, smooth, push, point)
+                for place, known in enumerate(knowns):
+                    beside = [value + NUDGE * (number == place) for number, value in enumerate(point)]
+                    nudged = answers(fmu, smooth, push, beside)
+                    for unknown, a, b in zip(smooth, here, nudged, strict=True):
+                        if a != b:
+                            row = found.setdefault(unknown.valueReference, {})
+                            row.setdefault(known.valueReference, []).append((b - a) / NUDGE)
+    return found
+
+
+def nominals(path, variable, value):
+    """The nominal values of the states before and after an event that sets a variable, and what each event tells."""
+    with instance(path) as (fmu, description, _):
+        there = {variable.name: variable for variable in description.modelVariables}
+        sizes = (c_double * len(description.derivatives))()
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        told = []
+        for change in (False, True, False):
+            if change:
+                write(fmu, there[variable], value)
+            _, _, renewed, *_ = fmu.updateDiscreteStates()
+            fmu.getNominalsOfContinuousStates(sizes, len(sizes))
+            told.append((renewed, list(sizes)))
+    return told
+
+
+def settle(fmu):
+    """Handle an event."""
+    fmu.updateDiscreteStates()
+    fmu.enterContinuousTimeMode()
+
+
+def put(fmu, push, point):
+    """Take states and input to a point."""
+    *states, force = point
+    write(fmu, push, force)
+    fmu.setTime(1.0)
+    fmu.setContinuousStates((c_double * len(states))(*states), len(states))
+
+
+def answers(fmu, smooth, push, point):
+    """What the unknowns read there."""
+    put(fmu, push, point)
+    return [read(fmu, variable) for variable in smooth]
+
+
+def call_each(requests):
+    """The answers of these functions to these arguments, one after another."""
+    return [globals()[function](*arguments) for function, *arguments in requests]
+
+
+if __name__ == "__main__":
+    function, arguments = sys.argv[1], json.loads(sys.argv[2])
+    print(json.dumps(globals()[function](*arguments)))

@@ -1,0 +1,198 @@
+"""The piecewise linear oscillators in closed form, typed by hand in 80-digit arithmetic: what the FMUs are judged by.
+
+Between two changes of mode or of force, with s the time since the last one and y = x - x(0),
+
+    m y'' + c y' + k y = N + R s,    y(0) = 0, y'(0) = v
+
+(N the net force at the start, R its rate).  With r1, r2 the roots of m r^2 + c r + k = 0, and [a, b, ...] the divided
+difference of exp(r s) over the nodes a, b, ..., which covers every damping regime in one formula,
+
+    G = [r2, r1],  I = [r2, r1, 0],  J = [r2, r1, 0, 0]          (G, its integral, and the integral of that)
+    y = v G + (N I + R J)/m,    y' = v (exp(r2 s) + r1 G) + (N G + R I)/m
+
+Nothing here is shared with the code under test.  Digits lost by nodes that nearly coincide are paid for in advance.
+"""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from itertools import count, takewhile
+
+from mpmath import atan2, atanh, exp, factorial, findroot, mp, mpf, pi, re, sign, sqrt
+
+mp.dps = 80
+TOUCH_TOLERANCE = (
+    mpf(10) ** -40
+)  # a speed this near to zero only touches it; a load this near to the limit is the limit
+ROUNDING = mpf(10) ** -75  # of a speed; below it a root is found no better, however often it is looked for
+
+
+@dataclass(frozen=True)
+class System:
+    """Forces of one span of time (SI units): `slide` and `hold` are the friction forces, `speed` is the driver's."""
+
+    m: float
+    k: float
+    c: float = 0.0
+    slide: float = 0.0
+    hold: float = 0.0
+    speed: float = 0.0
+    push: float = 0.0
+    dry: bool = True
+
+    def load(self, x, drive):
+        """What the mass would feel without friction and damping."""
+        return mpf(self.push) + mpf(self.k) * (drive - x)
+
+    @property
+    def rate(self):
+        """Of the load, while the mass rests."""
+        return mpf(self.k) * mpf(self.speed)
+
+
+def smd(m=1.0, k=157.9, c=2.0, F_ext=0.0):
+    return System(m, k, c, push=F_ext, dry=False)
+
+
+def coulomb(m=1.0, k=157.9, c=0.0, f=0.5, F_ext=0.0):
+    return System(m, k, c, f, f, push=F_ext)
+
+
+def stickslip(m=12.5, k=742.5, mu_s=0.9, mu_d=0.6, g=9.81, v_driver=0.034, F_ext=0.0):
+    weight = mpf(m) * mpf(g)
+    return System(m, k, slide=mu_d * weight, hold=mu_s * weight, speed=v_driver, push=F_ext)
+
+
+class LinearSegment:
+    """One linear piece: displacement and speed, and where the speed first changes sign."""
+
+    def __init__(self, system, net, v):
+        self.m, self.c, self.k = mpf(system.m), mpf(system.c), mpf(system.k)
+        self.net, self.rate, self.v = mpf(net), system.rate, mpf(v)
+        spread = sqrt(self.c**2 - 4 * self.m * self.k)
+        self.nodes = [(-self.c - spread) / (2 * self.m), (-self.c + spread) / (2 * self.m), mpf(0), mpf(0)]
+
+    def at(self, s):
+        """Displacement y and speed y' at s."""
+        first = [exp(r * s) for r in self.nodes]
+        row, heads = first, []
+        for n in range(1, 4):
+            row = [
+                (b - a) / (high - low) if high != low else s**n / factorial(n) * start
+                for a, b, low, high, start in zip(row, row[1:], self.nodes, self.nodes[n:], first, strict=False)
+            ]
+            heads.append(row[0])
+        G, I, J = heads  # noqa: E741 - the names of the equations
+        y = self.v * G + (self.net * I + self.rate * J) / self.m
+        v = self.v * (first[0] + self.nodes[1] * G) + (self.net * G + self.rate * I) / self.m
+        return re(y), re(v)
+
+    def flats(self):
+        """The times s > 0, in order, where the acceleration is zero; between two of them the speed is monotonic.
+
+        a = exp(-d s) (a0 cos(w s) + b/w sin(w s)) with d = c/(2 m), w^2 = k/m - d^2, b = a'(0) + d a0.
+        """
+        d = self.c / (2 * self.m)
+        a = (self.net - self.c * self.v) / self.m
+        b = (self.rate - self.c * a - self.k * self.v) / self.m + d * a
+        square = self.k / self.m - d**2
+        if a == b == 0:
+            return
+        if square > 0:
+            w = sqrt(square)
+            first = atan2(-a * w, b) % pi
+            yield from ((first + n * pi) / w for n in count(0 if first > 0 else 1))
+        elif b != 0:
+            w = sqrt(-square)
+            if 0 < -a * w / b < 1:
+                yield atanh(-a * w / b) / w
+            elif w == 0 < -a / b:
+                yield -a / b
+
+    def turning_point(self, mode, horizon, catches):
+        """The first s in (0, horizon] where the speed leaves the sign of `mode`, or None.
+
+        `catches`: static friction is larger, so that a speed which only touches zero stays there.
+        """
+        low = mpf(0)
+        for high in [*takewhile(lambda s: s < horizon, self.flats()), mpf(horizon)]:
+            if catches and abs(self.at(high)[1]) <= TOUCH_TOLERANCE:
+                return high
+            if mode * self.at(high)[1] < -TOUCH_TOLERANCE:
+                return findroot(lambda s: self.at(s)[1], (low, high), solver="anderson", tol=ROUNDING, maxsteps=200)
+            low = high
+        return None
+
+
+class Stuck:
+    """A mass at rest: no displacement, no speed."""
+
+    @staticmethod
+    def at(s):
+        return mpf(0), mpf(0)
+
+
+class ClosedFormMotion:
+    """The motion from the state (x, v) over spans of constant parameters, up to `stop`.
+
+    `spans` is a list of (time, System), the first of them at the start time.  `events` lists (time, new mode) for
+    every change of mode (-1, 0, 1; always 1 without dry friction).
+    """
+
+    def __init__(self, spans, x, v, stop):
+        self.starts, self.modes, self.parts, self.events = [], [], [], []
+        self.t, self.x, self.v, self.drive = mpf(spans[0][0]), mpf(x), mpf(v), mpf(0)
+        for (_, system), end in zip(spans, [mpf(t) for t, _ in spans[1:]] + [mpf(stop)], strict=True):
+            self.span(system, end)
+
+    def span(self, system, end):
+        """Append the pieces from the present point to `end`."""
+        load, rate = system.load(self.x, self.drive), system.rate
+        mode = (int(sign(self.v)) or direction(load, rate, system.hold)) if system.dry else 1
+        net = load - mode * system.slide
+        while True:
+            stuck = system.dry and mode == 0
+            piece = Stuck() if stuck else LinearSegment(system, net, self.v)
+            self.append(mode, piece)
+            if not system.dry:
+                s = None
+            elif stuck:
+                s = None if rate == 0 else (sign(rate) * system.hold - load) / rate
+            else:
+                s = piece.turning_point(mode, end - self.t, catches=system.hold > system.slide)
+            if s is None or self.t + s >= end:
+                self.move(system, piece, end - self.t)
+                return
+            self.move(system, piece, s)
+            self.v, load = mpf(0), system.load(self.x, self.drive)
+            # at a break-away the load equals the limit by definition: no rounding decides the direction
+            mode = int(sign(rate)) if stuck else direction(load, rate, system.hold)
+            net = mode * (system.hold - system.slide) if stuck else load - mode * system.slide
+
+    def append(self, mode, piece):
+        if self.modes and mode != self.modes[-1]:
+            self.events.append((self.t, mode))
+        self.starts.append(self.t)
+        self.modes.append(mode)
+        self.parts.append((self.x, piece))
+
+    def move(self, system, piece, s):
+        y, self.v = piece.at(s)
+        self.t, self.x, self.drive = self.t + s, self.x + y, self.drive + mpf(system.speed) * s
+
+    def at(self, t):
+        """Position and speed at time t."""
+        i = max(bisect_right(self.starts, t) - 1, 0)
+        x, piece = self.parts[i]
+        y, v = piece.at(mpf(t) - self.starts[i])
+        return x + y, v
+
+
+def direction(load, rate, limit):
+    """Where a mass at rest goes: nowhere while friction can hold the load.
+
+    Just the limit is held, unless the load is about to exceed it.
+    """
+    for way in (-1, 1):
+        if way * load > limit + TOUCH_TOLERANCE or (way * rate > 0 and way * load > limit - TOUCH_TOLERANCE):
+            return way
+    return 0

@@ -1,0 +1,73 @@
+"""Runs inside Python, step by step: of a model as it is written out, and of the sources on numpy arrays."""
+
+import struct
+
+import numpy as np
+from array_model import to_array_model
+
+from fmus.runtime import vectors
+
+COUNTS = ("n_accepted", "n_rejected", "n_rhs")
+
+
+def prepared_model(model, values, stop):
+    """A model with its values, at the start of a run."""
+    for variable, value in values.items():
+        owner = model.solver if "." in variable else model
+        setattr(owner, variable.split(".")[-1], value)
+    assert model.prepare() == 0
+    return model
+
+
+def start(model, y, stop):
+    model.solver.start(model, 0.0, *y, stop, model.tolerance)
+
+
+def bits(numbers):
+    """Of numbers, whatever Python calls them; all that is not a number is alike."""
+    return [struct.pack("<d", float(value)) if value == value else b"NaN" for value in numbers]
+
+
+def state_values(step, names):
+    """Numbers of a vector at the end of a step, by the names of their parts: x1 of x, x1_1 of x1."""
+    return [getattr(step, name + ("_" if name[-1].isdigit() else "") + "1") for name in names]
+
+
+def scalar_steps(model, values, stop, most):
+    """For each internal step its end, the state, its own rates, the modes, the size to try next, the counts, and the
+    state in its middle."""
+    prepared_model(model, values, stop)
+    start(model, model.initial_state(0.0), stop)
+    rates = [rate for rate in model.states.values() if rate not in model.states]
+
+    def row(step):
+        numbers = state_values(step, [*model.states, *rates, *model.contacts])
+        return [step.t1, *numbers, step.h_next, *counts(step), *step.state_at(model, 0.5 * (step.t0 + step.t1))]
+
+    return list(steps(model, row, stop, most))
+
+
+def array_steps(model, values, stop, most):
+    """The same of the sources."""
+    prepared_model(model, values, stop)
+    model = to_array_model(model)
+    start(model, [model.initial_state(0.0)], stop)
+
+    def row(step):
+        middle = step.state_at(model, 0.5 * (step.t0 + step.t1))
+        return [step.t1, *step.y1, *step.f1[vectors.is_dynamic], *step.modes1, step.h_next, *counts(step), *middle]
+
+    with np.errstate(all="ignore"):
+        return list(steps(model, row, stop, most))
+
+
+def counts(step):
+    return [*(getattr(step, name, 0) for name in COUNTS), getattr(step.interpolant, "n_event_evals", 0)]
+
+
+def steps(model, row, stop, most):
+    step = model.solver.step
+    while step.t1 < stop and most:
+        assert step.compute_next(model) == 0
+        yield bits(row(step))
+        most -= 1

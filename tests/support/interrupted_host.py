@@ -1,0 +1,94 @@
+"""A host in Python that is interrupted while its FMU computes: python interrupted_host.py FUNCTION '[ARGUMENTS]'."""
+
+import json
+import os
+import signal
+import sys
+import tempfile
+from math import isnan
+
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
+
+import worker
+
+
+class Stop(BaseException):
+    """What a host may have its handler raise."""
+
+    def __init__(self, why, when):
+        super().__init__(why, when)
+
+
+def stop(*_):
+    raise Stop("enough", 3)
+
+
+HANDLERS = {
+    "KeyboardInterrupt": signal.default_int_handler,
+    "SystemExit": lambda *_: sys.exit(143),
+    "Stop": stop,
+}
+
+
+def start_fmu(path):
+    process = worker.Worker(tempfile.mkdtemp())
+    fmu = process.instances[process.instantiate(path, "interrupted")]
+    begin(fmu)
+    return fmu
+
+
+def begin(fmu):
+    fmu.set({"solver.method": 2, "solver.rtol": 1e-9})  # ode23: seconds and seconds of work
+    fmu.setup(0.0, None, None)
+    fmu.init()
+
+
+def interrupt(*_):
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def interrupt_long_step(path, handler):
+    """One step of minutes: what reaches the host, what the log says, what is read, and whether a reset recovers."""
+    signal.signal(signal.SIGINT, HANDLERS[handler])
+    fmu = start_fmu(path)
+    signal.signal(signal.SIGVTALRM, interrupt)
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0.1)  # of the processor's time: the step is under way, however busy it is
+    try:
+        fmu.step(0.0, 1e7)
+    except BaseException as error:
+        reached = type(error).__name__, error.args
+    answer = {"reached": reached, "log": fmu.messages(), "x": isnan(fmu.get(["x"])[0])}
+    fmu.reset()
+    begin(fmu)
+    fmu.step(0.0, 0.1)
+    answer["recovers"] = not isnan(fmu.get(["x"])[0])
+    fmu.free()
+    return answer
+
+
+def interrupt_short_steps(path, times):
+    """So often in short steps, most of them at the very entry or exit of a call: what reaches the host."""
+    fmu, reached = start_fmu(path), []
+
+    def ring(*_):
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGALRM, ring)
+    for i in range(times):
+        t = 0.0
+        try:
+            signal.setitimer(signal.ITIMER_REAL, 0.001 + 2.74e-5 * i)
+            while True:
+                fmu.step(t, 1e-5)
+                t += 1e-5
+                fmu.get(["x", "v"])
+        except BaseException as error:
+            reached.append(type(error).__name__)
+        fmu.reset()
+        begin(fmu)
+    fmu.free()
+    return sorted(set(reached)), len(reached)
+
+
+if __name__ == "__main__":
+    print(json.dumps(globals()[sys.argv[1]](*json.loads(sys.argv[2]))))

@@ -1,0 +1,70 @@
+"""Coverage of the 95 % intervals of identified decays: `python tests/support/interval_coverage.py [RECORDS]`.
+
+RECORDS for each law, of masses and of pendulums, with white noise and with quantised samples, and of velocities and
+accelerations; then the records that are wrong by more than five standard errors without a remark, of which there must
+be none.  A share of n records scatters by sqrt(0.95 0.05/n).  Ctrl-C shows what there is until then.
+"""
+
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from decays import random_record
+
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
+from harness.analyses.decay.law import LAWS
+from harness.errors import HarnessError
+from harness.records.record import QUANTITIES
+
+NAMES = ("omega", "zeta", "r", "b", "rest")
+SAMPLES = 600
+FAR = 5.0  # standard errors
+POSITIONS = tuple(product(LAWS, (False, True), (False, True), (0,)))
+RATES = tuple(product(LAWS, (False, True), (False,), (1, 2)))
+CASES = POSITIONS + RATES
+
+
+def check_record(number):
+    """Of the record of a number, whose case is its remainder: which intervals hold the truth, and what went wrong."""
+    law, sine, quantised, order = CASES[number % len(CASES)]
+    record, truth, _ = random_record(number, law, sine, quantised, SAMPLES, order)
+    try:
+        found = fit_decay(record, KnownParameters(pendulum=sine))
+    except HarnessError as refusal:
+        return [], str(refusal)
+    each = {one.name: one for one in found.estimates}
+    off = max(abs(each[name].value - truth[name]) / each[name].error for name in NAMES)
+    wrong = f"off by {off:.1f} errors" if off > FAR and not found.remarks else ""
+    return [each[name].low <= truth[name] <= each[name].high for name in NAMES], wrong
+
+
+def table_lines(rows):
+    """The table of what was judged, in the order of the numbers."""
+    yield f"{'law':12} {'kind':9} {'quantity':13} {'noise':10} {'records':>7} " + " ".join(
+        f"{name:>6}" for name in (*NAMES, "all")
+    )
+    for i, (law, sine, quantised, order) in enumerate(CASES):
+        held = [held for held, _ in rows[i :: len(CASES)] if held]
+        kind, noise = "pendulum" if sine else "mass", "quantised" if quantised else "white"
+        shares = np.mean(held, axis=0) if held else np.full(len(NAMES), np.nan)
+        yield f"{'+'.join(law):12} {kind:9} {QUANTITIES[order]:13} {noise:10} {len(held):7} " + " ".join(
+            f"{share:6.3f}" for share in (*shares, shares.mean())
+        )
+    held = [held for held, _ in rows if held]
+    yield f"{'all':47} {len(held):7} " + " ".join(f"{share:6.3f}" for share in (*np.mean(held, 0), np.mean(held)))
+    yield from (f"record {number}: {text}" for number, (_, text) in enumerate(rows) if text)
+
+
+if __name__ == "__main__":
+    rows = []
+    with suppress(KeyboardInterrupt), ProcessPoolExecutor(2) as pool:
+        for row in pool.map(check_record, range(int((sys.argv[1:] or [1000])[0]) * len(CASES)), chunksize=8):
+            rows.append(row)
+    print(*table_lines(rows), sep="\n")

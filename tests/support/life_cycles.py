@@ -1,0 +1,210 @@
+"""Many lives of FMUs in one process: a test names a function here and what to give it; the answer is JSON.
+
+python life_cycles.py FUNCTION '[ARGUMENTS]'
+"""
+
+import ctypes
+import gc
+import json
+import multiprocessing
+import os
+import sys
+import threading
+from functools import cache
+from itertools import pairwise
+from shutil import rmtree
+
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
+
+TIMES = [0.25 * i for i in range(9)]
+
+
+describe = cache(read_model_description)
+
+
+class LifeCycle:
+    """An instance of the FMU in a folder."""
+
+    def __init__(self, folder, name="life"):
+        description = describe(folder)
+        self.fmu = FMU2Slave(
+            guid=description.guid, unzipDirectory=folder, modelIdentifier=description.modelName, instanceName=name
+        )
+        declared = description.modelVariables
+        self.outputs = [v.valueReference for v in declared if v.causality == "output" and v.type == "Real"]
+        self.fmu.instantiate()
+
+    def begin(self):
+        self.fmu.setupExperiment(startTime=TIMES[0], stopTime=TIMES[-1])
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+        return self
+
+    def step(self, t, ahead):
+        self.fmu.doStep(t, ahead - t)
+        return self.read()
+
+    def read(self):
+        return [value.hex() for value in self.fmu.getReal(self.outputs)]
+
+    def run(self):
+        return [self.step(t, ahead) for t, ahead in pairwise(TIMES)]
+
+    def end(self):
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+
+
+class Heap(ctypes.Structure):
+    """What mallinfo(3) of glibc tells."""
+
+    _fields_ = [(name, ctypes.c_int) for name in ("_0", "_1", "_2", "_3", "mapped", "_5", "_6", "used", "_8", "_9")]
+
+
+def memory():
+    """What is in use of the heap of C and of Python's own, whose blocks have some 64 bytes, in kB.  Of the resident
+    memory the same leak would show after ten times as many lives."""
+    gc.collect()
+    tell = ctypes.CDLL(None).mallinfo
+    tell.restype = Heap
+    return (tell().mapped + tell().used + 64 * sys.getallocatedblocks()) / 1000
+
+
+def run_in_turn(paths, number):
+    """Create, run, reset, run, free, one FMU after another: the runs that came of it, the memory after a tenth of the
+    lives and after all, and what sys.path gained."""
+    folders, before, after = [extract(path) for path in paths], list(sys.path), []
+    rows = {folder: set() for folder in folders}
+    for i in range(number):
+        folder = folders[i % len(folders)]
+        life = LifeCycle(folder)
+        rows[folder].add(repr(life.begin().run()))
+        life.fmu.reset()
+        rows[folder].add(repr(life.begin().run()))
+        life.end()
+        if i + 1 in (number // 10, number):
+            after.append(memory())
+    path = [entry for entry in sys.path if entry not in before]
+    return {"runs": [len(found) for found in rows.values()], "memory": after, "path": path}
+
+
+def run_interleaved(paths, number):
+    """All alive at once, stepped in turns: how many different runs each FMU gave, and the memory a life took."""
+    folders = [extract(path) for path in paths]
+    fleet = [[LifeCycle(folder, str(i)).begin() for i in range(5)] for folder in folders]
+    before = memory()
+    for lives, folder in zip(fleet, folders, strict=True):
+        lives += [LifeCycle(folder, str(i)).begin() for i in range(number)]
+    each = (memory() - before) / (number * len(paths))
+    rows = {}
+    for t, ahead in pairwise(TIMES):
+        for name, lives in enumerate(fleet):
+            rows.setdefault((name, t), set()).update(repr(life.step(t, ahead)) for life in lives)
+    for lives in reversed(fleet):
+        for life in reversed(lives):
+            life.end()
+    return {"runs": max(map(len, rows.values())), "each": each}
+
+
+def unpack_for_every_run(path, number):
+    """Unpacked, run and removed, as fmpy's simulate_fmu does: memory early and late, libraries and sys.path then."""
+    before, after = list(sys.path), []
+    for i in range(number):
+        folder = extract(path)
+        LifeCycle(folder).begin().end()
+        describe.cache_clear()
+        rmtree(folder)
+        if i + 1 in (number // 10, number):
+            after.append(memory())
+    with open("/proc/self/maps") as maps:
+        libraries = len({line.split(maxsplit=5)[5] for line in maps if "/binaries/" in line})
+    return {"memory": after, "libraries": libraries, "path": [entry for entry in sys.path if entry not in before]}
+
+
+def run_in_threads(paths, threads, turns):
+    """Each thread takes lives of every FMU, one after another: the different runs that came of it."""
+    folders = [extract(path) for path in paths]
+    for folder in folders:
+        describe(folder)  # now: the XML parser behind it fails now and then when two threads meet in it
+    rows, errors = {folder: set() for folder in folders}, []
+
+    def work():
+        try:
+            for _ in range(turns):
+                for folder in folders:
+                    life = LifeCycle(folder)
+                    rows[folder].add(repr(life.begin().run()))
+                    life.end()
+        except BaseException as error:
+            errors.append(repr(error))
+
+    workers = [threading.Thread(target=work) for _ in range(threads)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    return {"runs": [len(found) for found in rows.values()], "errors": errors}
+
+
+def continue_instances(given, folders):
+    """What the instances that were given say next, and a whole life of each FMU."""
+    return [life.step(TIMES[1], TIMES[2]) for life in given], [LifeCycle(folder).begin().run() for folder in folders]
+
+
+def run_in_child(answers, *given):
+    answers.put(continue_instances(*given))
+
+
+def run_in_processes(paths, method):
+    """Instances carried into two forked children, or none into a spawned one; the children against the parent."""
+    folders = [extract(path) for path in paths]
+    given = [LifeCycle(folder).begin() for folder in folders]
+    for life in given:
+        life.step(TIMES[0], TIMES[1])
+    if method == "spawn":
+        given = []
+    context = multiprocessing.get_context(method)
+    answers = context.Queue()
+    children = [context.Process(target=run_in_child, args=(answers, given, folders)) for _ in range(2 if given else 1)]
+    for child in children:
+        child.start()
+    told = [answers.get(timeout=60) for _ in children]
+    for child in children:
+        child.join(60)
+    expected = continue_instances(given, folders)
+    return {"same": all(answer == expected for answer in told), "codes": [child.exitcode for child in children]}
+
+
+def run_beside_sources(root, paths):
+    """The FMUs in a host that has imported the sources and another pythonfmu: the files their code came from."""
+    sys.path.insert(0, root)
+    import pythonfmu
+
+    import fmus.runtime.slave
+
+    assert fmus.runtime.slave.Fmi2Slave is pythonfmu.fmi2slave.Fmi2Slave
+    pythonfmu.fmi2slave.Fmi2Slave.do_step = None  # whoever leaned on it would notice
+    mine = set(sys.modules)
+    rows = run_each(paths)
+    new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - mine}
+    places = (os.path.join(root, "fmus", ""), os.path.join(os.path.dirname(pythonfmu.__file__), ""))
+    return {"rows": rows, "foreign": [file for file in new if file and file.startswith(places)]}
+
+
+def run_in_folder(path, folder):
+    """A run of the FMU unpacked into this very folder."""
+    life = LifeCycle(extract(path, folder))
+    rows = life.begin().run()
+    life.end()
+    return rows
+
+
+def run_each(paths):
+    """A run of each FMU."""
+    return [run_in_folder(path, None) for path in paths]
+
+
+if __name__ == "__main__":
+    function, arguments = sys.argv[1], json.loads(sys.argv[2])
+    print(json.dumps(globals()[function](*arguments)))

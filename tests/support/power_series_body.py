@@ -1,0 +1,123 @@
+"""One body under a force that is a polynomial in time, by power series in many digits: friction, spring and damper.
+
+m a = F(t) + k u t - k x - c v - mode slide,   stuck while |F(t) + k u t - k x| <= hold
+"""
+
+from decimal import Decimal, localcontext
+from itertools import pairwise
+from math import factorial
+
+import numpy as np
+
+STEP, TERMS, HALVINGS, NEWTONS, DIGITS = Decimal(1) / 16, 50, 100, 8, 34
+TIE = Decimal("1e-25")
+
+
+class Body:
+    """Where it is at time t, under a force in whose course it has been pushed; `events` tells when its mode changed."""
+
+    def __init__(self, m=1.0, k=0.0, c=0.0, hold=0.0, slide=0.0, u=0.0, x=0.0, v=0.0):
+        self.m, self.k, self.c, self.hold, self.slide, self.u = map(Decimal, (m, k, c, hold, slide, u))
+        self.t, self.x, self.v, self.mode, self.events = Decimal(0), Decimal(x), Decimal(v), 0, []
+        self.force, self.pushed = [Decimal(0)], Decimal(0)
+
+    def push(self, *force):
+        """From here on the force has this value and these derivatives; those of higher orders go on."""
+        self.force, self.pushed = [*map(Decimal, force), *self.course()[len(force) :]], self.t
+        before, self.mode = self.mode, self.settled()
+        self.events += [self.t] * bool(self.hold and self.t and self.mode != before)
+
+    def course(self):
+        """The force and its derivatives."""
+        s, many = self.t - self.pushed, len(self.force)
+        return [value([self.force[j] / factorial(j - n) for j in range(n, many)][::-1], s) for n in range(many)]
+
+    def forces(self):
+        """The load and its derivatives, while the body stays where it is."""
+        found = [*self.course(), Decimal(0), Decimal(0)]
+        found[0] += self.k * (self.u * self.t - self.x)
+        found[1] += self.k * self.u
+        return found
+
+    def settled(self):
+        """The mode that holds from here on; without dry friction any does."""
+        load, *rates = self.forces()
+        if self.v or not self.hold:
+            return sign(self.v)
+        outward = next((load * rate > 0 for rate in rates if rate), False)
+        return 0 if abs(load) + (TIE if outward else -TIE) <= self.hold else sign(load)
+
+    def series(self):
+        """The coefficients of position and speed, the highest first."""
+        forces = self.forces()
+        forces[0] += self.k * self.x - self.mode * self.slide
+        x = [self.x, self.v]
+        for n in range(TERMS):
+            force = forces[n] / factorial(n) if n < len(forces) else 0
+            x.append((force - self.k * x[n] - self.c * (n + 1) * x[n + 1]) / (self.m * (n + 1) * (n + 2)))
+        return x[::-1], [n * one for n, one in enumerate(x)][:0:-1]
+
+    def release(self):
+        """How long it stays where it is, and in which direction it goes then."""
+        load, *others = [one / factorial(n) for n, one in enumerate(self.forces())]
+        found = [(Decimal("inf"), 0)]
+        for side in 1, -1:
+            terms = [load - side * self.hold, *others]
+            while terms and not terms[-1]:
+                terms.pop()
+            rates = [n * one for n, one in enumerate(terms)][1:]
+            for root in np.polynomial.polynomial.polyroots([*map(float, terms or [1])]):
+                wait = Decimal(root.real)
+                for _ in range(NEWTONS * (abs(root.imag) < 1e-9)):
+                    wait -= value(terms[::-1], wait) / value(rates[::-1], wait)
+                found += [(wait, side)] * bool(abs(root.imag) < 1e-9 and wait > TIE)
+        return min(found)
+
+    def go(self, t):
+        """Position and speed at time t."""
+        t = Decimal(t)
+        while self.t < t:
+            h = min(STEP, t - self.t)
+            if self.hold and not self.mode:
+                wait, side = self.release()
+                if wait > t - self.t:
+                    self.t = t
+                else:
+                    self.t, self.mode = self.t + wait, side
+                    self.events.append(self.t)
+                continue
+            x, v = self.series()
+            ends = self.hold and self.mode * value(v, h) <= 0
+            if ends:
+                low = h * TIE * (not self.v)
+                for _ in range(HALVINGS):
+                    middle = (low + h) / 2
+                    low, h = (middle, h) if self.mode * value(v, middle) > 0 else (low, middle)
+            self.t, self.x, self.v = self.t + h, value(x, h), value(v, h) * (not ends)
+            if ends:
+                self.mode = self.settled()
+                self.events.append(self.t)
+        return self.x, self.v
+
+
+def sign(number):
+    return (number > 0) - (number < 0)
+
+
+def value(series, h):
+    """Of a polynomial, by its coefficients, the highest first."""
+    total = Decimal(0)
+    for one in series:
+        total = total * h + one
+    return total
+
+
+def sample_motion(body, pieces, times):
+    """Position, speed and time of the last event at each of the times, under a force that changes in pieces."""
+    rows, left = [], list(pieces)
+    with localcontext(prec=DIGITS):
+        for t, end in pairwise([0.0, *times]):
+            if left and left[0][0] == t:
+                body.push(*left.pop(0)[1:])
+            rows.append([*map(float, body.go(end)), float(body.events[-1]) if body.events else 0.0])
+    return rows

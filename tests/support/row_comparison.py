@@ -1,0 +1,16 @@
+"""Two tables of values that must agree, row by row; the first difference is told."""
+
+
+def assert_identical(rows, expected, names):
+    """Bit for bit; NaN equals NaN."""
+    assert_close(rows, expected, names, 0.0)
+
+
+def assert_close(rows, expected, names, rel):
+    """Every Real within `rel` of the largest value of its column; integers exactly, and NaN where NaN is expected."""
+    assert len(rows) == len(expected)
+    for name, column, reference in zip(names, zip(*rows, strict=True), zip(*expected, strict=True), strict=True):
+        numbers = [abs(b) for b in reference if b == b]
+        bound = rel * max(numbers) if numbers and isinstance(reference[0], float) else 0
+        for i, (a, b) in enumerate(zip(column, reference, strict=True)):
+            assert repr(a) == repr(b) or abs(a - b) <= bound, f"{name} in row {i}: {a!r}, expected {b!r} +- {bound:.1e}"

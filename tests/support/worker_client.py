@@ -1,0 +1,175 @@
+"""Built FMUs at arm's length: worker.py in a clean process, its crashes and hangs told in one sentence."""
+
+import itertools
+import json
+import os
+import select
+import tempfile
+from pathlib import Path
+
+import pytest
+from fork_server import ForkedProcess, pipe
+
+TIMEOUT = 120.0  # s, for one request
+
+
+def run_script(script, function, *arguments, **how):
+    """What a function of a script here answers, in a process that must end well and say nothing."""
+    answer, said = run_script_with_stderr(script, function, *arguments, **how)
+    assert said == ""
+    return answer
+
+
+def run_script_with_stderr(script, function, *arguments, folder=None, timeout=300):
+    """The same, and what it says on standard error."""
+    words = [Path(__file__).with_name(script), function, json.dumps(arguments, default=str)]
+    with open(os.devnull) as nothing, tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
+        process = ForkedProcess(words, nothing, out, err, folder)
+        try:
+            status = process.wait(timeout)
+        finally:
+            process.kill()
+        answer, said = (file.seek(0) or file.read() for file in (out, err))
+    assert status == 0, f"exit status {status}: {said}"
+    return json.loads(answer), said
+
+
+class FmiError(Exception):
+    """An FMI call did not return OK."""
+
+    def __init__(self, function, status):
+        super().__init__(f"{function} returned status {status}")
+        self.function, self.status = function, status
+
+
+class Worker:
+    """A process that runs FMUs; `alive` until it is closed, crashes or hangs."""
+
+    script = "worker.py"
+
+    def __init__(self):
+        self.stderr_file = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - lives as long as the process
+        script, (asked, self.asking), (self.answers, answering) = Path(__file__).with_name(self.script), pipe(), pipe()
+        with asked, answering:
+            self.process = ForkedProcess([script], asked, answering, self.stderr_file, tempfile.gettempdir())
+        self.heard, self.pending = 0, b""
+
+    @property
+    def alive(self):
+        return self.process.poll() is None
+
+    def call(self, instance, function, *arguments):
+        """The value of one request; Refused when an FMI call fails, AssertionError when anything else does."""
+        try:
+            self.asking.write(json.dumps([instance, function, arguments]).encode() + b"\n")
+            answer = json.loads(self._line(function))
+        except BrokenPipeError:
+            raise AssertionError(self._death_message(function)) from None
+        if "refused" in answer:
+            raise FmiError(*answer["refused"])
+        assert "value" in answer, answer["failed"]
+        return answer["value"]
+
+    def _line(self, function):
+        out = self.answers.fileno()
+        while b"\n" not in self.pending:
+            if not select.select([out], [], [], TIMEOUT)[0]:
+                self.process.kill()
+                raise AssertionError(f"the FMU process hung for {TIMEOUT:.0f} s in {function}: {self.read_stderr()}")
+            piece = os.read(out, 1 << 20)
+            if not piece:
+                raise AssertionError(self._death_message(function))
+            self.pending += piece
+        line, _, self.pending = self.pending.partition(b"\n")
+        return line
+
+    def _death_message(self, function):
+        return f"the FMU process died in {function} with exit code {self.process.wait(10)}: {self.read_stderr()}"
+
+    def read_stderr(self):
+        """What was written to standard error since the last call."""
+        self.stderr_file.seek(self.heard)
+        text = self.stderr_file.read()
+        self.heard += len(text)
+        return text.decode()
+
+    def instantiate(self, path, name="test"):
+        return Instance(self, self.call(None, "instantiate", str(path), name))
+
+    def modules(self):
+        return self.call(None, "modules")
+
+    def directory(self, path):
+        """Where an FMU that was instantiated was extracted to."""
+        return self.call(None, "directory", str(path))
+
+    def close(self):
+        """End the process; the exit code."""
+        self.asking.close()
+        code = self.process.wait(30)
+        self.answers.close()
+        self.stderr_file.close()
+        return code
+
+
+class Instance:
+    """An instance in the worker; its methods are those of worker.Instance."""
+
+    def __init__(self, worker, number):
+        self.worker, self.number, self.freed = worker, number, False
+
+    def __getattr__(self, function):
+        return lambda *arguments: self.worker.call(self.number, function, *arguments)
+
+    def get(self, *names):
+        """The value of one variable, or the list of several."""
+        values = self.worker.call(self.number, "get", names)
+        return values[0] if len(names) == 1 else values
+
+    def begin(self, values=None, start=0.0, stop=None, tolerance=None):
+        """Set values, then go through initialisation."""
+        self.set(values or {})
+        self.setup(start, stop, tolerance)
+        self.init()
+        return self
+
+    def run_with_changes(self, times, names, changes):
+        """As run; at the times in `changes` the values given there are set, after the row was read."""
+        asked = []
+        for t, end in itertools.pairwise([times[0], *sorted(changes), times[-1]]):
+            asked.append([self.number, "set", [changes.get(t, {})]])
+            asked.append([self.number, "run", [[s for s in times if t <= s <= end], names]])
+        first, *others = self.worker.call(None, "batch", asked)[1::2]
+        return first + [row for rows in others for row in rows[1:]]
+
+    def free(self):
+        self.freed = True
+        self.worker.call(self.number, "free")
+
+
+def worker_fixtures(kind, scope):
+    """The fixtures `_workers`, `worker` and `fresh` for processes of a kind, under these names."""
+
+    @pytest.fixture(scope=scope)
+    def _workers():
+        workers = [kind()]
+        yield workers
+        for worker in workers:
+            worker.close()
+
+    @pytest.fixture
+    def worker(_workers):
+        """The process that runs FMUs; a new one when the last test killed it."""
+        if not _workers[-1].alive:
+            _workers.append(kind())
+        _workers[-1].read_stderr()
+        return _workers[-1]
+
+    @pytest.fixture
+    def fresh_worker():
+        """A process of the test's own, which must end well: late damage to memory shows at the exit."""
+        worker = kind()
+        yield worker
+        assert worker.close() == 0
+
+    return _workers, worker, fresh_worker

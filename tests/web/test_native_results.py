@@ -1,0 +1,49 @@
+"""The numbers of the page are those of the native FMU, whatever is set and whenever it is changed."""
+
+import random
+from urllib.parse import urlencode
+
+import native_fmus
+import pytest
+from models import MODELS, declared, outputs, tunable
+
+EXACT, CLOSED = 1e-12, {"smd", "coulomb", "stickslip"}  # of the largest value, where the motion has a closed form
+STATED = 1e-5  # where another library of mathematics shifts the solver's steps, within its tolerance
+ONE = "const main = app.session.runs.main;"
+TIMES = f"{ONE} main.grid.map(row => main.time[row])"
+COLUMNS = f"{ONE} main.reals.map(name => main.grid.map(row => main.columns[name][row]))"
+
+
+def some(name, seed):
+    """Values of all tunable parameters that are not zero, each up to a factor of two off, within the rules."""
+    draw = random.Random(f"{name} {seed}")
+    values = {v: d.start * 2 ** draw.uniform(-1, 1) for v, d in tunable(name).items() if d.start}
+    if "mu_s" in values:
+        values["mu_d"] = draw.uniform(0.4, 0.9) * values["mu_s"]
+    return values
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_random_parameters_and_a_change_during_the_run_match_the_native_fmu(page, worker, name):
+    for seed in range(2):
+        page.open(urlencode({".model": name, **some(name, seed)}))
+        stop = page.run("app.state().stop")
+        when, (later, factor) = stop / 3, ("k" if "k" in declared(name) else "m", 1.25)
+        was = page.run(f"app.state().values[{later!r}]")
+        page.seek(when)
+        page.check("live", True)
+        page.type_number(later, repr(factor * was))
+        page.check("live", False)
+        (change,) = page.run("app.state().changes")
+        assert (change["t"], change["name"]) == (when, later)
+        times, columns = page.run(f"{{ {TIMES} }}"), page.run(f"{{ {COLUMNS} }}")
+        assert len(times) == 1601
+        fmu = worker.instantiate(native_fmus.build_native_fmus() / f"{name}.fmu")
+        fmu.begin(page.run("app.state().values"), stop=stop)
+        names = [v for v in outputs(name) if declared(name)[v].type == "Real"]
+        rows = fmu.run_with_changes(sorted({*times, when}), names, {when: {later: change["value"]}})
+        at = dict(zip(sorted({*times, when}), rows, strict=True))
+        fmu.free()
+        for here, there in zip(columns, zip(*(at[t] for t in times), strict=True), strict=True):
+            apart = max(abs(a - b) for t, a, b in zip(times, here, there, strict=True) if t != when)
+            assert apart <= (EXACT if name in CLOSED else STATED) * max(map(abs, there))

@@ -1,0 +1,122 @@
+"""What the page's C calls of its library is what C, and Python, have under that name."""
+
+import json
+import math
+import random
+import struct
+
+import pytest
+
+from fmus.packaging.native.compiler import INTRINSICS
+from fmus.packaging.native.expressions import ARGUMENT_COUNTS, MAY_RAISE, NEVER_RAISING
+from fmus.packaging.web.html_page import HERE
+
+FUNCTIONS = [function for function in (*NEVER_RAISING, *MAY_RAISE) if function not in INTRINSICS]
+AT = (0.0, -0.0, 1e-300, 1e-9, 0.3, -0.7, 1.0, -1.0, 2.5, -20.0, 700.0, 1e22, math.inf, -math.inf, math.nan)
+NUMBERS = [0.1, 5e-324, 1.7976931348623157e308, 9007199254740993.0, 1e16, 123456.0, 1e-4, 9.5e-5, 4.35, 2.0**-1074]
+
+
+@pytest.fixture(scope="module")
+def library(browser):
+    """An expression of the library's functions, beside a memory of its own and words to put there and to get."""
+    text = (HERE / "script" / "libc.js").read_text(encoding="utf-8").replace("export ", "")
+    setting = """
+        const memory = new WebAssembly.Memory({ initial: 1 }), said = [];
+        const c = libc(() => memory, (bytes) => said.push(...bytes));
+        const view = () => new DataView(memory.buffer);
+        const put = (text) => {
+          const place = c.malloc(text.length + 1);
+          [...text, "\\0"].forEach((each, i) => view().setUint8(place + i, each.charCodeAt(0)));
+          return place;
+        };
+        const get = (place) => {
+          let text = "";
+          for (let i = place; view().getUint8(i); i++) text += String.fromCharCode(view().getUint8(i));
+          return text;
+        };
+    """
+    return lambda expression: browser.run(f"(() => {{ {text} {setting} return {expression}; }})()")
+
+
+def value(function, *arguments):
+    """As C has it: Python raises where there is no number, or none that a double holds."""
+    try:
+        return function(*arguments)
+    except (ValueError, OverflowError):
+        return None
+
+
+@pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.__name__)
+def test_mathematical_functions_agree_with_python(library, function):
+    points = [(a,) for a in AT] if ARGUMENT_COUNTS.get(function, 1) == 1 else [(a, b) for a in AT for b in AT]
+    plain = "(a) => Number.isFinite(a) ? a : String(a)"  # JSON has no other numbers
+    listed = ", ".join("[" + ", ".join(map(js, each)) + "]" for each in points)
+    found = library(f"[{listed}].map((each) => ({plain})(c.{function.__name__}(...each)))")
+    for each, here in zip(points, found, strict=True):
+        there = value(function, *each)
+        if there is None:
+            assert here in ("NaN", "Infinity", "-Infinity"), each
+        else:
+            assert float(here) == pytest.approx(there, rel=1e-15, abs=0, nan_ok=True), each
+
+
+def js(number):
+    return {math.inf: "Infinity", -math.inf: "-Infinity"}.get(number, "NaN" if math.isnan(number) else repr(number))
+
+
+@pytest.mark.parametrize(
+    ("format", "types", "values"),
+    [
+        ("%s (%s): %s\n", "sss", ("sled", "", "no")),
+        ("%lld", "l", (-(2**63),)),
+        ("%se%d", "sd", ("12", -7)),
+        ("%.*e", "de", (16, 5e-324)),
+        ("%.*e", "de", (0, 9.5e22)),
+        ("%c%s%se%c%02d", "csscd", (49, ".", "5", 45, 7)),
+        ("0.%.*s%s", "dss", (2, "0000", "15")),
+        ("\\x%02x", "x", (10,)),
+        ("%d %s %lld %.*e %d", "dslded", (1, "two", 3, 1, 4.0, 5)),
+    ],
+)
+def test_strings_and_numbers_are_formatted_as_in_c(library, format, types, values):
+    size = {"l": 8, "e": 8}
+    method = {"l": "setBigInt64", "e": "setFloat64"}
+    here, steps = 0, []
+    for kind, each in zip(types, values, strict=True):
+        here = -(-here // size.get(kind, 4)) * size.get(kind, 4)
+        given = f"put({json.dumps(each)})" if kind == "s" else f"{each!r}n" if kind == "l" else repr(each)
+        steps.append(f"view().{method.get(kind, 'setInt32')}(values + {here}, {given}, true)")
+        here += size.get(kind, 4)
+    write = f"c.snprintf(place, room, put({json.dumps(format)}), values)"
+    place = "place = c.malloc(100), values = c.malloc(64)"
+    told = format.replace("%lld", "%d") % values
+    for room in (100, 3):
+        done = library(f"(({place}, room = {room}) => [{', '.join(steps)}, {write}, get(place)].slice(-2))()")
+        assert done == [len(told), told[: room - 1]]
+
+
+def test_memory_is_allocated_once_and_grows_until_exhausted(library):
+    sizes = (1, 100, 70_000, 2**32 - 1, 16)
+    *places, none, last = library(f"{list(sizes)}.map((size) => c.malloc(size))")
+    assert none == 0
+    for place, size, following in zip(places, sizes, [*places[1:], last], strict=False):
+        assert (bool(place), place % 16, place + size <= following) == (True, 0, True)
+    assert library("(p => [...new Uint8Array(memory.buffer, p, 15)])(c.calloc(3, 5))") == [0] * 15
+
+
+def test_string_functions_behave_as_in_c(library):
+    assert library("[c.strlen(put('')), c.strlen(put('four'))]") == [0, 4]
+    assert library("((a) => [c.strchr(a, 101) - a, c.strchr(a, 120)])(put('1e5e'))") == [1, 0]
+    assert library("['b', 'bb', 'a', 'c'].map((other) => Math.sign(c.strcmp(put('b'), put(other))))") == [0, -1, 1, -1]
+    assert library("[c.strtod(put('15e-1')), c.atoi(put('-07')), c.atoi(put('+308'))]") == [1.5, -7, 308]
+    assert bytes(library("(c.fwrite(put('tell'), 1, 4, 0), said)")) == b"tell"
+
+
+def test_numbers_in_a_message_are_formatted_as_in_python(page):
+    draw = random.Random(3)
+    doubles = (struct.unpack("<d", draw.randbytes(8))[0] for _ in range(300))
+    values = [-abs(each) for each in (*NUMBERS, *doubles) if math.isfinite(each)]
+    page.open(".model=stickslip")
+    told = "(m) => { try { app.session.runs.main.fmu.begin({ m }, 1) } catch (error) { return error.message } }"
+    for each, sentence in zip(values, page.run(f"{json.dumps(values)}.map({told})"), strict=True):
+        assert sentence.startswith(f"m = {each!r} kg is refused")
