@@ -66,7 +66,7 @@ def step_in_c(case: str) -> Benchmark:
 def run_through_fmpy(model: str) -> Benchmark:
     """One run with 1600 points through fmpy, all outputs recorded."""
     seconds = partial(time_through_fmpy, model, steps=COMMUNICATION_STEPS)
-    return row(
+    return measure_or_skip(
         f"{model}, native: {COMMUNICATION_STEPS} points through fmpy, harness's loop", "s", partial(duel, seconds)
     )
 

@@ -144,7 +144,7 @@ def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> St
     )
 
 
-def spans(
+def value_spans(
     start: float, stop: float, values: dict[str, float], changes: dict[float, dict[str, float]]
 ) -> list[ParameterSpan]:
     """From one change to the next, and the values that hold there; those of the solver are none of the truth's."""
