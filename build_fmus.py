@@ -9,6 +9,7 @@ if Path(sys.path[0]) != Path(__file__).parent:  # by -m: a model where one is ma
 
 from contextlib import AbstractContextManager
 from hashlib import sha256
+from typing import Any
 
 import click
 
@@ -33,6 +34,11 @@ FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  #
 @click.option("--law", "laws", multiple=True, type=click.Choice(list(LAWS)), help="Offer this law; repeatable.")
 @click.option("--platform", "platforms", multiple=True, help="For this only, as linux64; repeatable.")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder; fmus, or beside FILE.py, without.")
+@click.option(
+    "--release",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Write one zip with the FMUs of every kind, the live page, references, licences and checksums.",
+)
 @click.version_option(__version__, prog_name="friction-fmus", message="%(prog)s %(version)s")
 def main(
     models: tuple[str, ...],
@@ -43,6 +49,7 @@ def main(
     laws: tuple[str, ...],
     platforms: tuple[str, ...],
     out: Path | None,
+    release: Path | None,
 ) -> None:
     """Build the FMU of every model NAME, and of the model in every FILE.py (without any: of all models).
 
@@ -51,6 +58,11 @@ def main(
     gc.disable()  # what a build makes stays to its end; to look through it again and again is a tenth of its time
     if web and (compiled or platforms or fmi == "3"):
         raise CommandLineError("--web makes a page and no FMU: leave out --native, --platform and --fmi 3.")
+    if release is not None:
+        if models or compiled or web or methods or laws or platforms or out or fmi == "3":
+            raise CommandLineError("--release builds everything: leave out the other options and models.")
+        print_summary(release_archive(release))
+        return
     compiled, kind = compiled or fmi == "3", "native/fmi3" if fmi == "3" else "native" if compiled else ""
     try:
         wanted = {model: find_model(model) for model in models or model_names()}
@@ -82,7 +94,7 @@ def main(
         print_summary(path, weight)
 
 
-def show_progress(what: str) -> AbstractContextManager[object]:
+def show_progress(what: str) -> AbstractContextManager[Any]:
     """Say at the terminal, as long as it takes, what is being done."""
     from rich.console import Console
 
@@ -102,6 +114,17 @@ def build_native(
     from fmus.packaging.native import build
 
     return build(model, folder, methods, laws, platforms, fmi)
+
+
+def release_archive(folder: Path) -> Path:
+    """Build the release archive."""
+    from fmus.packaging.release import build_release
+
+    try:
+        with show_progress("building everything") as status:
+            return build_release(folder, SCENES.glob("*.toml"), lambda file: status.update(f"building {file}"))
+    except BuildError as error:
+        raise click.ClickException(str(error)) from error
 
 
 def build_page(models: list[ModelFile], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...]) -> Path:

@@ -1,1 +1,53 @@
-"""Runs the built FMUs, measures what they do, and sets it beside what was published."""
+"""Run, compare, sweep and identify FMUs of mechanical oscillators with dry friction.
+
+The functions of this module do what the commands of ``friction-fmus`` do, and return their results to Python. Nothing
+is printed. An error that a user can cause raises a subclass of `HarnessError`.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .api import compare, identify_decay, load_result, simulate, sweep
+from .errors import HarnessError, SceneError
+
+if TYPE_CHECKING:
+    from .analyses.decay.identification import DecayIdentification
+    from .running.trajectory import Run
+    from .studies.compare.difference import Comparison
+
+    __version__: str
+
+__all__ = [
+    "Comparison",
+    "HarnessError",
+    "Identified",
+    "Run",
+    "SceneError",
+    "__version__",
+    "compare",
+    "identify_decay",
+    "load_result",
+    "simulate",
+    "sweep",
+]
+
+# Types of results: loaded on first use, because they import numpy, which `--help` does not need.
+TYPES = {
+    "Comparison": "harness.studies.compare.difference",
+    "Identified": "harness.analyses.decay.identification",
+    "Run": "harness.running.trajectory",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in TYPES:
+        return getattr(import_module(TYPES[name]), name)
+    if name == "__version__":
+        from .results.provenance import HARNESS, installed
+
+        return installed(HARNESS)
+    raise AttributeError(f"module 'harness' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

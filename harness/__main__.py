@@ -8,11 +8,14 @@ if Path(sys.path[0]) != Path(__file__).parents[1]:  # a model in the folder that
     sys.path += [str(Path(__file__).parents[1]), sys.path.pop(0)]
 
 import click
+from click.shell_completion import shell_complete
 
 from .errors import HarnessError
 from .process.interrupt import interruptible
 
-COMMAND_NAME = "python -m harness"
+SCRIPT = "friction-fmus"
+COMMAND_NAME = SCRIPT if Path(sys.argv[0]).stem == SCRIPT else "python -m harness"
+COMPLETION = "_FRICTION_FMUS_COMPLETE"  # the environment variable that click's shell completion sets
 
 
 def main() -> None:
@@ -22,6 +25,8 @@ def main() -> None:
             from .commands import commands
             from .commands.terminal import prepare_process
 
+            if instruction := os.environ.get(COMPLETION):
+                sys.exit(shell_complete(commands, {}, SCRIPT, COMPLETION, instruction))
             prepare_process()
             try:
                 with commands.make_context(COMMAND_NAME, sys.argv[1:]) as context:

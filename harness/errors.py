@@ -2,6 +2,8 @@
 
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
+from importlib import import_module
+from typing import Any
 
 MAX_VALUE_LENGTH = 100  # letters of a value in a sentence
 MAX_LISTED_NAMES = 100  # names in one
@@ -47,3 +49,18 @@ def check_names(kind: str, names: Iterable[str], allowed: Collection[str]) -> No
     for name in names:
         if name not in allowed:
             raise SceneError(unknown_name_message(kind, name, allowed))
+
+
+def optional(package: str, purpose: str, extra: str) -> Any:
+    """Import an optional package.
+
+    Raises
+    ------
+    HarnessError
+        If the package is not installed; the message names the extra that installs it.
+    """
+    try:
+        return import_module(package)
+    except ModuleNotFoundError:
+        install = f"python -m pip install 'friction-fmus[{extra}]'"
+        raise HarnessError(f"{purpose} needs {package}, which is not installed: {install}") from None

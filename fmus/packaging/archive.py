@@ -21,7 +21,7 @@ from pathlib import Path
 from stat import S_IFREG
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from . import BuildError
+from . import BuildError, __date__
 from .embedded_modules import digest, embedded_files, installed_package
 from .extra_files import extra_files
 from .lowering import lowered_files, lowered_model, select_features
@@ -74,8 +74,10 @@ def build(
 
 
 def build_date() -> datetime:
-    """The date that the FMU tells: SOURCE_DATE_EPOCH (https://reproducible-builds.org), or always the same."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    """Return the build date: SOURCE_DATE_EPOCH (https://reproducible-builds.org), or the date of this version."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if epoch is None:
+        return datetime.fromisoformat(__date__).replace(tzinfo=UTC)
     latest = int(LATEST.timestamp())
     if not (epoch.isascii() and epoch.isdigit() and int(epoch) <= latest):
         raise BuildError(f"SOURCE_DATE_EPOCH is {epoch!r}; allowed are whole seconds from 0 to {latest}.")

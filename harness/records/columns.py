@@ -74,7 +74,11 @@ class Column:
 
 def read_record(source: str, columns: ColumnOptions, name: str) -> Record:
     """The record in a file, from `columns.begin` to `columns.end` in s; SceneError in one sentence if it is not one."""
-    table = load_table(source, columns.names)
+    return record_of(load_table(source, columns.names), columns, name)
+
+
+def record_of(table: Table, columns: ColumnOptions, name: str) -> Record:
+    """The same of a table that has been read."""
     if len(table.column_headings) < 2:
         raise SceneError(f"{table.name} has one column that is not empty; time and position are needed")
     if not any(table.column_headings):

@@ -31,12 +31,13 @@ def write_provenance(
     scene: object = None,
     name: str = FILE,
     source: str = "",
+    command: str | None = None,
 ) -> None:
     """Write into a folder of results where they come from: the digests of the `files` that were read, FMUs and
     records, all `parameters` in force, the `scene` as it was run, and the `source` that was named."""
     told = {
         "source": source,
-        "command": shlex.join(["python", "-m", "harness", *sys.argv[1:]]),
+        "command": shlex.join(["python", "-m", "harness", *sys.argv[1:]]) if command is None else command,
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
         "versions": package_versions(),
         "platform": platform.platform(),

@@ -22,6 +22,7 @@ from fmpy.fmi1 import FMICallException as FMICallException  # which those that r
 
 from ..errors import HarnessError, SceneError, first_line
 from .description import read_description, resolve_time_span
+from .inputs import InputSignals, check_inputs
 from .run_spec import RunSpec
 from .settings import check_fmu, resolve_settings
 from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory
@@ -163,6 +164,7 @@ def plan_run(spec: RunSpec, description: Any) -> RunPlan:
     """The plan of a run: what it names, and what follows the solver's steps."""
     variables = {variable.name: variable for variable in description.modelVariables}
     start, stop = resolve_time_span(spec, description)
+    check_inputs(spec.inputs, variables)
     if spec.grid is None and spec.equal_steps:
         spec = replace(spec, grid=(stop - start) / spec.equal_steps or None)
     if spec.grid is not None and (points := (stop - start) / spec.grid) > MAX_POINTS:
@@ -223,9 +225,12 @@ def record_run(plan: RunPlan, fmu: Any, report: ProgressCallback, turn: int) -> 
     n_reals, real_references, reals = make_buffer(plan.variables, plan.reals, c_double)
     n_integers, integer_references, integers = make_buffer(plan.variables, plan.integers, c_int)
     trace = RecordedSamples()
+    signals = input_signals(plan, fmu)
     row_of_reals, row_of_integers = memoryview(reals).cast("B"), memoryview(integers).cast("B")
 
     def record(t: float) -> None:
+        if signals:
+            signals.apply(t, after_event=True)
         if get_real(component, real_references, n_reals, reals) > WARNING:
             raise FMICallException("fmi2GetReal", ERROR)
         if n_integers and get_integer(component, integer_references, n_integers, integers) > WARNING:
@@ -246,10 +251,16 @@ def record_run(plan: RunPlan, fmu: Any, report: ProgressCallback, turn: int) -> 
                 point += 1
             if start + point * grid < stop - nearly:
                 target = start + point * grid
-        if follow and reals[next_at] <= target + nearly:
+        if signals:
+            target = min(target, signals.next_jump(t))
+        # an input that was set at an event restarts the solver there, up to a rounding before it
+        passed = signals is not None and reals[next_at] <= t + nearly
+        if follow and reals[next_at] <= target + nearly and not passed:
             target, ends = min(reals[next_at], stop), True
         if not target > t:
             raise HarnessError(f"{plan.spec.fmu.name}: solver.t_next = {target!r} s does not lie after t = {t!r} s")
+        if signals:
+            signals.apply(0.5 * (t + target))
         status = do_step(component, t, target - t, 1)
         if status > WARNING:
             raise FMICallException("fmi2DoStep", status)
@@ -261,6 +272,12 @@ def record_run(plan: RunPlan, fmu: Any, report: ProgressCallback, turn: int) -> 
         if turns % REPORT_INTERVAL == 0:
             report((turn + (t - start) / (stop - start)) / plan.spec.repeat)
     return trace
+
+
+def input_signals(plan: RunPlan, fmu: Any) -> InputSignals | None:
+    """Return what sets the inputs of an instance, None if the run has no input signals."""
+    inputs = plan.spec.inputs
+    return InputSignals(inputs, fmu.setReal, plan.variables) if inputs else None
 
 
 def make_buffer(variables: dict[str, Any], names: list[str], kind: Any) -> tuple[int, Any, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 from ..errors import SceneError
 from ..scenes.roles import find_roles
 from ..scenes.scene import Scene
+from .inputs import Inputs
 
 # Keys of a scene that are short for a variable of the FMU.
 SHORT_KEYS = {
@@ -24,9 +25,10 @@ DEFAULT_EQUAL_STEPS = 4096  # communication steps of a scene that says nothing o
 class RunSpec:
     """One run of an FMU, from `start` to `stop` in s (None: its own).
 
-    `values` are set by the names of variables, enumerations by label or number.  The communication points are those of
-    the `grid` (a step in s, if there is one; `even`: without one, that of so many steps), and where it is to `follow`
-    them the ends of the solver's own steps.  It is timed as often as it is to `repeat`.
+    `values` are set by the names of variables, enumerations by label or number; `inputs` is a table over time.  The
+    communication points are those of the `grid` (a step in s, if there is one; `even`: without one, that of so many
+    steps), and where it is to `follow` them the ends of the solver's own steps.  It is timed as often as it is to
+    `repeat`.
 
     Somebody else's FMU does not show its solver's steps: what is followed are ever shorter ones, until two results
     agree to the `tolerance`.  It is run by model exchange if `exchange` or if it offers nothing else; if `lenient` also
@@ -36,6 +38,7 @@ class RunSpec:
     fmu: Path
     outputs: tuple[str, ...] = ()
     values: Mapping[str, float | str] = field(default_factory=dict)
+    inputs: Inputs = field(default_factory=dict)
     start: float | None = None
     stop: float | None = None
     grid: float | None = None
@@ -65,10 +68,11 @@ def spec_from_scene(scene: Scene) -> RunSpec:
             raise SceneError(f"{name} is set twice, in [values] and above: leave one out")
     even = DEFAULT_EQUAL_STEPS if scene.follow is None else 0
     own: dict[str, Any] = {
+        "inputs": {},
         "fmu": scene.file,
         "values": short | scene.values,
         "equal_steps": even,
-        "follow": scene.follows_solver_steps,
+        "follow": scene.follows,
     }
     same = {each.name: getattr(scene, each.name) for each in fields(RunSpec) if each.name not in own}
     return RunSpec(**same, **own)

@@ -1,14 +1,23 @@
 """What a run leaves: time, columns, steps, events, cost, and what was wanted."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import HarnessError
-from ..results.files import write_csv, write_signals
+from ..errors import HarnessError, check_names, optional
+from ..results.files import heading, write_csv, write_signals
 from ..results.quantity import Quantity
 from .run_spec import RunSpec
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+FILES = ("trajectory.csv", "steps.csv", "events.csv")
+MOST_PANELS = 8  # of a plot that names no outputs
 
 
 @dataclass(frozen=True)
@@ -75,6 +84,118 @@ class Trajectory:
         """The value of every parameter, and its unit."""
         return {name: (value, self.units[name]) for name, value in self.parameters.items()}
 
+    @property
+    def statistics(self) -> Statistics | None:
+        """Steps, right-hand side evaluations and seconds of the run; None where the FMU does not show them."""
+        return self.cost
+
+    def __repr__(self) -> str:
+        """Describe the run in one line; its arrays may be long."""
+        span = f"{len(self.time)} points from {self.time[0]:g} to {self.time[-1]:g} s"
+        return f"<{type(self).__name__} of {self.spec.model}: {', '.join(self.columns)}; {span}>"
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return the values (n,) of an output by its name."""
+        check_names("column", [name], self.columns)
+        return self.columns[name]
+
+    def to_pandas(self) -> "pandas.DataFrame":
+        """Convert to a DataFrame with the time in s as its index.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A column for each output; ``attrs["units"]`` holds the units by name.
+
+        Raises
+        ------
+        HarnessError
+            If pandas is not installed.
+        """
+        library = optional("pandas", "to_pandas()", "sweep")
+        frame: pandas.DataFrame = library.DataFrame(self.columns, index=library.Index(self.time, name="time"))
+        frame.attrs["units"] = {"time": "s"} | {name: self.units[name] for name in self.columns}
+        return frame
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Convert to a Dataset over the dimension ``time``.
+
+        Returns
+        -------
+        xarray.Dataset
+            A variable for each output with the attributes ``units`` and ``long_name``; the parameters in force are
+            attributes of the dataset.
+
+        Raises
+        ------
+        HarnessError
+            If xarray is not installed.
+        """
+        library = optional("xarray", "to_xarray()", "sweep")
+        variables = {
+            name: ("time", column, {"units": self.units[name] or "1", "long_name": self.descriptions.get(name, name)})
+            for name, column in self.columns.items()
+        }
+        time = ("time", self.time, {"units": "s", "long_name": "time"})
+        attributes = {"model": self.spec.model, **self.parameters}
+        dataset: xarray.Dataset = library.Dataset(variables, {"time": time}, attributes)
+        return dataset
+
+    def plot(self, *names: str) -> "np.ndarray":
+        """Plot outputs over time, one panel each; shade the times when the body sticks.
+
+        Parameters
+        ----------
+        *names : str
+            The outputs to plot; all that are numbers if none is named, at most eight of them.
+
+        Returns
+        -------
+        numpy.ndarray
+            The matplotlib axes (n,), one for each output.
+        """
+        from .plot import plot
+
+        check_names("column", names, self.columns)
+        numeric = [name for name, column in self.columns.items() if column.dtype.kind != "U"]
+        texts = [name for name in names if name not in numeric]
+        if texts:
+            raise HarnessError(f"{texts[0]} is a text, which has no curve: name other outputs")
+        chosen = names or tuple(numeric[:MOST_PANELS])
+        labels = {heading(name, self.units[name]): self.columns[name] for name in chosen}
+        return plot(self.time, labels, self.sticking, self.spec.model)
+
+    @property
+    def sticking(self) -> list[tuple[float, float]]:
+        """The intervals of time in s in which the body sticks; none where the modes are not known."""
+        if self.events is None:
+            return []
+        ends = pairwise([*self.events.t.tolist(), float(self.time[-1])])
+        return [interval for interval, mode in zip(ends, self.events.mode, strict=True) if mode == 0]
+
+    def save(self, folder: str | Path) -> None:
+        """Write the trajectory, its events, its steps and its provenance into a result folder.
+
+        `load_result` reads the folder, and `simulate` repeats the run from it.
+
+        Parameters
+        ----------
+        folder : path
+            A new folder, or one that holds a result of the same FMU.
+
+        Raises
+        ------
+        HarnessError
+            If the folder holds other files or the result of another FMU.
+        """
+        from ..results.folder import replacing
+        from ..results.provenance import named, record
+
+        fmu = self.spec.fmu
+        with replacing(Path(folder), FILES, named(str(fmu))) as fresh:
+            self.write_tables(fresh)
+            record(fresh, [fmu], self.in_force, self.spec, source=named(str(fmu)), command="")
+
     def column_of_role(self, role: str) -> np.ndarray:
         """The recorded position, velocity or acceleration (n,)."""
         return self.columns[self.spec.motion_outputs[role]]
@@ -88,7 +209,7 @@ class Trajectory:
             )
         return value
 
-    def save(self, folder: Path) -> None:
+    def write_tables(self, folder: Path) -> None:
         """Write trajectory.csv, and steps.csv and events.csv where there are any."""
         write_signals(folder / "trajectory.csv", self.time, self.columns, self.units)
         if self.steps:

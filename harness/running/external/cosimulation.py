@@ -8,11 +8,17 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
 
 from ...errors import HarnessError
+from ..inputs import InputSignals
 from .refinement_run import StepRefusedError, TerminatedError, TimeGrid
 
 
 def cosimulate(
-    fmu: Any, version: str, span: TimeGrid, sample: Callable[[float], None], heed: Callable[..., Any]
+    fmu: Any,
+    version: str,
+    span: TimeGrid,
+    sample: Callable[[float], None],
+    heed: Callable[..., Any],
+    signals: InputSignals | None = None,
 ) -> None:
     """Step and sample; Ended if the FMU ends itself, Refused if it does not take a step."""
     step = step_fmi2 if version == "2.0" else step_fmi3
@@ -21,10 +27,14 @@ def cosimulate(
     even = abs(start + count * h - stop) < 1e-6 * h  # else the last step is a shorter one
     count += start + count * h < stop and not even
     t = start
+    if signals:
+        signals.apply(t, after_event=True)
     sample(t)
     for i in range(1, count + 1):
         target = stop if i == count else start + i * h
         heed(span.progress(t))
+        if signals:
+            signals.apply(0.5 * (t + target))
         try:
             step(fmu, t, h if even else target - t)  # who takes even steps only may look at the last bit
         except TerminatedError as end:
@@ -32,6 +42,8 @@ def cosimulate(
                 sample(end.t)
             raise
         t = target
+        if signals:
+            signals.apply(t, after_event=True)
         sample(t)
 
 

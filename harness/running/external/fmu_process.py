@@ -8,11 +8,13 @@ from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import fmpy
 from fmpy.fmi1 import FMICallException
 
 from ...errors import HarnessError, first_line
+from ..inputs import InputSignals
 from .cosimulation import cosimulate
 from .instance import MESSAGES, STATUS_NAMES, initialize, instantiate, last_error_message, trim_messages
 from .model_exchange import integrate
@@ -106,12 +108,13 @@ class ExternalFmu:
         fmu = instantiate(found, asked.folder, asked.exchange)
         initialize(fmu, found, asked.values, asked.start, asked.stop, tolerance)
         sample = RowRecorder(fmu, found.fmiVersion, self.variables, path, self.strings).record
+        signals = self.input_signals(fmu)
         span, heed = TimeGrid(asked.start, asked.stop, h), self.life.report_progress
         try:
             if asked.exchange:
-                integrate(fmu, found, span, tolerance, sample, heed)
+                integrate(fmu, found, span, tolerance, sample, heed, signals)
             else:
-                cosimulate(fmu, found.fmiVersion, span, sample, heed)
+                cosimulate(fmu, found.fmiVersion, span, sample, heed, signals)
         except (
             TerminatedError,
             StepRefusedError,
@@ -121,6 +124,17 @@ class ExternalFmu:
         with suppress(FMICallException):  # all that was wanted is there
             fmu.terminate()
         fmu.freeInstance()
+
+    def input_signals(self, fmu: Any) -> InputSignals | None:
+        """Return what sets the inputs of an instance, None if the run has no input signals."""
+        inputs = self.asked.inputs
+        variables = {variable.name: variable for variable in self.description.modelVariables}
+        if not inputs:
+            return None
+        kinds = {variables[name].type for name in inputs if name in variables}
+        if len(kinds) > 1:
+            raise HarnessError(f"inputs of several types ({', '.join(sorted(kinds))}) cannot be driven at once")
+        return InputSignals(inputs, getattr(fmu, f"set{kinds.pop()}"), variables)
 
 
 def main() -> None:

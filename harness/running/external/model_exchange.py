@@ -8,6 +8,7 @@ from fmpy.simulation import Input
 from fmpy.sundials import CVodeSolver
 
 from ...errors import HarnessError
+from ..inputs import InputSignals
 from .refinement_run import TerminatedError, TimeGrid
 
 MAX_CVODE_STEPS = 100_000  # of CVode from one point to the next
@@ -24,8 +25,9 @@ class CheckedCVode(CVodeSolver):
         self.report_progress = heed
         super().__init__(**options)
 
-    def f(self, *arguments: Any) -> int:
-        return self.call_checked(super().f, *arguments)
+    def f(self, t: float, *arguments: Any) -> int:
+        self.input.apply(t)  # fmpy sets inputs at the ends of its steps only
+        return self.call_checked(super().f, t, *arguments)
 
     def g(self, *arguments: Any) -> int:
         return self.call_checked(super().g, *arguments)
@@ -48,11 +50,19 @@ class CheckedCVode(CVodeSolver):
 
 
 def integrate(
-    fmu: Any, found: Any, span: TimeGrid, rtol: float, sample: Callable[[float], None], heed: Callable[..., Any]
+    fmu: Any,
+    found: Any,
+    span: TimeGrid,
+    rtol: float,
+    sample: Callable[[float], None],
+    heed: Callable[..., Any],
+    signals: InputSignals | None = None,
 ) -> None:
     """Integrate and sample at even points, and before and after each event; Ended if the FMU ends itself."""
     start, stop, h = span.start, span.stop, span.h
     old = found.fmiVersion == "2.0"
+    if signals:
+        signals.apply(start, after_event=True)
     update = fmu.newDiscreteStates if old else fmu.updateDiscreteStates
     upcoming = update_discrete_states(update, start)
     fmu.enterContinuousTimeMode()
@@ -66,7 +76,7 @@ def integrate(
         get_z=fmu.getEventIndicators,
         get_nominals=fmu.getNominalsOfContinuousStates,
         set_time=fmu.setTime,
-        input=Input(fmu, found, None),
+        input=signals or Input(fmu, found, None),
         startTime=start,
         maxStep=(stop - start) / 50,
         relativeTolerance=rtol,
@@ -77,10 +87,13 @@ def integrate(
     sample(t)
     while t < stop:
         target = stop if point >= count else start + point * h
-        goal = min(target, upcoming)
+        jump = signals.next_jump(t) if signals else inf
+        goal = min(target, upcoming, jump)
         event, _, reached = solver.step(t, goal)
         before, t = t, goal if abs(reached - goal) <= near else reached
         fmu.setTime(t)
+        if signals:
+            signals.apply(t)
         heed(span.progress(t))
         stepped = ended = False
         if found.modelExchange.needsCompletedIntegratorStep:
@@ -88,8 +101,10 @@ def integrate(
         sample(t)
         if ended:
             raise TerminatedError(t, "it answered terminateSimulation to a completed step")
-        if event or stepped or t >= upcoming:
+        if event or stepped or t >= min(upcoming, jump):
             fmu.enterEventMode()
+            if signals:
+                signals.apply(t, after_event=True)
             upcoming = update_discrete_states(update, t)
             fmu.enterContinuousTimeMode()
             solver.reset(t)

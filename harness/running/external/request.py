@@ -34,6 +34,7 @@ class ExternalRunRequest:
     coarsest: int = COARSEST_STEPS
     values: dict[str, Any] = field(default_factory=dict)
     outputs: dict[str, list[int]] = field(default_factory=dict)
+    inputs: dict[str, list[float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from ...process.interrupt import check_interrupt
 from ...process.subprocess_runner import run_module
 from ...process.temporary_directory import temporary_directory
 from ..description import resolve_time_span
+from ..inputs import check_inputs
 from ..run_spec import RunSpec
 from ..trajectory import Trajectory
 from ..unpacking import unpack
@@ -52,6 +53,7 @@ def simulate(spec: RunSpec, found: Any, report: Callable[[float], None]) -> Traj
         lacks = "model exchange is not among them" if spec.exchange else "neither co-simulation nor model exchange"
         raise HarnessError(f"{spec.fmu.name} offers {offered}; {lacks}")
     values = convert_values(spec, variables)
+    check_inputs(spec.inputs, variables)
     chosen = select_variables(spec, variables, values)
     start, stop = check_time_span(spec, found)
     with unpack(spec.fmu) as folder, temporary_directory("rows-") as place:
@@ -68,6 +70,7 @@ def simulate(spec: RunSpec, found: Any, report: Callable[[float], None]) -> Traj
             coarsest=round((stop - start) / spec.grid) if spec.grid else COARSEST_STEPS,
             values=values,
             outputs={variable.name: list(shape) for variable, shape in chosen},
+            inputs={name: np.asarray(column, dtype=float).tolist() for name, column in spec.inputs.items()},
         )
         answer = run_fmu_process(request, place, report)
         rows = read_longest_rows(place, answer.run_number, chosen)

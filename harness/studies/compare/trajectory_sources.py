@@ -1,5 +1,6 @@
 """The trajectories that are compared, wherever they come from: a result folder, a file, or a run of any FMU."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from os.path import abspath
 from pathlib import Path
@@ -20,11 +21,11 @@ FILES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
 SUFFIXES = (".fmu", ".py", ".toml")  # of what is run
 
 
-def load_both(sources: tuple[str, str], how: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
+def load_both(sources: Sequence[str | Signals], how: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
     """The trajectories of two folders, files, FMUs' paths or scenes.  What can be run is run to the same times, those
     of the other one if that is recorded or is a scene with a grid, and to the same stop; `how` says the rest."""
-    found = [read_recorded(source) for source in sources]
-    runs = [None if each else run_spec_for(source, how) for each, source in zip(found, sources, strict=True)]
+    found = [source if isinstance(source, Signals) else read_recorded(source) for source in sources]
+    runs = [None if each else run_spec_for(str(source), how) for each, source in zip(found, sources, strict=True)]
     grids = [grid_spacing(each.time) for each in found if each] + [each.grid for each in runs if each]
     grid = next(filter(None, grids), None)
     ends = [resolve_stop(each, read_description(each.fmu, each.lenient)) for each in runs if each]

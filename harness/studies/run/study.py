@@ -75,7 +75,7 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
     quantities += run.statistics.quantities if run.statistics else ()
     if not run.failure:
         check_published(scene, quantities)
-    run.save(folder)
+    run.write_tables(folder)
     stop = scene.stop if run.failure else float(run.time[-1])
     follow = scene.follow if run.spec.grid is None else run.spec.follow
     as_run = replace(scene, start=float(run.time[0]), stop=stop, grid=run.spec.grid, follow=follow)

@@ -96,7 +96,7 @@ class SweepDescription:
 
 
 def run_sweep(
-    asked: SweepRequest, out: Path, scheduler: str | None, workers: int, report: Callable[[float], None]
+    asked: SweepRequest, out: Path, scheduler: str | None, workers: int | None, report: Callable[[float], None]
 ) -> SweepResult:
     """Run the sweep and write its files to out/sweep/<name>; HarnessError in one sentence."""
     check_built(file := find_fmu(asked.model))

@@ -6,7 +6,7 @@ is held in memory than a worker has under way.  A run during which its worker di
 """
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -14,6 +14,7 @@ from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,9 @@ class Sweep:
         return Journal(folder / f".{self.key}.journal", len(self.points), self.columns)
 
 
-def perform(sweep: Sweep, kept: Journal, scheduler: str | None, workers: int, report: Callable[[float], None]) -> float:
+def perform(
+    sweep: Sweep, kept: Journal, scheduler: str | None, workers: int | None, report: Callable[[float], None]
+) -> float:
     """Do the runs that are left, into the journal; returns what that took, in s, the start of the workers included."""
     begun = perf_counter()
     left = kept.missing_spans
@@ -81,12 +84,40 @@ def perform(sweep: Sweep, kept: Journal, scheduler: str | None, workers: int, re
     return perf_counter() - begun
 
 
+class InProcess:
+    """Runs tasks at once in this process, for callers that do not want worker processes."""
+
+    size = 1
+    died: tuple[type[Exception], ...] = ()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Call function(*arguments) and return its result as a finished future."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(function(*arguments))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+    def ended(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
+        """Return the futures that are done, which are all."""
+        return set(futures)
+
+
 @contextmanager
-def open_workers(scheduler: str | None, workers: int, runs: int) -> Iterator[WorkerPool | DaskCluster]:
+def open_workers(
+    scheduler: str | None, workers: int | None, runs: int
+) -> Iterator[WorkerPool | DaskCluster | InProcess]:
     """Those who do the runs: processes of this machine, or the cluster of a scheduler."""
     if scheduler is not None:
         with connect_cluster(scheduler, unload) as found:
             yield found
+        return
+    if workers is None:
+        try:
+            yield InProcess()
+        finally:
+            unload()
         return
     with temporary_directory("sweep-") as folder:
         hands = WorkerPool(min(workers, runs), folder, [BlockResult.__module__])
@@ -99,7 +130,7 @@ def open_workers(scheduler: str | None, workers: int, runs: int) -> Iterator[Wor
 class Dispatcher:
     """The runs of a sweep on their way through the workers, in blocks that grow until each takes half a second."""
 
-    def __init__(self, sweep: Sweep, hands: WorkerPool | DaskCluster, left: list[Span]) -> None:
+    def __init__(self, sweep: Sweep, hands: WorkerPool | DaskCluster | InProcess, left: list[Span]) -> None:
         self.sweep, self.hands, self.left = sweep, hands, left[::-1]
         self.size = 1
         self.busy: dict[Future[BlockResult | None], Span] = {}

@@ -1,0 +1,75 @@
+"""The release archive: everything that users without Python download, in one zip file with its checksums."""
+
+from collections.abc import Callable, Iterable
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from . import __version__
+from .archive import build, build_date, licenses, write, zipped
+from .model_lookup import find, names
+from .native import build as build_native
+from .web import build as build_page
+
+CHECKSUMS = "SHA256SUMS"
+README = f"""\
+friction-fmus {__version__}
+
+FMUs of mechanical oscillators with dry friction.
+
+fmus/              FMI 2.0 co-simulation; needs Python 3.9 to 3.13 in the simulation tool
+fmus/native/       FMI 2.0 co-simulation and model exchange; needs nothing
+fmus/native/fmi3/  FMI 3.0 co-simulation and model exchange; needs nothing
+web/index.html     all models in a browser; works offline
+references/        certified results of the default experiments (CSV)
+licenses/          licences
+{CHECKSUMS}         checksums; check them with: sha256sum --check {CHECKSUMS}
+"""
+
+
+def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], None] = lambda file: None) -> Path:
+    """Build every FMU of every kind and the live page, and write them into one zip file.
+
+    The archive has the same bytes for the same sources.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to write ``friction-fmus-VERSION.zip``.
+    scenes : iterable of Path
+        The scene files that the live page offers as presets.
+    report : callable, optional
+        Takes the name of each file when its build begins.
+
+    Returns
+    -------
+    Path
+        The archive.
+
+    Raises
+    ------
+    BuildError
+        If an FMU cannot be built or the archive cannot be written.
+    """
+    entries = {f"licenses/{Path(path).name}": content for path, content in licenses().items()}
+    entries["README.txt"] = README.encode()
+    with TemporaryDirectory() as temporary:
+        for name in names():
+            source = find(name)
+            kinds = {
+                "fmus": lambda out, path=source.path: build(path, out),
+                "fmus/native": lambda out, path=source.path: build_native(path, out),
+                "fmus/native/fmi3": lambda out, path=source.path: build_native(path, out, fmi="3"),
+            }
+            for kind, make in kinds.items():
+                report(f"{kind}/{name}.fmu")
+                entries[f"{kind}/{name}.fmu"] = make(Path(temporary)).read_bytes()
+            for file in sorted(source.path.parent.glob(f"{name}*.csv")):
+                entries[f"references/{file.name}"] = file.read_bytes()
+        report("web/index.html")
+        page = build_page([find(name) for name in names()], Path(temporary), (), (), scenes)
+        entries["web/index.html"] = page.read_bytes()
+    sums = "".join(f"{sha256(entries[path]).hexdigest()}  {path}\n" for path in sorted(entries))
+    entries[CHECKSUMS] = sums.encode()
+    root = f"friction-fmus-{__version__}"
+    return write(folder / f"{root}.zip", zipped({f"{root}/{path}": entries[path] for path in entries}, build_date()))

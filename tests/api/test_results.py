@@ -1,0 +1,156 @@
+"""harness.compare, identify_decay, sweep and load_result, and what the module offers."""
+
+import ast
+import inspect
+import json
+
+import numpy as np
+import pytest
+
+import harness
+
+
+@pytest.fixture(autouse=True)
+def in_place(place, tmp_path, monkeypatch):
+    """Work in an empty folder with built FMUs."""
+    (tmp_path / "fmus").symlink_to(place / "fmus")
+    monkeypatch.chdir(tmp_path)
+
+
+def test_public_names_are_complete_and_documented():
+    tree = ast.parse(inspect.getsource(harness))
+    imported = {alias.name for node in tree.body if isinstance(node, ast.ImportFrom) for alias in node.names}
+    public = {name for name in imported if not name.startswith("_")} - {"import_module", "TYPE_CHECKING", "Any"}
+    assert {*harness.__all__} == public | {*harness.TYPES, "__version__"}
+    for name in harness.__all__:
+        value = getattr(harness, name)
+        assert name == "__version__" or inspect.getdoc(value)
+    with pytest.raises(AttributeError, match="no attribute 'run'"):
+        _ = harness.run
+
+
+def test_functions_document_every_parameter():
+    for name in ("simulate", "compare", "identify_decay", "sweep", "load_result"):
+        function = getattr(harness, name)
+        text = inspect.getdoc(function)
+        for section in ("Parameters", "Returns", "Raises"):
+            assert f"\n{section}\n---" in text, (name, section)
+        body = text.split("Parameters\n")[1].split("Returns\n")[0]
+        for parameter in inspect.signature(function).parameters:
+            assert parameter in body, (name, parameter)
+
+
+def test_a_stored_run_loads_bit_for_bit():
+    run = harness.simulate("stickslip", {"mu_s": 0.7})
+    run.save("saved")
+    loaded = harness.load_result("saved")
+    assert {*loaded.columns} == {*run.columns}
+    for name in run.columns:
+        assert np.array_equal(loaded[name], run[name])
+    assert loaded.parameters == run.parameters
+    assert loaded.units == run.units
+    assert np.array_equal(loaded.events.t, run.events.t)
+    assert np.array_equal(loaded.steps.t, run.steps.t)
+
+
+def test_saving_does_not_overwrite_other_files(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep")
+    with pytest.raises(harness.HarnessError, match=r"notes\.txt"):
+        harness.simulate("smd").save("mine")
+
+
+def test_compare_takes_runs_folders_and_fmus():
+    run = harness.simulate("coulomb")
+    run.save("saved")
+    for other in ("saved", run, "fmus/coulomb.fmu"):
+        assert harness.compare(run, other).worst == 0.0
+    other = harness.simulate("coulomb", {"f": 0.5001})
+    found = harness.compare(run, other)
+    (x,) = (each for each in found.differences if each.name == "x")
+    assert x.largest == pytest.approx(np.abs(run["x"] - np.interp(run.time, other.time, other["x"])).max(), rel=1e-3)
+    with pytest.raises(harness.HarnessError, match="no variable in common"):
+        harness.compare(harness.simulate("smd", outputs=["F_damper"]), run)
+
+
+def test_a_decay_is_identified_from_any_source(tmp_path):
+    pandas = pytest.importorskip("pandas")
+    run = harness.simulate("coulomb", stop=3.0, interval=0.005, outputs=["x"])
+    lines = ["t [s],x [m]", *(f"{t!r},{x!r}" for t, x in zip(run.time.tolist(), run["x"].tolist(), strict=True))]
+    (tmp_path / "record.csv").write_text("\n".join(lines))
+    sources = {
+        "file": {"record": "record.csv"},
+        "run": {"record": run},
+        "frame": {"record": run.to_pandas()},
+        "columns": {"record": pandas.DataFrame({"t [s]": run.time, "x [m]": run["x"]})},
+        "arrays": {"record": run.time, "x": run["x"], "unit": "m"},
+        "millimetres": {"record": run.time, "x": 1000 * run["x"], "unit": "mm"},
+    }
+    for name, arguments in sources.items():
+        found = harness.identify_decay(**arguments, k=157.9)
+        values = {each.name: each.value for each in found.estimates}
+        assert values["f"] == pytest.approx(0.5, rel=1e-6), name
+        assert values["zeta"] == pytest.approx(0.0, abs=1e-9), name
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"record": [0.0, 1.0]}, "x is missing"),
+        ({"record": [0.0, 1.0], "x": [1.0, 2.0]}, "unit is missing"),
+        ({"record": [0.0, 1.0], "x": [1.0], "unit": "m"}, "equally long"),
+        ({"record": "nowhere.csv"}, "cannot read nowhere.csv"),
+        ({"record": np.arange(20.0), "x": np.arange(20.0), "unit": "m", "k": 1.0, "m": 1.0}, "leave one out"),
+    ],
+)
+def test_an_invalid_record_is_one_sentence(arguments, message):
+    with pytest.raises(harness.HarnessError) as raised:
+        harness.identify_decay(**arguments)
+    assert message in str(raised.value)
+
+
+def test_a_sweep_measures_what_single_runs_measure():
+    pytest.importorskip("xarray")
+    data = harness.sweep("coulomb", {"f": [0.3, 0.6], "k": [100.0, 200.0, 300.0]}, measures=["final", "events"])
+    assert data.sizes == {"f": 2, "k": 3}
+    for f in data["f"].values:
+        for k in data["k"].values:
+            run = harness.simulate("coulomb", {"f": f, "k": k})
+            point = data.sel(f=f, k=k)
+            assert float(point["final_x"]) == run["x"][-1]
+            assert int(point["events"]) == len(run.events.t) - 1
+    assert (data["error"] == "").all()
+
+
+def test_samples_are_reproducible_and_stored():
+    pytest.importorskip("xarray")
+    first = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3, folder="kept")
+    again = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3)
+    assert first.equals(again)
+    (folder,) = ((path) for path in __import__("pathlib").Path("kept/sweep").iterdir() if not path.name.startswith("."))
+    assert harness.load_result(folder).equals(first)
+
+
+@pytest.mark.parametrize(
+    ("grid", "options", "message"),
+    [
+        ({}, {}, "grid is empty"),
+        ({"k": []}, {}, "k has no values"),
+        ({"k": ["stiff"]}, {}, "must be numbers"),
+        ({"kk": [1.0]}, {}, "'kk' (nearest: 'k')"),
+        ({"k": [1.0, 2.0, 3.0]}, {"samples": 4}, "its lower and its upper bound"),
+    ],
+)
+def test_an_invalid_grid_is_one_sentence(grid, options, message):
+    pytest.importorskip("xarray")
+    with pytest.raises(harness.HarnessError) as raised:
+        harness.sweep("smd", grid, **options)
+    assert message in str(raised.value)
+
+
+def test_results_of_commands_load(tmp_path):
+    (tmp_path / "decay").mkdir()
+    (tmp_path / "decay" / "decay.json").write_text(json.dumps({"record": "a"}))
+    assert harness.load_result("decay") == {"record": "a"}
+    with pytest.raises(harness.SceneError, match="holds no result"):
+        harness.load_result("nowhere")

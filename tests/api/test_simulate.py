@@ -1,0 +1,173 @@
+"""harness.simulate: models, scenes, FMUs and stored results, with options and input signals."""
+
+import sys
+from math import pi
+
+import fmi3_fixtures
+import native_fmus
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import harness
+
+SMD = {"m": 1.0, "k": 157.9, "c": 2.0}
+
+
+@pytest.fixture(autouse=True)
+def in_place(place, tmp_path, monkeypatch):
+    """Work in an empty folder with built FMUs."""
+    (tmp_path / "fmus").symlink_to(place / "fmus")
+    monkeypatch.chdir(tmp_path)
+
+
+def driven(t, force):
+    """Return the positions of smd from rest under a force, by scipy."""
+
+    def rates(t, y):
+        return y[1], (force(t) - SMD["k"] * y[0] - SMD["c"] * y[1]) / SMD["m"]
+
+    return solve_ivp(rates, (0.0, t[-1]), (0.0, 0.0), "DOP853", t_eval=t, rtol=1e-11, atol=1e-13).y[0]
+
+
+def test_a_model_runs_with_all_outputs():
+    run = harness.simulate("stickslip", {"mu_s": 0.8}, stop=8.0)
+    assert run.time[0] == 0.0
+    assert run.time[-1] == 8.0
+    assert {"x", "v", "a", "F_friction", "mode"} <= {*run.columns}
+    assert run.parameters["mu_s"] == 0.8
+    assert run.units["x"] == "m"
+    # the sled breaks away when the spring reaches the holding force: t = mu_s m g/(k v_driver)
+    assert run.events.t[1] == pytest.approx(0.8 * 12.5 * 9.81 / (742.5 * 0.034), rel=1e-12)
+    assert run.statistics.steps == 5
+
+
+def test_interval_is_the_time_between_recorded_points():
+    run = harness.simulate("coulomb", stop=3.0, interval=0.25)
+    assert run.time == pytest.approx(np.arange(13) * 0.25, abs=1e-12)
+    assert len(run.events.t) > 5
+
+
+def test_method_and_tolerance_are_those_of_the_solver():
+    exact, ode45 = (
+        harness.simulate("coulomb", stop=3.0, interval=0.1, method=method, rtol=1e-6, outputs=["x"])
+        for method in ("exact", "ode45")
+    )
+    assert 0.0 < np.abs(exact["x"] - ode45["x"]).max() < 1e-6
+    assert ode45.parameters["solver.method"] == "ode45"
+    assert ode45.parameters["solver.rtol"] == 1e-6
+    assert {*exact.columns} == {"x"}
+
+
+def test_a_scene_and_a_stored_result_run():
+    run = harness.simulate("pacejka-0.01", stop=1.0)
+    run.save("saved")
+    assert np.array_equal(harness.simulate("saved")["x"], run["x"])
+
+
+@pytest.mark.parametrize("interface", ["CoSimulation", "ModelExchange"])
+@pytest.mark.parametrize("folder", [native_fmus.build_native_fmus, fmi3_fixtures.build_fmi3_fmus], ids=["fmi2", "fmi3"])
+def test_input_signals_drive_every_interface(folder, interface):
+    time = np.linspace(0.0, 2.0, 2001)
+    table = {"time": time, "F_ext": np.sin(pi * time)}
+    start = {"x0": 0.0, "v0": 0.0}
+    options = {"interface": interface, "rtol": 1e-6, "interval": 0.02}
+    run = harness.simulate(folder() / "smd.fmu", start, stop=2.0, inputs=table, **options)
+    expected = driven(run.time, lambda t: np.sin(pi * t))
+    assert np.abs(run["x"] - expected).max() < 1e-5 * np.abs(expected).max()
+
+
+def test_an_input_that_jumps_jumps_at_its_time():
+    table = {"time": [0.0, 1.0, 1.0, 4.0], "F_ext": [0.0, 0.0, 5.0, 5.0]}
+    run = harness.simulate("smd", {"x0": 0.0, "v0": 0.0}, stop=4.0, inputs=table)
+    decay, after = SMD["c"] / 2, np.maximum(run.time - 1.0, 0.0)
+    omega = np.sqrt(SMD["k"] - decay**2)
+    swing = np.cos(omega * after) + decay / omega * np.sin(omega * after)
+    assert run["x"] == pytest.approx(5.0 / SMD["k"] * (1.0 - np.exp(-decay * after) * swing), abs=1e-14)
+
+
+def test_a_data_frame_drives_inputs():
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame({"F_ext": [0.0, 2.0]}, index=pandas.Index([0.0, 4.0], name="time"))
+    ramp = harness.simulate("coulomb", inputs=table, interval=0.5)
+    same = harness.simulate("coulomb", inputs={"time": [0.0, 4.0], "F_ext": [0.0, 2.0]}, interval=0.5)
+    assert np.array_equal(ramp["x"], same["x"])
+
+
+def test_results_convert_with_their_units():
+    run = harness.simulate("smd", stop=1.0, interval=0.1)
+    frame, dataset = run.to_pandas(), run.to_xarray()
+    assert frame.index.name == "time"
+    assert frame.index.to_numpy() == pytest.approx(run.time)
+    assert frame.attrs["units"]["v"] == "m/s"
+    assert dataset["F_spring"].attrs["units"] == "N"
+    assert dataset["time"].attrs["units"] == "s"
+    assert dataset.attrs["k"] == 157.9
+    assert np.array_equal(dataset["x"], frame["x"])
+
+
+@pytest.mark.parametrize(("package", "convert"), [("pandas", "to_pandas"), ("xarray", "to_xarray")])
+def test_a_missing_package_is_named(monkeypatch, package, convert):
+    run = harness.simulate("smd", stop=1.0)
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(harness.HarnessError, match=rf"needs {package}, which is not installed: .*friction-fmus\[sweep"):
+        getattr(run, convert)()
+
+
+def test_plot_draws_one_panel_for_each_output(monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    run = harness.simulate("coulomb")
+    import matplotlib.pyplot as plt
+
+    axes = run.plot("x", "mode")
+    assert [panel.get_ylabel() for panel in axes] == ["x [m]", "mode"]
+    assert len(run.plot()) == len(run.columns)
+    plt.close("all")
+    with pytest.raises(harness.SceneError, match="unknown column 'y'"):
+        run.plot("y")
+
+
+def test_nothing_is_printed(capfd):
+    harness.simulate("pendulum", stop=1.0, inputs={"time": [0.0], "T_ext": [0.001]})
+    shares = []
+    harness.simulate("coulomb", method="ode23", rtol=1e-9, progress=shares.append)
+    assert capfd.readouterr() == ("", "")
+    assert all(0.0 <= share <= 1.0 for share in shares)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"source": "stickslp"}, "unknown model or scene 'stickslp' (nearest: 'stickslip')"),
+        ({"source": "nowhere.fmu"}, "nowhere.fmu"),
+        ({"source": "fmus"}, "holds no result"),
+        ({"values": {"kk": 1.0}}, "'kk' (nearest: 'k')"),
+        ({"values": {"m": -1.0}}, "m = -1.0 is outside its range"),
+        ({"values": {"m": float("nan")}}, "m = nan"),
+        ({"stop": "8"}, "stop = '8' must be a finite number"),
+        ({"stop": -1.0}, "stop = -1.0 s is not after start"),
+        ({"interval": 0.0}, "interval = 0.0 must be a finite number above 0"),
+        ({"rtol": float("inf")}, "rtol = inf must be a finite number above 0"),
+        ({"timeout": -1}, "timeout = -1 must be"),
+        ({"method": "rk4"}, "'rk4'"),
+        ({"interface": "me"}, "unknown interface 'me'; allowed: CoSimulation, ModelExchange"),
+        ({"interface": "ModelExchange"}, "model exchange is not among them"),
+        ({"outputs": ["y"]}, "unknown output 'y'"),
+        ({"inputs": {"F_ext": [1.0]}}, "inputs has no column 'time'"),
+        ({"inputs": {"time": [0.0], "F": [1.0]}}, "unknown input 'F'"),
+        ({"inputs": {"time": [0.0, 1.0], "F_ext": [1.0]}}, "F_ext has 1 values for 2 times"),
+        ({"inputs": {"time": [1.0, 0.0], "F_ext": [1.0, 1.0]}}, "the time falls"),
+        ({"inputs": {"time": [0.0], "F_ext": [float("nan")]}}, "not a finite number"),
+        ({"inputs": [1.0, 2.0]}, "inputs must be a mapping or a DataFrame"),
+    ],
+)
+def test_an_invalid_argument_is_one_sentence(arguments, message):
+    with pytest.raises(harness.HarnessError) as raised:
+        harness.simulate(**({"source": "smd"} | arguments))
+    assert message in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_failed_run_raises_the_message_of_the_fmu():
+    with pytest.raises(harness.HarnessError, match="mu_d"):
+        harness.simulate("stickslip", {"mu_s": 0.5, "mu_d": 0.6})
