@@ -12,17 +12,17 @@ from .errors import HarnessError, SceneError
 
 if TYPE_CHECKING:
     from .analyses.decay.identification import DecayIdentification
-    from .running.trajectory import Run
+    from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
 
     __version__: str
 
 __all__ = [
     "Comparison",
+    "DecayIdentification",
     "HarnessError",
-    "Identified",
-    "Run",
     "SceneError",
+    "Trajectory",
     "__version__",
     "compare",
     "identify_decay",
@@ -34,8 +34,8 @@ __all__ = [
 # Types of results: loaded on first use, because they import numpy, which `--help` does not need.
 TYPES = {
     "Comparison": "harness.studies.compare.difference",
-    "Identified": "harness.analyses.decay.identification",
-    "Run": "harness.running.trajectory",
+    "DecayIdentification": "harness.analyses.decay.identification",
+    "Trajectory": "harness.running.trajectory",
 }
 
 
@@ -43,9 +43,9 @@ def __getattr__(name: str) -> Any:
     if name in TYPES:
         return getattr(import_module(TYPES[name]), name)
     if name == "__version__":
-        from .results.provenance import HARNESS, installed
+        from .results.provenance import HARNESS, package_version
 
-        return installed(HARNESS)
+        return package_version(HARNESS)
     raise AttributeError(f"module 'harness' has no attribute '{name}'")
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .errors import HarnessError, SceneError, optional, shown, unknown
+from .errors import HarnessError, SceneError, format_value, optional, unknown_name_message
 
 if TYPE_CHECKING:
     import pandas
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from .analyses.decay.identification import DecayIdentification
     from .records.record import Record
-    from .running.run_spec import Specification
-    from .running.trajectory import Run
+    from .running.run_spec import RunSpec
+    from .running.trajectory import Trajectory
     from .studies.compare.difference import Comparison
 
 Progress = Callable[[float], None]  # takes the finished share, from 0 to 1
@@ -40,8 +40,8 @@ def simulate(
     inputs: "Mapping[str, ArrayLike] | pandas.DataFrame | None" = None,
     timeout: float | None = None,
     progress: Progress | None = None,
-) -> "Run":
-    """Run a model, a scene, an FMU or a stored result once.
+) -> "Trajectory":
+    """Trajectory a model, a scene, an FMU or a stored result once.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def simulate(
 
     Returns
     -------
-    Run
+    Trajectory
         Time, columns by name, units, events, statistics and the parameters in force.
 
     Raises
@@ -101,14 +101,14 @@ def simulate(
     if interval is not None and spec.inputs:
         spec = replace(spec, grid=fine_step(spec, interval))
     done = runner.run(spec, progress or QUIET)
-    if done.failed:
-        raise HarnessError(done.failed)
+    if done.failure:
+        raise HarnessError(done.failure)
     return done if interval is None else at_interval(done, interval)
 
 
 def compare(
-    a: "str | Path | Run",
-    b: "str | Path | Run",
+    a: "str | Path | Trajectory",
+    b: "str | Path | Trajectory",
     *,
     stop: float | None = None,
     rtol: float | None = None,
@@ -120,7 +120,7 @@ def compare(
 
     Parameters
     ----------
-    a, b : Run, str or path
+    a, b : Trajectory, str or path
         Trajectories, result folders, files (fmpy, OpenModelica, Dymola, any table with the time in its first column),
         FMUs or scenes. What has to be run is run to the times of the other one.
     stop, rtol, interface, timeout
@@ -138,21 +138,23 @@ def compare(
     HarnessError
         If the two have no variable or no time in common.
     """
-    from .running.run_spec import Specification
-    from .running.signals import of_run
-    from .running.trajectory import Run
+    from .running.run_spec import RunSpec
+    from .running.signals import signals_from_trajectory
+    from .running.trajectory import Trajectory
     from .studies.compare.difference import compare as difference
-    from .studies.compare.trajectory_sources import both, names
+    from .studies.compare.trajectory_sources import display_names, load_both
 
-    how = with_options(Specification(Path()), stop, None, None, None, None, interface, timeout)
+    how = with_options(RunSpec(Path()), stop, None, None, None, None, interface, timeout)
     if rtol is not None:
         how = replace(how, tolerance=rtol)
-    first, second = both(
-        tuple(of_run(each) if isinstance(each, Run) else str(each) for each in (a, b)), how, progress or QUIET
+    first, second = load_both(
+        tuple(signals_from_trajectory(each) if isinstance(each, Trajectory) else str(each) for each in (a, b)),
+        how,
+        progress or QUIET,
     )
-    paths = [each for each in (a, b) if not isinstance(each, Run)]
+    paths = [each for each in (a, b) if not isinstance(each, Trajectory)]
     if len(paths) == 2:
-        one, two = names((str(a), str(b)))
+        one, two = display_names((str(a), str(b)))
         first, second = replace(first, name=one), replace(second, name=two)
     elif first.name == second.name:
         first, second = replace(first, name=f"{first.name} (a)"), replace(second, name=f"{second.name} (b)")
@@ -160,7 +162,7 @@ def compare(
 
 
 def identify_decay(
-    record: "str | Path | pandas.DataFrame | Run | ArrayLike",
+    record: "str | Path | pandas.DataFrame | Trajectory | ArrayLike",
     x: "ArrayLike | None" = None,
     *,
     unit: str | None = None,
@@ -175,12 +177,12 @@ def identify_decay(
     begin: float | None = None,
     end: float | None = None,
     progress: Progress | None = None,
-) -> "Identified":
+) -> "DecayIdentification":
     """Identify viscous damping, dry friction and quadratic drag from a free decay.
 
     Parameters
     ----------
-    record : str, path, DataFrame, Run or array_like
+    record : str, path, DataFrame, Trajectory or array_like
         A file with columns, a table, a trajectory, or the times (n,) in s of the samples `x`.
     x : array_like, optional
         The samples (n,), if `record` holds their times.
@@ -205,7 +207,7 @@ def identify_decay(
 
     Returns
     -------
-    Identified
+    DecayIdentification
         Estimates with 95 % intervals (`estimates`), the fitted laws and remarks.
 
     Raises
@@ -223,11 +225,11 @@ def identify_decay(
 
     from .analyses.decay.estimates import KnownParameters
     from .analyses.decay.identification import fit_decay
-    from .records.columns import Columns, read
+    from .records.columns import ColumnOptions, read_record
 
     if k is not None and m is not None:
         raise SceneError("k and m are both given: leave one out, because the frequency determines it")
-    columns = Columns(
+    columns = ColumnOptions(
         time=time,
         position=column,
         quantity=quantity,
@@ -237,10 +239,10 @@ def identify_decay(
     )
     if isinstance(record, str | Path):
         source = str(record)
-        read_record = read(source, columns, Path(source).stem)
+        loaded = read_record(source, columns, Path(source).stem)
     else:
-        read_record = record_from(record, x, columns)
-    return fit_decay(read_record, KnownParameters(k, m, pendulum), drag, drift, progress or QUIET)
+        loaded = record_from(record, x, columns)
+    return fit_decay(loaded, KnownParameters(k, m, pendulum), drag, drift, progress or QUIET)
 
 
 def sweep(
@@ -260,7 +262,7 @@ def sweep(
     folder: "str | Path | None" = None,
     progress: Progress | None = None,
 ) -> "xarray.Dataset":
-    """Run a model or an FMU at many points of its parameters.
+    """Trajectory a model or an FMU at many points of its parameters.
 
     Parameters
     ----------
@@ -304,26 +306,26 @@ def sweep(
 
     import numpy as np
 
-    from .process.temporary_directory import room
-    from .studies.sweep import result_files as sweep_file
+    from .process.temporary_directory import temporary_directory
+    from .studies.sweep import result_files as result_files
 
     library = optional("xarray", "a sweep", "sweep")
     if not grid:
         raise SceneError("grid is empty: name at least one parameter and its values, as in {'mu_d': [0.3, 0.6]}")
-    options: dict[str, Any] = {"stop": stop, "tolerance": rtol, "exchange": exchange_of(interface), "patience": timeout}
+    options: dict[str, Any] = {"stop": stop, "tolerance": rtol, "exchange": exchange_of(interface), "timeout": timeout}
     axes = []
     for name, column in grid.items():
         try:
             numbers = [repr(each) for each in np.ravel(np.asarray(column, dtype=float)).tolist()]
         except (TypeError, ValueError):
-            raise SceneError(f"grid: {name} = {shown(column)} must be numbers") from None
+            raise SceneError(f"grid: {name} = {format_value(column)} must be numbers") from None
         if not numbers:
             raise SceneError(f"grid: {name} has no values: give at least one")
         if samples is not None and len(numbers) != 2:
             raise SceneError(f"{name} has {len(numbers)} values: with samples give its lower and its upper bound")
         single = f"{numbers[0]}:{numbers[0]}:1" if len(numbers) == 1 else ",".join(numbers)
         axes.append(f"{name}={single if samples is None else ':'.join(numbers)}")
-    asked = sweep_file.Asked(
+    asked = result_files.SweepRequest(
         model=str(source),
         vary=tuple(axes),
         values=tuple(f"{name}={value}" for name, value in (values or {}).items()),
@@ -333,24 +335,24 @@ def sweep(
         name=None,
         options={name: value for name, value in options.items() if value is not None},
     )
-    with room("sweep-") if folder is None else nullcontext(Path(folder)) as place:
-        swept = sweep_file.carry_out(asked, place, scheduler, workers, progress or QUIET)
+    with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as place:
+        swept = result_files.run_sweep(asked, place, scheduler, workers, progress or QUIET)
         with library.open_dataset(swept.folder / "sweep.nc") as data:
             loaded: xarray.Dataset = data.load()
     return loaded
 
 
-def load_result(folder: "str | Path") -> "Run | xarray.Dataset | dict[str, Any]":
+def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str, Any]":
     """Read a stored result.
 
     Parameters
     ----------
     folder : path
-        A result folder, as a command or `Run.save` writes it.
+        A result folder, as a command or `Trajectory.save` writes it.
 
     Returns
     -------
-    Run, xarray.Dataset or dict
+    Trajectory, xarray.Dataset or dict
         The trajectory of a run, the dataset of a sweep, or the numbers of a decay or a comparison.
 
     Raises
@@ -378,45 +380,45 @@ def load_result(folder: "str | Path") -> "Run | xarray.Dataset | dict[str, Any]"
 # ---- what the functions above share
 
 
-def run_spec(source: "str | Path") -> "Specification":
+def run_spec(source: "str | Path") -> "RunSpec":
     """Return the run that a source describes."""
-    from .running.run_spec import EVEN, Specification, of_scene
-    from .scenes.fmu_files import check_built, fmu_of, known
-    from .scenes.scene import load
+    from .running.run_spec import DEFAULT_EQUAL_STEPS, RunSpec, spec_from_scene
+    from .scenes.fmu_files import check_built, find_fmu, list_models
+    from .scenes.scene import load_scene
 
     path, name = Path(source), str(source)
-    if path.suffix in (".fmu", ".py") or (name in known() and not path.is_dir()):
-        fmu = fmu_of(name)
+    if path.suffix in (".fmu", ".py") or (name in list_models() and not path.is_dir()):
+        fmu = find_fmu(name)
         check_built(fmu)
-        return Specification(fmu, even=EVEN)
+        return RunSpec(fmu, equal_steps=DEFAULT_EQUAL_STEPS)
     if path.is_dir():
         return stored_spec(path)
     try:
-        scene = load(source)
+        scene = load_scene(source)
     except SceneError as error:
         if path.suffix == ".toml":
             raise
-        from .scenes.scene import shipped
+        from .scenes.scene import shipped_scenes
 
-        names = sorted(known() | {file.stem for file in shipped()})
+        names = sorted(list_models() | {file.stem for file in shipped_scenes()})
         raise SceneError(
-            f"{unknown('model or scene', name, names)}, or the path of an FMU, a scene or a result"
+            f"{unknown_name_message('model or scene', name, names)}, or the path of an FMU, a scene or a result"
         ) from error
     check_built(scene.file)
-    return of_scene(scene)
+    return spec_from_scene(scene)
 
 
-def stored_spec(folder: Path) -> "Specification":
+def stored_spec(folder: Path) -> "RunSpec":
     """Return the run that made a stored result; HarnessError if its files have changed since."""
-    from .results.provenance import trusted
-    from .running.run_spec import Specification, of_scene
-    from .scenes.scene import again
+    from .results.provenance import load_verified_provenance
+    from .running.run_spec import RunSpec, spec_from_scene
+    from .scenes.scene import scene_from_provenance
 
-    scene = trusted(folder)["scene"] or {}
+    scene = load_verified_provenance(folder)["scene"] or {}
     if "title" in scene:
-        return of_scene(again(scene))
+        return spec_from_scene(scene_from_provenance(scene))
     try:
-        return Specification(**{**scene, "fmu": Path(scene["fmu"]), "outputs": tuple(scene["outputs"])})
+        return RunSpec(**{**scene, "fmu": Path(scene["fmu"]), "outputs": tuple(scene["outputs"])})
     except (KeyError, TypeError):
         raise SceneError(f"{folder} does not hold the result of one run: name another folder") from None
 
@@ -426,12 +428,12 @@ def exchange_of(interface: str | None) -> bool | None:
     if interface is None:
         return None
     if interface not in INTERFACES:
-        raise SceneError(unknown("interface", interface, INTERFACES))
+        raise SceneError(unknown_name_message("interface", interface, INTERFACES))
     return INTERFACES[interface]
 
 
 def with_options(
-    spec: "Specification",
+    spec: "RunSpec",
     stop: float | None,
     interval: float | None,
     outputs: Sequence[str] | None,
@@ -439,25 +441,25 @@ def with_options(
     rtol: float | None,
     interface: str | None,
     timeout: float | None,
-) -> "Specification":
+) -> "RunSpec":
     """Return a run with the options that are not None."""
-    from .running.description import description
-    from .running.runner import shows_steps
+    from .running.description import read_description
+    from .running.runner import exposes_solver_steps
     from .scenes.schema import is_number
 
     values = dict(spec.values)
     if method is not None:
         values["solver.method"] = method
     tolerance = spec.tolerance
-    if rtol is not None and spec.fmu.name and shows_steps(description(spec.fmu, spec.lenient)):
+    if rtol is not None and spec.fmu.name and exposes_solver_steps(read_description(spec.fmu, spec.lenient)):
         values["solver.rtol"] = rtol
     elif rtol is not None:
         tolerance = rtol
     for name, number in (("interval", interval), ("timeout", timeout), ("rtol", rtol)):
         if number is not None and not (is_number(number) and number > 0):
-            raise SceneError(f"{name} = {shown(number)} must be a finite number above 0")
+            raise SceneError(f"{name} = {format_value(number)} must be a finite number above 0")
     if stop is not None and not is_number(stop):
-        raise SceneError(f"stop = {shown(stop)} must be a finite number of seconds")
+        raise SceneError(f"stop = {format_value(stop)} must be a finite number of seconds")
     if isinstance(outputs, str):
         outputs = (outputs,)
     exchange = exchange_of(interface)
@@ -470,22 +472,22 @@ def with_options(
         follow=True if interval is not None else spec.follow,
         outputs=spec.outputs if outputs is None else tuple(outputs),
         exchange=spec.exchange if exchange is None else exchange,
-        patience=spec.patience if timeout is None else float(timeout),
+        timeout=spec.timeout if timeout is None else float(timeout),
     )
 
 
-def fine_step(spec: "Specification", interval: float) -> float:
+def fine_step(spec: "RunSpec", interval: float) -> float:
     """Return a communication step in s for input signals: a whole part of the interval, at most 1/4096 of the run."""
     from math import ceil
 
-    from .running.description import description, span
-    from .running.run_spec import EVEN
+    from .running.description import read_description, resolve_time_span
+    from .running.run_spec import DEFAULT_EQUAL_STEPS
 
-    start, stop = span(spec, description(spec.fmu, spec.lenient))
-    return interval / ceil(interval * EVEN / (stop - start))
+    start, stop = resolve_time_span(spec, read_description(spec.fmu, spec.lenient))
+    return interval / ceil(interval * DEFAULT_EQUAL_STEPS / (stop - start))
 
 
-def at_interval(run: "Run", interval: float) -> "Run":
+def at_interval(run: "Trajectory", interval: float) -> "Trajectory":
     """Keep the points of a run at multiples of an interval in s, and its last one."""
     import numpy as np
 
@@ -518,16 +520,16 @@ def record_from(source: Any, x: Any, columns: Any) -> "Record":
 
     from .records.columns import record_of
     from .records.table_files import Table
-    from .running.trajectory import Run
+    from .running.trajectory import Trajectory
 
     name = "the record"
-    if isinstance(source, Run):
+    if isinstance(source, Trajectory):
         heads = {"time": "t [s]"} | {each: f"{each} [{source.units[each]}]" for each in source.columns}
-        table, name = {"time": source.time, **source.columns}, source.wanted.model
+        table, name = {"time": source.time, **source.columns}, source.spec.model
         if columns.position is None and columns.quantity is None:
-            if "position" not in source.wanted.motion:
+            if "position" not in source.spec.motion_outputs:
                 raise SceneError(f"{name} records no position: add it to the outputs, or name a column")
-            columns = replace(columns, position=source.wanted.motion["position"])
+            columns = replace(columns, position=source.spec.motion_outputs["position"])
     elif hasattr(source, "columns"):
         frame = source if source.index.name is None else source.reset_index()
         units = frame.attrs.get("units", {})
@@ -548,27 +550,27 @@ def record_from(source: Any, x: Any, columns: Any) -> "Record":
     return record_of(Table(name, tuple(heads.values()), tuple(cells)), columns, name)
 
 
-def stored_run(folder: Path) -> "Run":
+def stored_run(folder: Path) -> "Trajectory":
     """Read the run in a result folder."""
     import numpy as np
 
-    from .records.columns import numeric
-    from .results.provenance import load
-    from .running.run_spec import Specification
-    from .running.trajectory import Events, Run, Steps
-    from .studies.compare.trajectory_files import read
+    from .records.columns import read_numeric
+    from .results.provenance import load_provenance
+    from .running.run_spec import RunSpec
+    from .running.trajectory import ModeChanges, SolverSteps, Trajectory
+    from .studies.compare.trajectory_files import read_trajectory
 
-    found, origin = read(folder), load(folder)
+    found, origin = read_trajectory(folder), load_provenance(folder)
     parameters = {name: each["value"] for name, each in origin.get("parameters", {}).items()}
     units = found.units | {name: each["unit"] for name, each in origin.get("parameters", {}).items()}
     scene = origin.get("scene") or {}
     fmu = Path(scene.get("fmu") or scene.get("file") or f"{folder.name}.fmu")
     steps = events = None
     if found.events is not None:
-        events = Events(found.events[:, 0], found.events[:, 1].astype(int))
+        events = ModeChanges(found.events[:, 0], found.events[:, 1].astype(int))
     if (folder / "steps.csv").is_file():
-        ends, sizes, rejected = numeric(folder / "steps.csv")[1].T
-        steps = Steps(np.append(found.time[0], ends), sizes, rejected.astype(int))
-    spec = Specification(fmu, outputs=tuple(found.columns), values=scene.get("values") or {})
+        ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
+        steps = SolverSteps(np.append(found.time[0], ends), sizes, rejected.astype(int))
+    spec = RunSpec(fmu, outputs=tuple(found.columns), values=scene.get("values") or {})
     names = {name: name for name in found.columns}
-    return Run(spec, found.time, found.columns, units, names, parameters, steps, events)
+    return Trajectory(spec, found.time, found.columns, units, names, parameters, steps, events)

@@ -6,8 +6,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from . import __version__
-from .archive import build, build_date, licenses, write, zipped
-from .model_lookup import find, names
+from .archive import build, build_date, license_files, write, zip_entries
+from .model_lookup import find_model, model_names
 from .native import build as build_native
 from .web import build as build_page
 
@@ -51,11 +51,11 @@ def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], 
     BuildError
         If an FMU cannot be built or the archive cannot be written.
     """
-    entries = {f"licenses/{Path(path).name}": content for path, content in licenses().items()}
+    entries = {f"licenses/{Path(path).name}": content for path, content in license_files().items()}
     entries["README.txt"] = README.encode()
     with TemporaryDirectory() as temporary:
-        for name in names():
-            source = find(name)
+        for name in model_names():
+            source = find_model(name)
             kinds = {
                 "fmus": lambda out, path=source.path: build(path, out),
                 "fmus/native": lambda out, path=source.path: build_native(path, out),
@@ -67,9 +67,11 @@ def build_release(folder: Path, scenes: Iterable[Path], report: Callable[[str], 
             for file in sorted(source.path.parent.glob(f"{name}*.csv")):
                 entries[f"references/{file.name}"] = file.read_bytes()
         report("web/index.html")
-        page = build_page([find(name) for name in names()], Path(temporary), (), (), scenes)
+        page = build_page([find_model(name) for name in model_names()], Path(temporary), (), (), scenes)
         entries["web/index.html"] = page.read_bytes()
     sums = "".join(f"{sha256(entries[path]).hexdigest()}  {path}\n" for path in sorted(entries))
     entries[CHECKSUMS] = sums.encode()
     root = f"friction-fmus-{__version__}"
-    return write(folder / f"{root}.zip", zipped({f"{root}/{path}": entries[path] for path in entries}, build_date()))
+    return write(
+        folder / f"{root}.zip", zip_entries({f"{root}/{path}": entries[path] for path in entries}, build_date())
+    )

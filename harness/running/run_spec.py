@@ -72,7 +72,7 @@ def spec_from_scene(scene: Scene) -> RunSpec:
         "fmu": scene.file,
         "values": short | scene.values,
         "equal_steps": even,
-        "follow": scene.follows,
+        "follow": scene.follows_solver_steps,
     }
     same = {each.name: getattr(scene, each.name) for each in fields(RunSpec) if each.name not in own}
     return RunSpec(**same, **own)

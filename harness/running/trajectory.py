@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import HarnessError, check_names, optional
-from ..results.files import heading, write_csv, write_signals
+from ..results.files import column_heading, write_csv, write_signals
 from ..results.quantity import Quantity
 from .run_spec import RunSpec
 
@@ -84,11 +84,6 @@ class Trajectory:
         """The value of every parameter, and its unit."""
         return {name: (value, self.units[name]) for name, value in self.parameters.items()}
 
-    @property
-    def statistics(self) -> Statistics | None:
-        """Steps, right-hand side evaluations and seconds of the run; None where the FMU does not show them."""
-        return self.cost
-
     def __repr__(self) -> str:
         """Describe the run in one line; its arrays may be long."""
         span = f"{len(self.time)} points from {self.time[0]:g} to {self.time[-1]:g} s"
@@ -147,7 +142,7 @@ class Trajectory:
         Parameters
         ----------
         *names : str
-            The outputs to plot; all that are numbers if none is named, at most eight of them.
+            The outputs to plot; all that are numbers if none is describe_sources, at most eight of them.
 
         Returns
         -------
@@ -162,7 +157,7 @@ class Trajectory:
         if texts:
             raise HarnessError(f"{texts[0]} is a text, which has no curve: name other outputs")
         chosen = names or tuple(numeric[:MOST_PANELS])
-        labels = {heading(name, self.units[name]): self.columns[name] for name in chosen}
+        labels = {column_heading(name, self.units[name]): self.columns[name] for name in chosen}
         return plot(self.time, labels, self.sticking, self.spec.model)
 
     @property
@@ -188,13 +183,15 @@ class Trajectory:
         HarnessError
             If the folder holds other files or the result of another FMU.
         """
-        from ..results.folder import replacing
-        from ..results.provenance import named, record
+        from ..results.folder import replace_folder
+        from ..results.provenance import describe_sources, write_provenance
 
         fmu = self.spec.fmu
-        with replacing(Path(folder), FILES, named(str(fmu))) as fresh:
+        with replace_folder(Path(folder), FILES, describe_sources(str(fmu))) as fresh:
             self.write_tables(fresh)
-            record(fresh, [fmu], self.in_force, self.spec, source=named(str(fmu)), command="")
+            write_provenance(
+                fresh, [fmu], self.effective_parameters, self.spec, source=describe_sources(str(fmu)), command=""
+            )
 
     def column_of_role(self, role: str) -> np.ndarray:
         """The recorded position, velocity or acceleration (n,)."""

@@ -127,7 +127,7 @@ class ExternalFmu:
 
     def input_signals(self, fmu: Any) -> InputSignals | None:
         """Return what sets the inputs of an instance, None if the run has no input signals."""
-        inputs = self.asked.inputs
+        inputs = self.request.inputs
         variables = {variable.name: variable for variable in self.description.modelVariables}
         if not inputs:
             return None

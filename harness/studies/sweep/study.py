@@ -88,7 +88,7 @@ class InProcess:
     """Runs tasks at once in this process, for callers that do not want worker processes."""
 
     size = 1
-    died: tuple[type[Exception], ...] = ()
+    death_errors: tuple[type[Exception], ...] = ()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Call function(*arguments) and return its result as a finished future."""
@@ -99,7 +99,7 @@ class InProcess:
             future.set_exception(error)
         return future
 
-    def ended(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
+    def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
         """Return the futures that are done, which are all."""
         return set(futures)
 
