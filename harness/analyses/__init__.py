@@ -1,1 +1,1 @@
-"""What runs and records say: decay, slip, steps."""
+"""Analyses of runs and records: decay, stick-slip and step sizes."""

@@ -1,22 +1,27 @@
-"""Whether the samples of a run are dense enough for what is measured in them."""
+"""Check that a run has enough samples for what is measured in it."""
 
 import numpy as np
 
 from ..errors import HarnessError
 
-MIN_SAMPLES = 8  # in a swing or a slip: the crest of a half wave, from three or four of them, is then right to 1e-4
+MIN_SAMPLES = 8  # in a half cycle or a slip: a parabola through the top samples is then accurate to 1e-4
 
 
-def require_dense_sampling(t: np.ndarray, begins: np.ndarray, ends: np.ndarray, measured: str) -> None:
-    """HarnessError if one of the stretches from `begins` to `ends` (n,) in s has fewer samples `t` (m,) than that."""
-    counts = np.searchsorted(t, ends, "right") - np.searchsorted(t, begins, "left")
+def require_dense_sampling(t: np.ndarray, starts: np.ndarray, ends: np.ndarray, measured: str) -> None:
+    """Raise HarnessError if one of the intervals has fewer than MIN_SAMPLES samples.
+
+    Parameters
+    ----------
+    t : (m,) sample times in s
+    starts, ends : (n,) bounds of the intervals in s
+    measured : what an interval is, for the message
+    """
+    counts = np.searchsorted(t, ends, "right") - np.searchsorted(t, starts, "left")
     if len(counts) and counts.min() < MIN_SAMPLES:
         i = int(np.argmin(counts))
-        step = (
-            0.5 * float((ends - begins).min()) / MIN_SAMPLES
-        )  # the half, for where few samples are, ends are not sure
+        # half the step that would do: with few samples the bounds of an interval are uncertain themselves
+        step = 0.5 * float((ends - starts).min()) / MIN_SAMPLES
         raise HarnessError(
-            f"{MIN_SAMPLES} samples are needed in each {measured}, and that from "
-            f"t = {begins[i]:.6g} s to {ends[i]:.6g} s "
-            f"has {counts[i]}: take a grid of {step:.1g} s"
+            f"each {measured} needs at least {MIN_SAMPLES} samples, and the one from t = {starts[i]:.6g} s to "
+            f"{ends[i]:.6g} s has {counts[i]}: set grid to {step:.1g} s or less"
         )

@@ -1,9 +1,9 @@
-"""Stick-slip of a sled behind its driver: when it slips, how often, how fast.
+"""Stick-slip of a sled pulled by a driver: slip times, slip period, peak speed and peak acceleration.
 
-Where the friction law knows modes, a slip lasts from the event that ends a stick to the one that begins the next.
-Otherwise it begins where the sled becomes as fast as the driver, which is where the spring is at its longest:
+If the friction law has modes, a slip lasts from the event that ends a stick to the event that begins the next one.
+Otherwise a slip begins when the sled becomes as fast as the driver, which is where the spring is longest:
     d/dt (x_driver - x) = v_driver - v.
-There too m da/dt = k (v_driver - v) is zero, so that the peak acceleration lies in the slip, apart from any chatter.
+At that point m da/dt = k (v_driver - v) is zero too, so the peak acceleration lies in the slip (chatter excepted).
 """
 
 import numpy as np
@@ -15,40 +15,50 @@ from . import sample_density
 
 
 def analyse(run: Trajectory) -> AnalysisResult:
-    """The slips of a sled, their `slip_time` where modes show it, and the peak acceleration where that is recorded;
-    HarnessError with fewer than two, or too few samples in one."""
+    """Measure the slips of a sled.
+
+    `slip_time` is measured only if the law has modes, the peak acceleration only if the acceleration is recorded.
+
+    Raises
+    ------
+    HarnessError
+        if the driver does not move, the run has fewer than two slips, or a slip has too few samples
+    """
     driver = run.get_parameter("v_driver", "the analysis 'slip'")
     v = run.column_of_role("velocity")
     if not driver:
-        raise HarnessError("the analysis 'slip' needs a driver that moves, and v_driver is 0 m/s: set it in [values]")
-    ahead = v * np.sign(driver) - abs(driver)  # of the driver
+        raise HarnessError("the analysis 'slip' needs a moving driver, and v_driver is 0 m/s: set it in [values]")
+    lead = v * np.sign(driver) - abs(driver)  # speed of the sled relative to the driver
     if run.events is not None and len(run.events.t) > 1:
         starts, durations = slips_from_modes(run.events.t, run.events.mode)
         ends = starts[: len(durations)] + durations
     else:
-        starts, durations = upward_crossings(run.time, ahead), np.array([])
-        ends = upward_crossings(run.time, -ahead)
-        ends = ends[np.searchsorted(ends, starts[:1]).sum() :]  # a slip that was under way is no slip that started
+        starts, durations = upward_crossings(run.time, lead), np.array([])
+        ends = upward_crossings(run.time, -lead)
+        ends = ends[np.searchsorted(ends, starts[:1]).sum() :]  # ignore a slip that began before the run
     if len(starts) < 2:
-        raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: take a later stop")
+        raise HarnessError(f"the analysis 'slip' needs two slips, and the run has {len(starts)}: set a later stop")
     sample_density.require_dense_sampling(run.time, starts[: len(ends)], ends, "slip")
-    fast = ahead >= 0
-    found = [
+    slipping = lead >= 0
+    quantities = [
         Quantity("slips", len(starts), "", "slips"),
         Quantity("first_slip", float(starts[0]), "s", "first slip"),
         Quantity("period", float(np.mean(np.diff(starts))), "s", "slip period"),
     ]
     if len(durations):
-        found.append(Quantity("slip_time", float(np.mean(durations)), "s", "duration of a slip"))
-    found.append(Quantity("peak_speed", peak_value(run.time, np.abs(v), fast), "m/s", "peak speed"))
+        quantities.append(Quantity("slip_time", float(np.mean(durations)), "s", "duration of a slip"))
+    quantities.append(Quantity("peak_speed", peak_value(run.time, np.abs(v), slipping), "m/s", "peak speed"))
     if "acceleration" in run.spec.motion_outputs:
-        peak = peak_value(run.time, np.abs(run.column_of_role("acceleration")), include_neighbours(fast))
-        found.append(Quantity("peak_acceleration", peak, "m/s2", "peak acceleration"))
-    return AnalysisResult(tuple(found))
+        peak = peak_value(run.time, np.abs(run.column_of_role("acceleration")), include_neighbours(slipping))
+        quantities.append(Quantity("peak_acceleration", peak, "m/s2", "peak acceleration"))
+    return AnalysisResult(tuple(quantities))
 
 
 def slips_from_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and durations in s of the slips that modes (n,) from times t (n,) show; one cut short has no duration."""
+    """Return start times and durations (s) of the slips, from the modes (n,) that hold from the times t (n,) on.
+
+    A slip that the end of the run cuts short has no duration.
+    """
     stuck = np.flatnonzero(mode == 0)
     starts = t[stuck[stuck < len(t) - 1] + 1]
     ends = t[stuck[stuck > 0]]
@@ -57,26 +67,29 @@ def slips_from_modes(t: np.ndarray, mode: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def upward_crossings(t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Times (m,) where y (n,) rises through zero, on straight lines between its samples."""
+    """Return the times (m,) at which y (n,) rises through zero, by linear interpolation between samples."""
     i = np.flatnonzero((y[:-1] < 0) & (y[1:] >= 0))
     return t[i] - y[i] * (t[i + 1] - t[i]) / (y[i + 1] - y[i])
 
 
-def include_neighbours(among: np.ndarray) -> np.ndarray:
-    """The samples named, and the neighbours of each."""
-    wide = among.copy()
-    wide[:-1] |= among[1:]
-    wide[1:] |= among[:-1]
+def include_neighbours(selected: np.ndarray) -> np.ndarray:
+    """Extend a mask of samples (n,) by the neighbours of each selected sample."""
+    wide = selected.copy()
+    wide[:-1] |= selected[1:]
+    wide[1:] |= selected[:-1]
     return wide
 
 
-def peak_value(t: np.ndarray, y: np.ndarray, among: np.ndarray) -> float:
-    """The largest y (n,) of the samples named, or the top of the parabola through it and its neighbours among them."""
-    i = int(np.argmax(np.where(among, y, -np.inf)))
-    if not (0 < i < len(y) - 1 and among[i - 1] and among[i + 1]):
+def peak_value(t: np.ndarray, y: np.ndarray, selected: np.ndarray) -> float:
+    """Return the largest y (n,) of the selected samples.
+
+    The peak is the vertex of the parabola through the largest sample and its neighbours if these are selected too.
+    """
+    i = int(np.argmax(np.where(selected, y, -np.inf)))
+    if not (0 < i < len(y) - 1 and selected[i - 1] and selected[i + 1]):
         return float(y[i])
     left, right = t[i] - t[i - 1], t[i + 1] - t[i]
     down, up = (y[i] - y[i - 1]) / left, (y[i + 1] - y[i]) / right
-    bend = (up - down) / (left + right)
+    curvature = (up - down) / (left + right)
     slope = (down * right + up * left) / (left + right)
-    return float(y[i] - slope * slope / (4 * bend)) if bend < 0 else float(y[i])
+    return float(y[i] - slope * slope / (4 * curvature)) if curvature < 0 else float(y[i])

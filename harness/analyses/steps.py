@@ -1,4 +1,4 @@
-"""The solver's own steps: how many, how large, how many refused, and how they collapse where the motion reverses."""
+"""Step sizes of the solver: count, sizes, rejected steps, and how far they collapse at reversals of the motion."""
 
 import numpy as np
 
@@ -7,13 +7,13 @@ from ..results.quantity import AnalysisResult
 from ..results.step_sizes import step_size_quantities
 from ..running.trajectory import Trajectory
 
-NEIGHBOUR_STEPS = 5  # steps on either side of a reversal that belong to it
+NEIGHBOUR_STEPS = 5  # steps on either side of a reversal that count as near it
 
 
 def analyse(run: Trajectory) -> AnalysisResult:
-    """The step sizes of a run that followed its solver."""
+    """Measure the step sizes of a run that follows its solver; HarnessError if it does not."""
     if run.steps is None or not len(run.steps.h):
-        raise HarnessError("the analysis 'steps' needs a run that follows the solver's own steps: add follow = true")
+        raise HarnessError("the analysis 'steps' needs a run that follows the solver's own steps: set follow = true")
     h = run.steps.h
     collapse = None
     if "velocity" in run.spec.motion_outputs:
@@ -22,9 +22,15 @@ def analyse(run: Trajectory) -> AnalysisResult:
 
 
 def step_collapse(ends: np.ndarray, h: np.ndarray, t: np.ndarray, v: np.ndarray) -> float | None:
-    """The median step over the median of the smallest steps near the reversals of v (m,) at t (m,).
+    """Return the median step divided by the median of the smallest steps near reversals; None without a reversal.
 
-    `ends` (n + 1,) bounds the steps h (n,).  A reversal is a change of sign, rests skipped; None without any.
+    A reversal is a change of sign of the velocity; samples at rest are skipped.
+
+    Parameters
+    ----------
+    ends : (n + 1,) bounds of the steps in s
+    h : (n,) step sizes in s
+    t, v : (m,) sample times in s and velocities
     """
     moving = np.flatnonzero(v)
     reversals = moving[1:][np.diff(np.sign(v[moving])) != 0]

@@ -1,1 +1,1 @@
-"""The answers to compare with: closed forms, series, other people's solvers, stored references."""
+"""Reference solutions: closed forms, series, peer solvers and stored certified results."""

@@ -1,7 +1,7 @@
-"""The answer to compare with: the default experiment of each model under each law, certified, with its changes of mode.
+"""Certified references: the default run of each model under each law, with its changes of mode.
 
-The numbers lie beside the file of the model, as certified.py makes them: stickslip.csv, whose first line tells how, and
-stickslip-events.csv; those of other laws and values under more of a name, as stickslip-threshold.csv.
+certification.py writes the numbers next to the file of the model: stickslip.csv, whose first line names the
+methods, and stickslip-events.csv; those of other laws and values under longer names, such as stickslip-threshold.csv.
 """
 
 from collections.abc import Sequence
@@ -16,15 +16,24 @@ from ..running.solution import Solution
 from .ode_problem import OdeProblem
 
 FOLDER = Path(__file__).parents[2] / "fmus"
-ERROR_LABEL = ", relative difference "  # before it stands how the numbers were got
-POINTS = 401  # common points of every run, start and stop included
+ERROR_LABEL = ", relative difference "  # in the first line of a file, between the methods and the estimated error
+POINTS = 401  # common output points of every run, including start and stop
 
 
 @dataclass(frozen=True)
 class ReferenceCase:
-    """A model under one law: `values` to set in its FMU, the `truth` of that law or its name, the `problem` as peers
-    write it, the name of the truth about `dry` friction if the law only approximates it, and the `outputs` that are the
-    states; the model is a name, or the path of a file."""
+    """A model under one law.
+
+    Attributes
+    ----------
+    model : name of the model, or path of its file
+    law : for people to read
+    reference_source : the reference of this law, or its name
+    problem : the equations for peer solvers
+    values : parameter values to set in the FMU
+    dry_friction_reference : name of the reference with dry friction, if the law only approximates it
+    outputs : names of the states among the outputs
+    """
 
     name: str
     model: str
@@ -37,22 +46,29 @@ class ReferenceCase:
 
     @property
     def is_chattering(self) -> bool:
-        """Whether friction jumps within a step, with no event: nothing that a peer is good for."""
+        """Whether friction jumps within a step without an event; peer solvers are not made for that."""
         return "friction" in self.values
 
     @property
     def reference(self) -> "CertifiedReference":
-        """The truth of the law."""
-        return (
-            load_reference(self.reference_source) if isinstance(self.reference_source, str) else self.reference_source
-        )
+        """The reference of the law."""
+        if isinstance(self.reference_source, str):
+            return load_reference(self.reference_source)
+        return self.reference_source
 
 
 @dataclass(frozen=True)
 class CertifiedReference:
-    """The states `motion` (n, states), position and speed first, at `times` (n,), and the `modes` (time in s, mode that
-    holds from there on) of which the first is the start; none where nothing sticks.  SI units.  `doubt` is the largest
-    difference of the two routes that led here, relative to the largest of each column; `how` names them."""
+    """A certified result in SI units.
+
+    Attributes
+    ----------
+    times : (n,) in s
+    motion : (n, states), position and velocity first
+    modes : (time in s, mode from there on), the first at the start; empty if nothing sticks
+    method : the methods that were compared
+    estimated_error : their largest difference, relative to the largest value of each column
+    """
 
     times: np.ndarray
     motion: np.ndarray
@@ -68,9 +84,14 @@ class CertifiedReference:
 
 @dataclass(frozen=True)
 class SolutionErrors:
-    """At the end, root mean square and largest over the common points, of position and speed alike, each relative to
-    the largest of the true motion; `events` in s is the largest of the event times, None if none were asked for and
-    NaN if their number or their modes are not the true ones."""
+    """Errors of a solution relative to the largest of the reference motion, the larger of position and velocity.
+
+    Attributes
+    ----------
+    final : at the end
+    rms, largest : over the common points
+    events : largest error of the event times in s; None without events, NaN if their number or modes are wrong
+    """
 
     final: float
     rms: float
@@ -80,42 +101,42 @@ class SolutionErrors:
 
 @cache
 def load_reference(name: str, folder: Path = FOLDER) -> CertifiedReference:
-    """The reference of a name."""
+    """Read the reference of a name."""
     with (folder / f"{name}.csv").open(encoding="utf-8") as file:
-        how, told, doubt = file.readline().strip("# \n").partition(ERROR_LABEL)
+        method, label, error = file.readline().strip("# \n").partition(ERROR_LABEL)
         times, *motion = np.loadtxt(file, delimiter=",", skiprows=1).T
     events, modes = folder / f"{name}-events.csv", np.empty((0, 2))
     if events.is_file():
         modes = np.loadtxt(events, delimiter=",", skiprows=1, ndmin=2)
     changes = [(t, int(mode)) for t, mode in modes.tolist()]
-    return CertifiedReference(times, np.array(motion).T, changes, how, float(doubt) if told else nan)
+    return CertifiedReference(times, np.array(motion).T, changes, method, float(error) if label else nan)
 
 
-def compute_errors(answer: Solution, truth: CertifiedReference) -> SolutionErrors:
-    """How far an answer at the common points is from the truth."""
-    off = relative_errors(answer.states, truth.motion)
-    asked = answer.events is not None
+def compute_errors(answer: Solution, reference: CertifiedReference) -> SolutionErrors:
+    """Return the errors of a solution at the times of a reference."""
+    error = relative_errors(answer.states, reference.motion)
+    has_events = answer.events is not None
     return SolutionErrors(
-        final=float(off[-1]),
-        rms=float(np.sqrt(np.mean(off * off))),
-        largest=float(off.max()),
-        events=event_time_error(answer.events or [], truth.events) if asked else None,
+        final=float(error[-1]),
+        rms=float(np.sqrt(np.mean(error * error))),
+        largest=float(error.max()),
+        events=event_time_error(answer.events or [], reference.events) if has_events else None,
     )
 
 
-def relative_errors(motion: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """The largest error of the states at each point (n,), relative to the largest of the true column."""
-    largest = np.abs(truth).max(axis=0)
-    return (np.abs(motion - truth) / np.where(largest > 0, largest, 1.0)).max(axis=1)
+def relative_errors(motion: np.ndarray, reference: np.ndarray) -> np.ndarray:
+    """Return the largest error of the states at each point (n,), relative to the largest of the reference column."""
+    largest = np.abs(reference).max(axis=0)
+    return (np.abs(motion - reference) / np.where(largest > 0, largest, 1.0)).max(axis=1)
 
 
-def max_relative_difference(one: Solution, other: Solution) -> float:
-    """The largest error of an answer, the first being the truth."""
-    return float(relative_errors(other.states, one.states).max())
+def max_relative_difference(reference: Solution, other: Solution) -> float:
+    """Return the largest relative difference of two solutions."""
+    return float(relative_errors(other.states, reference.states).max())
 
 
-def event_time_error(events: Sequence[tuple[float, int]], truth: Sequence[tuple[float, int]]) -> float:
-    """The largest error of event times in s; NaN if their number or their modes differ."""
-    if [mode for _, mode in events] != [mode for _, mode in truth]:
+def event_time_error(events: Sequence[tuple[float, int]], reference: Sequence[tuple[float, int]]) -> float:
+    """Return the largest error of event times in s; NaN if the number or the modes of the events differ."""
+    if [mode for _, mode in events] != [mode for _, mode in reference]:
         return float("nan")
-    return max((abs(t - true) for (t, _), (true, _) in zip(events, truth, strict=True)), default=0.0)
+    return max((abs(t - true) for (t, _), (true, _) in zip(events, reference, strict=True)), default=0.0)

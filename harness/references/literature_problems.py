@@ -1,5 +1,4 @@
-"""The problems of other people: the chattering classic, with modes and as plain sign(v); the block on a belt, as it is
-and smoothed."""
+"""Test problems from the literature: an oscillator that chatters, and a block on a belt, each in two formulations."""
 
 from math import atan, copysign, fabs, pi
 
@@ -8,14 +7,14 @@ from .ode_problem import JacobianFunction, OdeProblem, RhsFunction
 
 
 class ChatteringOscillator(Coulomb):
-    """The chattering classic: strong friction stops the mass within half a second, and holds it."""
+    """Classic chattering problem: strong friction stops the mass within half a second and holds it."""
 
     start, stop = (0.0, 5.0), 10.0 * pi
     m, k, f = 1.0, 1.0, 10.0
 
 
 class ChatteringOscillatorSign(ChatteringOscillator):
-    """The classic with sign(v) as it stands: one equation, no modes, and no end."""
+    """The same problem with sign(v): one equation without modes, in which the mass never stops."""
 
     has_dry_friction = False
 
@@ -28,7 +27,7 @@ class ChatteringOscillatorSign(ChatteringOscillator):
 class BeltBlock(OdeProblem):
     """Block on a belt (R. I. Leine, Bifurcations in Discontinuous Mechanical Systems of Filippov-Type, 2000).
 
-    m = k = F_s = 1 in SI units; seen from the belt, y = x - 0.2 t, the block sticks where its speed is zero:
+    m = k = F_s = 1 in SI units.  In the frame of the belt, y = x - 0.2 t, the block sticks where its velocity is zero:
 
     y'' = -(y + 0.2 t) - sign(v)/(1 + 3 |v|),    stuck while |y + 0.2 t| <= 1
     """
@@ -41,12 +40,12 @@ class BeltBlock(OdeProblem):
     def jacobian(self, mode: int) -> JacobianFunction | None:
         return lambda t, y: [[0.0, 1.0], [-1.0, 3 / (1 + 3 * mode * y[1]) ** 2]]
 
-    def hold(self, t: float, x: float) -> tuple[float, float, float]:
+    def static_load(self, t: float, x: float) -> tuple[float, float, float]:
         return -(x + 0.2 * t), -0.2, 1.0
 
 
 class SmoothedBeltBlock(BeltBlock):
-    """The block on a belt, its jump of friction smoothed to a steep arctan: it creeps where it should stick."""
+    """Block on a belt with friction smoothed to a steep arctan: it creeps where it should stick."""
 
     has_dry_friction = False
     steepness = 1e6  # s/m

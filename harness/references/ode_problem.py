@@ -1,9 +1,9 @@
-"""The oscillators as the user of another solver writes them: equations and modes, typed apart from the FMUs.
+"""Oscillators as the user of another solver writes them: equations and modes, independent of the FMUs.
 
     d(x, v)/dt = rates(mode)(t, (x, v)),    mode = -1 sliding backward, 0 stuck, 1 sliding forward
 
-A dry problem slides in one mode until v = 0, then goes where `settle` says; stuck, it waits for `release`.
-SI units throughout.
+With dry friction, a problem slides in one mode until v = 0 and then takes the mode from `resolve_mode`; while stuck, it
+waits for `breakaway`.  All quantities are in SI units.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,7 +11,7 @@ from math import copysign, inf
 
 import numpy as np
 
-from .segments import Friction, ParameterSpan, ParameterValues, Segment
+from .segments import FrictionLaw, ParameterSpan, ParameterValues, Segment
 
 StateVector = Sequence[float] | np.ndarray
 RhsFunction = Callable[[float, StateVector], tuple[float, float]]
@@ -19,8 +19,16 @@ JacobianFunction = Callable[[float, StateVector], list[list[float]]]
 
 
 class OdeProblem:
-    """One run from `start` (position in `unit`, and speed) at t = 0 to `stop` (s); `absolute` is the tolerance below
-    which errors do not matter, as a share of the relative one."""
+    """An initial value problem from t = 0 on.
+
+    Attributes
+    ----------
+    start : initial position (in `unit`) and velocity
+    stop : in s
+    has_dry_friction : whether the body can stick
+    is_stiff : whether peers need an implicit method
+    atol_factor : absolute tolerance divided by the relative one
+    """
 
     start: tuple[float, float]
     stop: float
@@ -28,38 +36,38 @@ class OdeProblem:
     has_dry_friction = is_stiff = False
     atol_factor = 1e-3  # SI units
 
-    def values(self, *names: str) -> ParameterValues:
-        """Its parameters and its start by their names in the FMU, for its closed form."""
+    def fmu_values(self, *names: str) -> ParameterValues:
+        """Return parameters and initial values by their names in the FMU, for the closed form."""
         return {n: getattr(self, n) for n in names} | {"x0": self.start[0], "v0": self.start[1], "F_ext": 0.0}
 
     def rates(self, mode: int) -> RhsFunction:
-        """The right-hand side in a mode of sliding."""
+        """Return the right-hand side in a mode of sliding."""
         raise NotImplementedError
 
     def jacobian(self, mode: int) -> JacobianFunction | None:
-        """Its derivatives by the state; None leaves them to the solver."""
+        """Return the Jacobian of the right-hand side; None leaves it to the solver."""
         return None
 
-    def hold(self, t: float, x: float) -> tuple[float, float, float]:
-        """Load on the body at rest, its rate, and what friction can hold."""
+    def static_load(self, t: float, x: float) -> tuple[float, float, float]:
+        """Return the load on the body at rest, its rate, and the largest load that friction holds."""
         raise NotImplementedError
 
     def resolve_mode(self, t: float, x: float, v: float) -> int:
-        """The mode that holds from here on."""
+        """Return the mode that holds from here on."""
         if not self.has_dry_friction:
             return 1
-        load, _, limit = self.hold(t, x)
+        load, _, limit = self.static_load(t, x)
         return int(copysign(1, v)) if v else int(copysign(1, load)) if abs(load) > limit else 0
 
     def breakaway(self, t: float, x: float) -> tuple[float, int]:
-        """When a stuck body breaks away, and in which direction; the load is linear in time."""
-        load, rate, limit = self.hold(t, x)
+        """Return when a stuck body breaks away, and in which direction; the load is linear in time."""
+        load, rate, limit = self.static_load(t, x)
         direction = int(copysign(1, rate))
         return (t + (limit - direction * load) / abs(rate), direction) if rate else (inf, 0)
 
 
 class LinearOscillator(OdeProblem):
-    """A mass on a spring, with a viscous damper or without."""
+    """A mass on a spring, with or without a viscous damper."""
 
     m: float
     k: float
@@ -71,14 +79,14 @@ class LinearOscillator(OdeProblem):
 
 
 class UnspecifiedProblem(OdeProblem):
-    """A model that nobody has written a second time: there is nothing to ask a peer."""
+    """A model without an independent implementation, which peers cannot solve."""
 
     def __init__(self, stop: float) -> None:
         self.stop = stop
 
 
-def closed_form_segments(friction: Friction | None, spans: list[ParameterSpan]) -> Iterator[Segment]:
-    """The motion over the spans in closed form, with dry friction if there is any."""
-    from .piecewise_linear import pieces  # which needs a package that not everybody has
+def closed_form_segments(friction: FrictionLaw | None, spans: list[ParameterSpan]) -> Iterator[Segment]:
+    """Return the motion over the spans in closed form, with or without dry friction."""
+    from .piecewise_linear import solve_segments  # imported here because it needs mpmath, an optional dependency
 
-    return pieces(spans, friction)
+    return solve_segments(spans, friction)

@@ -1,6 +1,6 @@
-"""Other people's solvers on the same problems, each in its best use: restarted at every change of mode.
+"""Peer solvers: scipy's solve_ivp, and CVODE of SUNDIALS through scikit-sundae, on the same problems.
 
-scipy's solve_ivp, and CVODE of SUNDIALS through scikit-sundae; both get the Jacobian where they want it.
+Each is used at its best: restarted at every change of mode, and with the Jacobian if the method is implicit.
 """
 
 import warnings
@@ -19,7 +19,7 @@ from ..running.solution import Solution
 from .ode_problem import OdeProblem, RhsFunction, StateVector
 
 SCIPY = ("RK23", "RK45", "DOP853", "Radau", "LSODA")
-IMPLICIT = ("Radau", "LSODA", "BDF")  # those that ask for a Jacobian
+IMPLICIT = ("Radau", "LSODA", "BDF")  # methods that take a Jacobian
 PACKAGES = {"scipy": ("scipy", "scipy"), "cvode": ("sksundae", "scikit-sundae")}  # module, and name to install
 
 
@@ -27,60 +27,69 @@ RhsWrapper = Callable[[RhsFunction], RhsFunction]
 
 
 def without_limit(rates: RhsFunction) -> RhsFunction:
-    """As they are: counting costs time."""
+    """Return the right-hand side unchanged, because counting evaluations takes time."""
     return rates
 
 
 def limit_evaluations(limit: int) -> RhsWrapper:
-    """Right-hand sides that end the run after so many of them, all together."""
+    """Return a wrapper that stops a run after `limit` evaluations of all right-hand sides together."""
     calls = count(1)
     return raise_when(lambda: next(calls) > limit, f"{limit} right-hand sides")
 
 
 def limit_run_time(seconds: float) -> RhsWrapper:
-    """Right-hand sides that end the run after so many seconds from now."""
+    """Return a wrapper that stops a run after a run time from now on."""
     end = perf_counter() + seconds
     return raise_when(lambda: perf_counter() > end, f"{seconds:g} s of run time")
 
 
-def raise_when(over: Callable[[], bool], after: str) -> RhsWrapper:
-    """Right-hand sides that end the run when it is `over`."""
+def raise_when(is_exceeded: Callable[[], bool], limit: str) -> RhsWrapper:
+    """Return a wrapper of right-hand sides that raises HarnessError once a limit is exceeded."""
 
-    def watched(rates: RhsFunction) -> RhsFunction:
-        def asked(t: float, y: StateVector) -> tuple[float, float]:
-            if over():
-                raise HarnessError(f"at t = {t:.3g} s after {after}")
+    def wrapper(rates: RhsFunction) -> RhsFunction:
+        def limited_rates(t: float, y: StateVector) -> tuple[float, float]:
+            if is_exceeded():
+                raise HarnessError(f"at t = {t:.3g} s after {limit}")
             return rates(t, y)
 
-        return asked
+        return limited_rates
 
-    return watched
+    return wrapper
 
 
 @dataclass(frozen=True)
 class SolverTask:
-    """What a peer is to solve, and how."""
+    """The problem, method and tolerances of a run, and the wrapper of its right-hand sides."""
 
     method: str
     problem: OdeProblem
-    watched: RhsWrapper
+    wrapper: RhsWrapper
     rtol: float
     atol: float
 
 
 @dataclass(frozen=True)
 class ModeInterval:
-    """One mode: samples (n, 2) at the points passed, the end in s, the state there, and whether v came to zero."""
+    """The solution while one mode holds.
+
+    Attributes
+    ----------
+    samples : (n, 2) states at the output times passed
+    end : in s
+    state : at the end
+    has_stopped : whether the velocity became zero
+    evaluations : of right-hand side and Jacobian
+    """
 
     samples: np.ndarray
     end: float
     state: tuple[float, float]
-    turned: bool
+    has_stopped: bool
     evaluations: int
 
 
 def missing_packages() -> dict[str, str]:
-    """The peers that are not installed, each with the package that brings it."""
+    """Return the package to install for each peer that is not installed."""
     return {peer: package for peer, (module, package) in PACKAGES.items() if find_spec(module) is None}
 
 
@@ -91,35 +100,44 @@ def solve(
     times: np.ndarray,
     rtol: float,
     atol: float,
-    watched: RhsWrapper = without_limit,
+    wrapper: RhsWrapper = without_limit,
 ) -> Solution:
-    """The motion at `times` (n,), which begin at 0 and end at the stop; HarnessError says why there is none."""
-    ask = partial(
-        {"scipy": solve_with_scipy, "cvode": solve_with_cvode}[peer], SolverTask(method, problem, watched, rtol, atol)
-    )
+    """Solve a problem by a method of a peer.
+
+    Parameters
+    ----------
+    times : (n,) output times, from 0 to the stop in s
+
+    Raises
+    ------
+    HarnessError
+        if the solver fails or exceeds a limit
+    """
+    task = SolverTask(method, problem, wrapper, rtol, atol)
+    solve_mode = partial({"scipy": solve_with_scipy, "cvode": solve_with_cvode}[peer], task)
     t, state = 0.0, problem.start
     mode = problem.resolve_mode(t, *state)
     motion = np.empty((len(times), 2))
     motion[0] = state
     events: list[tuple[float, int]] = []
-    evaluations, done = 0, 1  # samples made
+    evaluations, done = 0, 1  # `done` samples are filled
     while t < problem.stop:
         if mode:
-            part = ask(mode, t, state, times[done:])
-            motion[done : done + len(part.samples)] = part.samples
-            done += len(part.samples)
-            evaluations += part.evaluations
-            t, state = part.end, part.state
-            if part.turned:
+            interval = solve_mode(mode, t, state, times[done:])
+            motion[done : done + len(interval.samples)] = interval.samples
+            done += len(interval.samples)
+            evaluations += interval.evaluations
+            t, state = interval.end, interval.state
+            if interval.has_stopped:
                 mode = problem.resolve_mode(t, state[0], 0.0)
                 events.append((t, mode))
         else:
-            release, mode = problem.breakaway(t, state[0])
-            t = min(release, problem.stop)
+            breakaway, mode = problem.breakaway(t, state[0])
+            t = min(breakaway, problem.stop)
             passed = int(np.searchsorted(times, t, side="right"))
             motion[done:passed] = state
             done = max(done, passed)
-            if release <= problem.stop:
+            if breakaway <= problem.stop:
                 events.append((t, mode))
     return Solution(motion, events if problem.has_dry_friction else None, evaluations)
 
@@ -127,7 +145,7 @@ def solve(
 def solve_with_scipy(
     task: SolverTask, mode: int, t: float, state: tuple[float, float], times: np.ndarray
 ) -> ModeInterval:
-    """One mode through solve_ivp."""
+    """Solve one mode with solve_ivp."""
     from scipy.integrate import solve_ivp
 
     problem = task.problem
@@ -142,12 +160,12 @@ def solve_with_scipy(
     if task.method in IMPLICIT:
         options["jac"] = problem.jacobian(mode)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a failure is told by its status
-        run = solve_ivp(task.watched(problem.rates(mode)), (t, problem.stop), state, task.method, **options)
+        warnings.simplefilter("ignore")  # the status reports a failure
+        run = solve_ivp(task.wrapper(problem.rates(mode)), (t, problem.stop), state, task.method, **options)
     if run.status < 0:
         raise HarnessError(run.message.splitlines()[0])
     evaluations = int(run.nfev + run.njev)
-    samples = np.reshape(run.y, (2, -1)).T  # a list where there are none
+    samples = np.reshape(run.y, (2, -1)).T  # without output times run.y is a list
     if run.status == 1:
         end = float(run.t_events[0][-1])
         return ModeInterval(samples, end, (float(run.y_events[0][-1][0]), 0.0), True, evaluations)
@@ -157,28 +175,28 @@ def solve_with_scipy(
 def solve_with_cvode(
     task: SolverTask, mode: int, t: float, state: tuple[float, float], times: np.ndarray
 ) -> ModeInterval:
-    """One mode through CVODE."""
+    """Solve one mode with CVODE."""
     from sksundae.cvode import CVODE as Solver
 
     problem, method = task.problem, task.method
-    rates = task.watched(problem.rates(mode))
+    rates = task.wrapper(problem.rates(mode))
     jacobian = problem.jacobian(mode) if method in IMPLICIT else None
 
-    def fill(t: float, y: np.ndarray, slope: np.ndarray) -> None:
+    def fill_rates(t: float, y: np.ndarray, slope: np.ndarray) -> None:
         slope[0], slope[1] = rates(t, y)
 
-    def fill_matrix(t: float, y: np.ndarray, slope: np.ndarray, matrix: np.ndarray) -> None:
+    def fill_jacobian(t: float, y: np.ndarray, slope: np.ndarray, matrix: np.ndarray) -> None:
         assert jacobian is not None
         matrix[:] = jacobian(t, y)
 
-    def standstill(t: float, y: np.ndarray, guard: np.ndarray) -> None:
-        guard[0] = y[1]
+    def standstill(t: float, y: np.ndarray, event: np.ndarray) -> None:
+        event[0] = y[1]
 
     standstill.terminal, standstill.direction = [True], [-mode]  # type: ignore[attr-defined]
     options = {"eventsfn": standstill, "num_events": 1} if problem.has_dry_friction else {}
     if jacobian is not None:
-        options["jacfn"] = fill_matrix
-    solver = Solver(fill, method=method, rtol=task.rtol, atol=task.atol, max_num_steps=1_000_000, **options)
+        options["jacfn"] = fill_jacobian
+    solver = Solver(fill_rates, method=method, rtol=task.rtol, atol=task.atol, max_num_steps=1_000_000, **options)
     run = solver.solve(np.append(t, times), np.array(state))
     if not run.success:
         raise HarnessError(str(run.message).splitlines()[0])
@@ -187,5 +205,5 @@ def solve_with_cvode(
         end = float(run.t_events[-1])
         passed = int(np.searchsorted(times, end, side="right"))
         return ModeInterval(run.y[1 : passed + 1], end, (float(run.y_events[-1][0]), 0.0), True, evaluations)
-    samples = run.y[1:] if len(times) > 1 else run.y[-1:]  # between two points it shows its own steps
+    samples = run.y[1:] if len(times) > 1 else run.y[-1:]  # with two times CVODE returns its own steps
     return ModeInterval(samples, problem.stop, tuple(run.y[-1].tolist()), False, evaluations)

@@ -1,4 +1,4 @@
-"""The pendulum by Taylor series in 25 digits, from one turning point to the next."""
+"""Solution of the pendulum by Taylor series in 25 digits, from one turning point to the next."""
 
 from collections.abc import Callable
 
@@ -6,30 +6,30 @@ import numpy as np
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
 from ..running.solution import Solution
-from .models.pendulum import Pendulum, Reaction
+from .models.pendulum import Pendulum, PendulumWithReaction
 
 DIGITS = 25
-WITHIN = (0.25, 0.45)  # s: half a period and then some, which holds one turning point
+TURNING_POINT_BRACKET = (0.25, 0.45)  # s: around half a period, so that it holds one turning point
 
 
 def solve_pendulum(problem: Pendulum, times: list[float]) -> Solution:
-    """The motion at the times, and the changes of mode."""
+    """Return the motion at rising times in s, and the changes of mode."""
     with workdps(DIGITS):
         weight, arm = mpf(problem.m) * mpf(problem.g), mpf(problem.mu) * mpf(problem.r)
         inertia, a = mpf(problem.inertia), mpf(problem.a)
         moment = mpf(problem.m) * a
 
-        def normal(x: mpf, v: mpf, mode: int) -> mpf:
-            """The load on the pin; the reaction from N^2 = R^2 + (m g sin(x) + m a alpha)^2, alpha linear in N."""
-            if not isinstance(problem, Reaction):
+        def pin_load(x: mpf, v: mpf, mode: int) -> mpf:
+            """Return the load on the pin; N^2 = R^2 + (m g sin(x) + m a alpha)^2, where alpha is linear in N."""
+            if not isinstance(problem, PendulumWithReaction):
                 return weight
             radial = weight * cos(x) + moment * v * v
             b, s = weight * sin(x) * (1 - moment * a / inertia), mode * arm * moment / inertia
             return (sqrt((1 - s * s) * radial**2 + b * b) - s * b) / (1 - s * s)
 
-        def swing(mode: int, t: mpf, x: mpf) -> Callable[[mpf], list[mpf]]:
+        def half_cycle(mode: int, t: mpf, x: mpf) -> Callable[[mpf], list[mpf]]:
             def rates(_: mpf, y: list[mpf]) -> list[mpf]:
-                return [y[1], -(weight * a * sin(y[0]) + mode * arm * normal(y[0], y[1], mode)) / inertia]
+                return [y[1], -(weight * a * sin(y[0]) + mode * arm * pin_load(y[0], y[1], mode)) / inertia]
 
             return odefun(rates, t, [x, mpf(0)])
 
@@ -40,8 +40,9 @@ def solve_pendulum(problem: Pendulum, times: list[float]) -> Solution:
             mode = -int(sign(x))
             if t > 0:
                 events.append((t, mode))
-            state = swing(mode, t, x)
-            end = findroot(lambda s, state=state: state(s)[1], tuple(t + w for w in WITHIN), solver="anderson")
+            state = half_cycle(mode, t, x)
+            bracket = tuple(t + w for w in TURNING_POINT_BRACKET)
+            end = findroot(lambda s, state=state: state(s)[1], bracket, solver="anderson")
             motion += [tuple(state(mpf(s))) for s in times if t <= s < end]
             t, x = end, state(end)[0]
         events.append((t, 0))

@@ -1,9 +1,9 @@
 """Closed forms of the piecewise linear models, in 120 digits.
 
-    m x'' + c x' + k x = P + k u s          P holds from one event to the next, u is the speed of the driver
+    m x'' + c x' + k x = P + k u s          P is constant from one event to the next, u is the velocity of the driver
     x = q + u s + A e^(r1 s) + B e^(r2 s)   r1, r2 the roots of m r^2 + c r + k,  q = (P - c u)/k
 
-A double root and a missing spring are approached to 1e-40, which costs at most 80 of the digits.
+A double root is separated, and a missing spring replaced, by 1e-40; this costs at most 80 of the digits.
 """
 
 from collections.abc import Iterator
@@ -12,19 +12,35 @@ from typing import Any
 
 from mpmath import MPContext
 
-from .segments import Friction, MotionFunction, ParameterSpan, ParameterValues, Segment, constant_velocity, shift_time
+from .segments import (
+    FrictionLaw,
+    MotionFunction,
+    ParameterSpan,
+    ParameterValues,
+    Segment,
+    constant_velocity,
+    shift_time,
+)
 
-mp = MPContext()  # a context of its own: the precision of others stays theirs
+mp = MPContext()  # a context of its own, so that the precision of other users of mpmath does not change
 mp.dps = 120
 mpf = mp.mpf
 TINY = mpf(10) ** -40
-GRAZING_FRACTION = mpf(10) ** -30  # of the speed: what only touches zero is no standstill
+GRAZING_FRACTION = mpf(10) ** -30  # of the velocity: a motion that only touches zero does not stop
 
 
 @dataclass(frozen=True)
 class SpringMassSystem:
-    """The forces of one span: `slide` and `hold` are those of friction; `u` is the speed of the driver, and of one that
-    pulls as the input does that grows, which alone has the speed `ramp`."""
+    """The constants of one span.
+
+    Attributes
+    ----------
+    m, k, c : mass, stiffness and damping
+    slide, hold : friction while sliding, and the largest load that it holds
+    u : velocity of the driver; an input with a rate counts as a driver too, whose velocity alone is `ramp`
+    force : constant part of the input
+    has_dry_friction : whether the body can stick
+    """
 
     m: Any
     k: Any
@@ -33,20 +49,20 @@ class SpringMassSystem:
     hold: Any
     u: Any
     ramp: Any
-    push: Any
-    dry: bool
+    force: Any
+    has_dry_friction: bool
 
     def load(self, x: Any, drive: Any) -> Any:
-        """What a body at rest feels without friction."""
-        return self.push + self.k * (drive - x)
+        """Return the load on a body at rest, without friction."""
+        return self.force + self.k * (drive - x)
 
     def direction(self, load: Any) -> int:
-        """Where a body at rest goes: nowhere while friction can hold the load."""
+        """Return the direction in which a body at rest starts; 0 while friction can hold the load."""
         return 0 if abs(load) <= self.hold else 1 if load > 0 else -1
 
 
-def system(values: ParameterValues, friction: Friction | None) -> SpringMassSystem:
-    """The system that a model's values make."""
+def make_system(values: ParameterValues, friction: FrictionLaw | None) -> SpringMassSystem:
+    """Return the system with the given parameter values."""
     value = {name: mpf(number) for name, number in values.items()}
     slide, hold = friction(value) if friction else (mpf(0), mpf(0))
     rate = value.get("rate", mpf(0))
@@ -55,32 +71,30 @@ def system(values: ParameterValues, friction: Friction | None) -> SpringMassSyst
     return SpringMassSystem(value["m"], value["k"], c, slide, hold, u, ramp, value["F_ext"], friction is not None)
 
 
-def pieces(spans: list[ParameterSpan], friction: Friction | None = None) -> Iterator[Segment]:
-    """The pieces of the motion, each from an event or a change of values on; `friction` tells what slides and what
-    holds."""
+def solve_segments(spans: list[ParameterSpan], friction: FrictionLaw | None = None) -> Iterator[Segment]:
+    """Yield the segments of the motion, each from an event or a change of values on."""
     x, v, drive = mpf(spans[0][2]["x0"]), mpf(spans[0][2]["v0"]), mpf(0)
     for begin, end, values in spans:
-        s = system(values, friction)
+        s = make_system(values, friction)
         t, load = mpf(begin), s.load(x, drive)
-        mode = 1 if not s.dry else (1 if v > 0 else -1) if v != 0 else s.direction(load)
+        mode = 1 if not s.has_dry_friction else (1 if v > 0 else -1) if v != 0 else s.direction(load)
         while True:
-            stuck = s.dry and mode == 0
-            at = constant_velocity(x, mpf(0)) if stuck else sliding_motion(s, x, v, load - mode * s.slide)
+            is_stuck = s.has_dry_friction and mode == 0
+            at = constant_velocity(x, mpf(0)) if is_stuck else sliding_motion(s, x, v, load - mode * s.slide)
             yield Segment(t, mode, shift_time(at, t))
-            wait = (
-                time_to_breakaway(s, load)
-                if stuck
-                else time_to_standstill(s, mode, v, load - mode * s.slide)
-                if s.dry
-                else None
-            )
-            ahead = mpf(end) - t if wait is None or t + wait >= end else wait
+            if not s.has_dry_friction:
+                duration = None
+            elif is_stuck:
+                duration = time_to_breakaway(s, load)
+            else:
+                duration = time_to_standstill(s, mode, v, load - mode * s.slide)
+            ahead = mpf(end) - t if duration is None or t + duration >= end else duration
             x, v = at(ahead)
             t, drive = t + ahead, drive + s.u * ahead
-            if ahead != wait:
+            if ahead != duration:
                 break
             v, load = mpf(0), s.load(x, drive)
-            if stuck:  # the load is the limit by definition: no rounding decides the direction
+            if is_stuck:  # the load equals the limit by definition, so that rounding cannot decide the direction
                 mode = 1 if s.u > 0 else -1
                 load = mode * s.hold
             else:
@@ -89,32 +103,32 @@ def pieces(spans: list[ParameterSpan], friction: Friction | None = None) -> Iter
 
 
 def threshold_segments(s: SpringMassSystem, eps: float, stop: float) -> Iterator[Segment]:
-    """The sled, from rest, under the threshold law with `eps` (m/s) in the limit of exact integration.
+    """Yield the segments of the sled, from rest, under the threshold law in the limit of exact integration.
 
-    It is held below the speed eps only as far as friction can: it starts with the friction that holds until it is as
-    fast as eps, slides, and, once it has slowed down to eps, glides on at that speed until the pull exceeds what
-    friction holds.
+    Below the speed `eps` (m/s) friction balances the load, but only as far as static friction can.  The sled starts
+    with static friction until its speed is eps, then slides.  Once it has slowed down to eps, it moves on at that speed
+    until the load exceeds static friction.
     """
     level = mpf(eps)
     t, x, v = mpf(0), mpf(0), mpf(0)
     while t < stop:
         yield Segment(t, 0, shift_time(constant_velocity(x, v), t))
-        wait = (s.hold - s.load(x, s.u * t)) / (s.k * (s.u - v))
-        t, x = t + wait, x + v * wait
+        duration = (s.hold - s.load(x, s.u * t)) / (s.k * (s.u - v))
+        t, x = t + duration, x + v * duration
         if v < level:
-            heavy = sliding_motion(s, x, v, s.load(x, s.u * t) - s.hold)
-            yield Segment(t, 0, shift_time(heavy, t))
-            wait = mp.acos((s.u - level) / (s.u - v)) / mp.sqrt(s.k / s.m)  # v = u - (u - v0) cos(w s)
-            t, x = t + wait, heavy(wait)[0]
+            accelerating = sliding_motion(s, x, v, s.load(x, s.u * t) - s.hold)
+            yield Segment(t, 0, shift_time(accelerating, t))
+            duration = mp.acos((s.u - level) / (s.u - v)) / mp.sqrt(s.k / s.m)  # v = u - (u - v0) cos(w s)
+            t, x = t + duration, accelerating(duration)[0]
         net = s.load(x, s.u * t) - s.slide
         slip = sliding_motion(s, x, level, net)
         yield Segment(t, 1, shift_time(slip, t))
-        wait = time_to_standstill(replace(s, u=s.u - level), 1, mpf(0), net)  # seen by who moves at the level
-        t, x, v = t + wait, slip(wait)[0], level
+        duration = time_to_standstill(replace(s, u=s.u - level), 1, mpf(0), net)  # in a frame that moves at eps
+        t, x, v = t + duration, slip(duration)[0], level
 
 
 def sliding_motion(s: SpringMassSystem, x: Any, v: Any, net: Any) -> MotionFunction:
-    """Position and speed from x, v on; `net` is the force at the beginning without that of the damper."""
+    """Return the motion from x, v on; `net` is the force at its beginning without that of the damper."""
     k = s.k or TINY
     r1, r2 = characteristic_roots(s, k)
     rest = (net - s.c * s.u) / k  # of q - x
@@ -129,19 +143,19 @@ def sliding_motion(s: SpringMassSystem, x: Any, v: Any, net: Any) -> MotionFunct
 
 
 def characteristic_roots(s: SpringMassSystem, k: Any) -> tuple[Any, Any]:
-    """The roots of m r^2 + c r + k, never equal."""
-    spread = mp.sqrt((s.c * s.c - 4 * s.m * k) or TINY)
-    return (-s.c + spread) / (2 * s.m), (-s.c - spread) / (2 * s.m)
+    """Return the roots of m r^2 + c r + k, never equal."""
+    root = mp.sqrt((s.c * s.c - 4 * s.m * k) or TINY)
+    return (-s.c + root) / (2 * s.m), (-s.c - root) / (2 * s.m)
 
 
 def time_to_breakaway(s: SpringMassSystem, load: Any) -> Any:
-    """Time until the load on a body at rest is what friction can hold, or None."""
+    """Return the time until the load on a body at rest reaches the largest that friction holds, or None."""
     rate = s.k * s.u
     return None if rate == 0 else (s.hold - mp.sign(rate) * load) / abs(rate)
 
 
 def time_to_standstill(s: SpringMassSystem, mode: int, v: Any, net: Any) -> Any:
-    """Time until the speed leaves the sign of the mode, or None."""
+    """Return the time until the velocity no longer has the sign of the mode, or None."""
     k = s.k or TINY
     if s.c == 0:  # v = u + size cos(w s - phase)
         w = mp.sqrt(k / s.m)
@@ -151,17 +165,17 @@ def time_to_standstill(s: SpringMassSystem, mode: int, v: Any, net: Any) -> Any:
             return None
         return positive_angle(phase + mode * mp.acos(-s.u / size), 2 * mp.pi) / w
     if s.u != 0:
-        raise ValueError("a damper and a moving driver have no closed standstill")
+        raise ValueError("with a damper and a moving driver the time to standstill has no closed form")
     r1, r2 = characteristic_roots(s, k)
     a = (net - s.c * v) / s.m
-    ratio = (a - r1 * v) / (a - r2 * v) if a != r2 * v else mpf(0)  # v = 0 where e^((r1 - r2) s) is this
+    ratio = (a - r1 * v) / (a - r2 * v) if a != r2 * v else mpf(0)  # v = 0 where e^((r1 - r2) s) equals this
     if mp.im(r1) != 0:
         return positive_angle(mp.arg(ratio), 2 * mp.pi) / (2 * mp.im(r1))
-    late = mp.log(ratio) / (r1 - r2) if ratio > 0 else mpf(0)
-    return late if late > TINY else None
+    time = mp.log(ratio) / (r1 - r2) if ratio > 0 else mpf(0)
+    return time if time > TINY else None
 
 
-def positive_angle(angle: Any, whole: Any) -> Any:
-    """The angle in (0, whole]; one that is zero but for rounding is a whole turn."""
-    part = angle % whole
-    return whole if part < TINY else part
+def positive_angle(angle: Any, period: Any) -> Any:
+    """Return the angle modulo `period` in (0, period]; zero, or zero but for rounding, becomes a whole period."""
+    remainder = angle % period
+    return period if remainder < TINY else remainder

@@ -1,7 +1,8 @@
-"""The answer by a second route, for any values: what the stability table compares with.
+"""Reference trajectories for any parameter values, for the stability table and the benchmarks.
 
-Closed forms in 120 digits, or scipy's methods at 1e-11 and less, restarted at every change of mode or value: as the
-file of the model in models/ has it.  Nothing is shared with the FMUs.  Of others two methods may agree: certified.py.
+They are closed forms in 120 digits, or runs of scipy's methods at tolerances of 1e-11 and less, restarted at every
+change of mode or value, as the module of the model in models/ defines.  They share no code with the FMUs.  For a model
+without such a module, certification.py compares two methods of its FMU.
 """
 
 from collections.abc import Iterable
@@ -18,7 +19,7 @@ from .segments import ParameterSpan, Segment
 
 @dataclass(frozen=True)
 class ReferenceTrajectory:
-    """`x`, `v` (n,) at `times` (n,) in s; `events` are (time, new mode), the start left out."""
+    """Positions `x` and velocities `v` (n,) at `times` (n,) in s, and `events` as (time, new mode) after the start."""
 
     times: np.ndarray
     x: np.ndarray
@@ -26,69 +27,79 @@ class ReferenceTrajectory:
     events: tuple[tuple[float, int], ...]
 
     def error(self, x: np.ndarray, v: np.ndarray) -> float:
-        """The largest error of positions and speeds (n,); NaN if there is one.
+        """Return the largest relative error of positions and velocities (n,); NaN if one of them is NaN.
 
-        Position counts in its largest value; speed in its largest, or in what covers the largest distance in the run.
+        Positions are relative to the largest position; velocities to the largest velocity, or to the one that covers
+        the largest position within the run if that is larger.
         """
-        far = max_abs(self.x)
-        fast = max(max_abs(self.v), far / (self.times[-1] - self.times[0]))
-        return max_or_nan(max_abs(x - self.x) / (far or 1.0), max_abs(v - self.v) / (fast or 1.0))
+        x_max = max_abs(self.x)
+        v_max = max(max_abs(self.v), x_max / (self.times[-1] - self.times[0]))
+        return max_or_nan(max_abs(x - self.x) / (x_max or 1.0), max_abs(v - self.v) / (v_max or 1.0))
 
 
 def max_abs(values: np.ndarray) -> float:
-    """The largest size among values (n,); NaN if there is one."""
+    """Return the largest magnitude among values (n,); NaN if one of them is NaN."""
     return float(np.abs(values).max())
 
 
 def max_or_nan(*errors: float) -> float:
-    """The largest of some errors; NaN if there is one, which Python's own max may lose."""
+    """Return the largest error; NaN if one of them is NaN, which Python's own max may not return."""
     return float(np.max(errors))
 
 
 @dataclass(frozen=True)
 class CommunicationGrid:
-    """Communication points from `start` to `stop` (s): evenly `points` steps, and where values change or modes do."""
+    """Communication points of a run.
+
+    Attributes
+    ----------
+    start, stop : in s
+    intervals : number of equal communication steps
+    changes : times in s at which values change
+    at_events : whether there is a point at each event
+    """
 
     start: float
     stop: float
-    points: int
+    intervals: int
     changes: tuple[float, ...] = ()
     at_events: bool = False
 
     def times(self, events: Iterable[float]) -> list[float]:
-        run = self.stop - self.start
-        even = [self.start + run * i / self.points for i in range(self.points)]
+        """Return the points in s, given the times of the events."""
+        duration = self.stop - self.start
+        even = [self.start + duration * i / self.intervals for i in range(self.intervals)]
         return sorted({*even, self.stop, *self.changes, *(events if self.at_events else ())})
 
 
 def compute_reference(model: str, spans: list[ParameterSpan], grid: CommunicationGrid) -> ReferenceTrajectory:
-    """The motion over the spans, at the points of the grid."""
-    pieces = list(MODEL_MODULES[model].pieces(spans))
-    events = mode_changes(pieces)
+    """Return the reference trajectory of a model over the spans, at the points of the grid."""
+    segments = list(MODEL_MODULES[model].solve_segments(spans))
+    events = mode_changes(segments)
     times = grid.times(t for t, _ in events)
-    x, v = sample_segments(pieces, times).T
+    x, v = sample_segments(segments, times).T
     return ReferenceTrajectory(np.array(times), x, v, tuple(events))
 
 
-def mode_changes(pieces: list[Segment]) -> list[tuple[float, int]]:
-    """The changes of mode: times in s, and the modes that hold from there on."""
-    return [(float(new.start), new.mode) for old, new in pairwise(pieces) if new.mode != old.mode]
+def mode_changes(segments: list[Segment]) -> list[tuple[float, int]]:
+    """Return the changes of mode: times in s and new modes."""
+    return [(float(new.start), new.mode) for old, new in pairwise(segments) if new.mode != old.mode]
 
 
-def sample_segments(pieces: list[Segment], times: list[float]) -> np.ndarray:
-    """Positions and speeds (n, 2) at n rising times in s."""
+def sample_segments(segments: list[Segment], times: list[float]) -> np.ndarray:
+    """Return positions and velocities (n, 2) at n rising times in s."""
     rows, i = [], 0
     for t in times:
-        while i + 1 < len(pieces) and pieces[i + 1].start <= t:
+        while i + 1 < len(segments) and segments[i + 1].start <= t:
             i += 1
-        x, v = pieces[i].at(t)
+        x, v = segments[i].at(t)
         rows.append((float(x), float(v)))
     return np.array(rows)
 
 
 def require_reference_packages() -> None:
-    """HarnessError if what the answers are made with is not installed."""
+    """Raise HarnessError if a package that the references need is not installed."""
     missing = [name for name in ("mpmath", "scipy") if find_spec(name) is None]
     if missing:
         names = " and ".join(missing)
-        raise HarnessError(f"the answers to compare with need {names}: try `pip install {' '.join(missing)}`")
+        raise HarnessError(f"the references need {names}: try `pip install {' '.join(missing)}`")

@@ -1,20 +1,18 @@
-"""A true motion, piece by piece."""
+"""Segments of a reference motion, from one event or change of values to the next."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 ParameterValues = dict[str, float]
-MotionFunction = Callable[[Any], tuple[Any, Any]]  # position and speed at a time
-ParameterSpan = tuple[
-    float, float, ParameterValues
-]  # from, to in s, and the values that hold; `rate` is that of the input, per s
-Friction = Callable[[Mapping[str, Any]], tuple[Any, Any]]  # of values: the sliding force, and the most that is held
+MotionFunction = Callable[[Any], tuple[Any, Any]]  # position and velocity at a time
+ParameterSpan = tuple[float, float, ParameterValues]  # start and end in s, and values; `rate` is that of the input
+FrictionLaw = Callable[[Mapping[str, Any]], tuple[Any, Any]]  # from values: sliding force, largest load that it holds
 
 
 @dataclass(frozen=True)
 class Segment:
-    """From `start` (s) on in `mode`, up to the next piece: `at(t)` gives position and speed."""
+    """Motion in one `mode` from `start` (s) to the next segment; `at(t)` returns position and velocity."""
 
     start: Any
     mode: int
@@ -22,10 +20,10 @@ class Segment:
 
 
 def shift_time(at: MotionFunction, origin: Any) -> MotionFunction:
-    """A motion with its time counted from elsewhere."""
+    """Return a motion whose time starts at `origin` instead of 0."""
     return lambda t: at(t - origin)
 
 
 def constant_velocity(x: Any, v: Any) -> MotionFunction:
-    """Constant speed."""
+    """Return a motion of constant velocity."""
     return lambda s: (x + v * s, v)

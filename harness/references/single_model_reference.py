@@ -1,8 +1,8 @@
-"""The same bodies in one model, without communication steps: what a coupled run is compared with.
+"""Reference of a coupled scene: the same bodies in a single model, without communication steps.
 
     m_i a_i = F_i + k_i (v_driver_i t - x_i) - c_i v_i - F_friction_i,    F_i = sum of factor * output of a body
 
-Each body sticks, or slides forward or backward; every change is an event at which the integration begins anew.
+Each body sticks, or slides forward or backward; the integration restarts at every change of mode.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,12 +16,18 @@ from ..scenes.coupled.scene import CoupledScene
 from .models import MODEL_MODULES
 
 RTOL, ATOL = 1e-11, 1e-14
-MOST = 10_000  # events
+MAX_EVENTS = 10_000
 
 
 @dataclass(frozen=True)
 class CoupledBodies:
-    """The constants of n bodies, each (n,), and the couplings as (sink, source, output, factor)."""
+    """n coupled bodies.
+
+    Attributes
+    ----------
+    m, k, c, hold, slide, driver : (n,) mass, stiffness, damping, static and sliding friction, driver velocity
+    couplings : (sink, source, output, factor) each
+    """
 
     m: np.ndarray
     k: np.ndarray
@@ -32,7 +38,7 @@ class CoupledBodies:
     couplings: tuple[tuple[int, int, str, float], ...]
 
     def load(self, t: float, x: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """The force on each body but for friction (n,)."""
+        """Return the force on each body (n,) without friction."""
         springs = self.k * (self.driver * t - x)
         forces = springs - self.c * v
         for sink, source, output, factor in self.couplings:
@@ -40,72 +46,86 @@ class CoupledBodies:
         return forces
 
 
-BODY_MODELS = {
-    name: each.friction for name, each in MODEL_MODULES.items() if hasattr(each, "friction")
-}  # the models of bodies
+BODY_MODELS = {name: module.friction for name, module in MODEL_MODULES.items() if hasattr(module, "friction")}
 
 
 def build_bodies(scene: CoupledScene, defaults: dict[str, dict[str, float]]) -> tuple[CoupledBodies, np.ndarray]:
-    """The bodies of a scene and their start (x, v) (2 n,), from the values of the models and of the scene."""
-    values = [defaults[part.model] | part.values for part in scene.parts]
-    places = {part.name: i for i, part in enumerate(scene.parts)}
+    """Return the bodies of a scene and their initial state (x, v) (2 n,).
 
-    def each(name: str) -> np.ndarray:
+    Parameters
+    ----------
+    defaults : parameter values of each model, which the scene overrides
+    """
+    values = [defaults[part.model] | part.values for part in scene.parts]
+    indices = {part.name: i for i, part in enumerate(scene.parts)}
+
+    def column(name: str) -> np.ndarray:
         return np.array([value.get(name, 0.0) for value in values])
 
-    frictions = [BODY_MODELS[part.model] for part in scene.parts]
-    limits = [friction(its) if friction else (0.0, 0.0) for friction, its in zip(frictions, values, strict=True)]
+    laws = [BODY_MODELS[part.model] for part in scene.parts]
+    limits = [law(value) if law else (0.0, 0.0) for law, value in zip(laws, values, strict=True)]
     slide, hold = np.array(limits).T
-    constants = each("m"), each("k"), each("c"), hold, slide, each("v_driver")
-    return CoupledBodies(*constants, tuple(couplings(scene, places))), np.concatenate([each("x0"), each("v0")])
+    constants = column("m"), column("k"), column("c"), hold, slide, column("v_driver")
+    bodies = CoupledBodies(*constants, tuple(couplings(scene, indices)))
+    return bodies, np.concatenate([column("x0"), column("v0")])
 
 
-def couplings(scene: CoupledScene, places: dict[str, int]) -> Iterator[tuple[int, int, str, float]]:
-    """What acts on each body from the others: of a spring on its flange a k (x_b - x_a) + c (v_b - v_a)."""
-    for each in scene.direct_connections:
-        yield places[each.sink], places[each.source], each.output, 1.0
+def couplings(scene: CoupledScene, indices: dict[str, int]) -> Iterator[tuple[int, int, str, float]]:
+    """Yield what acts on each body from the others; a spring acts on its flange a by k (x_b - x_a) + c (v_b - v_a)."""
+    for signal in scene.direct_connections:
+        yield indices[signal.sink], indices[signal.source], signal.output, 1.0
     for spring in scene.springs:
         for flange, part in spring.force_ends:
             for end, source in (("a", spring.a), ("b", spring.b)):
                 sign = -1.0 if end == flange else 1.0
                 for output, factor in (("x", spring.k), ("v", spring.c)) if source else ():
-                    yield places[part], places[source], output, sign * factor
+                    yield indices[part], indices[source], output, sign * factor
 
 
 def solve_bodies(system: CoupledBodies, start: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Positions (len(times), n) at the rising times from the first on."""
+    """Return positions (len(times), n) at rising times in s.
+
+    Parameters
+    ----------
+    start : (2 n,) state (x, v) at the first time
+
+    Raises
+    ------
+    HarnessError
+        if there are more than MAX_EVENTS events
+    """
     n, state, t, stop = len(system.m), start.copy(), float(times[0]), float(times[-1])
     positions = np.empty((len(times), n))
     mode = np.array([resolve_mode(system, i, t, state) for i in range(n)])
-    for _ in range(MOST):
+    for _ in range(MAX_EVENTS):
         options = {"events": event_functions(system, mode), "dense_output": True, "rtol": RTOL, "atol": ATOL}
-        piece = solve_ivp(rates(system, mode), (t, stop), state, "DOP853", **options)
-        inside = (times >= t) & (times <= piece.t[-1])
-        if inside.any():
-            positions[inside] = piece.sol(times[inside])[:n].T
-        t, state = float(piece.t[-1]), piece.y[:, -1].copy()
-        if piece.status != 1 or t >= stop:
+        run = solve_ivp(rates(system, mode), (t, stop), state, "DOP853", **options)
+        covered = (times >= t) & (times <= run.t[-1])
+        if covered.any():
+            positions[covered] = run.sol(times[covered])[:n].T
+        t, state = float(run.t[-1]), run.y[:, -1].copy()
+        if run.status != 1 or t >= stop:
             return positions
-        i = next(i for i, found in enumerate(piece.t_events) if len(found))
+        i = next(i for i, events in enumerate(run.t_events) if len(events))
         if mode[i] == 0:
             mode[i] = int(np.sign(system.load(t, state[:n], state[n:])[i]))
         else:
             state[n + i] = 0.0
             mode[i] = resolve_mode(system, i, t, state)
-    raise HarnessError(f"the monolithic reference has more than {MOST} events before t = {t!r} s")
+    raise HarnessError(f"the single-model reference has more than {MAX_EVENTS} events before t = {t!r} s")
 
 
 def resolve_mode(system: CoupledBodies, i: int, t: float, state: np.ndarray) -> int:
-    """The mode that body i takes on: -1, 0 or 1."""
+    """Return the mode of body i: -1 sliding backward, 0 stuck, 1 sliding forward."""
     n = len(system.m)
     if state[n + i] != 0.0:
         return int(np.sign(state[n + i]))
-    pull = system.load(t, state[:n], state[n:])[i]
-    return 0 if system.hold[i] > 0 and abs(pull) <= system.hold[i] else int(np.sign(pull))
+    load = system.load(t, state[:n], state[n:])[i]
+    return 0 if system.hold[i] > 0 and abs(load) <= system.hold[i] else int(np.sign(load))
 
 
 def rates(system: CoupledBodies, mode: np.ndarray) -> Callable[[float, np.ndarray], np.ndarray]:
-    """The right-hand side while the modes (n,) last."""
+    """Return the right-hand side for fixed modes (n,)."""
     n, moves = len(mode), (mode != 0) | (system.hold == 0)
 
     def rate(t: float, state: np.ndarray) -> np.ndarray:
@@ -116,13 +136,13 @@ def rates(system: CoupledBodies, mode: np.ndarray) -> Callable[[float, np.ndarra
 
 
 def event_functions(system: CoupledBodies, mode: np.ndarray) -> list[Callable[[float, np.ndarray], float]]:
-    """An event for each body: its speed comes to zero, or its load reaches what holds it."""
+    """Return an event function for each body: its velocity becomes zero, or its load exceeds static friction."""
     n = len(mode)
 
-    def guard(i: int) -> Callable[[float, np.ndarray], float]:
+    def event_function(i: int) -> Callable[[float, np.ndarray], float]:
         def crossing(t: float, state: np.ndarray) -> float:
             if system.hold[i] == 0:
-                return 1.0  # nothing ever holds it
+                return 1.0  # without friction there is no event
             if mode[i] != 0:
                 return float(mode[i] * state[n + i])
             return float(system.hold[i] - abs(system.load(t, state[:n], state[n:])[i]))
@@ -130,4 +150,4 @@ def event_functions(system: CoupledBodies, mode: np.ndarray) -> list[Callable[[f
         crossing.terminal, crossing.direction = True, -1.0  # type: ignore[attr-defined]
         return crossing
 
-    return [guard(i) for i in range(n)]
+    return [event_function(i) for i in range(n)]

@@ -53,7 +53,7 @@ def test_a_pause_without_a_turning_point_costs_no_other_samples(share):
 def test_half_cycles_before_a_pause_are_skipped_and_reported_if_too_few():
     found = fit_decay(paused(0.55, 1.3), KnownParameters())
     assert found.t[0] > 0.55
-    assert "Before the gap that ends at t = 0.8760 s are too few swings" in " ".join(found.remarks)
+    assert "The record before the gap that ends at t = 0.8760 s has too few cycles" in " ".join(found.remarks)
 
 
 def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
@@ -73,4 +73,4 @@ def test_a_window_with_too_few_samples_is_reported(kept):
     record = paused(2.03, 0.95)
     problem, _ = prepare_problem(record, find_extrema(record, False), False, False)
     with pytest.raises(HarnessError, match=f"has only {kept} samples in a row that follow .* and 12 are needed"):
-        problem.only(slice(kept))
+        problem.subset(slice(kept))

@@ -67,7 +67,7 @@ def test_outliers_are_excluded_and_counted():
     record.x[[200, 500]] += (0.05, -0.08)
     found = fit_decay(record, KnownParameters())
     assert values(found.estimates)["r"] == pytest.approx(0.003, rel=2e-2)
-    assert "Left out as stray: 2 of 1000 samples." in remarks_text(found)
+    assert "2 of 1000 samples are outliers and are left out." in remarks_text(found)
 
 
 @pytest.mark.parametrize(  # a fit with drag tries longest what no fit can reach
@@ -84,7 +84,7 @@ def test_runs_of_invalid_samples_are_excluded_and_counted(value, run, drag):
     each = values(found.estimates)
     assert (each["r"], each["zeta"]) == (pytest.approx(0.003, rel=2e-2), pytest.approx(0.02, rel=2e-2))
     assert 20 <= 1000 - len(found.record.t) <= 30  # a run may take its neighbours with it
-    assert f"Left out as stray: {1000 - len(found.record.t)} of 1000 samples." in remarks_text(found)
+    assert f"{1000 - len(found.record.t)} of 1000 samples are outliers and are left out." in remarks_text(found)
 
 
 @pytest.mark.parametrize("gap", [(2.0, 2.4), (2.2, 3.7)])

@@ -55,7 +55,7 @@ def test_noise_does_not_hide_the_law(truth):
 
 def test_an_undecidable_law_is_reported_with_what_would_decide_it():
     found = fit_decay(decay_record(0.004, noise=3e-3, t=np.linspace(0, 2, 300)), KnownParameters())
-    assert "cannot be told from" in remarks_text(found)
+    assert "cannot be distinguished from" in remarks_text(found)
     assert "less noise" in remarks_text(found)
 
 

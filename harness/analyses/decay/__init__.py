@@ -1,1 +1,1 @@
-"""Damping and friction from a decay, measured or simulated."""
+"""Identification of damping and friction from a decay, measured or simulated."""

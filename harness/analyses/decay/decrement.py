@@ -1,11 +1,14 @@
-"""Decay of a free oscillation: what its turning points say about damping and friction.
+"""Damping ratio or friction from two peaks of a free oscillation: logarithmic decrement and linear envelope.
 
     viscous       x_n = x_0 exp(-n delta),     zeta = delta/sqrt(4 pi^2 + delta^2)
     Coulomb       x_n = x_0 - 4 n f/k,         f   = k (x_0 - x_n)/(4 n)
     pin joint     theta_n = theta_0 - 4 n T_f/(m g a)  for small angles
 
-x_0 and x_n are sizes of turning points n cycles apart; n may be a half number.  Rest is at zero.
-Sources: Thomson, Theory of Vibration, sections 2.6 and 2.7 (logarithmic decrement, Coulomb damping).
+x_0 and x_n are the magnitudes of turning points n cycles apart; n may be half-integer.  The rest position is zero.
+
+References
+----------
+W. T. Thomson, Theory of Vibration, sections 2.6 and 2.7 (logarithmic decrement, Coulomb damping)
 """
 
 from dataclasses import dataclass
@@ -19,15 +22,16 @@ from ...results.quantity import Quantity
 from .. import sample_density
 
 if TYPE_CHECKING:
-    from ...running.trajectory import Trajectory  # a record from a file needs nothing that runs
+    from ...running.trajectory import Trajectory  # only for annotations: a record from a file needs no FMU
 
 
-FORCES = {"f": ("N", "friction force", False), "T_f": ("N.m", "joint torque", True)}  # unit, words, of a rotation
+FORCES = {"f": ("N", "friction force", False), "T_f": ("N.m", "joint torque", True)}  # unit, text, is a rotation
 
 
 @dataclass(frozen=True)
 class DecrementResult:
-    """`result` (zeta, f or T_f) over `cycles` cycles; `times` in s and `positions` of the turning points used."""
+    """The measured `result` (zeta, f or T_f) over `cycles` cycles, and `times` (s) and `positions` of the turning
+    points used."""
 
     result: Quantity
     cycles: float
@@ -37,20 +41,31 @@ class DecrementResult:
 
 
 def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None = None) -> DecrementResult:
-    """What the decay of the recorded position `gives` (zeta, f or T_f) from the peak `first` over so many cycles, None
-    for all; HarnessError if the run does not show one."""
+    """Measure the decay of the recorded position.
+
+    Parameters
+    ----------
+    gives : what to measure: zeta, f or T_f
+    first : the cycle whose peak is x_0
+    cycles : number of cycles between x_0 and x_n; None for all that follow
+
+    Raises
+    ------
+    HarnessError
+        if the run shows no decay, or has too few turning points or samples
+    """
     times, positions = find_extrema_from_velocity(
         run.time, run.column_of_role("position"), run.column_of_role("velocity")
     )
     times, positions, cycles = select_cycles(times, positions, first, cycles)
-    sample_density.require_dense_sampling(run.time, times[:-1], times[1:], "half swing")
+    sample_density.require_dense_sampling(run.time, times[:-1], times[1:], "half cycle")
     x_0, x_n = float(abs(positions[0])), float(abs(positions[-1]))
     if gives == "zeta":
         result = Quantity("zeta", damping_ratio(x_0, x_n, cycles), "1", f"damping ratio, {cycles:g} cycles")
     else:
-        unit, words, turning = FORCES[gives]
-        force = friction_from_envelope(x_0, x_n, cycles, stiffness(run, turning, f"the decay to {gives}"))
-        result = Quantity(gives, force, unit, f"{words}, {cycles:g} cycles")
+        unit, text, is_rotation = FORCES[gives]
+        force = friction_from_envelope(x_0, x_n, cycles, stiffness(run, is_rotation, f"the decay to {gives}"))
+        result = Quantity(gives, force, unit, f"{text}, {cycles:g} cycles")
     unit = run.units[run.spec.motion_outputs["position"]]
     ends = (
         Quantity("x_0", x_0, unit, f"peak {first:g}"),
@@ -61,23 +76,26 @@ def analyse(run: "Trajectory", gives: str, first: int = 0, cycles: float | None 
     return DecrementResult(result, cycles, times, positions, (*ends, result))
 
 
-def stiffness(run: "Trajectory", turning: bool, purpose: str) -> float:
-    """That of a spring, k, or of a pendulum, m g a; HarnessError if the model has none."""
-    return prod(run.get_parameter(name, purpose) for name in (("m", "g", "a") if turning else ("k",)))
+def stiffness(run: "Trajectory", is_rotation: bool, purpose: str) -> float:
+    """Return k of a spring or m g a of a pendulum; HarnessError with the `purpose` if the model has neither."""
+    return prod(run.get_parameter(name, purpose) for name in (("m", "g", "a") if is_rotation else ("k",)))
 
 
 def sampled_peak(run: "Trajectory", time: float) -> float:
-    """The larger of the two samples around a turning point: what a plot of the samples shows as the peak."""
+    """Return the larger of the two samples around a turning point: the peak that a plot of the samples shows."""
     i = int(np.clip(np.searchsorted(run.time, time), 1, len(run.time) - 1))
     return float(np.abs(run.column_of_role("position")[i - 1 : i + 1]).max())
 
 
 def find_extrema_from_velocity(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times and positions where the velocity passes through zero or comes to rest there.
+    """Return times and positions of the turning points: where the velocity changes sign or comes to rest.
 
-    Between two samples the position is the cubic of their x and v, and the turning point is where its slope is zero.
-    A start at rest counts when motion follows at once.  Arrays of one length (n,); errors of the order of the sample
-    distance to the fourth.
+    Between two samples the position is the cubic through their x and v, and the turning point is where its slope is
+    zero; the error is of fourth order in the sample interval.  A start at rest counts if motion follows at once.
+
+    Parameters
+    ----------
+    t, x, v : (n,) times in s, positions and velocities
     """
     sign = np.sign(v)
     i = np.flatnonzero(sign[:-1] * sign[1:] < 0)
@@ -92,7 +110,7 @@ def find_extrema_from_velocity(t: np.ndarray, x: np.ndarray, v: np.ndarray) -> t
 
 
 def is_turning_point(sign: np.ndarray, i: int) -> bool:
-    """Whether the zero at sample i begins a rest that ends a motion and is not followed by more of the same."""
+    """Return whether the zero velocity at sample i ends a motion that does not go on in the same direction."""
     before = sign[i - 1] if i else 0.0
     if i and before == 0:
         return False  # the rest began earlier
@@ -103,9 +121,9 @@ def is_turning_point(sign: np.ndarray, i: int) -> bool:
 
 
 def locate_zero_slope(h: np.ndarray, rise: np.ndarray, v0: np.ndarray, v1: np.ndarray) -> np.ndarray:
-    """Where in [0, 1] cubics (n,) of steps h (s) and slopes v0, v1 of opposite sign are level.
+    """Return where in [0, 1] cubics (n,) have zero slope, for end slopes v0 and v1 of opposite sign.
 
-    Their slope is v0 + 2 b s + c s^2 with b = 3 rise/h - 2 v0 - v1 and c = 3 (v0 + v1) - 6 rise/h.
+    The slope is v0 + 2 b s + c s^2 with b = 3 rise/h - 2 v0 - v1 and c = 3 (v0 + v1) - 6 rise/h.
     """
     b = 3 * rise / h - 2 * v0 - v1
     c = 3 * (v0 + v1) - 6 * rise / h
@@ -113,36 +131,38 @@ def locate_zero_slope(h: np.ndarray, rise: np.ndarray, v0: np.ndarray, v1: np.nd
     q = np.where(b > 0, -(b + root), -(b - root))
     with np.errstate(divide="ignore", invalid="ignore"):
         one, other = np.where(q == 0, 0.5, v0 / q), np.where(c == 0, 2.0, q / c)
-    return np.where(abs(one - 0.5) <= abs(other - 0.5), one, other)  # inside: opposite slopes allow just one
+    return np.where(abs(one - 0.5) <= abs(other - 0.5), one, other)  # opposite end slopes: exactly one root is inside
 
 
 def select_cycles(
     times: np.ndarray, positions: np.ndarray, first: int, cycles: float | None
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """The turning points from cycle `first` over `cycles` cycles (None: all that follow), and how many cycles."""
+    """Return the turning points from cycle `first` over `cycles` cycles (None: all that follow), and their cycles."""
     begin = 2 * first
     end = len(times) - 1 if cycles is None else begin + round(2 * cycles)
     if end >= len(times) or end <= begin:
         least = max(end, begin + 1) + 1
         have = f"the decay needs {least} turning points, and the run has {len(times)}"
-        raise HarnessError(f"{have}: take a later stop, a finer grid or fewer cycles")
+        raise HarnessError(f"{have}: set a later stop, a finer grid or fewer cycles")
     return times[begin : end + 1], positions[begin : end + 1], (end - begin) / 2
 
 
 def damping_ratio(x_0: float, x_n: float, cycles: float) -> float:
-    """zeta from the logarithmic decrement of turning points `cycles` apart."""
+    """Return zeta from the logarithmic decrement of two turning points `cycles` apart."""
     check_decrease(x_0, x_n)
     delta = log(x_0 / x_n) / cycles
     return delta / sqrt(4 * pi * pi + delta * delta)
 
 
 def friction_from_envelope(x_0: float, x_n: float, cycles: float, stiffness: float) -> float:
-    """Friction from the linear envelope: force for a stiffness in N/m, torque for one in N.m/rad."""
+    """Return friction from the linear envelope: a force for a stiffness in N/m, a torque for one in N.m/rad."""
     check_decrease(x_0, x_n)
     return stiffness * (x_0 - x_n) / (4 * cycles)
 
 
 def check_decrease(x_0: float, x_n: float) -> None:
-    """The oscillation decays, and is not over."""
+    """Raise HarnessError unless x_0 > x_n > 0."""
     if not x_0 > x_n > 0:
-        raise HarnessError(f"the turning points do not decay: from {x_0:.6g} to {x_n:.6g}, at rest, driven or undamped")
+        raise HarnessError(
+            f"the turning points do not decay: from {x_0:.6g} to {x_n:.6g}; the motion is at rest, driven or undamped"
+        )

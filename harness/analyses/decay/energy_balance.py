@@ -1,13 +1,17 @@
-"""The start of the fits: what each half swing loses.
+"""Starting values of the losses, from the energy that each half cycle loses.
 
-Between turning points of amplitudes a_i and a_(i+1), whose mean is a, the potential energy (over k) falls by
+Between turning points of amplitudes a_i and a_(i+1), whose mean is a, the potential energy (divided by k) falls by
 
     V(a_i) - V(a_(i+1)) = 2 zeta I2(a) + 2 a r + b I3(a),      I2 = int y'^2 dtheta,  I3 = int |y'|^3 dtheta
 
-which is linear in the losses.  The integrals are those of the motion without losses, so that noise enters on the left
-alone: of a spring I2 = pi a^2/2, I3 = 4 a^3/3; of a pendulum with sin(y/2) = sin(a/2) sin(phi), by Gauss's rule.
-J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998) (decrements) and Journal of Sound and Vibration 295 (2006)
-(energy balance); the division by the mean slope, which weighs all half swings alike, is ours.
+which is linear in the losses zeta, r and b.  The integrals are those of the undamped motion, so that noise enters on
+the left side only: for a spring I2 = pi a^2/2 and I3 = 4 a^3/3; for a pendulum by Gaussian quadrature, with
+sin(y/2) = sin(a/2) sin(phi).
+
+References
+----------
+J. W. Liang, B. F. Feeny, Nonlinear Dynamics 16 (1998) (decrements); Journal of Sound and Vibration 295 (2006) (energy
+balance).  The division by the mean slope, which weights all half cycles alike, is not in these papers.
 """
 
 from functools import cache
@@ -16,11 +20,11 @@ import numpy as np
 
 from .law import TERMS, Terms, sublaws
 
-POINTS = 40  # of Gauss's rule
+QUADRATURE_POINTS = 40
 
 
 def estimate_losses(a: np.ndarray, terms: Terms, is_pendulum: bool) -> np.ndarray:
-    """zeta, r and b (3,), none negative and those not in `terms` zero, from successive amplitudes a (n,)."""
+    """Return zeta, r and b (3,), none negative, from successive amplitudes a (n,); those not in `terms` are zero."""
     mean = (a[:-1] + a[1:]) / 2
     if is_pendulum:
         nodes, weights = gauss_nodes()
@@ -39,19 +43,22 @@ def estimate_losses(a: np.ndarray, terms: Terms, is_pendulum: bool) -> np.ndarra
 
 @cache
 def gauss_nodes() -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and weights (POINTS,) of Gauss's rule."""
-    return np.polynomial.legendre.leggauss(POINTS)
+    """Return nodes and weights (QUADRATURE_POINTS,) of Gauss-Legendre quadrature."""
+    return np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
 
 
 def nonnegative_least_squares(columns: np.ndarray, right: np.ndarray, terms: Terms) -> np.ndarray:
-    """Least squares with values >= 0: the best of the few sets of columns whose own solution is so."""
+    """Solve the least-squares problem with nonnegative values.
+
+    The result is the best of the unconstrained solutions of all subsets of columns that has no negative value.
+    """
     best, least = np.zeros(len(TERMS)), float(right @ right)
     for law in sublaws(terms):
-        places = [TERMS.index(term) for term in law]
-        scale = np.linalg.norm(columns[:, places], axis=0)
-        found = np.linalg.lstsq(columns[:, places] / scale, right, rcond=1e-12)[0] / scale
-        left = right - columns[:, places] @ found
-        if (found >= 0).all() and left @ left < least:
-            best, least = np.zeros(len(TERMS)), float(left @ left)
-            best[places] = found
+        indices = [TERMS.index(term) for term in law]
+        scale = np.linalg.norm(columns[:, indices], axis=0)
+        solution = np.linalg.lstsq(columns[:, indices] / scale, right, rcond=1e-12)[0] / scale
+        residual = right - columns[:, indices] @ solution
+        if (solution >= 0).all() and residual @ residual < least:
+            best, least = np.zeros(len(TERMS)), float(residual @ residual)
+            best[indices] = solution
     return best

@@ -1,7 +1,7 @@
-"""The energy lost in a half swing against its amplitude: by its shape one sees which law it is.
+"""Energy lost in each half cycle as a function of its amplitude; the shape shows which law holds.
 
-As a share of the energy, viscous damping takes the same at every amplitude, dry friction more of small swings (1/a),
-and drag more of large ones (a).
+As a fraction of the energy, viscous damping takes the same at every amplitude, dry friction takes more of small
+amplitudes (1/a) and drag more of large ones (a).
 """
 
 from dataclasses import dataclass
@@ -14,35 +14,41 @@ from .law import Terms
 
 @dataclass(frozen=True)
 class EnergyLoss:
-    """Mean amplitudes (n,) of half swings and the `share` (n,) of the energy they lost, as the turning points show it;
-    and the same for each law as `curves`."""
+    """Energy lost per half cycle.
+
+    Attributes
+    ----------
+    amplitude : (n,) mean amplitudes of the half cycles between the turning points of the record
+    fraction : (n,) fraction of the energy that each of them loses
+    curves : amplitudes and fractions for each law
+    """
 
     amplitude: np.ndarray
     fraction: np.ndarray
     curves: dict[Terms, tuple[np.ndarray, np.ndarray]]
 
 
-def measure_energy_loss(found: DecayIdentification) -> EnergyLoss:
-    """The losses between the turning points of a record, and those of each law fitted to it."""
-    problem = found.problem
-    seen = np.zeros((2, 0))
-    if not found.record.order:
-        off = found.extrema.x - found.rest(found.best, found.extrema.t)
-        way = np.sign(off[0]) * (-1.0) ** np.arange(len(off))
-        seen = np.array(loss_fractions(way * off, problem.model.is_pendulum))
+def measure_energy_loss(identification: DecayIdentification) -> EnergyLoss:
+    """Return the energy lost between the turning points of a record, and by each law fitted to it."""
+    problem = identification.problem
+    measured = np.zeros((2, 0))
+    if not identification.record.order:
+        extrema = identification.extrema
+        displacement = extrema.x - identification.rest(identification.best, extrema.t)
+        sign = np.sign(displacement[0]) * (-1.0) ** np.arange(len(displacement))
+        measured = np.array(loss_fractions(sign * displacement, problem.model.is_pendulum))
     curves = {}
-    for law in found.laws:
-        amplitudes, begins = problem.half_cycles(law.p)
-        curves[law.terms] = loss_fractions(
-            amplitudes[begins <= problem.t[-1]] * problem.scale, problem.model.is_pendulum
-        )
-    return EnergyLoss(seen[0], seen[1], curves)
+    for law in identification.laws:
+        amplitudes, starts = problem.half_cycles(law.p)
+        during_record = amplitudes[starts <= problem.t[-1]] * problem.scale
+        curves[law.terms] = loss_fractions(during_record, problem.model.is_pendulum)
+    return EnergyLoss(measured[0], measured[1], curves)
 
 
 def loss_fractions(a: np.ndarray, is_pendulum: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Mean amplitudes of successive ones a (n + 1,), and the share of the potential energy that is lost (n,).
+    """Return mean amplitudes (n,) and lost fractions (n,) of the potential energy, from amplitudes a (n + 1,).
 
-    Without the last half swing where it ends on the side it came from.
+    The last half cycle is left out if it ends on the side where it started.
     """
     a = a[: int(np.argmin(a > 0))] if (a <= 0).any() else a
     energy = 2 * np.sin(a / 2) ** 2 if is_pendulum else a * a / 2

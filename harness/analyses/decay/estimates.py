@@ -1,8 +1,7 @@
-"""What is told of a fit: values with errors and intervals, in the units of the record and in newtons where k or m is
-known.
+"""Estimates of a fit: values with standard errors and confidence intervals, in the units of the record and in newtons.
 
-The values are those of the chosen law; errors and intervals are those of the full law, for which terms are present is
-not known but found: the intervals of the chosen law alone are too narrow wherever the choice is not clear.
+The values are those of the selected law; errors and intervals are those of the full law, because the selection itself
+is uncertain: the intervals of the selected law alone are too narrow wherever the choice is not clear.
 """
 
 from dataclasses import dataclass
@@ -11,15 +10,15 @@ import numpy as np
 
 from ...records.record import Record
 from .fit_problem import FitProblem
-from .intervals import SIDE, FitUncertainty, interval
+from .intervals import NORMAL_QUANTILE, FitUncertainty, confidence_interval
 from .law import DRIFT, OMEGA, REST, UNKNOWNS, ZETA, B, R
 from .model_selection import FittedLaw
 
 
 @dataclass(frozen=True)
 class KnownParameters:
-    """What is known beforehand: stiffness `k` or mass `m` (SI; of a rotation N.m/rad, kg.m2), and whether the
-    restoring torque is that of a pendulum, k sin(theta)."""
+    """What the user knows about the oscillator: stiffness `k` or mass `m` (SI; for a rotation N.m/rad, kg.m2), and
+    whether the restoring torque is that of a pendulum, k sin(theta)."""
 
     k: float | None = None
     m: float | None = None
@@ -28,7 +27,7 @@ class KnownParameters:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its standard error and the bounds of its 95 % interval; NaN where the data leave no freedom."""
+    """A value with its standard error and its 95 % interval; NaN where the data leave no degrees of freedom."""
 
     name: str
     value: float
@@ -38,81 +37,106 @@ class Estimate:
     unit: str
     text: str
 
-    def times(self, size: float, name: str, unit: str, text: str, share: float = 0.0) -> "Estimate":
-        """The estimate `size` times this one, where `size` has the relative standard error `share`."""
-        value, more = size * self.value, SIDE * share * size * self.value
-        low, high = (value - np.hypot(value - size * self.low, more), value + np.hypot(size * self.high - value, more))
-        error = float(np.hypot(size * self.error, more / SIDE))
+    def multiply(self, factor: float, name: str, unit: str, text: str, relative_error: float = 0.0) -> "Estimate":
+        """Return this estimate multiplied by a `factor` that has a relative standard error of its own."""
+        value, margin = factor * self.value, NORMAL_QUANTILE * relative_error * factor * self.value
+        low = value - np.hypot(value - factor * self.low, margin)
+        high = value + np.hypot(factor * self.high - value, margin)
+        error = float(np.hypot(factor * self.error, margin / NORMAL_QUANTILE))
         return Estimate(name, value, error, float(max(low, 0.0)), float(high), unit, text)
 
 
 def quantity_labels(record: Record) -> dict[int, tuple[str, str, str]]:
-    """Name, unit and words of each unknown that is told."""
-    base, turning = record.base, record.base == "rad"
+    """Return name, unit and text of each unknown that is reported, by its index in UNKNOWNS."""
+    base, is_rotation = record.base, record.base == "rad"
     rest, drift = "rest position", "drift of the rest position"
     if record.order:
         rest, drift = f"offset of the {record.quantity}", "drift of the offset"
     return {
         OMEGA: ("omega", "rad/s", "natural frequency"),
         ZETA: ("zeta", "1", "damping ratio"),
-        R: ("r", base, "friction over stiffness, T_f/k" if turning else "friction over stiffness, f/k"),
-        B: ("b", f"1/{base}", "drag over inertia" if turning else "drag over mass, q/m"),
+        R: ("r", base, "friction over stiffness, T_f/k" if is_rotation else "friction over stiffness, f/k"),
+        B: ("b", f"1/{base}", "drag over inertia" if is_rotation else "drag over mass, q/m"),
         REST: ("rest", record.unit, rest),
         DRIFT: ("drift", f"{record.unit}/s", drift),
     }
 
 
-def sizes(problem: FitProblem) -> dict[int, float]:
-    """The unit of each unknown of the problem in that of the record."""
-    unit = problem.scale
-    return {OMEGA: 1.0, ZETA: 1.0, R: unit, B: 1 / unit, REST: unit, DRIFT: unit}
+def unit_scales(problem: FitProblem) -> dict[int, float]:
+    """Return the unit of each unknown of the problem, in units of the record, by its index in UNKNOWNS."""
+    scale = problem.scale
+    return {OMEGA: 1.0, ZETA: 1.0, R: scale, B: 1 / scale, REST: scale, DRIFT: scale}
 
 
 def to_record_units(
-    record: Record, problem: FitProblem, place: int, value: float, error: float, low: float, high: float
+    record: Record, problem: FitProblem, unknown: int, value: float, error: float, low: float, high: float
 ) -> Estimate:
-    """An estimate of the problem in the record's units."""
-    size, level = sizes(problem)[place], problem.offset if place == REST else 0.0
-    name, unit, text = quantity_labels(record)[place]
-    return Estimate(name, size * value + level, size * error, size * low + level, size * high + level, unit, text)
+    """Return an estimate of one of the UNKNOWNS, converted from the units of the problem to those of the record."""
+    scale, offset = unit_scales(problem)[unknown], problem.offset if unknown == REST else 0.0
+    name, unit, text = quantity_labels(record)[unknown]
+    return Estimate(
+        name, scale * value + offset, scale * error, scale * low + offset, scale * high + offset, unit, text
+    )
 
 
-def estimates(
-    record: Record, problem: FitProblem, law: FittedLaw, full: FittedLaw, spread: FitUncertainty, known: KnownParameters
+def make_estimates(
+    record: Record,
+    problem: FitProblem,
+    law: FittedLaw,
+    full: FittedLaw,
+    uncertainty: FitUncertainty,
+    parameters: KnownParameters,
 ) -> tuple[Estimate, ...]:
-    """Everything that is told: of terms that the law has not, the largest value that the record allows."""
-    found = {}
-    bound = any(full.p[UNKNOWNS.index(term)] <= 0 for term in full.terms)  # elsewhere the fit is where it would be
-    free = spread.free if bound else full.p[spread.unknowns]
-    ends = {
-        int(place): interval(i, spread.unknowns, free, spread.errors, spread.correlation, spread.freedom)
-        for i, place in enumerate(spread.unknowns)
+    """Return the estimates of all quantities; for a term that is not in the law, `high` is the upper limit.
+
+    Parameters
+    ----------
+    law : the law whose values are reported
+    full : the full law
+    uncertainty : of the full law
+    """
+    estimates = {}
+    at_bound = any(full.p[UNKNOWNS.index(term)] <= 0 for term in full.terms)  # elsewhere the bounds have no effect
+    center = uncertainty.unconstrained if at_bound else full.p[uncertainty.unknowns]
+    intervals = {
+        int(unknown): confidence_interval(
+            i,
+            uncertainty.unknowns,
+            center,
+            uncertainty.standard_errors,
+            uncertainty.correlation,
+            uncertainty.degrees_of_freedom,
+        )
+        for i, unknown in enumerate(uncertainty.unknowns)
     }
-    if any(not low <= law.p[place] <= high for place, (low, high) in ends.items()):
+    if any(not low <= law.p[unknown] <= high for unknown, (low, high) in intervals.items()):
         law = full
-    errors = dict(zip(ends, spread.errors.tolist(), strict=True))
-    for place in quantity_labels(record):
-        if place in ends:  # elsewhere it was not to be tried
-            value, (low, high) = float(law.p[place]), ends[place]
+    errors = dict(zip(intervals, uncertainty.standard_errors.tolist(), strict=True))
+    for unknown in quantity_labels(record):
+        if unknown in intervals:  # otherwise it was not fitted
+            value, (low, high) = float(law.p[unknown]), intervals[unknown]
             bounds = min(low, value), max(high, value)
-            found[place] = to_record_units(record, problem, place, value, errors[place], *bounds)
-    return (*found.values(), *force_estimates(record, found[OMEGA], found, known))
+            estimates[unknown] = to_record_units(record, problem, unknown, value, errors[unknown], *bounds)
+    return (*estimates.values(), *force_estimates(record, estimates[OMEGA], estimates, parameters))
 
 
 def force_estimates(
-    record: Record, omega: Estimate, found: dict[int, Estimate], known: KnownParameters
+    record: Record, omega: Estimate, estimates: dict[int, Estimate], parameters: KnownParameters
 ) -> tuple[Estimate, ...]:
-    """Friction force, damping and drag constants from k or m: f = k r, c = 2 zeta k/omega, q = b k/omega^2."""
-    if known.k is None and known.m is None:
+    """Return friction force, damping and drag constants if k or m is known.
+
+    f = k r, c = 2 zeta k/omega, q = b k/omega^2, for the `estimates` of r, zeta and b that are there.
+    """
+    if parameters.k is None and parameters.m is None:
         return ()
-    share = omega.error / omega.value
-    k, k_share = (known.k, 0.0) if known.k is not None else (known.m * omega.value**2, 2 * share)  # type: ignore[operator]
-    m, m_share = (known.m, 0.0) if known.m is not None else (k / omega.value**2, 2 * share)
-    turning = record.base == "rad"
-    force, per = ("N.m", "rad") if turning else ("N", "m")
+    omega_error = omega.error / omega.value
+    k, k_error = (parameters.k, 0.0) if parameters.k is not None else (parameters.m * omega.value**2, 2 * omega_error)  # type: ignore[operator]
+    m, m_error = (parameters.m, 0.0) if parameters.m is not None else (k / omega.value**2, 2 * omega_error)
+    is_rotation = record.base == "rad"
+    force, per = ("N.m", "rad") if is_rotation else ("N", "m")
     rows: tuple[tuple[int, float, str, str, str, float], ...] = (
-        (R, k, "T_f" if turning else "f", force, "friction torque" if turning else "friction force", k_share),
-        (ZETA, 2 * m * omega.value, "c", f"{force}.s/{per}", "damping constant", share),
-        (B, m, "q", f"{force}.s2/{per}2", "drag constant", m_share),
+        (R, k, "T_f" if is_rotation else "f", force, "friction torque" if is_rotation else "friction force", k_error),
+        (ZETA, 2 * m * omega.value, "c", f"{force}.s/{per}", "damping constant", omega_error),
+        (B, m, "q", f"{force}.s2/{per}2", "drag constant", m_error),
     )
-    return tuple(found[row[0]].times(*row[1:]) for row in rows if row[0] in found)
+    return tuple(estimates[row[0]].multiply(*row[1:]) for row in rows if row[0] in estimates)

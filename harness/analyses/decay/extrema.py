@@ -1,7 +1,8 @@
-"""The turning points of a record: noisy or clean, evenly sampled or not, about any rest position.
+"""Turning points of a record: noisy or clean, evenly sampled or not, about any rest position.
 
-They are found in a smoothed copy, and only number and place the half swings for the fits that follow.  Of a velocity
-the copy is its integral; of an acceleration it is -a/omega^2, the position but for the small share of the losses.
+They are located in a smoothed copy of the record and only number and place the half cycles for the fits that follow.
+For a velocity the copy is its integral; for an acceleration it is -a/omega^2, which is the position except for the
+small contribution of the losses.
 """
 
 from dataclasses import dataclass
@@ -13,64 +14,73 @@ from ...errors import HarnessError
 from ...records.record import Record
 from .noise import estimate_noise, find_reversals, savitzky_golay
 
-SURE = 8.0  # times the noise: what a reversal of the record must measure to be one
-SMOOTHED = 18.0  # the same of a smoothed record, over the root of the samples in a window
-FINE = 1e-6  # share of the range that a reversal measures at least
-CLEAN = 1e-4  # share of the range: noise below this leaves single samples to trust
-WINDOW = 0.35  # half periods that a smoothing window spans
-DENSE = 200  # samples of a half period are enough to find where it ends
-PAUSE = 0.8  # of a half period without a sample is a gap
-FEWEST = 3  # turning points
-ENOUGH = 6  # to number the swings before a gap, rather than those after it
-WIDE = 2.0  # rad: beyond, a pendulum is begun at a turning point that was seen
+MIN_REVERSAL = 8.0  # times the noise, in the record itself
+MIN_SMOOTH_REVERSAL = 18.0  # times the noise in the smoothed record, divided by the root of the window's samples
+MIN_RELATIVE_REVERSAL = 1e-6  # of the range
+CLEAN = 1e-4  # of the range: a record with less noise needs no smoothing
+WINDOW = 0.35  # half periods in a smoothing window
+MAX_SAMPLES = 200  # per half period; a denser record is averaged
+GAP = 0.8  # of a half period without a sample
+MIN_TURNING_POINTS = 3
+ENOUGH_TURNING_POINTS = 6  # a segment before a gap is used if it has as many
+LARGE_ANGLE = 2.0  # rad: a pendulum beyond it starts at a turning point that was recorded
 
 
 @dataclass(frozen=True)
 class Extrema:
-    """Times `t` (n,) in s and positions `x` (n,) of the turning points after the one at `begin`; the `noise` of a
-    sample and the `step` of a quantiser (or 0), in the unit of the record; the `half` period in s; from where on the
-    record is one piece (`start`); and the `error` of a position."""
+    """Turning points of a record.
+
+    Attributes
+    ----------
+    t, x : (n,) times in s and positions of the turning points after the start
+    t_start : time in s of the turning point at which the motion starts
+    half_period : in s
+    noise : standard deviation of a sample, in the unit of the record
+    quantiser_step : in the unit of the record; 0 if it does not exceed the noise
+    segment_start : time in s from which on the record has no gap
+    error : standard error of the positions
+    """
 
     t: np.ndarray
     x: np.ndarray
-    begin: float
-    half: float
+    t_start: float
+    half_period: float
     noise: float
-    step: float
-    start: float
+    quantiser_step: float
+    segment_start: float
     error: float
 
 
 def find_extrema(record: Record, pendulum: bool) -> Extrema:
-    """The turning points; HarnessError where the record shows no decay to measure."""
+    """Return the turning points of a record; HarnessError if it shows no decay."""
     span = float(np.ptp(record.x))
     if not span > 0:
         raise HarnessError(f"{record.name} does not move: every value is {record.x[0]:.6g} {record.unit}")
     noise, step = estimate_noise(record.t, record.x)
-    half = estimate_half_period(record, noise, span)
-    pieces = gapless_slices(record, half)
-    found = [extrema_in_slice(record, piece, half, noise, step, span, pendulum) for piece in pieces]
-    enough = [turns for turns in found if turns is not None and len(turns.t) >= ENOUGH]
-    longest = max(filter(None, found), key=lambda turns: len(turns.t), default=None)
-    best = enough[0] if enough else longest
-    if best is None or len(best.t) < FEWEST - 1:
+    half_period = estimate_half_period(record, noise, span)
+    slices = gapless_slices(record, half_period)
+    candidates = [extrema_in_slice(record, part, half_period, noise, step, span, pendulum) for part in slices]
+    sufficient = [extrema for extrema in candidates if extrema is not None and len(extrema.t) >= ENOUGH_TURNING_POINTS]
+    longest = max(filter(None, candidates), key=lambda extrema: len(extrema.t), default=None)
+    best = sufficient[0] if sufficient else longest
+    if best is None or len(best.t) < MIN_TURNING_POINTS - 1:
         count = 0 if best is None else len(best.t) + 1
-        if span < 1.5 * SURE * noise:
+        if span < 1.5 * MIN_REVERSAL * noise:
             raise HarnessError(
-                f"{record.name} is all noise: it spans {span:.3g} {record.unit}, and its samples scatter by "
-                f"{noise:.3g}; filter it, or sample at least 10 times a cycle"
+                f"{record.name} is all noise: its range is {span:.3g} {record.unit}, its noise {noise:.3g}; "
+                "filter it, or take at least 10 samples per cycle"
             )
         raise HarnessError(
-            f"{record.name} has {count} turning points that stand out of the noise ({noise:.3g} {record.unit}); "
-            f"{FEWEST} or more are needed: take a longer record"
+            f"{record.name} has {count} turning points above the noise ({noise:.3g} {record.unit}), and "
+            f"{MIN_TURNING_POINTS} or more are needed: make a longer record"
         )
     check_decay(record, best)
     return best
 
 
 def estimate_half_period(record: Record, noise: float, span: float) -> float:
-    """In s, from the record as it is where its noise allows, otherwise from its spectrum."""
-    at = find_reversals(record.x, max(SURE * noise, FINE * span))
+    """Return the half period in s, from the reversals of the record or, if noise hides them, from its spectrum."""
+    at = find_reversals(record.x, max(MIN_REVERSAL * noise, MIN_RELATIVE_REVERSAL * span))
     if len(at) >= 4:
         return float(np.median(np.diff(record.t[at[1:]])))
     step = (record.t[-1] - record.t[0]) / (len(record.t) - 1)
@@ -80,100 +90,101 @@ def estimate_half_period(record: Record, noise: float, span: float) -> float:
     return 0.5 * size * step / max(peak, 1)
 
 
-def gapless_slices(record: Record, half: float) -> list[slice]:
-    """The record between its gaps."""
-    pauses = np.diff(record.t)
-    gaps = np.flatnonzero(pauses > max(PAUSE * half, 3 * float(np.median(pauses)))) + 1
+def gapless_slices(record: Record, half_period: float) -> list[slice]:
+    """Return the segments of the record between its gaps."""
+    intervals = np.diff(record.t)
+    gaps = np.flatnonzero(intervals > max(GAP * half_period, 3 * float(np.median(intervals)))) + 1
     ends = [0, *gaps.tolist(), len(record.t)]
-    pieces = [slice(low, high) for low, high in pairwise(ends) if high - low >= 8]
-    return pieces or [slice(0, len(record.t))]
+    slices = [slice(low, high) for low, high in pairwise(ends) if high - low >= 8]
+    return slices or [slice(0, len(record.t))]
 
 
 def extrema_in_slice(
-    record: Record, piece: slice, half: float, noise: float, step: float, span: float, pendulum: bool
+    record: Record, part: slice, half_period: float, noise: float, step: float, span: float, pendulum: bool
 ) -> Extrema | None:
-    """The turning points in one piece of the record; None where it has too few."""
-    t, x = record.t[piece], record.x[piece]
+    """Return the turning points in one segment of the record; None if it has too few."""
+    t, x = record.t[part], record.x[part]
     dt = (t[-1] - t[0]) / (len(t) - 1)
-    block = max(1, int(half / dt / DENSE))
+    block = max(1, int(half_period / dt / MAX_SAMPLES))
     even = np.interp(t[0] + dt * np.arange(len(t)), t, x)
     u = even[: len(even) // block * block].reshape(-1, block).mean(axis=1)
-    g = t[0] + dt * (block * np.arange(len(u)) + (block - 1) / 2)
-    dt, grain = dt * block, noise / np.sqrt(block)
-    width = max(int(WINDOW * half / dt) // 2 * 2 + 1, 5)
+    grid = t[0] + dt * (block * np.arange(len(u)) + (block - 1) / 2)
+    dt, block_noise = dt * block, noise / np.sqrt(block)
+    width = max(int(WINDOW * half_period / dt) // 2 * 2 + 1, 5)
     if width >= len(u) // 2:
         return None
     y = savitzky_golay(u, width, 4 if width > 5 else 3) if width > 5 or noise > CLEAN * span else u
-    least = max(SMOOTHED * grain / np.sqrt(width), FINE * span)
+    threshold = max(MIN_SMOOTH_REVERSAL * block_noise / np.sqrt(width), MIN_RELATIVE_REVERSAL * span)
     if record.order:
-        y, least = integrate_to_position(y, dt, half, record.order, least, pendulum)
+        y, threshold = integrate_to_position(y, dt, half_period, record.order, threshold, pendulum)
         span = float(np.ptp(y))
-    i = find_reversals(y, least)
-    if len(i) < FEWEST:
+    i = find_reversals(y, threshold)
+    if len(i) < MIN_TURNING_POINTS:
         return None
-    i = select_regular_reversals(i, half / dt)
+    i = select_regular_reversals(i, half_period / dt)
     i = i[(i < len(y) - 1 - width // 2) | (np.arange(len(i)) < 4)]
-    if len(i) < FEWEST:
+    if len(i) < MIN_TURNING_POINTS:
         return None
-    begin, i = locate_start(y, g, i, width)
-    reach = max(1, min(width // 4, int(min(i[0], len(y) - 1 - i[-1]))))
-    before, top, after = y[i - reach], y[i], y[np.minimum(i + reach, len(y) - 1)]
-    bend = before - 2 * top + after
-    shift = np.clip(0.5 * (before - after) / np.where(bend == 0, 1, bend), -1, 1)
-    times, places = g[i] + shift * reach * dt, top - 0.25 * (before - after) * shift
-    error = max(1.5 * least / SMOOTHED, 2e-4 * float(np.ptp(places)) / 2)
-    if pendulum and len(places) > 6 and abs(places[0] - places[1]) > 2 * WIDE:
-        begin, times, places = times[0], times[1:], places[1:]  # a turning point near pi is not made up
-    return Extrema(times, places, begin, half, noise, step, float(t[0]), error)
+    t_start, i = locate_start(y, grid, i, width)
+    distance = max(1, min(width // 4, int(min(i[0], len(y) - 1 - i[-1]))))
+    before, top, after = y[i - distance], y[i], y[np.minimum(i + distance, len(y) - 1)]
+    curvature = before - 2 * top + after
+    shift = np.clip(0.5 * (before - after) / np.where(curvature == 0, 1, curvature), -1, 1)
+    times, positions = grid[i] + shift * distance * dt, top - 0.25 * (before - after) * shift
+    error = max(1.5 * threshold / MIN_SMOOTH_REVERSAL, 2e-4 * float(np.ptp(positions)) / 2)
+    if pendulum and len(positions) > 6 and abs(positions[0] - positions[1]) > 2 * LARGE_ANGLE:
+        # near pi an extrapolated start would be unreliable: start at the first turning point recorded
+        t_start, times, positions = times[0], times[1:], positions[1:]
+    return Extrema(times, positions, t_start, half_period, noise, step, float(t[0]), error)
 
 
-def select_regular_reversals(i: np.ndarray, half: float) -> np.ndarray:
-    """The reversals (samples) of a free motion whose half period is about `half` samples, and the one before.
+def select_regular_reversals(i: np.ndarray, half_period: float) -> np.ndarray:
+    """Return the reversals i (samples) of a free motion with a half period in samples, and the one before them.
 
-    What is quicker before them is the ringing of the smoothed copy at a release; where they become irregular they are
-    lost in noise, or disturbed.
+    Faster reversals at the beginning are ringing of the smoothed copy at a release.  Where the reversals become
+    irregular, the motion is lost in noise or disturbed.
     """
     gaps = np.diff(i)
-    long = gaps > 0.5 * half
-    swings = np.flatnonzero(long[:-1] & long[1:])
-    first = int(swings[0]) if len(swings) else 0
+    long = gaps > 0.5 * half_period
+    regular = np.flatnonzero(long[:-1] & long[1:])
+    first = int(regular[0]) if len(regular) else 0
     i, gaps = i[first:], gaps[first + 1 :]
-    rough = np.flatnonzero((gaps[1:] > 1.5 * gaps[:-1]) | (gaps[1:] < 0.65 * gaps[:-1]))
-    return i[: rough[0] + 3] if len(rough) else i
+    irregular = np.flatnonzero((gaps[1:] > 1.5 * gaps[:-1]) | (gaps[1:] < 0.65 * gaps[:-1]))
+    return i[: irregular[0] + 3] if len(irregular) else i
 
 
-def locate_start(y: np.ndarray, g: np.ndarray, i: np.ndarray, width: int) -> tuple[float, np.ndarray]:
-    """When the motion began, or would have, from rest; and the turning points (samples) after that.
+def locate_start(y: np.ndarray, grid: np.ndarray, i: np.ndarray, width: int) -> tuple[float, np.ndarray]:
+    """Return the time at which the motion starts from rest, or would have, and the turning points i after it.
 
-    The first reversal is where the record begins, where it was let go from a hold, or where it turned.
+    The first reversal is the start of the record, a release from a hold, or a turning point.
     """
-    gap = g[i[2]] - g[i[1]]
-    share = (g[i[1]] - g[i[0]]) / gap
-    if share > 1.2 or i[0] <= width // 4:  # held, or let go, or begun after a turning point
-        return float(g[i[0]] if 0.9 < share <= 1.2 else g[i[1]] - gap), i[1:]
-    if abs(y[0] - y[i[0]]) > 0.25 * abs(y[i[1]] - y[i[0]]):  # begun in free motion
-        return float(2 * g[i[0]] - g[i[1]]), i
-    return float(g[i[0]]), i[1:]  # begun near a turning point, or let go after a short while
+    gap = grid[i[2]] - grid[i[1]]
+    share = (grid[i[1]] - grid[i[0]]) / gap
+    if share > 1.2 or i[0] <= width // 4:  # held before, released, or recorded from after a turning point on
+        return float(grid[i[0]] if 0.9 < share <= 1.2 else grid[i[1]] - gap), i[1:]
+    if abs(y[0] - y[i[0]]) > 0.25 * abs(y[i[1]] - y[i[0]]):  # recorded from within the free motion on
+        return float(2 * grid[i[0]] - grid[i[1]]), i
+    return float(grid[i[0]]), i[1:]  # recorded from near a turning point on, or released after a short time
 
 
 def integrate_to_position(
-    y: np.ndarray, dt: float, half: float, order: int, least: float, pendulum: bool
+    y: np.ndarray, dt: float, half_period: float, order: int, threshold: float, pendulum: bool
 ) -> tuple[np.ndarray, float]:
-    """About the position, from a smoothed velocity or acceleration; and the least reversal of it that counts."""
-    i = find_reversals(y, least)[1:]
+    """Return the approximate position from a smoothed velocity or acceleration, and its reversal threshold."""
+    i = find_reversals(y, threshold)[1:]
     middle = float(np.median((y[i[:-2]] + 2 * y[i[1:-1]] + y[i[2:]]) / 4)) if len(i) > 2 else float(np.mean(y))
-    omega = np.pi / half
+    omega = np.pi / half_period
     if order == 1:
-        return np.concatenate([[0.0], np.cumsum((y[1:] + y[:-1]) / 2 - middle) * dt]), least / omega
+        return np.concatenate([[0.0], np.cumsum((y[1:] + y[:-1]) / 2 - middle) * dt]), threshold / omega
     y = (middle - y) / omega**2
-    return np.arcsin(np.clip(y, -1, 1)) if pendulum else y, least / omega**2
+    return np.arcsin(np.clip(y, -1, 1)) if pendulum else y, threshold / omega**2
 
 
-def check_decay(record: Record, turns: Extrema) -> None:
-    """The swings do not grow."""
-    swings = np.abs(np.diff(turns.x))
-    if swings[-1] > swings[0] + 8 * turns.error and swings[-1] > 1.001 * swings[0]:
+def check_decay(record: Record, extrema: Extrema) -> None:
+    """Raise HarnessError if the oscillation grows."""
+    sizes = np.abs(np.diff(extrema.x))  # peak to peak
+    if sizes[-1] > sizes[0] + 8 * extrema.error and sizes[-1] > 1.001 * sizes[0]:
         raise HarnessError(
-            f"{record.name} grows, from a swing of {swings[0]:.4g} to one of {swings[-1]:.4g} {record.base}: it is "
-            "driven or gains energy, and has no decay to measure"
+            f"{record.name} grows, from {sizes[0]:.4g} to {sizes[-1]:.4g} {record.base} peak to peak: it is driven or "
+            "gains energy, and has no decay to measure"
         )

@@ -1,9 +1,10 @@
-"""What the turning points alone say of the losses, beside the fit of the whole signal.
+"""Losses from the turning points alone, for comparison with the fit of the whole signal.
 
-By all of them: their positions x_i = rest +- a_i fitted by the chain of half swings of the law (a_(i+1) = e a_i -
-(1 + e) r for a spring without drag: B. F. Feeny, J. W. Liang, Journal of Sound and Vibration 195 (1996)).  By the first
-and the last: the one loss that alone leads from the one amplitude to the other, of a spring the textbook's logarithmic
-decrement or linear envelope; of a pendulum by the same chain.
+From all turning points: their positions x_i = rest +- a_i, fitted by the return map of the law (for a spring without
+drag a_(i+1) = e a_i - (1 + e) r: B. F. Feeny, J. W. Liang, Journal of Sound and Vibration 195 (1996)).
+
+From the first and the last one: the single loss that leads from the first amplitude to the last.  For a spring this is
+the textbook's logarithmic decrement or linear envelope; for a pendulum it comes from the same return map.
 """
 
 from dataclasses import replace
@@ -15,112 +16,122 @@ from .decrement import damping_ratio, friction_from_envelope
 from .estimates import Estimate, KnownParameters, force_estimates, to_record_units
 from .extrema import Extrema
 from .fit_problem import FitProblem
-from .intervals import correlated, interval
+from .intervals import confidence_interval, to_correlation
 from .law import AMPLITUDE, OMEGA, REST, TERMS, UNKNOWNS, ZETA, B, R
 from .least_squares import column_norms, least_squares
 from .model_selection import FittedLaw
-from .return_map import chain
+from .return_map import iterate_return_map
 from .signal_model import SignalModel
 
-CLOSE = 1e-9  # share of a loss that a step changes
-STEPS = 20
+CONVERGED = 1e-9  # relative change of a loss
+MAX_STEPS = 20
 
 
 def estimate_from_extrema(
-    record: Record, problem: FitProblem, turns: Extrema, law: FittedLaw, known: KnownParameters, omega: Estimate
+    record: Record, problem: FitProblem, extrema: Extrema, law: FittedLaw, parameters: KnownParameters, omega: Estimate
 ) -> tuple[tuple[Estimate, ...], str]:
-    """The law's values by the turning points alone, and why there are none."""
+    """Return estimates of the law from all turning points, and the reason if there are none."""
     if record.order:
         return (), f"a record of {record.quantity} shows no turning points of the position"
     if problem.drift:
-        return (), "the rest position drifts, and turning points alone do not tell how"
+        return (), "the rest position drifts, and turning points alone do not show how"
     unknowns = np.array([AMPLITUDE, REST, *(UNKNOWNS.index(term) for term in law.terms)])
-    if len(turns.x) <= len(unknowns):
-        return (), f"{len(turns.x)} turning points leave no freedom for {len(unknowns)} values"
-    places = (turns.x - problem.offset) / problem.scale
+    if len(extrema.x) <= len(unknowns):
+        return (), f"{len(extrema.x)} turning points leave no degrees of freedom for {len(unknowns)} values"
+    positions = (extrema.x - problem.offset) / problem.scale
     start = law.p.copy()
-    amplitudes, _ = problem.half_cycles(start, most=len(cycles_before_first_extremum(problem, turns, start)))
+    amplitudes, _ = problem.half_cycles(start, max_count=len(cycles_before_first_extremum(problem, extrema, start)))
     model = problem.model
     before = len(amplitudes) - 1
     start[AMPLITUDE] = amplitudes[-1]
-    model = replace(model, side=model.side * (-1) ** before)
+    model = replace(model, initial_sign=model.initial_sign * (-1) ** before)
 
-    def off(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        laws, at, changes = model.perturbed_laws(p, unknowns)
-        rows = chain(laws, model.is_pendulum, model.floor, len(places) - 1).amplitudes
-        rows = np.pad(rows, ((0, len(places) - len(rows)), (0, 0)), mode="edge")
-        way = model.side * (-1.0) ** np.arange(len(places))
-        jacobian = np.ones((len(places), len(unknowns)))
-        for i, place in enumerate(at.tolist()):
-            slope = way * (rows[:, 1 + i] - rows[:, 0]) / changes[i]
-            jacobian[:, np.flatnonzero(unknowns == place)[0]] = slope
-        return p[REST] + way * rows[:, 0] - places, jacobian
+    def residuals(p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        laws, changed, changes = model.perturbed_laws(p, unknowns)
+        sequence = iterate_return_map(laws, model.is_pendulum, model.min_amplitude, len(positions) - 1)
+        sizes = np.pad(sequence.amplitudes, ((0, len(positions) - len(sequence.amplitudes)), (0, 0)), mode="edge")
+        sign = model.initial_sign * (-1.0) ** np.arange(len(positions))
+        jacobian = np.ones((len(positions), len(unknowns)))
+        for i, unknown in enumerate(changed.tolist()):
+            slope = sign * (sizes[:, 1 + i] - sizes[:, 0]) / changes[i]
+            jacobian[:, np.flatnonzero(unknowns == unknown)[0]] = slope
+        return p[REST] + sign * sizes[:, 0] - positions, jacobian
 
-    p, cost, _, jacobian = least_squares(off, start, unknowns)
-    freedom = len(places) - len(unknowns)
+    p, cost, _, jacobian = least_squares(residuals, start, unknowns)
+    degrees_of_freedom = len(positions) - len(unknowns)
     scale = column_norms(jacobian)
-    covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * cost / freedom
-    found = {}
-    errors, correlation = np.sqrt(np.diag(covariance)) / scale, correlated(covariance)
-    for i, place in enumerate(unknowns.tolist()):
-        if place != AMPLITUDE:
-            low, high = interval(i, unknowns, p[unknowns], errors, correlation, freedom)
-            found[place] = to_record_units(record, problem, place, float(p[place]), float(errors[i]), low, high)
-    return (*found.values(), *force_estimates(record, omega, found, known)), ""
+    covariance = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale)) * cost / degrees_of_freedom
+    estimates = {}
+    errors, correlation = np.sqrt(np.diag(covariance)) / scale, to_correlation(covariance)
+    for i, unknown in enumerate(unknowns.tolist()):
+        if unknown != AMPLITUDE:
+            low, high = confidence_interval(i, unknowns, p[unknowns], errors, correlation, degrees_of_freedom)
+            estimates[unknown] = to_record_units(
+                record, problem, unknown, float(p[unknown]), float(errors[i]), low, high
+            )
+    return (*estimates.values(), *force_estimates(record, omega, estimates, parameters)), ""
 
 
-def cycles_before_first_extremum(problem: FitProblem, turns: Extrema, p: np.ndarray) -> np.ndarray:
-    """The half swings of the fit that have ended about the first turning point seen."""
-    _, begins = problem.half_cycles(p)
-    return begins[1:][begins[1:] < turns.t[0] - problem.time_origin + turns.half / 2]
+def cycles_before_first_extremum(problem: FitProblem, extrema: Extrema, p: np.ndarray) -> np.ndarray:
+    """Return the end times of the fitted half cycles that end at about the first turning point, or before it."""
+    _, starts = problem.half_cycles(p)
+    return starts[1:][starts[1:] < extrema.t[0] - problem.time_origin + extrema.half_period / 2]
 
 
 def estimate_from_two_peaks(
-    record: Record, problem: FitProblem, turns: Extrema, law: FittedLaw, known: KnownParameters, omega: Estimate
+    record: Record, problem: FitProblem, extrema: Extrema, law: FittedLaw, parameters: KnownParameters, omega: Estimate
 ) -> tuple[tuple[Estimate, ...], str]:
-    """Each loss that alone leads from the first to the last turning point; or why there is none."""
+    """Return each single loss that leads from the first to the last turning point, and the reason if there is none."""
     if record.order:
         return (), f"a record of {record.quantity} shows no turning points of the position"
     rest = float(law.p[REST]) * problem.scale + problem.offset
-    sizes = np.sign(turns.x[0] - rest) * (-1.0) ** np.arange(len(turns.x)) * (turns.x - rest)
-    count = int(np.flatnonzero(sizes > 0)[-1])  # the end may be on the side it came from
-    first, last = float(sizes[0]), float(sizes[count])
+    amplitudes = np.sign(extrema.x[0] - rest) * (-1.0) ** np.arange(len(extrema.x)) * (extrema.x - rest)
+    count = int(np.flatnonzero(amplitudes > 0)[-1])  # the last half cycle may end on the side where it started
+    first, last = float(amplitudes[0]), float(amplitudes[count])
     if problem.drift:
         return (), "the rest position drifts"
     if not first > last:
         return (), "the last turning point is no smaller than the first"
-    found = {}
+    estimates = {}
     for term in TERMS:
-        place = UNKNOWNS.index(term)
-        value = solve_single_loss(place, first / problem.scale, last / problem.scale, count, problem.model.is_pendulum)
+        unknown = UNKNOWNS.index(term)
+        value = solve_single_loss(
+            unknown, first / problem.scale, last / problem.scale, count, problem.model.is_pendulum
+        )
         if np.isfinite(value):
-            found[place] = to_record_units(record, problem, place, value, np.nan, np.nan, np.nan)
-    return (*found.values(), *force_estimates(record, omega, found, known)), ""
+            estimates[unknown] = to_record_units(record, problem, unknown, value, np.nan, np.nan, np.nan)
+    return (*estimates.values(), *force_estimates(record, omega, estimates, parameters)), ""
 
 
-def solve_single_loss(place: int, first: float, last: float, count: int, is_pendulum: bool) -> float:
-    """The one loss that leads from the amplitude `first` to `last` in `count` half swings; NaN where none does.
+def solve_single_loss(unknown: int, first: float, last: float, count: int, is_pendulum: bool) -> float:
+    """Return the single loss that leads from one amplitude to another in `count` half cycles; NaN if none does.
 
-    Of a spring in closed form but for drag; elsewhere that of a small loss is where Newton's method begins.
+    For a spring with damping or friction it has a closed form; otherwise Newton's method starts from that of a small
+    loss.
+
+    Parameters
+    ----------
+    unknown : index in UNKNOWNS of the loss: ZETA, R or B
+    first, last : amplitudes
     """
-    small = {
+    small_loss = {
         ZETA: damping_ratio(first, last, count / 2),
         R: friction_from_envelope(first, last, count / 2, 1.0),
         B: 0.75 * (1 / last - 1 / first) / count,
-    }[place]
-    if place != B and not is_pendulum:
-        return small
+    }[unknown]
+    if unknown != B and not is_pendulum:
+        return small_loss
     p = np.zeros(len(UNKNOWNS))
-    p[[AMPLITUDE, OMEGA, place]] = first, 1.0, small
-    model, unknowns = SignalModel(1.0, 0, is_pendulum, 0.0, 0.0), np.array([place])
+    p[[AMPLITUDE, OMEGA, unknown]] = first, 1.0, small_loss
+    model, unknowns = SignalModel(1.0, 0, is_pendulum, 0.0, 0.0), np.array([unknown])
 
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         laws, _, changes = model.perturbed_laws(p, unknowns)
-        ends = chain(laws, is_pendulum, 0.0, count).amplitudes[-1]
+        ends = iterate_return_map(laws, is_pendulum, 0.0, count).amplitudes[-1]
         step = changes[0] * (last - ends[0]) / (ends[1] - ends[0])
         if not np.isfinite(step):
             break
-        p[place] = np.clip(p[place] + step, p[place] / 4, 4 * p[place])
-        if abs(step) < CLOSE * p[place]:
-            return float(p[place])
+        p[unknown] = np.clip(p[unknown] + step, p[unknown] / 4, 4 * p[unknown])
+        if abs(step) < CONVERGED * p[unknown]:
+            return float(p[unknown])
     return np.nan

@@ -1,11 +1,11 @@
-"""How sure the values are: their covariance, and 95 % intervals of what cannot be negative.
+"""Uncertainty of the fitted values: their covariance, and 95 % confidence intervals.
 
-Residuals that resemble their neighbours carry less than their number says.  With the scores g_i = J_i e_i summed over
+Correlated residuals carry less information than their number suggests.  With the scores g_i = J_i e_i summed over
 blocks, the covariance (J'J)^-1 (sum of g g' over blocks) (J'J)^-1 allows for that (W. K. Newey, K. D. West,
-Econometrica 55 (1987), with blocks for their kernel); of several lengths of blocks the widest is taken.
+Econometrica 55 (1987), with blocks instead of their kernel); of several block lengths, the largest variance counts.
 
-Of losses near zero, and of those beside them, bounded.py tells the intervals, from where the fit would be if losses
-could be negative: one linear step beyond the bound.
+The intervals of losses near zero, and of losses correlated with them, come from nonnegative_intervals.py.  They start
+from the values that the fit would have if losses could be negative: one linear step beyond the bound.
 """
 
 from dataclasses import dataclass
@@ -18,59 +18,82 @@ from .law import OMEGA, ZETA, Terms
 from .least_squares import column_norms
 from .nonnegative_intervals import NEGLIGIBLE_BOUND, nonnegative_interval
 
-NORMAL = NormalDist()
-SIDE = NORMAL.inv_cdf(0.975)
-FEW = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)  # Student's t at 97.5 %, 1 to 9 degrees
-BLOCKS = (1.0, 0.3, 0.1, 0.03)  # to a half swing
-FEWEST_BLOCKS, MOST_BLOCKS = 24, 400
-ALIKE = 4.5  # standard deviations of the correlation of white residuals
+NORMAL_QUANTILE = NormalDist().inv_cdf(0.975)
+STUDENT_QUANTILES = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262)  # at 97.5 %, 1 to 9 degrees
+BLOCKS_PER_HALF_CYCLE = (1.0, 0.3, 0.1, 0.03)
+MIN_BLOCKS, MAX_BLOCKS = 24, 400
+SIGNIFICANT_CORRELATION = 4.5  # standard deviations of the correlation of white residuals
 
 
 @dataclass(frozen=True)
 class FitUncertainty:
-    """Of the `unknowns` (n,): standard `errors`, their `correlation` (n, n), and `free`, where they would be if losses
-    could be negative.  Of the residuals: rms, correlation `rho` of neighbours, and whether they are `alike`."""
+    """Uncertainty of a fit, for its n unknowns.
+
+    Attributes
+    ----------
+    unknowns : (n,) indices in UNKNOWNS
+    standard_errors : (n,)
+    correlation : (n, n)
+    unconstrained : (n,) the values that the fit would have if losses could be negative
+    rms : root mean square of the residuals
+    neighbour_correlation : correlation of neighbouring residuals
+    is_correlated : whether the residuals differ significantly from white noise
+    degrees_of_freedom : samples less unknowns
+    """
 
     unknowns: np.ndarray
-    errors: np.ndarray
+    standard_errors: np.ndarray
     correlation: np.ndarray
-    free: np.ndarray
+    unconstrained: np.ndarray
     rms: float
-    rho: float
-    alike: bool
-    freedom: int
+    neighbour_correlation: float
+    is_correlated: bool
+    degrees_of_freedom: int
 
 
-def spread(problem: FitProblem, p: np.ndarray, terms: Terms) -> FitUncertainty:
-    """The spread of the values p of a law fitted to the problem."""
-    e, jacobian = problem.off(p, terms)
+def estimate_uncertainty(problem: FitProblem, p: np.ndarray, terms: Terms) -> FitUncertainty:
+    """Return the uncertainty of the fitted values p of a law with these terms."""
+    e, jacobian = problem.residuals(p, terms)
     unknowns, n = problem.unknowns(terms), len(e)
     scale = column_norms(jacobian)
     jacobian = jacobian / scale
     inverse = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14)
-    freedom = max(n - len(unknowns), 1)
-    white = np.diag(inverse) * (float(e @ e) / freedom + problem.exact**2)
-    swing = np.pi / p[OMEGA]
-    rho, alike = likeness(e, max(int(swing / 4 / float(np.median(np.diff(problem.t)))), 1))
+    degrees_of_freedom = max(n - len(unknowns), 1)
+    white = np.diag(inverse) * (float(e @ e) / degrees_of_freedom + problem.residual_floor**2)
+    half_period = np.pi / p[OMEGA]
+    quarter = max(int(half_period / 4 / float(np.median(np.diff(problem.t)))), 1)
+    neighbour_correlation, is_correlated = residual_correlation(e, quarter)
     variance = white
-    if alike:
-        swings = (problem.t[-1] - problem.t[0]) / swing
-        counts = {int(np.clip(share * swings, FEWEST_BLOCKS, MOST_BLOCKS)) for share in BLOCKS}
-        variance = np.max([white, *(by_blocks(jacobian, e, inverse, count) for count in sorted(counts))], axis=0)
-    free = p[unknowns] - inverse @ (jacobian.T @ e) / scale
+    if is_correlated:
+        half_cycles = (problem.t[-1] - problem.t[0]) / half_period
+        counts = {int(np.clip(share * half_cycles, MIN_BLOCKS, MAX_BLOCKS)) for share in BLOCKS_PER_HALF_CYCLE}
+        variance = np.max([white, *(block_variances(jacobian, e, inverse, count) for count in sorted(counts))], axis=0)
+    unconstrained = p[unknowns] - inverse @ (jacobian.T @ e) / scale
     rms = float(np.sqrt(np.mean(e**2)))
-    return FitUncertainty(unknowns, np.sqrt(variance) / scale, correlated(inverse), free, rms, rho, alike, freedom)
+    return FitUncertainty(
+        unknowns,
+        np.sqrt(variance) / scale,
+        to_correlation(inverse),
+        unconstrained,
+        rms,
+        neighbour_correlation,
+        is_correlated,
+        degrees_of_freedom,
+    )
 
 
-def correlated(covariance: np.ndarray) -> np.ndarray:
-    """The correlations (n, n) in a covariance (n, n)."""
-    squares = np.diag(covariance)
-    sizes = np.sqrt(np.where(squares > 0, squares, 1.0))
-    return covariance / np.outer(sizes, sizes)
+def to_correlation(covariance: np.ndarray) -> np.ndarray:
+    """Return the correlation matrix (n, n) of a covariance matrix (n, n)."""
+    variances = np.diag(covariance)
+    deviations = np.sqrt(np.where(variances > 0, variances, 1.0))
+    return covariance / np.outer(deviations, deviations)
 
 
-def likeness(e: np.ndarray, width: int) -> tuple[float, bool]:
-    """The correlation of neighbouring residuals, and whether they, or their sums over `width`, are no white noise."""
+def residual_correlation(e: np.ndarray, width: int) -> tuple[float, bool]:
+    """Return the correlation of neighbouring residuals e (n,), and whether they differ from white noise.
+
+    They do if this correlation, or the variance of their sums over `width` samples, is significantly large.
+    """
     squares = float(e @ e)
     if squares == 0:
         return 0.0, False
@@ -78,37 +101,50 @@ def likeness(e: np.ndarray, width: int) -> tuple[float, bool]:
     rho = float(e[:-1] @ e[1:]) / squares
     sums = np.add.reduceat(e, np.arange(0, n, width))
     ratio = float(np.mean(sums**2)) / (width * squares / n)
-    return rho, abs(rho) > ALIKE / np.sqrt(n) or ratio > 1 + 5 * np.sqrt(2 * width / n)
+    return rho, abs(rho) > SIGNIFICANT_CORRELATION / np.sqrt(n) or ratio > 1 + 5 * np.sqrt(2 * width / n)
 
 
-def by_blocks(jacobian: np.ndarray, e: np.ndarray, inverse: np.ndarray, count: int) -> np.ndarray:
-    """Variances from scores summed over `count` blocks of residuals."""
+def block_variances(jacobian: np.ndarray, e: np.ndarray, inverse: np.ndarray, count: int) -> np.ndarray:
+    """Return the variances of the unknowns, from scores summed over `count` blocks of residuals."""
     edges = np.unique(np.linspace(0, len(e), count + 1).astype(int))[:-1]
     scores = np.add.reduceat(jacobian * e[:, None], edges, axis=0)
-    free = max(len(edges) - jacobian.shape[1], 1)
-    return np.diag(inverse @ (scores.T @ scores) @ inverse) * len(edges) / free
+    degrees_of_freedom = max(len(edges) - jacobian.shape[1], 1)
+    return np.diag(inverse @ (scores.T @ scores) @ inverse) * len(edges) / degrees_of_freedom
 
 
-def student_t_quantile(freedom: int) -> float:
-    """Student's t at 97.5 %, by the series of Abramowitz and Stegun (26.7.5) from ten degrees of freedom on."""
-    if freedom <= len(FEW):
-        return FEW[freedom - 1] if freedom > 0 else float("nan")
-    z, v = SIDE, float(freedom)
+def student_t_quantile(degrees_of_freedom: int) -> float:
+    """Return Student's t at 97.5 %; from ten degrees of freedom on by Abramowitz and Stegun, 26.7.5."""
+    if degrees_of_freedom <= len(STUDENT_QUANTILES):
+        return STUDENT_QUANTILES[degrees_of_freedom - 1] if degrees_of_freedom > 0 else float("nan")
+    z, v = NORMAL_QUANTILE, float(degrees_of_freedom)
     first, second = (z**3 + z) / 4, (5 * z**5 + 16 * z**3 + 3 * z) / 96
     third = (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384
     return z + first / v + second / v**2 + third / v**3
 
 
-def interval(
-    i: int, unknowns: np.ndarray, free: np.ndarray, errors: np.ndarray, correlation: np.ndarray, freedom: int
+def confidence_interval(
+    i: int,
+    unknowns: np.ndarray,
+    center: np.ndarray,
+    standard_errors: np.ndarray,
+    correlation: np.ndarray,
+    degrees_of_freedom: int,
 ) -> tuple[float, float]:
-    """The 95 % interval of the i-th of the `unknowns` (places in UNKNOWNS) that were measured as `free`."""
-    wide = errors * student_t_quantile(freedom) / SIDE
+    """Return the 95 % interval of the i-th unknown.
+
+    Parameters
+    ----------
+    unknowns : (n,) indices in UNKNOWNS
+    center : (n,) measured values; losses may be negative here
+    standard_errors : (n,)
+    correlation : (n, n)
+    """
+    wide = standard_errors * student_t_quantile(degrees_of_freedom) / NORMAL_QUANTILE
     losses = (unknowns >= ZETA) & (wide > 0)
-    z = free / np.where(losses, wide, 1.0)
-    near = losses & (z < NEGLIGIBLE_BOUND)
-    if not losses[i] or not near.any():
-        return float(free[i] - SIDE * wide[i]), float(free[i] + SIDE * wide[i])
-    some = [i, *(j for j in np.flatnonzero(near).tolist() if j != i)]
-    low, high = nonnegative_interval(z[some], correlation[np.ix_(some, some)])
+    z = center / np.where(losses, wide, 1.0)
+    near_bound = losses & (z < NEGLIGIBLE_BOUND)
+    if not losses[i] or not near_bound.any():
+        return float(center[i] - NORMAL_QUANTILE * wide[i]), float(center[i] + NORMAL_QUANTILE * wide[i])
+    joint = [i, *(j for j in np.flatnonzero(near_bound).tolist() if j != i)]
+    low, high = nonnegative_interval(z[joint], correlation[np.ix_(joint, joint)])
     return float(low * wide[i]), float(high * wide[i])

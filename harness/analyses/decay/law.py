@@ -1,12 +1,12 @@
-"""The law of a free decay, its unknowns and its seven forms.
+"""The equation of motion of a free decay, its unknowns and the seven laws of damping.
 
-In the time theta = omega (t - t0), with y the distance from rest and s = sign y',
+In the time theta = omega (t - t0), with y the displacement from rest and s = sign y',
 
-    y'' + 2 zeta y' + s b y'^2 + s r + y = 0         (a pendulum: sin y in place of y)
+    y'' + 2 zeta y' + s b y'^2 + s r + y = 0         (pendulum: sin y instead of y)
 
-zeta = c/(2 m omega), r = f/k (a length), b = q/m (1/length) for a drag q v |v|, omega^2 = k/m.  The motion begins at
-rest at y = A, held there before, and ends for good at the first turning point with |y| <= r.  Every loss is one:
-zeta, r and b are at least 0.
+zeta = c/(2 m omega), r = f/k (a length), b = q/m (1/length) for a quadratic drag q v |v|, omega^2 = k/m.  The motion
+starts from rest at y = A, where the body was held before, and ends at the first turning point with |y| <= r.  The loss
+terms zeta, r and b are nonnegative.
 """
 
 from itertools import combinations
@@ -23,22 +23,22 @@ Terms = tuple[str, ...]
 
 
 def sublaws(terms: Terms) -> tuple[Terms, ...]:
-    """Every law of some of these terms, the full one first."""
+    """Return every law with some of these terms, the full one first."""
     return tuple(law for law in LAWS if set(law) <= set(terms))
 
 
 def unknown_indices(terms: Terms, drift: bool) -> np.ndarray:
-    """The places in UNKNOWNS of what a law with these terms leaves to find."""
+    """Return the indices in UNKNOWNS of the values to fit for a law with these terms."""
     basic = [T0, AMPLITUDE, REST, *([DRIFT] if drift else []), OMEGA]
     return np.array(basic + [UNKNOWNS.index(term) for term in terms])
 
 
 def describe_law(terms: Terms) -> str:
-    """A law by the names of its terms."""
+    """Return the names of the terms, as in 'viscous damping and dry friction'."""
     *most, last = (TERM_NAMES[term] for term in terms)
     return f"{', '.join(most)} and {last}" if most else last
 
 
 def sticking_limit(r: np.ndarray, is_pendulum: bool) -> np.ndarray:
-    """The largest distance from rest at which friction holds (same shape as r)."""
+    """Return the largest displacement at which friction holds the body at rest (same shape as r)."""
     return np.arcsin(np.clip(r, 0.0, 1.0)) if is_pendulum else r

@@ -1,8 +1,8 @@
-"""Which of the laws: each fitted to the same samples, judged by BIC = n ln(squares/n) + p ln n (G. Schwarz, Annals of
-Statistics 6 (1978)).
+"""Selection among the laws: each is fitted to the same samples and ranked by its Bayesian information criterion.
 
-The laws are nested, and one more term can only take squares away: BIC cannot rise by more than ln n for it.  A law
-that leaves more squares than one of its parts has stopped in a local minimum, and is fitted again from there.
+BIC = n ln(squares/n) + p ln n for p unknowns (G. Schwarz, Annals of Statistics 6 (1978)).  The laws are nested, so an
+additional term can only reduce the sum of squares, and BIC can rise by no more than ln n.  A law with a larger sum of
+squares than one of its special cases has stopped in a local minimum and is fitted again from that case.
 """
 
 from collections.abc import Callable
@@ -15,13 +15,13 @@ from .energy_balance import estimate_losses
 from .fit_problem import FitProblem, FitResult
 from .law import TERMS, ZETA, Terms, describe_law, sublaws
 
-ROUNDS = 2
-SAME = 1.0  # of n ln(squares)
+MAX_REFITS = 2  # passes over all pairs of laws
+EQUAL_DEVIANCE = 1.0  # difference of n ln(squares) below which two laws fit equally well
 
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law with these `terms`: the values `p` of UNKNOWNS, in the problem's units, what they cost, and its BIC."""
+    """A law with these `terms`, fitted: the values `p` of UNKNOWNS in the problem's units, the sum of squares, BIC."""
 
     terms: Terms
     p: np.ndarray
@@ -34,23 +34,30 @@ class FittedLaw:
 
 
 def select_reported_law(laws: tuple[FittedLaw, ...], full: FittedLaw, problem: FitProblem) -> FittedLaw:
-    """The law whose values are told: the best one where the full one says the same within one standard error.
+    """Return the law whose values are reported: the best law if it agrees with the full law within a standard error.
 
-    Of nested fits no value moves by more standard errors than the root of what n ln(squares) changes by.
+    Between nested fits, no value moves by more standard errors than the root of the change of n ln(squares).
     """
-    return full if more(problem, laws[0], full) > SAME else laws[0]
+    return full if deviance_difference(problem, laws[0], full) > EQUAL_DEVIANCE else laws[0]
 
 
-def more(problem: FitProblem, law: FittedLaw, other: FittedLaw) -> float:
-    """By how much n ln(squares) of a law is more than that of another, as far as a fit is exact."""
-    n, least = len(problem.t), len(problem.t) * problem.exact**2
+def deviance_difference(problem: FitProblem, law: FittedLaw, other: FittedLaw) -> float:
+    """Return n ln(squares) of a law minus that of another, with squares no smaller than the accuracy of the model."""
+    n, least = len(problem.t), len(problem.t) * problem.residual_floor**2
     return n * float(np.log(max(law.sum_of_squares, least) / max(other.sum_of_squares, least)))
 
 
 def fit_all_laws(
     problem: FitProblem, full: FitResult, terms: Terms, amplitudes: np.ndarray, report: Callable[[float], None]
 ) -> tuple[FittedLaw, ...]:
-    """Every law of these terms, best first, from the fit of the full one and the amplitudes of turning points (n,)."""
+    """Fit every law with some of the terms and return them by rising BIC.
+
+    Parameters
+    ----------
+    full : fit of the law with all terms
+    amplitudes : (n,) amplitudes at the turning points, for starting values
+    report : receives the progress from 0 to 1
+    """
     laws = sublaws(terms)
     fits = {terms: full}
     for done, law in enumerate(laws):
@@ -62,14 +69,16 @@ def fit_all_laws(
         without, start = full[0].copy(), full[0].copy()
         without[[ZETA + TERMS.index(term) for term in absent]] = 0.0
         start[ZETA:] = estimate_losses(amplitudes, law, problem.model.is_pendulum)
-        fits[law] = problem.fit(min(without, start, key=lambda p: float(np.sum(problem.off(p, law)[0] ** 2))), law)
-    for _ in range(ROUNDS):
-        for less, more in permutations(laws, 2):
-            if set(less) < set(more) and fits[more][1] > fits[less][1] * (1 + 1e-9) + 1e-30:
-                fits[more] = min(problem.fit(fits[less][0], more), fits[less], key=lambda fit: fit[1])
+        best = min(without, start, key=lambda p: float(np.sum(problem.residuals(p, law)[0] ** 2)))
+        fits[law] = problem.fit(best, law)
+    for _ in range(MAX_REFITS):
+        for part, whole in permutations(laws, 2):
+            if set(part) < set(whole) and fits[whole][1] > fits[part][1] * (1 + 1e-9) + 1e-30:
+                fits[whole] = min(problem.fit(fits[part][0], whole), fits[part], key=lambda fit: fit[1])
     n = len(problem.t)
 
     def bic(law: Terms) -> float:
-        return float(n * np.log(max(fits[law][1] / n, problem.exact**2)) + len(problem.unknowns(law)) * np.log(n))
+        floor = problem.residual_floor**2
+        return float(n * np.log(max(fits[law][1] / n, floor)) + len(problem.unknowns(law)) * np.log(n))
 
     return tuple(sorted((FittedLaw(law, *fits[law], bic(law)) for law in laws), key=lambda law: law.bic))

@@ -1,9 +1,10 @@
-"""The chain of half swings: a half swing depends on its amplitude alone, so two numbers of it make a table.
+"""Return map of a free decay: the next amplitude and the duration of a half cycle, as functions of its amplitude.
 
-    a -> (a next, duration)        at Chebyshev nodes between where friction holds and the first amplitude
+    a -> (next a, duration)        tabulated at Chebyshev nodes between the sticking limit and the first amplitude
 
-The table costs one vectorised march over its nodes; after that a half swing is one look into it, whatever the law.
-The series of the motion itself are smooth in the amplitude too, and are looked up at the same places.
+A half cycle depends on its amplitude alone.  The table costs one vectorised integration over its nodes; after that,
+each half cycle is one Chebyshev interpolation, whatever the law.  The Taylor series of the motion are smooth in the
+amplitude too and are interpolated with the same weights.
 """
 
 from dataclasses import dataclass
@@ -11,76 +12,96 @@ from functools import lru_cache
 
 import numpy as np
 
-from .half_cycle import HalfCycles, halves, slopes
+from .half_cycle import HalfCycles, differentiate_series, integrate_half_cycles
 from .law import sticking_limit
 
-STRAIGHT, NODES, NODES_SINE, NODES_WIDE = 2, 32, 40, 80  # of a spring without drag, with it, a pendulum, beyond WIDE
-WIDE = 2.0  # rad
-MOST = 1_000_000  # half swings
-RECENT = 4  # tables kept: a fit that has arrived asks for the same ones again, and so does who judges it
+NODES_LINEAR, NODES_DRAG = 2, 32  # of a spring, without and with quadratic drag
+NODES_PENDULUM, NODES_LARGE = 40, 80  # of a pendulum, up to and beyond LARGE_ANGLE
+LARGE_ANGLE = 2.0  # rad
+MAX_HALF_CYCLES = 1_000_000
+CACHED_TABLES = 4  # the last iterations of a fit, and its evaluation afterwards, use the same tables
 
 
 @dataclass(frozen=True)
 class HalfCycleSequence:
-    """Amplitudes and begins in theta, (N + 1, P) each, of the half swings of P laws; the last row is where the motion
-    has got to, or has ended.  `weights` (P, N, M) of the M nodes, whose `swings` are one law after the other."""
+    """The N half cycles of P laws.
+
+    Attributes
+    ----------
+    amplitudes : (N + 1, P); the last row is the end of the last half cycle
+    starts : (N + 1, P) start of each half cycle in theta
+    weights : (P, N, M) interpolation weights of the M nodes
+    node_cycles : half cycles from the nodes, all nodes of the first law first
+    """
 
     amplitudes: np.ndarray
-    begins: np.ndarray
+    starts: np.ndarray
     weights: np.ndarray
-    swings: HalfCycles
+    node_cycles: HalfCycles
 
     def series(self, order: int) -> np.ndarray:
-        """Of the derivative of that order of the motion, (P, terms, S N): the S-th of the N-th half swing, which holds
-        from swings.begins[S] on, is in column S N + n."""
+        """Return the Taylor coefficients of a derivative of the motion.
+
+        Returns
+        -------
+        coefficients : (P, terms, S N); column s N + n is segment s of half cycle n, valid from series_starts[s] on
+        """
         laws, _, nodes = self.weights.shape
-        at_nodes = self.swings.series
+        at_nodes = self.node_cycles.series
         for _ in range(order):
-            at_nodes = slopes(at_nodes)
+            at_nodes = differentiate_series(at_nodes)
         terms = len(at_nodes)
         by_law = at_nodes.reshape(-1, laws, nodes).transpose(1, 0, 2)
         return np.matmul(by_law, self.weights.transpose(0, 2, 1)).reshape(laws, terms, -1)
 
 
-def chain(
-    laws: np.ndarray, is_pendulum: bool, floor: float, most: int = MOST, until: float = np.inf
+def iterate_return_map(
+    laws: np.ndarray,
+    is_pendulum: bool,
+    min_amplitude: float,
+    max_count: int = MAX_HALF_CYCLES,
+    until: float = np.inf,
 ) -> HalfCycleSequence:
-    """The half swings of laws with rows A, zeta, r, b (P, 4).
+    """Return the half cycles of several laws; the first law decides how many.
 
-    The first law decides how many there are: no more than `most`, none that begins after `until` in theta, none from an
-    amplitude that friction holds or that is below `floor`.
+    Parameters
+    ----------
+    laws : (P, 4) rows of A, zeta, r, b
+    min_amplitude : half cycles from a smaller amplitude, or from one that friction holds, are left out
+    max_count : maximum number of half cycles
+    until : half cycles that start later, in theta, are left out
     """
     first, _, r, b = laws.T
     low = sticking_limit(r, is_pendulum)
-    plain, curved = (NODES_SINE, NODES_WIDE) if is_pendulum else (STRAIGHT, NODES)
-    count = curved if (first.max() > WIDE if is_pendulum else b.any()) else plain
+    few, many = (NODES_PENDULUM, NODES_LARGE) if is_pendulum else (NODES_LINEAR, NODES_DRAG)
+    count = many if (first.max() > LARGE_ANGLE if is_pendulum else b.any()) else few
     order = np.arange(float(count))
     angle = np.pi * (order + 0.5) / count
     scale = 2 / (first - low)
     nodes = low[:, None] + (np.cos(angle) + 1) / scale[:, None]
-    swings = table(nodes.tobytes(), laws.tobytes(), is_pendulum)
-    next_share = (-swings.end.reshape(-1, count) - low[:, None]) * scale[:, None] - 1  # as shares, from -1 to 1
+    node_cycles = tabulate(nodes.tobytes(), laws.tobytes(), is_pendulum)
+    next_share = (-node_cycles.end.reshape(-1, count) - low[:, None]) * scale[:, None] - 1  # mapped to [-1, 1]
     weights = np.cos(np.outer(order, angle)) * 2 / count
     weights[0] /= 2
-    coefficients = np.stack([next_share, swings.duration.reshape(-1, count)]) @ weights.T
+    coefficients = np.stack([next_share, node_cycles.duration.reshape(-1, count)]) @ weights.T
     ones = np.ones(len(laws))
-    shares, durations, least, at = [ones], [np.zeros(len(laws))], floor * scale[0] - 1, 0.0
-    looks: list[np.ndarray] = []
-    while first[0] > low[0] and len(looks) < most and shares[-1][0] > least and at <= until:
+    shares, durations, min_share, at = [ones], [np.zeros(len(laws))], min_amplitude * scale[0] - 1, 0.0
+    polynomials: list[np.ndarray] = []
+    while first[0] > low[0] and len(polynomials) < max_count and shares[-1][0] > min_share and at <= until:
         angle = np.arccos(np.minimum(np.maximum(shares[-1], -ones), ones))
-        looks.append(np.cos(np.multiply.outer(angle, order)))
-        share, duration = np.vecdot(looks[-1], coefficients)
+        polynomials.append(np.cos(np.multiply.outer(angle, order)))
+        share, duration = np.vecdot(polynomials[-1], coefficients)
         shares.append(share)
         durations.append(duration)
         at += float(duration[0])
-    found = np.array(looks).reshape(len(looks), len(laws), count).transpose(1, 0, 2)
+    by_law = np.array(polynomials).reshape(len(polynomials), len(laws), count).transpose(1, 0, 2)
     amplitudes = low + (np.array(shares) + 1) / scale
-    return HalfCycleSequence(amplitudes, np.cumsum(durations, axis=0), np.matmul(found, weights), swings)
+    return HalfCycleSequence(amplitudes, np.cumsum(durations, axis=0), np.matmul(by_law, weights), node_cycles)
 
 
-@lru_cache(RECENT)
-def table(nodes: bytes, laws: bytes, is_pendulum: bool) -> HalfCycles:
-    """The half swings from the nodes (P, M) of the laws (P, 4)."""
+@lru_cache(CACHED_TABLES)
+def tabulate(nodes: bytes, laws: bytes, is_pendulum: bool) -> HalfCycles:
+    """Return the half cycles from the nodes (P, M) of the laws (P, 4), both given as bytes for the cache."""
     a, rows = np.frombuffer(nodes), np.frombuffer(laws).reshape(-1, 4)
     _, zeta, r, b = np.repeat(rows.T, len(a) // len(rows), axis=1)
-    return halves(a, zeta, r, b, is_pendulum)
+    return integrate_half_cycles(a, zeta, r, b, is_pendulum)

@@ -1,5 +1,7 @@
-"""The models that are written a second time, each in the file of its name: its problems as peers solve them, the cases
-that are certified (CASES), its true motion in pieces for any values, and where there are any its closed forms (CLOSED).
+"""Independent implementations of models, one module each.
+
+A module provides the problems for peer solvers, CASES with certified references, `solve_segments`, which returns the
+motion for any parameter values, and CLOSED_FORMS if there are any.
 """
 
 from importlib import import_module
@@ -10,4 +12,4 @@ from ..certified_reference import ReferenceCase
 
 MODEL_MODULES: dict[str, Any] = {file.name: import_module(f"{__name__}.{file.name}") for file in iter_modules(__path__)}
 MODELS = tuple(MODEL_MODULES)
-CASES: tuple[ReferenceCase, ...] = tuple(case for each in MODEL_MODULES.values() for case in each.CASES)
+CASES: tuple[ReferenceCase, ...] = tuple(case for module in MODEL_MODULES.values() for case in module.CASES)

@@ -18,18 +18,18 @@ class Coulomb(LinearOscillator):
         square, drag = self.k / self.m, mode * self.f / self.m
         return lambda t, y: (y[1], -square * y[0] - drag)
 
-    def hold(self, t: float, x: float) -> tuple[float, float, float]:
+    def static_load(self, t: float, x: float) -> tuple[float, float, float]:
         return -self.k * x, 0.0, self.f
 
 
 def friction(value: Mapping[str, Any]) -> tuple[Any, Any]:
-    """What slides and what holds."""
+    """Return sliding friction and the largest load that friction holds."""
     return value["f"], value["f"]
 
 
-pieces = partial(closed_form_segments, friction)
+solve_segments = partial(closed_form_segments, friction)
 CASES = (
     ReferenceCase("coulomb", "coulomb", "hybrid", "coulomb", Coulomb()),
     ReferenceCase("coulomb-sign", "coulomb", "sign", "coulomb", Coulomb(), {"friction": 2}, "coulomb"),
 )
-CLOSED_FORMS = {"coulomb": lambda stop: pieces([(0.0, stop, Coulomb().values("m", "k", "f"))])}
+CLOSED_FORMS = {"coulomb": lambda stop: solve_segments([(0.0, stop, Coulomb().fmu_values("m", "k", "f"))])}

@@ -1,4 +1,4 @@
-"""The sled with the magic formula, by scipy's Radau, with the slope of the curve, restarted where a value changes."""
+"""Sled with the magic formula, by scipy's Radau with the exact Jacobian, restarted where a value changes."""
 
 from collections.abc import Iterator
 from math import asin, atan, cos, pi, sin, tan
@@ -12,7 +12,7 @@ from .stickslip import Stickslip
 
 
 class MagicFormula:
-    """The magic formula: mu and its slope at a speed."""
+    """Coefficient of friction and its slope as functions of the velocity."""
 
     def __init__(self, p: ParameterValues):
         self.D, self.C = p["mu_s"], 1 + (1 - 2 * asin(p["mu_d"] / p["mu_s"]) / pi)
@@ -32,17 +32,17 @@ class MagicFormula:
 
 
 class Pacejka(Stickslip):
-    """The sled with the magic formula: one smooth equation, no modes."""
+    """The sled with the magic formula: one smooth equation without modes."""
 
     has_dry_friction, is_stiff = False, True
 
     def __init__(self, x_m: float = 0.01) -> None:
-        self.atol_factor = min(x_m, OdeProblem.atol_factor)  # the curve is as fine as that
+        self.atol_factor = min(x_m, OdeProblem.atol_factor)  # the velocity at the peak of the curve sets the scale
         self.curve = MagicFormula({"mu_s": self.mu_s, "mu_d": self.mu_d, "x_m": x_m})
 
     def rates(self, mode: int) -> RhsFunction:
         square, speed, weight = self.k / self.m, self.v_driver, self.curve.D * self.g
-        B, C, E = self.curve.B, self.curve.C, self.curve.E  # written out, as who wants it fast would
+        B, C, E = self.curve.B, self.curve.C, self.curve.E  # inlined, as in a program written for speed
 
         def rates(t: float, y: StateVector) -> tuple[float, float]:
             x, v = y
@@ -56,8 +56,8 @@ class Pacejka(Stickslip):
         return lambda t, y: [[0.0, 1.0], [-square, -self.curve.slope(y[1]) * self.g]]
 
 
-def pieces(spans: list[ParameterSpan]) -> Iterator[Segment]:
-    """m a = F_ext + k (x_driver - x) - mu(v) m g, in one piece from each change of values on."""
+def solve_segments(spans: list[ParameterSpan]) -> Iterator[Segment]:
+    """Yield the motion of m a = F_ext + k (x_driver - x) - mu(v) m g, one segment from each change of values on."""
     from scipy.integrate import solve_ivp
 
     y, drive = [spans[0][2]["x0"], spans[0][2]["v0"]], 0.0
@@ -67,22 +67,27 @@ def pieces(spans: list[ParameterSpan]) -> Iterator[Segment]:
         def rates(
             s: float, y: np.ndarray, p: ParameterValues = p, curve: MagicFormula = curve, drive: float = drive
         ) -> tuple[float, float]:
-            pull = p["F_ext"] + p.get("rate", 0.0) * s + p["k"] * (drive + p["v_driver"] * s - y[0])
-            return y[1], pull / p["m"] - curve.mu(y[1]) * p["g"]
+            load = p["F_ext"] + p.get("rate", 0.0) * s + p["k"] * (drive + p["v_driver"] * s - y[0])
+            return y[1], load / p["m"] - curve.mu(y[1]) * p["g"]
 
-        def slopes(s: float, y: np.ndarray, p: ParameterValues = p, curve: MagicFormula = curve) -> list[list[float]]:
+        def jacobian(s: float, y: np.ndarray, p: ParameterValues = p, curve: MagicFormula = curve) -> list[list[float]]:
             return [[0.0, 1.0], [-p["k"] / p["m"], -curve.slope(y[1]) * p["g"]]]
 
-        # in the time from the beginning of the span, which has finer digits than that of the clock
-        run = solve_ivp(rates, (0.0, end - begin), y, "Radau", jac=slopes, rtol=1e-11, atol=1e-15, dense_output=True)
+        # time counts from the beginning of the span, where it has more digits than the time of the run
+        options = {"rtol": 1e-11, "atol": 1e-15, "dense_output": True}
+        run = solve_ivp(rates, (0.0, end - begin), y, "Radau", jac=jacobian, **options)
         yield Segment(begin, 1, shift_time(run.sol, begin))
         y, drive = run.y[:, -1], drive + p["v_driver"] * (end - begin)
 
 
-def case(x_m: str, truth: str) -> ReferenceCase:
-    """One of its curves."""
+def make_case(x_m: str, reference: str) -> ReferenceCase:
+    """Return the case of a curve with its peak at the velocity x_m (m/s)."""
     law, problem = f"magic formula, x_m = {x_m} m/s", Pacejka(float(x_m))
-    return ReferenceCase(f"pacejka-{x_m}", "pacejka", law, truth, problem, {"x_m": float(x_m)}, "stickslip")
+    return ReferenceCase(f"pacejka-{x_m}", "pacejka", law, reference, problem, {"x_m": float(x_m)}, "stickslip")
 
 
-CASES = (case("0.01", "pacejka"), case("0.001", "pacejka-0.001"), case("0.0001", "pacejka-0.0001"))
+CASES = (
+    make_case("0.01", "pacejka"),
+    make_case("0.001", "pacejka-0.001"),
+    make_case("0.0001", "pacejka-0.0001"),
+)

@@ -18,6 +18,6 @@ class Smd(LinearOscillator):
 
 
 friction = None
-pieces = partial(closed_form_segments, friction)
+solve_segments = partial(closed_form_segments, friction)
 CASES = (ReferenceCase("smd", "smd", "linear damping", "smd", Smd()),)
-CLOSED_FORMS = {"smd": lambda stop: pieces([(0.0, stop, Smd().values("m", "k", "c"))])}
+CLOSED_FORMS = {"smd": lambda stop: solve_segments([(0.0, stop, Smd().fmu_values("m", "k", "c"))])}

@@ -21,32 +21,32 @@ class Stickslip(LinearOscillator):
         square, drag, speed = self.k / self.m, mode * self.mu_d * self.g, self.v_driver
         return lambda t, y: (y[1], square * (speed * t - y[0]) - drag)
 
-    def hold(self, t: float, x: float) -> tuple[float, float, float]:
+    def static_load(self, t: float, x: float) -> tuple[float, float, float]:
         return self.k * (self.v_driver * t - x), self.k * self.v_driver, self.mu_s * self.m * self.g
 
 
-VALUES = Stickslip().values("m", "k", "g", "mu_s", "mu_d", "v_driver")
+VALUES = Stickslip().fmu_values("m", "k", "g", "mu_s", "mu_d", "v_driver")
 
 
 def friction(value: Mapping[str, Any]) -> tuple[Any, Any]:
-    """What slides and what holds."""
+    """Return sliding friction and the largest load that friction holds."""
     weight = value["m"] * value["g"]
     return value["mu_d"] * weight, value["mu_s"] * weight
 
 
-def held_below(eps: float, stop: float) -> Iterator[Segment]:
-    """Its motion under the threshold law."""
+def threshold_motion(eps: float, stop: float) -> Iterator[Segment]:
+    """Return the motion under the threshold law."""
     from .. import piecewise_linear
 
-    return piecewise_linear.threshold_segments(piecewise_linear.system(VALUES, friction), eps, stop)
+    return piecewise_linear.threshold_segments(piecewise_linear.make_system(VALUES, friction), eps, stop)
 
 
-pieces = partial(closed_form_segments, friction)
+solve_segments = partial(closed_form_segments, friction)
 CASES = (
     ReferenceCase("stickslip", "stickslip", "hybrid", "stickslip", Stickslip()),
     ReferenceCase(THRESHOLD, "stickslip", "threshold", THRESHOLD, Stickslip(), {"friction": 3}, "stickslip"),
 )
 CLOSED_FORMS = {
-    "stickslip": lambda stop: pieces([(0.0, stop, VALUES)]),
-    THRESHOLD: lambda stop: held_below(1e-7, stop),
+    "stickslip": lambda stop: solve_segments([(0.0, stop, VALUES)]),
+    THRESHOLD: lambda stop: threshold_motion(1e-7, stop),
 }
