@@ -1,0 +1,270 @@
+"""Make the pictures of the documentation in docs/images, and the outputs of its notebook.
+
+`python docs/make_images.py [NAME...]` makes all pictures or those named (without the ending).  Pictures of results are
+the figures that the code blocks of the pages make; those that no command makes are drawn here.  The FMUs must be built;
+the picture of the live page needs chromium.
+"""
+
+import csv
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import matplotlib
+
+matplotlib.use("agg")
+
+import matplotlib.pyplot as plt
+import numpy as np
+from run_blocks import run_page
+
+DOCS = Path(__file__).parent
+IMAGES = DOCS / "images"
+FMUS = DOCS.parent / "fmus"
+
+# The figures of results: the page whose code blocks make them, and where they are.
+OF_PAGES = {
+    "stickslip": ("tutorials/first_run.md", "results/stickslip/figure.svg"),
+    "compare-laws": ("tutorials/first_run.md", "results/compare/*/figure.svg"),
+    "cart": ("tutorials/own_model.md", "results/cart/figure.svg"),
+    "shaken": ("tutorials/own_model.md", "results/shaken/figure.svg"),
+    "chain": ("tutorials/own_model.md", "results/speeds/figure.svg"),
+    "decay": ("tutorials/identify_decay.md", "results/decay/record/figure.svg"),
+    "sweep": ("tutorials/sweep.md", "results/sweep/map/figure.svg"),
+    "compare": ("how-to/external_fmus.md", "results/compare/coulomb-coulomb-sign/figure.svg"),
+    "my_scene": ("reference/scene_files.md", "results/my_scene/figure.svg"),
+}
+# Those of commands that pages show but do not run.
+OF_COMMANDS = {
+    "coulomb": ("run coulomb", "results/coulomb/figure.svg"),
+    "pendulum": ("run pendulum", "results/pendulum/figure.svg"),
+    "coupled": ("couple two-masses", "results/coupled/two-masses/figure.svg"),
+    "precision": ("precision stickslip --quick", "results/precision/stickslip.svg"),
+}
+
+
+def harness(folder: Path, command: str) -> None:
+    """Run a command in a folder that has the built FMUs."""
+    if not (folder / "fmus").exists():
+        (folder / "fmus").symlink_to(FMUS.resolve())
+    words = [sys.executable, "-m", "harness", *command.split(), "--quiet"]
+    subprocess.run(words, cwd=folder, check=True, env=os.environ | {"PYTHONPATH": str(DOCS.parent)})
+
+
+def of_page(page: str, folder: Path) -> None:
+    """Run the code blocks of a page in a folder."""
+    (folder / "fmus").symlink_to(FMUS.resolve())
+    here = os.getcwd()
+    os.chdir(folder)
+    try:
+        faults = run_page(DOCS / page)
+    finally:
+        os.chdir(here)
+    if faults:
+        sys.exit("\n".join(faults))
+
+
+def copy(found: Path, picture: Path) -> None:
+    """Copy a figure with coordinates of a tenth of a point, which halves long curves."""
+    text = found.read_text(encoding="utf-8")
+    text = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d)\d+", r"\1", line[0]), text)
+    picture.write_text(text, encoding="utf-8")
+
+
+# ---- pictures that are drawn here
+
+SCENE = """\
+title = "Coulomb friction to a standstill, law {law}"
+model = "coulomb"
+law = "{law}"
+method = "ode23"
+rtol = 1e-3
+atol = 1e-6
+stop = 6.0
+outputs = ["x", "v"]
+plots = []
+follow = true
+grid = 0.005
+"""
+LIGHT = {"text": "#1f2328", "line": "#d0d7de", "hybrid": "#0072B2", "sign": "#D55E00"}
+DARK = {"text": "#e6edf3", "line": "#3d444d", "hybrid": "#4aa8e0", "sign": "#f08a4b"}
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    """The columns of a result, by name without unit."""
+    with path.open(newline="") as file:
+        heads, *rows = csv.reader(file)
+    return dict(zip((head.split(" ")[0] for head in heads), np.array(rows, float).T, strict=True))
+
+
+def stick(folder: Path) -> None:
+    """The opening picture: true sticking beside sign(v), in a version for light and one for dark pages."""
+    runs = {}
+    for law in ("hybrid", "sign"):
+        (folder / f"{law}.toml").write_text(SCENE.format(law=law))
+        harness(folder, f"run {law}.toml")
+        result = folder / "results" / law
+        runs[law] = columns(result / "trajectory.csv") | {"steps": columns(result / "steps.csv")["t"]}
+    for name, colours in (("light", LIGHT), ("dark", DARK)):
+        draw_stick(runs, colours, IMAGES / f"stick-{name}.svg")
+
+
+def draw_stick(runs: dict[str, dict[str, np.ndarray]], colours: dict[str, str], path: Path) -> None:
+    """The motion to a standstill, and three close-ups of the end."""
+    style = {
+        "font.size": 10,
+        "font.family": "DejaVu Sans",
+        "svg.fonttype": "path",
+        "svg.hashsalt": "friction",
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color"), colours["text"]),
+        **dict.fromkeys(("axes.edgecolor", "grid.color"), colours["line"]),
+        "axes.facecolor": "none",
+        "figure.facecolor": "none",
+        "axes.grid": True,
+        "axes.titlesize": 10,
+        "axes.titlelocation": "left",
+    }
+    begin, span = 4.001, 4e-4  # s; the mass has stopped at 4.0002 s
+    labels = {"sign": "sign(v)", "hybrid": "true sticking"}
+    with plt.rc_context(style):
+        figure = plt.figure(figsize=(8.0, 4.7), layout="constrained")
+        grid = figure.add_gridspec(2, 3, height_ratios=(1.15, 1.0))
+        whole = figure.add_subplot(grid[0, :])
+        creep, speed, count = (figure.add_subplot(grid[1, i]) for i in range(3))
+        for law in ("sign", "hybrid"):
+            run, look = runs[law], {"color": colours[law], "zorder": 3 if law == "hybrid" else 2}
+            t, x, v = run["t"], run["x"], run["v"]
+            even = np.unique(np.searchsorted(t, np.arange(0.0, 6.0, 0.01)))
+            whole.plot(t[even], 100 * x[even], lw=1.8 if law == "hybrid" else 3.4, label=labels[law], **look)
+            late = even[t[even] >= begin]
+            creep.plot(t[late], 1e6 * (x[late] - x[late[0]]), lw=1.8, **look)
+            near = (t >= begin) & (t <= begin + span)
+            if law == "sign":
+                speed.plot(1e3 * (t[near] - begin), 1e6 * v[near], lw=1.4, **look)
+            else:  # one internal step covers the standstill
+                speed.plot([0.0, 1e3 * span], [0.0, 0.0], lw=1.8, **look)
+            steps = run["steps"]
+            some = np.unique(np.searchsorted(steps, np.linspace(0.0, 6.0, 301)[1:]).clip(0, len(steps) - 1))
+            count.plot(steps[some], some + 1, lw=1.8, **look)
+            count.annotate(
+                f"{len(steps):,}".replace(",", " "), (5.95, 1.3 * len(steps)), ha="right", color=colours[law]
+            )
+        whole.set(xlabel="time, s", ylabel="position, cm", xlim=(0, 6))
+        whole.set_title("A mass on a spring, stopped by dry friction")
+        whole.legend(loc="upper right", frameon=False, ncols=2)
+        creep.set(xlabel="time, s", ylabel="µm", title="Creep after the stop")
+        speed.set(xlabel="time after 4.001 s, ms", ylabel="µm/s", title="Speed after the stop")
+        count.set(xlabel="time, s", title="Solver steps so far", yscale="log", ylim=(1, 2e6), xlim=(0, 6))
+        figure.savefig(path, transparent=True, metadata={"Date": None})
+    plt.close(figure)
+
+
+def laws(folder: Path) -> None:
+    """The friction force over the speed, for the four laws."""
+    mu_s, mu_d, x_m = 0.9, 0.6, 0.2
+    C = 2 - 2 * np.arcsin(mu_d / mu_s) / np.pi
+    B = 2 * mu_s / (x_m * C * mu_s)
+    peak = B * x_m
+    E = (peak - np.tan(0.5 * np.pi / C)) / (peak - np.arctan(peak))
+    v = np.linspace(-1, 1, 801)
+    z = B * v
+    magic = mu_s * np.sin(C * np.arctan(z - E * (z - np.arctan(z))))
+    sliding = {side: ([0, side], [side * mu_d] * 2) for side in (-1, 1)}
+    style = {"font.size": 9, "svg.fonttype": "path", "svg.hashsalt": "friction", "axes.titlelocation": "left"}
+    style |= {"axes.titlesize": 9, "axes.grid": True, "grid.color": "#dddddd"}
+    with plt.rc_context(style):
+        figure, axes = plt.subplots(1, 4, figsize=(8.0, 2.3), sharey=True, layout="constrained")
+        titles = ("hybrid", "sign", "threshold (wide)", "magic formula")
+        for axis, title in zip(axes, titles, strict=True):
+            axis.set(title=title, xlabel="relative speed", xticks=[0], ylim=(-1.1, 1.1))
+            if title != "magic formula":
+                for x, y in sliding.values():
+                    gap = 0.08 if title.startswith("threshold") else 0.0
+                    axis.plot([x[0] + gap * np.sign(x[1]), x[1]], y, color="#0072B2", lw=2)
+        axes[0].plot([0, 0], [-mu_s, mu_s], color="#009E73", lw=3, label="stuck")
+        axes[0].legend(loc="lower right", fontsize=8)
+        axes[1].plot(0, 0, "o", color="#0072B2", ms=5)
+        axes[2].fill_between([-0.08, 0.08], -mu_s, mu_s, color="#D55E00", alpha=0.35, lw=0, label="balances the load")
+        axes[2].legend(loc="lower right", fontsize=8)
+        axes[3].plot(v, magic, color="#0072B2", lw=2)
+        axes[0].set(ylabel="friction / weight", yticks=[-mu_s, -mu_d, 0, mu_d, mu_s])
+        figure.savefig(IMAGES / "laws.svg", metadata={"Date": None})
+    plt.close(figure)
+
+
+def live(folder: Path) -> None:
+    """The live page, as chromium shows it."""
+    chromium = next((found for word in ("chromium", "google-chrome") if (found := shutil.which(word))), None)
+    if chromium is None:
+        print("live: skipped, chromium is not installed")
+        return
+    build = [sys.executable, "-m", "build_fmus", "stickslip", "--web", "--out", str(folder / "live")]
+    environment = os.environ | {"PYTHONPATH": str(DOCS.parent)}
+    subprocess.run(build, cwd=folder, check=True, env=environment, capture_output=True)
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars", "--window-size=1200,900"]
+    options += [
+        "--virtual-time-budget=8000",
+        f"--screenshot={folder / 'live.png'}",
+        f"--user-data-dir={folder / 'profile'}",
+    ]
+    page = (folder / "live" / "index.html").as_uri()
+    subprocess.run([chromium, *options, page], check=True, capture_output=True, timeout=120)
+    from PIL import Image
+
+    picture = Image.open(folder / "live.png").convert("RGB")
+    picture.quantize(64).save(IMAGES / "live.png", optimize=True)
+
+
+def notebook(folder: Path) -> None:
+    """The notebook, with its outputs."""
+    import nbformat
+    from nbclient import NotebookClient
+
+    path = DOCS / "tutorials" / "python_api.ipynb"
+    (folder / "fmus").symlink_to(FMUS.resolve())
+    content = nbformat.read(path, as_version=4)
+    client = NotebookClient(content, timeout=300, record_timing=False, resources={"metadata": {"path": str(folder)}})
+    client.execute(env=os.environ | {"PYTHONPATH": str(DOCS.parent), "MPLBACKEND": INLINE})
+    nbformat.write(content, path)
+
+
+INLINE = "module://matplotlib_inline.backend_inline"
+DRAWN: dict[str, Callable[[Path], None]] = {"stick": stick, "laws": laws, "live": live, "notebook": notebook}
+
+
+def main() -> None:
+    """Make the pictures."""
+    bin = str(Path(sys.executable).parent)
+    os.environ.update(PATH=f"{bin}{os.pathsep}{os.environ['PATH']}", MPLBACKEND="agg", COLUMNS="80")
+    wanted = sys.argv[1:] or [*OF_PAGES, *OF_COMMANDS, *DRAWN]
+    IMAGES.mkdir(exist_ok=True)
+    for page in dict.fromkeys(page for name, (page, _) in OF_PAGES.items() if name in wanted):
+        with TemporaryDirectory() as folder:
+            of_page(page, Path(folder))
+            for name, (source, file) in OF_PAGES.items():
+                if source == page and name in wanted:
+                    (found,) = Path(folder).glob(file)
+                    copy(found, IMAGES / f"{name}.svg")
+    for name, (command, file) in OF_COMMANDS.items():
+        if name in wanted:
+            with TemporaryDirectory() as folder:
+                harness(Path(folder), command)
+                copy(Path(folder, file), IMAGES / f"{name}.svg")
+    for name, draw in DRAWN.items():
+        if name in wanted:
+            with TemporaryDirectory() as folder:
+                draw(Path(folder))
+    for picture in sorted(IMAGES.iterdir()):
+        print(f"{picture.name}  {picture.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    sys.path[:0] = [str(DOCS.parent)]
+    main()

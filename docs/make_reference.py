@@ -1,0 +1,281 @@
+"""Write the generated parts of the reference pages: commands, FMU variables, scene keys, result files.
+
+`python docs/make_reference.py FMUS` reads the built FMUs in the folder FMUS (default: fmus) and replaces what stands
+between the comments <!-- generated: NAME --> and <!-- end --> in docs/reference.
+"""
+
+import re
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import MISSING, fields, is_dataclass
+from inspect import cleandoc
+from pathlib import Path
+from typing import Any, get_args
+
+DOCS = Path(__file__).parent
+PART = re.compile(r"(<!-- generated: ([\w-]+) -->\n).*?(<!-- end -->)", re.S)
+MODELS = ("smd", "coulomb", "stickslip", "pacejka", "pendulum")
+
+SCENE_TEXTS = {
+    "title": "One line that describes the scene.",
+    "outputs": "The output variables to record.",
+    "model": "A model of this project by name: `smd` means `fmus/smd.fmu`. Give either `model` or `fmu`.",
+    "fmu": "The path of an FMU, relative to the scene file.",
+    "start": "Start time in s. Default: that of the FMU.",
+    "stop": "Stop time in s. Default: that of the FMU.",
+    "method": "Value of `solver.method`, by name.",
+    "law": "Value of `friction`, by name.",
+    "rtol": "Value of `solver.rtol`.",
+    "atol": "Value of `solver.atol`, in SI units.",
+    "h_max": "Value of `solver.h_max`, in s.",
+    "grid": "Communication step in s.",
+    "follow": "Also visit the end of every internal step of the solver. Without `grid`, visit these only.",
+    "repeat": "Time the run this many times and report the fastest.",
+    "tolerance": "Relative tolerance for an FMU that does not show its internal steps.",
+    "exchange": "Run such an FMU by model exchange, if it offers both interfaces.",
+    "lenient": "Run such an FMU although it violates the FMI standard.",
+    "patience": "Seconds allowed for one call of such an FMU.",
+    "timeout": "Seconds allowed for one call of such an FMU.",
+    "about": "What the model does; the report prints it.",
+    "analyses": "Analyses to perform: `decay`, `slip`, `steps`.",
+    "plots": "Panels of the figure: `position`, `velocity`, `acceleration`, `phase`, `steps`, or the name of an "
+    "output; `[]` for no figure. Default: all outputs and the phase plane.",
+    "values": "Parameters and inputs by name, in SI units; enumerations by name.",
+    "decay": "Settings of the analysis `decay`, see below.",
+    "published": "Published numbers to compare with, see below.",
+}
+DECAY_TEXTS = {
+    "gives": "The quantity to calculate from the peaks: damping ratio, friction force or friction torque.",
+    "first": "How many peaks to skip at the start.",
+    "cycles": "How many cycles to use. Default: all.",
+}
+COUPLED_TEXTS = {
+    "title": "One line that describes the scene.",
+    "stop": "Stop time in s.",
+    "steps": "Communication steps in s. The scene runs once with each; the figure shows the finest.",
+    "parts": "One table for each FMU, as in `[parts.left]`.",
+    "springs": "Springs and dampers between two parts, as in `[[springs]]`.",
+    "connections": "Outputs that drive the input `F_ext` of another part, as in `[[connections]]`.",
+    "model": "`smd`, `coulomb` or `stickslip`.",
+    "values": "Parameters of the part, in SI units.",
+    "between": "The names of two parts. The spring exerts no force when their positions are equal.",
+    "k": "Stiffness in N/m.",
+    "c": "Damping constant in N·s/m.",
+    "from": "`part.x`, `part.v` or `part.F_spring`.",
+    "to": "The part that receives the force.",
+    "factor": "Factor from the output to the force; it must be 1 for `F_spring`.",
+}
+
+
+def table(heads: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """A Markdown table."""
+    heads = list(heads)
+    lines = [heads, ["---"] * len(heads), *([str(cell).replace("|", "\\|") for cell in row] for row in rows)]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def number(text: object) -> str:
+    """A number of a model description, shortened to seven digits."""
+    return "" if text is None else f"{float(str(text)):.7g}"
+
+
+def variables(fmus: Path, model: str) -> str:
+    """The declared variables of a model."""
+    from fmpy import read_model_description
+
+    description = read_model_description(str(fmus / f"{model}.fmu"))
+    rows = []
+    for each in description.modelVariables:
+        if each.name.startswith(("solver.", "events.")):
+            continue
+        start, unit = number(each.start), each.unit or ""
+        if each.type == "Enumeration":
+            items = [f"{item.value} {item.name}" for item in each.declaredType.items]
+            start, unit = start and items[int(float(start)) - 1], ", ".join(items)
+        kind = {"parameter": each.variability, "output": "output", "input": "input"}[each.causality]
+        rows.append(
+            (
+                f"`{each.name}`",
+                kind if kind in ("output", "input") else f"{kind} parameter",
+                start,
+                unit,
+                each.description,
+            )
+        )
+    return table(("name", "kind", "start", "unit or items", "description"), rows)
+
+
+def common_variables(fmus: Path) -> str:
+    """The variables of the solver and of the events, which all FMUs share."""
+    from fmpy import read_model_description
+
+    description = read_model_description(str(fmus / "stickslip.fmu"))
+    rows = [
+        (f"`{each.name}`", each.type, f"{each.variability} {each.causality}", each.unit or "", each.description)
+        for each in description.modelVariables
+        if each.name.startswith(("solver.", "events."))
+    ]
+    return table(("name", "type", "kind", "unit", "description"), rows)
+
+
+def enumerations(fmus: Path) -> str:
+    """The items of all enumerations, with the FMUs that have them."""
+    from fmpy import read_model_description
+
+    found: dict[tuple[str, str, str, str], list[str]] = {}
+    for model in MODELS:
+        for each in read_model_description(str(fmus / f"{model}.fmu")).modelVariables:
+            for item in each.declaredType.items if each.type == "Enumeration" else ():
+                default = int(float(each.start)) == int(item.value)
+                name = f"`{model}`" + (" (default)" if default else "")
+                found.setdefault((each.name, str(item.value), item.name, item.description), []).append(name)
+    rows = [
+        (f"`{name}`", value, item, text, ", ".join(models))
+        for (name, value, item, text), models in sorted(found.items())
+    ]
+    return table(("variable", "value", "name", "meaning", "FMUs"), rows)
+
+
+def constraints(annotation: Any) -> list[str]:
+    """What a value must be, in words: the text in each annotation of a type."""
+    marks = getattr(annotation, "__metadata__", ())
+    return [text for mark in marks for text in vars(mark).values() if isinstance(text, str)]
+
+
+def schema_within(schema: Any, key: str) -> Any:
+    """The dataclass of the tables under a key."""
+    annotation = next(each.type for each in fields(schema) if each.name == key)
+    return next((part for part in get_args(annotation) if is_dataclass(part)), annotation)
+
+
+def keys(schema: Any, texts: dict[str, str]) -> str:
+    """The keys of a dataclass that is a schema."""
+    rows = []
+    for each in fields(schema):
+        words = next(iter(constraints(each.type)), "a table")
+        inner = [text for part in get_args(each.type) for text in constraints(part)]
+        if words == "a table" and inner:
+            words = f"a table; each value is {inner[0]}"
+        if words == "a table" and str(each.type).startswith("tuple"):
+            words = "a list of tables"
+        needed = each.default is MISSING and each.default_factory is MISSING
+        default = each.default
+        if needed:
+            shown = "**required**"
+        elif default is None or default is MISSING or default in ((), ""):
+            shown = ""
+        else:
+            shown = f"`{str(default).lower() if isinstance(default, bool) else default}`"
+        name = each.name.rstrip("_")
+        rows.append((f"`{name}`", words, shown, texts[name]))
+    return table(("key", "value", "default", "meaning"), rows)
+
+
+def result_files(fmus: Path) -> str:
+    """The files of a sample run, with their columns."""
+    import tempfile
+
+    from run_blocks import Block, run
+
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "fmus").symlink_to(fmus.resolve())
+        for command in SAMPLES:
+            run(Block("sh", "", f"cd {folder} && python -m harness {command} --quiet", 0, "", (0, 0), ""), folder, {})
+        for file in sorted(folder.glob("results/**/*.csv")):
+            head = next(line for line in file.read_text().splitlines() if not line.startswith("#"))
+            columns = ", ".join(f"`{cell.strip()}`" for cell in head.split(",") if cell.strip())
+            rows.append((f"`{file.relative_to(folder)}`", columns))
+    return table(("file", "columns"), rows)
+
+
+def all_commands() -> dict[str, Any]:
+    """Every command by what a user types, the build first."""
+    from build_fmus import main
+    from harness.commands import commands
+
+    others = {
+        f"friction-fmus {name}": command for name, command in sorted(commands.commands.items()) if name != "build"
+    }
+    return {"friction-fmus": commands, "friction-fmus build": main} | others
+
+
+def command_list() -> str:
+    """Every command with its purpose."""
+    rows = []
+    for name, command in all_commands().items():
+        anchor = name.replace(" ", "-")
+        rows.append((f"[`{name}`](#{anchor})", command.get_short_help_str(limit=1000)))
+    return table(("command", "purpose"), rows)
+
+
+def command_texts() -> str:
+    """Description, usage and options of every command."""
+    return "\n".join(command_text(name, command) for name, command in all_commands().items())
+
+
+def command_text(name: str, command: Any) -> str:
+    """The section of one command."""
+    import click
+
+    context = click.Context(command, info_name=name)
+    lines = [f"## {name}\n"]
+    for paragraph in cleandoc(command.help or "").split("\n\n"):
+        verbatim = paragraph.startswith("\b\n")
+        lines.append(f"```text\n{paragraph[2:]}\n```\n" if verbatim else f"{' '.join(paragraph.split())}\n")
+    lines.append(f"```text\n{name} {' '.join(command.collect_usage_pieces(context))}\n```\n")
+    records = [each.get_help_record(context) for each in command.get_params(context)]
+    return (
+        "\n".join(lines)
+        + "\n"
+        + table(("option", "meaning"), ((f"`{what}`", text) for what, text in filter(None, records) if text))
+    )
+
+
+SAMPLES = (
+    "run stickslip",
+    "run --fmu fmus/pendulum.fmu",
+    "decay coulomb",
+    "sweep stickslip --vary mu_d=0.5,0.6 --measure slips,period --workers 1 --name mine",
+)
+
+
+def parts(fmus: Path) -> dict[str, Callable[[], str]]:
+    """What generates each part, by its name."""
+    from harness.scenes import scene
+    from harness.scenes.coupled import scene as coupled
+
+    return {
+        **{f"variables-{model}": lambda model=model: variables(fmus, model) for model in MODELS},
+        "command-list": command_list,
+        "command-texts": command_texts,
+        "variables-common": lambda: common_variables(fmus),
+        "enumerations": lambda: enumerations(fmus),
+        "scene-keys": lambda: keys(scene.SceneKeys, SCENE_TEXTS),
+        "scene-decay": lambda: keys(schema_within(scene.SceneKeys, "decay"), DECAY_TEXTS),
+        "coupled-keys": lambda: keys(coupled.CoupledKeys, COUPLED_TEXTS),
+        "coupled-parts": lambda: keys(schema_within(coupled.CoupledKeys, "parts"), COUPLED_TEXTS),
+        "coupled-springs": lambda: keys(schema_within(coupled.CoupledKeys, "springs"), COUPLED_TEXTS),
+        "coupled-connections": lambda: keys(schema_within(coupled.CoupledKeys, "connections"), COUPLED_TEXTS),
+        "result-files": lambda: result_files(fmus),
+    }
+
+
+def generated(page: str, fmus: Path) -> str:
+    """A page with its generated parts up to date."""
+    makers = parts(fmus)
+    return PART.sub(lambda part: f"{part[1]}\n{makers[part[2]]()}\n{part[3]}", page)
+
+
+def main() -> None:
+    """Rewrite the pages."""
+    fmus = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS.parent / "fmus"
+    for page in sorted((DOCS / "reference").glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        page.write_text(generated(text, fmus), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.path[:0] = [str(DOCS.parent), str(DOCS)]
+    main()

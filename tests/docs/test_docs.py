@@ -1,0 +1,96 @@
+"""Every code block of docs/ runs, generated tables are up to date, and the site builds without warnings."""
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+PAGES = sorted(str(page.relative_to(DOCS)) for page in DOCS.rglob("*.md"))
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT), "NO_MKDOCS_2_WARNING": "1"}
+
+
+def load(name):
+    """A script of docs/ as a module."""
+    specification = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    module = sys.modules[name] = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def runnable(page):
+    """Whether a page has a block that runs."""
+    return any(
+        block.language in scripts.RUN and not block.title and not block.skipped
+        for block in scripts.blocks((DOCS / page).read_text(encoding="utf-8"))
+    )
+
+
+scripts = load("run_blocks")
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if runnable(page)])
+def test_code_blocks_run(page, fmus, tmp_path):
+    (tmp_path / "fmus").symlink_to(fmus)
+    command = [sys.executable, str(DOCS / "run_blocks.py"), str(tmp_path), str(DOCS / page)]
+    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
+    assert done.returncode == 0, done.stderr
+
+
+def test_each_python_or_sh_block_that_is_not_run_has_a_reason():
+    for page in PAGES:
+        for block in scripts.blocks((DOCS / page).read_text(encoding="utf-8")):
+            assert block.language, f"{page}, line {block.line}: the block has no language"
+            assert not block.skipped or len(block.skipped.split()) >= 3, f"{page}, line {block.line}: give a reason"
+
+
+def test_generated_tables_are_up_to_date(fmus):
+    reference = load("make_reference")
+    for page in sorted((DOCS / "reference").glob("*.md")):
+        text = page.read_text(encoding="utf-8")
+        assert reference.generated(text, fmus) == text, f"run `python docs/make_reference.py` for {page.name}"
+
+
+def test_architecture_quotes_the_code_as_it_is(fmus):
+    """The stages from the equation to scalar Python, line by line; those of C need a compiler."""
+    with ZipFile(fmus / "stickslip.fmu") as archive:
+        embedded = [archive.read(name).decode() for name in archive.namelist() if name.endswith(".py")]
+    sources = [(ROOT / "fmus" / file).read_text(encoding="utf-8") for file in ("stickslip.py", "runtime/ode23.py")]
+    lines = {line.strip() for text in (*embedded, *sources) for line in text.splitlines()}
+    page = (DOCS / "explanation" / "architecture.md").read_text(encoding="utf-8")
+    quoted = [block.text for block in scripts.blocks(page[page.index("**1.") : page.index("**6.")])]
+    graph = quoted.pop(1)
+    assert graph == "/(-(+(F_ext, F_spring), F_friction), m)\n"
+    for line in "".join(quoted).splitlines():
+        assert line.strip() in lines, line
+
+
+def test_each_picture_is_used_and_small():
+    used = {name for page in DOCS.rglob("*.md") for name in re.findall(r"images/([\w.-]+)", page.read_text())}
+    used |= set(re.findall(r"docs/images/([\w.-]+)", (ROOT / "README.md").read_text()))
+    for picture in sorted((DOCS / "images").iterdir()):
+        assert picture.stat().st_size < 150_000, f"{picture.name} is too large"
+        assert picture.name in used or picture.name == "stick-dark.svg", f"no page shows {picture.name}"
+
+
+def test_notebook_runs(fmus, tmp_path):
+    nbclient = pytest.importorskip("nbclient", reason="extra docs")
+    nbformat = pytest.importorskip("nbformat", reason="extra docs")
+    (tmp_path / "fmus").symlink_to(fmus)
+    notebook = nbformat.read(DOCS / "tutorials" / "python_api.ipynb", as_version=4)
+    client = nbclient.NotebookClient(notebook, timeout=120, resources={"metadata": {"path": str(tmp_path)}})
+    client.execute(env=ENVIRONMENT)
+
+
+def test_site_builds_without_warnings(tmp_path):
+    pytest.importorskip("mkdocs", reason="extra docs")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=ENVIRONMENT, timeout=300)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+    assert (Path(tmp_path) / "reference" / "commands" / "index.html").is_file()
