@@ -1,1 +1,1 @@
-"""What travels inside every FMU: standard library only, plain floats."""
+"""Runtime that every FMU carries: solver, friction, and FMI instance; standard library only, plain floats."""

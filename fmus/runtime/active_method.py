@@ -1,16 +1,16 @@
-"""The integration methods there are, and the one in force."""
+"""Dispatch to the integration method that the user selects."""
 
 from .codes import EXACT
 from .linear_closed_form import LinearClosedForm
 from .method_registry import methods
 from .vectors import ContactVector, RateVector, StateVector
 
-EXACT_ITEM = ("exact", EXACT, "closed form of each linear piece, events included; the hybrid law only")
+EXACT_ITEM = ("exact", EXACT, "closed form of each linear segment, with events; hybrid law only")
 METHOD_ITEMS = tuple((label, file.NUMBER, file.TEXT) for label, file, _ in methods)
 
 
 class ActiveMethod:
-    """The method chosen for a run, and how its step size is controlled."""
+    """Method of a run, with the parameters of its step-size control."""
 
     def __init__(self):
         self.exact = LinearClosedForm()
@@ -20,7 +20,7 @@ class ActiveMethod:
         self.power = self.safety = self.shrink = self.grow = 0.0
 
     def select(self, method):
-        """Put a method in force; between the events of the exact one there are no steps to control."""
+        """Select a method by its number; the closed form has no step-size control."""
         self.method_number = method
         for _, file, _ in methods:
             if method == file.NUMBER:
@@ -30,14 +30,14 @@ class ActiveMethod:
     def propose(
         self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
-        """The new state, its rates, and the rates e of the error: the estimates are h e."""
+        """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         method_number = self.method_number
         for label, file, _ in methods:
             if method_number == file.NUMBER:
                 return getattr(self, label).propose(model, modes, t, y, f, h)
 
     def build_interpolant(self, model, step):
-        """The interpolant of the step just taken."""
+        """Build the interpolant of the step just computed."""
         for label, file, _ in methods:
             if self.method_number == file.NUMBER:
                 getattr(self, label).build_interpolant(model, step)

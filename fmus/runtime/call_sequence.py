@@ -1,6 +1,7 @@
-"""What an importer may ask for when, and which refusal is told first: the slaves ask here, and so does the C.
+"""Call sequence of an FMU: which calls are valid when, and which error has precedence.
 
-Status of a function: OK, or the code of what is wrong; sentences.py has the words.
+The Python and the native FMU share these functions.  Most return a status: OK or an error code (messages.py has the
+texts).
 """
 
 from math import fabs, inf, isfinite, nan
@@ -27,21 +28,23 @@ from .vectors import contact_indices
 
 
 class RunState:
-    """What makes the run of an instance, but for the numbers of its model."""
+    """State of a run, besides the numbers of its model."""
 
     def __init__(self, tolerance):
         self.phase, self.interface = INSTANTIATED, CO_SIMULATION
         self.start_time, self.stop_time, self.tolerance = 0.0, inf, tolerance
-        self.n_invalid_values = 0  # how many values were set that cannot be used
-        self.has_pending_changes = False  # values were set that are not yet in force
-        self.values_changed = False  # and such that came into force since the last event
-        self.outputs_current = False  # the outputs are those of the present point
+        self.n_invalid_values = 0  # variables whose last value was rejected
+        self.has_pending_changes = False  # values were set but not applied yet
+        self.values_changed = False  # values were applied since the last event
+        self.outputs_current = False  # the outputs belong to the current time
         self.has_failed = False
 
 
 def is_valid_state(run, model, exchanges):
-    """Whether an instance, for model exchange or not, can be in this state; the motion of one that cannot may have no
-    end."""
+    """Return whether a restored state is valid for an instance, for model exchange if `exchanges`.
+
+    The solver might never end in an invalid one.
+    """
     if not (INSTANTIATED <= run.phase <= CONTINUOUS and 0.0 < run.tolerance < 1.0):
         return False
     if run.interface != (MODEL_EXCHANGE if exchanges else CO_SIMULATION):
@@ -62,12 +65,12 @@ def is_valid_state(run, model, exchanges):
 
 
 def is_in_range(value, low, high, above, below):
-    """Whether a value is in a range; NaN and infinities never are."""
+    """Return whether a value is in a range; NaN and infinities never are."""
     return isfinite(value) and low <= value <= high and above < value < below
 
 
 def rejection_reason(run, calculated, fixed, allowed):
-    """Why a variable cannot be set to a value."""
+    """Return why a value cannot be set, or OK."""
     if calculated:
         return CALCULATED
     if fixed and run.phase >= RUNNING:
@@ -76,14 +79,14 @@ def rejection_reason(run, calculated, fixed, allowed):
 
 
 def note_change(run, model):
-    """A value is about to change: what has been integrated in closed form ends at the present point."""
+    """Prepare the model for a change of value: closed-form motions are rebased to the current time."""
     if not run.has_pending_changes and run.phase >= RUNNING:
         model.rebase(model.solver.t)
     run.has_pending_changes = True
 
 
 def set_experiment(run, start, stop, tolerance):
-    """The experiment; inf and 0 where no stop time and no tolerance is given."""
+    """Set the experiment; `stop` is inf and `tolerance` 0 if not given."""
     run.start_time, run.stop_time = start, stop
     if 0.0 < tolerance < 1.0:
         run.tolerance = tolerance
@@ -91,7 +94,7 @@ def set_experiment(run, start, stop, tolerance):
 
 
 def check_values(run, model):
-    """Status of the values as they stand."""
+    """Check all values.  Returns a status."""
     if run.n_invalid_values > 0:
         return BAD_VALUE
     if not isfinite(run.start_time):
@@ -100,22 +103,22 @@ def check_values(run, model):
         return BAD_STOP
     rule = model.prepare()
     if rule == model.own_solver_rule and run.interface != CO_SIMULATION:
-        return OK  # another solver solves
+        return OK  # the importer uses its own solver
     return FIRST_RULE + rule if rule > 0 else OK
 
 
-# ---- the run
+# ---- run
 
 
 def apply_changes(run, model, beginning):
-    """Take over what was set: the motion begins, or goes on from the present point.  Status."""
+    """Apply the values that were set: start the run, or restart at the current time.  Returns a status."""
     status = check_values(run, model)
     if status == OK:
         solver = model.solver
         if beginning:
             y = model.initial_state(run.start_time)
             solver.start(model, run.start_time, y, run.stop_time, run.tolerance)
-        elif run.interface != MODEL_EXCHANGE:  # where nothing starts anew: the mode follows at the next event
+        elif run.interface != MODEL_EXCHANGE:  # no restart in model exchange: modes change at the next event
             solver.restart(model)
         run.has_pending_changes = run.outputs_current = False
         run.values_changed = not beginning
@@ -123,8 +126,8 @@ def apply_changes(run, model, beginning):
 
 
 def exit_initialization(run, model):
-    """Initialisation ends.  Status."""
-    beginning = run.phase < RUNNING  # an importer may end it twice
+    """End the initialisation.  Returns a status."""
+    beginning = run.phase < RUNNING  # an importer may call this twice
     run.phase = RUNNING
     if run.has_failed:
         return FAILED
@@ -132,7 +135,7 @@ def exit_initialization(run, model):
 
 
 def prepare_to_step(run, model):
-    """Status of a run that shall go on; values that were set are judged first."""
+    """Prepare to continue the run: check and apply values that were set.  Returns a status."""
     if run.has_failed:
         return FAILED
     if run.phase < RUNNING:
@@ -143,8 +146,8 @@ def prepare_to_step(run, model):
 
 
 def do_step(run, model, t, h):
-    """A communication step of h from t.  Status."""
-    if not (run.outputs_current and run.phase >= RUNNING):  # something was set since the last point was read
+    """Do a communication step of size h from t.  Returns a status."""
+    if not (run.outputs_current and run.phase >= RUNNING):  # a value was set since the outputs were read
         status = prepare_to_step(run, model)
         if status != OK:
             return status
@@ -159,31 +162,31 @@ def do_step(run, model, t, h):
 
 
 def communication_step_end(run, solver, t, h):
-    """Where a communication step of h from t ends, NaN where it is refused.
+    """Return the end of a communication step of size h from t; NaN if the step is invalid.
 
-    It begins at the present point and ends by the stop time.  An importer's times are sums at the size of the start, so
-    that near zero they may be off by more than the last place of the time itself.
+    The step must start at the current time and end by the stop time.  Importers add up their times, so that rounding
+    errors scale with the largest time of the run and may exceed one ulp of a time near zero.
     """
     step = solver.step
     start, now, stop, end = run.start_time, solver.t, step.t_end, t + h
     if 0.0 <= start <= t == now < end < stop and not (1.0 - 1e-14) * step.t1 <= end <= (1.0 + 1e-14) * step.t1:
-        return end  # as what follows would have it: nearly every step
+        return end  # shortcut for nearly every step; same result as below
     size = fabs(start) if fabs(start) > fabs(now) else fabs(now)
     if fabs(end) > size:
         size = fabs(end)
     if fabs(end - step.t1) <= 1e-15 * size < inf:
-        end = step.t1  # the end of an internal step, but for the rounding of the sum
+        end = step.t1  # the end of an internal step, except for rounding
     elif stop < end < inf and end <= stop + 1e-6 * h + 1e-11 * size:
-        end = stop  # a million steps that were added up end as far beyond it
-    begins_here = fabs(t - now) <= 1e-6 * h + 4e-15 * size
-    return end if h > 0.0 and begins_here and now <= end <= stop and end < inf else nan
+        end = stop  # error of a sum of a million steps
+    starts_now = fabs(t - now) <= 1e-6 * h + 4e-15 * size
+    return end if h > 0.0 and starts_now and now <= end <= stop and end < inf else nan
 
 
 # ---- outputs
 
 
 def update_outputs(run, model):
-    """Bring the outputs to the present point.  Status: DIVERGED, or that of values which cannot be used yet."""
+    """Update the outputs to the current time.  Returns a status: DIVERGED, or that of invalid values."""
     if run.has_pending_changes or run.n_invalid_values > 0 or run.phase < RUNNING:
         status = apply_changes(run, model, run.phase < RUNNING)
         if status != OK:
@@ -193,13 +196,13 @@ def update_outputs(run, model):
 
 
 def set_outputs(run, model):
-    """Set the outputs."""
+    """Compute the outputs at the current time."""
     solver = model.solver
     run.outputs_current = model.compute_outputs(solver.t, solver.y, solver.modes)
 
 
 def update_statistics(model, ahead):
-    """Bring what is told of solver and events to the present point; `ahead`: also where the next step ends."""
+    """Update the statistics of solver and events to the current time; with `ahead` also solver.t_next."""
     model.solver.report(model.events)
     if ahead:
         model.solver.update_t_next(model)

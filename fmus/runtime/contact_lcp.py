@@ -1,10 +1,10 @@
-"""Dry friction where a contact may be stuck while something moves: several contacts, a belt, bodies that they share.
+"""Stick and slip of coupled contacts: several contacts, belts, contacts that share bodies.
 
-A slip is any expression that is linear in the speeds, so that a contact at rest bears what the equations ask for: the
-loads of all stuck contacts together solve A F = b, where A says how each acts on the slips of all.  Where contacts come
-to rest, impulses in them take what is left of their slips, which keeps the momentum.  Which of them then hold is a
-linear complementarity problem (F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts, chapters 5 and 6):
-all are held; whatever bears more than it holds is let go, and what would slip against its own force is held again.
+A slip velocity is any expression linear in the velocities.  The forces of all stuck contacts solve A F = b, where A
+maps contact forces to slip accelerations.  When contacts come to rest, impulses remove the remaining slip velocities
+and conserve momentum.  Which contacts then stick is a linear complementarity problem (F. Pfeiffer, C. Glocker,
+Multibody Dynamics with Unilateral Contacts, chapters 5 and 6).  Its pivoting starts with all contacts stuck, releases
+those whose load exceeds the limit, and locks again those that would slip against their own friction force.
 """
 
 from math import fabs, inf
@@ -14,223 +14,235 @@ from .rounding import ROUNDOFF_MARGIN
 from .stick_slip import DryFriction, sign
 from .vectors import ContactIndex, ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
 
-N_SUBINTERVALS = 5  # parts of a step in which something may end, each looked at by its end
-NEAR_ZERO_SHARE = 0.25  # of what a guard changes in a step: below, it is looked at more closely
-INTERIOR_MINIMUM_RATIO = (
-    3.0  # times the second difference over the middle: by up to 2 the ends differ where a parabola turns inside
-)
-SLIP_SCALE = 1e-3  # m/s or rad/s: the size of a slip, where it is of no size itself
-TIE_SHARE = 1.0 - 1e-9  # of the greatest load, as a share of what is held: what is let go with it
-MAX_JOINT_ITERATIONS, MAX_ITERATIONS = (
-    60,
-    200,
-)  # of letting go and holding again: of all contacts; then of one at a time
-MAX_IMPULSES = 3  # for slips that are not linear in positions
-TINY_FORCE = 1e-300  # a force
-SLIPPING, RELOCKED, AT_REST, AT_LIMIT = (
-    0,
-    1,
-    2,
-    3,
-)  # contacts with a slip, held again, at rest, with a load at the limit
+N_SUBINTERVALS = 5  # parts of a step that are searched for the end of a mode
+NEAR_ZERO_SHARE = 0.25  # share of the change of a guard in a step; smaller values are examined more closely
+# largest ratio of end difference to second difference of a guard; up to 2 a parabola has a minimum inside
+INTERIOR_MINIMUM_RATIO = 3.0
+SLIP_SCALE = 1e-3  # m/s or rad/s: scale of slip velocities whose terms are zero
+TIE_SHARE = 1.0 - 1e-9  # contacts within this share of the highest relative load are released together
+MAX_JOINT_ITERATIONS, MAX_ITERATIONS = 60, 200  # pivots of all contacts at once; then of one at a time
+MAX_IMPULSES = 3  # several, since slip velocities may be nonlinear in the positions
+TINY_FORCE = 1e-300  # N, avoids a division by zero
+SLIPPING, RELOCKED, AT_REST, AT_LIMIT = 0, 1, 2, 3  # status of a contact in the pivoting
 
 
 class CoupledFriction(DryFriction):
-    """An oscillator that sticks in one contact while it moves in another, or with a belt.
+    """Oscillator in which a contact may stick while something moves.
 
-    It says, in the order of its contacts,
-        slips(t, states)               their slips
-        slip_terms(t, states)          the sums of the sizes of what these are made of
-        forces(t, states, modes)       their forces, their limits, and the sums of the sizes that the forces consist of
-        changes(t, states, modes)      the rates of forces and limits; what each force lacks to hold its contact, and
-                                       the rate of that
-        struck(t, states, modes)       the states after impulses in the stuck contacts, which end their slips
+    The generated model also defines, over its contacts,
+
+        slip_velocities(t, states)         slip velocities
+        slip_magnitudes(t, states)         sums of their absolute terms
+        contact_forces(t, states, modes)   forces, holding limits, and sums of the absolute terms of the forces
+        contact_rates(t, states, modes)    rates of forces and limits; residual forces (force required to hold a contact
+                                           minus present force) and their rates
+        apply_impulses(t, states, modes)   states after impulses that stop the slip of stuck contacts
     """
 
     is_coupled, rests_when_stuck = True, False
 
-    # ---- where modes end
+    # ---- end of modes
 
     def guards(self, t, y: StateVector, modes: ContactVector) -> ContactVector:
-        """Positive while the modes last: what the load of a stuck contact lacks to the limit, where one that stays
-        there, but for rounding, is held; or the slip, in the direction of the mode."""
+        """Return the event functions, positive while the modes last.
+
+        Slip: the slip velocity in the direction of the mode.  Stick: holding limit, with a margin for rounding errors,
+        minus absolute load.
+        """
         slips = self.slip_velocities(t, y)
-        left = contact_vector()
+        values = contact_vector()
         for i in contact_indices:
-            left[i] = modes[i] * slips[i]
+            values[i] = modes[i] * slips[i]
         if any_of(modes == STUCK):
             force, limit, terms = self.contact_forces(t, y, modes)
             for i in contact_indices:
                 if modes[i] == STUCK:
-                    left[i] = limit[i] + ROUNDOFF_MARGIN * (terms[i] + limit[i]) - fabs(force[i])
-        return left
+                    values[i] = limit[i] + ROUNDOFF_MARGIN * (terms[i] + limit[i]) - fabs(force[i])
+        return values
 
     def guard(self, step, t, i: ContactIndex):
-        """That of one contact, within a step; while it slides nobody asks for loads."""
+        """Return the event function of one contact inside a step; loads are computed only if it sticks."""
         y = step.state_at(self, t)
         if step.modes0[i] != STUCK:
             slips = self.slip_velocities(t, y)
             return step.modes0[i] * slips[i]
-        left = self.guards(t, y, step.modes0)
-        return left[i]
+        values = self.guards(t, y, step.modes0)
+        return values[i]
 
-    def may_cross_zero(self, step, first: ContactVector, last: ContactVector):
-        """Whether a guard may come to zero between the ends of the step, where it has these values, as far as the
-        parabola through its middle tells: no interpolant is worked out for that, the middle is that of the cubic with
-        the values and slopes of both ends."""
+    def may_cross_zero(self, step, g_start: ContactVector, g_end: ContactVector):
+        """Return whether a guard may reach zero inside the step, judged by a parabola through both ends and the middle.
+
+        The state in the middle is that of the cubic Hermite polynomial, so that no interpolant is built.
+        """
         h = step.t1 - step.t0
         y2 = 0.5 * (step.y0 + step.y1) + 0.125 * h * (step.f0 - step.f1)
-        middle = self.guards(step.t0 + 0.5 * h, y2, step.modes0)
-        found = False
+        g_middle = self.guards(step.t0 + 0.5 * h, y2, step.modes0)
+        crossing = False
         for i in contact_indices:
-            end = first[i] if first[i] < last[i] else last[i]
-            low = end if end < middle[i] else middle[i]
-            expand_series = first[i] + last[i] - 2.0 * middle[i]
-            rise = fabs(last[i] - first[i])
-            close = low <= NEAR_ZERO_SHARE * (rise if rise > expand_series else expand_series)
-            found = (
-                found
-                or last[i] <= 0.0
-                or middle[i] <= 0.0
-                or (close and rise <= INTERIOR_MINIMUM_RATIO * expand_series)
+            end = g_start[i] if g_start[i] < g_end[i] else g_end[i]
+            low = end if end < g_middle[i] else g_middle[i]
+            second_difference = g_start[i] + g_end[i] - 2.0 * g_middle[i]
+            end_difference = fabs(g_end[i] - g_start[i])
+            close = low <= NEAR_ZERO_SHARE * (
+                end_difference if end_difference > second_difference else second_difference
             )
-        return found
+            crossing = (
+                crossing
+                or g_end[i] <= 0.0
+                or g_middle[i] <= 0.0
+                or (close and end_difference <= INTERIOR_MINIMUM_RATIO * second_difference)
+            )
+        return crossing
 
     def mode_end_times(self, step) -> ContactVector:
-        """When each mode ends within the step, to the last bit; inf where it does not.
+        """Return when each mode ends within the step, to machine precision; inf if it does not.
 
-        A guard that falls to zero and rises again within the step is found as well.
+        Guards that fall to zero and rise again within the step are detected as well.
         """
-        found, before = contact_vector(), contact_vector()
+        ends, g_before = contact_vector(), contact_vector()
         for i in contact_indices:
-            found[i], before[i] = inf, -inf
-        here = self.guards(step.t0, step.y0, step.modes0)
-        last = self.guards(step.t1, step.y1, step.modes0)
-        if self.may_cross_zero(step, here, last):
+            ends[i], g_before[i] = inf, -inf
+        g = self.guards(step.t0, step.y0, step.modes0)
+        g_end = self.guards(step.t1, step.y1, step.modes0)
+        if self.may_cross_zero(step, g, g_end):
             step.interpolant.n_event_evals += N_SUBINTERVALS
-            t_before = t_here = step.t0
+            t_before = t_part_start = step.t0
             for part in range(1, N_SUBINTERVALS + 1):
-                t, ahead = step.t1, last
+                t, g_part = step.t1, g_end
                 if part < N_SUBINTERVALS:
                     t = step.t0 + (step.t1 - step.t0) * part / N_SUBINTERVALS
                     y = step.state_at(self, t)
-                    ahead = self.guards(t, y, step.modes0)
+                    g_part = self.guards(t, y, step.modes0)
                 for i in contact_indices:
-                    if found[i] == inf and ahead[i] <= 0.0:
-                        found[i] = self.find_root(step, t_here, t, here[i], ahead[i], i)
-                    elif found[i] == inf and before[i] > here[i] and ahead[i] > here[i]:  # lowest in between
-                        low = self.find_minimum(step, t_before, t, i)
-                        if low < inf:
-                            least = self.guard(step, low, i)
-                            found[i] = self.find_root(step, t_before, low, before[i], least, i)
-                before, here = here, ahead
-                t_before, t_here = t_here, t
-        return found
+                    if ends[i] == inf and g_part[i] <= 0.0:
+                        ends[i] = self.find_root(step, t_part_start, t, g[i], g_part[i], i)
+                    elif ends[i] == inf and g_before[i] > g[i] and g_part[i] > g[i]:  # minimum in between
+                        t_low = self.find_minimum(step, t_before, t, i)
+                        if t_low < inf:
+                            g_min = self.guard(step, t_low, i)
+                            ends[i] = self.find_root(step, t_before, t_low, g_before[i], g_min, i)
+                g_before, g = g, g_part
+                t_before, t_part_start = t_part_start, t
+        return ends
 
     def resolve_after_event(self, step, ends: ContactVector, tie_tolerance) -> tuple[StateVector, ContactVector, bool]:
-        """State and modes at the end of a step that has been cut there, and whether the modes fit."""
+        """Return states and modes after an event at the end of a step, and whether the modes are consistent."""
         t = step.t1
         slips = self.slip_velocities(t, step.y1)
         terms = self.slip_magnitudes(t, step.y1)
-        rest, first = contact_vector(), contact_vector()
+        status, new_modes = contact_vector(), contact_vector()
         for i in contact_indices:
-            rest[i], first[i] = SLIPPING, step.modes0[i]
-            if first[i] == STUCK:
-                rest[i] = AT_LIMIT if ends[i] <= t else AT_REST
-            elif ends[i] <= t or first[i] * slips[i] <= ROUNDOFF_MARGIN * terms[i]:
-                rest[i], first[i] = AT_REST, STUCK
-        y = self.stop_slips(t, step.y1, first)
-        modes, fit = self.solve_modes(t, y, first, rest, tie_tolerance)
-        return y, modes, fit
+            status[i], new_modes[i] = SLIPPING, step.modes0[i]
+            if new_modes[i] == STUCK:
+                status[i] = AT_LIMIT if ends[i] <= t else AT_REST
+            elif ends[i] <= t or new_modes[i] * slips[i] <= ROUNDOFF_MARGIN * terms[i]:
+                status[i], new_modes[i] = AT_REST, STUCK
+        y = self.stop_slips(t, step.y1, new_modes)
+        modes, consistent = self.solve_modes(t, y, new_modes, status, tie_tolerance)
+        return y, modes, consistent
 
     def resolve_at_start(
         self, t, y: StateVector, modes: ContactVector, tie_tolerance, reach
     ) -> tuple[StateVector, ContactVector, bool]:
-        """The same where a motion begins, or values have changed, after these modes: what has a slip slides.
+        """Return the same at the start of a run or after a change of values: contacts with a slip velocity slide.
 
-        Of its size the share `near` is none where a contact was stuck, and the share `reach` where it is against the
-        direction of a slide.
+        Parameters
+        ----------
+        t
+            Time in s.
+        y
+            States.
+        modes
+            Previous modes.
+        tie_tolerance, reach
+            Slip velocities below these shares of their absolute terms count as zero, for contacts that were stuck and
+            for contacts that slip against their mode.
         """
         slips = self.slip_velocities(t, y)
         terms = self.slip_magnitudes(t, y)
-        rest, first = contact_vector(), contact_vector()
+        status, new_modes = contact_vector(), contact_vector()
         for i in contact_indices:
-            known = ROUNDOFF_MARGIN * terms[i]
+            zero_level = ROUNDOFF_MARGIN * terms[i]
             if modes[i] * slips[i] <= 0.0:
-                known = (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + SLIP_SCALE)
-            rest[i], first[i] = SLIPPING, sign(slips[i])
-            if fabs(slips[i]) <= known:
-                rest[i], first[i] = AT_REST, STUCK
-        y = self.stop_slips(t, y, first)
-        after, fit = self.solve_modes(t, y, first, rest, tie_tolerance)
-        return y, after, fit
+                zero_level = (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + SLIP_SCALE)
+            status[i], new_modes[i] = SLIPPING, sign(slips[i])
+            if fabs(slips[i]) <= zero_level:
+                status[i], new_modes[i] = AT_REST, STUCK
+        y = self.stop_slips(t, y, new_modes)
+        resolved_modes, consistent = self.solve_modes(t, y, new_modes, status, tie_tolerance)
+        return y, resolved_modes, consistent
 
-    # ---- which contacts hold
+    # ---- complementarity problem
 
     def stop_slips(self, t, y: StateVector, modes: ContactVector) -> StateVector:
-        """The nearest state whose stuck contacts have no slip: impulses in these keep the momentum."""
+        """Return the states without slip in the stuck contacts; impulses conserve momentum."""
         for _ in range(MAX_IMPULSES):
             slips = self.slip_velocities(t, y)
-            still = True
+            at_rest = True
             for i in contact_indices:
                 if modes[i] == STUCK and slips[i] != 0.0:
-                    still = False
-            if still:
+                    at_rest = False
+            if at_rest:
                 break
             y = self.apply_impulses(t, y, modes)
         return y
 
     def solve_modes(
-        self, t, y: StateVector, modes: ContactVector, rest: ContactVector, tie_tolerance
+        self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
     ) -> tuple[ContactVector, bool]:
-        """The modes that hold from here on, of which those of contacts at rest may be others than these; and whether
-        they fit the forces.
+        """Solve the complementarity problem for the modes of contacts at rest.
 
-        What would slip against its own force is held; else what bears most of what it holds is let go, and what bears
-        as much with it.  If that comes to no end, one contact is changed at a time, the first that has to.
+        Contacts that would slip against their own friction force are locked first; else those with the highest load
+        relative to their limit are released together.  If this does not end, one contact changes at a time, the first
+        that violates its conditions.
+
+        Returns
+        -------
+        tuple
+            The modes, and whether they are consistent with the forces.
         """
-        after, state = contact_vector(), contact_vector()
+        pivot_modes, pivot_status = contact_vector(), contact_vector()
         for i in contact_indices:
-            after[i], state[i] = modes[i], rest[i]
-        for turn in range(MAX_ITERATIONS):
-            urgency, other = self.violations(t, y, after, state, tie_tolerance)
-            worst = max_of(urgency)
-            if not worst > 0.0:
-                return after, True
-            least = TIE_SHARE * worst if turn < MAX_JOINT_ITERATIONS else 0.0
+            pivot_modes[i], pivot_status[i] = modes[i], status[i]
+        for iteration in range(MAX_ITERATIONS):
+            violation, next_modes = self.violations(t, y, pivot_modes, pivot_status, tie_tolerance)
+            highest = max_of(violation)
+            if not highest > 0.0:
+                return pivot_modes, True
+            release_level = TIE_SHARE * highest if iteration < MAX_JOINT_ITERATIONS else 0.0
             changed = False
             for i in contact_indices:
-                if urgency[i] > 0.0 and urgency[i] >= least and not (changed and least == 0.0):
-                    after[i], changed = other[i], True
-                    if other[i] == STUCK:
-                        state[i] = RELOCKED
+                if violation[i] > 0.0 and violation[i] >= release_level and not (changed and release_level == 0.0):
+                    pivot_modes[i], changed = next_modes[i], True
+                    if next_modes[i] == STUCK:
+                        pivot_status[i] = RELOCKED
         return modes, False
 
     def violations(
-        self, t, y: StateVector, modes: ContactVector, rest: ContactVector, tie_tolerance
+        self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
     ) -> tuple[ContactVector, ContactVector]:
-        """How urgently each contact at rest must change, not at all where its mode fits, and to which mode.
+        """Return how far each contact at rest violates the conditions of its mode (0: not at all), and its next mode.
 
-        A tie is decided by the next derivative, unless the contact has been held again.  A load is known but for the
-        rounding of what it is made of, and, where it moves inward, the share `near` of the limit.
+        The next derivative decides ties, unless the contact was locked again.  Loads have the rounding errors of their
+        terms and, if they decrease, the relative error `tie_tolerance`.
         """
         force, limit, terms = self.contact_forces(t, y, modes)
         force_rate, limit_rate, residual_force, residual_force_rate = self.contact_rates(t, y, modes)
-        urgency, other = contact_vector(), contact_vector()
+        violation, next_modes = contact_vector(), contact_vector()
         for i in contact_indices:
-            urgency[i], other[i] = 0.0, STUCK
+            violation[i], next_modes[i] = 0.0, STUCK
             slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
-            if rest[i] != SLIPPING and modes[i] == STUCK:
-                other[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
-                outward = other[i] * force_rate[i] - limit_rate[i]
-                if rest[i] == AT_LIMIT or (rest[i] == AT_REST and outward > 0.0):
+            if status[i] != SLIPPING and modes[i] == STUCK:
+                next_modes[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
+                outward = next_modes[i] * force_rate[i] - limit_rate[i]
+                if status[i] == AT_LIMIT or (status[i] == AT_REST and outward > 0.0):
                     slack = -slack
                 elif outward < 0.0:
                     slack += tie_tolerance * limit[i]
-                if other[i] != STUCK and fabs(force[i]) > limit[i] + slack:
-                    urgency[i] = fabs(force[i]) / (limit[i] + TINY_FORCE)
-            elif rest[i] != SLIPPING:
+                if next_modes[i] != STUCK and fabs(force[i]) > limit[i] + slack:
+                    violation[i] = fabs(force[i]) / (limit[i] + TINY_FORCE)
+            elif status[i] != SLIPPING:
                 ahead = modes[i] * residual_force[i]
                 if ahead < -slack or (ahead <= slack and modes[i] * residual_force_rate[i] <= 0.0):
-                    urgency[i] = inf
-        return urgency, other
+                    violation[i] = inf
+        return violation, next_modes

@@ -1,7 +1,7 @@
-"""Dormand-Prince 8(5,3) of E. Hairer, local extrapolation, first same as last, interpolant of order 7.
+"""Dormand-Prince 8(5,3) of E. Hairer: local extrapolation, first same as last, interpolant of order 7.
 
 E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.5, II.6 and II.10, and the program
-DOP853 that goes with it: its numbers, to the last bit of a double, under its names (A1210: stage 12, slope 10).
+DOP853: its coefficients in double precision under the same names (A1210: stage 12, slope 10).
 """
 
 from math import sqrt
@@ -9,8 +9,8 @@ from math import sqrt
 from .vectors import ContactVector, RateVector, StateVector, elementwise
 
 NUMBER, TEXT = 4, "Dormand-Prince 8(5,3); for tight tolerances"
-STAGES = 12  # right-hand sides a step; the last is the first of the next step
-EXTRA = 3  # right-hand sides that the interpolant needs on top
+STAGES = 12  # evaluations of the right-hand side in a step; the last one serves the next step
+EXTRA = 3  # additional evaluations for the interpolant
 POWER, SAFETY, SHRINK, GROW = 1.0 / 8.0, 0.9, 1.0 / 3.0, 6.0
 
 C2, C3, C4, C5, C6 = 0.05260015195876773, 0.0789002279381516, 0.1183503419072274, 0.2816496580927726, 0.3333333333333333
@@ -59,7 +59,7 @@ D713, D714, D715, D716 = -43.53345659001114, 96.32455395918828, -39.177261675615
 
 
 class Dop853:
-    """One step, and the polynomial of degree 7 that keeps values and slopes of both its ends."""
+    """Method with an interpolant of degree 7 that matches values and slopes at both ends."""
 
     def __init__(self):
         self.f6 = self.f7 = self.f8 = self.f9 = self.f10 = self.f11 = self.f12 = 0.0
@@ -67,7 +67,7 @@ class Dop853:
     def propose(
         self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
-        """The new state, its rates, and the rates e of the error: the estimates are h e."""
+        """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + h * (A21 * f)
         f2 = model.rates(t + C2 * h, y2, modes)
         y3 = y + h * (A31 * f + A32 * f2)
@@ -101,7 +101,7 @@ class Dop853:
         return y1, f1, e
 
     def build_interpolant(self, model, step):
-        """The interpolant of the step just taken."""
+        """Build the interpolant of the step just computed."""
         inside = step.interpolant
         h, modes, t, y, f, y1, f1 = step.h_full, step.modes0, step.t0, step.y0, step.f0, step.y1, step.f1  # noqa: F841
         f6, f7, f8, f9, f10, f11, f12 = self.f6, self.f7, self.f8, self.f9, self.f10, self.f11, self.f12
@@ -128,6 +128,6 @@ class Dop853:
 
 @elementwise
 def combined(fifth, third):
-    """The rate of the error from the two embedded formulas, of order 5 and of order 3."""
+    """Combine the errors of the embedded formulas of orders 5 and 3 into the estimate of DOP853, per unit of h."""
     size = fifth * fifth + 0.01 * third * third
     return fifth * fifth / sqrt(size) if size != 0.0 else 0.0

@@ -1,7 +1,7 @@
-"""A communication step in leaps, for an importer that handles events itself or looks inside: each goes to the end of an
-internal step, so that none passes an event.
+"""Communication steps of FMI 3.0 with early return and intermediate updates: one internal step at a time.
 
-An event at the end of a leap may wait to be handled: until then the outputs are those before it.
+No internal step passes an event.  An event may be deferred until the importer handles it; until then the outputs are
+those before the event.
 """
 
 from . import call_sequence
@@ -10,7 +10,7 @@ from .integrator import MAX_EVALUATIONS, MAX_STEPS
 
 
 def begin_step(run, model, t, h):
-    """Begin a communication step of h from t.  Status."""
+    """Begin a communication step of size h at t.  Returns a status."""
     status = call_sequence.prepare_to_step(run, model)
     if status != OK:
         return status
@@ -29,13 +29,15 @@ def begin_step(run, model, t, h):
 
 
 def next_internal_step(run, model, defer_events):
-    """Go on to the end of an internal step, or to that of the communication step; whether an event there waits to be
-    handled.  Status."""
+    """Advance to the end of the internal step or of the communication step, whichever is first.  Returns a status.
+
+    With `defer_events`, an event there is left to the importer (`event_reached`).
+    """
     exchange = model.model_exchange
     solver = model.solver
     step = solver.step
     run.outputs_current = False
-    status = call_sequence.prepare_to_step(run, model)  # an input may have been set here
+    status = call_sequence.prepare_to_step(run, model)  # an input may have changed
     if status == OK and solver.t >= step.t1:
         status = step.compute_next(model)
     if status != OK:
@@ -52,7 +54,7 @@ def next_internal_step(run, model, defer_events):
 
 
 def complete_event(run, model):
-    """The event at the present point takes place."""
+    """Complete a deferred event at the current time."""
     solver = model.solver
     run.outputs_current = False
     if solver.t >= solver.step.t1:

@@ -1,8 +1,8 @@
-"""A declared model in the hands of a host, whatever the version of FMI: rules.py decides, this asks and tells.
+"""FMU instance, independent of the FMI version; call_sequence.py decides which calls are valid.
 
-Nothing here lets an exception into the host: the native layer would free what it still needs, and a host that is not
-Python would abort.  What is wrong is remembered and said in one sentence, in the log and on standard error; do_step
-then returns False and every calculated Real reads NaN.
+No exception may reach the host: the native layer of pythonfmu would release references that it still needs, and a host
+other than Python would abort.  Errors are reported in one message, in the log and on standard error; then do_step
+returns False and every calculated Real reads NaN.
 """
 
 from __future__ import annotations
@@ -18,31 +18,31 @@ from .variable_declarations import VariableOwner, variables
 
 
 def make_fmu_class(slave: type[FmuInstance], model: type[VariableOwner]) -> Any:
-    """The class of slaves of a model class, under its name.
+    """Make the FMU class of a model class, with the same name.
 
-    A spare instance says what there is: CPython 3.11 reads the attributes of an object whose __dict__ has been
-    looked at twice as slowly, so nobody looks at that of an instance which runs.
+    A temporary instance is inspected for the variables: CPython 3.11 reads attributes half as fast once __dict__ of an
+    object has been accessed, so that of a running instance is never accessed.
     """
-    spare = model()
-    about = {
+    inspected = model()
+    attributes = {
         "Model": model,
-        "variables": variables(spare),
-        "attribute_tree": attribute_tree(spare),
+        "variables": variables(inspected),
+        "attribute_tree": attribute_tree(inspected),
         "__module__": __name__,
     }
-    about["instances"] = WeakSet()
-    made: Any = type(model.__name__, (slave,), about)
-    made.plain_class = made  # an entry script may derive from it
-    return made
+    attributes["instances"] = WeakSet()
+    fmu_class: Any = type(model.__name__, (slave,), attributes)
+    fmu_class.plain_class = fmu_class  # entry scripts may derive a subclass
+    return fmu_class
 
 
 class FmuInstance(SavedStateAccess):
-    """One instance of the model `Model`.
+    """Instance of the model class `Model`.
 
-    A base class after this one has `instance_name` and log(sentence, status).
+    A base class that follows in the MRO has `instance_name` and log(message, status).
     """
 
-    Model: type  # of the subclass that hosting() makes
+    Model: type  # set by make_fmu_class()
 
     @signal_safe
     def __init__(self, **kwargs: Any) -> None:
@@ -50,12 +50,12 @@ class FmuInstance(SavedStateAccess):
             self.initialize(**kwargs)
         except Exception:
             raise
-        except BaseException as error:  # the layer that resets an instance needs the new one
+        except BaseException as error:  # the native layer needs the new instance after a reset
             self.initialize(**kwargs)
             self.handle_exception(error)
 
     def initialize(self, **kwargs: Any) -> None:
-        """As after instantiation."""
+        """Set the state after instantiation."""
         super().__init__(**kwargs)
         self.instances.add(self)
         self.model = self.Model()
@@ -68,18 +68,18 @@ class FmuInstance(SavedStateAccess):
             status = call_sequence.exit_initialization(self.run, self.model)
             if status != OK:
                 self.fail_with_status(status)
-        except BaseException as error:  # an exception that left Python would crash the host
+        except BaseException as error:  # an exception outside Python would crash the host
             self.handle_exception(error)
 
     @signal_safe
     def do_step(self, current_time: float, step_size: float) -> Any:
         try:
             run, model = self.run, self.model
-            seen = run.outputs_current
+            outputs_were_read = run.outputs_current
             status = call_sequence.do_step(run, model, current_time, step_size)
             if status != OK:
                 return self.fail_with_status(status, current_time, step_size)
-            if seen:  # who has read the last point will read this one too, and this way is shorter
+            if outputs_were_read:  # the importer reads outputs at every step: computing them here saves calls
                 call_sequence.set_outputs(run, model)
             return True
         except BaseException as error:  # as above

@@ -1,18 +1,18 @@
-"""An input that changes while nobody sets it: a polynomial in time, known by its derivatives."""
+"""Polynomial in time for an input between two settings, given by its derivatives."""
 
 from .codes import MAX_INPUT_ORDER
 
 
 class InputPolynomial:
-    """Its derivatives at one time, from order 0 on; s is how many seconds have passed since."""
+    """Input u(s) as a polynomial in s, the seconds since its derivatives were set."""
 
     def __init__(self):
-        self.order = 0  # of the highest that is not zero; where one has been set, a higher one until begin()
-        self.derivatives = [0.0] * (MAX_INPUT_ORDER + 1)
-        self.c = [0.0] * (MAX_INPUT_ORDER + 1)  # the coefficients of the powers of s
+        self.order = 0  # highest non-zero order; setting a derivative may raise it until set_value() is called
+        self.derivatives = [0.0] * (MAX_INPUT_ORDER + 1)  # at s = 0, from order 0 on
+        self.c = [0.0] * (MAX_INPUT_ORDER + 1)  # coefficients of the powers of s
 
     def set_value(self, value):
-        """The value is this one; some derivatives may have been set."""
+        """Set the value at s = 0 and recompute the coefficients from the derivatives."""
         self.derivatives[0] = self.c[0] = value
         highest, self.order = self.order, 0
         factorial = 1.0
@@ -23,7 +23,10 @@ class InputPolynomial:
                 self.order = n
 
     def value_at(self, s):
-        """The value; without loops and faults, for every right-hand side wants it."""
+        """Return the value at s.
+
+        There is no loop, because every evaluation of the right-hand side calls this.
+        """
         return (
             self.c[0]
             if self.order == 0
@@ -31,16 +34,16 @@ class InputPolynomial:
         )
 
     def higher_order_change(self, s):
-        """What it has changed by since then, over s."""
+        """Return (u(s) - u(0)) / s."""
         c = self.c[4] + s * (self.c[5] + s * (self.c[6] + s * (self.c[7] + s * self.c[8])))
         return self.c[1] + s * (self.c[2] + s * (self.c[3] + s * c))
 
     def rate_at(self, s):
-        """The first derivative."""
+        """Return the first derivative at s."""
         return self.c[1] if self.order < 2 else self.derivative_at(s, 1)
 
     def derivative_at(self, s, n):
-        """The n-th derivative."""
+        """Return the n-th derivative at s."""
         total = 0.0
         for i in range(self.order + 1 - n):
             k = self.order - i
@@ -48,7 +51,7 @@ class InputPolynomial:
         return total
 
     def shift_to(self, s):
-        """Tell all derivatives as they are now, and the value."""
+        """Move the origin to s: update all derivatives there and return the value."""
         if self.order > 0:
             for n in range(self.order):
                 self.derivatives[n] = self.derivative_at(s, n)

@@ -1,18 +1,18 @@
-"""The state inside a step: one polynomial for all methods, of the degree that each of them needs.
+"""Interpolant inside a step: one polynomial form for all methods, degree 3 to 7.
 
 At the fraction s of the step, with r = 1 - s,
 
     y = c0 + s (c1 + r (c2 + s (c3 + r (c4 + s (c5 + r (c6 + s c7))))))
 
-so that the ends are met whatever c2 ... c7 are.  c0 ... c3 are the cubic of Hermite; what a method knows of the
-inside of its step goes beyond (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.6).
+which matches both ends for any c2 ... c7.  c0 ... c3 give the cubic Hermite interpolant; c4 ... c7 add the information
+of a method's stages (E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.6).
 """
 
 from .vectors import StateVector
 
 
 class Interpolant:
-    """The coefficients for a step of the length `span`, once they are worked out."""
+    """Coefficients for a step of size `h`; valid once `ready` is set."""
 
     c0: StateVector
     c1: StateVector
@@ -27,11 +27,11 @@ class Interpolant:
         self.ready = False
         self.h = 0.0
         self.degree = 3
-        self.n_event_evals = 0  # how often somebody looked for what may end inside a step
+        self.n_event_evals = 0  # evaluations of event functions inside the step
         self.c0 = self.c1 = self.c2 = self.c3 = self.c4 = self.c5 = self.c6 = self.c7 = 0.0
 
     def set_hermite_cubic(self, step):
-        """The cubic with the values and slopes of both ends of a step."""
+        """Set the cubic Hermite interpolant through the values and slopes at both ends of a step."""
         h = step.h_full
         self.ready, self.h, self.degree = True, h, 3
         c1 = step.y1 - step.y0
@@ -40,7 +40,7 @@ class Interpolant:
         self.c3 = 2.0 * c1 - h * (step.f0 + step.f1)
 
     def evaluate(self, elapsed) -> StateVector:
-        """The state, `elapsed` seconds after the step began."""
+        """Return the state `elapsed` seconds after the start of the step."""
         s = elapsed / self.h
         r = 1.0 - s
         c = self.c3

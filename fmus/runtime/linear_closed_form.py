@@ -1,15 +1,15 @@
-"""Closed form of one linear piece: m x'' + c x' + k x = F + (m q + k u) t, and its next standstill.
+"""Closed form of a linear segment, m x'' + c x' + k x = F + (m q + k u) t, and the time of its next standstill.
 
 With z = c/(2 m), n^2 = k/m, p = F/m and the impulse response G (G'' + 2 z G' + n^2 G = 0, G(0) = 0, G'(0) = 1)
 
     x = x0 (G' + 2 z G) + v0 G + p I + q J  I = integral of G, J = integral of I
     v = -n^2 x0 G + v0 G' + p G + q I
 
-G, G', I and J are written for each kind of damping so that no digit is lost near critical damping, with a weak
-spring or without one (L. Meirovitch, Fundamentals of Vibrations, chapters 2 and 4, has the usual forms).
-A resting point that drifts at the speed u (a driver pulling the spring) is offered without damping only: no
-oscillator here has both.  Where inputs have no rates, neither has the force: q is zero.  Where it changes at a rate
-that changes as well, it bends: the motion is then taken in stretches, each by its power series.
+Each damping regime has its own form of G, G', I and J, which keeps full precision near critical damping and with a weak
+spring or none (L. Meirovitch, Fundamentals of Vibrations, chapters 2 and 4, has the usual forms).  An equilibrium that
+moves at the velocity u (a driver that pulls the spring) is supported without damping only.  The rate q of the force is
+zero unless inputs have derivatives.  For inputs of higher order the motion is computed by power series, interval by
+interval.
 """
 
 from math import atan2, copysign, cos, exp, expm1, fabs, inf, log1p, pi, sin, sqrt
@@ -24,18 +24,26 @@ MAX_BISECTIONS, MAX_DOUBLINGS = 200, 1000
 
 
 class LinearClosedForm:
-    """The constants of the oscillator, and the piece that began at x0, v0 with the acceleration a0."""
+    """Constants of the oscillator, and the current segment, which starts at x0, v0 with the acceleration a0."""
 
     def __init__(self):
         self.regime = UNDAMPED
-        self.has_input_derivatives = True  # of some models, as Oscillator has it
+        self.has_input_derivatives = True  # code generation inserts the flag of the model
         self.z = self.n2 = self.drift = self.q = 0.0
         self.w = self.slow_root = 0.0
         self.x0 = self.v0 = self.a0 = self.p = self.x_roundoff = 0.0
-        self.velocity_series = PowerSeries()  # of the speed, where the force bends
+        self.velocity_series = PowerSeries()  # of the velocity, for inputs of higher order
 
     def prepare(self, m, c, k, drift):
-        """Take over mass (kg), damping (N.s/m), stiffness (N/m) and the speed of the resting point (m/s)."""
+        """Set the coefficients.
+
+        Parameters
+        ----------
+        m, c, k
+            Mass in kg, damping in N s/m, stiffness in N/m.
+        drift
+            Velocity of the equilibrium in m/s.
+        """
         self.z, self.n2, self.drift = 0.5 * c / m, k / m, drift
         z, n = self.z, sqrt(self.n2)
         square = (n - z) * (n + z)
@@ -47,29 +55,31 @@ class LinearClosedForm:
             self.regime = UNDERDAMPED
         else:
             self.regime = OVERDAMPED
-            self.slow_root = -self.n2 / (z + self.w)  # the slow root of s^2 + 2 z s + n^2, without cancellation
+            self.slow_root = -self.n2 / (z + self.w)  # slow root of s^2 + 2 z s + n^2, without cancellation
 
     def set_force_rate(self, q):
-        """The force changes at a constant rate, and an acceleration that nothing else changed would at q (m/s3)."""
+        """Set the constant rate q (m/s3) of the acceleration that is due to the force."""
         self.q = q
         if self.regime == UNDAMPED:
-            self.drift += q / self.n2  # so does the resting point
+            self.drift += q / self.n2  # the equilibrium moves, too
 
     def start_segment(self, x, v, a, p, x_roundoff):
-        """A piece from x, v with the acceleration a, of which p is due to the constant force; x lacks what it lost to
-        rounding."""
+        """Start a segment at x, v with acceleration a.
+
+        `p` is the acceleration due to the constant force, `x_roundoff` the rounding error of x.
+        """
         self.x0, self.v0, self.a0, self.p, self.x_roundoff = x, v, a, p, x_roundoff
 
     def evaluate(self, t) -> StateVector:
-        """Position and speed t seconds after the beginning of the piece."""
+        """Return position and velocity t seconds after the start of the segment."""
         if self.regime == UNDAMPED:
             half = 0.5 * self.w * t
             s, c = sin(half), cos(half)
-            g, fall = 2.0 * s * c / self.w, 2.0 * s * s
+            g, one_minus_cos = 2.0 * s * c / self.w, 2.0 * s * s
             lag = t - g if half > 0.25 else t * lag_series(4.0 * half * half)
             return (
-                self.x0 + (self.v0 * g + self.a0 * fall / self.n2 + self.drift * lag + self.x_roundoff),
-                self.v0 * (1.0 - fall) + self.a0 * g + self.drift * fall,
+                self.x0 + (self.v0 * g + self.a0 * one_minus_cos / self.n2 + self.drift * lag + self.x_roundoff),
+                self.v0 * (1.0 - one_minus_cos) + self.a0 * g + self.drift * one_minus_cos,
             )
         if self.has_input_derivatives and self.regime == HIGHER_ORDER_INPUT:
             return self.evaluate_series(t)
@@ -80,11 +90,11 @@ class LinearClosedForm:
         if self.regime == UNDERDAMPED:
             half = 0.5 * self.w * t
             e, s, c = exp(-self.z * t), sin(half), cos(half)
-            g, fall = 2.0 * s * c / self.w, 2.0 * s * s
+            g, one_minus_cos = 2.0 * s * c / self.w, 2.0 * s * s
             zg = self.z * g
-            # 1 - e cos is split so that it keeps its digits at small t; without a force nobody asks for it
-            integral = (e * (fall - zg) - expm1(-self.z * t)) / self.n2 if self.p != 0.0 else 0.0
-            g, slope = e * g, e * (1.0 - fall - zg)
+            # 1 - e cos is split to avoid cancellation at small t; needed only with a force
+            integral = (e * (one_minus_cos - zg) - expm1(-self.z * t)) / self.n2 if self.p != 0.0 else 0.0
+            g, slope = e * g, e * (1.0 - one_minus_cos - zg)
         else:
             g, slope, integral = self.overdamped_response(t)
         return (
@@ -93,57 +103,62 @@ class LinearClosedForm:
         )
 
     def state_at_standstill(self, t) -> tuple[StateVector, float]:
-        """Position and speed at the next standstill, t seconds after the beginning, and what the position lacks.
+        """Return position, velocity (zero) and rounding error of the position at a standstill at time t.
 
-        Only a body that goes on for ever, behind its driver, comes far enough for that to matter.
+        The rounding error matters only for a body that follows a driver over a long distance.
         """
         if self.regime != UNDAMPED:
             x, _ = self.evaluate(t)
             return x, 0.0, 0.0
         x0, self.x0 = self.x0, 0.0
-        way, _ = self.evaluate(t)
-        self.x0, x = x0, x0 + way
-        moved = x - x0
-        return x, 0.0, (x0 - (x - moved)) + (way - moved)
+        distance, _ = self.evaluate(t)
+        self.x0, x = x0, x0 + distance
+        x_step = x - x0
+        return x, 0.0, (x0 - (x - x_step)) + (distance - x_step)
 
     def evaluate_ramp(self, t) -> StateVector:
-        """The same where the force changes."""
+        """Return position and velocity where the force has a constant rate."""
         z, w, n2 = self.z, self.w, self.n2
         if self.regime == OVERDAMPED:
-            g, slope, once = self.overdamped_response(t)
+            g, slope, g_integral = self.overdamped_response(t)
         else:
-            e, once = exp(-z * t), 0.0
+            e, g_integral = exp(-z * t), 0.0
             g = e * sin(w * t) / w if w > 0.0 else t
             slope = e * cos(w * t) - z * g
         if (z + w) * t < 0.5:
-            once, twice = self.integral_series(t, 0.5 * t * t, 2), self.integral_series(t, t * t * t / 6.0, 3)
+            g_integral, g_integral2 = (
+                self.integral_series(t, 0.5 * t * t, 2),
+                self.integral_series(t, t * t * t / 6.0, 3),
+            )
         elif self.regime == OVERDAMPED and w > 0.5 * z:
-            twice = 0.5 * (exp_double_integral(self.slow_root, t) - exp_double_integral(-(z + w), t)) / w
+            g_integral2 = 0.5 * (exp_double_integral(self.slow_root, t) - exp_double_integral(-(z + w), t)) / w
         else:
-            once = (1.0 - slope - 2.0 * z * g) / n2
-            twice = (t - 2.0 * z * once - g) / n2
+            g_integral = (1.0 - slope - 2.0 * z * g) / n2
+            g_integral2 = (t - 2.0 * z * g_integral - g) / n2
         return (
-            self.x0 * (slope + 2.0 * z * g) + self.v0 * g + self.p * once + self.q * twice,
-            (self.p - n2 * self.x0) * g + self.v0 * slope + self.q * once,
+            self.x0 * (slope + 2.0 * z * g) + self.v0 * g + self.p * g_integral + self.q * g_integral2,
+            (self.p - n2 * self.x0) * g + self.v0 * slope + self.q * g_integral,
         )
 
-    def expand_series(self, model, t, span):
-        """Work out the series from t on, over so many seconds: v'' + 2 z v' + n^2 v = p', as the model tells it."""
+    def expand_series(self, model, t, duration):
+        """Expand v'' + 2 z v' + n^2 v = p' in a power series from t on, over `duration` seconds."""
         series = self.velocity_series
-        series.duration = span
-        series.c[0], series.c[1] = self.v0, self.a0 * span
-        scale = span * span
-        push = self.n2 * self.drift
+        series.duration = duration
+        series.c[0], series.c[1] = self.v0, self.a0 * duration
+        scale = duration * duration
+        force_term = self.n2 * self.drift
         for k in range(TERMS - 1):
             if k < MAX_INPUT_ORDER:
-                push += model.applied_acceleration_derivative(t, k + 1)
-            back = 2.0 * self.z * span * (k + 1) * series.c[k + 1] + self.n2 * span * span * series.c[k]
-            series.c[k + 2] = (push * scale - back) / ((k + 1) * (k + 2.0))
-            push = 0.0
-            scale *= span / (k + 1)
+                force_term += model.applied_acceleration_derivative(t, k + 1)
+            damping_and_spring = (
+                2.0 * self.z * duration * (k + 1) * series.c[k + 1] + self.n2 * duration * duration * series.c[k]
+            )
+            series.c[k + 2] = (force_term * scale - damping_and_spring) / ((k + 1) * (k + 2.0))
+            force_term = 0.0
+            scale *= duration / (k + 1)
 
     def evaluate_series(self, t) -> StateVector:
-        """Position and speed where the force bends."""
+        """Return position and velocity from the power series."""
         series = self.velocity_series
         mean = v = 0.0
         for i in range(TERMS + 1):
@@ -153,7 +168,7 @@ class LinearClosedForm:
         return self.x0 + mean * t, v
 
     def overdamped_response(self, t):
-        """G, G' and I from the two real roots, which coincide at critical damping."""
+        """Return G, G' and I from the two real roots, which coincide at critical damping."""
         z, w, slow_root = self.z, self.w, self.slow_root
         e = exp(slow_root * t)
         u = expm1(-2.0 * w * t)
@@ -163,25 +178,27 @@ class LinearClosedForm:
             integral = self.integral_series(t, 0.5 * t * t, 2)
         elif w > 0.5 * z:
             fast = -(z + w)
-            far = expm1(slow_root * t) / slow_root if slow_root < 0.0 else t
-            integral = 0.5 * (far - expm1(fast * t) / fast) / w
+            slow_integral = expm1(slow_root * t) / slow_root if slow_root < 0.0 else t
+            integral = 0.5 * (slow_integral - expm1(fast * t) / fast) / w
         else:
             integral = (1.0 - mean - z * g) / self.n2
         return g, mean - z * g, integral
 
     def integral_series(self, t, term, power):
-        """An integral of G at small t, where its closed form cancels, by its series, whose first term is of that power:
-        that of I'' = 1 - 2 z I' - n^2 I or J'' = t - 2 z J' - n^2 J."""
+        """Return an integral of G at small t by its series, where the closed form loses digits.
+
+        The first term has the given power of t: 2 for I'' = 1 - 2 z I' - n^2 I, 3 for J'' = t - 2 z J' - n^2 J.
+        """
         y, y2 = 2.0 * self.z * t, self.n2 * t * t
-        last, total = 0.0, term
+        previous, total = 0.0, term
         for j in range(power, 18):
-            term, last = -(y * j * term + y2 * last) / ((j + 1.0) * j), term
+            term, previous = -(y * j * term + y2 * previous) / ((j + 1.0) * j), term
             total += term
         return total
 
     def next_standstill(self, mode):
-        """When the speed, of the sign of mode, next comes to zero; inf if it never does."""
-        v, a = fabs(self.v0), mode * self.a0  # a product would turn the speed of a body at rest into -0.0
+        """Return when the velocity, which has the sign of `mode`, next reaches zero; inf if never."""
+        v, a = fabs(self.v0), mode * self.a0  # not mode * v0, which is -0.0 for a body at rest
         if self.regime == UNDAMPED:
             return self.undamped_standstill(v, a / self.w, mode * self.drift)
         if self.has_input_derivatives and self.q != 0.0:
@@ -189,12 +206,12 @@ class LinearClosedForm:
         return self.decay_time(v, a, mode * self.p)
 
     def decay_time(self, v, a, p):
-        """When what begins at v with the rate a and obeys the homogeneous equation next comes to zero, from above."""
+        """Return when a solution of the homogeneous equation with value v >= 0 and rate a next falls to zero."""
         b = a + self.z * v
         w = self.w
         if self.regime == UNDERDAMPED:
             return atan2(v * w, -b) / w
-        # the share of the slow root; without a spring that is what p keeps up
+        # weight of the slow root; without a spring it is given by p
         slow_root = b + w * v if self.n2 > 0.0 else p
         if v == 0.0 or slow_root >= 0.0:
             return inf
@@ -203,10 +220,10 @@ class LinearClosedForm:
         return -0.5 * log1p(2.0 * w * v / (slow_root - 2.0 * w * v)) / w
 
     def ramped_standstill(self, mode, v, a, q):
-        """The same where the force changes at the rate q, in the direction of the mode.
+        """Return the same for a force with rate q, in the direction of the mode.
 
-        The acceleration then obeys the homogeneous equation.  So its zeros have a closed form, and where the speed
-        falls from one to the next, the time of a standstill is halved down to.
+        The acceleration obeys the homogeneous equation, so that its zeros have a closed form.  Bisection finds the
+        standstill between two of them.
         """
         if self.regime == FREE:
             return free_standstill(v, a, q)
@@ -220,32 +237,32 @@ class LinearClosedForm:
         else:
             high = self.decay_time(fabs(a), -jerk, -q)
         if not low < inf or (high == inf and q > 0.0):
-            return inf  # it rises for ever, or falls towards a speed that lasts
+            return inf  # it rises forever, or falls towards a positive velocity
         if high < inf:
-            _, least = self.evaluate_ramp(high)
-            if mode * least > ROUNDOFF_MARGIN * v:
+            _, v_min = self.evaluate_ramp(high)
+            if mode * v_min > ROUNDOFF_MARGIN * v:
                 return inf
         else:
-            reach = 1.0 / (z + w)
+            width = 1.0 / (z + w)
             for _ in range(MAX_DOUBLINGS):
-                high = low + reach
-                reach *= 2.0
-                _, least = self.evaluate_ramp(high)
-                if mode * least <= 0.0:
+                high = low + width
+                width *= 2.0
+                _, v_min = self.evaluate_ramp(high)
+                if mode * v_min <= 0.0:
                     break
         for _ in range(MAX_BISECTIONS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            _, here = self.evaluate_ramp(middle)
-            if mode * here > 0.0:
+            _, v_middle = self.evaluate_ramp(middle)
+            if mode * v_middle > 0.0:
                 low = middle
             else:
                 high = middle
         return high
 
     def undamped_standstill(self, v, q, u):
-        """First root of u + (v - u) cos y + q sin y, a quadratic in T = tan(y/2), over w; it may be a double one."""
+        """Return the first root of u + (v - u) cos(w t) + q sin(w t), a quadratic in tan(w t/2); it may be double."""
         lead = 2.0 * u - v
         square = q * q - v * lead
         if square < 0.0:
@@ -258,13 +275,13 @@ class LinearClosedForm:
 
 
 def lag_series(square):
-    """1 - sin(y)/y for y below 0.5, from y^2, by its series."""
+    """Return 1 - sin(y)/y from y^2 by its series, for y below 0.5."""
     tail = 1.0 - square / 72.0 * (1.0 - square / 110.0 * (1.0 - square / 156.0 * (1.0 - square / 210.0)))
     return square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * tail))
 
 
 def exp_double_integral(s, t):
-    """exp(s t), twice integrated."""
+    """Return the double integral of exp(s t) from 0 to t."""
     y = s * t
     if fabs(y) > 0.5:
         return (expm1(y) - y) / (s * s)
@@ -277,7 +294,7 @@ def exp_double_integral(s, t):
 
 
 def free_standstill(v, a, q):
-    """First root of v + a t + q t^2/2 beyond zero; it may be a double one."""
+    """Return the first positive root of v + a t + q t^2/2, which may be double."""
     square = a * a - 2.0 * q * v
     if square < 0.0:
         if square < -ROUNDOFF_MARGIN * a * a:
@@ -293,7 +310,7 @@ def free_standstill(v, a, q):
 
 
 def half_angle(over, under):
-    """The angle in (0, pi] whose tangent is over/under; a tangent of zero is the end of the turn, not its start."""
+    """Return the angle in (0, pi] whose tangent is over/under; a tangent of zero gives pi."""
     y = atan2(over, under)
     if y <= 0.0:
         y += pi

@@ -1,8 +1,17 @@
-"""All that an FMU says, by its code; the native kind gets these very words.
+"""Messages of an FMU, by status code.  The native FMU gets the same texts (packaging/native).
 
-Fields: t, h are the communication step that is asked for; now, t_end the present point and where the run ends; t0 is
-the beginning of the internal step in force; start, stop are the experiment; text, unit and allowed are declared of the
-variable `name`.  Of a call: word is what it is about, a type, an address, phases.  Numbers stand as repr writes them.
+Fields of the templates:
+
+    t, h            start (s) and size (s) of the requested communication step
+    now, t0, t_end  current time, start of the current internal step, end of the run (s)
+    start, stop     start and stop time of the experiment (s)
+    name, value     variable and the value that was set
+    text, unit, allowed     description, unit and range that the variable declares
+    function, reference     FMI function and value reference of a call
+    word            subject of a call: a type, an argument, the allowed phases
+    phase           present phase of the instance
+
+Numbers are formatted by repr.
 """
 
 from __future__ import annotations
@@ -15,44 +24,44 @@ from .integrator import MAX_EVALUATIONS, MAX_STEPS
 from .variable_declarations import VariableDeclaration
 
 RUN_MESSAGES = {
-    codes.DIVERGED: "the motion leaves the range of numbers after t = {t0!r} s; lower what drives it or check the "
-    "parameters",
-    codes.STALLED: "the solver makes no headway after t = {t0!r} s, its step is as small as the time axis can hold; "
-    "raise solver.rtol or choose another solver.method",
+    codes.DIVERGED: "the solution diverges after t = {t0!r} s; reduce the excitation or check the parameters",
+    codes.STALLED: "the solver stalls after t = {t0!r} s: its step has shrunk to the resolution of the time; raise "
+    "solver.rtol or choose another solver.method",
     codes.TOO_MANY_STEPS: f"more than {MAX_STEPS} internal steps or {MAX_EVALUATIONS} right-hand sides within one "
-    "communication step, from t = {now!r} s on; choose another solver.method, raise solver.rtol or take "
-    "shorter communication steps",
-    codes.BAD_STEP: "a communication step of {h!r} s from t = {t!r} s is refused: it must be above zero, begin at the "
-    "present point, t = {now!r} s, and end by the stop time, t = {t_end!r} s",
+    "communication step after t = {now!r} s; choose another solver.method, raise solver.rtol or take shorter "
+    "communication steps",
+    codes.BAD_STEP: "a communication step of {h!r} s from t = {t!r} s is refused: it must be positive, start at the "
+    "current time, t = {now!r} s, and end by the stop time, t = {t_end!r} s",
     codes.BAD_START: "start time = {start!r} s is refused: it must be a finite number",
     codes.BAD_STOP: "stop time = {stop!r} s is refused: it must be above the start time, {start!r} s",
     codes.INTERRUPTED: "the run was interrupted after t = {now!r} s; reset the FMU to run again",
 }
 VALUE_MESSAGES = {
-    codes.CALCULATED: "{name} = {value} is refused: {text} is calculated, not set",
-    codes.FIXED: "{name} = {value} is refused: {text} is fixed, it must be set before initialisation ends; reset the "
+    codes.CALCULATED: "{name} = {value} is refused: {text} is calculated and cannot be set",
+    codes.FIXED: "{name} = {value} is refused: {text} is fixed and must be set before initialisation ends; reset the "
     "FMU to change it",
     codes.OUT_OF_RANGE: "{name} = {value}{unit} is refused: {text} must be {allowed}",
 }
 CALL_MESSAGES = {
-    codes.UNKNOWN_REFERENCE: "value reference {reference} is refused: it is not that of a variable of type "
-    "{word}; the model description of this very FMU has those that are",
-    codes.INVALID_STATE: "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; save a "
-    "state anew and pass it on unchanged",
-    codes.OUT_OF_ORDER: "{function} is refused: the FMU is {phase}, the call is allowed when it is {word}",
-    codes.NULL_POINTER: "{function} is refused: an address is missing, {word} is NULL",
-    codes.NO_MEMORY: "{function} failed: no memory is left",
-    codes.NOT_SUPPORTED: "{function} is refused: this FMU does not offer it, see its description",
-    codes.BUFFER_TOO_SMALL: "{function} is refused: a state does not fit into so few bytes",
-    codes.WRONG_TOKEN: "{function} is refused: the GUID or token must be {word}, that of modelDescription.xml",
-    codes.NO_PARTIAL_DERIVATIVE: "{function} is refused: value reference {reference} is not that of a state or an "
-    "input, or of what follows from them",
-    codes.NO_OUTPUT_DERIVATIVE: "{function} is refused: value reference {reference} has no such derivative; those "
-    "told are of outputs, and of the order 1",
-    codes.NO_INPUT_DERIVATIVE: "{function} is refused: value reference {reference} takes no such derivative; an "
-    f"input without a range takes finite ones of the orders 1 to {codes.MAX_INPUT_ORDER}, so leave out those "
-    "above and take shorter communication steps",
-    codes.WRONG_LENGTH: "{function} is refused: {word} is another number than there are",
+    codes.UNKNOWN_REFERENCE: "value reference {reference} is refused: this FMU has no such variable of type {word}; "
+    "see its modelDescription.xml",
+    codes.INVALID_STATE: "a saved state is refused: another FMU wrote it or it has been changed; save the state again "
+    "and pass it on unchanged",
+    codes.OUT_OF_ORDER: "{function} is refused: the FMU is {phase}, but the call is allowed only when it is {word}",
+    codes.NULL_POINTER: "{function} is refused: {word} is NULL",
+    codes.NO_MEMORY: "{function} failed: out of memory",
+    codes.NOT_SUPPORTED: "{function} is refused: this FMU does not support it, see its modelDescription.xml",
+    codes.BUFFER_TOO_SMALL: "{function} is refused: the buffer is too small for a state",
+    codes.WRONG_TOKEN: "{function} is refused: the GUID or instantiation token must be {word}, as in "
+    "modelDescription.xml",
+    codes.NO_PARTIAL_DERIVATIVE: "{function} is refused: value reference {reference} is neither a state nor an input "
+    "nor a variable that depends on them",
+    codes.NO_OUTPUT_DERIVATIVE: "{function} is refused: value reference {reference} has no such derivative; outputs "
+    "have derivatives of order 1",
+    codes.NO_INPUT_DERIVATIVE: "{function} is refused: value reference {reference} accepts no such derivative; an "
+    f"input without a range accepts finite derivatives of orders 1 to {codes.MAX_INPUT_ORDER}; leave out higher orders "
+    "and take shorter communication steps",
+    codes.WRONG_LENGTH: "{function} is refused: {word} is wrong",
 }
 PHASE_NAMES = {
     codes.INSTANTIATED: "instantiated",
@@ -66,16 +75,16 @@ PHASE_NAMES = {
 
 
 def run_message(status: int, run: RunState, model: Any, t: float, h: float) -> str:
-    """The sentence about a run, or about the rule of the model that its values break."""
+    """Return the message for a failed run, or for the rule of the model that the values violate."""
     if status not in RUN_MESSAGES:
         return str(model.rules[status - codes.FIRST_RULE - 1]).format_map(vars(model))
     solver = model.solver
-    present = {"now": solver.t, "t0": solver.step.t0, "t_end": solver.step.t_end}
-    return RUN_MESSAGES[status].format(t=t, h=h, start=run.start_time, stop=run.stop_time, **present)
+    times = {"now": solver.t, "t0": solver.step.t0, "t_end": solver.step.t_end}
+    return RUN_MESSAGES[status].format(t=t, h=h, start=run.start_time, stop=run.stop_time, **times)
 
 
 def value_message(reason: int, name: str, declared: VariableDeclaration, value: float) -> str:
-    """The sentence about a value that cannot be used, of a declared variable."""
+    """Return the message for a value that the declared variable `name` rejects."""
     return VALUE_MESSAGES[reason].format(
         name=name, value=repr(value), unit=declared.unit_suffix, text=declared.text, allowed=declared.allowed
     )

@@ -1,15 +1,15 @@
-"""Model exchange: what an importer's solver asks of an oscillator, and what happens at an event.
+"""Model exchange: derivatives, event indicators and event handling for the solver of an importer.
 
-Continuous states are those of the model and, where there is one, the position of the driver: so nothing depends on the
-time as such.  The modes of friction are discrete states.  They change in `update` only, so that the motion is smooth
-between events, and stands exactly still where friction holds it.  An importer finds an event where an indicator of a
-contact falls to zero, or at the time that it was told:
+The continuous states are those of the model and the position of the driver, if there is one; nothing depends on time
+explicitly.  The modes of friction are discrete states, which change in `update_modes` only.  So the motion is smooth
+between events, and exactly at rest while it sticks.  An event occurs at `t_next_event`, or where an indicator of a
+contact falls to zero:
 
-    to_rest          mode v while sliding, 1 while stuck
+    to_rest          mode * v while sliding, 1 while stuck
     to_break_away    limit - |load| while stuck, 1 while sliding
 
-At an event that has been handled neither is zero, for solvers take a root there for one that stays: both fall to zero
-just beyond the event.
+Both indicators fall to zero slightly beyond the event, because some solvers report a zero at the current time as
+another event.
 """
 
 from math import fabs, inf, nan
@@ -34,14 +34,17 @@ from .vectors import (
     velocity_indices,
 )
 
-OVERSHOOT_TOLERANCE = 0.1  # share of a slip and what it is made of, by which an importer may find its end too late
-INDICATOR_OFFSET, TINY = 4.0 * EPSILON, 1e-300  # of the limit; of a speed and a force
-DEFAULT_TOLERANCE = 1e-4  # taken for the importer's, where it tells none
+OVERSHOOT_TOLERANCE = 0.1  # slip velocities of the wrong sign up to this share of their terms are overshoot
+INDICATOR_OFFSET, TINY = 4.0 * EPSILON, 1e-300  # offset relative to the limit; absolute offset of velocities and forces
+DEFAULT_TOLERANCE = 1e-4  # relative tolerance if the importer gives none
 
 
 class ModelExchange:
-    """What is read of it, as last asked for: rows over the continuous states and over the event indicators, all to rest
-    before all to break away; the indicators one by one, and the rate of the driver; what an event has changed."""
+    """Buffers of the model-exchange interface.
+
+    `states`, `rates` and `nominals` run over the continuous states, `indicators` over the event indicators: first
+    `to_rest` of all contacts, then `to_break_away`.
+    """
 
     to_rest: ContactVector
     to_break_away: ContactVector
@@ -55,19 +58,19 @@ class ModelExchange:
         self.states = [*y, 0.0] if model.has_driver else [*y]
         self.rates = [*y, 0.0] if model.has_driver else [*y]
         self.nominals = [*y, 0.0] if model.has_driver else [*y]
-        self.indicators = [*modes, *modes, 1.0]  # the last is nobody's: C has no empty rows
+        self.indicators = [*modes, *modes, 1.0]  # the last one is unused: C has no empty arrays
         self.to_rest = self.to_break_away = 1.0
         self.driver_rate = self.nominal_velocity = 0.0
         self.states_changed = self.nominals_changed = False
-        self.t_next_event = inf  # when a contact will break away, as far as can be known
-        # a communication step in leaps: where it ends, whether a leap ended at an event, and what they may cost
+        self.t_next_event = inf  # time of the next break-away, as far as it is known
+        # communication step with early return: end, event reached, internal steps and limit of evaluations
         self.step_end = 0.0
         self.event_reached = False
         self.n_internal_steps = self.max_evals = 0
 
 
 class ModelExchangeMixin:
-    """A base before that of a model, which then owns an Exchange."""
+    """Mixin that gives a model its ModelExchange buffers."""
 
     def __init__(self):
         super().__init__()
@@ -75,12 +78,12 @@ class ModelExchangeMixin:
 
 
 def enable(run):
-    """The instance is for model exchange."""
+    """Configure an instance for model exchange."""
     run.interface, run.tolerance = MODEL_EXCHANGE, DEFAULT_TOLERANCE
 
 
 def begin(model):
-    """From here on the importer's solver steps: no internal step is in force, and none has been counted."""
+    """Hand over to the solver of the importer: there is no internal step, and its counters are zero."""
     solver = model.solver
     step = solver.step
     start_counters = step.start_counters
@@ -90,7 +93,7 @@ def begin(model):
 
 
 def prepare(run, model):
-    """Whether the values can be used.  Status."""
+    """Apply pending changes before the model is evaluated.  Returns a status."""
     if run.phase >= RUNNING or run.has_failed:
         return call_sequence.prepare_to_step(run, model)
     if run.outputs_current:
@@ -99,7 +102,7 @@ def prepare(run, model):
 
 
 def set_time(run, model, t):
-    """The present time is t, the states stay."""
+    """Set the time; the states stay."""
     run.outputs_current = False
     solver = model.solver
     solver.t = solver.step.t0 = t
@@ -108,7 +111,7 @@ def set_time(run, model, t):
 
 
 def set_continuous_states(run, model):
-    """Take over the continuous states, which stand in their row; the driver's is at the present time, as it stays."""
+    """Copy the continuous states from their buffer into the model, at the current time."""
     run.outputs_current = False
     exchange = model.model_exchange
     solver = model.solver
@@ -119,7 +122,7 @@ def set_continuous_states(run, model):
 
 
 def update_states(model):
-    """The continuous states."""
+    """Update the buffer of the continuous states."""
     exchange = model.model_exchange
     solver = model.solver
     for i in state_indices:
@@ -129,7 +132,7 @@ def update_states(model):
 
 
 def update_nominals(model):
-    """The sizes of the states below which a tolerance is absolute: those of our own solver where nobody sets them."""
+    """Update the nominal values of the continuous states, with the defaults of the internal solver."""
     exchange = model.model_exchange
     solver = model.solver
     exchange.nominal_velocity = model.nominal_velocity()
@@ -144,7 +147,7 @@ def update_nominals(model):
 
 
 def update_rates(model):
-    """The derivatives of the continuous states."""
+    """Update the derivatives of the continuous states."""
     exchange = model.model_exchange
     solver = model.solver
     y = solver.y
@@ -160,13 +163,13 @@ def update_rates(model):
 
 
 def update_input_rates(model):
-    """Set the rates of the inputs that have any."""
+    """Update the rates of inputs that have derivatives."""
     if model.has_input_derivatives:
         model.set_input_rates(model.solver.t)
 
 
 def update_indicators(model):
-    """The event indicators; where the law of friction knows no modes, they are 1."""
+    """Update the event indicators; they are 1 if the friction law has no modes."""
     exchange = model.model_exchange
     solver = model.solver
     to_rest, to_break_away = contact_vector(), contact_vector()
@@ -175,13 +178,13 @@ def update_indicators(model):
     if model.has_dry_friction and solver.step.is_hybrid:
         if model.is_coupled:
             slips = model.slip_velocities(solver.t, solver.y)
-            force, most, terms = model.contact_forces(solver.t, solver.y, solver.modes)
+            force, limit, terms = model.contact_forces(solver.t, solver.y, solver.modes)
             for i in contact_indices:
                 if solver.modes[i] != STUCK:
                     to_rest[i] = solver.modes[i] * slips[i] + TINY
                 else:
-                    slack = ROUNDOFF_MARGIN * (terms[i] + most[i])
-                    to_break_away[i] = most[i] + slack + INDICATOR_OFFSET * most[i] + TINY - fabs(force[i])
+                    slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
+                    to_break_away[i] = limit[i] + slack + INDICATOR_OFFSET * limit[i] + TINY - fabs(force[i])
         else:
             for i in contact_indices:
                 if solver.modes[i] != STUCK:
@@ -195,7 +198,7 @@ def update_indicators(model):
 
 
 def update_variables(model):
-    """Set what is read like a variable."""
+    """Update the buffers that are read as variables: indicators and rate of the driver."""
     exchange = model.model_exchange
     solver = model.solver
     if model.has_dry_friction:
@@ -210,16 +213,16 @@ def update_variables(model):
 
 
 def handle_event(run, model):
-    """An event is handled: `jumped` and `rescaled` tell the importer what is new, `due` when the next is.  Status.
+    """Handle an event; set `states_changed`, `nominals_changed` and `t_next_event`.  Returns a status.
 
-    What was set makes another motion, as a new mode does: some importers restart their solver only where a state is
-    said to have jumped, and an input that jumps ends their run.
+    Changed parameters and inputs also report `states_changed`: some importers restart their solver only then, and fail
+    at an input with a jump otherwise.
     """
     exchange = model.model_exchange
     solver = model.solver
     exchange.states_changed = exchange.nominals_changed = run.outputs_current = False
     status = call_sequence.prepare_to_step(run, model)
-    if status != OK or run.interface != MODEL_EXCHANGE:  # co-simulation goes on with what was set
+    if status != OK or run.interface != MODEL_EXCHANGE:  # co-simulation continues with the new values
         return status
     if not sum_of(magnitude(solver.y)) < OVERFLOW_LIMIT:
         return DIVERGED
@@ -235,17 +238,18 @@ def handle_event(run, model):
 
 
 def update_modes(model, solver):
-    """Let the modes follow the present point; whether the motion is another from here on, as solvers must know.
+    """Update the modes at the current time; return whether the solver must restart.
 
-    The speed is set to zero where a slide has ended.  Without a reason for an event nothing changes, nor does it the
-    second time.
+    The slip velocity is set to zero where slip ends.  Without a cause nothing changes, so a second call has no effect.
     """
     tie_tolerance = TIE_FACTOR * solver.step.tolerance
-    another = changed = False
-    fits = True
+    needs_restart = changed = False
+    consistent = True
     if model.is_coupled:
-        y, modes, fits = model.resolve_at_start(solver.t, solver.y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE)
-        another, changed = any_of(y != solver.y), any_of(modes != solver.modes)
+        y, modes, consistent = model.resolve_at_start(
+            solver.t, solver.y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
+        )
+        needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
         solver.y, solver.modes = y, modes
     else:
         for i in contact_indices:
@@ -253,31 +257,32 @@ def update_modes(model, solver):
             if not mode * solver.y[slip_index[i]] > 0.0:
                 if mode != STUCK and solver.y[slip_index[i]] != 0.0:
                     solver.y[slip_index[i]] = 0.0
-                    another = True
+                    needs_restart = True
                 if not model.is_grazing(solver.t, solver.y, solver.modes, 0.0, i):
                     solver.modes[i] = model.resolve_mode(solver.t, solver.y, tie_tolerance, i)
                 if solver.modes[i] == STUCK and solver.t >= model.model_exchange.t_next_event:
-                    load, rate, limit = model.stick_load(solver.t, solver.y, i)  # due, but for rounding
+                    # the load is at the limit, except for rounding errors
+                    load, rate, limit = model.stick_load(solver.t, solver.y, i)
                     if load * rate > 0.0 and limit - fabs(load) <= tie_tolerance * limit:
                         solver.modes[i] = 1 if rate > 0.0 else -1
                 if solver.modes[i] != mode:
                     changed = True
                     if solver.modes[i] != STUCK and solver.y[slip_index[i]] == 0.0:
-                        fits = fits and model.is_consistent(solver.t, solver.y, solver.modes, i)
-    if not fits:
+                        consistent = consistent and model.is_consistent(solver.t, solver.y, solver.modes, i)
+    if not consistent:
         for i in state_indices:
-            solver.y[i] = nan  # no motion obeys the equations
+            solver.y[i] = nan  # no modes satisfy the equations
     if changed:
         solver.step.start_counters.n_events += 1
         solver.step.start_counters.t_event = solver.t
-    return another or changed
+    return needs_restart or changed
 
 
 def next_breakaway(model, solver):
-    """When a contact breaks away if nothing but the driver moves; inf if it never does."""
+    """Return when a contact breaks away if only the driver moves; inf if never."""
     if not (model.rests_when_stuck and all_of(solver.modes == STUCK)):
         return inf
-    ends, ways = contact_vector(), contact_vector()
+    ends, directions = contact_vector(), contact_vector()
     for i in contact_indices:
-        ends[i], ways[i] = model.breakaway_time(solver.t, solver.y, i)
+        ends[i], directions[i] = model.breakaway_time(solver.t, solver.y, i)
     return min_of(ends)

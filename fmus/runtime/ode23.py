@@ -1,4 +1,4 @@
-"""Bogacki-Shampine 3(2), local extrapolation, first same as last, cubic interpolant.
+"""Bogacki-Shampine 3(2): local extrapolation, first same as last, cubic interpolant.
 
 P. Bogacki, L. F. Shampine, A 3(2) pair of Runge-Kutta formulas, Appl. Math. Lett. 2 (1989) 321-325;
 L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22.
@@ -6,19 +6,19 @@ L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1
 
 from .vectors import ContactVector, RateVector, StateVector
 
-NUMBER, TEXT = 2, "Bogacki-Shampine 3(2), with the step control of MATLAB's program; for loose tolerances"
-STAGES = 3  # right-hand sides a step; the last is the first of the next step
-EXTRA = 0  # right-hand sides that the interpolant needs on top
+NUMBER, TEXT = 2, "Bogacki-Shampine 3(2), step control as in MATLAB; for loose tolerances"
+STAGES = 3  # evaluations of the right-hand side in a step; the last one serves the next step
+EXTRA = 0  # additional evaluations for the interpolant
 POWER, SAFETY, SHRINK, GROW = 1.0 / 3.0, 0.8, 0.5, 5.0
 
 
 class Ode23:
-    """One step, and the cubic through values and slopes of both its ends."""
+    """Method with a cubic Hermite interpolant."""
 
     def propose(
         self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
-        """The new state, its rates, and the rates e of the error: the estimates are h e."""
+        """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + 0.5 * h * f
         f2 = model.rates(t + 0.5 * h, y2, modes)
         y3 = y + 0.75 * h * f2
@@ -29,5 +29,5 @@ class Ode23:
         return y1, f1, e
 
     def build_interpolant(self, model, step):
-        """The interpolant of the step just taken."""
+        """Build the interpolant of the step just computed."""
         step.interpolant.set_hermite_cubic(step)

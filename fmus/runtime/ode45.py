@@ -1,4 +1,4 @@
-"""Dormand-Prince 5(4), local extrapolation, first same as last, interpolant of order 4.
+"""Dormand-Prince 5(4): local extrapolation, first same as last, interpolant of order 4.
 
 J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta formulae, J. Comp. Appl. Math. 6 (1980) 19-26;
 L. F. Shampine, Some practical Runge-Kutta formulas, Math. Comp. 46 (1986) 135-150 (the interpolant), in the form of
@@ -7,9 +7,9 @@ E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 
 
 from .vectors import ContactVector, RateVector, StateVector
 
-NUMBER, TEXT = 3, "Dormand-Prince 5(4), with the step control of MATLAB's program; for moderate tolerances"
-STAGES = 6  # right-hand sides a step; the last is the first of the next step
-EXTRA = 0  # right-hand sides that the interpolant needs on top
+NUMBER, TEXT = 3, "Dormand-Prince 5(4), step control as in MATLAB; for moderate tolerances"
+STAGES = 6  # evaluations of the right-hand side in a step; the last one serves the next step
+EXTRA = 0  # additional evaluations for the interpolant
 POWER, SAFETY, SHRINK, GROW = 1.0 / 5.0, 0.8, 0.1, 5.0
 
 A21 = 1.0 / 5.0
@@ -26,7 +26,7 @@ D5, D6, D7 = 701980252875.0 / 199316789632.0, -1453857185.0 / 822651844.0, 69997
 
 
 class Ode45:
-    """One step, and the quartic that keeps values and slopes of both its ends."""
+    """Method with a quartic interpolant that matches values and slopes at both ends."""
 
     def __init__(self):
         self.f3 = self.f4 = self.f5 = self.f6 = 0.0
@@ -34,7 +34,7 @@ class Ode45:
     def propose(
         self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
-        """The new state, its rates, and the rates e of the error: the estimates are h e."""
+        """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         y2 = y + h * A21 * f
         f2 = model.rates(t + C2 * h, y2, modes)
         y3 = y + h * (A31 * f + A32 * f2)
@@ -52,7 +52,7 @@ class Ode45:
         return y1, f1, e
 
     def build_interpolant(self, model, step):
-        """The interpolant of the step just taken: the cubic of ode23 and D s^2 (1 - s)^2."""
+        """Build the interpolant: the cubic Hermite polynomial plus D s^2 (1 - s)^2."""
         inside = step.interpolant
         inside.set_hermite_cubic(step)
         inside.degree = 4

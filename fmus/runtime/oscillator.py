@@ -1,4 +1,4 @@
-"""One degree of freedom: what all oscillators share."""
+"""Base class of all models: protocol between a model and the solver."""
 
 from math import inf
 
@@ -6,40 +6,41 @@ from .variable_declarations import Count, Local, VariableOwner
 
 
 class Events(VariableOwner):
-    """Changes of mode up to the present point."""
+    """Statistics of mode changes up to the current time."""
 
-    count = Count("changes of mode up to the present point")
-    t_last = Local("s", "time of the last change of mode; the start time before the first")
+    count = Count("changes of mode up to the current time")
+    t_last = Local("s", "time of the last change of mode; the start time if there is none")
 
 
 class Oscillator(VariableOwner):
-    """An oscillator of some states, those of one body where it does not say otherwise, under names of its own.
+    """Oscillator with one or more states.
 
-    A model owns `solver`, a March, and says, of all its states and modes in their order,
-        initial(t)                     the states at the start, which is at time t
-        prepare()                      constants that follow from the values; 0, or the number of the broken rule
-        rates(t, states, modes)        those that are no states; a mode is the direction of sliding, 0 where the law
-                                       itself looks at the speed
-        jacobian(t, states, modes)     for each of these its derivatives by t and by the states, for rodas
-        observe(t, states, modes)      sets the outputs; whether they are numbers
-    and if it is linear, between its modes, m v' + c v + k x = F + k u t,
-        piece()                        m, c, k and u
-        push(t, modes)                 what of the acceleration is due to forces, at x = v = 0
-        push_rate(t, n)                the n-th derivative of that, where inputs have any
+    The generated model class owns `solver`, an Integrator, and defines
+
+        initial_state(t)               states at the start time t
+        prepare()                      constants that depend on parameters; returns 0, or the number of a violated rule
+        rates(t, states, modes)        rates that are not states themselves; a mode is the direction of sliding, or 0
+                                       where the friction law evaluates the velocity itself
+        jacobian(t, states, modes)     for each of these rates its derivatives by t and by the states (for rodas)
+        compute_outputs(t, states, modes)   sets the outputs; returns whether all are finite
+
+    A model that is linear between its changes of mode, m v' + c v + k x = F + k u t, also defines
+
+        linear_coefficients()          m, c, k and u
+        applied_acceleration(t, modes) acceleration due to forces, at x = v = 0
+        applied_acceleration_derivative(t, n)   n-th derivative of that, if inputs have derivatives
     """
 
-    states: dict[str, str] = {"x": "v", "v": "a"}  # name -> name of its rate, which may be a state
-    contacts: dict[str, str] = {}  # name of the mode -> the state that is its slip
-    has_dry_friction = False  # friction with modes: see automaton.py
-    rests_when_stuck = False  # while its contact is stuck nothing moves
-    is_coupled = False  # a contact may be stuck while something moves
-    has_driver = False  # it follows a driver, who stood at x_base at the time t_base and moves at the speed drive()
-    has_input_derivatives = (
-        False  # its inputs have derivatives, those in input_course at the time t_base; some bend, if bends()
-    )
-    is_linear = False  # piecewise linear: see exact.py
-    rules: tuple[str, ...] = ()  # one sentence for each rule that binds several values, in their names
-    own_solver_rule = 0  # the number of the rule that is about our solver, and does not bind an importer's
+    states: dict[str, str] = {"x": "v", "v": "a"}  # state -> its rate, which may be a state
+    contacts: dict[str, str] = {}  # mode -> state that is the slip velocity of the contact
+    has_dry_friction = False  # friction with modes (stick_slip.py)
+    rests_when_stuck = False  # a single body: nothing moves while its contact sticks
+    is_coupled = False  # a contact may stick while something moves (contact_lcp.py)
+    has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()
+    has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1
+    is_linear = False  # piecewise linear (linear_closed_form.py)
+    rules: tuple[str, ...] = ()  # message for each rule that several values must satisfy; fields are their names
+    own_solver_rule = 0  # number of the rule that concerns this solver only, not an importer's
     stop_time = 4.0
     step_size = 0.004
     tolerance = 1e-6
@@ -49,14 +50,14 @@ class Oscillator(VariableOwner):
         self.events = Events()
 
     def nominal_velocity(self):
-        """The speed, in m/s or rad/s, that an absolute tolerance must resolve; inf where none is special."""
+        """Return the velocity (m/s or rad/s) that the absolute tolerance must resolve; inf if there is none."""
         return inf
 
     def driver_velocity(self):
-        """The speed of the driver."""
+        """Return the velocity of the driver."""
         return 0.0
 
     def rebase(self, t):
-        """Fix at time t what is integrated in closed form, before a value changes: where the driver is."""
+        """Move the reference of closed-form motions (the driver) to time t, before a parameter changes."""
         if self.has_driver:
             self.t_base, self.x_base = t, self.x_base + self.driver_velocity() * (t - self.t_base)

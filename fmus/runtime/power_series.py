@@ -1,37 +1,45 @@
-"""A power series over a stretch of time, and where it first comes to zero: motions and loads that have no closed form.
+"""Power series over a time interval and its first zero, for motions and loads without a closed form.
 
-With u the share of the stretch that has passed, f = sum c_j u^j.  As long as |f''| <= M, f lies above the parabola
-f + f' d - M d^2/2 for d to come: who goes where that comes to zero passes no zero of f.
+f(u) = sum c_j u^j, where u in [0, 1] is the elapsed fraction of the interval.  While |f''| <= M, f(u + d) stays above
+the parabola f + f' d - M d^2/2.  Stepping to the zero of that parabola therefore cannot jump over a zero of f.
 """
 
 from math import fabs, sqrt
 
-TERMS = 20  # of a motion, where the largest rate times the stretch is 1
+TERMS = 20  # enough for a motion whose largest eigenvalue times the interval is 1
 MAX_BISECTIONS, MAX_ITERATIONS = 200, 100
 
 
 class PowerSeries:
-    """The coefficients, and how many seconds the stretch takes."""
+    """Coefficients, and the duration of the interval in s."""
 
     def __init__(self):
         self.duration = 0.0
         self.c = [0.0] * (TERMS + 1)
 
     def first_zero(self, side):
-        """How far it keeps the sign of `side`, as a share of the stretch, and whether it ends there; it may begin with
-        zero, and then it has the sign that comes first.  No further is looked than where its first two terms count."""
+        """Find the first zero of a series that has the sign of `side` (1 or -1) at first.
+
+        A series that starts at zero has the sign of its first non-zero term.  The search covers only the part of the
+        interval where the first two terms dominate.
+
+        Returns
+        -------
+        tuple
+            The fraction of the interval up to which the sign is known, and whether there is a zero.
+        """
         first = 0
         while self.c[first] == 0.0:
             first += 1
             if first == TERMS:
                 return 1.0, False
         reach = 1.0
-        rest, most = self.coefficient_bounds(first, reach)
+        higher_terms, curvature = self.coefficient_bounds(first, reach)
         for _ in range(MAX_BISECTIONS):
-            if rest <= fabs(self.c[first]) + fabs(self.c[first + 1]) * reach:
+            if higher_terms <= fabs(self.c[first]) + fabs(self.c[first + 1]) * reach:
                 break
             reach *= 0.5
-            rest, most = self.coefficient_bounds(first, reach)
+            higher_terms, curvature = self.coefficient_bounds(first, reach)
         u = 0.0
         for _ in range(MAX_ITERATIONS):
             value = slope = 0.0
@@ -40,20 +48,20 @@ class PowerSeries:
                 value = side * self.c[TERMS - i] + value * u
             if value <= 0.0:
                 return u, True
-            fall = sqrt(slope * slope + 2.0 * most * value) - slope
-            if not 2.0 * value < (reach - u) * fall:
+            descent = sqrt(slope * slope + 2.0 * curvature * value) - slope
+            if not 2.0 * value < (reach - u) * descent:
                 return reach, False
-            ahead = u + 2.0 * value / fall
-            if ahead == u:
+            u_next = u + 2.0 * value / descent
+            if u_next == u:
                 return u, True
-            u = ahead
+            u = u_next
         return u, False
 
     def coefficient_bounds(self, first, reach):
-        """Of f/u^first up to there: of all terms but the first two, and of the second derivative."""
-        rest = most = 0.0
+        """Bound, for f/u^first on [0, reach], the terms beyond the first two and the second derivative."""
+        higher_terms = curvature = 0.0
         for i in range(TERMS - 1 - first):
             n = TERMS - first - i
-            rest = fabs(self.c[first + n]) + rest * reach
-            most = n * (n - 1) * fabs(self.c[first + n]) + most * reach
-        return rest * reach * reach, most
+            higher_terms = fabs(self.c[first + n]) + higher_terms * reach
+            curvature = n * (n - 1) * fabs(self.c[first + n]) + curvature * reach
+        return higher_terms * reach * reach, curvature

@@ -1,7 +1,7 @@
-"""What may cross from Python into the native layer that called it: text, and no exception unless it is paid for.
+"""Workarounds for the native layer of pythonfmu: exceptions, references, texts and standard error.
 
-After an exception the layer gives back its references to the class, the instance and the log; freed or reset, it gives
-them back once more.
+After an exception the layer releases its references to the class, the instance and the log; when the instance is freed
+or reset, it releases them again.  Add the missing references before an exception leaves Python.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from weakref import ref
 
 
 def signal_safe(function: Any) -> Any:
-    """The function, all of which is one try statement, such that this holds from its first instruction on.
+    """Extend the try statement of a function to its first instruction; the body must be one try statement.
 
-    Since Python 3.11 a signal that has come meanwhile is handled when a function is entered: before the first line of
-    it, hence outside of any try.  The table of handlers (Objects/exception_handling_notes.txt of CPython) begins with
-    the start and the length of what the outermost covers, in 6 bits a byte.  Before, a function that begins with its
-    try is safe as it is, if that is no longer than 127 instructions.
+    Since Python 3.11 a pending signal is handled on entry to a function, before its first line and hence outside of any
+    try.  The exception table (Objects/exception_handling_notes.txt of CPython) begins with start and length of the
+    outermost range, in 6 bits a byte.  Earlier versions need no change, if the try statement has at most 127
+    instructions.
     """
     table = getattr(function.__code__, "co_exceptiontable", b"")
     if table:
@@ -49,33 +49,33 @@ def _write_varint(number: int) -> bytes:
 
 
 def reraise_later(error: BaseException, message: object) -> object:
-    """Raise the exception in this thread again as soon as the message is gone.
+    """Raise the exception again in this thread once the message has been released.
 
-    The layer hands the messages to the host, who may run Python for it, and drops them when the call has no more to do:
-    what it returns to is the host.  Until then nothing of ours may run, so all that listens is made in C.
+    The native layer passes messages to the host, which may run Python, and releases them at the end of the call.  No
+    Python code of the FMU may run until then, so the callback consists of C functions only.
     """
     error.__traceback__ = None
     again = type(type(error).__name__, (type(error),), {"__new__": lambda cls: error})
     raise_in = pythonapi["PyThreadState_SetAsyncExc"]
-    raise_in.argtypes = c_ulong, py_object, py_object  # the last is the reference that died, which C overlooks
+    raise_in.argtypes = c_ulong, py_object, py_object  # the last one is the dead weak reference, which C ignores
     return ref(message, partial(raise_in, get_ident(), again))
 
 
-def add_references(*things: object) -> None:
-    """Take the references that the layer will give back once too often."""
-    for thing in things:
-        pythonapi["Py_IncRef"](py_object(thing))
+def add_references(*objects: object) -> None:
+    """Add the references that the native layer releases once too often."""
+    for one in objects:
+        pythonapi["Py_IncRef"](py_object(one))
 
 
 def sanitize(text: str) -> str:
-    """A text that can be handed over as UTF-8, and ends where it ends in C."""
+    """Return a text without NUL characters that can be encoded in UTF-8."""
     return text.replace("\0", "").encode("utf-8", "backslashreplace").decode()
 
 
 def write_to_stderr(line: str) -> None:
-    """On standard error, whatever has become of it.
+    """Write a line to standard error, even if the stream is broken.
 
-    Past its buffer, where there is one: what cannot be written would wait there, and Python end with status 120.
+    The buffer is bypassed: text that cannot be written would stay there, and Python would exit with status 120.
     """
     with suppress(Exception):
         stream = sys.stderr

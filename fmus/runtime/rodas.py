@@ -1,23 +1,23 @@
-"""RODAS4P2: a Rosenbrock method of order 4(3), stiffly accurate and L-stable, with an interpolant of order 3.
+"""RODAS4P2: Rosenbrock method of order 4(3), stiffly accurate, L-stable, with an interpolant of order 3.
 
-Every stage solves one linear system with the Jacobian J at the beginning of the step, and nothing is iterated:
+Every stage solves one linear system with the Jacobian J at the start of the step; there is no iteration:
 
     (1/(GAMMA h) - J) u_i = f(t + C_i h, y + sum A_ij u_j) + sum G_ij u_j/h + D_i h f_t,    i = 1 ... 6
 
-Here u_i = h k_i.  The system is solved by elimination, written out for the states that a model has: a state whose rate
-is a state follows from it, so one body costs one division.  Stages 5, 6 and the new point differ by one u each.
+Here u_i = h k_i.  Gaussian elimination is unrolled for the states of a model.  States whose rate is another state are
+eliminated first, so one body costs one division.  Stages 5, 6 and the new state differ by one u each.
 
 E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.7; G. Steinebach, Improvement of Rosenbrock-Wanner
-method RODASP, in: Progress in Differential-Algebraic Equations II, Springer 2020, 165-184 (the numbers).
+method RODASP, in: Progress in Differential-Algebraic Equations II, Springer 2020, 165-184 (coefficients).
 """
 
-from math import fabs, nan  # noqa: F401  of a system that cannot be solved
+from math import fabs, nan  # noqa: F401  used by the unrolled elimination for singular systems
 
 from .vectors import ContactVector, RateVector, StateVector, factorize, select_kinematic, solve_factored
 
 NUMBER, TEXT = 5, "Rosenbrock 4(3), L-stable; for stiff friction curves"
-STAGES = 6  # right-hand sides a step, and one Jacobian; the last is the first of the next step
-EXTRA = 0  # right-hand sides that the interpolant needs on top
+STAGES = 6  # evaluations of the right-hand side in a step, besides one Jacobian; the last one serves the next step
+EXTRA = 0  # additional evaluations for the interpolant
 POWER, SAFETY, SHRINK, GROW = 1.0 / 4.0, 0.9, 0.1, 6.0
 
 GAMMA = 0.25
@@ -45,7 +45,7 @@ H34, H35 = 18.104410789349338, -3.516963011559032
 
 
 class Rodas:
-    """One step, and between its ends a cubic: Hermite's for a state whose rate is a state, else as the stages say."""
+    """Method with a cubic interpolant: Hermite for states whose rate is a state, else from the stages."""
 
     k1: StateVector
     k2: StateVector
@@ -59,7 +59,7 @@ class Rodas:
     def propose(
         self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h
     ) -> tuple[StateVector, RateVector, StateVector]:
-        """The new state, its rates, and the rates e of the error: the estimates are h e."""
+        """Propose a step of size h: return the new state, its rates, and e, where h e estimates the error."""
         f_t, J = model.jacobian(t, y, modes)
         drift = h * f_t
         s = factorize(GAMMA, h, J)
@@ -98,7 +98,7 @@ class Rodas:
         return y1, f1, e
 
     def build_interpolant(self, model, step):
-        """The interpolant of the step just taken; slopes are of no use where the curve is stiff."""
+        """Build the interpolant; the end slopes are unusable where the problem is stiff."""
         inside = step.interpolant
         inside.set_hermite_cubic(step)
         h = step.h_full

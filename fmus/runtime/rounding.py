@@ -1,4 +1,4 @@
-"""What rounding does to a number, as a share of it."""
+"""Relative sizes of rounding errors."""
 
-EPSILON = 2.220446049250313e-16  # the last place of a double
-ROUNDOFF_MARGIN = 64.0 * EPSILON  # how far it may carry a closed form from a tie
+EPSILON = 2.220446049250313e-16  # machine epsilon of a double
+ROUNDOFF_MARGIN = 64.0 * EPSILON  # relative tolerance for ties between stick and slip in closed forms

@@ -1,4 +1,4 @@
-"""Saved states: what one holds, what its bytes are (a checksum, then JSON), and whether they may be taken over."""
+"""Saved states of an instance: contents, serialization (checksum and JSON), and validation."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from .messages import CALL_MESSAGES
 from .pythonfmu_workarounds import add_references, sanitize, signal_safe, write_to_stderr
 from .variable_access import SETTABLE_CAUSALITIES, UNKNOWN_NAME, VariableAccess
 
-AttributeTree = dict[str, Any]  # the name of every number with None, and of every object with the shape of that
+AttributeTree = dict[str, Any]  # attribute name -> None for a number, subtree for an object
 
-MAX_BYTES = 1 << 20  # bytes; a state has some thousand
-MAX_NESTING = 400  # brackets: what they nest must not overflow the parser
-INT64_LIMIT = 1 << 63  # integers are those of C
+MAX_BYTES = 1 << 20  # typical: some thousand
+MAX_NESTING = 400  # brackets in total, so that the parser cannot overflow
+INT64_LIMIT = 1 << 63  # integers must fit into C
 
 INVALID_STATE_MESSAGE = CALL_MESSAGES[INVALID_STATE]
 
 
 def to_bytes(state: object) -> bytes:
-    """The bytes of a state."""
+    """Serialize a state."""
     text = json.dumps(state).encode()
     return b"%08x" % crc32(text) + text
 
 
 def from_bytes(content: bytes) -> Any:
-    """What the bytes hold, or None where they cannot be a state."""
+    """Parse a serialized state; None if it cannot be one."""
     seal, text = content[:8], content[8:]
     if len(text) > MAX_BYTES or seal != b"%08x" % crc32(text) or text.count(b"[") + text.count(b"{") > MAX_NESTING:
         return None
@@ -40,12 +40,12 @@ def from_bytes(content: bytes) -> Any:
 
 
 def parse_integer(text: str) -> int:
-    """As int, which takes minutes for a million digits."""
+    """Parse an integer of limited length; int() would take minutes for a million digits."""
     return int(text[:20])
 
 
 def matches_pattern(value: Any, pattern: Any) -> bool:
-    """Whether a value has the very names, types and lengths of the pattern."""
+    """Return whether a value has the same names, types and lengths as the pattern."""
     if type(value) is not type(pattern):
         return False
     if type(value) is dict:
@@ -55,46 +55,46 @@ def matches_pattern(value: Any, pattern: Any) -> bool:
     return type(value) is not int or -INT64_LIMIT <= value < INT64_LIMIT
 
 
-def attribute_tree(thing: object) -> AttributeTree:
-    """The name of every number of an object with None, and of every object it owns with the shape of that."""
-    return {name: attribute_tree(value) if hasattr(value, "__dict__") else None for name, value in vars(thing).items()}
+def attribute_tree(owner: object) -> AttributeTree:
+    """Return the attribute tree of an object: None for each number, a subtree for each object that it owns."""
+    return {name: attribute_tree(value) if hasattr(value, "__dict__") else None for name, value in vars(owner).items()}
 
 
-def read_numbers(thing: object, names: AttributeTree) -> dict[str, Any]:
-    """All numbers of an object and of the objects it owns, as its shape names them: a flat copy that JSON can hold."""
-    kept = {}
+def read_numbers(owner: object, names: AttributeTree) -> dict[str, Any]:
+    """Read all numbers of an object and of the objects it owns into nested dictionaries for JSON."""
+    state = {}
     for name, inner in names.items():
-        value = getattr(thing, name)
-        kept[name] = (
+        value = getattr(owner, name)
+        state[name] = (
             read_numbers(value, inner) if inner is not None else list(value) if isinstance(value, list) else value
         )
-    return kept
+    return state
 
 
-def write_numbers(thing: object, names: AttributeTree, kept: dict[str, Any]) -> None:
-    """Put the numbers back, under the names of the shape and no others."""
+def write_numbers(owner: object, names: AttributeTree, state: dict[str, Any]) -> None:
+    """Write numbers back to the attributes of the tree."""
     for name, inner in names.items():
-        value = kept[name]
+        value = state[name]
         if inner is not None:
-            write_numbers(getattr(thing, name), inner, value)
+            write_numbers(getattr(owner, name), inner, value)
         else:
-            setattr(thing, name, list(value) if isinstance(value, list) else value)
+            setattr(owner, name, list(value) if isinstance(value, list) else value)
 
 
 RUN_TREE = attribute_tree(call_sequence.RunState(0.0))
 
 
 class InvalidStateError(ValueError):
-    """What is not a saved state of this FMU; the layer tells the host what it reads here."""
+    """Bytes or object that is no saved state of this FMU; the native layer reports the repr."""
 
     def __repr__(self) -> str:
         return INVALID_STATE_MESSAGE
 
 
 class SavedStateAccess(VariableAccess):
-    """The part of an instance that saves and restores its state."""
+    """Mixin of an FMU instance that saves and restores its state."""
 
-    # of the subclass that hosting() makes
+    # set by make_fmu_class()
     attribute_tree: AttributeTree
     instances: WeakSet[Any]
     plain_class: Any
@@ -102,10 +102,11 @@ class SavedStateAccess(VariableAccess):
     @signal_safe
     def _get_fmu_state(self) -> dict[str, Any]:
         try:
-            run = dict(read_numbers(self.run, RUN_TREE), outputs_current=False)  # for outputs are calculated anew
-            kept = {"run": run, "origin": __name__, "invalid_values": dict(self.invalid_values)}
-            return kept | {"model": read_numbers(self.model, self.attribute_tree)}
-        except BaseException as error:  # as in hosted.py
+            # outputs are recomputed after restoring
+            run = dict(read_numbers(self.run, RUN_TREE), outputs_current=False)
+            state = {"run": run, "origin": __name__, "invalid_values": dict(self.invalid_values)}
+            return state | {"model": read_numbers(self.model, self.attribute_tree)}
+        except BaseException as error:  # as in fmu_instance.py
             self.handle_exception(error)
             return {}
 
@@ -133,26 +134,26 @@ class SavedStateAccess(VariableAccess):
 
     @classmethod
     def compensate_references(cls) -> None:
-        """Pay for an exception that leaves a method of the class; which instance will be let go is not told."""
+        """Add references for an exception in a class method; the instance it releases is unknown, so for all."""
         for slave in cls.instances:
             add_references(slave, slave._get_log_queue())
         add_references(cls)
 
     @classmethod
     def is_own_state(cls, state: dict[str, Any], content: bytes) -> bool:
-        """Whether an instance can be in a state, and would write it so."""
-        spare = cls.plain_class(instance_name="")
-        cls.instances.discard(spare)
+        """Return whether an instance can have this state and would serialize it to the same bytes."""
+        instance = cls.plain_class(instance_name="")
+        cls.instances.discard(instance)
         try:
-            if not matches_pattern(dict(state, invalid_values={}), spare._get_fmu_state()):
+            if not matches_pattern(dict(state, invalid_values={}), instance._get_fmu_state()):
                 return False
-            spare.restore(state)
-            return spare.is_valid() and to_bytes(spare._get_fmu_state()) == content
+            instance.restore(state)
+            return instance.is_valid() and to_bytes(instance._get_fmu_state()) == content
         except (ArithmeticError, LookupError, TypeError, ValueError):
             return False
 
     def is_valid(self) -> bool:
-        """Whether run, settings and sentences are such as can come about."""
+        """Return whether run, settings and messages are valid."""
         names = {UNKNOWN_NAME, *(name for name, _ in self.variables)}
         return (
             call_sequence.is_valid_state(self.run, self.model, False)
@@ -160,8 +161,8 @@ class SavedStateAccess(VariableAccess):
             and names.issuperset(self.invalid_values)
             and all(type(text) is str and text == sanitize(text) for text in self.invalid_values.values())
             and all(
-                declared.accepts(getattr(thing, name))
-                for (_, declared), (thing, name) in zip(self.variables, self.attribute_owners)
+                declared.accepts(getattr(owner, name))
+                for (_, declared), (owner, name) in zip(self.variables, self.attribute_owners)
                 if declared.causality in SETTABLE_CAUSALITIES or declared.type != "Real"
             )
         )
@@ -172,7 +173,7 @@ class SavedStateAccess(VariableAccess):
             own = type(state) is dict and state.get("origin") == __name__
             if own:
                 self.restore(state)
-        except BaseException as error:  # as in hosted.py
+        except BaseException as error:  # as in fmu_instance.py
             self.handle_exception(error)
         else:
             if not own:
@@ -181,7 +182,7 @@ class SavedStateAccess(VariableAccess):
                 raise InvalidStateError
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Take over a state that has been found good."""
+        """Restore a valid state."""
         write_numbers(self.run, RUN_TREE, state["run"])
         self.invalid_values = dict(state["invalid_values"])
         write_numbers(self.model, self.attribute_tree, state["model"])

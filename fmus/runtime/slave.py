@@ -1,4 +1,4 @@
-"""The FMI 2.0 side: a pythonfmu slave made from a declared model."""
+"""FMI 2.0 co-simulation slave of pythonfmu for a model."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .variable_declarations import VariableOwner
 
 
 def make_slave_class(model: type[VariableOwner]) -> Any:
-    """The slave of a model class, under its name."""
+    """Make the slave class of a model class, with the same name."""
     return make_fmu_class(Slave, model)
 
 
 class Slave(FmuInstance, Fmi2Slave):
-    """One instance of a model as pythonfmu's native layer calls it."""
+    """Instance of a model with the methods that the native layer of pythonfmu calls."""
 
     @signal_safe
     def setup_experiment(
@@ -29,10 +29,10 @@ class Slave(FmuInstance, Fmi2Slave):
         try:
             stop_time, tolerance = inf if stop_time is None else stop_time, tolerance or 0.0
             call_sequence.set_experiment(self.run, start_time, stop_time, tolerance)
-        except BaseException as error:  # as in hosted.py
+        except BaseException as error:  # as in fmu_instance.py
             self.handle_exception(error)
 
-    # No variable is a Boolean or a String; a host that asks all the same is told so, and not crashed.
+    # No variable is a Boolean or a String; these methods report an error instead of crashing the host.
 
     get_real, set_real = make_getter("Real", nan), make_setter("Real")
     get_integer, set_integer = make_getter("Integer", 0), make_setter("Integer")
@@ -40,5 +40,5 @@ class Slave(FmuInstance, Fmi2Slave):
     get_string, set_string = make_getter("String", ""), make_setter("String")
 
     def log(self, msg: object, status: int = Fmi2Status.ok, category: str | None = None, debug: Any = None) -> None:
-        """The native layer takes the message for a printf format."""
+        """Log a message; percent signs are escaped, since the native layer uses it as a printf format."""
         super().log(str(msg).replace("%", "%%"), Fmi2Status(status), category, debug)

@@ -1,8 +1,8 @@
-"""One internal step: propose, judge, accept; end it at an event; interpolate inside it.
+"""Step-size control: computes one internal step, ends it at an event and interpolates inside it.
 
-The step goes from t0 to t1.  It is a stick, up to the break-away; or a closed form, up to the next standstill; or a
-step of a method that meets the tolerance.  Its size is controlled as the public descriptions of MATLAB's ode23 and
-ode45 give it (L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22).
+A step from t0 to t1 is one of: standstill up to the break-away; closed form up to the next standstill; a step of an
+integration method that meets the tolerance.  The step size is controlled as in MATLAB's ode23 and ode45
+(L. F. Shampine, M. W. Reichelt, The MATLAB ODE Suite, SIAM J. Sci. Comput. 18 (1997) 1-22).
 """
 
 from math import inf
@@ -31,15 +31,18 @@ from .vectors import (
     sum_of,
 )
 
-OVERFLOW_LIMIT = 1e100  # beyond it squares, as of an energy, would overflow
-MAX_TRIES = 200  # of one step, which halves each time
-MAX_STALLED_STEPS = 100  # steps in a row that hardly move the time
-TIE_FACTOR = 30.0  # how far a method may be from a tie, over its tolerance
+OVERFLOW_LIMIT = 1e100  # larger states are treated as divergence: squares, as in an energy, would overflow
+MAX_TRIES = 200  # attempts for one step; each one halves the step size
+MAX_STALLED_STEPS = 100  # consecutive steps that hardly advance the time
+TIE_FACTOR = 30.0  # tolerance for ties between stick and slip, relative to the solver tolerance
 
 
 class StepCounters:
-    """The beginning of the step: counts up to there, the step size to try there, the length of the step before, how
-    many steps before it hardly moved the time, and when the mode last changed (without a change, the start)."""
+    """Counters at the start of the step.
+
+    `h_next` is the step size to try there, `h_last` the size of the previous step, `n_stalled` the number of
+    consecutive steps that hardly advanced the time, `t_event` the time of the last change of mode (or of the start).
+    """
 
     def __init__(self):
         self.n_accepted = self.n_rejected = self.n_rhs = self.n_events = self.n_stalled = 0
@@ -47,65 +50,64 @@ class StepCounters:
 
 
 class RoundoffCompensation:
-    """What the times t0, t1 and the positions x0, x1 of a step lack.
+    """Rounding errors of the times t0, t1 and the positions x0, x1 of a step.
 
-    Closed forms carry it on, so that the rounding of one event does not add to that of the others.
+    Closed forms carry them along, so that rounding errors do not accumulate over events.
     """
 
     def __init__(self):
         self.t0 = self.x0 = self.t1 = self.x1 = 0.0
 
     def carry(self):
-        """The step begins where the last one ended."""
+        """Move the errors at the end of the last step to the start of the next one."""
         self.t0, self.x0 = self.t1, self.x1
         self.t1 = 0.0
 
 
 class InternalStep:
-    """The internal step in force, and the counts up to both its ends.
+    """Current internal step, with counters up to both ends.
 
-    CPython 3.11 has the attributes of an object at hand while they are fewer than thirty; with more, a step of ode23
-    takes a tenth longer.
+    Keep fewer than thirty attributes: CPython 3.11 then stores them inline; with more, a step of ode23 takes a tenth
+    longer.
     """
 
     error_scale_floor: StateVector
 
     def __init__(self):
         self.active_method = ActiveMethod()
-        # the run: tolerances in force, largest step, stop time (inf where unknown), whether zero speed is a mode
+        # run: relative tolerance, largest step, scale floor of the error norm; stop time (inf if unknown); hybrid law
         self.tolerance = self.h_max = self.error_scale_floor = 0.0
         self.t_end = inf
         self.is_hybrid = False
-        # the step: its beginning, its end, the modes within and the modes after
+        # step: start, end, modes inside and after it
         self.t0 = self.y0 = self.f0 = 0.0
         self.t1 = self.y1 = self.f1 = 0.0
         self.modes0 = self.modes1 = STUCK
-        # all stands still; a mode changes at its end; a speed only touches zero there, and the slide goes on
+        # nothing moves; a mode changes at t1; a velocity only touches zero at t1 and the slip continues
         self.is_stuck = self.event_at_end = self.grazes_at_end = False
-        self.has_consistent_modes = True  # whether there are modes that agree with the forces
-        # the length of the step before an event cut it, and what holds within
+        self.has_consistent_modes = True  # False if no modes satisfy the force balance at t1
+        # step size before an event shortened the step; interpolant
         self.h_full = 0.0
         self.interpolant = Interpolant()
-        self.load_series = PowerSeries()  # of a load, where inputs bend
-        # counts up to t1, and the size to try next; the same at t0
+        self.load_series = PowerSeries()  # of a load, for inputs of higher order
+        # counters up to t1 and the step size to try next; the same at t0
         self.n_accepted = self.n_rejected = self.n_rhs = 0
         self.h_next = 0.0
         self.start_counters = StepCounters()
         self.roundoff = RoundoffCompensation()
 
     def begin_run(self, model, t, y: StateVector):
-        """The empty step at the start of a run."""
-        start_counters = self.start_counters
-        self.n_accepted = self.n_rejected = self.n_rhs = start_counters.n_events = start_counters.n_stalled = 0
-        self.h_next = start_counters.h_last = 0.0
-        start_counters.t_event = t
+        """Start a run with an empty step at t."""
+        counters = self.start_counters
+        self.n_accepted = self.n_rejected = self.n_rhs = counters.n_events = counters.n_stalled = 0
+        self.h_next = counters.h_last = 0.0
+        counters.t_event = t
         self.event_at_end = False
         self.modes0 = STUCK
         self.start_empty_step(model, t, y, self.modes0, ROUNDOFF_MARGIN)
 
     def start_empty_step(self, model, t, y: StateVector, modes: ContactVector, tie_tolerance):
-        """The empty step at t, after these modes: both its ends are there, and a step size is at hand unless all stands
-        still."""
+        """Start an empty step at t, given the previous modes; choose a step size unless nothing moves."""
         if model.is_linear:
             roundoff = self.roundoff
             roundoff.t1 = roundoff.x1 = 0.0
@@ -120,27 +122,27 @@ class InternalStep:
         self.save_counters()
 
     def save_counters(self):
-        """What holds at t1, where the next step begins."""
-        start_counters = self.start_counters
-        start_counters.n_accepted, start_counters.n_rejected = self.n_accepted, self.n_rejected
-        start_counters.n_rhs, start_counters.h_next = self.n_rhs, self.h_next
+        """Save the counters at t1, where the next step starts."""
+        counters = self.start_counters
+        counters.n_accepted, counters.n_rejected = self.n_accepted, self.n_rejected
+        counters.n_rhs, counters.h_next = self.n_rhs, self.h_next
 
     def restore_counters(self):
-        """Forget what the step that began at t0 has counted."""
-        start_counters = self.start_counters
-        self.n_accepted, self.n_rejected = start_counters.n_accepted, start_counters.n_rejected
-        self.n_rhs, self.h_next = start_counters.n_rhs, start_counters.h_next
+        """Restore the counters at t0 and discard those of the step."""
+        counters = self.start_counters
+        self.n_accepted, self.n_rejected = counters.n_accepted, counters.n_rejected
+        self.n_rhs, self.h_next = counters.n_rhs, counters.h_next
 
     def compute_next(self, model):
-        """The internal step from t1 on; OK or the reason why not."""
+        """Compute the internal step that starts at t1.  Returns a status."""
         if model.has_dry_friction and not self.has_consistent_modes:
             return NO_CONSISTENT_MODES
         if model.has_dry_friction and self.event_at_end:
             self.count_event()
             self.event_at_end = False
-        start_counters = self.start_counters
+        counters = self.start_counters
         if self.t1 > self.t0:
-            start_counters.h_last = self.t1 - self.t0
+            counters.h_last = self.t1 - self.t0
         self.save_counters()
         self.t0, self.y0 = self.t1, self.y1
         self.f0, self.modes0 = self.f1, self.modes1
@@ -157,33 +159,34 @@ class InternalStep:
         self.n_accepted += 1
         t = self.t0
         if self.t1 - t > 16.0 * EPSILON * (t if t > 0.0 else -t):
-            start_counters.n_stalled = 0
+            counters.n_stalled = 0
         else:
-            start_counters.n_stalled += 1
-            if start_counters.n_stalled > MAX_STALLED_STEPS:
+            counters.n_stalled += 1
+            if counters.n_stalled > MAX_STALLED_STEPS:
                 return STALLED
         return status
 
     def count_event(self):
+        """Count the change of mode at t1."""
         self.start_counters.n_events += 1
         self.start_counters.t_event = self.t1
 
     def advance_stuck(self, model):
-        """Stand still until a load exceeds what friction holds."""
+        """Stay at rest until a load exceeds the holding limit."""
         if model.is_linear:
             self.roundoff.carry()
         self.is_stuck, self.grazes_at_end = True, False
         self.y1 = self.y0
         for i in contact_indices:
             self.y1[slip_index[i]] = 0.0
-        ends, ways = contact_vector(), contact_vector()
+        ends, directions = contact_vector(), contact_vector()
         for i in contact_indices:
-            ends[i], ways[i] = model.breakaway_time(self.t0, self.y1, i)
+            ends[i], directions[i] = model.breakaway_time(self.t0, self.y1, i)
         end = min_of(ends)
         if end <= self.t_end and end < inf:
             self.t1 = end
             for i in contact_indices:
-                self.modes1[i] = ways[i]
+                self.modes1[i] = directions[i]
             self.restart_after_event(model)
             for i in contact_indices:
                 if self.modes1[i] != STUCK:
@@ -193,21 +196,21 @@ class InternalStep:
         return OK
 
     def advance_linear_segment(self, model):
-        """One closed form, up to the next standstill or to the end of the run."""
+        """Follow the closed form up to the next standstill or the end of the run."""
         exact = self.active_method.exact
         roundoff = self.roundoff
         roundoff.carry()
         exact.start_segment(self.y0, self.f0, model.applied_acceleration(self.t0, self.modes0), roundoff.x0)
         self.t1 = self.t_end
         if model.has_dry_friction:
-            ahead = exact.next_standstill(self.modes0)
-            elapsed = ahead + roundoff.t0
+            duration = exact.next_standstill(self.modes0)
+            elapsed = duration + roundoff.t0
             end = self.t0 + elapsed
             if end <= self.t_end and end < inf:
-                moved = end - self.t0
-                roundoff.t1 = (self.t0 - (end - moved)) + (elapsed - moved)
+                t_step = end - self.t0
+                roundoff.t1 = (self.t0 - (end - t_step)) + (elapsed - t_step)
                 self.t1 = end
-                self.y1, roundoff.x1 = exact.state_at_standstill(ahead)
+                self.y1, roundoff.x1 = exact.state_at_standstill(duration)
                 return self.end_at_event(model)
         if self.t1 < inf:
             roundoff.x1 = 0.0
@@ -218,23 +221,23 @@ class InternalStep:
         return OK
 
     def advance_power_series(self, model):
-        """A stretch of a motion under a force that bends, up to the next standstill."""
+        """Follow a power series over one interval or up to the next standstill, for inputs of higher order."""
         exact = self.active_method.exact
-        pace = exact.z + exact.w
-        span = self.h_max if self.h_max * pace < 1.0 else 1.0 / pace
-        left = self.t_end - self.t0
-        last = span >= left
+        max_rate = exact.z + exact.w
+        duration = self.h_max if self.h_max * max_rate < 1.0 else 1.0 / max_rate
+        remaining = self.t_end - self.t0
+        last = duration >= remaining
         if last:
-            span = left
+            duration = remaining
         exact.start_segment(self.y0, self.f0, 0.0, 0.0)
-        exact.expand_series(model, self.t0, span)
-        self.t1 = self.t_end if last else self.t0 + span
+        exact.expand_series(model, self.t0, duration)
+        self.t1 = self.t_end if last else self.t0 + duration
         if model.has_dry_friction:
-            share, ends = exact.velocity_series.first_zero(self.modes0)
-            if share < 1.0:
-                self.t1 = self.t0 + share * span
-            if ends:
-                self.y1 = exact.evaluate(share * span)
+            fraction, has_zero = exact.velocity_series.first_zero(self.modes0)
+            if fraction < 1.0:
+                self.t1 = self.t0 + fraction * duration
+            if has_zero:
+                self.y1 = exact.evaluate(fraction * duration)
                 for i in contact_indices:
                     self.y1[slip_index[i]] = 0.0
                 return self.end_at_event(model)
@@ -243,45 +246,44 @@ class InternalStep:
         return OK if sum_of(magnitude(self.y1)) < OVERFLOW_LIMIT else DIVERGED
 
     def advance_with_method(self, model):
-        """One step of the method that meets the tolerance, cut where the mode changes."""
+        """Compute a step of the method that meets the tolerance; end it at a change of mode."""
         t, y, f, modes = self.t0, self.y0, self.f0, self.modes0
         tolerance = self.tolerance
-        smallest = (
-            16.0 * EPSILON * (t if t > 0.0 else -t)
-        )  # a third of the time of fabs; so below, for it is in each step
-        size = self.h_next if self.h_next < self.h_max else self.h_max
-        if size < smallest:
-            size = smallest
-        left = self.t_end - t
-        last = 1.1 * size >= left
-        h = left if last else size
+        # h_min: fabs(t) would take three times as long in every step
+        h_min = 16.0 * EPSILON * (t if t > 0.0 else -t)
+        h_new = self.h_next if self.h_next < self.h_max else self.h_max
+        if h_new < h_min:
+            h_new = h_min
+        remaining = self.t_end - t
+        last = 1.1 * h_new >= remaining
+        h = remaining if last else h_new
         scale = magnitude(y)
         scale = elementwise_max(self.error_scale_floor, scale)
-        tries = 0
-        methods = self.active_method
+        attempts = 0
+        method = self.active_method
         while True:
-            y1, f1, e = methods.propose(model, modes, t, y, f, h)
-            self.n_rhs += methods.stages
-            far = magnitude(y1)
-            e = magnitude(e) / elementwise_max(far, scale)
+            y1, f1, e = method.propose(model, modes, t, y, f, h)
+            self.n_rhs += method.stages
+            size1 = magnitude(y1)
+            e = magnitude(e) / elementwise_max(size1, scale)
             error = h * max_of(e) / tolerance
-            if error <= 1.0 and sum_of(far, e) < OVERFLOW_LIMIT:  # NaN leaves here too
+            if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
                 break
             self.n_rejected += 1
-            tries += 1
-            if h <= smallest or tries == MAX_TRIES:
-                return STALLED if error < inf and sum_of(far) < OVERFLOW_LIMIT else DIVERGED
-            shrink = methods.safety * error**-methods.power if 1.0 < error < inf and tries == 1 else 0.5
-            lowest = methods.shrink if tries == 1 else 0.5
-            size = h * (shrink if shrink > lowest else lowest)
-            if size < smallest:
-                size = smallest
-            h = size
+            attempts += 1
+            if h <= h_min or attempts == MAX_TRIES:
+                return STALLED if error < inf and sum_of(size1) < OVERFLOW_LIMIT else DIVERGED
+            shrink = method.safety * error**-method.power if 1.0 < error < inf and attempts == 1 else 0.5
+            shrink_limit = method.shrink if attempts == 1 else 0.5
+            h_new = h * (shrink if shrink > shrink_limit else shrink_limit)
+            if h_new < h_min:
+                h_new = h_min
+            h = h_new
             last = False
-        if tries == 0:
-            grow = methods.safety * error**-methods.power if error > 1e-9 else methods.grow
-            size = h * (grow if grow < methods.grow else methods.grow)
-        self.h_next = size
+        if attempts == 0:
+            grow = method.safety * error**-method.power if error > 1e-9 else method.grow
+            h_new = h * (grow if grow < method.grow else method.grow)
+        self.h_next = h_new
         self.h_full = h
         self.t1, self.y1, self.f1 = self.t_end if last else t + h, y1, f1
         if model.has_dry_friction and self.is_hybrid:
@@ -291,7 +293,7 @@ class InternalStep:
             else:
                 for i in contact_indices:
                     ends[i] = model.find_slip_reversal(self, i)
-            if self.interpolant.ready:  # the search had to look inside
+            if self.interpolant.ready:  # the event search built the interpolant
                 self.n_rhs += self.active_method.extra
             end = min_of(ends)
             if end <= self.t1:
@@ -311,15 +313,14 @@ class InternalStep:
         return OK
 
     def end_at_event(self, model):
-        """The speed of a contact has come to zero at t1: stick, or slide the other way, or go on if it only touches
-        zero; or its load has come to the limit: let go."""
+        """Resolve the event at t1: a slip velocity is zero, or a load has reached its limit."""
         if not model.is_coupled:
             self.update_end_modes(model, self.modes0, self.tie_tolerance(model))
         self.restart_after_event(model)
         return OK if sum_of(magnitude(self.y1)) < OVERFLOW_LIMIT else DIVERGED
 
     def tie_tolerance(self, model):
-        """How far what was computed up to here may be from a tie, as a share."""
+        """Return the relative tolerance for deciding ties between stick and slip."""
         return (
             ROUNDOFF_MARGIN
             if model.is_linear and self.active_method.method_number == EXACT
@@ -327,7 +328,7 @@ class InternalStep:
         )
 
     def update_end_modes(self, model, modes: ContactVector, tie_tolerance):
-        """The modes that hold from t1 on, after these."""
+        """Determine the modes after t1, given the previous modes."""
         self.modes1, self.grazes_at_end, self.has_consistent_modes = STUCK, False, True
         if self.is_hybrid:
             if model.is_coupled:
@@ -342,7 +343,7 @@ class InternalStep:
                             self.modes1[i], self.grazes_at_end = modes[i], True
 
     def update_end_rates(self, model):
-        """The rates in the modes that hold from t1 on."""
+        """Evaluate the rates at t1 in the new modes."""
         if model.rests_when_stuck and self.is_hybrid and all_of(self.modes1 == STUCK):
             self.f1 = 0.0
         else:
@@ -358,30 +359,30 @@ class InternalStep:
                         self.has_consistent_modes = self.grazes_at_end or model.is_consistent(
                             self.t1, self.y1, self.modes1, i
                         )
-                        self.f1[slip_index[i]] = 0.0  # the last bit at a break-away: no body starts against its mode
+                        self.f1[slip_index[i]] = 0.0  # rounding at a break-away: no body starts against its mode
 
     def restart_after_event(self, model):
-        """The step has been cut: forget the slopes, but keep the step size of the last slide, if there was one."""
-        self.event_at_end = any_of(self.modes1 != self.modes0)  # a slide that only touches zero goes on
+        """Restart after an event; the step size of the last slip phase is kept, if there was one."""
+        self.event_at_end = any_of(self.modes1 != self.modes0)  # no event if the velocity only touches zero
         self.update_end_rates(model)
         if self.h_next == 0.0 and self.active_method.method_number != EXACT:
             self.h_next = self.initial_step_size()
 
     def initial_step_size(self):
-        """The step to try first, from the slopes at t1."""
-        far = magnitude(self.y1)
-        pace = magnitude(self.f1) / elementwise_max(far, self.error_scale_floor)
-        rate = max_of(pace)
-        size = self.active_method.safety * self.tolerance**self.active_method.power
-        return size / rate if size < rate * self.h_max else self.h_max
+        """Estimate the first step h from the slopes at t1."""
+        size1 = magnitude(self.y1)
+        relative_rate = magnitude(self.f1) / elementwise_max(size1, self.error_scale_floor)
+        rate = max_of(relative_rate)
+        h = self.active_method.safety * self.tolerance**self.active_method.power
+        return h / rate if h < rate * self.h_max else self.h_max
 
     def state_at(self, model, t) -> StateVector:
-        """The state at t inside the step."""
-        inside = self.interpolant
-        if not inside.ready:
+        """Interpolate the state at t inside the step."""
+        interpolant = self.interpolant
+        if not interpolant.ready:
             if model.rests_when_stuck and self.is_stuck:
                 return self.y1
             if model.is_linear and self.active_method.method_number == EXACT:
                 return self.active_method.exact.evaluate(t - self.t0 - self.roundoff.t0)
             self.active_method.build_interpolant(model, self)
-        return inside.evaluate(t - self.t0)
+        return interpolant.evaluate(t - self.t0)

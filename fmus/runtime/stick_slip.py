@@ -1,9 +1,9 @@
-"""Dry friction as a mode: backward, stuck, forward; its guard, and where it settles.  coupled.py has several contacts.
+"""Stick and slip of a single contact as a hybrid automaton with the modes backward, stuck and forward.
 
-Sliding, the friction force is that of the model and opposes the direction of the mode.  Stuck, it is whatever
-holds the body at rest, up to the holding limit.  A mode ends where its guard does: a slide when the slip speed comes to
-zero, a stick when the load exceeds the limit (M. Otter, H. Elmqvist, S. E. Mattsson, Hybrid modeling in Modelica
-based on the synchronous data flow principle, CACSD 1999).
+While it slides, the friction force follows the model and opposes the direction of the mode.  While it sticks, the force
+balances the load, up to the holding limit.  Slip ends when the slip velocity reaches zero, stick when the load exceeds
+the limit (M. Otter, H. Elmqvist, S. E. Mattsson, Hybrid modeling in Modelica based on the synchronous data flow
+principle, CACSD 1999).  contact_lcp.py treats several contacts.
 """
 
 from math import fabs, inf
@@ -13,45 +13,47 @@ from .oscillator import Oscillator
 from .rounding import ROUNDOFF_MARGIN
 from .vectors import ContactIndex, ContactVector, StateVector, contact_vector, position_index, slip_index
 
-HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes, every change of mode is located as an event")
-SIGN_LAW = ("sign", SIGN, "sliding force times sign(v) as it stands: no event, no stick; chatters")
-THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but below a small speed friction balances the spring; chatters")
+HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes; every change of mode is an event")
+SIGN_LAW = ("sign", SIGN, "sliding force times sign(v); no events, no sticking; chatters")
+THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but friction balances the load below a small velocity; chatters")
 
-NO_CONSISTENT_MODES = FIRST_RULE + 2  # status: no modes fit the forces, as the second rule has it
-WRONG_WAY_TOLERANCE = 1e-9  # of the force of friction: less than that is the last bits
+NO_CONSISTENT_MODES = FIRST_RULE + 2  # status: no modes satisfy the force balance (the second rule below)
+WRONG_WAY_TOLERANCE = 1e-9  # accelerations below this share of that due to friction are rounding errors
 MAX_BISECTIONS = 200
 MAX_TERNARY_STEPS = 25
 
 
 def sign(v):
-    """-1, 0 or 1."""
+    """Return the sign of v: -1, 0 or 1."""
     return 1 if v > 0.0 else -1 if v < 0.0 else 0
 
 
 def threshold(v, eps, load, slide, hold):
-    """Friction by the threshold law."""
+    """Return the friction force of the threshold law."""
     if fabs(v) >= eps:
         return sign(v) * slide
     return hold if load > hold else -hold if load < -hold else load
 
 
 class DryFriction(Oscillator):
-    """An oscillator of one body, which stands still while it sticks.
+    """Oscillator with one body, which is at rest while its contact sticks.
 
-    It says of its contact
-        hold(t, states)         the load on it at rest, its rate and the holding limit
-        terms(t, states)        the sum of the sizes of what the load is made of, of which rounding takes its share
-        load_rate(t, states, n) the n-th derivative of the load, where inputs have any
-    While the body stands still, the load is linear in time, unless an input bends.
+    The generated model also defines
+
+        stick_load(t, states)           load on the contact at rest, its rate, and the holding limit
+        load_magnitude(t, states)       sum of the absolute terms of the load, which scales its rounding error
+        load_derivative(t, states, n)   n-th derivative of the load, if inputs have derivatives
+
+    At rest the load is linear in time, unless an input has a higher order.
     """
 
     contacts: dict[str, str] = {"mode": "v"}
     has_dry_friction = rests_when_stuck = True
     rules: tuple[str, ...] = (
-        "friction = {friction} with solver.method = 1 (exact): the closed form holds for the hybrid law only; "
+        "friction = {friction} with solver.method = 1 (exact) is refused: the closed form covers the hybrid law only; "
         "set friction to 1 (hybrid), or solver.method to 2 (ode23)",
-        "the contacts can neither hold nor slip: one of them slides with a larger force than it holds; let no sliding "
-        "force be above the holding force",
+        "no combination of stick and slip satisfies the force balance: a contact slides with a larger force than it "
+        "holds; set no sliding force above the holding force",
     )
     own_solver_rule = 1
 
@@ -59,10 +61,21 @@ class DryFriction(Oscillator):
         return 1 if self.friction != HYBRID and self.solver.method == EXACT else 0
 
     def resolve_mode(self, t, y: StateVector, tie_tolerance, i: ContactIndex):
-        """The mode that holds from here on.
+        """Return the mode from time t on.
 
-        A load of the limit is a tie, which its rate decides: outward it lets go, inward or without a rate it is held.
-        The load is known but for the rounding of its terms, and, where it moves inward, the share `near` of the limit.
+        A load at the limit is a tie, which the rate of the load decides: the contact breaks away if the load grows and
+        sticks otherwise.
+
+        Parameters
+        ----------
+        t
+            Time in s.
+        y
+            States.
+        tie_tolerance
+            Relative tolerance of the limit for a decreasing load, besides the rounding errors of its terms.
+        i
+            Index of the contact.
         """
         if y[slip_index[i]] > 0.0:
             return FORWARD
@@ -80,86 +93,89 @@ class DryFriction(Oscillator):
         return FORWARD if load > 0.0 else BACKWARD
 
     def stick_balance(self, t, y: StateVector, i: ContactIndex):
-        """The load on a contact at rest, its rate, the holding limit, and what rounding may add to that."""
+        """Return the load on a contact at rest, its rate, the holding limit, and the rounding error of that."""
         load, rate, limit = self.stick_load(t, y, i)
         return load, rate, limit, ROUNDOFF_MARGIN * (self.load_magnitude(t, y, i) + limit)
 
     def is_grazing(self, t, y: StateVector, modes: ContactVector, tie_tolerance, i: ContactIndex):
-        """Whether a slide whose speed comes to zero here only touches it: friction lets go so soon that a speed which
-        is off by the share `near` would not have come to zero.
+        """Return whether the slip velocity only touches zero here and the slip continues.
 
-        After the wait s the speed grows as v = u (1 - cos(w s)), with the load's rate m w^2 u.
+        This is so if the contact would break away again so soon that a velocity with the relative error
+        `tie_tolerance` might not reach zero.  After s seconds the velocity grows as v = u (1 - cos(w s)), where the
+        load has the rate m w^2 u.
         """
         load, rate, limit = self.stick_load(t, y, i)
         if rate == 0.0:
-            return load == 0.0 and limit == 0.0  # nothing stops it: what is left of the speed is the method's error
+            return load == 0.0 and limit == 0.0  # no friction: the remaining velocity is the error of the method
         if modes[i] * rate < 0.0:
             return False
-        wait = (limit - modes[i] * load) / fabs(rate)
+        delay = (limit - modes[i] * load) / fabs(rate)
         _, J = self.jacobian(t, y, modes)
         stiffness = J[slip_index[i], position_index[i]]
-        return (stiffness < 0.0 or wait == 0.0) and -0.5 * stiffness * wait * wait < tie_tolerance
+        return (stiffness < 0.0 or delay == 0.0) and -0.5 * stiffness * delay * delay < tie_tolerance
 
     def breakaway_acceleration(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
-        """The rate of a slip at a break-away, where the load is just the limit."""
+        """Return the slip acceleration at a break-away, where the load equals the limit."""
         return self.slip_acceleration(t, y, modes, i)
 
     def slip_acceleration(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
-        """The rate of a slip."""
+        """Return the slip acceleration."""
         f = self.rates(t, y, modes)
         return f[slip_index[i]]
 
     def is_consistent(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
-        """Whether a body at rest that has been let go starts in the direction of its mode, but for the last bits: one
-        that slides with more than it holds does not."""
-        back = contact_vector()
-        back[i] = -modes[i]
-        forward, backward = self.slip_acceleration(t, y, modes, i), self.slip_acceleration(t, y, back, i)
+        """Return whether a body that breaks away starts in the direction of its mode.
+
+        It does not if the sliding force exceeds the holding force; rounding errors are tolerated.
+        """
+        reverse_modes = contact_vector()
+        reverse_modes[i] = -modes[i]
+        forward, backward = self.slip_acceleration(t, y, modes, i), self.slip_acceleration(t, y, reverse_modes, i)
         if modes[i] * backward <= 0.0:
-            return True  # nor does it stay: it moves the other way
+            return True  # it does not stay at rest either, it moves the other way
         load, _, _, slack = self.stick_balance(t, y, i)
         if fabs(load) <= slack:
             return True
-        # late in a run a load is the difference of large numbers
-        last_bits = WRONG_WAY_TOLERANCE * fabs(forward - backward) + slack / fabs(load) * fabs(forward + backward)
-        return modes[i] * forward >= -last_bits
+        # late in a run a load is a small difference of large numbers
+        rounding = WRONG_WAY_TOLERANCE * fabs(forward - backward) + slack / fabs(load) * fabs(forward + backward)
+        return modes[i] * forward >= -rounding
 
     def breakaway_time(self, t, y: StateVector, i: ContactIndex):
-        """When a contact breaks away if nothing moves, and in which direction; inf if it never does."""
+        """Return when a contact breaks away if nothing moves (inf if never), and the direction."""
         load, rate, limit = self.stick_load(t, y, i)
         if self.has_input_derivatives and self.has_higher_order():
             return self.breakaway_time_by_series(t, y, load, rate, limit, i)
         if rate == 0.0:
             return inf, STUCK
         direction = FORWARD if rate > 0.0 else BACKWARD
-        wait = (limit - direction * load) / fabs(rate)
-        return t + (wait if wait > 0.0 else 0.0), direction
+        delay = (limit - direction * load) / fabs(rate)
+        return t + (delay if delay > 0.0 else 0.0), direction
 
     def breakaway_time_by_series(self, t, y: StateVector, load, rate, limit, i: ContactIndex):
-        """The same where inputs bend; in no direction where it is to be looked for again from there on."""
+        """Return the same for inputs of higher order; direction 0 if the search must continue from that time."""
         series = self.solver.step.load_series
-        span = scale = self.solver.step.h_max
-        series.c[1] = rate * span
+        duration = scale = self.solver.step.h_max
+        series.c[1] = rate * duration
         for n in range(2, MAX_INPUT_ORDER + 1):
-            scale *= span / n
+            scale *= duration / n
             series.c[n] = self.load_derivative(t, y, n, i) * scale
         series.c[0] = load - limit if load < limit else 0.0
         up, forward = series.first_zero(BACKWARD)
         series.c[0] = load + limit if load > -limit else 0.0
         down, backward = series.first_zero(FORWARD)
         if forward and up <= down:
-            return t + up * span, FORWARD
+            return t + up * duration, FORWARD
         if backward and down <= up:
-            return t + down * span, BACKWARD
-        return t + (up if up < down else down) * span, STUCK
+            return t + down * duration, BACKWARD
+        return t + (up if up < down else down) * duration, STUCK
 
     def guard(self, step, t, i: ContactIndex):
-        """Positive while the mode lasts: the speed, in the direction of the mode."""
+        """Return the event function: the slip velocity in the direction of the mode, positive while the mode lasts."""
         y = step.state_at(self, t)
         return step.modes0[i] * y[slip_index[i]]
 
     def find_slip_reversal(self, step, i: ContactIndex):
-        """When the slip speed leaves the direction of the mode within the step, to the last bit; inf if it does not."""
+        """Return when the slip velocity reaches zero within the step, to machine precision; inf if it does not."""
         mode = step.modes0[i]
         ahead, behind = mode * step.y0[slip_index[i]], mode * step.y1[slip_index[i]]
         high = step.t1
@@ -172,36 +188,38 @@ class DryFriction(Oscillator):
             behind = self.guard(step, high, i)
         return self.find_root(step, step.t0, high, ahead, behind, i)
 
-    def find_root(self, step, low, high, ahead, behind, i: ContactIndex):
-        """The first instant at which the guard is not positive; at `low` it is `ahead`, at `high` `behind`, which is
-        not."""
-        kept = 0  # the end of the bracket that the last secant left where it was
-        looks = 0
+    def find_root(self, step, low, high, g_low, g_high, i: ContactIndex):
+        """Return the first time at which the guard is not positive, by the Illinois method.
+
+        The guard has the value `g_low` > 0 at time `low` and `g_high` <= 0 at time `high`.
+        """
+        kept_end = 0  # end of the bracket that the last iteration kept: 1 high, -1 low
+        evaluations = 0
         for _ in range(MAX_BISECTIONS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            if ahead > 0.0 and behind < 0.0:
-                secant = low + (high - low) * (ahead / (ahead - behind))
+            if g_low > 0.0 and g_high < 0.0:
+                secant = low + (high - low) * (g_low / (g_low - g_high))
                 if low < secant < high:
                     middle = secant
-            here = self.guard(step, middle, i)
-            looks += 1
-            if here > 0.0:
-                low, ahead = middle, here
-                if kept == 1:
-                    behind *= 0.5
-                kept = 1
+            g = self.guard(step, middle, i)
+            evaluations += 1
+            if g > 0.0:
+                low, g_low = middle, g
+                if kept_end == 1:
+                    g_high *= 0.5
+                kept_end = 1
             else:
-                high, behind = middle, here
-                if kept == -1:
-                    ahead *= 0.5
-                kept = -1
-        step.interpolant.n_event_evals += looks
+                high, g_high = middle, g
+                if kept_end == -1:
+                    g_low *= 0.5
+                kept_end = -1
+        step.interpolant.n_event_evals += evaluations
         return high
 
     def find_minimum(self, step, low, high, i: ContactIndex):
-        """When the guard is found not positive where it falls at first and rises at last; else inf."""
+        """Return a time at which a guard with a minimum in between is not positive, by ternary search; else inf."""
         step.interpolant.n_event_evals += MAX_TERNARY_STEPS
         for _ in range(MAX_TERNARY_STEPS):
             third = (high - low) / 3.0

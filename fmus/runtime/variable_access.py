@@ -1,4 +1,4 @@
-"""Reading and writing variables by their value references."""
+"""Access to variables by value reference."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from .failure_handling import FailureHandling
 from .pythonfmu_workarounds import signal_safe
 
 SETTABLE_CAUSALITIES = ("parameter", "input")
-UNKNOWN_NAME = ""  # among the values that cannot be used: one for a variable that is not there
-MAX_READERS = 64  # an importer that asks for other lists all the time costs time, not memory
+UNKNOWN_NAME = ""  # key in invalid_values for an unknown value reference
+MAX_READERS = 64  # bounds the memory if an importer keeps asking for new lists
 
 
 def make_getter(kind: str, blank: object) -> Any:
-    """The method that reads variables of a kind; `blank` answers for those that are not there."""
+    """Make the method that reads variables of a type; `blank` is returned for unknown ones."""
 
     @signal_safe
     def get(slave: VariableAccess, references: list[int]) -> list[Any]:
@@ -30,7 +30,7 @@ def make_getter(kind: str, blank: object) -> Any:
             if counts and run.outputs_current:
                 slave.update_statistics(ahead)
             return values(slave.model)
-        except BaseException as error:  # an exception that left Python would crash the host
+        except BaseException as error:  # an exception outside Python would crash the host
             slave.handle_exception(error)
             return [blank for _ in references]
 
@@ -38,7 +38,7 @@ def make_getter(kind: str, blank: object) -> Any:
 
 
 def make_setter(kind: str) -> Any:
-    """The method that writes variables of a kind."""
+    """Make the method that writes variables of a type."""
 
     @signal_safe
     def put(slave: VariableAccess, references: list[int], values: Sequence[float]) -> None:
@@ -46,9 +46,8 @@ def make_setter(kind: str) -> Any:
             for i, reference in enumerate(references):
                 if slave.has_type(kind, reference):
                     slave.set_value(reference, values[i])
-                elif (
-                    UNKNOWN_NAME not in slave.invalid_values
-                ):  # its value is not touched: a text not in UTF-8 is no object at all
+                # the value is not accessed: a string that is not UTF-8 is no Python object
+                elif UNKNOWN_NAME not in slave.invalid_values:
                     slave.set_invalid(UNKNOWN_NAME, unknown_reference_message(kind, reference))
         except BaseException as error:  # as above
             slave.handle_exception(error)
@@ -57,12 +56,12 @@ def make_setter(kind: str) -> Any:
 
 
 class VariableAccess(FailureHandling):
-    """The part of an instance that reads and writes; a value reference is a place in `variables`."""
+    """Mixin of an FMU instance that reads and writes variables; value references are indices into `variables`."""
 
     def initialize_access(self) -> None:
-        """To the variables of a new model."""
+        """Initialize the access to the variables of a new model."""
         self.attribute_owners = [self.locate(name) for name, _ in self.variables]
-        # what reads a list of value references, by kind and references; the same by kind, for those last asked for
+        # compiled reader by type and value references; the last one used, by type
         self.readers: dict[tuple[object, ...], Any] = {}
         self.last_readers: dict[str, Any] = dict.fromkeys(
             ("Real", "Integer", "Boolean", "String"), (None, None, False, False)
@@ -70,19 +69,19 @@ class VariableAccess(FailureHandling):
         self.invalid_values = {}
 
     def attribute_path(self, name: str) -> str:
-        """Where in the model a variable is."""
+        """Return the dotted attribute path of a variable in the model."""
         return name
 
     def locate(self, name: str) -> tuple[object, str]:
-        """The object that holds a variable, and the name of the attribute there."""
-        thing: object = self.model
+        """Return the object that owns a variable, and the name of the attribute."""
+        owner: object = self.model
         *path, last = self.attribute_path(name).split(".")
         for part in path:
-            thing = getattr(thing, part)
-        return thing, last
+            owner = getattr(owner, part)
+        return owner, last
 
     def has_type(self, kind: str, reference: int) -> bool:
-        """Whether a reference is that of a variable of the kind."""
+        """Return whether a value reference belongs to a variable of the type."""
         if not 0 <= reference < len(self.variables):
             return False
         return kind == ("Real" if self.variables[reference][1].type == "Real" else "Integer")
@@ -90,38 +89,45 @@ class VariableAccess(FailureHandling):
     # ---- reading
 
     def compile_reader(self, kind: str, references: list[int], blank: object) -> tuple[list[int], Any, bool, bool]:
-        """The references, what reads them, whether they tell of the solver, and whether it must look ahead first."""
+        """Compile a reader for a list of value references.
+
+        Returns
+        -------
+        tuple
+            The references, the reader, whether it needs statistics, and whether it needs solver.t_next.
+        """
         key = kind, *references
         if key in self.readers:
-            known: tuple[list[int], Any, bool, bool] = self.readers[key]
-            self.last_readers[kind] = known
-            return known
-        there = [self.has_type(kind, reference) for reference in references]
-        places = [
-            self.attribute_path(self.variables[r][0]) if has_type else "" for r, has_type in zip(references, there)
+            cached: tuple[list[int], Any, bool, bool] = self.readers[key]
+            self.last_readers[kind] = cached
+            return cached
+        is_known = [self.has_type(kind, reference) for reference in references]
+        paths = [
+            self.attribute_path(self.variables[reference][0]) if known else ""
+            for reference, known in zip(references, is_known)
         ]
-        terms = ["model." + attribute_path if attribute_path else "blank" for attribute_path in places]
-        values = eval(f"lambda model: [{', '.join(terms)}]", {"blank": blank})  # no other is as fast
-        found = (
+        terms = ["model." + path if path else "blank" for path in paths]
+        values = eval(f"lambda model: [{', '.join(terms)}]", {"blank": blank})  # the fastest way
+        compiled = (
             list(references),
             values,
-            any("." in attribute_path for attribute_path in places),
-            "solver.t_next" in places,
+            any("." in path for path in paths),
+            "solver.t_next" in paths,
         )
-        if not all(there):
-            self.report_error(unknown_reference_message(kind, references[there.index(False)]))
-            return found
+        if not all(is_known):
+            self.report_error(unknown_reference_message(kind, references[is_known.index(False)]))
+            return compiled
         if len(self.readers) == MAX_READERS:
             self.readers.clear()
-        self.last_readers[kind] = self.readers[key] = found
-        return found
+        self.last_readers[kind] = self.readers[key] = compiled
+        return compiled
 
     def update_statistics(self, ahead: bool) -> None:
-        """Bring what is told of solver and events to the present point; `ahead`: also where the next step ends."""
+        """Update the statistics of solver and events to the current time; with `ahead` also solver.t_next."""
         call_sequence.update_statistics(self.model, ahead)
 
     def update_outputs(self) -> None:
-        """Bring the outputs to the present point; NaN while the values cannot be used."""
+        """Update the outputs to the current time; NaN while values are invalid."""
         status = call_sequence.update_outputs(self.run, self.model)
         if status == DIVERGED:
             raise OverflowError
@@ -131,30 +137,30 @@ class VariableAccess(FailureHandling):
     # ---- writing
 
     def set_value(self, reference: int, value: float) -> None:
-        """Take over a value; one that cannot be used is remembered, and told by the next step."""
+        """Set a value; an invalid one is recorded, and the next step reports it."""
         name, declared = self.variables[reference]
-        thing, attribute = self.attribute_owners[reference]
-        if value == getattr(thing, attribute) and name not in self.invalid_values:
+        owner, attribute = self.attribute_owners[reference]
+        if value == getattr(owner, attribute) and name not in self.invalid_values:
             return
         calculated, fixed = declared.causality not in SETTABLE_CAUSALITIES, declared.variability == "fixed"
         reason = call_sequence.rejection_reason(self.run, calculated, fixed, declared.accepts(value))
         if reason == OK:
             self.set_invalid(name, "")
             call_sequence.note_change(self.run, self.model)
-            setattr(thing, attribute, value)
+            setattr(owner, attribute, value)
         else:
             self.set_invalid(name, messages.value_message(reason, name, declared, value))
 
-    def set_invalid(self, name: str, sentence: str) -> None:
-        """Remember what is said of a value that was set, the last of all; no sentence: it can be used."""
+    def set_invalid(self, name: str, message: str) -> None:
+        """Record the message for an invalid value; an empty message marks the value as valid."""
         run = self.run
         run.outputs_current = False
         self.invalid_values.pop(name, None)
-        if sentence:
-            self.invalid_values[name] = sentence
+        if message:
+            self.invalid_values[name] = message
         run.n_invalid_values = len(self.invalid_values)
 
 
 def unknown_reference_message(kind: str, reference: int) -> str:
-    """The sentence about a value reference, which the layer hands over as if it had a sign."""
+    """Return the message for an unknown value reference, which the native layer passes as a signed integer."""
     return messages.CALL_MESSAGES[UNKNOWN_REFERENCE].format(reference=reference & 0xFFFFFFFF, word=kind)

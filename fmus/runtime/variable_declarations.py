@@ -1,7 +1,7 @@
-"""Declared variables: the number, its unit, its range and its sentence in one place.
+"""Declarations of variables: start value, unit, range and description.
 
-A variable is an attribute of a class; it takes its name from there.  An instance of the class starts with
-plain numbers of the same names.  The XML, the pages and the error messages read the declaration.
+A declaration is a class attribute, whose name is the name of the variable.  Instances of the class start with plain
+numbers under the same names.  XML, documentation pages and error messages use the declarations.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from .call_sequence import is_in_range
 
 
 class VariableDeclaration:
-    """What a variable is: unit, description and range; an enumeration has `items` (label, value, sentence)."""
+    """Declaration of a variable: unit, description, range; enumerations have `items` (label, value, description)."""
 
     type = "Real"
     causality = ""
@@ -21,9 +21,9 @@ class VariableDeclaration:
     initial = ""
     start: float = 0.0
     items: tuple[tuple[str, int, str], ...] = ()
-    role = ""  # what it is to the motion: a "state", the force of a "contact"
-    rate_of = ""  # the name of the state whose rate it is
-    rate = ""  # the name of the parameter that is its rate for all time, as of a driver
+    role = ""  # "state", or "contact" for the friction force of a contact
+    rate_of = ""  # name of the state whose rate this is
+    rate = ""  # name of the parameter that is its constant rate, as for a driver
 
     def __init__(
         self,
@@ -45,12 +45,12 @@ class VariableDeclaration:
 
     @property
     def unit_suffix(self) -> str:
-        """The unit, as it stands behind a number."""
+        """Return the unit as a suffix of a number."""
         return "" if self.unit in ("", "1") else f" {self.unit}"
 
     @property
     def allowed(self) -> str:
-        """The range in words."""
+        """Return the range in words."""
         if self.items:
             return "one of " + ", ".join(f"{value} ({label})" for label, value, _ in self.items)
         coefficient_bounds = (
@@ -63,14 +63,14 @@ class VariableDeclaration:
         return " and ".join(words) or "a finite number"
 
     def accepts(self, value: float) -> bool:
-        """Whether `value` lies in the range; NaN and infinities never do."""
+        """Return whether `value` is in the range; NaN and infinities never are."""
         if self.items:
             return value in [number for _, number, _ in self.items]
         return is_in_range(value, self.low, self.high, self.above, self.below)
 
 
 class Parameter(VariableDeclaration):
-    """Set by the user; tunable at every communication point."""
+    """Parameter that is tunable at every communication point."""
 
     causality, variability, initial = "parameter", "tunable", "exact"
 
@@ -80,13 +80,13 @@ class Parameter(VariableDeclaration):
 
 
 class Fixed(Parameter):
-    """Set by the user before initialisation ends."""
+    """Parameter that is fixed after initialisation."""
 
     variability = "fixed"
 
 
 class Choice(Fixed):
-    """An enumeration, set before initialisation ends: items of (label, value, sentence)."""
+    """Enumeration that is fixed after initialisation; items are (label, value, description)."""
 
     type = "Enumeration"
 
@@ -96,13 +96,13 @@ class Choice(Fixed):
 
 
 class Input(Parameter):
-    """Set by the importer, held over a communication step."""
+    """Input, constant over a communication step unless derivatives are set."""
 
     causality, variability, initial = "input", "continuous", ""
 
 
 class Output(VariableDeclaration):
-    """Calculated; `direct`: it follows a changed input at once, without a step in between."""
+    """Output; `direct` if it depends on an input directly, without a step in between."""
 
     causality, variability, initial = "output", "continuous", "calculated"
 
@@ -112,7 +112,7 @@ class Output(VariableDeclaration):
 
 
 class State(Output):
-    """A continuous state."""
+    """Continuous state."""
 
     role = "state"
 
@@ -122,7 +122,7 @@ class State(Output):
 
 
 class Contact(Output):
-    """The force of dry friction in a contact."""
+    """Friction force of a contact."""
 
     role = "contact"
 
@@ -131,7 +131,7 @@ class Contact(Output):
 
 
 class Mode(Output):
-    """The discrete state of dry friction: -1, 0 or 1."""
+    """Mode of a contact: -1 sliding backward, 0 stuck, 1 sliding forward."""
 
     type, variability, start = "Integer", "discrete", 0
 
@@ -140,13 +140,13 @@ class Mode(Output):
 
 
 class Local(VariableDeclaration):
-    """Calculated; read on request, not recorded by default."""
+    """Local variable, calculated, not recorded by default."""
 
     causality, variability, initial = "local", "discrete", "calculated"
 
 
 class Count(Local):
-    """A number of things that have happened."""
+    """Counter."""
 
     type, start = "Integer", 0
 
@@ -155,7 +155,7 @@ class Count(Local):
 
 
 class VariableOwner:
-    """An instance starts with the start value of every declared variable, as plain attributes."""
+    """Object whose declared variables are plain attributes, initialized with their start values."""
 
     def __init__(self) -> None:
         for declared in declarations(type(self)):
@@ -163,19 +163,19 @@ class VariableOwner:
 
 
 def declarations(cls: type) -> list[VariableDeclaration]:
-    """The declared variables of a class, its own before those of its bases; a class may declare one anew."""
-    found: dict[str, VariableDeclaration] = {}
+    """Return the declarations of a class, its own before those of its bases; a class may override one."""
+    result: dict[str, VariableDeclaration] = {}
     for base in cls.__mro__:
         for name, value in vars(base).items():
             if isinstance(value, VariableDeclaration):
-                found.setdefault(name, value)
-    return list(found.values())
+                result.setdefault(name, value)
+    return list(result.values())
 
 
-def variables(thing: VariableOwner, prefix: str = "") -> list[tuple[str, VariableDeclaration]]:
-    """Dotted name and declaration of every variable of an object and of the objects it owns, in order."""
-    found = [(prefix + declared.name, declared) for declared in declarations(type(thing))]
-    for name, part in vars(thing).items():
+def variables(owner: VariableOwner, prefix: str = "") -> list[tuple[str, VariableDeclaration]]:
+    """Return dotted name and declaration of every variable of an object and of the objects it owns, in order."""
+    result = [(prefix + declared.name, declared) for declared in declarations(type(owner))]
+    for name, part in vars(owner).items():
         if isinstance(part, VariableOwner):
-            found += variables(part, f"{prefix}{name}.")
-    return found
+            result += variables(part, f"{prefix}{name}.")
+    return result

@@ -271,7 +271,7 @@ def test_a_file_holds_one_model(text, sentence, tmp_path):
         find_model(path).generated_source  # noqa: B018
 
 
-@pytest.mark.parametrize("name", ["Solver", "March", "Größe"])
+@pytest.mark.parametrize("name", ["Solver", "Integrator", "Größe"])
 def test_a_class_name_must_be_unique(name, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text((HEAD + RATE).replace("Mine", name))

@@ -246,7 +246,7 @@ def test_a_diverging_motion_fails_in_one_sentence_or_stays_finite(launch, name, 
 def test_overflowing_outputs_of_a_finite_motion_are_reported(launch, name):
     fmu = launch(name, {"k": 1e300, "m": 1e300, "x0": 1e20, "solver.rtol": 1e-3})
     assert all(isnan(value) for value in fmu.get(*REALS[name]))
-    assert "leaves the range of numbers" in fmu.worker.read_stderr()
+    assert "the solution diverges" in fmu.worker.read_stderr()
     with pytest.raises(FmiError):
         fmu.step(0.0, 1e-3)
     fmu.reset()

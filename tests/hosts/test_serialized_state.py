@@ -19,8 +19,8 @@ from fmus.packaging.lowering import sibling_module
 TIMES = 10_000 // len(MODELS)
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 REFUSAL = (
-    "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
-    "save a state anew and pass it on unchanged"
+    "a saved state is refused: another FMU wrote it or it has been changed; "
+    "save the state again and pass it on unchanged"
 )
 
 

@@ -79,7 +79,7 @@ def test_a_traceback_points_into_the_source(name):
         model.solver.start(model, 0.0, *model.initial_state(0.0), "never", 1e-6)
     frame = traceback.extract_tb(caught.value.__traceback__)[-1]
     assert frame.filename == str(ROOT / "fmus" / "runtime" / "integrator.py")
-    assert frame.line == "run = t_end - t if t_end < inf else model.stop_time"
+    assert frame.line == "duration = t_end - t if t_end < inf else model.stop_time"
 
 
 HEAD = "class Some:\n    def step(self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h):\n        "

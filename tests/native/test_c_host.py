@@ -220,7 +220,7 @@ def test_a_call_out_of_sequence_is_refused_and_changes_nothing(stickslip, phase,
         assert answers[1] == ERROR
         allowed = " or ".join(CALLS[call])
         assert re.search(
-            rf"fmi2\w+ is refused: the FMU is {phase}, the call is allowed when it is {allowed}$", answers[0]
+            rf"fmi2\w+ is refused: the FMU is {phase}, but the call is allowed only when it is {allowed}$", answers[0]
         )
         assert numbers(answers[2]) == [model_class("stickslip").m.start]
 

@@ -13,8 +13,8 @@ from native_host import SANITIZER_ENVIRONMENT, SANITIZERS, compile_sanitized
 
 STATES = 75_000  # damaged ones, over all models
 SENTENCE = (
-    "a saved state is refused: it is not, to the last bit, one that this very FMU wrote; "
-    "save a state anew and pass it on unchanged"
+    "a saved state is refused: another FMU wrote it or it has been changed; "
+    "save the state again and pass it on unchanged"
 )
 
 

@@ -92,7 +92,7 @@ def test_every_method_of_the_runtime_is_tested_here():
 
 def test_a_duplicate_method_number_is_refused(monkeypatch):
     monkeypatch.setattr(method_registry.methods[1][1], "NUMBER", method_registry.methods[0][1].NUMBER)
-    with pytest.raises(ValueError, match=r"^ode23\.py: the number 2 is taken; the next is 6$"):
+    with pytest.raises(ValueError, match=r"^ode23\.py: method number 2 is in use; the next free one is 6$"):
         method_registry.find_methods()
 
 
