@@ -4,7 +4,7 @@ import gc
 import sys
 from pathlib import Path
 
-if Path(sys.path[0]) != Path(__file__).parent:  # by -m: a model where one is may be called math.py, or fmus.py
+if Path(sys.path[0]) != Path(__file__).parent:  # run by -m: a model in this folder may be called math.py
     sys.path += [str(Path(__file__).parent), sys.path.pop(0)]
 
 from contextlib import AbstractContextManager
@@ -22,22 +22,35 @@ from fmus.packaging.model_lookup import find_model, model_names
 
 HERE = Path(__file__).parent
 SCENES = HERE / "harness" / "scenes"
-FMUS = HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")  # installed: in the current folder
+FMUS = (
+    HERE / "fmus" if (HERE / "pyproject.toml").is_file() else Path("fmus")
+)  # an installed package builds into the current folder
 
 
 @click.command()
 @click.argument("models", metavar="[NAME | FILE.py]...", nargs=-1)
-@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="Version; 3 is --native.")
-@click.option("--native", "compiled", is_flag=True, help="Compiled to machine code: no Python in the FMU.")
-@click.option("--web", is_flag=True, help="No FMUs but one page, web/index.html, that runs them in a browser.")
-@click.option("--method", "methods", multiple=True, type=click.Choice(list(METHODS)), help="Offer this; repeatable.")
-@click.option("--law", "laws", multiple=True, type=click.Choice(list(LAWS)), help="Offer this law; repeatable.")
-@click.option("--platform", "platforms", multiple=True, help="For this only, as linux64; repeatable.")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder; fmus, or beside FILE.py, without.")
+@click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="FMI version; 3 implies --native.")
+@click.option("--native", "compiled", is_flag=True, help="Compile to machine code; the FMU contains no Python.")
 @click.option(
-    "--release",
-    type=click.Path(file_okay=False, path_type=Path),
-    help="Write one zip with the FMUs of every kind, the live page, references, licences and checksums.",
+    "--web", is_flag=True, help="Write a page that runs the models in a browser, web/index.html, instead of FMUs."
+)
+@click.option(
+    "--method",
+    "methods",
+    multiple=True,
+    type=click.Choice(list(METHODS)),
+    help="Include only this integration method; repeatable.",
+)
+@click.option(
+    "--law",
+    "laws",
+    multiple=True,
+    type=click.Choice(list(LAWS)),
+    help="Include only this friction law; repeatable.",
+)
+@click.option("--platform", "platforms", multiple=True, help="Include only this platform, such as linux64; repeatable.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Output folder; by default fmus, or the folder of FILE.py."
 )
 @click.version_option(__version__, prog_name="friction-fmus", message="%(prog)s %(version)s")
 def main(
@@ -51,39 +64,36 @@ def main(
     out: Path | None,
     release: Path | None,
 ) -> None:
-    """Build the FMU of every model NAME, and of the model in every FILE.py (without any: of all models).
+    """Build an FMU for each model NAME or model file FILE.py; without arguments, for all models of the project.
 
-    Prints the size, the time that Python takes to import it, and the sha256 digest.
+    Prints file size, import time in Python, and SHA-256 digest.
     """
-    gc.disable()  # what a build makes stays to its end; to look through it again and again is a tenth of its time
+    gc.disable()  # objects of a build live until its end; collecting garbage takes a tenth of the build time
     if web and (compiled or platforms or fmi == "3"):
-        raise CommandLineError("--web makes a page and no FMU: leave out --native, --platform and --fmi 3.")
-    if release is not None:
-        if models or compiled or web or methods or laws or platforms or out or fmi == "3":
-            raise CommandLineError("--release builds everything: leave out the other options and models.")
-        print_summary(release_archive(release))
-        return
+        raise CommandLineError("--web writes a page, not FMUs: remove --native, --platform and --fmi 3.")
     compiled, kind = compiled or fmi == "3", "native/fmi3" if fmi == "3" else "native" if compiled else ""
     try:
-        wanted = {model: find_model(model) for model in models or model_names()}
+        sources = {model: find_model(model) for model in models or model_names()}
     except BuildError as error:
         raise CommandLineError(str(error)) from error
-    for source in wanted.values():
-        alike = sorted({str(other.path.resolve()) for other in wanted.values() if other.name == source.name})
-        if (out or web) and len(alike) > 1:
-            raise CommandLineError(f"{' and '.join(alike)} have one name: build them into folders of their own.")
+    for source in sources.values():
+        same_name = sorted({str(other.path.resolve()) for other in sources.values() if other.name == source.name})
+        if (out or web) and len(same_name) > 1:
+            raise CommandLineError(f"{' and '.join(same_name)} have the same name: build them into separate folders.")
     if web:
-        ours = any(model in model_names() for model in wanted)
-        place = out or (FMUS if ours else next(iter(wanted.values())).path.parent) / "web"
+        is_project_model = any(model in model_names() for model in sources)
+        web_folder = out or (FMUS if is_project_model else next(iter(sources.values())).path.parent) / "web"
         with show_progress("writing the page"):
-            path = build_page(list(wanted.values()), place, methods, laws)
+            path = build_page(list(sources.values()), web_folder, methods, laws)
         print_summary(path)
         return
-    for model, source in wanted.items():
+    for model, source in sources.items():
         folder = out or (FMUS if model in model_names() else source.path.parent) / kind
         try:
             if compiled:
-                with show_progress(f"{source.name}: compiling; the first time with the C libraries, half a minute"):
+                with show_progress(
+                    f"{source.name}: compiling (the first build also compiles the C libraries, half a minute)"
+                ):
                     path = build_native(source.path, folder, methods, laws, platforms, fmi)
                 weight = ""
             else:
@@ -94,15 +104,15 @@ def main(
         print_summary(path, weight)
 
 
-def show_progress(what: str) -> AbstractContextManager[Any]:
-    """Say at the terminal, as long as it takes, what is being done."""
+def show_progress(what: str) -> AbstractContextManager[object]:
+    """Show a status message at the terminal while the block runs."""
     from rich.console import Console
 
     return Console(stderr=True).status(what)
 
 
 def print_summary(path: Path, weight: str = "") -> None:
-    """One line about a file that was built."""
+    """Print name, size, import time and digest of a file that was built."""
     content = path.read_bytes()
     click.echo(f"{path.name}  {len(content) / 1000:4.0f} kB{weight}  {sha256(content).hexdigest()[:16]}")
 
@@ -110,7 +120,7 @@ def print_summary(path: Path, weight: str = "") -> None:
 def build_native(
     model: Path, folder: Path, methods: tuple[str, ...], laws: tuple[str, ...], platforms: tuple[str, ...], fmi: str
 ) -> Path:
-    """The native FMU; what builds it needs more than the others do."""
+    """Build the native FMU; imported late because it needs further packages."""
     from fmus.packaging.native import build
 
     return build(model, folder, methods, laws, platforms, fmi)
@@ -128,7 +138,7 @@ def release_archive(folder: Path) -> Path:
 
 
 def build_page(models: list[ModelFile], folder: Path, methods: tuple[str, ...], laws: tuple[str, ...]) -> Path:
-    """The page that runs them."""
+    """Build the web page that runs the models."""
     from fmus.packaging.web import build
 
     try:
@@ -138,7 +148,7 @@ def build_page(models: list[ModelFile], folder: Path, methods: tuple[str, ...], 
 
 
 class CommandLineError(click.ClickException):
-    """A mistake in the command line, told in one sentence without the usage lines."""
+    """An invalid command line; click prints the message without the usage lines."""
 
     exit_code = 2
 

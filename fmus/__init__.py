@@ -1,7 +1,7 @@
-"""What an author of a model imports: declared variables, and what can be calculated with them.
+"""Authoring interface for models: variable declarations and functions of expressions.
 
-A model is a class that derives from Model, alone in its file: it declares variables and writes each equation once, in
-their names.  `python build_fmus.py path/to/file.py` makes an FMU of it.
+A model file defines one class derived from Model, which declares variables and writes each equation once.
+`python build_fmus.py path/to/file.py` builds its FMU.
 """
 
 from math import pi

@@ -4,7 +4,7 @@ from fmus import Fixed, Input, Model, Output, Parameter, Rule, State, asin, atan
 
 
 class Pacejka(Model):
-    """Drag sled with the smooth friction curve of Pacejka's magic formula; it creeps where the sled sticks.
+    """Drag sled with the smooth friction curve of Pacejka's magic formula; a sled at rest creeps instead of sticking.
 
         m a = F_ext + k (x_driver - x) - F_friction,   d(x_driver)/dt = v_driver
         F_friction = mu(v) m g,   mu(v) = D sin(C atan(B v - E (B v - atan(B v))))
@@ -16,15 +16,15 @@ class Pacejka(Model):
     """
 
     m = Parameter(12.5, "kg", "mass of the sled", above=0.0)
-    k = Parameter(742.5, "N/m", "stiffness of the spring", low=0.0)
+    k = Parameter(742.5, "N/m", "spring stiffness", low=0.0)
     mu_s = Parameter(0.9, "1", "peak of the friction coefficient", above=0.0)
     mu_d = Parameter(0.6, "1", "coefficient of friction at high speed", low=0.0)
-    g = Parameter(9.81, "m/s2", "gravity", low=0.0)
+    g = Parameter(9.81, "m/s2", "gravitational acceleration", low=0.0)
     v_driver = Parameter(0.034, "m/s", "speed of the driver")
     x_m = Parameter(0.01, "m/s", "speed at the peak of the friction curve", above=0.0)
-    x0 = Fixed(0.0, "m", "position at the start")
-    v0 = Fixed(0.0, "m/s", "speed at the start")
-    F_ext = Input(0.0, "N", "outer force on the sled")
+    x0 = Fixed(0.0, "m", "initial position")
+    v0 = Fixed(0.0, "m/s", "initial speed")
+    F_ext = Input(0.0, "N", "external force on the sled")
 
     x = State("m", "position of the sled", start=x0)
     v = State("m/s", "speed of the sled", start=v0, rate_of=x, nominal_velocity=x_m)
@@ -41,15 +41,15 @@ class Pacejka(Model):
 
     weight = m * g
     stretch = x_driver - x
-    F_spring = Output("N", "force of the spring on the sled", k * stretch)
-    F_friction = Output("N", "force of friction, against the motion", mu * weight)
+    F_spring = Output("N", "spring force on the sled", k * stretch)
+    F_friction = Output("N", "friction force, opposing the motion", mu * weight)
     a = Output("m/s2", "acceleration of the sled", (F_ext + F_spring) / m - mu * g, rate_of=v)
     energy = Output("J", "kinetic and potential energy", 0.5 * (m * v * v + F_spring * stretch), low=0.0)
 
     stop_time = 16.0
     step_size = 0.016
     method = "rodas"
-    tolerance = 2e-7  # a position error shifts the next break-away: the speed loses a digit more
+    tolerance = 2e-7  # a position error shifts the next break-away and costs the speed another digit
     rules = (
         Rule(
             mu_d >= mu_s,

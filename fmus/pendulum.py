@@ -38,15 +38,15 @@ class Pendulum(Model):
     m = Parameter(0.46 * POUND, "kg", "mass", above=0.0)
     a = Parameter(3.7 * INCH, "m", "distance from the pin to the centre of mass", low=0.0)
     J_G = Parameter(1.5 * POUND * INCH * INCH, "kg.m2", "moment of inertia about the centre of mass", low=0.0)
-    g = Parameter(386.0 * INCH, "m/s2", "gravity", low=0.0)
+    g = Parameter(386.0 * INCH, "m/s2", "gravitational acceleration", low=0.0)
     mu = Parameter(0.1, "1", "coefficient of friction in the pin", low=0.0)
     r = Parameter(0.25 * INCH, "m", "radius of the pin", low=0.0)
-    theta0 = Fixed(radians(10.02), "rad", "angle at the start, zero hanging down", display="deg")
-    omega0 = Fixed(0.0, "rad/s", "angular speed at the start", display="deg/s")
+    theta0 = Fixed(radians(10.02), "rad", "initial angle, zero when hanging down", display="deg")
+    omega0 = Fixed(0.0, "rad/s", "initial angular speed", display="deg/s")
     pin_load = Choice("load on the pin", weight="the weight", reaction="the magnitude of the pin reaction")
-    T_ext = Input(0.0, "N.m", "outer torque on the pendulum")
+    T_ext = Input(0.0, "N.m", "external torque on the pendulum")
 
-    theta = State("rad", "angle, zero hanging down", start=theta0, display="deg")
+    theta = State("rad", "angle, zero when hanging down", start=theta0, display="deg")
     omega = State("rad/s", "angular speed", start=omega0, rate_of=theta, display="deg/s")
     mode = Mode()
 
@@ -66,7 +66,7 @@ class Pendulum(Model):
 
     T_friction = Contact(
         "N.m",
-        "torque of friction in the pin, against the motion",
+        "friction torque in the pin, opposing the motion",
         mode=mode,
         slip=omega,
         slide=arm * N,
@@ -77,7 +77,7 @@ class Pendulum(Model):
     half = sin(0.5 * theta)
     energy = Output(
         "J",
-        "kinetic and potential energy, zero at rest hanging down",
+        "kinetic and potential energy, zero at rest when hanging down",
         0.5 * J * omega * omega + 2.0 * moment * half * half,
         low=0.0,
     )

@@ -14,15 +14,15 @@ class Stickslip(Model):
     """
 
     m = Parameter(12.5, "kg", "mass of the sled", above=0.0)
-    k = Parameter(742.5, "N/m", "stiffness of the spring", low=0.0)
+    k = Parameter(742.5, "N/m", "spring stiffness", low=0.0)
     mu_s = Parameter(0.9, "1", "coefficient of static friction", low=0.0)
     mu_d = Parameter(0.6, "1", "coefficient of sliding friction", low=0.0, alias="mu_k")
-    g = Parameter(9.81, "m/s2", "gravity", low=0.0)
+    g = Parameter(9.81, "m/s2", "gravitational acceleration", low=0.0)
     v_driver = Parameter(0.034, "m/s", "speed of the driver")
     eps = Parameter(1e-7, "m/s", "speed below which the threshold law holds the sled", above=0.0)
-    x0 = Fixed(0.0, "m", "position at the start")
-    v0 = Fixed(0.0, "m/s", "speed at the start")
-    F_ext = Input(0.0, "N", "outer force on the sled")
+    x0 = Fixed(0.0, "m", "initial position")
+    v0 = Fixed(0.0, "m/s", "initial speed")
+    F_ext = Input(0.0, "N", "external force on the sled")
 
     x = State("m", "position of the sled", start=x0)
     v = State("m/s", "speed of the sled", start=v0, rate_of=x)
@@ -32,10 +32,10 @@ class Stickslip(Model):
     sliding = mu_d * m * g
     holding = mu_s * m * g
     stretch = x_driver - x
-    F_spring = Output("N", "force of the spring on the sled", k * stretch)
+    F_spring = Output("N", "spring force on the sled", k * stretch)
     F_friction = Contact(
         "N",
-        "force of friction, against the motion",
+        "friction force, opposing the motion",
         mode=mode,
         slip=v,
         slide=sliding,

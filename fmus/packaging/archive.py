@@ -1,16 +1,16 @@
-"""The zip: binaries, sources and description under the names that FMI gives them, the same bytes for the same content.
+"""Writes the FMU archive with the file names of FMI; equal content gives equal bytes.
 
     modelDescription.xml
-    binaries/<platform>/<name>.{so,dll}     the native layer of pythonfmu
+    binaries/<platform>/<name>.{so,dll}     native layer of pythonfmu
     resources/slavemodule.txt               names the entry script
-    resources/<entry>.py                    imports the class; guard.py says what else it does, and why
-    resources/<package>/                    the model and what it needs (modules.py)
-    documentation/                          the page (page.py), licences, what the host must have
-    model.png                               the icon
-    extra/org.fmi-standard.fmi-ls-ref/      the certified result (reference.py)
+    resources/<entry>.py                    imports the class (see pythonfmu_workarounds.py)
+    resources/<package>/                    the model and the modules it needs (embedded_modules.py)
+    documentation/                          page, licences, requirements on the host
+    model.png                               icon
+    extra/org.fmi-standard.fmi-ls-ref/      certified result (certified_result.py)
 
-Python finds modules by bare name in the process of the host.  So package and entry carry a digest of their
-content, and two versions of an FMU live side by side.
+Python finds modules by bare name in the host process.  Package and entry script therefore carry a digest of their
+content, so that two versions of an FMU can be loaded side by side.
 """
 
 import os
@@ -29,10 +29,10 @@ from .model_description import declared_variables, describe
 from .model_lookup import find_model
 
 HOST_REQUIREMENTS = """\
-CPython 3.9 or newer, 64 bit, with its standard library and nothing else.
+CPython 3.9 or newer, 64 bit, with its standard library; no other packages.
 
-Linux     libpython3 in the process: a host that is Python has it, any other is started with it in LD_PRELOAD.
-Windows   the folder of python3.dll in PATH.
+Linux     libpython3 must be loaded in the process: start hosts other than Python with it in LD_PRELOAD.
+Windows   the folder of python3.dll must be in PATH.
 """
 PYTHONFMU = "pythonfmu"
 ENTRY_SCRIPT = """\
@@ -40,7 +40,7 @@ from {package} import {model}, keep_reference
 
 keep_reference(globals())
 """
-EARLIEST, LATEST = datetime(1980, 1, 1, tzinfo=UTC), datetime(2107, 12, 31, tzinfo=UTC)  # that a zip can tell
+EARLIEST, LATEST = datetime(1980, 1, 1, tzinfo=UTC), datetime(2107, 12, 31, tzinfo=UTC)  # range of dates in a zip file
 
 
 def build(
@@ -50,14 +50,22 @@ def build(
     laws: Sequence[str] = (),
     platforms: Sequence[str] = (),
 ) -> Path:
-    """Write the FMU of a model, given by its name or by the path of its file, into `folder`.
+    """Write the Python FMU of a model into `folder` and return its path.
 
-    An older one is replaced whole or not at all.  Methods, friction laws and platforms may be chosen
-    (written/offer.py); without a choice it has all there are.
+    Parameters
+    ----------
+    model
+        Name of a model of the project, or path of a model file.
+    folder
+        Output folder; an existing FMU is replaced atomically.
+    methods, laws
+        Integration methods and friction laws to include; by default all that the model has.
+    platforms
+        FMI platform names to include; by default all that pythonfmu provides.
     """
     source, date = find_model(model), build_date()
-    name, offered = source.name, select_features(source, methods, laws)
-    cls, texts = lowered_model(source, offered), lowered_files(source, offered)
+    name, features = source.name, select_features(source, methods, laws)
+    cls, texts = lowered_model(source, features), lowered_files(source, features)
     sources = embedded_files(source, texts)
     code = digest(sources, ENTRY_SCRIPT)
     package = f"{name}_{code[:12]}"
@@ -74,18 +82,16 @@ def build(
 
 
 def build_date() -> datetime:
-    """Return the build date: SOURCE_DATE_EPOCH (https://reproducible-builds.org), or the date of this version."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH")
-    if epoch is None:
-        return datetime.fromisoformat(__date__).replace(tzinfo=UTC)
+    """Return the build date: SOURCE_DATE_EPOCH (https://reproducible-builds.org), or a constant."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
     latest = int(LATEST.timestamp())
     if not (epoch.isascii() and epoch.isdigit() and int(epoch) <= latest):
-        raise BuildError(f"SOURCE_DATE_EPOCH is {epoch!r}; allowed are whole seconds from 0 to {latest}.")
+        raise BuildError(f"SOURCE_DATE_EPOCH must be a whole number of seconds from 0 to {latest}, got {epoch!r}.")
     return max(EARLIEST, datetime.fromtimestamp(int(epoch), UTC))
 
 
 def _binaries(name: str, platforms: Sequence[str]) -> dict[str, bytes]:
-    """The native layer for the platforms, or for every one that it comes for."""
+    """Return the native layer of pythonfmu for the given platforms, by default for all."""
     files = (installed_package(PYTHONFMU) / "resources" / "binaries").glob("*/*")
     there = {path.parent.name: path for path in sorted(files) if path.suffix in (".so", ".dll", ".dylib")}
     if not there:
@@ -99,10 +105,12 @@ def _binaries(name: str, platforms: Sequence[str]) -> dict[str, bytes]:
 
 
 def license_files() -> dict[str, bytes]:
-    """The licence of the FMU, and that of the native layer inside it."""
+    """Return the licences of this project and of pythonfmu, by path in the FMU."""
     ours, kept = Path(__file__).resolve().parents[2], "{}-*.dist-info/**/LICENSE"
     return {
-        "documentation/licenses/license.txt": _license(ours, kept.format("friction_fmus"), "LICENSE"),  # or of a clone
+        "documentation/licenses/license.txt": _license(
+            ours, kept.format("friction_fmus"), "LICENSE"
+        ),  # the last pattern is for a clone
         f"documentation/licenses/{PYTHONFMU}.txt": _license(
             installed_package(PYTHONFMU).parent, kept.format(PYTHONFMU)
         ),
@@ -110,27 +118,27 @@ def license_files() -> dict[str, bytes]:
 
 
 def _license(folder: Path, *patterns: str) -> bytes:
-    """The text of the first pattern that is there; of several files, the last."""
+    """Return the last file that matches the first pattern with a match."""
     for pattern in patterns:
         for path in sorted(folder.glob(pattern), reverse=True):
             return path.read_text(encoding="utf-8").encode()
-    raise BuildError(f"There is no {patterns[-1]} in {folder}, and an FMU carries it: restore it.")
+    raise BuildError(f"{patterns[-1]} is missing in {folder}, and every FMU includes it: restore it.")
 
 
 def zip_entries(entries: dict[str, bytes], date: datetime) -> bytes:
-    """A zip of the entries; order, time, permissions and compression do not depend on the machine."""
+    """Return a zip archive of the entries; order, times, permissions and compression do not depend on the machine."""
     buffer = BytesIO()
     with ZipFile(buffer, "w") as archive:
         for path in sorted(entries):
             info = ZipInfo(path, date.timetuple()[:6])
-            info.compress_type, info.create_system = ZIP_DEFLATED, 3  # 3 is Unix: only there permissions count
+            info.compress_type, info.create_system = ZIP_DEFLATED, 3  # 3 is Unix, where permissions are honoured
             info.external_attr = (S_IFREG | (0o755 if path.startswith("binaries/") else 0o644)) << 16
             archive.writestr(info, entries[path], compresslevel=9)
     return buffer.getvalue()
 
 
 def write(path: Path, content: bytes) -> Path:
-    """Put the file in its place in one move; nothing else is left behind."""
+    """Write a file atomically; no temporary file remains."""
     part = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

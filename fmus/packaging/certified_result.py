@@ -1,10 +1,10 @@
-"""The certified result of the default experiment, as the layered standard FMI-LS-REF 1.0.0-alpha.1 places it.
+"""Embeds the certified result of the default experiment as in the layered standard FMI-LS-REF 1.0.0-alpha.1.
 
     extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml
-    extra/org.fmi-standard.fmi-ls-ref/<name>_out.csv          time and the states, by their names
+    extra/org.fmi-standard.fmi-ls-ref/<name>_out.csv          columns: time and the states
 
-The numbers lie beside the file of the model, under its name: `belt.csv`, whose first line tells after a # how they were
-got and how well that agrees, the second what each column is.
+The result stands next to the model file, for example `belt.csv`.  Its first line states after a # how the numbers were
+computed and how well two methods agree, the second line names the columns.
 """
 
 import csv
@@ -29,29 +29,31 @@ STANDARD = {
 
 @dataclass(frozen=True)
 class CertifiedResult:
-    """Rows of time (s) and the states, as they stand in the file; how they were got, and how well that agrees."""
+    """Rows of time in s and states, as text, and a sentence on how they were computed and how well methods agree."""
 
     rows: list[list[str]]
     provenance: str
 
     @property
     def caption(self) -> str:
-        """Where the numbers come from, in one sentence."""
+        """Describe the origin of the numbers in one sentence."""
         return f"Certified result of the default experiment: {self.provenance}."
 
 
 def find_certified_result(path: Path, declared: Variables) -> CertifiedResult | None:
-    """The reference of the model in a file, if it has one that holds for what is declared: with true sticking, where it
-    sticks."""
+    """Return the certified result of the model file, or None.
+
+    The result is valid only for FMUs that include the hybrid law, where the model has friction laws.
+    """
     laws: Any = next((meaning.items for variable, meaning in declared if variable == "friction"), ())
     if laws and "hybrid" not in [label for label, _, _ in laws]:
         return None
-    beside = path.with_suffix(".csv")
-    return _read_table(beside, len(integrated_states(declared))) if beside.is_file() else None
+    file = path.with_suffix(".csv")
+    return _read_table(file, len(integrated_states(declared))) if file.is_file() else None
 
 
 def _read_table(file: Path, states: int) -> CertifiedResult:
-    """That in a file; BuildError where it is no such table."""
+    """Read and check the file; raise BuildError if it is not a valid table."""
     text = file.read_text(encoding="utf-8", errors="replace")
     provenance, _, table = text.partition("\n")
     rows = list(csv.reader(table.splitlines()))[1:]
@@ -62,8 +64,8 @@ def _read_table(file: Path, states: int) -> CertifiedResult:
         or not all(_is_row(row, states) for row in rows)
     ):
         raise BuildError(
-            f"{file} is no certified result: its first line tells after a # how the numbers were got, the second what "
-            f"each column is, and the others hold the time in s, from 0 on, and {states} states, all finite numbers."
+            f"{file} is not a certified result: line 1 must state after a # how the numbers were computed, line 2 must "
+            f"name the columns, and each other line must hold the time in s and {states} states, all finite numbers."
         )
     return CertifiedResult(rows, provenance[1:].strip().rstrip("."))
 
@@ -75,13 +77,13 @@ def _is_row(row: list[str], states: int) -> bool:
         return False
 
 
-def result_files(name: str, found: CertifiedResult, declared: Variables) -> dict[str, bytes]:
-    """The result and its manifest, by their paths in the FMU."""
-    lines = [["time", *(variable for variable, _ in integrated_states(declared))], *found.rows]
+def result_files(name: str, certified: CertifiedResult, declared: Variables) -> dict[str, bytes]:
+    """Return the result and its manifest by path in the FMU."""
+    lines = [["time", *(variable for variable, _ in integrated_states(declared))], *certified.rows]
     result = "".join(",".join(line) + "\n" for line in lines)
     root = Element("fmiReferences", {"xmlns:fmi-ls": NAMESPACE})
     for key, text in STANDARD.items():
         root.set(f"fmi-ls:fmi-ls-{key}", text)
-    related = {"source": f"{name}_out.csv", "role": "result", "type": "text/csv", "description": found.caption}
+    related = {"source": f"{name}_out.csv", "role": "result", "type": "text/csv", "description": certified.caption}
     SubElement(root, "Related", related)
     return {f"{RESULT_FOLDER}/{name}_out.csv": result.encode(), f"{RESULT_FOLDER}/fmi-ls-manifest.xml": xml_bytes(root)}

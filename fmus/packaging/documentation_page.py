@@ -1,4 +1,4 @@
-"""The page inside each FMU, documentation/index.html: what the model is, read from its declaration."""
+"""Writes documentation/index.html of an FMU from the declaration of the model."""
 
 import re
 from html import escape
@@ -16,11 +16,11 @@ from .units import unit_of
 GREEK = {"theta": "theta", "omega": "omega", "alpha": "alpha", "mu": "mu", "eps": "epsilon", "phi": "phi", "pi": "pi"}
 STYLE = Path(__file__).with_name("documentation_page.css")
 USAGE = """\
-<p>Parameters may be changed at every communication point, those marked <i>fixed</i> only before initialisation ends.
-The solver runs free: its steps do not depend on the communication steps. Read <code>solver.t_next</code> and step to
-it, and every internal step and every event shows.</p>
-<p>A value that cannot be used, or a run that cannot go on, is told in one sentence, in the log and on standard error;
-<code>doStep</code> fails, and every calculated Real reads NaN from then on. Reset recovers.</p>
+<p>Parameters can be changed at every communication point, those marked <i>fixed</i> only until initialization ends.
+The internal steps of the solver do not depend on the communication steps. To see every internal step and every event,
+step to <code>solver.t_next</code>.</p>
+<p>An invalid value or a failed run is reported in one sentence in the log and on standard error. <code>doStep</code>
+then fails, and all calculated Reals are NaN until reset.</p>
 """
 CAPABILITIES = """\
 | | in Python | native | native, FMI 3.0 |
@@ -33,22 +33,24 @@ CAPABILITIES = """\
 | event mode, early return at stick and slip | | | yes |
 | intermediate update after every internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |
-"""  # by each kind of FMU, as the README has it
-UNRESTRICTED = VariableDeclaration("", "").allowed  # in words, where every finite number is
+"""  # capabilities of each kind of FMU; the README has the same table
+UNRESTRICTED = VariableDeclaration("", "").allowed  # the range text of an unbounded variable
 
 
 def documentation_page(
-    model: type[VariableOwner], name: str, declared: Variables, found: CertifiedResult | None, icon: str, use: str
+    model: type[VariableOwner], name: str, declared: Variables, result: CertifiedResult | None, icon: str, use: str
 ) -> bytes:
-    """The page of the FMU `name`, as HTML that needs nothing but the icon beside it, or nothing where that is ""; `use`
-    says how it can be run."""
+    """Return the page of the FMU `name` as self-contained HTML.
+
+    `icon` is the path of the icon in the FMU or "", `use` a paragraph on how to run the FMU.
+    """
     first, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
     title = f"<h1>{escape(name)}</h1><p>{escape(first)}</p>"
     picture = f"<img src='../{icon}' alt=''>" if icon else ""
     parts = [f"<header>{picture}<div>{title}</div></header>", "<h2>Equations</h2>"]
     parts += map(format_paragraph, blocks)
-    if found is not None:
-        parts += _result_figure(found, declared)
+    if result is not None:
+        parts += _result_figure(result, declared)
     choices = [(variable, meaning) for variable, meaning in declared if meaning.items]
     for variable, meaning in choices:
         parts.append(_enumeration_table(variable, meaning))
@@ -60,7 +62,7 @@ def documentation_page(
         ("Solver and events", [pair for pair in plain if "." in pair[0]]),
     ):
         parts += [f"<h2>{title}</h2>", _variable_table(chosen)]
-    parts += ["<h2>Use</h2>", USAGE + use, _capabilities_table(), _footer(model, found)]
+    parts += ["<h2>Use</h2>", USAGE + use, _capabilities_table(), _footer(model, result)]
     head = f"<meta charset='utf-8'><meta name='viewport' content='width=device-width'><title>{escape(name)}</title>"
     style = STYLE.read_text(encoding="utf-8")
     begin = f"<!doctype html>\n<html lang='en'><head>{head}<style>\n{style}</style></head><body>"
@@ -68,15 +70,14 @@ def documentation_page(
 
 
 def format_paragraph(paragraph: str) -> str:
-    """A paragraph of the docstring; what is indented there is equations, as is what says in each line what equals what
-    (a docstring of nothing else has no indentation)."""
+    """Format a paragraph of the docstring; indented text, or text with " = " in every line, is shown as equations."""
     if paragraph.startswith("    ") or all(" = " in line for line in paragraph.splitlines()):
         return f"<pre>{typeset(cleandoc(paragraph))}</pre>"
     return f"<p>{typeset(paragraph)}</p>"
 
 
 def typeset(text: str) -> str:
-    """Names with an underscore get an index, powers are raised, Greek letters are written as such.
+    """Typeset subscripts, powers and Greek letters as HTML.
 
     >>> typeset("m a^2 = F_ext - mu_s m g")
     'm a<sup>2</sup> = F<sub>ext</sub> &minus; &mu;<sub>s</sub> m g'
@@ -87,7 +88,7 @@ def typeset(text: str) -> str:
 
 
 def readable_unit(unit: str) -> str:
-    """A unit, or words with one, as people write it.
+    """Write units with multiplication dots and superscripts.
 
     >>> readable("kg.m2")
     'kg·m²'
@@ -95,32 +96,32 @@ def readable_unit(unit: str) -> str:
     return re.sub(r"(?<=[a-z])2", "²", re.sub(r"(?<=[A-Za-z])\.", "·", unit)) if unit != "1" else ""
 
 
-def _result_figure(found: CertifiedResult, declared: Variables) -> list[str]:
-    """The states over time."""
-    times, *columns = ([float(word) for word in column] for column in zip(*found.rows, strict=True))
+def _result_figure(result: CertifiedResult, declared: Variables) -> list[str]:
+    """Return a figure of the certified states over time."""
+    times, *columns = ([float(word) for word in column] for column in zip(*result.rows, strict=True))
     parts = ["<h2>Default run</h2>", "<figure>"]
     for values, (variable, meaning) in zip(columns, integrated_states(declared), strict=True):
         shown, factor = meaning.unit, 1.0
         if meaning.display:
             shown, factor = meaning.display, unit_of(variable, meaning.unit).factor
         parts.append(draw_chart(times, [factor * value for value in values], f"{variable} in {readable_unit(shown)}"))
-    return [*parts, f"<figcaption>{escape(found.caption)}</figcaption></figure>"]
+    return [*parts, f"<figcaption>{escape(result.caption)}</figcaption></figure>"]
 
 
 def _enumeration_table(variable: str, meaning: VariableDeclaration) -> str:
-    """The items of an enumeration."""
+    """Return a table of the items of an enumeration."""
     title = meaning.text[0].upper() + meaning.text[1:]
     rows = "".join(
         f"<tr><td><code>{value}</code></td><td><b>{escape(label)}</b>{' (default)' if value == meaning.start else ''}"
         f"</td><td>{escape(sentence)}</td></tr>"
         for label, value, sentence in meaning.items
     )
-    head = "<thead><tr><th>value</th><th>name</th><th>what it is</th></tr></thead>"
+    head = "<thead><tr><th>value</th><th>name</th><th>description</th></tr></thead>"
     return f"<h2>{escape(title)}: <code>{escape(variable)}</code></h2>\n<table>{head}{rows}</table>"
 
 
 def _variable_table(chosen: Variables) -> str:
-    """Name, start, unit, what it is and what is allowed, of each variable."""
+    """Return a table of name, default, unit, description and range of each variable."""
     rows = []
     for variable, meaning in chosen:
         unit = readable_unit(meaning.unit)
@@ -137,12 +138,12 @@ def _variable_table(chosen: Variables) -> str:
         rows.append("<tr><td>{}</td><td class='number'>{}</td><td>{}</td></tr>".format(*cells))
     set_ = [meaning.causality in SETTABLE_CAUSALITIES for _, meaning in chosen]
     value = "default" if all(set_) else "default, unit" if any(set_) else "unit"
-    head = f"<thead><tr><th>name</th><th>{value}</th><th>what it is</th></tr></thead>"
+    head = f"<thead><tr><th>name</th><th>{value}</th><th>description</th></tr></thead>"
     return f"<table>{head}{''.join(rows)}</table>"
 
 
 def _capabilities_table() -> str:
-    """What every kind of FMU offers."""
+    """Return the table of capabilities of each kind of FMU."""
     marked = re.sub("`(.*?)`", r"<code>\1</code>", CAPABILITIES)
     head, *rows = ([cell.strip() for cell in line.split("|")[1:-1]] for line in marked.splitlines())
     titles = "".join(f"<th>{title}</th>" for title in head)
@@ -150,9 +151,9 @@ def _capabilities_table() -> str:
     return f"<table class='offered'><thead><tr>{titles}</tr></thead>{lines}</table>"
 
 
-def _footer(model: type[VariableOwner], found: CertifiedResult | None) -> str:
-    """The default experiment, licences and version."""
+def _footer(model: type[VariableOwner], result: CertifiedResult | None) -> str:
+    """Return the footer: default experiment, licences and version."""
     run = f"Default run: 0 to {model.stop_time:g} s, tolerance {model.tolerance:g}."  # type: ignore[attr-defined]
-    certified = f" Certified result: <a href='../{RESULT_FOLDER}/'>{RESULT_FOLDER}</a>." if found else ""
+    certified = f" Certified result: <a href='../{RESULT_FOLDER}/'>{RESULT_FOLDER}</a>." if result else ""
     licences = " Licences: <a href='licenses/'>licenses</a>."
     return f"<footer>{run}{certified}{licences} friction-fmus {__version__}.</footer>"

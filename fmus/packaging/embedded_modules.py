@@ -1,7 +1,7 @@
-"""Which source files travel inside an FMU: those that a model reaches through its imports, and no others.
+"""Collects the source files that an FMU embeds: those that a model reaches through its imports.
 
-They become one package that leans on nothing but the standard library.  The part of pythonfmu that is needed, if any,
-travels inside as `<package>/pythonfmu`, so the FMU never meets the pythonfmu of its host.
+They form one package that needs only the standard library.  The required part of pythonfmu is embedded as
+`<package>/pythonfmu`, so the FMU never uses a pythonfmu installed in its host.
 """
 
 import ast
@@ -17,8 +17,8 @@ from .equations.model_file import ModelFile
 from .model_lookup import FMUS
 from .syntax_trees import parsed_module, parsed_nodes
 
-ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # what stands in the originals of these does not travel
-WORKAROUNDS, SLAVE = "pythonfmu_workarounds.py", "runtime/slave.py"  # travel with the model
+ROOT, VENDORED = "__init__.py", "pythonfmu/__init__.py"  # replaced by generated or empty files
+WORKAROUNDS, SLAVE = "pythonfmu_workarounds.py", "runtime/slave.py"  # embedded with every model
 INIT_SOURCE = '''\
 """{name} as an FMI 2.0 co-simulation slave."""
 
@@ -32,43 +32,46 @@ from .runtime.slave import make_slave_class
 
 @cache
 def installed_package(package: str) -> Path:
-    """Where a package is installed of which an FMU carries a part; it is found without being imported."""
+    """Return the folder of an installed package without importing it."""
     spec = find_spec(package)
     if spec is None or spec.origin is None:
-        raise BuildError(f"{package} is not installed, and an FMU carries a part of it: try 'pip install {package}'.")
+        raise BuildError(f"{package} is not installed, and FMUs include a part of it: run 'pip install {package}'.")
     return Path(spec.origin).parent
 
 
 def embedded_files(source: ModelFile, texts: Mapping[str, str], root: Path = FMUS) -> dict[str, str]:
-    """Path inside the package and text of the model and of every file that it needs, of `texts` or else in `root`."""
+    """Return the text of the model and of every file that it imports, by path in the package.
+
+    Files are taken from `texts` if they are there, else from `root`.
+    """
     files = {ROOT: INIT_SOURCE.format(name=source.name, model=source.class_name)}
-    waiting = [f"{source.name}.py", WORKAROUNDS, SLAVE]
-    for path in waiting:  # which grows on the way
+    pending = [f"{source.name}.py", WORKAROUNDS, SLAVE]
+    for path in pending:  # the list grows during the loop
         if path == VENDORED:
             files[path] = ""
         elif path not in files:
             text = texts[path] if path in texts else _on_disk(path, root).read_text(encoding="utf-8")
             files[path], needed = _embed(path, text, root)
-            waiting += needed
+            pending += needed
     return files
 
 
 def digest(files: dict[str, str], first: str = "") -> str:
-    """What the files hold, after `first`, in 64 letters."""
+    """Return the SHA-256 digest of `first` and all files, as 64 hexadecimal digits."""
     content = "".join(f"{path}\0{text}\0" for path, text in sorted(files.items()))
     return sha256((first + content).encode()).hexdigest()
 
 
 def _on_disk(path: str, root: Path) -> Path:
-    """The source of a path inside the package."""
+    """Return the source file for a path in the package."""
     if path == WORKAROUNDS:
         return Path(__file__).with_name(path)
     return installed_package("pythonfmu").parent / path if path.startswith("pythonfmu/") else root / path
 
 
 def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
-    """The text of a file as it travels, and the paths of the files that it needs in turn."""
-    # Text mode turns any line end into "\n", so that checkouts on all systems build the same bytes.
+    """Return the text of a file as embedded, and the paths of the files that it imports."""
+    # Text mode converts line ends to "\n", so checkouts on all systems build the same bytes.
     lines = text.splitlines(keepends=True)
     inside = PurePosixPath(path).parts
     needed = ["/".join((*inside[:depth], "__init__.py")) for depth in range(1, len(inside))]
@@ -91,7 +94,7 @@ def _embed(path: str, text: str, root: Path) -> tuple[str, list[str]]:
 
 
 def _imports(path: str, source: str) -> Iterator[ast.Import | ast.ImportFrom]:
-    """Every import statement; all stand at the top, for a host may delete the files once they are loaded."""
+    """Yield all import statements; all must be at top level, because hosts may delete the files after loading."""
     body = parsed_module(source).body
     for node in parsed_nodes(source):
         if isinstance(node, (ast.Import, ast.ImportFrom)):
@@ -101,15 +104,15 @@ def _imports(path: str, source: str) -> Iterator[ast.Import | ast.ImportFrom]:
 
 
 def _standard(path: str, module: str) -> None:
-    """Refuse a module that a host may not have."""
+    """Raise BuildError for a module outside the standard library."""
     if module.split(".")[0] not in sys.stdlib_module_names:
         raise BuildError(f"{path} imports {module}; inside an FMU only the standard library and relative imports work.")
 
 
 def _resolve(path: str, base: tuple[str, ...], name: str, root: Path) -> str:
-    """The file that `from base import name` reads: the module `base.name` or, for a name inside it, `base`."""
+    """Return the file that `from base import name` reads: module `base.name`, or `base` if name is defined in it."""
     for parts in ((*base, name), base):
         for candidate in ("/".join(parts) + ".py", "/".join((*parts, "__init__.py"))):
             if candidate not in (ROOT, VENDORED) and _on_disk(candidate, root).is_file():
                 return candidate
-    raise BuildError(f"{path} imports {name} from {'.'.join(base) or 'the package itself'}, which no FMU carries.")
+    raise BuildError(f"{path} imports {name} from {'.'.join(base) or 'the package itself'}, which FMUs do not include.")

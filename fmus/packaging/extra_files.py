@@ -1,4 +1,4 @@
-"""What an FMU of any kind carries for people: page, icon, known boundaries, certified result."""
+"""Files for users in FMUs of all kinds: documentation page, icon, known boundaries, certified result."""
 
 from pathlib import Path
 
@@ -11,15 +11,18 @@ from .fmi_variables import Variables
 def extra_files(
     model: type[VariableOwner], path: Path, declared: Variables, icon: str = "model.png", use: str = ""
 ) -> dict[str, bytes]:
-    """Their content, by their paths in the FMU; a model has an icon, known boundaries (harness/studies/sweep)
-    and a certified result if they lie beside its file at `path`, under the same name.  The icon goes to `icon`;
-    the page says `use` of the ways to run it."""
+    """Return the content of these files by path in the FMU.
+
+    Icon (.png), known boundaries (.toml, see harness/studies/sweep) and certified result (.csv) are optional and stand
+    next to the model file at `path`, under the same name.  `icon` is the path of the icon in the FMU; `use` is a
+    paragraph of the page on how to run the FMU.
+    """
     name, picture, boundaries = path.stem, path.with_suffix(".png"), path.with_suffix(".toml")
-    found = find_certified_result(path, declared)
-    shown = icon if picture.is_file() else ""
-    entries = {"documentation/index.html": documentation_page(model, name, declared, found, shown, use)}
-    if found is not None:
-        entries |= result_files(name, found, declared)
+    certified = find_certified_result(path, declared)
+    icon_path = icon if picture.is_file() else ""
+    entries = {"documentation/index.html": documentation_page(model, name, declared, certified, icon_path, use)}
+    if certified is not None:
+        entries |= result_files(name, certified, declared)
     if picture.is_file():
         entries[icon] = picture.read_bytes()
     if boundaries.is_file():

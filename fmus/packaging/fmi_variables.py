@@ -1,6 +1,6 @@
-"""The variables that no model declares: the time, event indicators, the rate of a driver; and what becomes of states.
+"""FMI variables beyond those that a model declares: time, event indicators, rate of the driver.
 
-They stand behind the declared variables, whose value references stay.
+They follow the declared variables, whose value references do not change.
 """
 
 from typing import Any
@@ -9,7 +9,7 @@ from ..runtime.variable_declarations import Local, VariableDeclaration, Variable
 from .lowering import sibling_module
 
 TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
-DERIVATIVE_NAME = "der({})"  # of a state that a driver is
+DERIVATIVE_NAME = "der({})"  # derivative of the position of a driver
 Variables = list[tuple[str, VariableDeclaration]]
 
 
@@ -20,21 +20,21 @@ class TimeVariable(VariableDeclaration):
 
 
 class ContinuousLocal(Local):
-    """Calculated; continuous between events."""
+    """A calculated local variable, continuous between events."""
 
     variability = "continuous"
 
 
 def model_exchange_instance(model: type[VariableOwner]) -> Any:
-    """An object of a model, as written out, that an importer's solver may lead."""
-    exchange = sibling_module(model, "runtime.model_exchange")
+    """Create an instance of a lowered model for model exchange."""
+    exchange = sibling_module(model, "runtime.exchange")
     thing = type(model.__name__, (exchange.ModelExchangeMixin, model), {})()
     exchange.update_nominals(thing)
     return thing
 
 
 def attribute_path(name: str) -> str:
-    """Where a variable is in such an object."""
+    """Return the attribute path of a variable in a model-exchange instance."""
     if name == TIME:
         return "solver.t"
     if name.startswith((TO_REST, TO_BREAK_AWAY)):
@@ -43,35 +43,35 @@ def attribute_path(name: str) -> str:
 
 
 def integrated_states(declared: Variables) -> Variables:
-    """The states that a solver integrates, in order."""
+    """Return the states that a solver integrates, in order of declaration."""
     return [(name, meaning) for name, meaning in declared if meaning.role == "state" and not meaning.rate]
 
 
 def all_variables(thing: Any) -> Variables:
-    """Name and declaration of every variable of such an object: those declared, then the others, the time last."""
+    """Return name and declaration of all variables of a model-exchange instance: declared ones, added ones, time."""
     declared = variables(thing)
     meanings = dict(declared)
-    found: Variables = []
+    added: Variables = []
     forces = [meaning.unit for _, meaning in declared if meaning.role == "contact"]
     states = [meaning for _, meaning in integrated_states(declared)]
     speed = next((meaning.unit for meaning in states if meaning.rate_of), states[0].unit)
     for (mode, slip), force in zip(thing.contacts.items(), forces, strict=True):
         tail, where = (f"_{mode}", f" of {mode}") if len(forces) > 1 else ("", "")
-        rest = f"event indicator{where}: speed in the direction of the slide; 1 while stuck"
-        away = f"event indicator{where}: holding limit less load on the body at rest; 1 while sliding"
-        found += [
-            (TO_REST + tail, ContinuousLocal(meanings[slip].unit if slip else speed, rest)),
-            (TO_BREAK_AWAY + tail, ContinuousLocal(force, away)),
+        stick_text = f"event indicator{where}: speed in the direction of sliding; 1 while stuck"
+        slip_text = f"event indicator{where}: holding limit minus load on the body at rest; 1 while sliding"
+        added += [
+            (TO_REST + tail, ContinuousLocal(meanings[slip].unit if slip else speed, stick_text)),
+            (TO_BREAK_AWAY + tail, ContinuousLocal(force, slip_text)),
         ]
     for name, meaning in declared:
         if meaning.rate:
-            words = "rate of the " + meaning.text.split(",")[0]
-            found.append((DERIVATIVE_NAME.format(name), ContinuousLocal(meanings[meaning.rate].unit, words)))
-    return [*declared, *found, (TIME, TimeVariable("s", "the independent variable"))]
+            description = "rate of the " + meaning.text.split(",")[0]
+            added.append((DERIVATIVE_NAME.format(name), ContinuousLocal(meanings[meaning.rate].unit, description)))
+    return [*declared, *added, (TIME, TimeVariable("s", "the independent variable"))]
 
 
 def derivative_indices(declared: Variables) -> dict[int, int]:
-    """The places of the derivatives, each with that of its state: states as declared, then drivers."""
+    """Return {index of derivative: index of its state}: states in order of declaration, then drivers."""
     names = {name: index for index, (name, _) in enumerate(declared)}
     rates = {names[name]: names[meaning.rate_of] for name, meaning in declared if meaning.rate_of}
     of_state = {state: rate for rate, state in rates.items() if declared[state][1].role == "state"}
@@ -80,7 +80,7 @@ def derivative_indices(declared: Variables) -> dict[int, int]:
 
 
 def event_indicator_indices(declared: Variables) -> list[int]:
-    """The places of the event indicators: all to rest before all to break away."""
+    """Return the indices of the event indicators: all for coming to rest, then all for breaking away."""
     return [
         index
         for start in (TO_REST, TO_BREAK_AWAY)

@@ -1,4 +1,4 @@
-"""What an FMU costs its host: the time that a fresh Python takes to import its code."""
+"""Measures how long a fresh Python process takes to import the code of an FMU."""
 
 import subprocess
 import sys
@@ -16,7 +16,7 @@ print(time.process_time() - begin)
 
 
 def measure_import_time(fmu: Path) -> float:
-    """Seconds of its processor; the standard library's part included, nothing compiled before."""
+    """Return the CPU time of the import in s, including the standard library and without cached bytecode."""
     with TemporaryDirectory() as folder:
         with ZipFile(fmu) as archive:
             archive.extractall(folder, [path for path in archive.namelist() if path.startswith("resources/")])

@@ -1,8 +1,7 @@
-"""What every output follows from at the start: the parameters and inputs in its equation, with the start values put in,
-so that terms which are zero are gone.
+"""Dependencies of outputs at initialization: parameters and inputs in each equation after inserting start values.
 
-The mode of a contact follows from its slip and, where it may stick, from its load and from what it holds, and from the
-rates of both, which decide ties; of contacts that share bodies from those of all.
+The mode of a contact depends on its slip and, if it can stick, on its load, its holding limit and the rates of both,
+which decide ties.  For contacts that share bodies it depends on those of all these contacts.
 """
 
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
@@ -15,7 +14,7 @@ from .fmi_variables import Variables
 
 
 def initial_dependencies(model: type[VariableOwner], declared: Variables) -> dict[str, list[str]]:
-    """For every output the parameters and inputs that it follows from while the model is initialised."""
+    """Return for every output the parameters and inputs that it depends on at initialization."""
     outputs = [name for name, meaning in declared if meaning.causality == "output"]
     if not outputs:
         return {}
@@ -31,20 +30,22 @@ def initial_dependencies(model: type[VariableOwner], declared: Variables) -> dic
         return {leaf for e in terms for leaf in variables_in(substitute(e, start))}
 
     def of_mode(c: Contact) -> set[Expression]:
-        near = [c] if c in an.independent_contacts else an.contacts
-        held = [*an.load_expressions(c), *(an.holding_limit[d] for d in near)] if HYBRID in laws else []
+        contacts = [c] if c in an.independent_contacts else an.contacts
+        held = [*an.load_expressions(c), *(an.holding_limit[d] for d in contacts)] if HYBRID in laws else []
         rates = [differentiate(e, an.coasting_derivatives) for e in held]
-        others = [e for d in near if d is not c for e in (d.slip, d.slide)]
+        others = [e for d in contacts if d is not c for e in (d.slip, d.slide)]
         return among(c.slip, *held, *rates, *others, *([c.eps] if THRESHOLD in laws else []))
 
     def of_force(c: Contact) -> set[Expression]:
         return of_mode(c) | among(c.slide, *([] if laws == [SIGN] else [*an.load_expressions(c), an.holding_limit[c]]))
 
     def follows(e: Expression) -> set[str]:
-        found = among(e)
-        touched = [of_force(c) if c in found else of_mode(c) for c in an.contacts if {c, c.mode} & found]
-        names = {one.name for part in (found, *touched) for one in part}
-        return names | {"friction"} if touched and laws[1:] else names
+        variables = among(e)
+        contact_variables = [
+            of_force(c) if c in variables else of_mode(c) for c in an.contacts if {c, c.mode} & variables
+        ]
+        names = {one.name for part in (variables, *contact_variables) for one in part}
+        return names | {"friction"} if contact_variables and laws[1:] else names
 
     equations = {e.name: follows(e) for e in an.declared if e.name in outputs}
     known = [name for name, meaning in declared if meaning.causality in SETTABLE_CAUSALITIES]

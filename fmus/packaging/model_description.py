@@ -1,7 +1,7 @@
-"""The model description: `modelDescription.xml` from the declared variables (FMI 2.0.4, sections 2.2, 3.3 and 4.3).
+"""Writes `modelDescription.xml` from the declared variables (FMI 2.0.4, sections 2.2, 3.3 and 4.3).
 
-A Python FMU is for co-simulation; a native one for model exchange as well, with further variables (further.py).  What
-does not depend on the version of FMI is shared with description3.py.
+Python FMUs support co-simulation; native FMUs also model exchange, with additional variables (fmi_variables.py).
+Functions that do not depend on the FMI version are shared with model_description_fmi3.py.
 """
 
 from datetime import datetime
@@ -37,7 +37,7 @@ STEPPING_CAPABILITIES = {
 DIRECTIONAL_DERIVATIVES = {"providesDirectionalDerivative": "true"}
 OUTPUT_DERIVATIVES = {"maxOutputDerivativeOrder": "1"}
 INPUT_INTERPOLATION = {"canInterpolateInputs": "true"}  # as polynomials
-EXCHANGE_CAPABILITIES = {  # what is said of model exchange: the same, but for the steps
+EXCHANGE_CAPABILITIES = {  # for model exchange: the same without communication steps
     **{key: able for key, able in STEPPING_CAPABILITIES.items() if "Communication" not in key},
     "completedIntegratorStepNotNeeded": "true",
     **DIRECTIONAL_DERIVATIVES,
@@ -46,22 +46,27 @@ EXPERIMENT_ATTRIBUTES = {"stopTime": "stop_time", "tolerance": "tolerance", "ste
 LOG_CATEGORIES = {
     "logStatusWarning": "Messages with status {fmi}Warning.",
     "logStatusDiscard": "Messages with status {fmi}Discard.",
-    "logStatusError": "Messages with status {fmi}Error: what was wrong, and what is allowed.",
+    "logStatusError": "Messages with status {fmi}Error: invalid values and calls, with the allowed range or order.",
     "logStatusFatal": "Messages with status {fmi}Fatal.",
     "logAll": "All messages.",
 }
 
 
 def describe(model: type[VariableOwner], name: str, code: str, date: datetime, exchanging: bool = False) -> bytes:
-    """The model description of the FMU `name`, also for model exchange if wanted, as XML.
+    """Return the FMI 2.0 model description of the FMU `name` as XML.
 
-    `code` is the digest of the source that travels inside.  The guid follows from it and from all of the
-    description but the date: equal guids mean equal content.
+    Parameters
+    ----------
+    code
+        Digest of the embedded sources.  The GUID is computed from it and from the description without the date, so
+        equal GUIDs mean equal content.
+    exchanging
+        Whether the FMU supports model exchange.
     """
     root = create_root(model, name, "2.0", "guid")
     thing: Any = model_exchange_instance(model) if exchanging else model()
     declared = variables(thing)
-    if exchanging:  # FMI 2.0 needs no variable for the time, and FMILibrary takes one for a mistake
+    if exchanging:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
         declared = [one for one in all_variables(thing) if one[0] != TIME]
         root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
         SubElement(root, "ModelExchange", EXCHANGE_CAPABILITIES, modelIdentifier=name)
@@ -75,12 +80,12 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, e
     _add_types(root, declared)
     add_log_categories_and_experiment(root, model, "fmi2")
     scalars = SubElement(root, "ModelVariables")
-    places = {variable: str(place) for place, (variable, _) in enumerate(declared, 1)}
+    positions = {variable: str(number) for number, (variable, _) in enumerate(declared, 1)}
     for reference, (variable, meaning) in enumerate(declared):
         scalar = SubElement(scalars, "ScalarVariable", common_attributes(variable, meaning, reference))
         of_type = SubElement(scalar, meaning.type, type_attributes(variable, meaning))
         if meaning.rate_of:
-            of_type.set("derivative", places[meaning.rate_of])
+            of_type.set("derivative", positions[meaning.rate_of])
     rates = derivative_indices(declared) if exchanging else {}
     mark_states([scalar[0] for scalar in scalars], thing, rates, first=1)
     _add_structure(root, model, declared, rates)
@@ -88,7 +93,7 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, e
 
 
 def create_root(model: type[VariableOwner], name: str, version: str, key: str) -> Element:
-    """The root; the attribute `key` is the last to be known."""
+    """Create the root element; `serialize` sets the attribute `key` last."""
     root = Element("fmiModelDescription", {"fmiVersion": version, "modelName": name, key: ""})
     root.set("description", (model.__doc__ or "").strip().splitlines()[0])
     root.attrib |= {"author": "friction-fmus", "version": __version__, "license": "MIT"}
@@ -97,14 +102,14 @@ def create_root(model: type[VariableOwner], name: str, version: str, key: str) -
 
 
 def serialize(root: Element, key: str, code: str, date: datetime) -> bytes:
-    """The text; all but the date goes into the attribute `key`."""
+    """Return the XML; the attribute `key` is a UUID of all content except the date."""
     root.set(key, f"{{{uuid5(NAMESPACE_OID, code + tostring(root, 'unicode'))}}}")
     root.set("generationDateAndTime", date.strftime("%Y-%m-%dT%H:%M:%SZ"))
     return xml_bytes(root)
 
 
 def add_log_categories_and_experiment(root: Element, model: type[VariableOwner], fmi: str) -> None:
-    """LogCategories, with the prefix of the status names, and DefaultExperiment."""
+    """Add LogCategories and DefaultExperiment; `fmi` is the prefix of the status names."""
     categories = SubElement(root, "LogCategories")
     for category, text in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=category, description=text.format(fmi=fmi))
@@ -114,12 +119,12 @@ def add_log_categories_and_experiment(root: Element, model: type[VariableOwner],
 
 
 def declared_variables(model: type[VariableOwner]) -> Variables:
-    """Name and declaration of every variable of a model."""
+    """Return name and declaration of every variable of a model."""
     return variables(model())
 
 
 def add_units(root: Element, declared: Variables) -> None:
-    """UnitDefinitions: every unit that a variable has, in the order of the table."""
+    """Add UnitDefinitions for all units in use."""
     definitions = SubElement(root, "UnitDefinitions")
     for symbol, unit in used_units(declared):
         powers = {base: str(getattr(unit, base)) for base in ("kg", "m", "s", "rad") if getattr(unit, base)}
@@ -130,7 +135,7 @@ def add_units(root: Element, declared: Variables) -> None:
 
 
 def _add_types(root: Element, declared: Variables) -> None:
-    """TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
+    """Add TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
     types = SubElement(root, "TypeDefinitions")
     for quantity in quantities(declared):
         element = SubElement(types, "SimpleType", name=quantity["quantity"])
@@ -142,37 +147,39 @@ def _add_types(root: Element, declared: Variables) -> None:
 
 
 def quantities(declared: Variables) -> list[dict[str, str]]:
-    """What is measured and in which unit, for every unit that a variable has."""
-    found = [{"quantity": u.quantity, "unit": symbol, "displayUnit": u.display} for symbol, u in used_units(declared)]
-    return [{key: value for key, value in one.items() if value} for one in found]
+    """Return quantity, unit and display unit for every unit in use."""
+    quantity_attributes = [
+        {"quantity": u.quantity, "unit": symbol, "displayUnit": u.display} for symbol, u in used_units(declared)
+    ]
+    return [{key: value for key, value in one.items() if value} for one in quantity_attributes]
 
 
 def used_units(declared: Variables) -> list[tuple[str, Unit]]:
-    """Every unit that a variable has: those with a name in the order of the table, then the others."""
+    """Return all units in use: named ones in the order of the table, then the others."""
     used = {meaning.unit: unit_of(name, meaning.unit) for name, meaning in declared if meaning.type == "Real"}
     return [(symbol, used[symbol]) for symbol in dict.fromkeys((*UNITS, *used)) if symbol in used]
 
 
 def add_enumeration_items(element: Element, meaning: VariableDeclaration) -> None:
-    """The items of an enumeration."""
+    """Add the items of an enumeration."""
     for label, value, text in meaning.items:
         SubElement(element, "Item", name=label, value=str(value), description=text)
 
 
 def type_name(variable: str) -> str:
-    """The name of an enumeration: `solver.method` is of the type SolverMethod."""
+    """Return the type name of an enumeration: SolverMethod for `solver.method`."""
     return "".join(word.capitalize() for word in variable.replace(".", "_").split("_"))
 
 
 def common_attributes(name: str, meaning: VariableDeclaration, reference: int) -> dict[str, str]:
-    """The attributes that a variable of any type has."""
+    """Return the XML attributes common to variables of all types."""
     attributes = {"name": name, "valueReference": str(reference), "description": meaning.text}
     attributes |= {"causality": meaning.causality, "variability": meaning.variability}
     return attributes | ({"initial": meaning.initial} if meaning.initial else {})
 
 
 def type_attributes(name: str, meaning: VariableDeclaration) -> dict[str, str]:
-    """The others.  FMI has no open bounds, so a value `above` or `below` a bound gets that bound."""
+    """Return the XML attributes that depend on the type.  FMI has no open bounds: `above` becomes min."""
     attributes: dict[str, str] = {}
     if meaning.items:
         attributes["declaredType"] = type_name(name)
@@ -191,24 +198,26 @@ def type_attributes(name: str, meaning: VariableDeclaration) -> dict[str, str]:
 
 
 def mark_states(elements: list[Element], thing: Any, rates: dict[int, int], first: int) -> None:
-    """Derivatives name their states, the first of all variables being that number; a state has a nominal value, and a
-    speed may be put to zero at an event."""
+    """Set `derivative`, `nominal` and `reinit`; variables are numbered from `first`.
+
+    Slip speeds have reinit, because events may set them to zero.
+    """
     if not rates:
         return
     for (rate, state), size in zip(rates.items(), thing.model_exchange.nominals, strict=True):
         elements[rate].set("derivative", str(state + first))
         elements[state].set("nominal", repr(size))
     slips = [slip for slip in thing.contacts.values() if slip]
-    if len(slips) < len(thing.contacts):  # one that is an expression: any speed may be
+    if len(slips) < len(thing.contacts):  # the slip of a contact is an expression: any speed may be set
         slips = [name for name in thing.states if name in thing.states.values()] or list(thing.states)
     for slip in slips:
         elements[list(rates.values())[list(thing.states).index(slip)]].set("reinit", "true")
 
 
 def continuous_dependencies(declared: Variables, rates: dict[int, int], place: int) -> list[int]:
-    """The places of what a variable follows from between events: an output or a derivative.
+    """Return the indices of the states and inputs that an output or derivative depends on between events.
 
-    A state follows from itself, and a driver's rate from nothing that moves.
+    A state depends on itself, and the rate of a driver on no state or input.
     """
     name, meaning = declared[place]
     states = list(rates.values())
@@ -220,13 +229,13 @@ def continuous_dependencies(declared: Variables, rates: dict[int, int], place: i
     return states + inputs * cast(Output, meaning).direct
 
 
-DependencyTable = dict[int, list[int]]  # the place of a variable -> those of what it follows from
+DependencyTable = dict[int, list[int]]  # index of a variable -> indices of the variables that it depends on
 
 
 def dependency_tables(model: type[VariableOwner], declared: Variables, rates: dict[int, int]) -> list[DependencyTable]:
-    """What outputs and what derivatives follow from between events, and what both follow from at the start.
+    """Return the dependencies of outputs and of derivatives between events, and of both at initialization.
 
-    Without the latter an importer must assume that it is everything, and sees loops where there are none.
+    Without the last table importers must assume dependence on everything and find algebraic loops that do not exist.
     """
     places = {name: place for place, (name, _) in enumerate(declared)}
     outputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "output"]
@@ -241,12 +250,12 @@ def dependency_tables(model: type[VariableOwner], declared: Variables, rates: di
 
 
 def _add_structure(root: Element, model: type[VariableOwner], declared: Variables, rates: dict[int, int]) -> None:
-    """ModelStructure: what follows an input or a state at once, and from what each follows at the start."""
+    """Add ModelStructure: Outputs, Derivatives and InitialUnknowns with their dependencies."""
     structure = SubElement(root, "ModelStructure")
     outputs, derivatives, at_first = dependency_tables(model, declared, rates)
     kinds = {"Outputs": outputs} | ({"Derivatives": derivatives} if rates else {}) | {"InitialUnknowns": at_first}
     for kind, unknown in kinds.items():
         element = SubElement(structure, kind)
         for place, known in unknown.items():
-            dependencies = " ".join(str(one + 1) for one in known)  # the first variable is number 1
+            dependencies = " ".join(str(one + 1) for one in known)  # FMI 2.0 counts from 1
             SubElement(element, "Unknown", index=str(place + 1), dependencies=dependencies)

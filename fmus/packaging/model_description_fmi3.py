@@ -1,6 +1,6 @@
-"""The model description of FMI 3.0, for co-simulation and model exchange (FMI 3.0.1, sections 2.4, 3.3 and 4.3).
+"""Writes the model description of FMI 3.0 for co-simulation and model exchange (FMI 3.0.1, sections 2.4, 3.3, 4.3).
 
-The declared variables keep the value references they have in FMI 2.0.  Behind them stand those of further.py.
+Declared variables keep their value references of FMI 2.0; the variables of fmi_variables.py follow.
 """
 
 from datetime import datetime
@@ -39,7 +39,7 @@ STEPPING_CAPABILITIES = {
 
 
 def describe(model: type[VariableOwner], name: str, code: str, date: datetime) -> bytes:
-    """The model description of the FMU `name` as XML; the instantiation token is to it what the guid is in FMI 2.0."""
+    """Return the FMI 3.0 model description of the FMU `name` as XML; the token is computed like the GUID of FMI 2.0."""
     root = shared.create_root(model, name, "3.0", "instantiationToken")
     for interface, abilities in ("ModelExchange", EXCHANGE_CAPABILITIES), ("CoSimulation", STEPPING_CAPABILITIES):
         SubElement(root, interface, {"modelIdentifier": name} | COMMON_CAPABILITIES | abilities)
@@ -63,32 +63,29 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime) -
 
 
 def _add_types(root: Element, declared: Variables) -> None:
-    """TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
+    """Add TypeDefinitions: a quantity for every unit, and every enumeration with its items."""
     types = SubElement(root, "TypeDefinitions")
     for quantity in shared.quantities(declared):
         SubElement(types, "Float64Type", quantity, name=quantity["quantity"])
     for name, meaning in declared:
         if meaning.items:
-            words = {"name": shared.type_name(name), "description": meaning.text}
-            shared.add_enumeration_items(SubElement(types, "EnumerationType", words), meaning)
+            attributes = {"name": shared.type_name(name), "description": meaning.text}
+            shared.add_enumeration_items(SubElement(types, "EnumerationType", attributes), meaning)
 
 
 def _add_structure(
     root: Element, model: type[VariableOwner], thing: Any, declared: Variables, rates: dict[int, int]
 ) -> None:
-    """ModelStructure: what follows from which states and inputs, and at the start from which parameters.
-
-    Of a smooth model some factors are known: one, and those that parameters make.
-    """
+    """Add ModelStructure with all dependencies; for smooth models also dependenciesKind constant or tunable."""
     structure, states = SubElement(root, "ModelStructure"), list(rates.values())
     outputs, derivatives, at_first = shared.dependency_tables(model, declared, rates)
     for place, known in outputs.items():
         _add_unknown(structure, "Output", place, known)
     for place, known in derivatives.items():
-        steady = (
+        kind_of_factors = (
             "" if thing.has_dry_friction else "constant" if place in states else "tunable" if thing.is_linear else ""
         )
-        _add_unknown(structure, "ContinuousStateDerivative", place, known, steady)
+        _add_unknown(structure, "ContinuousStateDerivative", place, known, kind_of_factors)
     for place, known in at_first.items():
         _add_unknown(structure, "InitialUnknown", place, known)
     places = {name: place for place, (name, _) in enumerate(declared)}
@@ -101,6 +98,8 @@ def _add_structure(
 
 
 def _add_unknown(structure: Element, kind: str, reference: int, known: list[int], factors: str = "") -> None:
-    """What a variable follows from, and of what kind the factors are, if that is told."""
-    words = {"valueReference": str(reference), "dependencies": " ".join(map(str, known))}
-    SubElement(structure, kind, words | ({"dependenciesKind": " ".join([factors] * len(known))} if factors else {}))
+    """Add an unknown with its dependencies and, if given, their kind."""
+    attributes = {"valueReference": str(reference), "dependencies": " ".join(map(str, known))}
+    SubElement(
+        structure, kind, attributes | ({"dependenciesKind": " ".join([factors] * len(known))} if factors else {})
+    )

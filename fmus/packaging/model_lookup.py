@@ -1,4 +1,4 @@
-"""Where models are: those of `fmus/`, one a file, by their names; any other by the path of its file."""
+"""Finds models: those in `fmus/` by name, all others by the path of their file."""
 
 from pathlib import Path
 
@@ -9,12 +9,12 @@ FMUS = Path(__file__).resolve().parent.parent
 
 
 def model_names() -> list[str]:
-    """The name of every model of the project, in alphabetical order."""
+    """Return the names of all models of the project, sorted."""
     return sorted(path.stem for path in FMUS.glob("*.py") if not path.stem.startswith("_"))
 
 
 def find_model(source: str | Path) -> ModelFile:
-    """The model of a name, or in the file of a path, which has the ending .py."""
+    """Load a model by name, or by the path of a .py file."""
     path = Path(source)
     if path.suffix == ".py":
         if not path.is_file():
@@ -22,6 +22,7 @@ def find_model(source: str | Path) -> ModelFile:
         return load_model_file(path)
     if str(source) not in model_names():
         raise BuildError(
-            f"There is no model {str(source)!r}; known are {', '.join(model_names())}, and any .py file by its path."
+            f"There is no model {str(source)!r}; choose one of {', '.join(model_names())}, "
+            "or give the path of a .py file."
         )
     return load_model_file(FMUS / f"{source}.py")

@@ -1,14 +1,12 @@
-"""What keeps the native layer of pythonfmu from freeing twice, and from leaving its mark; travels inside every FMU.
+"""Workarounds for memory errors in the native layer of pythonfmu 0.7.0; embedded in every Python FMU.
 
-Seen with pythonfmu 0.7.0, the first in reference counts, the second with valgrind:
-
-1. Every instance releases one reference to the names of the entry script, which was only lent.  A script without
-   functions of its own loses its names under the second instance.  So each run of the script keeps one more.
-2. At the end of the process a library that is still loaded releases its state in a static destructor, then again
-   through the pointer left over, which now and then ends in "corrupted double-linked list".
-   `finalizePythonInterpreter` clears the pointer; called while Python still runs it makes the later releases find
-   nothing.  The library is not held for that: a host that unloads it gets its memory back.
-3. Every instance leaves an entry at the head of sys.path.  Nothing needs it once the script has run.
+1. Every instance releases a borrowed reference to the globals of the entry script.  Without countermeasure the second
+   instance frees them.  Each run of the script therefore takes one extra reference.
+2. At process exit a library that is still loaded releases its state in a static destructor, and again through the
+   dangling pointer, which sometimes ends in "corrupted double-linked list" (seen with valgrind).
+   `finalizePythonInterpreter` clears the pointer; called while Python still runs, it makes the later releases no-ops.
+   The library is not kept loaded for this: a host that unloads it gets its memory back.
+3. Every instance prepends an entry to sys.path, which is not needed after the script has run.
 """
 
 import atexit
@@ -24,25 +22,25 @@ finalizers: dict[str, Any] = {}  # path -> address of its finalizePythonInterpre
 
 
 def keep_reference(names: dict[str, str]) -> None:
-    """Called by the entry script, with its names: when it is imported, then whenever an instance is made."""
+    """Take an extra reference to the globals of the entry script; called at import and for every instance."""
     kept_references.append(names)
     if len(kept_references) == 1:
         return
     script = names["__name__"] + ".py"
     for folder in list(sys.path):
         if isinstance(folder, str) and os.path.isfile(os.path.join(folder, script)):
-            with suppress(ValueError):  # by value: another thread may have moved the places meanwhile
+            with suppress(ValueError):  # by value, because another thread may have changed the positions
                 sys.path.remove(folder)
             register_libraries(folder)
             return
 
 
 def register_libraries(resources: str) -> None:
-    """Note where the library of the FMU in this folder has its last function."""
+    """Store the address of the finalizer of the FMU library next to this resources folder."""
     if sys.platform != "linux":
         return
     for path in glob(os.path.join(escape(resources), "../binaries/*linux*/*.so")):
-        with suppress(OSError, AttributeError):  # a host that loaded a copy of the file: out of reach
+        with suppress(OSError, AttributeError):  # the host has loaded a copy of the file, which cannot be found
             library = PyDLL(path, os.RTLD_NOLOAD | os.RTLD_LAZY)
             finalizers[os.path.realpath(path)] = cast(library.finalizePythonInterpreter, c_void_p).value
             PyDLL(None).dlclose(c_void_p(library._handle))
@@ -50,7 +48,7 @@ def register_libraries(resources: str) -> None:
 
 @atexit.register
 def release_libraries() -> None:
-    """Call the last function of each library that is still there; asking the loader would block inside dlclose."""
+    """Call the finalizer of each library that is still mapped; asking the loader would block inside dlclose."""
     if not finalizers:
         return
     with open("/proc/self/maps", encoding="utf-8", errors="replace") as mapped:

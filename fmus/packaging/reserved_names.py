@@ -1,4 +1,4 @@
-"""Words where a model goes: names that mean something else there, texts as Python and C both read them."""
+"""Names reserved in C, and string literals that are valid in Python and in C."""
 
 from json import dumps
 
@@ -14,5 +14,5 @@ C_NAMES = frozenset(
 
 
 def string_literal(text: str) -> str:
-    """A string literal of printable letters."""
+    """Return a string literal for printable text."""
     return dumps(text, ensure_ascii=False)

@@ -1,32 +1,32 @@
-"""A curve over time as an inline SVG, in the colours of the page around it."""
+"""Draws a curve over time as inline SVG; colours come from the style sheet of the page."""
 
 from math import ceil, floor, log10
 
-WIDTH, HEIGHT = 640, 230  # of the drawing, which scales
-LEFT, RIGHT, TOP, BOTTOM = 70, 14, 10, 48  # room for the ticks
+WIDTH, HEIGHT = 640, 230  # of the view box
+LEFT, RIGHT, TOP, BOTTOM = 70, 14, 10, 48  # margins for the tick labels
 TICKS = 5
 
 
 def draw_chart(times: list[float], values: list[float], label: str) -> str:
-    """The drawing; `label` names the values and their unit, time is in s."""
+    """Return the SVG of values over times in s; `label` names the values and their unit."""
     low, high = min(values), max(values)
-    room = 0.05 * (high - low) or 1.0
-    low, high = low - room, high + room
+    margin = 0.05 * (high - low) or 1.0
+    low, high = low - margin, high + margin
 
-    def place(t: float, value: float) -> tuple[float, float]:
+    def to_view_box(t: float, value: float) -> tuple[float, float]:
         x = LEFT + (t - times[0]) / (times[-1] - times[0]) * (WIDTH - LEFT - RIGHT)
         return x, TOP + (high - value) / (high - low) * (HEIGHT - TOP - BOTTOM)
 
     parts = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{label} over time">']
     for value in tick_values(low, high):
-        _, y = place(times[0], value)
+        _, y = to_view_box(times[0], value)
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y:.1f}" y2="{y:.1f}"/>')
         parts.append(f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{value:g}</text>')
     for t in tick_values(times[0], times[-1]):
-        x, _ = place(t, low)
+        x, _ = to_view_box(t, low)
         parts.append(f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>')
         parts.append(f'<text x="{x:.1f}" y="{HEIGHT - BOTTOM + 19}" text-anchor="middle">{t:g}</text>')
-    points = (place(t, value) for t, value in zip(times, values, strict=True))
+    points = (to_view_box(t, value) for t, value in zip(times, values, strict=True))
     line = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     parts.append(f'<polyline class="curve" points="{line}"/>')
     parts.append(f'<text x="{WIDTH - RIGHT}" y="{HEIGHT - 6}" text-anchor="end">time in s</text>')
@@ -35,7 +35,7 @@ def draw_chart(times: list[float], values: list[float], label: str) -> str:
 
 
 def tick_values(low: float, high: float) -> list[float]:
-    """Round numbers from low to high, about TICKS of them.
+    """Return about TICKS round numbers from low to high.
 
     >>> ticks(-0.11, 0.11)
     [-0.1, -0.05, 0.0, 0.05, 0.1]

@@ -1,4 +1,4 @@
-"""Trees of Python, of which most are looked at again and again: read once, and shared where they do not change."""
+"""Cached and immutable Python syntax trees: parsed once, and shared where they do not change."""
 
 import ast
 from functools import lru_cache
@@ -15,69 +15,68 @@ CHILD_FIELDS = {kind: [name for name in kind._fields if name not in NON_NODE_FIE
 
 @lru_cache(200)
 def parsed_nodes(text: str) -> list[ast.AST]:
-    """Every node of a text, its tree first; nobody changes them."""
+    """Return all nodes of the source text, the module first; callers must not change them."""
     return all_nodes(ast.parse(text))
 
 
 def parsed_module(text: str) -> ast.Module:
-    """The tree itself."""
-    found = parsed_nodes(text)[0]
-    assert isinstance(found, ast.Module)
-    return found
+    """Return the parsed module."""
+    result = parsed_nodes(text)[0]
+    assert isinstance(result, ast.Module)
+    return result
 
 
 def child_nodes(node: ast.AST) -> list[ast.AST]:
-    """The nodes one level down; not whether something is read or written."""
-    found: list[ast.AST] = []
+    """Return the direct child nodes, without load and store contexts."""
+    result: list[ast.AST] = []
     for name in CHILD_FIELDS[type(node)]:
         value = getattr(node, name, None)
         if isinstance(value, list):
-            found += [one for one in value if isinstance(one, ast.AST)]
+            result += [one for one in value if isinstance(one, ast.AST)]
         elif isinstance(value, ast.AST):
-            found.append(value)
-    return found
+            result.append(value)
+    return result
 
 
 def all_nodes(root: ast.AST) -> list[ast.AST]:
-    """A tree and all that is in it, in the order of ast.walk."""
-    found = [root]
-    for node in found:  # which grows on the way
-        found += child_nodes(node)
-    return found
+    """Return a node and all its descendants, in the order of ast.walk."""
+    result = [root]
+    for node in result:  # the list grows during the loop
+        result += child_nodes(node)
+    return result
 
 
 class TreeTransformer:
-    """What becomes of a tree: visit_Name(node) and its like say it of a kind of nodes, and tell it of the node itself
-    where nothing does.  No tree is changed: what is new holds those parts of the old that stay."""
+    """Like ast.NodeTransformer, but never changes a tree in place: new trees share unchanged parts with the old."""
 
     def visit(self, node: ast.AST) -> Any:
         return getattr(self, f"visit_{type(node).__name__}", self.generic_visit)(node)
 
     def generic_visit(self, node: Node) -> Node:
-        found = {}
+        result = {}
         for name in CHILD_FIELDS[type(node)]:
             value = getattr(node, name, None)
             if isinstance(value, list):
-                found[name] = [self.visit(one) if isinstance(one, ast.AST) else one for one in value]
+                result[name] = [self.visit(one) if isinstance(one, ast.AST) else one for one in value]
             elif isinstance(value, ast.AST):
-                found[name] = self.visit(value)
-        return replace_fields(node, **found) if found else node
+                result[name] = self.visit(value)
+        return replace_fields(node, **result) if result else node
 
 
 def replace_fields(node: Node, **parts: Any) -> Node:
-    """A node with these parts in place of its own; the node itself, if they are its own."""
-    its = vars(node)
+    """Return a copy of the node with these fields replaced, or the node itself if nothing changes."""
+    fields = vars(node)
     for name, part in parts.items():
-        old = its[name]
+        old = fields[name]
         if part is not old and not (isinstance(old, list) and len(part) == len(old) and all(map(is_, part, old))):
-            made = node.__new__(type(node))
-            vars(made).update(its | parts)
-            return made
+            copy = node.__new__(type(node))
+            vars(copy).update(fields | parts)
+            return copy
     return node
 
 
 def is_same_tree(a: Any, b: Any) -> bool:
-    """Whether two trees say the same, wherever they stand."""
+    """Return whether two trees are equal, ignoring positions."""
     if a is b:
         return True
     if type(a) is not type(b):

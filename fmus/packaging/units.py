@@ -1,4 +1,4 @@
-"""The units that models may declare: products and quotients of SI units, as N.m.s/rad (FMI 2.0.4, section 2.2.2).
+"""Units that models may declare: products and quotients of SI units, such as N.m.s/rad (FMI 2.0.4, section 2.2.2).
 
 1 <unit> = kg^kg · m^m · s^s · rad^rad;   value in display unit = factor · value in unit.
 """
@@ -14,7 +14,7 @@ DEGREE = 180.0 / pi
 
 @dataclass(frozen=True)
 class Unit:
-    """What is measured, the exponents of the base units, and the unit that people prefer to read, if another."""
+    """Physical quantity, exponents of the base units, and optional display unit with its conversion factor."""
 
     quantity: str
     kg: int = 0
@@ -25,7 +25,7 @@ class Unit:
     factor: float = 1.0
 
 
-UNITS = {  # those whose quantity has a name
+UNITS = {  # units whose quantity has a name
     "1": Unit("Ratio"),
     "s": Unit("Time", s=1),
     "kg": Unit("Mass", kg=1),
@@ -52,7 +52,7 @@ FACTOR_PATTERN = re.compile(r"([./])(1|[A-Za-z]+)(-?\d{1,2})?")
 
 
 def parse_unit(symbol: str) -> Unit | None:
-    """A unit that is a product or quotient, each with an exponent if need be; None for what is not.
+    """Parse a product or quotient of units with optional exponents; return None if invalid.
 
     >>> derived("N.m.s/rad")
     Unit(quantity='N.m.s/rad', kg=1, m=2, s=-1, rad=-1, display='', factor=1.0)
@@ -67,14 +67,14 @@ def parse_unit(symbol: str) -> Unit | None:
 
 
 def unit_of(name: str, symbol: str, display: str = "") -> Unit:
-    """The unit of the variable `name`, with the display unit that it asks for."""
+    """Return the unit of the variable `name`; raise BuildError for an unknown unit or display unit."""
     unit = UNITS.get(symbol) or parse_unit(symbol)
     if unit is None:
         raise BuildError(
-            f"{name} has the unit {symbol!r}; known units are {', '.join(UNITS)}, and products of {', '.join(SYMBOLS)} "
-            "and their powers, as in N.m.s/rad."
+            f"{name} has the unit {symbol!r}; allowed units are {', '.join(UNITS)}, and products of powers of "
+            f"{', '.join(SYMBOLS)}, such as N.m.s/rad."
         )
     if display not in ("", symbol, unit.display):
         allowed = " or ".join(repr(word) for word in (symbol, unit.display) if word)
-        raise BuildError(f"{name} has the display unit {display!r}; allowed for {symbol} is {allowed}.")
+        raise BuildError(f"{name} has the display unit {display!r}; allowed for {symbol}: {allowed}.")
     return unit

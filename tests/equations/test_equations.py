@@ -223,7 +223,7 @@ def test_generated_source_is_deterministic(source):
         analysis.derivative_while_sliding(analysis.rate_outputs[analysis.dynamic_states[0]], slope)
     assert analysis.overflow_indicators
     assert again.generated_source == first.generated_source
-    assert f"Written out from the equations in {first.path.name}" in first.generated_source
+    assert f"Generated from the equations in {first.path.name}" in first.generated_source
 
 
 def test_a_changed_file_is_read_again(tmp_path):

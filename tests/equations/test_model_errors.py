@@ -1,4 +1,4 @@
-"""What an author gets wrong is said when the FMU is built: one sentence, with the line."""
+"""Mistakes in a model file are reported at build time in one sentence with the line number."""
 
 import re
 
@@ -30,57 +30,69 @@ STUCK = '    a = Output("m/s2", "acceleration", (F - k * x - R) / m, rate_of=v)\
 
 # What follows the head, the line that is told (the head has 15), and the sentence.
 WRONG = {
-    "no rate": ("", 15, "nothing is the rate of v: say rate_of=v where its derivative is declared"),
-    "two rates": (RATE + RATE.replace("a =", "b ="), 17, "b and a both say that they are the rate of v"),
-    "two equations": (RATE + RATE, 17, "a has two equations: give the second another name"),
+    "no rate": ("", 15, "v has no derivative: declare an Output or a State with rate_of=v"),
+    "two rates": (RATE + RATE.replace("a =", "b ="), 17, "b and a both declare rate_of=v"),
+    "two equations": (RATE + RATE, 17, "a is assigned twice: give the second equation another name"),
     "an unknown name": (RATE.replace("F -", "G -"), 16, "NameError: name 'G' is not defined"),
-    "no Python": (RATE.replace("F -", "F - -) "), 16, "this is no Python: "),
+    "no Python": (RATE.replace("F -", "F - -) "), 16, "invalid Python: "),
     "units": (
         RATE.replace("k * x", "k * v"),
         16,
-        "F - k * v subtracts kg m/s^2 and kg m/s^3",
+        "F - k * v mixes units: kg m/s^2 and kg m/s^3",
     ),
     "another unit": (
         RATE + '    E = Output("J", "energy", k * x)\n',
         17,
-        "E is declared in J, and k * x is in kg m/s^2",
+        "E is declared in J, but k * x is in kg m/s^2",
     ),
     "no rate by its unit": (
         RATE.replace("m/s2", "m").replace("(F - k * x) / m", "x"),
         16,
         "a in m cannot be the rate of v in m/s",
     ),
-    "an unknown unit": (RATE.replace("m/s2", "furlong/s2"), 16, "a has the unit 'furlong/s2'; known units are"),
+    "an unknown unit": (RATE.replace("m/s2", "furlong/s2"), 16, "a has the unit 'furlong/s2'; allowed units are"),
     "a function of metres": (
         RATE + '    s = Output("1", "sine", sin(x))\n',
         17,
-        "sin(x) is of m: what is in its brackets must be a number",
+        "the argument of sin(x) must be dimensionless, got m",
     ),
-    "an if": (RATE + "    if x > 0.0:\n        pass\n", 17, "an expression has no value yet: write choose("),
-    "a loop": (RATE + "    for y in x:\n        pass\n", 17, "x is one number: there is nothing to loop over"),
+    "an if": (RATE + "    if x > 0.0:\n        pass\n", 17, "an expression has no value at build time: write choose("),
+    "a loop": (RATE + "    for y in x:\n        pass\n", 17, "x is a scalar: it cannot be iterated over"),
     "a table": (
         RATE + "    table = [1.0, 2.0]\n    y = table[x]\n",
         18,
-        "x has no value yet, and no table can be read by it: write its law as a formula",
+        "x has no value at build time and cannot index a table: write a formula",
     ),
-    "a power": (RATE + "    y = x ** 2\n", 17, "** rounds in ways of its own: write a product, x * x"),
+    "a power": (RATE + "    y = x ** 2\n", 17, "** is not supported"),
     "math.sin": (
         RATE + "    import math\n    y = math.sin(x)\n",
         18,
-        "x has no value yet: functions of expressions are imported from fmus",
+        "x has no value at build time: import functions of expressions from fmus",
     ),
     "a text": (RATE + '    y = x + "1"\n', 17, "'1' is neither a number nor an expression"),
     "infinity": (RATE + '    y = x + float("inf")\n', 17, "inf is not a finite number"),
-    "a word of ours": (RATE + '    solver = Parameter(1.0, "1", "ours")\n', 17, "the name solver is taken"),
-    "a method of ours": (RATE + '    rates = Parameter(1.0, "1", "ours")\n', 17, "the name rates is taken"),
-    "a word of C": (RATE + '    double = Parameter(1.0, "1", "ours")\n', 17, "the name double is taken"),
-    "time": (RATE + '    t = Parameter(1.0, "s", "ours")\n', 17, "the name t is taken"),
+    "a word of ours": (
+        RATE + '    solver = Parameter(1.0, "1", "ours")\n',
+        17,
+        "the name solver is reserved by the solver or by C",
+    ),
+    "a method of ours": (
+        RATE + '    rates = Parameter(1.0, "1", "ours")\n',
+        17,
+        "the name rates is reserved by the solver or by C",
+    ),
+    "a word of C": (
+        RATE + '    double = Parameter(1.0, "1", "ours")\n',
+        17,
+        "the name double is reserved by the solver or by C",
+    ),
+    "time": (RATE + '    t = Parameter(1.0, "s", "ours")\n', 17, "the name t is reserved by the solver or by C"),
     "a start that moves": (
         RATE + '    z = State("m", "more", start=x, rate=u)\n',
         17,
-        "start of z moves: it must follow from parameters",
+        "start of z varies with time: it must depend on parameters only",
     ),
-    "a law without friction": (DRY + RATE, 17, "R does not act on its own slip: nothing could hold it"),
+    "a law without friction": (DRY + RATE, 17, "R does not act on its own slip, so it can never stick"),
     "a squared force": (
         DRY + STUCK.replace("- R)", "- R * R / f)"),
         17,
@@ -91,45 +103,61 @@ WRONG = {
         17,
         "R must enter the rate of the slip of R linearly",
     ),
-    "a mode of nobody": (RATE + "    mode = Mode()\n", 17, "mode is the mode of 0 contacts, and must be that of one"),
+    "a mode of nobody": (
+        RATE + "    mode = Mode()\n",
+        17,
+        "mode is the mode of 0 contacts: each Mode needs exactly one Contact",
+    ),
     "a threshold without eps": (
         DRY.replace("slide=f", "slide=f, laws=(HYBRID, THRESHOLD)") + STUCK,
         17,
-        "eps is given with the law THRESHOLD, and with no other",
+        "eps is required with the law THRESHOLD and not allowed without it",
     ),
     "a slide of another unit": (
         DRY.replace("slide=f", "slide=k") + STUCK,
         17,
-        "R is declared in N, and slide k is in kg/s^2",
+        "R is declared in N, but slide k is in kg/s^2",
     ),
-    "a rule that moves": (RATE + '    rules = Rule(x > 1.0, "far")\n', 17, "a Rule is about parameters, and this one"),
+    "a rule that moves": (RATE + '    rules = Rule(x > 1.0, "far")\n', 17, "a Rule must depend on parameters only"),
     "a rule with another name": (
         RATE + '    rules = Rule(k > 1.0, "{stiff!r} is much")\n',
         17,
-        "the sentence of a Rule names 'stiff', which is no parameter",
+        "the sentence of a Rule refers to 'stiff', which is not a parameter",
     ),
-    "an unknown method": (RATE + '    method = "euler"\n', 4, "method = 'euler' is not known; there are exact, ode23"),
+    "an unknown method": (
+        RATE + '    method = "euler"\n',
+        4,
+        "method = 'euler' is unknown; available methods: exact, ode23",
+    ),
     "a method that does not fit": (
         RATE.replace("k * x", "k * x * x / (x + x)") + '    method = "exact"\n',
         4,
-        "method = 'exact' needs a linear law, and Mine has none",
+        "method = 'exact' needs a linear equation of motion, which Mine does not have",
     ),
-    "a macro of C": (RATE + '    NULL = Parameter(1.0, "1", "ours")\n', 17, "the name NULL is taken"),
-    "a function of ours": (RATE + '    sqrt = Parameter(1.0, "1", "ours")\n', 17, "the name sqrt is taken"),
+    "a macro of C": (
+        RATE + '    NULL = Parameter(1.0, "1", "ours")\n',
+        17,
+        "the name NULL is reserved by the solver or by C",
+    ),
+    "a function of ours": (
+        RATE + '    sqrt = Parameter(1.0, "1", "ours")\n',
+        17,
+        "the name sqrt is reserved by the solver or by C",
+    ),
     "a start out of range": (
         RATE + '    q = Parameter(0.0, "kg", "charge", above=0.0)\n',
         17,
-        "q starts at 0.0, and must be above 0.0 kg",
+        "q has the start value 0.0; it must be above 0.0 kg",
     ),
     "a unit for a number": (
         RATE + '    q = Parameter("kg", 1.0, "charge")\n',
         17,
-        "q: the unit and what it is are texts",
+        "q: unit and description must be strings",
     ),
     "a text for a number": (
         RATE + '    q = Parameter("1.0", "kg", "q")\n',
         17,
-        "q: start value and bounds are numbers",
+        "q: start value and bounds must be numbers",
     ),
     "a variable without a name": (
         RATE.replace("F - k * x", 'Parameter(1.0, "N", "pull") - k * x'),
@@ -144,18 +172,18 @@ WRONG = {
     "an alias that is a name": (
         RATE + '    q = Parameter(1.0, "kg", "mass", alias="m")\n',
         17,
-        "q has the alias 'm': it must be a name that nothing else has",
+        "q has the alias 'm': it must be an identifier that nothing else uses",
     ),
-    "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is refused: it must be above zero"),
+    "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is invalid: it must be above 0"),
     "a broken rule": (
         RATE + '    rules = Rule(k + k > k, "k = {k!r} is too much")\n',
         4,
-        "the start values are refused: k = 100.0 is too much",
+        "the start values are invalid: k = 100.0 is too much",
     ),
     "a division by zero": (
         RATE + '    q = Output("m", "shift", x * f / (f - f))\n',
         4,
-        "the start values lead out of the range of numbers: float division by zero",
+        "the equations cannot be evaluated at the start values: float division by zero",
     ),
     "a squared force in another rate": (
         DRY + STUCK + '    w = State("m/s", "another speed")\n'
@@ -166,13 +194,13 @@ WRONG = {
     "a force that drives": (
         DRY + STUCK.replace("- R)", "+ R)"),
         17,
-        "R drives its own slip on, and does not oppose it: change its sign in the rates",
+        "R accelerates its own slip instead of opposing it: change its sign in the rates",
     ),
     "two contacts that hold the same": (
         DRY + '    other = Mode()\n    S = Contact("N", "friction", mode=other, slip=v - u, slide=f)\n'
         "    a = Output('m/s2', 'acceleration', (F - k * x - R - S) / m, rate_of=v)\n",
         19,
-        "S holds at rest what R already holds: nobody can say which bears how much; leave one out",
+        "S and R hold the same motion at rest, so their forces are not determined: remove one or put a",
     ),
     "contacts of several laws": (
         DRY + '    other = Mode()\n    w = State("m/s", "another speed")\n'
@@ -180,60 +208,68 @@ WRONG = {
         + STUCK
         + "    b = Output('m/s2', 'acceleration', -S / m, rate_of=w)\n",
         20,
-        "S has other laws than R: give all contacts the same",
+        "S and R have different laws: give all contacts the same laws",
     ),
     "a driver whose speed moves": (
         RATE + '    p = State("m", "one", rate=u)\n    q = State("m", "another", rate=v)\n',
         18,
-        "rate of q moves: it must follow from parameters",
+        "rate of q varies with time: it must depend on parameters only",
     ),
     "a driver in another unit": (
         RATE + '    p = State("m", "one", rate=u)\n    q = State("m", "another", rate=u * u)\n',
         18,
-        "q is declared in m, and its rate u * u is in m^2/s^2",
+        "q is declared in m, but its rate u * u is in m^2/s^2",
     ),
     "a rate of a text": (
         RATE.replace("rate_of=v", 'rate_of="v"'),
         16,
-        "a says that it is the rate of 'v', which is no",
+        "rate_of of a is 'v', which is not a state of the model",
     ),
     "a number out of range": (
         RATE + '    q = Parameter(10**400, "kg", "q")\n',
         17,
-        "q: start value and bounds are numbers",
+        "q: start value and bounds must be numbers",
     ),
-    "no rules": (RATE + "    rules = None\n", 4, "rules are one Rule, or several in brackets"),
-    "a rule without words": (RATE + "    rules = Rule(k > k + k, 3)\n", 17, "the sentence of a Rule: 3 is no text"),
+    "no rules": (RATE + "    rules = None\n", 4, "rules must be a Rule or a tuple of Rules"),
+    "a rule without words": (
+        RATE + "    rules = Rule(k > k + k, 3)\n",
+        17,
+        "the sentence of a Rule: 3 must be printable text on one line",
+    ),
     "words that no page can show": (
         RATE + '    q = Parameter(1.0, "kg", "mass\\x00")\n',
         17,
-        "q: 'mass\\x00' is no text of letters that can be printed in one line",
+        "q: 'mass\\x00' must be printable text on one line",
     ),
-    "a choice of nothing": (RATE + '    q = Choice("kind")\n', 17, "a Choice has items, each with what it is"),
+    "a choice of nothing": (RATE + '    q = Choice("kind")\n', 17, "a Choice needs at least one item"),
     "an exit": (RATE + "    raise SystemExit(3)\n", 17, "SystemExit: 3"),
     "an error of two lines": (RATE + '    raise ValueError("no\\nway")\n', 17, "ValueError: no way"),
-    "an equality": (RATE + "    q = 1.0 if k == 0.0 else 2.0\n", 17, "== and != say nothing of values that are not"),
+    "an equality": (RATE + "    q = 1.0 if k == 0.0 else 2.0\n", 17, "== and != cannot compare expressions"),
     "an equality of two": (
         RATE + "    q = 1.0 if x != v else 2.0\n",
         17,
-        "== and != say nothing of values that are not",
+        "== and != cannot compare expressions",
     ),
     "friction that drives": (
         DRY.replace("slide=f", "slide=-f") + STUCK,
         17,
-        "R slides or holds with a negative force at the start values",
+        "slide or hold of R is negative at the start values",
     ),
-    "a huge unit": (RATE + '    q = Parameter(1.0, "m999", "q")\n', 17, "q has the unit 'm999'; known units are"),
+    "a huge unit": (RATE + '    q = Parameter(1.0, "m999", "q")\n', 17, "q has the unit 'm999'; allowed units are"),
     "a setting as a variable": (
         RATE + '    stop_time = Parameter(4.0, "s", "stop")\n',
         17,
-        "the name stop_time is taken",
+        "the name stop_time is reserved by the solver or by C",
     ),
-    "the time of FMI": (RATE + '    time = Parameter(4.0, "s", "ours")\n', 17, "the name time is taken"),
+    "the time of FMI": (
+        RATE + '    time = Parameter(4.0, "s", "ours")\n',
+        17,
+        "the name time is reserved by the solver or by C",
+    ),
     "a name for the rate of a driver": (
         RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
         17,
-        "the name q_rate is taken: it is the rate of q; choose another",
+        "the name q_rate is reserved for the rate of q: choose another name",
     ),
 }
 
@@ -260,8 +296,8 @@ def test_any_docstring_text_survives_unchanged(tmp_path):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "a file holds one class that derives from Model; this one has none"),
-        (HEAD + RATE + HEAD.replace("Mine", "Other") + RATE, "this one has 2 of them, Mine, Other"),
+        ("", "a model file must define exactly one class derived from Model; this one has none"),
+        (HEAD + RATE + HEAD.replace("Mine", "Other") + RATE, "this one has 2: Mine, Other"),
     ],
 )
 def test_a_file_holds_one_model(text, sentence, tmp_path):
@@ -275,7 +311,7 @@ def test_a_file_holds_one_model(text, sentence, tmp_path):
 def test_a_class_name_must_be_unique(name, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text((HEAD + RATE).replace("Mine", name))
-    with pytest.raises(BuildError, match=f"mine.py, line 4: the name {name} is taken, or has letters that C does not"):
+    with pytest.raises(BuildError, match=f"mine.py, line 4: the class name {name} is reserved or not ASCII"):
         find_model(path).generated_source  # noqa: B018
 
 
@@ -283,7 +319,7 @@ def test_a_class_name_must_be_unique(name, tmp_path):
 def test_a_file_must_have_a_valid_model_name(name, tmp_path):
     path = tmp_path / name
     path.write_text(HEAD + RATE)
-    with pytest.raises(BuildError, match="a model has the name of its file, in letters, digits and _"):
+    with pytest.raises(BuildError, match="the file name is the model name: use only ASCII letters, digits and _"):
         find_model(path).generated_source  # noqa: B018
 
 
@@ -291,9 +327,6 @@ def test_the_command_reports_it_without_a_traceback(tmp_path):
     (tmp_path / "mine.py").write_text(HEAD)
     run = build("mine.py", folder=tmp_path)
     assert run.returncode == 1
-    assert (
-        run.stderr
-        == "Error: mine.py, line 15: nothing is the rate of v: say rate_of=v where its derivative is declared.\n"
-    )
+    assert run.stderr == "Error: mine.py, line 15: v has no derivative: declare an Output or a State with rate_of=v.\n"
     missing = build("nowhere.py", folder=tmp_path)
     assert (missing.returncode, missing.stderr) == (2, "Error: There is no file nowhere.py.\n")

@@ -250,12 +250,12 @@ def test_an_invalid_result_is_refused(oil):
     for table in tables:
         (oil / "pendulum.csv").write_text(table)
         with pytest.raises(
-            BuildError, match=r"pendulum\.csv is no certified result: its first line tells after a # how"
+            BuildError, match=r"pendulum\.csv is not a certified result: line 1 must state after a # how"
         ):
             build(oil / "pendulum.py", oil)
     run = command("pendulum.py", cwd=oil)
     assert run.returncode == 1
-    assert run.stderr.startswith("Error: pendulum.csv is no certified result: ")
+    assert run.stderr.startswith("Error: pendulum.csv is not a certified result: ")
     assert run.stderr.count("\n") == 1
 
 
@@ -325,7 +325,7 @@ def test_a_model_may_have_one_state(puck, kind):
 @pytest.mark.parametrize("kind", ["", "native"])
 def test_sliding_friction_above_static_friction_is_refused_before_the_run(puck, worker, kind):
     """It could neither stay nor go: as built, and when a value is set."""
-    sentence = "F slides with more than it holds (f = {}, grip = {}): lower what slides, or raise what holds"
+    sentence = "F: the sliding force exceeds the holding force (f = {}, grip = {}): lower slide or raise hold"
     fmu = worker.instantiate(built(puck, kind))
     puck.write_text(PUCK.replace("(4.0", "(2.0"))
     done = command("puck.py", cwd=puck.parent)

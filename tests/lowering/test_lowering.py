@@ -44,7 +44,7 @@ def test_emitted_code_has_no_vectors_names_its_source_and_keeps_the_line_length(
         if path != f"{name}.py" and source.read_text() != text:
             states = ", ".join(model_class(name).states)
             first, *_ = text.splitlines()
-            assert first.startswith(f"# Written out for {states}")
+            assert first.startswith(f"# Generated for {states}")
             assert f" from fmus/{path} of" in first
         if path != f"{name}.py":
             assert [line for line in text.splitlines() if len(line) > 120] == [], path
@@ -84,15 +84,15 @@ def test_a_traceback_points_into_the_source(name):
 
 HEAD = "class Some:\n    def step(self, model, modes: ContactVector, t, y: StateVector, f: RateVector, h):\n        "
 BODIES = {
-    "f3 = model.rates(t, y, modes)": "must call the rates at y2 f2",
-    "y2 = y + h * model.rates(t, y, modes)": "give it a name on a line of its own",
-    "e = magnitude(y + f)": "would work something out twice",
+    "f3 = model.rates(t, y, modes)": "must assign the rates at y2 to f2",
+    "y2 = y + h * model.rates(t, y, modes)": "assign it to a name on a separate line",
+    "e = magnitude(y + f)": "would evaluate its argument twice",
     "e = y + f\n        e += y": "write c = c + ...",
-    "if y > 0.0:\n            t = 0.0": "is a vector where a number is wanted",
-    "j = 1\n        t = y[j]": "is an index that is not known",
+    "if y > 0.0:\n            t = 0.0": "is a vector where a scalar is required",
+    "j = 1\n        t = y[j]": "is an index that is not known at build time",
     "e = y + modes": "loop over contact_indices",
     "y = y + h * f": "changes under f",
-    "y2 = y + h * f\n        v2 = t": "uses v2 for a number",
+    "y2 = y + h * f\n        v2 = t": "uses v2 for a scalar",
 }
 
 

@@ -249,7 +249,7 @@ def test_an_unknown_name_is_refused_with_the_known_ones_before_any_build(argumen
     run = command(*arguments, "--out", tmp_path)
     assert (run.returncode, run.stdout) == (2, "")
     known = ", ".join(model_names())
-    assert run.stderr == f"Error: There is no model 'bogus'; known are {known}, and any .py file by its path.\n"
+    assert run.stderr == f"Error: There is no model 'bogus'; choose one of {known}, or give the path of a .py file.\n"
     assert list(tmp_path.iterdir()) == []
 
 
@@ -260,7 +260,7 @@ def test_two_models_of_one_name_are_refused_before_any_build(tmp_path):
     files = [tmp_path / folder / "smd.py" for folder in ("one", "two")]
     run = command(*files, "--out", tmp_path / "out")
     assert (run.returncode, run.stdout) == (2, "")
-    assert run.stderr == f"Error: {files[0]} and {files[1]} have one name: build them into folders of their own.\n"
+    assert run.stderr == f"Error: {files[0]} and {files[1]} have the same name: build them into separate folders.\n"
     assert not (tmp_path / "out").exists()
 
 
@@ -276,7 +276,10 @@ def test_an_unwritable_folder_is_named_in_one_sentence(tmp_path):
 def test_an_invalid_source_date_is_refused(epoch, tmp_path):
     run = command("smd", "--out", tmp_path, SOURCE_DATE_EPOCH=epoch)
     assert run.returncode == 1
-    assert run.stderr == f"Error: SOURCE_DATE_EPOCH is {epoch!r}; allowed are whole seconds from 0 to 4354732800.\n"
+    assert (
+        run.stderr
+        == f"Error: SOURCE_DATE_EPOCH must be a whole number of seconds from 0 to 4354732800, got {epoch!r}.\n"
+    )
 
 
 def test_a_missing_pythonfmu_error_says_what_to_install(tmp_path):
@@ -311,9 +314,9 @@ ODD = SimpleNamespace(name="odd", class_name="Odd")
         ("import numpy", "imports numpy; inside an FMU only the standard library"),
         ("from fmus.runtime import codes", "imports fmus; inside an FMU only the standard library"),
         ("import pythonfmu.enums", "imports pythonfmu.enums; inside an FMU only"),
-        ("from pythonfmu import Fmi2Slave", "imports Fmi2Slave from pythonfmu, which no FMU carries"),
-        ("from . import __version__", "imports __version__ from the package itself, which no FMU carries"),
-        ("from .nowhere import thing", "imports thing from nowhere, which no FMU carries"),
+        ("from pythonfmu import Fmi2Slave", "imports Fmi2Slave from pythonfmu, which FMUs do not include"),
+        ("from . import __version__", "imports __version__ from the package itself, which FMUs do not include"),
+        ("from .nowhere import thing", "imports thing from nowhere, which FMUs do not include"),
         ("def late():\n    import math", "imports inside a block in line 2"),
     ],
 )
@@ -385,7 +388,7 @@ def test_the_guid_follows_the_content():
 
 
 def test_an_unknown_unit_is_refused_by_the_name_of_its_variable():
-    with pytest.raises(BuildError, match=r"w has the unit 'furlong'; known units are 1, s, kg"):
+    with pytest.raises(BuildError, match=r"w has the unit 'furlong'; allowed units are 1, s, kg"):
         sketch(w=Fixed(1.0, "furlong", "Width."))
-    with pytest.raises(BuildError, match=r"phi has the display unit 'turn'; allowed for rad is 'rad' or 'deg'"):
+    with pytest.raises(BuildError, match=r"phi has the display unit 'turn'; allowed for rad: 'rad' or 'deg'"):
         sketch(phi=Fixed(1.0, "rad", "Angle.", display="turn"))

@@ -105,7 +105,7 @@ FUNCTIONS = {"sqrt": _sqrt, "fabs": _fabs, "copysign": _copysign, "atan2": _atan
 def patch_functions(monkeypatch):
     """Let the models that have been written out, and their runtime, take roots and magnitudes of quantities."""
     for name, module in list(sys.modules.items()):
-        if name.startswith("written_"):
+        if name.startswith("lowered_"):
             for function, taught in FUNCTIONS.items():
                 if getattr(module, function, None) is getattr(math, function):
                     monkeypatch.setattr(module, function, taught)

@@ -1,16 +1,17 @@
-"""From a file of declared equations to a model in plain scalars.
+"""Turns a file of declared equations into the source of a scalar model class.
 
-    expressions.py   what can be calculated with
-    declared.py      the variables of a model, and what says how they hang together
-    authored.py      the file of an author: where it is, what it holds, what is wrong with it and in which line
-    algebra.py       values put in, derivatives, operations undone, bounds
-    anatomy.py       roles by name: states and their rates, drives, contacts with their loads; what can be run
-    dimensions.py    units of expressions against those declared
-    names.py         those that a written-out model takes for itself
-    scribe.py        expressions as text, line by line
-    frame.py         what its methods share
-    values.py, motion.py, friction.py, coupled.py, outputs.py    its methods
-    written.py       its text
+    expressions.py              expressions and their functions
+    model_declaration.py        variables, rules and the base class of models
+    model_file.py               loads a model file and reports errors with file and line
+    algebra.py                  substitution, differentiation, solving for a variable, rounding scales
+    model_analysis.py           roles of variables, contact loads, applicable solvers
+    dimensions.py               checks the units of expressions
+    generated_names.py          names reserved by generated models
+    expression_printer.py       prints expressions as Python statements
+    codegen_context.py          shared by the generators of methods
+    setup_methods.py, rate_methods.py, single_contact_methods.py, coupled_contact_methods.py, output_method.py
+                                generate the methods of a model class
+    model_source.py             generates the module
 
-Nothing is regrouped: what an author wrote as (F_ext + F_spring - F_friction) / m is calculated in that order.
+Terms are not regrouped: (F_ext + F_spring - F_friction) / m is evaluated in the order in which it is written.
 """

@@ -1,6 +1,6 @@
-"""Calculating with expressions: values put in, derivatives, operations undone, bounds.
+"""Algebra on expressions: substitution, differentiation, solving for a variable, rounding scales.
 
-A term is made shorter only where that leaves its bits alone: by zeros, ones and signs.
+Terms are simplified only where the result keeps its bits: zeros, ones and signs.
 """
 
 import math
@@ -20,51 +20,52 @@ ARITHMETIC: dict[str, Callable[[float, float], float]] = {
 
 
 def operands(e: Operand) -> tuple[Operand, ...]:
-    """What an expression is calculated from, one level down."""
+    """Return the direct operands of an expression."""
     return e.args if isinstance(e, Term) else (e.expression,) if isinstance(e, Output) else ()
 
 
 def depends_on(e: Operand, variables: Collection[Expression]) -> bool:
-    """Whether an expression has one of the leaves in it."""
+    """Return whether an expression contains one of the variables."""
     return not subexpressions(e).keys().isdisjoint(map(id, variables))
 
 
 def has_condition_on(e: Operand, variables: Collection[Expression]) -> bool:
-    """Whether a condition in an expression has one of the leaves in it: derivatives do not tell."""
+    """Return whether a condition in an expression depends on the variables; derivatives do not show this."""
     conditions = (one for one in subexpressions(e).values() if isinstance(one, Term) and one.op in COMPARISONS)
     return any(depends_on(one, variables) for one in conditions)
 
 
-def subexpressions(e: Operand, found: Memo | None = None) -> Memo:
-    """All that an expression is made of, each once, by identity: what comes first in the text stands first."""
-    found = {} if found is None else found
-    if id(e) not in found:
-        found[id(e)] = e
+def subexpressions(e: Operand, result: Memo | None = None) -> Memo:
+    """Return all distinct subexpressions by identity, in the order of the source text."""
+    result = {} if result is None else result
+    if id(e) not in result:
+        result[id(e)] = e
         for one in operands(e):
-            subexpressions(one, found)
-    return found
+            subexpressions(one, result)
+    return result
 
 
 def variables_in(e: Operand) -> list[Expression]:
-    """The declared variables in an expression, each once."""
+    """Return the distinct declared variables in an expression."""
     return [
         one for one in subexpressions(e).values() if isinstance(one, Expression) and not isinstance(one, (Term, Output))
     ]
 
 
 def count_occurrences(e: Operand, leaf: Expression) -> int:
+    """Return how often a variable occurs in an expression."""
     return 1 if e is leaf else sum(count_occurrences(one, leaf) for one in operands(e))
 
 
 def is_same_expression(a: Operand, b: Operand) -> bool:
-    """Whether two expressions are one, written twice."""
+    """Return whether two expressions have the same structure."""
     if isinstance(a, Term) and isinstance(b, Term):
         return a is b or (a.op == b.op and len(a.args) == len(b.args) and all(map(is_same_expression, a.args, b.args)))
     return a is b or (not isinstance(a, Expression) and not isinstance(b, Expression) and a == b)
 
 
 def substitute(e: Operand, values: Mapping[Expression, Operand], memo: Memo | None = None) -> Operand:
-    """The expression with leaves, or parts, replaced; what does not change is shared."""
+    """Replace variables or subexpressions by values; unchanged parts are shared."""
     memo = {} if memo is None else memo
     if id(e) in memo:
         return memo[id(e)]
@@ -82,20 +83,21 @@ def substitute(e: Operand, values: Mapping[Expression, Operand], memo: Memo | No
 
 
 def is_constant(e: Operand, value: float) -> bool:
+    """Return whether an operand is this number."""
     return not isinstance(e, Expression) and e == value
 
 
 def build_term(op: str, *args: Operand) -> Operand:
-    """A term, shorter where a number is known."""
+    """Build a term, simplified where operands are numbers."""
     if op == "neg":
         return negate(args[0])
     if op == "choose":
         condition, this, that = args
-        if isinstance(condition, bool):  # which has been settled
+        if isinstance(condition, bool):  # decided at build time
             return this if condition else that
         return this if is_same_expression(this, that) else Term(op, *args)
     if op in FUNCTIONS and not isinstance(args[0], Expression):
-        with suppress(ArithmeticError, ValueError):  # as of a logarithm behind a condition that does not hold
+        with suppress(ArithmeticError, ValueError):  # for example a logarithm in a branch that is not taken
             return getattr(math, op)(args[0])
     if op not in ARITHMETIC:
         return Term(op, *args)
@@ -131,7 +133,7 @@ def build_term(op: str, *args: Operand) -> Operand:
 
 
 def negate(e: Operand) -> Operand:
-    """-e; a minus goes inside where that is as exact."""
+    """Return -e, with the minus sign moved inside where this is exact."""
     if not isinstance(e, Term):
         return Term("neg", e) if isinstance(e, Expression) else 0.0 - e
     if e.op == "neg":
@@ -146,7 +148,7 @@ def negate(e: Operand) -> Operand:
 
 
 def differentiate(e: Operand, by: Mapping[Expression, Operand], memo: Memo | None = None) -> Operand:
-    """The derivative along `by`: leaves and their rates."""
+    """Return the derivative of e, where `by` gives the derivatives of the variables."""
     memo = {} if memo is None else memo
     if id(e) in memo:
         return memo[id(e)]
@@ -190,7 +192,7 @@ def _differentiate_term(e: Term, slope: Callable[[Operand], Operand]) -> Operand
 
 
 def _apply_chain_rule(outer: Operand, inner: Operand) -> Operand:
-    """A product, over whose denominator there is the whole of it where the outer part is one over something."""
+    """Return outer * inner, with inner in the numerator where outer is a quotient."""
     if isinstance(outer, Term) and outer.op == "choose":
         return build_term("choose", outer.args[0], *(_apply_chain_rule(one, inner) for one in outer.args[1:]))
     if isinstance(outer, Term) and outer.op == "/":
@@ -199,7 +201,7 @@ def _apply_chain_rule(outer: Operand, inner: Operand) -> Operand:
 
 
 def solve_for(e: Operand, leaf: Expression) -> Operand:
-    """The value of the leaf, which occurs once, that makes e zero: each operation is undone, the outermost first."""
+    """Solve e = 0 for a variable that occurs once in e, by inverting the operations from the outside."""
     right: Operand = 0.0
     while e is not leaf:
         if isinstance(e, Output):
@@ -219,12 +221,12 @@ def solve_for(e: Operand, leaf: Expression) -> Operand:
             case "/" if left:
                 e, right = a, build_term("*", right, b)
             case _:
-                raise ModelError(f"{leaf.name} must enter the rates linearly, and not through {e.op}", e.location)
+                raise ModelError(f"{leaf.name} must enter the rates linearly, not through {e.op}", e.location)
     return right
 
 
 def is_summand(e: Operand, leaf: Expression) -> bool:
-    """Whether the leaf is one of the terms that an expression adds up."""
+    """Return whether the variable is a summand of the expression."""
     if not isinstance(e, Term):
         return e is leaf or any(is_summand(one, leaf) for one in operands(e))
     return (
@@ -233,7 +235,7 @@ def is_summand(e: Operand, leaf: Expression) -> bool:
 
 
 def rounding_scale(e: Operand) -> Operand:
-    """The sum of the sizes of what an expression is made of, of which rounding takes its share."""
+    """Return a bound on the magnitude of the terms of e; rounding errors of e are relative to it."""
     if not isinstance(e, Expression):
         return abs(e)
     if isinstance(e, Output):
@@ -242,8 +244,8 @@ def rounding_scale(e: Operand) -> Operand:
         return e
     if not isinstance(e, Term):
         return Term("fabs", e)
-    found = _term_rounding_scale(e)
-    return e if is_same_expression(found, e) else found
+    result = _term_rounding_scale(e)
+    return e if is_same_expression(result, e) else result
 
 
 def _term_rounding_scale(e: Term) -> Operand:
@@ -255,7 +257,7 @@ def _term_rounding_scale(e: Term) -> Operand:
             return build_term("*", rounding_scale(a), rounding_scale(b))
         case "/":
             return build_term("/", rounding_scale(a), rounding_scale(b) if not isinstance(b, Term) else Term("fabs", b))
-        case "neg" | "fabs" | "sin" | "atan" | "tanh":  # whose slope is at most 1, and which vanish with the argument
+        case "neg" | "fabs" | "sin" | "atan" | "tanh":  # slope at most 1, zero at zero
             return rounding_scale(a)
         case "choose":
             return build_term("choose", a, rounding_scale(e.args[1]), rounding_scale(b))
@@ -264,7 +266,7 @@ def _term_rounding_scale(e: Term) -> Operand:
 
 
 def growth_exponent(e: Operand, moving: Collection[Expression]) -> float:
-    """How an expression grows with what moves, as a power."""
+    """Return the exponent with which an expression grows with the moving variables."""
     if not depends_on(e, moving):
         return 0.0
     if not isinstance(e, (Term, Output)):

@@ -1,4 +1,4 @@
-"""What the methods of a written-out model share: its parts by role, its constants, and how a method returns."""
+"""State and helpers shared by the generators of model methods."""
 
 from collections.abc import Sequence
 
@@ -8,15 +8,15 @@ from .expressions import Expression, Operand, Term
 from .model_analysis import TIME, ModelAnalysis
 from .model_declaration import Contact
 
-MAX_RETURN_LENGTH = 100  # letters in a line
+MAX_RETURN_LENGTH = 100  # characters
 
 
 class CodegenContext:
-    """A model of any states and contacts."""
+    """Model analysis together with the names, constants and argument lists of generated code."""
 
     def __init__(self, an: ModelAnalysis) -> None:
         self.an = an
-        self.rate_expressions = [an.rate_outputs[s] for s in an.dynamic_states]  # the rates that must be calculated
+        self.rate_expressions = [an.rate_outputs[s] for s in an.dynamic_states]  # outputs that are rates of states
         self.driver = an.drivers[0] if an.drivers else None
         taken = {e.name for e in an.declared}
         for c in an.contacts:
@@ -39,12 +39,12 @@ class CodegenContext:
         self.constants = self._constants()
 
     def _constants(self) -> list[Term]:
-        """Named expressions of parameters alone that the motion needs: prepare() calculates them."""
-        an, found = self.an, {}
+        """Return named expressions of parameters that the equations need; prepare() computes them."""
+        an, result = self.an, {}
 
         def walk(e: Operand) -> None:
             if isinstance(e, Term) and e.name and not depends_on(e, (*an.time_varying, *an.inputs)):
-                found[id(e)] = e
+                result[id(e)] = e
             else:
                 for one in operands(e):
                     walk(one)
@@ -54,16 +54,16 @@ class CodegenContext:
                 walk(e)
         for e in an.outputs:
             walk(e)
-        return list(found.values())
+        return list(result.values())
 
     def printer(self, depth: int = 2) -> ExpressionPrinter:
-        """The lines of a method, or of a block in it."""
+        """Create a printer for a method, or for a block in it."""
         an = self.an
         given = {s: s.name for s in an.states} | {m: m.name for m in an.modes} | {TIME: "t"}
         return ExpressionPrinter(given, self.constants, self.used_names, depth)
 
     def emit_driver(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> None:
-        """Where the driver is, and what an input that has a rate is, if that is needed."""
+        """Emit the position of the driver and time-dependent inputs, if the targets need them."""
         for e, rate in self.an.ramps.items():
             course = f"self.{e.name}_polynomial"
             if e not in s.bound_names and any(depends_on(one, (e,)) for one in targets):
@@ -77,7 +77,7 @@ class CodegenContext:
             s.emit(f"{self.driver.name} = self.x_base + self.{self.driver.constant_rate.name} * (t - self.t_base)")
 
     def nth_derivative_method(self, name: str, arguments: Sequence[str], targets: Sequence[Operand]) -> str:
-        """The text of a method that returns targets in which n-th derivatives of inputs stand for their rates."""
+        """Generate a method that returns targets with the n-th derivatives of inputs in place of their rates."""
         s = self.printer()
         n = s.fresh_name("n")
         for e, rate in self.an.ramps.items():
@@ -87,18 +87,18 @@ class CodegenContext:
 
     @property
     def single_contact(self) -> Contact | None:
-        """The contact of a single body: nothing moves while it is stuck, and nobody asks for rates then."""
+        """The contact of a single-body model, which rests while stuck, or None."""
         return self.an.contacts[0] if self.an.waits else None
 
     def emit_sign_mode(self, s: ExpressionPrinter, c: Contact, targets: Sequence[Operand]) -> None:
-        """Where the law itself looks at the slip, that tells the direction."""
+        """Emit the sign of the slip as mode where the law uses it and mode is 0."""
         if len(c.laws) > 1 and any(depends_on(e, (c.mode,)) for e in targets):
             with s.block(f"if {c.mode.name} == 0:"):
                 s.emit(f"{c.mode.name} = sign({s.text(c.slip)})")
 
     def return_lines(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
-        """The lines that return the targets: one block for each item of a choice that they look at."""
-        test = next((found for e in targets if (found := find_choice_test(e)) is not None), None)
+        """Return the lines that return the targets, with one block for each item of a choice that they use."""
+        test = next((result for e in targets if (result := find_choice_test(e)) is not None), None)
         if test is None:
             self.emit_driver(s, targets)
             s.count_uses(*targets)
@@ -109,7 +109,7 @@ class CodegenContext:
 
 
 def emit_return(s: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
-    """The lines, of which the last return the targets."""
+    """Emit a return statement for the targets and return all lines."""
     texts = list(map(s.text, targets))
     if sum(map(len, texts)) <= MAX_RETURN_LENGTH:
         s.emit("return " + ", ".join(texts))
@@ -122,29 +122,29 @@ def emit_return(s: ExpressionPrinter, targets: Sequence[Operand]) -> list[str]:
 
 
 def emit_scales(f: CodegenContext, s: ExpressionPrinter, sizes: list[Operand]) -> list[Operand]:
-    """Sizes of what is added up, where the driver's is that of what his position is made of."""
+    """Return the rounding scales with the scale of the driver position inserted."""
     drive = f.driver
     if drive is None or not any(depends_on(e, (drive,)) for e in sizes):
         return sizes
-    reach = Expression()
-    reach.name = drive.name if drive not in s.bound_names else s.fresh_name(f"reach_of_{drive.name}")
-    s.emit(f"{reach.name} = fabs(self.x_base) + fabs(self.{drive.constant_rate.name}) * (fabs(t) + fabs(self.t_base))")
-    s.bound_names[reach] = reach.name
+    scale = Expression()
+    scale.name = drive.name if drive not in s.bound_names else s.fresh_name(f"scale_of_{drive.name}")
+    s.emit(f"{scale.name} = fabs(self.x_base) + fabs(self.{drive.constant_rate.name}) * (fabs(t) + fabs(self.t_base))")
+    s.bound_names[scale] = scale.name
     return [
-        substitute(e, {one: reach for one in subexpressions(e).values() if is_magnitude_of(one, drive)}) for e in sizes
+        substitute(e, {one: scale for one in subexpressions(e).values() if is_magnitude_of(one, drive)}) for e in sizes
     ]
 
 
 def is_magnitude_of(e: Operand, drive: Expression) -> bool:
-    """Whether this asks for the size of the position of a driver."""
+    """Return whether this is the magnitude of the driver position."""
     return isinstance(e, Term) and e.op == "fabs" and e.args[0] is drive
 
 
 def method_source(name: str, arguments: Sequence[str], lines: list[str]) -> str:
-    """The text of a method."""
+    """Return the source of a method."""
     return "\n".join([f"{INDENT}def {name}({', '.join(('self', *arguments))}):", *lines])
 
 
 def find_choice_test(e: Operand) -> Term | None:
-    """A test of a choice in an expression."""
+    """Return a comparison with a choice in the expression, or None."""
     return next((one for one in subexpressions(e).values() if isinstance(one, Term) and one.op == "=="), None)

@@ -1,8 +1,8 @@
-"""The methods of a written-out model about its contacts where one may be stuck while something moves.
+"""Generates the methods for models in which a contact may stick while other bodies move.
 
-What stuck contacts bear makes the rates of their slips zero.  A contact that acts on no other's slip has its load in
-closed form; for the others one linear system is solved, of which a sliding contact has the row F = mode slide.  Rates,
-derivatives and impulses of the forces obey systems of the same matrix.
+The forces of stuck contacts make the rates of their slips zero.  An independent contact has its load in closed form.
+Interacting contacts share one linear system, in which a sliding contact has the row F = mode * slide.  Rates,
+derivatives and impulses of the forces satisfy systems with the same matrix.
 """
 
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ from .model_declaration import SIGN, THRESHOLD, Contact, State
 
 @dataclass
 class ContactUnknown:
-    """A number of each contact: the expression that stands for it; what it is where the contact slides; and what
-    follows where it is stuck, its value or, of contacts that share bodies, the right-hand side."""
+    """An unknown of each contact: its symbol, its value while sliding, and while stuck its value or, for interacting
+    contacts, the right-hand side of the linear system."""
 
     symbols: dict[Contact, Operand]
     sliding_values: dict[Contact, Operand]
@@ -30,12 +30,12 @@ class ContactUnknown:
 
 
 def coupled_contact_methods(f: CodegenContext) -> list[str]:
-    """All of them."""
+    """Return the source of all methods for coupled contacts."""
     if f.single_contact is not None or not f.an.contacts:
         return []
     slips = [c.slip for c in f.an.contacts]
     return [
-        method_source("slip_velocities", ["t", *f.states], f.return_lines(f.printer(), slips)),
+        method_source("slips", ["t", *f.states], f.return_lines(f.printer(), slips)),
         slip_scale_method(f),
         forces_method(f),
         force_rates_method(f),
@@ -43,11 +43,11 @@ def coupled_contact_methods(f: CodegenContext) -> list[str]:
     ]
 
 
-# ---- what is solved
+# ---- unknowns
 
 
 def force_unknown(f: CodegenContext) -> ContactUnknown:
-    """The forces themselves."""
+    """Return the contact forces as unknowns."""
     an = f.an
     none = dict.fromkeys(an.contacts, 0.0)
     held = {c: an.load[c] if c in an.independent_contacts else substitute(an.slip_rate[c], none) for c in an.contacts}
@@ -55,7 +55,7 @@ def force_unknown(f: CodegenContext) -> ContactUnknown:
 
 
 def derivative_unknown(f: CodegenContext, name: str, by: dict[Expression, Operand]) -> ContactUnknown:
-    """The derivatives of the forces along `by`."""
+    """Return the derivatives of the forces along `by` as unknowns."""
     an, fixed = f.an, by | dict.fromkeys(f.an.contacts, 0.0)
     slides = {c: build_term("*", c.mode, differentiate(c.slide, by)) for c in an.contacts}
     held = {
@@ -74,7 +74,7 @@ def derivative_unknown(f: CodegenContext, name: str, by: dict[Expression, Operan
 
 
 def local_symbol(name: str) -> Expression:
-    """What stands for a local variable."""
+    """Return a symbol for a local variable."""
     symbol = Expression()
     symbol.name = name
     return symbol
@@ -83,7 +83,7 @@ def local_symbol(name: str) -> Expression:
 def emit_solution(
     f: CodegenContext, s: ExpressionPrinter, unknowns: Sequence[ContactUnknown], law: bool = False
 ) -> None:
-    """The lines that calculate them; with `law`, the law in force says what is stuck."""
+    """Emit the lines that solve for the unknowns; with `law`, the selected law decides which contacts are stuck."""
     shared = f.an.interacting_contacts
     matrix = {(c, d): s.fresh_name(f"A_{c.name}_{d.name}") for c in shared for d in shared}
     names = {
@@ -98,12 +98,12 @@ def emit_solution(
     for c in f.an.contacts:
         own = [n for n in range(len(unknowns)) if (n, c) in names]
         test = f"{c.mode.name} == 0" + (" and self.friction == HYBRID" if law and SIGN in c.laws else "")
-        for head, words in ((f"if {test}:", "stuck_values"), ("else:", "sliding_values")) if own else ():
+        for head, attribute in ((f"if {test}:", "stuck_values"), ("else:", "sliding_values")) if own else ():
             with s.block(head):
                 for n in own:
-                    s.emit(f"{names[n, c]} = {s.text(getattr(unknowns[n], words)[c])}")
+                    s.emit(f"{names[n, c]} = {s.text(getattr(unknowns[n], attribute)[c])}")
                 for d in shared if c in shared else []:
-                    s.emit(f"{matrix[c, d]} = {s.text(f.an.A[c, d] if words == 'stuck_values' else float(c is d))}")
+                    s.emit(f"{matrix[c, d]} = {s.text(f.an.A[c, d] if attribute == 'stuck_values' else float(c is d))}")
     sides = [{c: names[n, c] for c in shared} for n in range(len(unknowns)) if all((n, c) in names for c in shared)]
     emit_elimination(s, shared, matrix, sides)
     for (n, c), name in names.items():
@@ -113,9 +113,9 @@ def emit_solution(
 def emit_elimination(
     s: ExpressionPrinter, rows: list[Contact], A: dict[tuple[Contact, Contact], str], sides: list[dict[Contact, str]]
 ) -> None:
-    """Lines that put the solutions in the places of the right-hand sides.
+    """Emit a Gaussian elimination that overwrites the right-hand sides with the solutions.
 
-    No rows are exchanged: the rows of stuck contacts are those of a positive definite matrix, so no pivot is zero.
+    It needs no pivoting: the rows of stuck contacts belong to a positive definite matrix, so no pivot is zero.
     """
     for n, k in enumerate(rows):
         for i in rows[n + 1 :]:
@@ -126,15 +126,15 @@ def emit_elimination(
                 s.emit(f"{b[i]} = {b[i]} - {A[i, k]} * {b[k]}")
     for n, k in reversed(list(enumerate(rows))):
         for b in sides:
-            behind = "".join(f" - {A[k, j]} * {b[j]}" for j in rows[n + 1 :])
-            s.emit(f"{b[k]} = {f'({b[k]}{behind})' if behind else b[k]} / {A[k, k]}")
+            terms = "".join(f" - {A[k, j]} * {b[j]}" for j in rows[n + 1 :])
+            s.emit(f"{b[k]} = {f'({b[k]}{terms})' if terms else b[k]} / {A[k, k]}")
 
 
 # ---- the methods
 
 
 def emit_friction_forces(f: CodegenContext, s: ExpressionPrinter) -> None:
-    """The forces under the law in force, and the modes as it has them."""
+    """Emit the forces and modes under the selected law."""
     contacts = [c for c in f.an.contacts if len(c.laws) > 1]
     if contacts:
         with s.block("if self.friction != HYBRID:"):
@@ -149,14 +149,15 @@ def emit_friction_forces(f: CodegenContext, s: ExpressionPrinter) -> None:
 
 
 def slip_scale_method(f: CodegenContext) -> str:
+    """Rounding scales of the slips."""
     s = f.printer()
     sizes = emit_scales(f, s, [rounding_scale(c.slip) for c in f.an.contacts])
     f.emit_driver(s, sizes)
-    return method_source("slip_magnitudes", ["t", *f.states], emit_return(s, sizes))
+    return method_source("slip_terms", ["t", *f.states], emit_return(s, sizes))
 
 
 def forces_method(f: CodegenContext) -> str:
-    """Forces, limits, and the sums of the sizes of what the forces are made of."""
+    """Forces, limits and rounding scales of the forces."""
     an, s, u = f.an, f.printer(), force_unknown(f)
     sizes = [
         rounding_scale(an.load[c])
@@ -169,11 +170,11 @@ def forces_method(f: CodegenContext) -> str:
     s.count_uses(*u.terms, *limits, *sizes)
     emit_solution(f, s, [u])
     sizes = emit_scales(f, s, sizes)
-    return method_source("contact_forces", f.arguments, emit_return(s, [*an.contacts, *limits, *sizes]))
+    return method_source("forces", f.arguments, emit_return(s, [*an.contacts, *limits, *sizes]))
 
 
 def force_rates_method(f: CodegenContext) -> str:
-    """Rates of forces and limits; what a force lacks to hold its contact, and the rate of that."""
+    """Rates of forces and limits, residual forces that would hold the contacts, and their rates."""
     an, s, u, rate = f.an, f.printer(), force_unknown(f), derivative_unknown(f, "rate", f.an.time_derivatives)
     flow = an.time_derivatives | {c: rate.symbols[c] for c in an.contacts}
     pulls, pull_rates = [], []
@@ -190,11 +191,11 @@ def force_rates_method(f: CodegenContext) -> str:
     s.count_uses(*u.terms, *rate.terms, *targets)
     emit_solution(f, s, [u])
     emit_solution(f, s, [rate])
-    return method_source("contact_rates", f.arguments, emit_return(s, targets))
+    return method_source("changes", f.arguments, emit_return(s, targets))
 
 
 def impulse_method(f: CodegenContext) -> str:
-    """The states after impulses that end the slips of stuck contacts, to the last bit where these are sums."""
+    """States after impulses that stop the slips of stuck contacts, exactly where slips are sums of speeds."""
     an, s = f.an, f.printer()
     ends = {c: c.slip if c not in an.independent_contacts else build_term("/", c.slip, an.A[c, c]) for c in an.contacts}
     impulse = ContactUnknown(
@@ -203,9 +204,9 @@ def impulse_method(f: CodegenContext) -> str:
     after: dict[State, Operand] = {}
     for state in an.dynamic_states:
         for c in an.contacts:
-            acts = differentiate(an.rate_outputs[state], {c: 1.0})
-            if not is_same_expression(acts, 0.0):
-                after[state] = build_term("+", after.get(state, state), build_term("*", acts, impulse.symbols[c]))
+            effect = differentiate(an.rate_outputs[state], {c: 1.0})
+            if not is_same_expression(effect, 0.0):
+                after[state] = build_term("+", after.get(state, state), build_term("*", effect, impulse.symbols[c]))
     f.emit_driver(s, [*impulse.terms, *after.values()])
     s.count_uses(*impulse.terms, *after.values())
     emit_solution(f, s, [impulse])
@@ -214,4 +215,4 @@ def impulse_method(f: CodegenContext) -> str:
         with s.block(f"if {c.mode.name} == 0:"):
             s.emit(f"{state.name} = {s.text(value)}")
     s.emit(f"return {', '.join(f.states)}")
-    return method_source("apply_impulses", f.arguments, s.lines)
+    return method_source("struck", f.arguments, s.lines)

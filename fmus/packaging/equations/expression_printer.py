@@ -1,4 +1,4 @@
-"""Expressions as text, line by line: what is needed twice is calculated once, under the name that the author gave."""
+"""Prints expressions as Python statements; common subexpressions become local variables with the names of the model."""
 
 import ast
 from collections import Counter
@@ -13,7 +13,7 @@ from .expressions import Expression, ModelError, Operand, Term
 from .model_declaration import Choice, Fixed, Input, Output, Parameter
 
 INDENT = "    "
-MAX_INLINE_LENGTH = 50  # letters: what has a name and is longer stands on a line of its own
+MAX_INLINE_LENGTH = 50  # characters; longer named subexpressions get a separate line
 BINARY_OPERATORS: dict[str, ast.operator] = {"+": ast.Add(), "-": ast.Sub(), "*": ast.Mult(), "/": ast.Div()}
 COMPARISON_OPERATORS: dict[str, ast.cmpop] = {
     "<": ast.Lt(),
@@ -25,9 +25,9 @@ COMPARISON_OPERATORS: dict[str, ast.cmpop] = {
 
 
 class ExpressionPrinter:
-    """The lines of one block.
+    """Prints the lines of one block.
 
-    `given`: what variables are called here.  `kept`: constants, which are attributes of the model.
+    `given` maps variables to their names in the block; `kept` are constants stored as attributes of the model.
     """
 
     def __init__(
@@ -36,24 +36,26 @@ class ExpressionPrinter:
         self.bound_names, self.constants, self.used_names = dict(given), kept, set(taken)
         self.lines: list[str] = []
         self.depth = depth
-        self.local_names: dict[int, str] = {}  # number of an expression -> its local name
+        self.local_names: dict[int, str] = {}  # value number -> local variable
         self.author_names: dict[int, str] = {}
         self._use_counts: Counter[int] = Counter()
-        self._value_numbers: dict[tuple[Any, ...], int] = {}  # equal expressions have one number
+        self._value_numbers: dict[tuple[Any, ...], int] = {}  # equal expressions share a value number
         self._number_by_id: dict[int, int] = {}
-        self._kept_alive: list[Operand] = []  # whose identity must not pass on to another
+        self._kept_alive: list[Operand] = []  # keeps id() unique
 
     # ---- lines
 
     def emit(self, line: str) -> None:
+        """Append a line at the current indentation."""
         self.lines.append(INDENT * self.depth + line)
 
     def emit_assignment(self, target: str, e: Operand) -> None:
+        """Emit target = expression unless they are equal."""
         if (text := self.text(e)) != target:
             self.emit(f"{target} = {text}")
 
     def fresh_name(self, name: str) -> str:
-        """The name, or another where it is taken: from here on it is."""
+        """Return an unused name derived from `name` and reserve it."""
         if name in self.used_names:
             name = next(n for i in range(1, 1000) if (n := f"{name}_{i}") not in self.used_names)
         self.used_names.add(name)
@@ -61,7 +63,7 @@ class ExpressionPrinter:
 
     @contextmanager
     def block(self, head: str) -> Iterator[None]:
-        """The lines below a head; what is calculated there is not known behind it."""
+        """Emit a compound statement; local variables assigned in its body are not known after it."""
         self.emit(head)
         outside, self.depth = dict(self.local_names), self.depth + 1
         yield
@@ -70,6 +72,7 @@ class ExpressionPrinter:
     # ---- expressions
 
     def value_number(self, e: Operand) -> int:
+        """Return the value number of an expression; equal expressions share it."""
         if isinstance(e, Expression) and id(e) in self._number_by_id:
             return self._number_by_id[id(e)]
         key: tuple[Any, ...]
@@ -79,13 +82,13 @@ class ExpressionPrinter:
             key = "is", self.value_number(e.expression)
         else:
             key = ("leaf", id(e)) if isinstance(e, Expression) else ("number", repr(e))
-        found = self._value_numbers.setdefault(key, len(self._value_numbers)) if key[0] != "is" else key[1]
+        number = self._value_numbers.setdefault(key, len(self._value_numbers)) if key[0] != "is" else key[1]
         self._kept_alive.append(e)
         if isinstance(e, Expression):
-            self._number_by_id[id(e)] = found
-            if e.name and (isinstance(e, VariableDeclaration) or found not in self.author_names):
-                self.author_names[found] = e.name
-        return found
+            self._number_by_id[id(e)] = number
+            if e.name and (isinstance(e, VariableDeclaration) or number not in self.author_names):
+                self.author_names[number] = e.name
+        return number
 
     def _is_constant(self, e: Operand) -> bool:
         return isinstance(e, Expression) and any(e is one for one in self.constants)
@@ -94,7 +97,7 @@ class ExpressionPrinter:
         return not isinstance(e, (Term, Output)) or e in self.bound_names or self._is_constant(e)
 
     def count_uses(self, *targets: Operand) -> None:
-        """Note what is coming, so that what is needed twice gets a name."""
+        """Count uses in advance, so that expressions used twice become local variables."""
         for e in targets:
             if not self._is_leaf(e):
                 if isinstance(e, Output):
@@ -107,14 +110,15 @@ class ExpressionPrinter:
                     self.count_uses(*operands(e))
 
     def is_shared(self, e: Operand) -> bool:
-        """Whether a term has been counted more than once."""
+        """Return whether a term is used more than once."""
         return isinstance(e, Term) and self._use_counts[self.value_number(e)] > 1
 
     def text(self, e: Operand) -> str:
+        """Return the source of an expression; emits local variables as needed."""
         return ast.unparse(ast.fix_missing_locations(self._to_ast(e)))
 
     def local_variable(self, e: Operand) -> str:
-        """The name of a local variable that has the value, whether or not it is needed twice."""
+        """Return a local variable with the value; emit its assignment if needed."""
         number = self.value_number(e)
         if number not in self.local_names:
             node = self._to_ast(e)
@@ -129,7 +133,7 @@ class ExpressionPrinter:
         return ast.Name(name)
 
     def _choose_local_name(self, number: int) -> str:
-        """A name for an expression: the author's, if it is free."""
+        """Return a local name for an expression: that of the model if it is unused."""
         name = self.author_names.get(number, "")
         if not name or name in self.local_names.values() or name in self.bound_names.values():
             name = next(n for i in range(1, 1000) if (n := f"{name or 'u'}{i}") not in self.used_names)
@@ -148,7 +152,7 @@ class ExpressionPrinter:
         if isinstance(e, Output):
             return self._to_ast(e.expression)
         if not isinstance(e, Term):
-            raise ModelError(f"{e.name} is not known where it is needed", e.location)
+            raise ModelError(f"{e.name} is not available in this equation", e.location)
         if e.op == "choose" and not all(map(self._is_leaf, e.args[1:])):
             return self._emit_branch(e, number)
         node = self._build_node(e)
@@ -180,7 +184,7 @@ class ExpressionPrinter:
 
 
 def binary_node(op: str, a: ast.expr, b: ast.expr) -> ast.expr:
-    """a op b; a minus in front of a product or quotient is drawn into the sum around it, which has the same bits."""
+    """Return a op b; a leading minus of b is merged into the sum, which keeps the bits."""
     other = {"+": "-", "-": "+"}
     inner = b
     while isinstance(inner, ast.BinOp) and isinstance(inner.op, (ast.Mult, ast.Div)):
@@ -191,14 +195,14 @@ def binary_node(op: str, a: ast.expr, b: ast.expr) -> ast.expr:
 
 
 def negate_node(node: ast.expr) -> ast.expr:
-    """The negative; of a product or a quotient that of its first factor, which has the same bits."""
+    """Return the negative; products and quotients negate their first factor, which keeps the bits."""
     if isinstance(node, ast.BinOp) and isinstance(node.op, (ast.Mult, ast.Div)):
         return ast.BinOp(negate_node(node.left), node.op, node.right)
     return ast.UnaryOp(ast.USub(), node)
 
 
 def drop_minus(node: ast.expr) -> ast.expr:
-    """A product without the minus in front."""
+    """Return a product without its leading minus."""
     if isinstance(node, ast.BinOp):
         return ast.BinOp(drop_minus(node.left), node.op, node.right)
     assert isinstance(node, ast.UnaryOp)

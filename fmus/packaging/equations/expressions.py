@@ -1,4 +1,4 @@
-"""Expressions: what a number is calculated from.  Nothing is evaluated here."""
+"""Symbolic expressions; nothing is evaluated here."""
 
 import math
 import sys
@@ -10,7 +10,7 @@ EQUATIONS_FOLDER = str(Path(__file__).parent)
 PACKAGING_FOLDER = str(Path(__file__).parents[2] / "packaging")
 Operand = Any  # an expression or a number
 
-# The derivative of each function, by its argument and its value.
+# The derivative of each function, as a function of argument and value.
 FUNCTIONS: dict[str, Callable[[Operand, Operand], Operand]] = {
     "sin": lambda u, value: Term("cos", u),
     "cos": lambda u, value: -Term("sin", u),
@@ -30,7 +30,7 @@ COMPARISONS = ("<", "<=", ">", ">=", "==")
 
 
 class ModelError(ValueError):
-    """Something that an author wrote and that cannot be: what is wrong, and in which line of which file."""
+    """Raised for a mistake in a model file: message, file and line."""
 
     def __init__(self, sentence: str, location: "tuple[str, int] | None" = None) -> None:
         super().__init__(sentence)
@@ -38,7 +38,7 @@ class ModelError(ValueError):
 
 
 def author_location() -> tuple[str, int]:
-    """File and line, in the file of the author, of what is made just now."""
+    """Return file and line of the model file from which the current call comes."""
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(EQUATIONS_FOLDER):
         frame = frame.f_back
@@ -46,12 +46,12 @@ def author_location() -> tuple[str, int]:
 
 
 def _binary_operators(op: str) -> tuple[Any, Any]:
-    """The methods that make a term of an operation, self op other and other op self."""
+    """Return the methods for self op other and other op self."""
     return (lambda self, other: Term(op, self, other)), (lambda self, other: Term(op, other, self))
 
 
 def _refusal(sentence: str) -> Callable[..., Never]:
-    """A method that cannot be, with what it says."""
+    """Return a method that raises ModelError with this message."""
 
     def refuse(e: "Expression", *_: object) -> Never:
         raise ModelError(sentence.format(name=e.name or "an expression"))
@@ -60,21 +60,21 @@ def _refusal(sentence: str) -> Callable[..., Never]:
 
 
 class Expression:
-    """What a number is calculated from: a declared variable, or a term of such."""
+    """Base class of expressions: a declared variable or a term."""
 
     name = ""
     location: tuple[str, int]
 
     def __new__(cls, *_: object, **__: object) -> "Expression":
-        made = super().__new__(cls)
-        made.location = author_location()
-        return made
+        expression = super().__new__(cls)
+        expression.location = author_location()
+        return expression
 
     __add__, __radd__ = _binary_operators("+")
     __sub__, __rsub__ = _binary_operators("-")
     __mul__, __rmul__ = _binary_operators("*")
     __truediv__, __rtruediv__ = _binary_operators("/")
-    # Python turns a < b round to b > a by itself
+    # Python falls back from a < b to b > a
     __lt__, __le__, __gt__, __ge__ = (_binary_operators(op)[0] for op in ("<", "<=", ">", ">="))
 
     def __neg__(self) -> "Term":
@@ -87,51 +87,56 @@ class Expression:
         return Term("fabs", self)
 
     def __eq__(self, other: object) -> bool:
-        """Whether this is the very same: for those who calculate with expressions; an author would get no answer."""
+        """Compare by identity within this package; raise ModelError in model files."""
         if self is not other and not sys._getframe(1).f_code.co_filename.startswith(PACKAGING_FOLDER):
-            raise ModelError("== and != say nothing of values that are not there yet: write choose(a < b, this, that)")
+            raise ModelError(
+                "== and != cannot compare expressions, which have no value yet: write choose(a < b, this, that)"
+            )
         return self is other
 
     __hash__ = object.__hash__
 
-    __pow__ = __rpow__ = _refusal("** rounds in ways of its own: write a product, x * x, or exp and log")
-    __bool__ = _refusal("{name} has no value yet: write choose(condition, this, that) for an if")
-    __float__ = _refusal(
-        f"{{name}} has no value yet: functions of expressions are imported from fmus, which has {', '.join(FUNCTIONS)}"
+    __pow__ = __rpow__ = _refusal(
+        "** is not supported, because its rounding differs between platforms: write x * x, or exp and log"
     )
-    __iter__ = _refusal("{name} is one number: there is nothing to loop over")
+    __bool__ = _refusal("{name} has no value at build time: write choose(condition, this, that) instead of if")
+    __float__ = _refusal(
+        "{name} has no value at build time: import functions of expressions from fmus, which has "
+        f"{', '.join(FUNCTIONS)}"
+    )
+    __iter__ = _refusal("{name} is a scalar: it cannot be iterated over")
     __index__ = _refusal(
-        "{name} has no value yet, and no table can be read by it: write its law as a formula, or as pieces with "
+        "{name} has no value at build time and cannot index a table: write a formula, or a piecewise one with "
         "choose(condition, this, that)"
     )
-    __array_ufunc__ = None  # numpy leaves it alone
+    __array_ufunc__ = None  # disables numpy arithmetic
 
 
 def as_operand(e: Operand) -> Operand:
-    """An expression as it is, a number as a float; anything else is refused."""
+    """Return an expression unchanged and a number as float; raise ModelError for anything else."""
     if isinstance(e, Expression):
         return e
     if isinstance(e, bool) or not isinstance(e, (int, float)):
-        raise ModelError(f"{e!r} is neither a number nor an expression: nothing can be calculated with it")
+        raise ModelError(f"{e!r} is neither a number nor an expression")
     if not math.isfinite(e):
-        raise ModelError(f"{e!r} is not a finite number: nothing can be calculated with it")
+        raise ModelError(f"{e!r} is not a finite number")
     return float(e)
 
 
 class Term(Expression):
-    """An operation or a function, and what it is done to."""
+    """An operation or function applied to operands."""
 
     def __init__(self, op: str, *args: Operand) -> None:
         self.op, self.args = op, tuple(map(as_operand, args))
 
 
 def _function(name: str) -> Callable[[Operand], Operand]:
-    def made(u: Operand) -> Operand:
+    def function(u: Operand) -> Operand:
         return Term(name, u) if isinstance(u, Expression) else getattr(math, name)(u)
 
-    made.__name__ = made.__qualname__ = name
-    made.__doc__ = f"The function {name} of an expression, or of a number."
-    return made
+    function.__name__ = function.__qualname__ = name
+    function.__doc__ = f"Return {name} of an expression or a number."
+    return function
 
 
 sin, cos, tan, asin, acos, atan = map(_function, ("sin", "cos", "tan", "asin", "acos", "atan"))
@@ -140,7 +145,7 @@ sqrt, fabs = map(_function, ("sqrt", "fabs"))
 
 
 def choose(condition: Operand, this: Operand, that: Operand) -> Term:
-    """The expression `this` where the condition, a comparison of expressions, holds, and `that` elsewhere."""
+    """Return `this` where the condition, a comparison of expressions, is true, else `that`."""
     if not (isinstance(condition, Term) and condition.op in COMPARISONS):
-        raise ModelError("choose() begins with a comparison of expressions by <, <=, > or >=")
+        raise ModelError("the first argument of choose() must be a comparison of expressions by <, <=, > or >=")
     return Term("choose", condition, this, that)

@@ -1,4 +1,4 @@
-"""The names that a written-out model takes for itself; an author's are others."""
+"""Names reserved by generated models; variables of a model must not use them."""
 
 from ...runtime.contact_lcp import CoupledFriction
 from ...runtime.method_registry import methods
@@ -6,7 +6,7 @@ from ...runtime.stick_slip import DryFriction
 from .expressions import FUNCTIONS
 
 MATH = ("copysign", "inf", "pi", *FUNCTIONS)
-IMPORTS = {  # module -> what may be needed of it
+IMPORTS = {  # module -> names that generated code may import
     "": tuple(label for label, _, _ in methods),
     "stick_slip": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
     "codes": ("EXACT", "HYBRID"),
@@ -18,7 +18,7 @@ IMPORTS = {  # module -> what may be needed of it
     "oscillator": ("Oscillator",),
 }
 ATTRIBUTES = ("friction", "solver", "events", "exact", "model_exchange", "x_base", "t_base", "time", "method")
-METHODS = (  # beside those inherited
+METHODS = (  # in addition to inherited ones
     *("initial_state", "rates", "jacobian", "applied_acceleration", "linear_coefficients"),
     *("stick_load", "load_magnitude", "compute_outputs"),
     *("applied_acceleration_derivative", "load_derivative", "set_input_rates", "has_higher_order"),

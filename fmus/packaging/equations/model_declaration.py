@@ -1,4 +1,4 @@
-"""The variables that an author declares, and what says how they hang together."""
+"""Declarations in a model file: variables, contacts, rules and the base class Model."""
 
 from collections.abc import MutableMapping
 from typing import Any
@@ -10,42 +10,55 @@ HYBRID, SIGN, THRESHOLD = "hybrid", "sign", "threshold"
 
 
 class Variable(Expression, variable_declarations.VariableDeclaration):
-    """What has a name, a unit, words and a range."""
+    """A declared variable: name, unit, description and range."""
 
     def __set_name__(self, owner: object, name: str) -> None:
-        """It has its name since it was first assigned: D = mu_s does not change that."""
+        """Keep the name of the first assignment; an alias such as D = mu_s does not change it."""
 
 
 class Parameter(Variable, variable_declarations.Parameter):
-    """Set by the user, tunable at every communication point.
+    """A parameter, tunable at every communication point.
 
-    Parameter(start, unit, text): the start value in `unit`, which is SI, and what it is in a few words.  A range is
-    given by `low`, `high` (at least, at most), `above`, `below`; a unit that people rather read by `display`; the name
-    that it has elsewhere, and in FMI 3.0 here too, by `alias`.
+    Parameters
+    ----------
+    start
+        Default value in `unit`.
+    unit
+        SI unit, such as "N.s/m".
+    text
+        Short description.
+    low, high
+        Inclusive bounds.
+    above, below
+        Exclusive bounds.
+    display
+        Display unit, such as "deg".
+    alias
+        Alternative name, exported in FMI 3.0.
     """
 
 
 class Fixed(Variable, variable_declarations.Fixed):
-    """As Parameter, but set before initialisation ends: where a state starts, for example."""
+    """A parameter that is fixed after initialization, such as the start value of a state."""
 
 
 class Input(Variable, variable_declarations.Input):
-    """As Parameter, but set by the importer while it runs."""
+    """An input; arguments as for Parameter."""
 
 
 class Choice(Variable, variable_declarations.Choice):
-    """An enumeration, label=sentence for each item: numbered from 1, and the first is the default."""
+    """An enumeration with items label=sentence, numbered from 1; the first is the default."""
 
     def __init__(self, text: str, **items: str) -> None:
         if not items:
-            raise ModelError("a Choice has items, each with what it is: label=sentence")
+            raise ModelError("a Choice needs at least one item: label=sentence")
         super().__init__(1, text, tuple((label, n, sentence) for n, (label, sentence) in enumerate(items.items(), 1)))
         self.tests = {label: Term("==", self, n) for n, label in enumerate(items, 1)}
 
     def choose(self, **cases: Operand) -> Operand:
-        """The expression of the item in force, by its label."""
+        """Return the expression of the selected item; cases are given by label."""
         if set(cases) != set(self.tests):
-            raise ModelError(f"choose() has a case for each of {', '.join(self.tests)}, and for nothing else")
+            raise ModelError(f"choose() needs exactly one case for each of {', '.join(self.tests)}")
         *rest, (_, value) = cases.items()
         for label, case in reversed(rest):
             value = Term("choose", self.tests[label], case, value)
@@ -55,9 +68,18 @@ class Choice(Variable, variable_declarations.Choice):
 class State(Variable, variable_declarations.Output):
     """A continuous state.
 
-    `start`: a number or an expression of parameters.  `rate_of`: the state that this one is the rate of, as a speed is
-    of a position.  `rate`: what the rate of this one is for all time, as of a driver, a parameter or an expression of
-    such.  `nominal_velocity`: the size that a tolerance must resolve, where the law has one of its own.
+    Parameters
+    ----------
+    unit, text
+        As for Parameter.
+    start
+        Initial value: a number or an expression of parameters.
+    rate_of
+        The state whose derivative this state is, such as the position of a speed.
+    rate
+        Constant rate of this state, such as the speed of a driver: a parameter or an expression of parameters.
+    nominal_velocity
+        Smallest magnitude that the integrator must resolve, where the friction law defines one.
     """
 
     def __init__(
@@ -76,7 +98,7 @@ class State(Variable, variable_declarations.Output):
 
 
 class Output(Variable, variable_declarations.Output):
-    """What is calculated: unit, words, expression.  `rate_of`: the state whose rate it is."""
+    """A calculated variable: unit, description, expression; `rate_of` is the state whose derivative it is."""
 
     def __init__(self, unit: str, text: str, expression: Operand, rate_of: State | None = None, **more: Any) -> None:
         super().__init__(unit, text, **more)
@@ -91,12 +113,24 @@ class Mode(Variable, variable_declarations.Mode):
 
 
 class Contact(Variable, variable_declarations.Output):
-    """The force of dry friction in a contact, an unknown of the equations; positive where it opposes a positive slip.
+    """The force of dry friction in a contact, an unknown of the equations; positive if it opposes a positive slip.
 
-    mode: its declared Mode.  slip: the relative speed, a state or an expression of such, as v - v_belt; several of them
-    may push one body.  slide: the force while it slides, at least 0.  hold: the most that it holds, at least as much;
-    left out, the sliding force at zero slip.  laws: HYBRID, and beside it SIGN or THRESHOLD, which needs eps, the slip
-    below which it holds.
+    Parameters
+    ----------
+    unit, text
+        As for Parameter.
+    mode
+        The declared Mode of the contact.
+    slip
+        Relative speed: a state or an expression of states, such as v - v_belt.  Several contacts may act on one body.
+    slide
+        Force while sliding, at least 0.
+    hold
+        Largest force while stuck, at least `slide`; by default the sliding force at zero slip.
+    laws
+        (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD).
+    eps
+        Slip below which the law THRESHOLD holds; required with that law.
     """
 
     def __init__(
@@ -115,24 +149,24 @@ class Contact(Variable, variable_declarations.Output):
         self.mode, self.slip, self.slide, self.laws, self.eps = mode, slip, as_operand(slide), laws, eps
         self.hold = None if hold is None else as_operand(hold)
         if laws not in ((HYBRID,), (HYBRID, SIGN), (HYBRID, THRESHOLD)):
-            raise ModelError(f"laws = {laws!r} is refused: HYBRID comes first, and beside it SIGN or THRESHOLD")
+            raise ModelError(f"laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got {laws!r}")
         if (eps is not None) != (THRESHOLD in laws):
-            raise ModelError("eps is given with the law THRESHOLD, and with no other")
+            raise ModelError("eps is required with the law THRESHOLD and not allowed without it")
 
 
 class Rule:
-    """A comparison of parameters that must not hold, and the sentence about it, with values as {name!r}."""
+    """A comparison of parameters that must not be true, and the error message, with values as {name!r}."""
 
     def __init__(self, broken: Operand, sentence: str) -> None:
         self.broken, self.sentence = broken, sentence
 
 
 class _ClassBody(dict[str, Any]):
-    """The body of the class of a model, in which no name has two equations."""
+    """Namespace of a model class; rejects a second equation for a name."""
 
     def __setitem__(self, name: str, value: Any) -> None:
         if isinstance(self.get(name), Expression):
-            raise ModelError(f"{name} has two equations: give the second another name")
+            raise ModelError(f"{name} is assigned twice: give the second equation another name")
         if isinstance(value, Expression):
             value.name = value.name or name
         super().__setitem__(name, value)
@@ -146,15 +180,24 @@ class _ModelMeta(type):
         return _ClassBody()
 
     def __new__(cls, name: str, bases: tuple[type, ...], body: dict[str, Any]) -> "_ModelMeta":
-        made = super().__new__(cls, name, bases, dict(body))
-        made.location = author_location()
-        return made
+        model = super().__new__(cls, name, bases, dict(body))
+        model.location = author_location()
+        return model
 
 
 class Model(metaclass=_ModelMeta):
-    """What a model derives from: its docstring is its page, its body its variables and equations.
+    """Base class of models: the docstring becomes the documentation page, the body declares variables and equations.
 
-    `rules`: one Rule or several.  The default run: `stop_time` and `step_size` in s, relative `tolerance`, `method`.
+    Attributes
+    ----------
+    rules
+        A Rule or a tuple of Rules.
+    stop_time, step_size
+        Default experiment in s.
+    tolerance
+        Relative tolerance of the default experiment.
+    method
+        Label of the default integration method.
     """
 
     rules: Rule | tuple[Rule, ...] = ()

@@ -1,6 +1,6 @@
-"""The file of an author: where it is, the model that it holds, and the same written out.
+"""Loads model files: path, model class, and generated source.
 
-What is wrong with it is told in one sentence, with file and line.
+Errors are reported in one sentence with file and line.
 """
 
 import linecache
@@ -23,16 +23,16 @@ from .model_declaration import Model
 from .model_source import model_source
 
 PACKAGE = __name__.split(".", 1)[0]
-RESERVED_FILE_NAMES = ("pythonfmu", "pythonfmu_workarounds", "runtime")  # what travels beside a model
+RESERVED_FILE_NAMES = ("pythonfmu", "pythonfmu_workarounds", "runtime")  # embedded in the same package
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A file with one model in it; its name is that of the FMU."""
+    """A file that defines one model; its stem is the name of the FMU."""
 
     path: Path
     source: str
-    ramps: bool = False  # whether its inputs may have rates
+    ramps: bool = False  # whether inputs may have time derivatives
 
     @property
     def name(self) -> str:
@@ -40,22 +40,22 @@ class ModelFile:
 
     @property
     def class_name(self) -> str:
-        """The name of the class."""
+        """Name of the model class."""
         return self.analysis.name
 
     @cached_property
     def analysis(self) -> ModelAnalysis:
-        """The model, judged."""
+        """The analysed and checked model."""
         try:
-            found = ModelAnalysis(self._load_class(), self.ramps)
-            check_units(found)
-            return found
+            analysis = ModelAnalysis(self._load_class(), self.ramps)
+            check_units(analysis)
+            return analysis
         except ModelError as mistake:
             raise self._build_error(mistake) from mistake
 
     @cached_property
     def generated_source(self) -> str:
-        """The module as it travels."""
+        """Source of the generated module."""
         try:
             self.analysis.check_solvable()
             return model_source(self.analysis, self.path.name)
@@ -64,10 +64,10 @@ class ModelFile:
 
     @cached_property
     def model(self) -> type[VariableOwner]:
-        """The class of the model as it travels, in this process; `inspect` and tracebacks find its text."""
+        """The generated model class, loaded in this process; `inspect` and tracebacks find its source."""
         digest = sha256(self.generated_source.encode()).hexdigest()[:12]
-        file = f"written-{digest}/{self.name}.py"
-        module = ModuleType(f"{PACKAGE}.written_{digest}.{self.name}")
+        file = f"generated-{digest}/{self.name}.py"
+        module = ModuleType(f"{PACKAGE}.generated_{digest}.{self.name}")
         module.__package__, module.__file__ = PACKAGE, file
         linecache.cache[file] = (
             len(self.generated_source),
@@ -77,30 +77,30 @@ class ModelFile:
         )
         sys.modules[module.__name__] = module
         exec(compile(self.generated_source, file, "exec"), vars(module))
-        made = vars(module)[self.class_name]
-        self._check_start_values(made())
-        return made
+        cls = vars(module)[self.class_name]
+        self._check_start_values(cls())
+        return cls
 
     def _check_start_values(self, thing: Any) -> None:
-        """Refuse start values that go nowhere: nobody could run the model as it is."""
+        """Raise BuildError if the equations cannot be evaluated at the start values."""
         try:
             rule = thing.prepare()
             begins = thing.initial_state(0.0)
-            states = begins if isinstance(begins, tuple) else (begins,)  # of one state a number
+            states = begins if isinstance(begins, tuple) else (begins,)  # a model with one state returns a number
             thing.compute_outputs(0.0, *states, *(0 for _ in self.analysis.contacts))
         except (ArithmeticError, ValueError) as error:
             mistake = ModelError(
-                f"the start values lead out of the range of numbers: {error}", self.analysis.model.location
+                f"the equations cannot be evaluated at the start values: {error}", self.analysis.model.location
             )
             raise self._build_error(mistake) from error
         if rule:
             sentence = thing.rules[rule - 1].format_map(vars(thing))
             raise self._build_error(
-                ModelError(f"the start values are refused: {sentence}", self.analysis.model.location)
+                ModelError(f"the start values are invalid: {sentence}", self.analysis.model.location)
             )
 
     def _load_class(self) -> type[Model]:
-        """The class in the file."""
+        """Execute the file and return its model class."""
         if (
             not (self.name.isidentifier() and self.name.isascii())
             or iskeyword(self.name)
@@ -108,32 +108,34 @@ class ModelFile:
         ):
             taken = f", and not {' or '.join(RESERVED_FILE_NAMES)}" if self.name in RESERVED_FILE_NAMES else ""
             raise BuildError(
-                f"{self.path}: a model has the name of its file, in letters, digits and _{taken}: rename it."
+                f"{self.path}: the file name is the model name: use only ASCII letters, digits and _{taken}."
             )
-        module = ModuleType(f"{PACKAGE}.authored.{self.name}")
+        module = ModuleType(f"{PACKAGE}.model_files.{self.name}")
         module.__file__ = str(self.path)
         try:
             exec(compile(self.source, str(self.path), "exec"), vars(module))
         except ModelError:
             raise
         except SyntaxError as error:
-            raise ModelError(f"this is no Python: {error.msg}", (str(self.path), error.lineno or 1)) from error
+            raise ModelError(f"invalid Python: {error.msg}", (str(self.path), error.lineno or 1)) from error
         except (Exception, SystemExit) as error:
             lines = [frame.lineno or 1 for frame in extract_tb(error.__traceback__) if frame.filename == str(self.path)]
-            told = " ".join(f"{type(error).__name__}: {error}".split())
-            raise ModelError(told, (str(self.path), lines[-1] if lines else 1)) from error
+            description = " ".join(f"{type(error).__name__}: {error}".split())
+            raise ModelError(description, (str(self.path), lines[-1] if lines else 1)) from error
         models = [
             one
             for one in vars(module).values()
             if isinstance(one, type) and issubclass(one, Model) and one.__module__ == module.__name__
         ]
         if len(models) != 1:
-            what = f"has {len(models)} of them, {', '.join(one.__name__ for one in models)}" if models else "has none"
-            raise BuildError(f"{self.path}: a file holds one class that derives from Model; this one {what}.")
+            what = f"has {len(models)}: {', '.join(one.__name__ for one in models)}" if models else "has none"
+            raise BuildError(
+                f"{self.path}: a model file must define exactly one class derived from Model; this one {what}."
+            )
         return models[0]
 
     def _build_error(self, mistake: ModelError) -> BuildError:
-        """The sentence, with the line."""
+        """Return a BuildError with file and line in front of the message."""
         file, line = mistake.location
         where = f"{self.path}, line {line}" if file == str(self.path) else str(self.path)
         return BuildError(f"{where}: {mistake}.")
@@ -143,7 +145,7 @@ _loaded: dict[Path, ModelFile] = {}
 
 
 def load_model_file(path: Path) -> ModelFile:
-    """The model in a file; read anew when the file has changed, and otherwise made once."""
+    """Load a model file; cached until the file changes."""
     try:
         source = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

@@ -1,4 +1,4 @@
-"""The class of a model in plain scalars, as text: what travels inside an FMU, and what is frozen to C."""
+"""Generates the source of a scalar model class, which is embedded in Python FMUs and translated to C."""
 
 import ast
 from inspect import cleandoc
@@ -21,7 +21,7 @@ from .single_contact_methods import single_contact_methods
 
 MODULE_TEMPLATE = '''"""{first}
 
-Written out from the equations in {file}: change those, not this.
+Generated from the equations in {file}; edit that file instead.
 """
 
 {import_lines}
@@ -40,13 +40,13 @@ class {name}({base_class}):
 
 {methods}
 '''
-IMPORTS_MARK = "\0"  # where imports go; no text of an author's has it
+IMPORTS_MARK = "\0"  # marks the place of the imports; model texts cannot contain it
 WIDTH = 105
 RUN_SETTINGS = ("stop_time", "step_size", "tolerance")
 
 
 def model_source(an: ModelAnalysis, file: str) -> str:
-    """The text of the module."""
+    """Return the source of the module."""
     f = CodegenContext(an)
     first, _, rest = escape_docstring(cleandoc(an.model.__doc__ or "")).partition("\n")
     about = indent(f"{first}\n{rest}" + ("\n" if rest else ""), INDENT).strip(" ")
@@ -75,22 +75,22 @@ def model_source(an: ModelAnalysis, file: str) -> str:
 
 
 def base_class(an: ModelAnalysis) -> str:
-    """The class of the runtime that it derives from."""
+    """Return the runtime base class of the model."""
     return "DryFriction" if an.waits else "CoupledFriction" if an.contacts else "Oscillator"
 
 
 def import_lines(text: str) -> str:
-    """What the text needs."""
+    """Return the import lines for all names used in the text."""
     used = {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
     lines = [f"from math import {', '.join(names)}\n"] if (names := sorted(used & set(MATH))) else []
-    for module, offered in IMPORTS.items():
-        if names := [name for name in offered if name in used]:
+    for module, available in IMPORTS.items():
+        if names := [name for name in available if name in used]:
             lines.append(f"from {f'.runtime.{module}'.rstrip('.')} import {', '.join(names)}")
     return "\n".join(lines)
 
 
 def declaration_lines(an: ModelAnalysis) -> list[str]:
-    """The variables in the order of the description: parameters, choices, inputs, outputs."""
+    """Declare the variables in the order of the model description."""
     lines = [
         f"{e.name} = {'Fixed' if isinstance(e, Fixed) else 'Parameter'}({float(e.start)!r}, {declaration_arguments(e)})"
         for e in an.parameters
@@ -108,7 +108,7 @@ def declaration_lines(an: ModelAnalysis) -> list[str]:
 
 
 def output_declaration(an: ModelAnalysis, e: Variable) -> str:
-    """The declaration of what is calculated."""
+    """Return the declaration of a calculated variable."""
     if isinstance(e, Mode):
         return f"Mode({string_literal(e.text)})"
     more = (
@@ -125,7 +125,7 @@ def output_declaration(an: ModelAnalysis, e: Variable) -> str:
 
 
 def declaration_arguments(e: Variable) -> str:
-    """Unit, words and range."""
+    """Return the arguments unit, description and range."""
     bounds = [(key, getattr(e, key)) for key in ("low", "high", "above", "below")]
     more = [f"{key}={float(bound)!r}" for key, bound in bounds if isfinite(bound)]
     more += [f"{key}={string_literal(getattr(e, key))}" for key in ("display", "alias") if getattr(e, key)]
@@ -133,7 +133,7 @@ def declaration_arguments(e: Variable) -> str:
 
 
 def class_attribute_lines(an: ModelAnalysis) -> list[str]:
-    """What the runtime asks of the class."""
+    """Return the class attributes that the runtime reads."""
     states = ", ".join(f"{string_literal(s.name)}: {string_literal(an.rate[s].name)}" for s in an.states)
     lines = [f"states = {{{states}}}"]
     if an.contacts:
@@ -143,11 +143,7 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
         lines.append(f"contacts = {{{slips}}}")
     lines += [
         f"{word} = True"
-        for word, holds in (
-            ("is_linear", an.closed_form),
-            ("has_driver", an.drivers),
-            ("has_input_derivatives", an.ramps),
-        )
+        for word, holds in (("linear", an.closed_form), ("driven", an.drivers), ("ramps", an.ramps))
         if holds
     ]
     for word in RUN_SETTINGS:
@@ -161,12 +157,12 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
 
 
 def string_lines(text: str) -> str:
-    """A string literal over several lines, if it is long."""
+    """Return a string literal, split over several lines if long."""
     lines = wrap(text, WIDTH, drop_whitespace=False)
     return string_literal(text) if len(lines) == 1 else f"\n{INDENT}".join(map(string_literal, lines))
 
 
 def escape_docstring(text: str) -> str:
-    """A text as it stands between three quotes."""
+    """Escape a text for a triple-quoted string."""
     text = text.replace("\\", "\\\\").replace('"""', '\\"\\"\\"')
     return f'{text[:-1]}\\"' if text.endswith('"') else text

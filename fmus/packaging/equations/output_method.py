@@ -1,4 +1,4 @@
-"""The method of a written-out model that sets its outputs, and says whether they are numbers."""
+"""Generates the method that computes the outputs and returns whether they are finite."""
 
 from .codegen_context import CodegenContext, method_source
 from .coupled_contact_methods import emit_friction_forces
@@ -7,6 +7,7 @@ from .single_contact_methods import emit_friction_force
 
 
 def observe_method(f: CodegenContext) -> str:
+    """Return the source of the output method."""
     an, s = f.an, f.printer()
     f.emit_driver(s, [*an.drivers, *an.ramps])
     s.count_uses(*an.outputs, *an.outputs)
@@ -22,4 +23,4 @@ def observe_method(f: CodegenContext) -> str:
         s.emit(f"self.{e.name} = {s.text(e)}")
     sizes = (s.text(e) if e.low >= 0.0 else f"fabs({s.text(e)})" for e in an.overflow_indicators)
     s.emit(f"return {' + '.join(sizes)} < inf")
-    return method_source("compute_outputs", f.arguments, s.lines)
+    return method_source("observe", f.arguments, s.lines)

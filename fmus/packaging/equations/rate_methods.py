@@ -1,4 +1,4 @@
-"""The methods of a written-out model that solvers ask: rates, Jacobian, constant push."""
+"""Generates the methods for integrators: rates, Jacobian, coefficients of the linear closed form."""
 
 from .algebra import build_term, depends_on, differentiate, substitute
 from .codegen_context import CodegenContext, emit_return, method_source
@@ -10,12 +10,12 @@ from .single_contact_methods import threshold_call
 
 
 def rate_methods(f: CodegenContext) -> list[str]:
-    """All of them."""
+    """Return the source of all methods for integrators."""
     return [rates_method(f), jacobian_method(f), *closed_form_methods(f)]
 
 
 def rates_method(f: CodegenContext) -> str:
-    """The rates that are no states, in the order of these."""
+    """Rates that are not states, in the order of the states."""
     an, s, c = f.an, f.printer(), f.single_contact
     targets = [law.expression for law in f.rate_expressions]
     if c is not None and THRESHOLD not in c.laws:
@@ -38,31 +38,31 @@ def rates_method(f: CodegenContext) -> str:
 
 
 def jacobian_method(f: CodegenContext) -> str:
-    """For each of these rates its derivatives by time and by each state."""
+    """Derivatives of each of these rates with respect to time and each state."""
     an, s, c = f.an, f.printer(), f.single_contact
-    ways: list[dict[Expression, Operand]] = [
+    directions: list[dict[Expression, Operand]] = [
         an.explicit_time_derivatives | an.ramps,
         *({state: 1.0} for state in an.states),
     ]
     if c is None and an.contacts:
-        return method_source("jacobian", f.arguments, coupled_jacobian_lines(f, s, ways))
+        return method_source("jacobian", f.arguments, coupled_jacobian_lines(f, s, directions))
     if c is None:
         return method_source(
             "jacobian",
             f.arguments,
-            f.return_lines(s, [differentiate(law, by) for law in f.rate_expressions for by in ways]),
+            f.return_lines(s, [differentiate(law, by) for law in f.rate_expressions for by in directions]),
         )
-    targets = [an.derivative_while_sliding(law, by) for law in f.rate_expressions for by in ways]
+    targets = [an.derivative_while_sliding(law, by) for law in f.rate_expressions for by in directions]
     if THRESHOLD in c.laws:
         with s.block(f"if {c.mode.name} == 0 and fabs({s.text(c.slip)}) < {s.text(c.eps)}:"):
             inner = f.printer(s.depth)
-            held = [an.derivative_while_stuck(law, by) for law in f.rate_expressions for by in ways]
-            f.emit_driver(inner, [an.load[c], *held])
+            stuck = [an.derivative_while_stuck(law, by) for law in f.rate_expressions for by in directions]
+            f.emit_driver(inner, [an.load[c], *stuck])
             with inner.block(f"if fabs({inner.text(an.load[c])}) <= {inner.text(an.holding_limit[c])}:"):
-                inner.emit("return " + ", ".join(map(inner.text, held)))
+                inner.emit("return " + ", ".join(map(inner.text, stuck)))
             s.lines += inner.lines
             if depends_on(c.slide, an.time_varying) or depends_on(an.holding_limit[c], an.time_varying):
-                limits = [by | {c: clipped_force_derivative(f, c, by)} for by in ways]
+                limits = [by | {c: clipped_force_derivative(f, c, by)} for by in directions]
                 s.lines += f.return_lines(
                     f.printer(s.depth), [differentiate(law, by) for law in f.rate_expressions for by in limits]
                 )
@@ -70,11 +70,15 @@ def jacobian_method(f: CodegenContext) -> str:
     return method_source("jacobian", f.arguments, f.return_lines(s, targets))
 
 
-def coupled_jacobian_lines(f: CodegenContext, s: ExpressionPrinter, ways: list[dict[Expression, Operand]]) -> list[str]:
-    """The lines that return the derivatives of the rates where some contacts slide and others hold."""
-    forces = [derivative_unknown(f, f"by_{next(iter(by)).name}", by) for by in ways]
+def coupled_jacobian_lines(
+    f: CodegenContext, s: ExpressionPrinter, directions: list[dict[Expression, Operand]]
+) -> list[str]:
+    """Return the lines that compute the Jacobian while some contacts slide and others stick."""
+    forces = [derivative_unknown(f, f"by_{next(iter(by)).name}", by) for by in directions]
     targets = [
-        differentiate(law, by | u.symbols) for law in f.rate_expressions for by, u in zip(ways, forces, strict=True)
+        differentiate(law, by | u.symbols)
+        for law in f.rate_expressions
+        for by, u in zip(directions, forces, strict=True)
     ]
     terms = [e for u in (force_unknown(f), *forces) for e in u.terms]
     f.emit_driver(s, [*terms, *targets])
@@ -82,7 +86,9 @@ def coupled_jacobian_lines(f: CodegenContext, s: ExpressionPrinter, ways: list[d
     emit_friction_forces(f, s)
     emit_solution(f, s, forces, law=True)
     for c in f.an.contacts:
-        known = [(u.symbols[c], by) for u, by in zip(forces, ways, strict=True) if isinstance(u.symbols[c], Expression)]
+        known = [
+            (u.symbols[c], by) for u, by in zip(forces, directions, strict=True) if isinstance(u.symbols[c], Expression)
+        ]
         if THRESHOLD in c.laws and known:
             clips = f"fabs({c.name}) >= {s.text(f.an.holding_limit[c])}"
             with s.block(f"if {c.mode.name} == 0 and self.friction != HYBRID and {clips}:"):
@@ -92,36 +98,27 @@ def coupled_jacobian_lines(f: CodegenContext, s: ExpressionPrinter, ways: list[d
 
 
 def clipped_force_derivative(f: CodegenContext, c: Contact, by: dict[Expression, Operand]) -> Operand:
-    """The derivative of a force that the threshold law limits."""
+    """Return the derivative of a force that the threshold law clips."""
     force_unknown = c if f.single_contact is None else f.an.load[c]
     return build_term("*", Term("copysign", 1.0, force_unknown), differentiate(f.an.holding_limit[c], by))
 
 
 def closed_form_methods(f: CodegenContext) -> list[str]:
-    """Where the motion has a closed form: its constants, and the part of the rate that is there where all states are
-    zero."""
+    """Coefficients of the linear closed form, and the acceleration at zero states; empty without a closed form."""
     if not f.an.closed_form:
         return []
     targets = [law.expression for law in f.rate_expressions]
     targets = targets if f.single_contact is None else with_sliding_force(f.single_contact, targets)
     at_zero = dict.fromkeys(f.an.states, 0.0)
-    piece = method_source("linear_coefficients", (), f.return_lines(f.printer(), f.an.closed_form))
+    piece = method_source("piece", (), f.return_lines(f.printer(), f.an.closed_form))
     return [
         piece,
-        *[
-            f.nth_derivative_method(
-                "applied_acceleration_derivative", ["t"], [differentiate(f.rate_expressions[0].expression, f.an.ramps)]
-            )
-        ]
+        *[f.nth_derivative_method("push_rate", ["t"], [differentiate(f.rate_expressions[0].expression, f.an.ramps)])]
         * bool(f.an.ramps),
-        method_source(
-            "applied_acceleration",
-            ["t", *f.modes],
-            f.return_lines(f.printer(), [substitute(e, at_zero) for e in targets]),
-        ),
+        method_source("push", ["t", *f.modes], f.return_lines(f.printer(), [substitute(e, at_zero) for e in targets])),
     ]
 
 
 def with_sliding_force(c: Contact, targets: list[Operand]) -> list[Operand]:
-    """Expressions with the force of a contact that slides."""
+    """Insert the force of a sliding contact."""
     return [substitute(e, {c: Term("*", c.mode, c.slide)}) for e in targets]

@@ -1,4 +1,4 @@
-"""The methods of a written-out model about its values: at its birth, at the start, when they have changed."""
+"""Generates the methods for construction, initial states, derived constants and inputs."""
 
 from ...runtime.stick_slip import DryFriction
 from .algebra import Memo, subexpressions
@@ -8,7 +8,7 @@ from .expressions import Term
 
 
 def setup_methods(f: CodegenContext) -> list[str]:
-    """All of them."""
+    """Return the source of all setup methods."""
     return [
         init_method(f),
         initial_method(f),
@@ -20,7 +20,7 @@ def setup_methods(f: CodegenContext) -> list[str]:
 
 
 def init_method(f: CodegenContext) -> str:
-    """Every attribute is born here."""
+    """Constructor; creates all attributes."""
     lines = ["super().__init__()", "self.solver = Solver()"]
     if f.driver is not None:
         lines.append("self.t_base = self.x_base = 0.0")
@@ -33,29 +33,29 @@ def init_method(f: CodegenContext) -> str:
 
 
 def initial_method(f: CodegenContext) -> str:
-    """Position and speed at the start."""
+    """Initial states."""
     s = f.printer()
     if f.driver is not None:
         s.emit("self.t_base, self.x_base = t, 0.0")
     elif f.an.ramps:
         s.emit("self.t_base = t")
-    return method_source("initial_state", ["t"], f.return_lines(s, [state.start_expression for state in f.an.states]))
+    return method_source("initial", ["t"], f.return_lines(s, [state.start_expression for state in f.an.states]))
 
 
 def prepare_method(f: CodegenContext) -> str:
-    """Constants and rules; a rule is judged as soon as it can be: what it refuses could not be divided by."""
+    """Constants and rules; a rule is checked as early as possible, before its values are used as divisors."""
     s, dry = f.printer(), bool(f.an.contacts)
-    done: list[Term] = []
-    s.constants = done
+    computed: list[Term] = []
+    s.constants = computed
     for e in f.an.ramps:
         s.emit(f"self.{e.name}_polynomial.set_value(self.{e.name})")
     s.count_uses(*f.constants, *(rule.broken for rule in f.an.rules))
 
     def calculate(needed: Memo | None = None) -> None:
         for e in f.constants:
-            if (needed is None or id(e) in needed) and not any(e is one for one in done):
+            if (needed is None or id(e) in needed) and not any(e is one for one in computed):
                 s.emit_assignment(f"self.{e.name}", e)
-                done.append(e)
+                computed.append(e)
 
     for number, rule in enumerate(f.an.rules, len(DryFriction.rules) + 1 if dry else 1):
         calculate(subexpressions(rule.broken))
@@ -67,23 +67,20 @@ def prepare_method(f: CodegenContext) -> str:
 
 
 def nominal_velocity_method(f: CodegenContext) -> list[str]:
-    """The speed that a tolerance must resolve."""
+    """Smallest speed that the tolerance must resolve."""
     wanted = [state.nominal_velocity for state in f.an.states if state.nominal_velocity is not None]
-    return [method_source("nominal_velocity", (), f.return_lines(f.printer(), wanted))] if wanted else []
+    return [method_source("finest", (), f.return_lines(f.printer(), wanted))] if wanted else []
 
 
 def driver_method(f: CodegenContext) -> list[str]:
-    """The speed of the driver."""
+    """Speed of the driver."""
     return (
-        []
-        if f.driver is None
-        else [method_source("driver_velocity", (), f.return_lines(f.printer(), [f.driver.constant_rate]))]
+        [] if f.driver is None else [method_source("drive", (), f.return_lines(f.printer(), [f.driver.constant_rate]))]
     )
 
 
 def input_polynomial_methods(f: CodegenContext) -> list[str]:
-    """Where inputs have derivatives: fix at time t what goes on by itself, which prepare() takes over; tell their rates
-    there; and whether any has more than a rate."""
+    """For inputs with derivatives: move the time base to t, set input rates, test for derivatives above order 1."""
     if not f.an.ramps:
         return []
     base, rates = f.printer(), f.printer()
@@ -94,5 +91,5 @@ def input_polynomial_methods(f: CodegenContext) -> list[str]:
     base.emit("self.t_base = t")
     bends = f.printer()
     bends.emit("return " + " or ".join(f"self.{e.name}_polynomial.order > 1" for e in f.an.ramps))
-    scribes = {"rebase": base, "set_input_rates": rates, "has_higher_order": bends}
-    return [method_source(name, ["t"] * (name != "has_higher_order"), s.lines) for name, s in scribes.items()]
+    printers = {"rebase": base, "set_input_rates": rates, "has_higher_order": bends}
+    return [method_source(name, ["t"] * (name != "has_higher_order"), s.lines) for name, s in printers.items()]

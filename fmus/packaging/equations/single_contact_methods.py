@@ -1,4 +1,4 @@
-"""The methods of a written-out model about the contact of its only body, and the force under the law in force."""
+"""Generates the methods for the contact of a single-body model, and the friction force under the selected law."""
 
 from .algebra import depends_on, differentiate, rounding_scale, substitute
 from .codegen_context import CodegenContext, emit_scales, method_source
@@ -8,7 +8,7 @@ from .model_declaration import SIGN, THRESHOLD, Contact
 
 
 def single_contact_methods(f: CodegenContext) -> list[str]:
-    """All of them."""
+    """Return the source of all methods for a single contact."""
     c = f.single_contact
     return (
         []
@@ -18,60 +18,58 @@ def single_contact_methods(f: CodegenContext) -> list[str]:
 
 
 def load_method(f: CodegenContext, c: Contact) -> str:
-    """The load on the body at rest, its rate, and the most that is held."""
+    """Load on the body at rest, its rate, and the holding limit."""
     an = f.an
     wanted = [
         an.load[c],
         substitute(differentiate(an.load[c], an.coasting_derivatives), {c.slip: 0.0}),
         an.holding_limit[c],
     ]
-    return method_source("stick_load", ["t", *f.states], f.return_lines(f.printer(), wanted))
+    return method_source("hold", ["t", *f.states], f.return_lines(f.printer(), wanted))
 
 
 def load_rate_method(f: CodegenContext, c: Contact) -> list[str]:
-    """The n-th derivative of that load, as far as inputs make it."""
+    """The n-th derivative of the load caused by inputs."""
     ramps = f.an.ramps
     return (
-        [f.nth_derivative_method("load_derivative", ["t", *f.states], [differentiate(f.an.load[c], ramps)])]
-        if ramps
-        else []
+        [f.nth_derivative_method("load_rate", ["t", *f.states], [differentiate(f.an.load[c], ramps)])] if ramps else []
     )
 
 
 def load_scale_method(f: CodegenContext, c: Contact) -> str:
-    """The sum of the sizes of what the load is made of."""
+    """Rounding scale of the load."""
     s = f.printer()
     (sizes,) = emit_scales(f, s, [rounding_scale(f.an.load[c])])
     f.emit_driver(s, [sizes])
     s.count_uses(sizes)
     s.emit(f"return {s.text(sizes)}")
-    return method_source("load_magnitude", ["t", *f.states], s.lines)
+    return method_source("terms", ["t", *f.states], s.lines)
 
 
 def breakaway_method(f: CodegenContext, c: Contact) -> list[str]:
-    """The rate of the slip at a break-away, where the load is just the limit and friction falls to that of a slide."""
+    """Slip acceleration at breakaway, when friction drops from the holding limit to the sliding force."""
     if c.hold is None or any(depends_on(e, f.an.time_varying) for e in (c.slide, c.hold)):
         return []
     less = Term("neg", Term("*", c.mode, Term("-", c.hold, c.slide)))
     jump = differentiate(f.an.rate_outputs[c.slip].expression, {c: less})
-    return [method_source("breakaway_acceleration", f.arguments, f.return_lines(f.printer(), [jump]))]
+    return [method_source("departure", f.arguments, f.return_lines(f.printer(), [jump]))]
 
 
 def emit_friction_force(f: CodegenContext, s: ExpressionPrinter, c: Contact) -> None:
-    """The lines that calculate the force; the mode is told as the law has it."""
+    """Emit the friction force, and the mode under the selected law."""
     load, mode, slip = f.an.load[c], c.mode.name, s.text(c.slip)
-    held = s.local_variable(load) if isinstance(load, Term) else s.text(load)
+    stuck_force = s.local_variable(load) if isinstance(load, Term) else s.text(load)
     if THRESHOLD in c.laws:
         with s.block(f"if {mode} != 0:"):
             s.emit(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
         with s.block("elif self.friction == HYBRID:"):
-            s.emit(f"{c.name} = {held}")
+            s.emit(f"{c.name} = {stuck_force}")
         with s.block("else:"):
             s.emit(f"{c.name} = {threshold_call(f, s, c)}")
             s.emit(f"{mode} = sign({slip}) if fabs({slip}) >= {s.text(c.eps)} else 0")
     else:
         with s.block(f"if {mode} == 0{' and self.friction == HYBRID' if SIGN in c.laws else ''}:"):
-            s.emit(f"{c.name} = {held}")
+            s.emit(f"{c.name} = {stuck_force}")
         with s.block("else:"):
             f.emit_sign_mode(s, c, [c.mode])
             s.emit(f"{c.name} = {s.text(Term('*', c.mode, c.slide))}")
@@ -79,5 +77,5 @@ def emit_friction_force(f: CodegenContext, s: ExpressionPrinter, c: Contact) -> 
 
 
 def threshold_call(f: CodegenContext, s: ExpressionPrinter, c: Contact) -> str:
-    """The force by the threshold law."""
+    """Return the call that computes the force of the threshold law."""
     return f"threshold({', '.join(map(s.text, (c.slip, c.eps, f.an.load[c], c.slide, f.an.holding_limit[c])))})"

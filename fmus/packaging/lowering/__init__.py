@@ -1,27 +1,28 @@
-"""The numerics over vectors, written out in scalars for the model at hand: from them the FMU and the C are made.
+"""Lowers the runtime from vectors to scalars for one model; the results are embedded in the FMU or translated to C.
 
-    spec.py            what a model and an offer fix; the names of the numbers of a vector: x2, v2 of y2
-    offer.py           which methods and friction laws there are, and which an FMU offers
-    declarations.py    what the sources say of attributes and results
-    numbers.py         the expressions and statements of a function, number by number
-    elimination.py     the linear system of rodas
-    settled.py         what is fixed is settled: flags, choices, and the tests that follow
-    text.py            a file, line by line: what does not change is copied with its comments
-    needed.py          what nobody needs is left out
-    live.py            the model in this process, as it will travel
+    layout.py              facts fixed by model and features; names of vector components: x2, v2 of y2
+    feature_selection.py   the integration methods and friction laws that an FMU includes
+    source_symbols.py      attributes, results and constants found in the sources
+    scalarize.py           expressions and statements of a function, component by component
+    elimination.py         the linear system of rodas
+    constant_folding.py    replaces flags, choices and dependent tests by constants
+    emit_source.py         a file, line by line: unchanged lines are copied with their comments
+    dead_code.py           removes unused code
+    lowered_sources.py     lowers all files of the runtime and the model
+    import_hook.py         imports the lowered model into this process
 
-A vector is declared by its annotation, `e: StateVector`, at a parameter, at a result or in the body of a class; what is
-calculated from vectors is one; y, f and modes, with a number or without, are vectors as attributes.  Their numbers are
+A vector is declared by an annotation such as `e: StateVector` of a parameter, result or class attribute.  Results of vector
+operations are vectors, and so are the attributes y, f and modes, with or without a number.  Their components are
 
-    y, y2, step.y0           the states' own: x, v;  x2, v2;  step.x0, step.v0
-    f, f2, step.f0           the rates' own: a;  a2;  step.a0.  The rate of x is v, so that of x2 is v2: it is there
-    modes, step.modes0       the contacts' own: mode;  step.mode0
-    e, k3, self.c2           any other: e_x, e_v;  k3_x, k3_v;  self.c2_x, self.c2_v
+    y, y2, step.y0           named after the states: x, v;  x2, v2;  step.x0, step.v0
+    f, f2, step.f0           named after the rates: a;  a2;  step.a0.  The rate of x is v, so the rate of x2 is v2
+    modes, step.modes0       named after the modes: mode;  step.mode0
+    e, k3, self.c2           all others: e_x, e_v;  k3_x, k3_v;  self.c2_x, self.c2_v
 
 A loop over contact_indices, state_indices or velocity_indices is unrolled; a function with a parameter
 `i: ContactIndex` is written once for each contact.  A loop over the methods is unrolled for those that
 are offered; one that tests each of them becomes a chain.
-The guard of all this is that arrays, scalars and C give the same bits (tests/lowering/test_lowering.py).
+Tests check that arrays, scalars and C give the same bits (tests/lowering/test_lowering.py).
 """
 
 from .feature_selection import LAWS, METHODS, select_features

@@ -1,4 +1,4 @@
-"""What a model or an offer fixes is settled: flags, comparisons of choices, and the tests that follow from them."""
+"""Folds constants: flags, comparisons of choices, and dependent tests."""
 
 import ast
 from typing import Any
@@ -8,11 +8,11 @@ from .layout import ModelLayout
 
 
 class ConstantFolder(TreeTransformer):
-    """An expression in which what is fixed stands as True, False or a number."""
+    """Replaces fixed parts of expressions by True, False or a number."""
 
     def __init__(self, spec: ModelLayout, constants: dict[str, Any]) -> None:
         self.spec, self.constants = spec, constants
-        self.choices = dict(spec.choices)  # those of local names as well
+        self.choices = dict(spec.choices)  # includes local names
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         node = self.generic_visit(node)
@@ -57,5 +57,5 @@ class ConstantFolder(TreeTransformer):
 
 
 def known_truth(node: ast.AST) -> bool | None:
-    """True or False where it is known, else None."""
+    """Return True or False if the node is that constant, else None."""
     return node.value if isinstance(node, ast.Constant) and isinstance(node.value, bool) else None

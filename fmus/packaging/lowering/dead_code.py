@@ -1,7 +1,6 @@
-"""What nobody needs is left out: attributes that are set and never read, functions that nobody calls, classes of which
-nobody makes one, dead imports.
+"""Removes dead code: attributes that are never read, functions and classes that are never used, unused imports.
 
-Who reads is known by name: any file that travels, and whoever finds its way by dotted names, as those of variables.
+Uses are matched by name in all embedded files, and in dotted names such as those of variables.
 """
 
 import ast
@@ -18,38 +17,40 @@ FMI_LAYER_MODULES = (
     *("call_sequence", "early_return", "failure_handling", "fmu_instance", "messages", "model_exchange"),
     *("pythonfmu_workarounds", "saved_state", "slave", "variable_access", "variable_declarations"),
 )
-KEPT_WHOLE = {f"runtime/{name}.py" for name in FMI_LAYER_MODULES}  # by a layer of FMI
+KEPT_WHOLE = {f"runtime/{name}.py" for name in FMI_LAYER_MODULES}  # called by the FMI layer
 Files = dict[str, list[SourceLine]]
 Removable = ast.ClassDef | ast.FunctionDef | ast.Assign
 
 
 def remove_dead_code(files: Files, model: str, names: Iterable[str]) -> Files:
-    """The files without what nobody needs; `model` is that of the model, and `names` are read by others."""
-    wanted = reachable_names(
+    """Remove dead code from the files; `model` is the path of the model, `names` are read from outside."""
+    used = reachable_names(
         [one for path, lines in files.items() for one in code_units(path, lines, path == model)], set(names)
     )
-    return {path: prune_file(path, lines, wanted, path == model) for path, lines in files.items()}
+    return {path: prune_file(path, lines, used, path == model) for path, lines in files.items()}
 
 
 def parse_lines(lines: list[SourceLine]) -> ast.Module:
-    """The tree of a file."""
+    """Parse a file."""
     return parsed_module("\n".join(lines))
 
 
 @dataclass
 class CodeUnit:
-    """What a piece of code reads: .attribute, name; it runs if of each of its `needs` one is wanted."""
+    """A piece of code and what it reads (".attribute" or "name").
+
+    It is reachable if at least one name of each set in `needs` is reachable.
+    """
 
     needs: list[set[str]]
     reads: set[str]
 
 
 def code_units(path: str, lines: list[SourceLine], is_model: bool) -> list[CodeUnit]:
-    """The functions of a file, and in them what only sets attributes, each with what it reads; of a model each class is
-    needed."""
+    """Return functions and attribute assignments of a file with what they read; all classes of a model are kept."""
     if path in KEPT_WHOLE:
         return units_of_node(parse_lines(lines), [], True)
-    found: list[CodeUnit] = []
+    result: list[CodeUnit] = []
     for part in parse_lines(lines).body:
         needs: list[set[str]] = []
         pieces: list[ast.AST] = [part]
@@ -58,14 +59,14 @@ def code_units(path: str, lines: list[SourceLine], is_model: bool) -> list[CodeU
             pieces = [*part.bases, *part.decorator_list, *part.body]
         for node in pieces:
             names = [call_names(node)] if isinstance(node, ast.FunctionDef) and not node.name.startswith("__") else []
-            found += units_of_node(node, needs + names, is_model)
-    return found
+            result += units_of_node(node, needs + names, is_model)
+    return result
 
 
-def reachable_names(found: list[CodeUnit], names: set[str]) -> set[str]:
-    """All that is read by what can be reached."""
+def reachable_names(units: list[CodeUnit], names: set[str]) -> set[str]:
+    """Return all names read by reachable code."""
     while True:
-        reached = [one for one in found if all(names & need for need in one.needs)]
+        reached = [one for one in units if all(names & need for need in one.needs)]
         more = names.union(*(one.reads for one in reached))
         if more == names:
             return names
@@ -73,11 +74,13 @@ def reachable_names(found: list[CodeUnit], names: set[str]) -> set[str]:
 
 
 def units_of_node(part: ast.AST, needs: list[set[str]], whole: bool) -> list[CodeUnit]:
-    """What a piece of code reads, of a dotted name in a text every word as an attribute; on its own, where it is not
-    kept `whole`, what an assignment reads that only sets attributes."""
+    """Return what a piece of code reads; the parts of dotted names in strings count as attributes.
+
+    Unless `whole`, assignments that only set attributes become units of their own.
+    """
     mine = CodeUnit(needs, set())
-    found, waiting = [mine], [part]
-    for node in waiting:  # which grows on the way
+    result, pending = [mine], [part]
+    for node in pending:  # the list grows during the loop
         match node:
             case ast.Name(id=name, ctx=ast.Load()):
                 mine.reads.add(name)
@@ -89,66 +92,66 @@ def units_of_node(part: ast.AST, needs: list[set[str]], whole: bool) -> list[Cod
                 mine.reads |= {"." + name for name in attributes_with_effects(node)}
                 for targets, value in [] if whole else assignment_pairs(node):
                     if all(is_dead_store(one, value, set()) for one in targets):
-                        found += units_of_node(
+                        result += units_of_node(
                             value, [*needs, {"." + one.attr for one in targets if is_self_assignment(one)}], True
                         )
                     else:
-                        waiting += [*targets, value]
+                        pending += [*targets, value]
                 if not whole:
                     continue
             case ast.AugAssign(target=ast.Attribute(attr=name)):
                 mine.reads.add("." + name)
-        waiting += child_nodes(node)
-    return found
+        pending += child_nodes(node)
+    return result
 
 
-def prune_file(path: str, lines: list[SourceLine], wanted: set[str], is_model: bool) -> list[SourceLine]:
-    """One file without what is not wanted."""
+def prune_file(path: str, lines: list[SourceLine], used: set[str], is_model: bool) -> list[SourceLine]:
+    """Remove from a file what is not in `used`."""
     if path in KEPT_WHOLE:
         return lines
     whole, lines = parse_lines(lines), list(lines)
-    for node in sorted(removable_nodes(whole, wanted, is_model), key=lambda one: one.lineno, reverse=True):
+    for node in sorted(removable_nodes(whole, used, is_model), key=lambda one: one.lineno, reverse=True):
         if isinstance(node, ast.Assign):
-            prune_assignment(lines, node, wanted)
+            prune_assignment(lines, node, used)
         else:
             delete_definition(lines, node)
     return prune_imports(lines)
 
 
-def removable_nodes(whole: ast.Module, wanted: set[str], is_model: bool) -> list[Removable]:
-    """The classes and functions that nobody needs, and all assignments outside of these; of a model its functions."""
-    found: list[Removable] = []
-    waiting: list[ast.AST] = [*whole.body]
-    for node in waiting:  # which grows on the way
+def removable_nodes(whole: ast.Module, used: set[str], is_model: bool) -> list[Removable]:
+    """Return unused classes and functions, and all assignments outside of them; only functions for a model."""
+    result: list[Removable] = []
+    pending: list[ast.AST] = [*whole.body]
+    for node in pending:  # the list grows during the loop
         match node:
-            case ast.ClassDef(name=name) if not is_model and not {name, "." + name} & wanted:
-                found.append(node)
-            case ast.FunctionDef(name=name) if not name.startswith("__") and not call_names(node) & wanted:
-                found.append(node)
+            case ast.ClassDef(name=name) if not is_model and not {name, "." + name} & used:
+                result.append(node)
+            case ast.FunctionDef(name=name) if not name.startswith("__") and not call_names(node) & used:
+                result.append(node)
             case ast.Assign() if not is_model:
-                found.append(node)
+                result.append(node)
             case _:
-                waiting += ast.iter_child_nodes(node)
-    return found
+                pending += ast.iter_child_nodes(node)
+    return result
 
 
 def call_names(node: ast.FunctionDef) -> set[str]:
-    """By what a function is called: a method by .name alone."""
+    """Return the names by which a function is called; methods only as .name."""
     return {"." + node.name} if node.col_offset else {"." + node.name, node.name}
 
 
 def delete_definition(lines: list[SourceLine], node: ast.ClassDef | ast.FunctionDef) -> None:
-    """Take out a class or a function, with the blank lines above it."""
+    """Delete a class or function with the blank lines above it."""
     first = node.lineno - 1
     while first and not lines[first - 1].strip():
         first -= 1
     del lines[first : node.end_lineno]
 
 
-def prune_assignment(lines: list[SourceLine], node: ast.Assign, wanted: set[str]) -> None:
-    """Take attributes of self that nobody reads out of an assignment that does nothing else."""
+def prune_assignment(lines: list[SourceLine], node: ast.Assign, used: set[str]) -> None:
+    """Remove unread attributes of self from an assignment without other effects."""
     pairs = assignment_pairs(node)
-    kept = [([one for one in targets if not is_dead_store(one, value, wanted)], value) for targets, value in pairs]
+    kept = [([one for one in targets if not is_dead_store(one, value, used)], value) for targets, value in pairs]
     if kept == pairs:
         return
     if len(pairs) > 1:
@@ -159,12 +162,12 @@ def prune_assignment(lines: list[SourceLine], node: ast.Assign, wanted: set[str]
     comment = re.search(r"  #.*$", lines[end - 1])
     text = " = ".join(sides) + (comment[0] if comment else "") if len(sides) > 1 else ""
     if not text and lines[node.lineno - 2].endswith(":") and not "".join(lines[end : end + 1]).strip():
-        text = "pass"  # nothing else is left of the function
+        text = "pass"  # the body would be empty
     lines[node.lineno - 1 : end] = [SourceLine.of(" " * node.col_offset + text, old.source)] if text else []
 
 
 def assignment_pairs(node: ast.Assign) -> list[tuple[list[ast.expr], ast.expr]]:
-    """What is assigned, each with all that it is assigned to."""
+    """Return pairs of targets and value."""
     target, value = node.targets[0], node.value
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and len(target.elts) == len(value.elts):
         return [([one], what) for one, what in zip(target.elts, value.elts, strict=True)]
@@ -172,27 +175,28 @@ def assignment_pairs(node: ast.Assign) -> list[tuple[list[ast.expr], ast.expr]]:
 
 
 def assignment_targets(node: ast.Assign) -> list[tuple[ast.expr, ast.expr]]:
-    """What is assigned, target by target."""
+    """Return pairs of target and value, one per target."""
     return [(target, value) for targets, value in assignment_pairs(node) for target in targets]
 
 
 def attributes_with_effects(node: ast.Assign) -> set[str]:
-    """The attributes that an assignment sets in a way that does more, or may."""
+    """Return the attributes in assignments that may have other effects."""
     kept = [target for target, value in assignment_targets(node) if not is_dead_store(target, value, set())]
     return {part.attr for one in kept for part in all_nodes(one) if isinstance(part, ast.Attribute)}
 
 
-def is_dead_store(target: ast.expr, value: ast.expr, wanted: set[str]) -> bool:
-    """Whether this only sets an attribute of self, or of what self is made of, that nobody reads."""
+def is_dead_store(target: ast.expr, value: ast.expr, used: set[str]) -> bool:
+    """Return whether this only sets an attribute of self that is never read."""
     makes = isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and not value.args
-    mine = is_self_assignment(target) and "." + target.attr not in wanted
+    mine = is_self_assignment(target) and "." + target.attr not in used
     return mine and (makes or isinstance(value, (ast.Name, ast.Constant, ast.Attribute)))
 
 
 def prune_imports(lines: list[SourceLine]) -> list[SourceLine]:
-    used = {node.id for node in parsed_nodes("\n".join(lines)) if isinstance(node, ast.Name)}
+    """Remove unused names from the imports of a file."""
+    names = {node.id for node in parsed_nodes("\n".join(lines)) if isinstance(node, ast.Name)}
     for node in reversed([node for node in parse_lines(lines).body if isinstance(node, ast.ImportFrom)]):
-        kept = [alias.name for alias in node.names if alias.name in used]
+        kept = [alias.name for alias in node.names if alias.name in names]
         if len(kept) < len(node.names) and not any(alias.asname for alias in node.names):
             text = f"from {'.' * node.level}{node.module or ''} import {', '.join(kept)}"
             new = [SourceLine.of(text, lines[node.lineno - 1].source)] if kept else []

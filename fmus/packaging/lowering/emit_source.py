@@ -1,4 +1,4 @@
-"""The text of one file: lines that do not change are copied, with their comments, and each knows its source."""
+"""Emits a lowered file: unchanged lines are copied with comments; all lines keep their source line numbers."""
 
 import ast
 import re
@@ -13,129 +13,139 @@ MAX_LINE_LENGTH = 120
 
 
 class SourceLine(str):
-    """A line of text, and the number of the line of the source that it follows from."""
+    """A line of text with the number of its source line."""
 
     __slots__ = ("source",)
     source: int
 
     @classmethod
     def of(cls, text: str, source: int) -> "SourceLine":
+        """Create a line with its source line number."""
         line = cls(text)
         line.source = source
         return line
 
 
 class SourceEmitter:
-    """A file written out, line by line; `vectors`: whether it speaks of any."""
+    """Lowers a file line by line; `vectors` is whether it uses vectors."""
 
     def __init__(self, spec: ModelLayout, declared: SourceSymbols, path: str, text: str, vectors: bool) -> None:
         self.spec, self.declared, self.path, self.has_vectors = spec, declared, path, vectors
         self.old = [SourceLine.of(line, n) for n, line in enumerate(text.split("\n"), 1)]
         self.lines: list[SourceLine] = []
-        self.after = 0  # the lines of the source that have been dealt with
-        self.scalarizer = self.fresh()
+        self.after = 0  # number of source lines already processed
+        self.scalarizer = self.new_scalarizer()
         body = parsed_module(text).body
         imports = [node for node in body if isinstance(node, ast.ImportFrom) and is_build_time_import(node)]
         self.ranges = {alias.name for node in imports for alias in node.names} & {*LOOP_RANGES, METHOD_LOOP}
-        self.block(body, 0)
+        self.lower_block(body, 0)
         self.lines += self.old[self.after :]
 
-    def fresh(self, index: dict[str, int] | None = None) -> Scalarizer:
+    def new_scalarizer(self, index: dict[str, int] | None = None) -> Scalarizer:
+        """Create the scalarizer of a function; `index` binds loop variables."""
         return Scalarizer(self.spec, self.declared, self.path, self.has_vectors, index)
 
     # ---- lines
 
-    def copy(self, end: int, shift: int) -> None:
-        """The lines of the source up to one, moved to the left by some blanks."""
+    def copy_lines(self, end: int, shift: int) -> None:
+        """Copy source lines up to `end`, moved left by `shift` spaces."""
         for line in self.old[self.after : end]:
             moved = line[shift:] if shift > 0 and not line[:shift].strip() else " " * -shift + line if line else line
             self.lines.append(SourceLine.of(moved, line.source))
         self.after = max(self.after, end)
 
-    def write(self, text: str, node: ast.AST) -> None:
+    def write_lines(self, text: str, node: ast.AST) -> None:
+        """Emit lines for a node."""
         self.lines += [SourceLine.of(line, getattr(node, "lineno", 0)) for line in text.split("\n")]
 
     @staticmethod
-    def first(node: ast.stmt) -> int:
+    def first_line(node: ast.stmt) -> int:
+        """Return the zero-based first line of a statement, including decorators."""
         return min([node.lineno, *(one.lineno for one in getattr(node, "decorator_list", []))]) - 1
 
-    def comment(self, node: ast.AST) -> str:
-        """The comment behind a line."""
-        found = re.search(r"  #.*$", self.old[getattr(node, "end_lineno", 1) - 1])
-        return found[0] if found else ""
+    def trailing_comment(self, node: ast.AST) -> str:
+        """Return the comment at the end of a line."""
+        match = re.search(r"  #.*$", self.old[getattr(node, "end_lineno", 1) - 1])
+        return match[0] if match else ""
 
     # ---- statements
 
-    def block(self, statements: list[ast.stmt], depth: int) -> bool:
-        """Statements in a row; whether they certainly leave the function, after which nothing follows."""
+    def lower_block(self, statements: list[ast.stmt], depth: int) -> bool:
+        """Lower a block; return whether it always leaves the function, so that later statements are dropped."""
         for node in statements:
-            mark = len(self.lines)
-            self.copy(self.first(node), node.col_offset - depth)
-            kept = len(self.lines)
-            leaves = self.statement(node, depth)
-            if len(self.lines) == kept:
-                del self.lines[mark:]  # with the comment that stood above it
+            start = len(self.lines)
+            self.copy_lines(self.first_line(node), node.col_offset - depth)
+            n_lines = len(self.lines)
+            leaves = self.lower_any_statement(node, depth)
+            if len(self.lines) == n_lines:
+                del self.lines[start:]  # with the comment above it
             self.after = node.end_lineno or 0
             if leaves:
                 self.after = statements[-1].end_lineno or 0
                 return True
         return False
 
-    def statement(self, node: ast.stmt, depth: int) -> bool:
+    def lower_any_statement(self, node: ast.stmt, depth: int) -> bool:
+        """Lower a statement; return whether it always leaves the function."""
         match node:
             case ast.ClassDef():
-                self.copy(self.first(node.body[0]), node.col_offset - depth)
-                self.block(node.body, depth + 4)
+                self.copy_lines(self.first_line(node.body[0]), node.col_offset - depth)
+                self.lower_block(node.body, depth + 4)
             case ast.FunctionDef():
                 counted = [one.arg for one in node.args.args if is_contact(one)]
                 for i in range(len(self.spec.contacts)) if counted else [0]:
-                    self.function(node, depth, counted, i)
+                    self.lower_function(node, depth, counted, i)
             case ast.For(target=ast.Name(id=name), iter=ast.Name(id=over)) if over in self.ranges:
-                self.unrolled(node, name, over, depth)
+                self.unroll_indices(node, name, over, depth)
             case ast.For(iter=ast.Name(id=over)) if over == METHOD_LOOP and over in self.ranges:
-                return self.chosen(node, depth) if isinstance(node.body[0], ast.If) else self.of_methods(node, depth)
+                return (
+                    self.lower_method_search(node, depth)
+                    if isinstance(node.body[0], ast.If)
+                    else self.unroll_methods(node, depth)
+                )
             case ast.If():
-                return self.branch(node, depth, "if")
+                return self.lower_if(node, depth, "if")
             case ast.While() | ast.For():
-                self.head(node, depth)
-                self.block(node.body, depth + 4)
+                self.emit_head(node, depth)
+                self.lower_block(node.body, depth + 4)
             case _:
-                self.simple(node, depth)
+                self.lower_simple(node, depth)
         return isinstance(node, (ast.Return, ast.Raise))
 
-    def unrolled(self, node: ast.For, name: str, over: str, depth: int) -> None:
-        """A loop over states or contacts, once for each."""
+    def unroll_indices(self, node: ast.For, name: str, over: str, depth: int) -> None:
+        """Unroll a loop over states or contacts."""
         many = {"contact_indices": range(len(self.spec.contacts)), "state_indices": range(len(self.spec.states))}
         for i in many.get(over, self.spec.velocity_states):
             self.scalarizer.loop_indices[name] = i
-            self.after = self.first(node.body[0])
-            self.block(node.body, depth)
+            self.after = self.first_line(node.body[0])
+            self.lower_block(node.body, depth)
 
-    def of_methods(self, node: ast.For, depth: int) -> bool:
-        """A loop over the methods that are offered, once for each."""
+    def unroll_methods(self, node: ast.For, depth: int) -> bool:
+        """Unroll a loop over the included methods."""
         for name in self.spec.methods:
             self.scalarizer.bind_method(node.target, name)
-            self.after = self.first(node.body[0])
-            self.block(node.body, depth)
+            self.after = self.first_line(node.body[0])
+            self.lower_block(node.body, depth)
         self.scalarizer.method_bindings = {}
         return False
 
-    def chosen(self, node: ast.For, depth: int) -> bool:
-        """A loop that looks for the method in force: a chain of tests, the last of which is not asked for."""
+    def lower_method_search(self, node: ast.For, depth: int) -> bool:
+        """Turn a loop that finds the selected method into a chain of tests with a final else."""
         (test,) = node.body
         assert isinstance(test, ast.If)
         many, leaves = len(self.spec.methods), True
         for n, name in enumerate(self.spec.methods, 1):
             self.scalarizer.bind_method(node.target, name)
             if many > 1:
-                asked = f"{'if' if n == 1 else 'elif'} {ast.unparse(self.scalarizer.visit(test.test))}:"
-                self.write(" " * depth + (asked if n < many else "else:"), test)
-            self.after = self.first(test.body[0])
-            leaves = self.block(test.body, depth + (4 if many > 1 else 0)) and leaves
+                head = f"{'if' if n == 1 else 'elif'} {ast.unparse(self.scalarizer.visit(test.test))}:"
+                self.write_lines(" " * depth + (head if n < many else "else:"), test)
+            self.after = self.first_line(test.body[0])
+            leaves = self.lower_block(test.body, depth + (4 if many > 1 else 0)) and leaves
         self.scalarizer.method_bindings = {}
         return leaves and many > 0
 
-    def simple(self, node: ast.stmt, depth: int) -> None:
+    def lower_simple(self, node: ast.stmt, depth: int) -> None:
+        """Lower a simple statement; copied if it does not change."""
         new: list[ast.stmt]
         match node:
             case ast.ImportFrom(module="method_registry"):
@@ -146,35 +156,36 @@ class SourceEmitter:
             case ast.Import() | ast.ImportFrom():
                 new = [node]
             case _:
-                new = self.scalarizer.lower_statement(self.offered(node))
+                new = self.scalarizer.lower_statement(self.drop_excluded_items(node))
         if len(new) == 1 and is_same_tree(new[0], node):
-            self.copy(node.end_lineno or 0, node.col_offset - depth)
+            self.copy_lines(node.end_lineno or 0, node.col_offset - depth)
             return
         for n, one in enumerate(new):
             whole = ast.unparse(ast.copy_location(one, node))
             text = " " * depth + unparse_bare(one, whole)
             text = text if len(text) <= MAX_LINE_LENGTH else wrap_line(" " * depth + whole)
-            self.write(text + self.comment(node) * (n == 0), node)
+            self.write_lines(text + self.trailing_comment(node) * (n == 0), node)
 
-    def head(self, node: ast.stmt, depth: int, word: str = "", test: ast.expr | None = None) -> None:
-        """The first line of a compound statement; copied unless its test has changed."""
-        body = self.first(node.body[0])  # type: ignore[attr-defined]
+    def emit_head(self, node: ast.stmt, depth: int, word: str = "", test: ast.expr | None = None) -> None:
+        """Emit the first line of a compound statement; copied unless its test has changed."""
+        body = self.first_line(node.body[0])  # type: ignore[attr-defined]
         if isinstance(node, ast.While):
             word, test = "while", self.scalarizer.visit(node.test)
-        if test is None or self.stands(node, word, test):
-            self.copy(body, node.col_offset - depth)
+        if test is None or self.is_unchanged(node, word, test):
+            self.copy_lines(body, node.col_offset - depth)
         else:
             text = wrap_line(f"{' ' * depth}{word} {ast.unparse(test)}:")
-            self.write(text + self.comment(node.test), node)  # type: ignore[attr-defined]
+            self.write_lines(text + self.trailing_comment(node.test), node)  # type: ignore[attr-defined]
             self.after = body
 
-    def stands(self, node: ast.stmt, word: str, test: ast.expr) -> bool:
-        """Whether the head of a compound statement can stay as it is."""
-        kept = is_same_tree(test, node.test)  # type: ignore[attr-defined]
-        return kept and self.old[node.lineno - 1].lstrip().startswith(word + " ")
+    def is_unchanged(self, node: ast.stmt, word: str, test: ast.expr) -> bool:
+        """Return whether the first line of a compound statement is unchanged."""
+        same_test = is_same_tree(test, node.test)  # type: ignore[attr-defined]
+        return same_test and self.old[node.lineno - 1].lstrip().startswith(word + " ")
 
-    def function(self, node: ast.FunctionDef, depth: int, counted: list[str], i: int) -> None:
-        outer, self.scalarizer = self.scalarizer, self.fresh(dict.fromkeys(counted, i))
+    def lower_function(self, node: ast.FunctionDef, depth: int, counted: list[str], i: int) -> None:
+        """Lower a function with the contact index `i`."""
+        outer, self.scalarizer = self.scalarizer, self.new_scalarizer(dict.fromkeys(counted, i))
         arguments = []
         for one in node.args.args:
             if self.has_vectors and (kind := annotated_kind(one)):
@@ -182,68 +193,68 @@ class SourceEmitter:
                 arguments += [ast.unparse(term) for term in self.scalarizer.own_components(ast.Name(one.arg))]
             elif one.arg not in counted:
                 arguments.append(one.arg)
-        body = self.first(node.body[0])
+        body = self.first_line(node.body[0])
         if any(isinstance(one, ast.Name) and one.id == "elementwise" for one in node.decorator_list):
             self.after = node.lineno - 1
         if arguments == [one.arg for one in node.args.args] and not (
             annotated_results(node) or any(map(annotated_kind, node.args.args))
         ):
-            self.copy(body, node.col_offset - depth)
+            self.copy_lines(body, node.col_offset - depth)
         else:
             if i:
-                self.write("", node)
+                self.write_lines("", node)
             name = node.name + (self.spec.contact_suffix(i) if counted else "")
-            self.write(wrap_line(f"{' ' * depth}def {name}({', '.join(arguments)}):"), node)
+            self.write_lines(wrap_line(f"{' ' * depth}def {name}({', '.join(arguments)}):"), node)
             self.after = body
-        mark = len(self.lines)
-        self.block(node.body, depth + 4)
-        if all(not line.strip() for line in self.lines[mark:]):
-            self.write(" " * (depth + 4) + "pass", node)
+        start = len(self.lines)
+        self.lower_block(node.body, depth + 4)
+        if all(not line.strip() for line in self.lines[start:]):
+            self.write_lines(" " * (depth + 4) + "pass", node)
         if name := self.scalarizer.find_name_clash():
             raise self.scalarizer.error(
-                node, f"uses {name} for a number, and a number of a vector gets that name; take another"
+                node, f"uses {name} for a scalar, but a component of a vector gets that name; take another"
             )
         self.scalarizer = outer
 
-    def branch(self, node: ast.If, depth: int, word: str) -> bool:
+    def lower_if(self, node: ast.If, depth: int, word: str) -> bool:
+        """Lower an if statement; return whether all branches leave the function."""
         test = self.scalarizer.visit(node.test)
         if known_truth(test) is not None:
             chosen = node.body if known_truth(test) else node.orelse
             if not chosen:
                 return False
-            self.after = self.first(chosen[0])
-            return self.block(chosen, depth)
-        self.head(node, depth, word, test)
-        mark = len(self.lines)
-        leaves = self.block(node.body, depth + 4)
-        if len(self.lines) == mark:
-            self.write(" " * (depth + 4) + "pass", node)
+            self.after = self.first_line(chosen[0])
+            return self.lower_block(chosen, depth)
+        self.emit_head(node, depth, word, test)
+        start = len(self.lines)
+        leaves = self.lower_block(node.body, depth + 4)
+        if len(self.lines) == start:
+            self.write_lines(" " * (depth + 4) + "pass", node)
         if not node.orelse:
             return False
-        other, mark = node.orelse[0], len(self.lines)
+        other, start = node.orelse[0], len(self.lines)
         if isinstance(other, ast.If) and len(node.orelse) == 1 and other.col_offset == node.col_offset:
-            self.after = self.first(other)
+            self.after = self.first_line(other)
             if known_truth(self.scalarizer.visit(other.test)) is None:
-                return self.branch(other, depth, "elif") and leaves
-            self.write(" " * depth + "else:", other)
+                return self.lower_if(other, depth, "elif") and leaves
+            self.write_lines(" " * depth + "else:", other)
         else:
-            self.copy(self.first(other), node.col_offset - depth)
-        leaves = self.block(node.orelse, depth + 4) and leaves
-        if all(line.lstrip().startswith(("else:", "#")) for line in self.lines[mark:]):
-            del self.lines[mark:]
+            self.copy_lines(self.first_line(other), node.col_offset - depth)
+        leaves = self.lower_block(node.orelse, depth + 4) and leaves
+        if all(line.lstrip().startswith(("else:", "#")) for line in self.lines[start:]):
+            del self.lines[start:]
             return False
         return leaves
 
-    def offered(self, node: ast.stmt) -> ast.stmt:
-        """A choice of methods or laws without the items that are not offered; one that starts with such an item starts
-        with the first that is offered."""
+    def drop_excluded_items(self, node: ast.stmt) -> ast.stmt:
+        """Remove excluded items from a choice; the default becomes the first included item if it is excluded."""
         match node:
             case ast.Assign(
                 targets=[ast.Name(id=name)],
                 value=ast.Call(func=ast.Name(id="Choice"), args=[start, text, items]) as choice,
             ) if possible := self.spec.choices.get(name):
-                kept = ast.unparse(start).removesuffix(".NUMBER") in self.spec.methods
-                if not kept and self.declared.constants.get(getattr(start, "id", "")) not in possible:
+                is_included = ast.unparse(start).removesuffix(".NUMBER") in self.spec.methods
+                if not is_included and self.declared.constants.get(getattr(start, "id", "")) not in possible:
                     start = ast.Constant(possible[0])
                 if isinstance(items, ast.Tuple):
                     items = replace_fields(items, elts=[one for one in items.elts if not self.is_gone(one)])
@@ -251,21 +262,22 @@ class SourceEmitter:
         return node
 
     def is_gone(self, node: ast.expr) -> bool:
-        """Whether this is an item that is not offered, or its name."""
+        """Return whether this is an excluded item, or its name."""
         return (item_label(node) or self.declared.constants.get(getattr(node, "id", ""))) in self.spec.excluded
 
 
 def is_build_time_import(node: ast.ImportFrom) -> bool:
-    """Whether this imports what does not travel: the vectors, and the methods that are found."""
+    """Return whether this imports a build-time module: vectors or the method registry."""
     return (node.module or "").rsplit(".", 1)[-1] in ("vectors", "method_registry")
 
 
 def is_contact(argument: ast.arg) -> bool:
+    """Return whether an argument is a contact index."""
     return isinstance(argument.annotation, ast.Name) and argument.annotation.id == "ContactIndex"
 
 
 def unparse_bare(node: ast.stmt, text: str) -> str:
-    """The text of a simple statement, without brackets around a row."""
+    """Unparse a simple statement without parentheses around tuples."""
     value = getattr(node, "value", None)
     if not (isinstance(value, ast.Tuple) and value.elts):
         return text
@@ -274,11 +286,11 @@ def unparse_bare(node: ast.stmt, text: str) -> str:
 
 
 def wrap_line(text: str, depth: int = 0) -> str:
-    """A line that is too long on several, broken inside its brackets, of which `depth` are open before it."""
+    """Break a long line inside its brackets, of which `depth` are already open."""
     if len(text) <= MAX_LINE_LENGTH:
         return text
     blanks, whole = text[: len(text) - len(text.lstrip())], not depth
-    if not depth and text.count(" = ") > 1:  # a row of targets
+    if not depth and text.count(" = ") > 1:  # several targets
         *targets, value = text.strip().split(" = ")
         half = len(targets) // 2
         return "\n".join(
@@ -304,7 +316,7 @@ def wrap_line(text: str, depth: int = 0) -> str:
 
 
 def is_bracketed(text: str) -> bool:
-    """Whether one pair of brackets holds all of an expression."""
+    """Return whether one pair of brackets encloses the whole expression."""
     depth = 0
     for n, letter in enumerate(text):
         depth += (letter in "([") - (letter in ")]")

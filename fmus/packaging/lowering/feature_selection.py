@@ -1,6 +1,6 @@
-"""An FMU that offers some of the methods and friction laws, and carries just their code.
+"""Selects the integration methods and friction laws that an FMU includes.
 
-What is not offered is settled like what a model fixes, so that its branches, its objects and its files are gone.
+Code of excluded methods and laws is removed by constant folding and dead-code elimination.
 """
 
 from collections.abc import Sequence
@@ -19,42 +19,40 @@ EXACT, HYBRID = EXACT_ITEM[0], HYBRID_LAW[0]
 
 @dataclass(frozen=True)
 class FeatureSelection:
-    """The labels of the methods and of the laws that an FMU offers."""
+    """Labels of the methods and laws that an FMU includes."""
 
     methods: tuple[str, ...]
     laws: tuple[str, ...]
 
     @property
     def choices(self) -> dict[str, tuple[int, ...]]:
-        """Every attribute that tells a choice, with the values that it can have."""
+        """Attributes that hold a choice, with their possible values."""
         methods = tuple(METHODS[label] for label in self.methods)
         laws = tuple(LAWS[label] for label in self.laws)
         return {"method": methods, "method_number": methods} | ({"friction": laws} if laws else {})
 
     @property
     def excluded(self) -> frozenset[str]:
-        """The labels of what is not offered."""
+        """Labels of excluded methods and laws."""
         return frozenset({*METHODS, *LAWS} - {*self.methods, *self.laws})
 
     @property
     def stepping_methods(self) -> dict[str, str]:
-        """Label and class of the methods with steps that are offered."""
+        """Label and class of the included methods that take steps."""
         return {label: cls.__name__ for label, _, cls in methods if label in self.methods}
 
 
 def select_features(source: ModelFile, methods: Sequence[str] = (), laws: Sequence[str] = ()) -> FeatureSelection:
-    """What is asked for; where nothing is, all that the model has.  BuildError for what it does not have."""
+    """Select methods and laws, by default all of the model; raise BuildError for those that it does not have."""
     an, chosen = source.analysis, []
-    for word, has, wanted in ("method", an.methods, methods), ("friction law", an.laws, laws):
-        for label in wanted:
+    for word, has, requested in ("method", an.methods, methods), ("friction law", an.laws, laws):
+        for label in requested:
             if label not in has:
                 raise BuildError(f"{source.name} has no {word} {label!r}; it has {', '.join(has) or 'none to choose'}.")
-        chosen.append(tuple(label for label in has if label in wanted or not wanted))
+        chosen.append(tuple(label for label in has if label in requested or not requested))
     kept, ruling = chosen
-    if ruling and HYBRID not in ruling:  # the closed form holds for no other
+    if ruling and HYBRID not in ruling:  # the closed form requires the hybrid law
         kept = tuple(label for label in kept if label != EXACT)
         if not kept:
-            raise BuildError(
-                f"{source.name} has the method {EXACT!r} for the law {HYBRID!r} only: ask for that law as well."
-            )
+            raise BuildError(f"{source.name}: the method {EXACT!r} needs the law {HYBRID!r}: add --law {HYBRID}.")
     return FeatureSelection(kept, ruling)

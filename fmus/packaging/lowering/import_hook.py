@@ -1,4 +1,4 @@
-"""A model in this process, as it will travel: its lines are those of the source, for tracebacks and refusals."""
+"""Imports lowered models into this process, with the line numbers of the original sources in tracebacks."""
 
 import ast
 import inspect
@@ -21,48 +21,48 @@ from ..syntax_trees import all_nodes
 from .feature_selection import FeatureSelection, select_features
 from .lowered_sources import PLAIN_NAME, SUFFIXED_NAME, SourceFiles, lower_all
 
-TREE_NAME = "written_out"  # in a module of a written-out package: its tree, with the lines of the source
+TREE_NAME = "written_out"  # attribute of lowered modules: the tree with source line numbers
 
 
 def resolve_features(
-    source: str | Path | ModelFile, offered: FeatureSelection | None
+    source: str | Path | ModelFile, features: FeatureSelection | None
 ) -> tuple[ModelFile, FeatureSelection]:
-    """The model of a name or a path, or of an author's file; and what it offers, which without an offer is all."""
-    found = source if isinstance(source, ModelFile) else find_model(source)
-    return found, offered or select_features(found)
+    """Return the model file, and the features, by default all."""
+    result = source if isinstance(source, ModelFile) else find_model(source)
+    return result, features or select_features(result)
 
 
-def lowered_files(source: str | Path | ModelFile, offered: FeatureSelection | None = None) -> dict[str, str]:
-    """Path and text of every file of the runtime, and of the model, as they travel."""
-    return {path: "\n".join(lines) for path, lines in lower_all(*resolve_features(source, offered)).items()}
+def lowered_files(source: str | Path | ModelFile, features: FeatureSelection | None = None) -> dict[str, str]:
+    """Return the text of every lowered file of the runtime and the model, by path."""
+    return {path: "\n".join(lines) for path, lines in lower_all(*resolve_features(source, features)).items()}
 
 
-def lowered_model(source: str | Path | ModelFile, offered: FeatureSelection | None = None) -> type[VariableOwner]:
-    """The class of a model as it will travel, with what the runtime is for it; the same each time."""
-    return import_lowered(*resolve_features(source, offered))
+def lowered_model(source: str | Path | ModelFile, features: FeatureSelection | None = None) -> type[VariableOwner]:
+    """Return the lowered class of a model, imported with its lowered runtime; cached."""
+    return import_lowered(*resolve_features(source, features))
 
 
 @cache
-def import_lowered(source: ModelFile, offered: FeatureSelection) -> type[VariableOwner]:
-    """The model class out of a package of its files, imported under a name of its own."""
-    files, name, model = lower_all(source, offered), source.name, source.model
-    package = f"written_{name}_{digest(lowered_files(source, offered))[:12]}"
+def import_lowered(source: ModelFile, features: FeatureSelection) -> type[VariableOwner]:
+    """Import the model class from a package of its lowered files with a unique name."""
+    files, name, model = lower_all(source, features), source.name, source.model
+    package = f"lowered_{name}_{digest(lowered_files(source, features))[:12]}"
     for parent in package, f"{package}.runtime":
         sys.modules[parent] = ModuleType(parent)
         sys.modules[parent].__path__ = []
     sys.modules[f"{package}.runtime.variable_declarations"] = (
-        variable_declarations  # what is declared is what it is to everybody else
+        variable_declarations  # declarations keep their classes, for isinstance
     )
     sys.meta_path.insert(
         0, LoweredModuleFinder(package, files, {f"{name}.py": sys.modules[model.__module__].__file__ or "?"})
     )
-    found = vars(import_module(f"{package}.{name}"))[model.__name__]
-    found.analysis = source.analysis  # for whoever describes it
-    return found
+    result = vars(import_module(f"{package}.{name}"))[model.__name__]
+    result.analysis = source.analysis  # used by model description and page
+    return result
 
 
 class LoweredModuleFinder(MetaPathFinder, Loader):
-    """Finds the modules of one written-out package."""
+    """Finds and loads the modules of one lowered package."""
 
     def __init__(self, package: str, files: SourceFiles, places: dict[str, str]) -> None:
         self.package, self.files, self.places = package, files, places
@@ -87,23 +87,23 @@ class LoweredModuleFinder(MetaPathFinder, Loader):
 
 
 def sibling_module(model: type[VariableOwner], path: str) -> Any:
-    """A module of the package of a written-out model, as `runtime.call_sequence`."""
+    """Return a module of the package of a lowered model, such as `runtime.call_sequence`."""
     return import_module(f"{model.__module__.split('.', 1)[0]}.{path}")
 
 
 def scalar_name(thing: Any, name: str) -> str:
-    """What the numerics of a written-out model call one of its states or modes."""
+    """Return the name of a state or mode in the lowered runtime."""
     return next(one for one in (SUFFIXED_NAME.format(name), PLAIN_NAME.format(name)) if hasattr(thing.solver, one))
 
 
 def function_tree(function: FunctionType) -> ast.FunctionDef:
-    """The tree of a function, with the lines of its source: as written out, if it is."""
+    """Return the syntax tree of a function with its source line numbers; lowered functions have lowered trees."""
     if TREE_NAME not in function.__globals__:
-        found = ast.parse(dedent(inspect.getsource(function))).body[0]
-        ast.increment_lineno(found, function.__code__.co_firstlineno - 1)
+        result = ast.parse(dedent(inspect.getsource(function))).body[0]
+        ast.increment_lineno(result, function.__code__.co_firstlineno - 1)
     else:
-        found = function.__globals__[TREE_NAME]
+        result = function.__globals__[TREE_NAME]
         for name in function.__qualname__.split("."):
-            found = next(one for one in reversed(found.body) if getattr(one, "name", "") == name)
-    assert isinstance(found, ast.FunctionDef)
-    return found
+            result = next(one for one in reversed(result.body) if getattr(one, "name", "") == name)
+    assert isinstance(result, ast.FunctionDef)
+    return result

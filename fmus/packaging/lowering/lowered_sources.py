@@ -1,4 +1,4 @@
-"""All the files of the runtime and the file of a model, written out."""
+"""Lowers all files of the runtime and the file of a model."""
 
 from functools import cache
 from pathlib import Path
@@ -14,17 +14,17 @@ from .layout import ModelLayout
 from .source_symbols import SourceSymbols
 
 FMUS_FOLDER = Path(__file__).resolve().parents[2]
-BUILD_TIME_ONLY = ("vectors.py", "method_registry.py")  # never travel
+BUILD_TIME_ONLY = ("vectors.py", "method_registry.py")  # never embedded
 PLAIN_NAME, SUFFIXED_NAME = (
     "{}",
     "its_{}_",
-)  # what the numerics call a state: so where its name means something else to them
+)  # name of a state in the runtime; the second form avoids name clashes
 SourceFiles = dict[str, list[SourceLine]]
 
 
 @cache
 def runtime_sources() -> dict[str, str]:
-    """Path and text of every file of the numerics and of what hosts them."""
+    """Return the text of every embedded runtime file, by path."""
     paths = [
         path
         for path in sorted((FMUS_FOLDER / "runtime").glob("*.py"))
@@ -35,48 +35,46 @@ def runtime_sources() -> dict[str, str]:
 
 @cache
 def runtime_symbols() -> SourceSymbols:
-    """What they say, for any model."""
+    """Return the symbols of the runtime sources."""
     return SourceSymbols(runtime_sources().values())
 
 
-def model_layout(model: Any, offered: FeatureSelection, called: str) -> ModelLayout:
-    """What a model and an offer fix; `called`: as its states, rates and modes are."""
+def model_layout(model: Any, features: FeatureSelection, name_format: str) -> ModelLayout:
+    """Return the layout of a model; `name_format` formats the names of states, rates and modes."""
     flags = {
         flag: getattr(model, flag)
         for flag in ("has_dry_friction", "rests_when_stuck", "is_coupled", "has_driver", "has_input_derivatives")
     }
-    flags["is_linear"] = EXACT in offered.methods
+    flags["is_linear"] = EXACT in features.methods
     states, contacts = (
-        {called.format(name): other and called.format(other) for name, other in pairs.items()}
+        {name_format.format(name): other and name_format.format(other) for name, other in pairs.items()}
         for pairs in (model.states, model.contacts)
     )
-    return ModelLayout(states, contacts, flags, offered.choices, offered.excluded, offered.stepping_methods)
+    return ModelLayout(states, contacts, flags, features.choices, features.excluded, features.stepping_methods)
 
 
 @cache
-def lower_all(source: ModelFile, offered: FeatureSelection) -> SourceFiles:
-    """The lines of every file of the runtime and of the file of a model.
+def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
+    """Lower all runtime files and the file of a model.
 
-    The numbers go by the names of the model, if these mean nothing else in the numerics.
+    Components have the names of the model unless these clash with names of the runtime.
     """
     try:
-        return lower_with_layout(source, model_layout(source.model, offered, PLAIN_NAME))
+        return lower_with_layout(source, model_layout(source.model, features, PLAIN_NAME))
     except BuildError:
-        return lower_with_layout(source, model_layout(source.model, offered, SUFFIXED_NAME))
+        return lower_with_layout(source, model_layout(source.model, features, SUFFIXED_NAME))
 
 
 def lower_with_layout(source: ModelFile, spec: ModelLayout) -> SourceFiles:
-    """The lines with the names of `spec`."""
+    """Lower with the names of a layout."""
     file = f"{source.name}.py"
-    left = {
-        f"runtime/{'linear_closed_form' if label == EXACT else label}.py" for label in spec.excluded
-    }  # methods that are not offered
+    left = {f"runtime/{label}.py" for label in spec.excluded}  # excluded methods
     texts = {path: text for path, text in runtime_sources().items() if path not in left} | {
         file: source.generated_source
     }
     declared = runtime_symbols()
     if name := declared.find_name_clash(spec):
-        raise BuildError(f"The name {name} means something else in the numerics; take another.")
+        raise BuildError(f"The numerics already use the name {name}; take another name.")
     files = {path: SourceEmitter(spec, declared, path, text, path != file).lines for path, text in texts.items()}
     names = {"." + part for variable, _ in variables(source.model()) for part in variable.split(".")}
     files = remove_dead_code(files, file, names)
@@ -84,9 +82,9 @@ def lower_with_layout(source: ModelFile, spec: ModelLayout) -> SourceFiles:
 
 
 def add_origin_line(path: str, lines: list[SourceLine], text: str, spec: ModelLayout) -> list[SourceLine]:
-    """The lines with one on top that names the source, where they differ from it."""
+    """Add a first line that names the source if the file differs from it."""
     if "\n".join(lines) == text:
         return lines
     modes = f"; {', '.join(spec.contacts)}" if spec.contacts else ""
-    origin = f"# Written out for {', '.join(spec.states)}{modes} from fmus/{path} of friction-fmus {__version__}."
+    origin = f"# Generated for {', '.join(spec.states)}{modes} from fmus/{path} of friction-fmus {__version__}."
     return [SourceLine.of(origin, 1), *lines]

@@ -1,4 +1,4 @@
-"""The expressions and simple statements of one function, in scalars."""
+"""Rewrites expressions and simple statements of one function from vectors to scalars."""
 
 import ast
 import re
@@ -14,42 +14,43 @@ from .source_symbols import SourceSymbols, annotated_kind
 ELEMENTWISE = {
     "magnitude": "{0} if {0} > 0.0 else -{0}",
     "elementwise_max": "{0} if {0} > {1} else {1}",
-}  # number by number
-REDUCTIONS = {"max_of": ">", "min_of": "<"}  # one of the numbers
+}  # component by component
+REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
 ALLOCATORS = ("state_vector", "contact_vector")
-LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices")  # what a loop may run over
-METHOD_LOOP = "methods"  # or (label, file, class) of every one
-INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place"}
+LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices")  # iterables of loops
+METHOD_LOOP = "methods"  # iterable of (label, module, class)
+INDEX_LOOKUPS = ("slip", "place")
 
 
 class LoweringError(BuildError):
-    """Source that cannot be written out: the line, what is wrong and what to do instead."""
+    """Raised for source that cannot be lowered: line, problem, and what to write instead."""
 
 
 class Scalarizer(ConstantFolder):
-    """What the names of a function stand for, and its expressions by number."""
+    """Tracks the names of a function and rewrites its expressions component by component."""
 
     def __init__(
         self, spec: ModelLayout, declared: SourceSymbols, path: str, vectors: bool, index: dict[str, int] | None = None
     ) -> None:
         super().__init__(spec, declared.constants)
         self.declared, self.path, self.has_vectors = declared, path, vectors
-        self.vector_kinds: dict[str, str] = {}  # of names that are vectors
-        self.loop_indices = dict(index or {})  # of names that count
-        self.scalar_names: set[str] = set()  # names that are numbers
-        self.component_owner: dict[str, str] = {}  # name of a number of a vector -> the vector
+        self.vector_kinds: dict[str, str] = {}  # vector names -> what they run over
+        self.loop_indices = dict(index or {})  # loop variables -> current value
+        self.scalar_names: set[str] = set()  # names of scalars
+        self.component_owner: dict[str, str] = {}  # name of a component -> its vector
         self.known_zeros: set[str] = set()
         self.systems: dict[str, tuple[str, str]] = {}
-        self.jacobians: set[str] = set()  # names that are a Jacobian
-        self.method_bindings: dict[str, ast.expr] = {}  # of a loop over the methods: name -> what it stands for
+        self.jacobians: set[str] = set()  # names of Jacobians
+        self.method_bindings: dict[str, ast.expr] = {}  # in a loop over methods: loop variable -> value
 
     def error(self, node: ast.AST, why: str) -> LoweringError:
+        """Return a LoweringError with location and source text."""
         return LoweringError(f"{self.path}:{getattr(node, 'lineno', '?')}: '{ast.unparse(node)[:60]}' {why}.")
 
-    # ---- vectors and their numbers
+    # ---- vectors and their components
 
     def vector_kind(self, node: ast.AST) -> str | None:
-        """What an expression runs over; None for a number."""
+        """Return what an expression runs over; None for a scalar."""
         if not self.has_vectors:
             return None
         match node:
@@ -61,47 +62,48 @@ class Scalarizer(ConstantFolder):
                 kinds = self.result_kinds(node)
                 return kinds[0] if len(kinds) == 1 else None
             case ast.BinOp(left=left, right=right) | ast.Compare(left=left, comparators=[right]):
-                found = {self.vector_kind(left), self.vector_kind(right)} - {None}
-                if len(found) > 1:
-                    raise self.error(node, "has a vector of states and one of contacts; loop over contact_indices")
-                return found.pop() if found else None
+                result = {self.vector_kind(left), self.vector_kind(right)} - {None}
+                if len(result) > 1:
+                    raise self.error(node, "mixes a vector of states and one of contacts; loop over contact_indices")
+                return result.pop() if result else None
             case ast.UnaryOp(op=ast.USub(), operand=one):
                 return self.vector_kind(one)
         return None
 
     def is_elementwise(self, node: ast.AST) -> bool:
-        """Whether a call works on vectors number by number."""
+        """Return whether a call works on vectors component by component."""
         names = {*ELEMENTWISE, *self.declared.elementwise, "select_kinematic"}
         return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in names
 
     def result_kinds(self, call: ast.Call) -> list[str | None]:
-        """What a function returns."""
+        """Return the kinds of the results of a call."""
         if self.is_elementwise(call):
             return [self.vector_kind(call.args[0])]
         return self.declared.result_kinds.get(function_name(call), [None])
 
     def all_indices(self, kind: str) -> range:
+        """Return the indices of all components."""
         return range(len(self.spec.component_names(kind)))
 
     def own_indices(self, node: ast.AST, kind: str) -> Sequence[int]:
-        """The places whose numbers are a vector's own: not those rates of f2 that are found in y2."""
+        """Return the indices of components stored in the vector itself; kinematic rates of f2 are stored in y2."""
         name = getattr(node, "attr", getattr(node, "id", ""))
-        beside = self.declared.assigned_attributes if isinstance(node, ast.Attribute) else self.vector_kinds
-        borrows = kind == STATES and re.fullmatch(r"f\d*", name) and "y" + name[1:] in beside
+        stored = self.declared.assigned_attributes if isinstance(node, ast.Attribute) else self.vector_kinds
+        borrows = kind == STATES and re.fullmatch(r"f\d*", name) and "y" + name[1:] in stored
         return self.spec.dynamic_states if borrows else self.all_indices(kind)
 
     def component_name(self, node: ast.AST, vector: str, kind: str, place: int) -> str:
-        """The name of one number of a vector that is a local name."""
+        """Return the local name of a component of a vector."""
         name = self.spec.component_name(vector, kind, place)
         borrowed = vector[0] == "f" and name in self.component_owner and self.component_owner[name] == "y" + vector[1:]
         if not borrowed and self.component_owner.setdefault(name, vector) != vector:
             raise self.error(
-                node, f"has numbers of the same name, {name}, as {self.component_owner[name]}; take another name"
+                node, f"has a component {name}, which is also one of {self.component_owner[name]}; take another name"
             )
         return name
 
     def component(self, node: ast.expr, place: int) -> ast.expr:
-        """One number of a vector; a number as it is."""
+        """Return one component of a vector expression; scalars are rewritten as they are."""
         kind = self.vector_kind(node)
         if kind is None:
             return self.visit(node)
@@ -121,51 +123,51 @@ class Scalarizer(ConstantFolder):
                 return self.component(other if place in self.spec.dynamic_states else moved, place)
             case ast.Call(func=ast.Name(id=name), args=args) if name in ELEMENTWISE:
                 if not all(isinstance(one, (ast.Name, ast.Attribute)) for one in args):
-                    raise self.error(node, "would work something out twice; give what is in the brackets a name")
+                    raise self.error(node, "would evaluate its argument twice; assign the argument to a name first")
                 return parse_expression(
                     ELEMENTWISE[name].format(*(ast.unparse(self.component(one, place)) for one in args))
                 )
             case ast.Call(func=function, args=args) if self.is_elementwise(node):
                 return ast.Call(function, [self.component(one, place) for one in args], [])
             case _:
-                raise self.error(node, "is a vector inside a calculation; give it a name on a line of its own")
+                raise self.error(node, "is a vector inside an expression; assign it to a name on a separate line")
 
     def own_components(self, node: ast.expr) -> list[ast.expr]:
-        """All the numbers of an argument, a target or a result that are its own."""
+        """Return the components stored in an argument, target or result."""
         kind = self.vector_kind(node)
         return [self.component(node, i) for i in self.own_indices(node, kind)] if kind else [self.visit(node)]
 
     def all_components(self, node: ast.expr) -> list[ast.expr]:
-        """All the numbers of a vector, those that it borrows as well."""
+        """Return all components of a vector, including those stored in another one."""
         if not (kind := self.vector_kind(node)):
-            raise self.error(node, "is a number where a vector is wanted")
+            raise self.error(node, "is a scalar where a vector is required")
         return [self.component(node, i) for i in self.all_indices(kind)]
 
-    # ---- what is a number
+    # ---- scalars
 
     def bind_method(self, target: ast.expr, label: str) -> None:
-        """What the names of a loop over the methods, label, file and class, stand for at one of them."""
+        """Bind the loop variables label, module and class to one method."""
         parts = ast.Constant(label), ast.Name(label), parse_expression(f"{label}.{self.spec.methods[label]}")
         assert isinstance(target, ast.Tuple)
         self.method_bindings = {getattr(name, "id", ""): part for name, part in zip(target.elts, parts, strict=True)}
 
     def visit_for_method(self, item: ast.expr, target: ast.expr, label: str) -> ast.expr:
         self.bind_method(target, label)
-        found = self.visit(item)
+        result = self.visit(item)
         self.method_bindings = {}
-        return found
+        return result
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         if node.id in self.method_bindings:
             return self.method_bindings[node.id]
         if self.vector_kinds.get(node.id):
-            raise self.error(node, "is a vector where a number is wanted")
+            raise self.error(node, "is a vector where a scalar is required")
         return ast.Constant(self.loop_indices[node.id]) if node.id in self.loop_indices else node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         match node:
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Name(id=i)) if name in INDEX_LOOKUPS:
-                return ast.Constant(getattr(self.spec, INDEX_LOOKUPS[name])(self.loop_indices[i]))
+                return ast.Constant(getattr(self.spec, name)(self.loop_indices[i]))
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Tuple(elts=[tuple_or_single, column])) if (
                 name in self.jacobians
             ):
@@ -180,10 +182,13 @@ class Scalarizer(ConstantFolder):
         )
 
     def constant_index(self, index: ast.expr) -> int:
-        found = self.visit(index)
-        if not (isinstance(found, ast.Constant) and isinstance(found.value, int)):
-            raise self.error(index, "is an index that is not known; loop over contact_indices or state_indices")
-        return found.value
+        """Evaluate an index that must be known at build time."""
+        result = self.visit(index)
+        if not (isinstance(result, ast.Constant) and isinstance(result.value, int)):
+            raise self.error(
+                index, "is an index that is not known at build time; loop over contact_indices or state_indices"
+            )
+        return result.value
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         node = self.generic_visit(node)
@@ -199,12 +204,12 @@ class Scalarizer(ConstantFolder):
         return ast.Tuple(self.expand_stars(node.elts), node.ctx)
 
     def expand_stars(self, parts: list[ast.expr]) -> list[ast.expr]:
-        """The parts of a row; *y stands for all the numbers of y."""
-        found: list[ast.expr] = []
+        """Rewrite the elements of a row; *y expands to all components of y."""
+        result: list[ast.expr] = []
         for one in parts:
             starred = isinstance(one, ast.Starred) and self.vector_kind(one.value)
-            found += self.all_components(one.value) if isinstance(one, ast.Starred) and starred else [self.visit(one)]
-        return found
+            result += self.all_components(one.value) if isinstance(one, ast.Starred) and starred else [self.visit(one)]
+        return result
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         match node:
@@ -223,10 +228,10 @@ class Scalarizer(ConstantFolder):
                 return ConstantFolder.visit_BoolOp(self, ast.BoolOp(ast.And() if name == "all_of" else ast.Or(), tests))
             case ast.Call(func=ast.Name(id=name), args=[ast.Name() as one]) if name in REDUCTIONS:
                 *terms, text = [ast.unparse(term) for term in self.all_components(one)] or ["inf"]
-                behind = [text]
+                others = [text]
                 for term in reversed(terms):
-                    text = f"{term} if {' and '.join(f'{term} {REDUCTIONS[name]} {one}' for one in behind)} else {text}"
-                    behind.insert(0, term)
+                    text = f"{term} if {' and '.join(f'{term} {REDUCTIONS[name]} {one}' for one in others)} else {text}"
+                    others.insert(0, term)
                 return parse_expression(text)
         function = node.func
         contacts = [one.id for one in node.args if isinstance(one, ast.Name) and one.id in self.loop_indices]
@@ -245,12 +250,12 @@ class Scalarizer(ConstantFolder):
     # ---- simple statements
 
     def lower_statement(self, node: ast.stmt) -> list[ast.stmt]:
-        """What a simple statement becomes."""
+        """Rewrite a simple statement."""
         match node:
             case ast.AnnAssign() if annotated_kind(node):
                 return []
             case ast.AugAssign(target=target) if self.vector_kind(target):
-                raise self.error(node, "writes into a vector, which another name may share; write c = c + ...")
+                raise self.error(node, "modifies a vector in place, which another name may refer to; write c = c + ...")
             case ast.Expr(ast.Call(ast.Name(id="setattr"), [thing, ast.Name(id=name), value])) if (
                 name in self.method_bindings
             ):
@@ -280,7 +285,7 @@ class Scalarizer(ConstantFolder):
         return [self.visit(node)]
 
     def record_kinds(self, targets: Sequence[ast.expr], kinds: Sequence[str | None] = ()) -> None:
-        """What names stand for from here on; numbers, if nothing is said."""
+        """Record the kinds of assigned names; scalars by default."""
         for one, kind in zip(targets, kinds or [None] * len(targets), strict=True):
             if not isinstance(one, ast.Name):
                 continue
@@ -291,13 +296,13 @@ class Scalarizer(ConstantFolder):
                 continue
             if kind == STATES and one.id[0] == "y" and "f" + one.id[1:] in self.vector_kinds:
                 raise self.error(
-                    one, f"changes under f{one.id[1:]}, some of whose rates are read from it; take another name"
+                    one, f"changes under f{one.id[1:]}, which takes some of its rates from it; take another name"
                 )
             if self.vector_kinds.setdefault(one.id, kind) != kind:
                 raise self.error(one, "is another vector elsewhere in the function; take another name")
 
     def lower_assignment(self, node: ast.Assign) -> list[ast.stmt]:
-        """An assignment number by number, one below the other, or side by side where one would disturb the next."""
+        """Rewrite an assignment by component; as one tuple assignment where components depend on each other."""
         value, target = node.value, node.targets[0]
         if len(node.targets) > 1:  # self.c1 = self.c2 = 0.0
             terms = [term for one in node.targets for term in self.own_components(one)]
@@ -345,7 +350,7 @@ class Scalarizer(ConstantFolder):
         return [ast.Assign([to], number) for to, number in pairs]
 
     def lower_unpacking(self, node: ast.Assign, left: list[ast.expr], value: ast.Call) -> list[ast.stmt]:
-        """What a function returns, taken apart."""
+        """Rewrite the unpacking of a function result."""
         kinds = self.result_kinds(value)
         if (
             kinds == [STATES]
@@ -353,15 +358,17 @@ class Scalarizer(ConstantFolder):
             and function_name(value) == "rates"
             and not is_matching_pair(left[0], value.args[1])
         ):
-            raise self.error(node, "must call the rates at y2 f2, and so on: those that are states are read from y2")
+            raise self.error(
+                node, "must assign the rates at y2 to f2 (the same suffix): those that are states are read from y2"
+            )
         if len(kinds) != len(left):
-            kinds = [None] * len(left)  # numbers that are taken one by one
+            kinds = [None] * len(left)  # scalars
         self.record_kinds(left, kinds)
         terms = [term for one in left for term in self.own_components(one)]
         return [ast.Assign([tuple_or_single(terms)], self.visit(value))] if terms else [ast.Expr(self.visit(value))]
 
     def lower_jacobian(self, f_t: str, J: str, call: ast.Call) -> list[ast.stmt]:
-        """f_t, J = model.jacobian(...): for each rate to calculate its derivatives, that by time first."""
+        """Rewrite f_t, J = model.jacobian(...): the derivatives of each dynamic rate, time first."""
         self.vector_kinds[f_t] = STATES
         self.jacobians.add(J)
         own = self.spec.dynamic_states
@@ -374,44 +381,50 @@ class Scalarizer(ConstantFolder):
         ]
         for name in names:
             if self.component_owner.setdefault(name, J) != J:
-                raise self.error(call, f"has a slope of the name {name}, as {self.component_owner[name]} has a number")
+                raise self.error(
+                    call, f"has a Jacobian entry {name}, which is also a component of {self.component_owner[name]}"
+                )
         self.component_owner.update(dict.fromkeys((named[i] for i in own), f_t))
         return [ast.Assign([tuple_or_single([ast.Name(name) for name in names])], self.visit(call))]
 
     def find_name_clash(self) -> str:
-        """A name that is both a number and a number of a vector, if there is one."""
+        """Return a name that is both a scalar and a component of a vector, or ""."""
         return min(self.scalar_names & self.component_owner.keys(), default="")
 
 
 def function_name(call: ast.Call) -> str:
-    """The bare name of a function."""
+    """Return the unqualified name of a called function."""
     return getattr(call.func, "attr", getattr(call.func, "id", ""))
 
 
 def is_matching_pair(rates: ast.expr, states: ast.expr) -> bool:
-    """f2 and y2."""
+    """Return whether the names are f2 and y2, with equal suffixes."""
     f, y = (getattr(one, "attr", getattr(one, "id", "")) for one in (rates, states))
     return f[:1] == "f" and y == "y" + f[1:] and NAMED_VECTOR.fullmatch(y) is not None
 
 
 def parse_expression(text: str) -> ast.expr:
+    """Parse an expression."""
     return ast.parse(text, mode="eval").body
 
 
 def tuple_or_single(terms: list[ast.expr]) -> ast.expr:
+    """Return a tuple, or the only element."""
     return ast.Tuple(terms, ast.Load()) if len(terms) != 1 else terms[0]
 
 
 def names_used(node: ast.AST) -> set[str]:
+    """Return all names in a tree, dotted ones as a whole."""
     return {dotted_name(one) for one in all_nodes(node) if isinstance(one, (ast.Name, ast.Attribute))}
 
 
 def dotted_name(node: ast.expr) -> str:
+    """Return a name or dotted name as text."""
     return node.id if isinstance(node, ast.Name) else ast.unparse(node)
 
 
 def fold_zero(left: ast.expr, op: ast.operator, right: ast.expr) -> ast.expr:
-    """A calculation, shorter where a number is known to be zero."""
+    """Return left op right, simplified where an operand is zero."""
     zero = [isinstance(one, ast.Constant) and one.value == 0.0 for one in (left, right)]
     if isinstance(op, ast.Mult) and any(zero):
         return ast.Constant(0.0)

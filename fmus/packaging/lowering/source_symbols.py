@@ -1,4 +1,4 @@
-"""What all sources say of attributes and results, by name; their constants; functions that take vectors by number."""
+"""Symbols of the runtime sources by name: vector attributes, results, constants, elementwise functions."""
 
 import ast
 from collections.abc import Iterable
@@ -11,15 +11,15 @@ VECTOR_KINDS = {"StateVector": STATES, "RateVector": STATES, "ContactVector": CO
 
 
 class SourceSymbols:
-    """Of the files of the numerics."""
+    """Symbols of all files of the runtime."""
 
     def __init__(self, texts: Iterable[str]) -> None:
         self.vector_attributes: dict[str, str] = {}
         self.assigned_attributes: set[str] = set()
         self.constants: dict[str, Any] = {}
         self.elementwise: set[str] = set()
-        self.module_names: set[str] = set()  # what files call their own: constants, functions, classes
-        self.class_attributes: list[set[str]] = []  # the attributes of each class
+        self.module_names: set[str] = set()  # module-level names: constants, functions, classes
+        self.class_attributes: list[set[str]] = []  # attribute names of each class
         self.result_kinds: dict[str, list[str | None]] = {
             "initial_state": [STATES],
             "rates": [STATES],
@@ -39,7 +39,7 @@ class SourceSymbols:
                 self.read_node(node)
 
     def read_node(self, node: ast.AST) -> None:
-        """What one node says."""
+        """Collect the symbols of one node."""
         match node:
             case ast.AnnAssign(target=ast.Name(id=name)) if kind := annotated_kind(node):
                 self.vector_attributes[name] = kind
@@ -55,18 +55,18 @@ class SourceSymbols:
                     self.elementwise.add(name)
 
     def find_name_clash(self, spec: ModelLayout) -> str:
-        """A name of the model that means something else in the numerics, if there is one."""
-        found = self.module_names & {*spec.states, *spec.states.values(), *spec.contacts}
+        """Return a name of the model that already has another meaning in the runtime, or ""."""
+        clashes = self.module_names & {*spec.states, *spec.states.values(), *spec.contacts}
         for names in self.class_attributes:
             vectors = filter(NAMED_VECTOR.fullmatch, names)
             kinds = [(vector, self.attribute_kind(vector) or STATES) for vector in vectors]
-            found |= names & {
+            clashes |= names & {
                 spec.component_name(v, kind, i) for v, kind in kinds for i in range(len(spec.component_names(kind)))
             }
-        return min(found, default="")
+        return min(clashes, default="")
 
     def read_file(self, node: ast.Module) -> None:
-        """What a file calls its own."""
+        """Collect the module-level names and constants of a file."""
         for statement in node.body:
             if isinstance(statement, (ast.FunctionDef, ast.ClassDef)):
                 self.module_names.add(statement.name)
@@ -83,25 +83,25 @@ class SourceSymbols:
                         self.constants[one.id] = item_label(what) or getattr(what, "value", None)
 
     def attribute_kind(self, name: str) -> str | None:
-        """What an attribute runs over; None for a number."""
+        """Return what an attribute runs over (states or contacts); None for a scalar."""
         stem = NAMED_VECTOR.fullmatch(name)
         return self.vector_attributes.get(name) or ((CONTACTS if stem[1] == "modes" else STATES) if stem else None)
 
 
 def is_self_assignment(node: ast.AST) -> TypeGuard[ast.Attribute]:
-    """Whether this sets an attribute of self."""
+    """Return whether this node sets an attribute of self."""
     return (
         isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and getattr(node.value, "id", "") == "self"
     )
 
 
 def annotated_kind(node: ast.arg | ast.AnnAssign) -> str | None:
-    """What an annotation makes a name run over."""
+    """Return what a name with this annotation runs over."""
     return VECTOR_KINDS.get(node.annotation.id) if isinstance(node.annotation, ast.Name) else None
 
 
 def annotated_results(node: ast.FunctionDef) -> list[str | None]:
-    """What the annotation of a result says, part by part; nothing where no vector is among them."""
+    """Return the kinds in the result annotation; empty if none is a vector."""
     parts = node.returns
     if isinstance(parts, ast.Subscript):
         parts = parts.slice
@@ -111,8 +111,8 @@ def annotated_results(node: ast.FunctionDef) -> list[str | None]:
 
 
 def item_label(node: ast.AST) -> str:
-    """The label of an item of an enumeration, (label, value, sentence); of anything else none."""
+    """Return the label of an enumeration item (label, value, sentence), else ""."""
     match node:
-        case ast.Tuple(elts=[ast.Constant(value=str(found)), _, _]):
-            return found
+        case ast.Tuple(elts=[ast.Constant(value=str(text)), _, _]):
+            return text
     return ""
