@@ -252,7 +252,7 @@ def test_the_build_description_names_the_existing_files(smd):
 
 def test_a_mistake_is_reported_in_one_sentence():
     for arguments, words in (
-        (("--native", "--platform", "amiga"), "There is no platform 'amiga'; known are linux64, win64, darwin64"),
+        (("--native", "--platform", "amiga"), "There is no platform 'amiga'; choose from linux64, win64, darwin64"),
         (("--native", "unheard"), "There is no model 'unheard'"),
     ):
         done = build(*arguments)

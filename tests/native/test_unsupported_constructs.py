@@ -363,7 +363,7 @@ def test_a_property_is_refused():
     def use(self, x, y):
         return self.twice
 
-    with pytest.raises(UnsupportedConstructError, match=r"'self\.twice' is no number and no method of Property"):
+    with pytest.raises(UnsupportedConstructError, match=r"'self\.twice' is neither a number nor a method of Property"):
         CallGraph(Property()).add_model_entry_point("entry", use, FLOAT, FLOAT)
 
 
@@ -384,9 +384,9 @@ OTHER.extra = 1.0
         (owner(a=[1.0, 2]), "Owner.a is [1.0, 2]"),
         (owner(a=(1.0,)), "Owner.a is (1.0,)"),
         (owner(a=math.sin), "Owner.a is <built-in"),
-        (owner(p=SHARED, q=SHARED), "Owner.q is reached in two ways"),
-        (owner(p=Part(), q=OTHER), "Owner.q has other attributes than another Part"),
-        (owner(long=1.0), "Owner.long: long is a word of C"),
+        (owner(p=SHARED, q=SHARED), "Owner.q refers to an object that another attribute owns"),
+        (owner(p=Part(), q=OTHER), "Owner.q has different attributes from another Part"),
+        (owner(long=1.0), "Owner.long: long is a C keyword or macro"),
     ],
     ids=lambda part: part if isinstance(part, str) else "",
 )

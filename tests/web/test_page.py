@@ -94,7 +94,7 @@ def test_no_width_makes_it_scroll_sideways_and_every_control_has_a_name(page, na
     for variable, meaning in parameters(name).items():
         if "." not in variable:
             assert meaning.text in said
-    assert "The mechanism:" in json.dumps(tree)
+    assert "Mechanism:" in json.dumps(tree)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -193,10 +193,10 @@ def test_comparing_two_laws_shows_the_difference_and_the_counters(page):
         "Math.abs(main.columns.x[row] - comparison.columns.x[comparison.grid[i]]))) })()"
     )
     assert 1e-6 < apart < 1e-2
-    rows = page.table("What it costs")
+    rows = page.table("Cost and accuracy")
     assert web_page.number(rows["largest difference in x"][1]) == pytest.approx(apart, rel=1e-2)
-    assert rows["largest error of x against the closed form"][0] == "is the closed form"
-    one, other = (int(cell) for cell in rows["evaluations of the right-hand side"])
+    assert rows["largest error of x against the closed form"][0] == "closed form"
+    one, other = (int(cell) for cell in rows["right-hand side evaluations"])
     assert other > 20 * one
     assert not page.run("document.getElementById('panel-error').hidden")
 
@@ -326,9 +326,9 @@ def test_a_link_stores_the_complete_setup(page):
     page.open(f".model=coulomb&k=100&{wrong}")
     assert page.run("app.state()") | {"values": {"k": 100}, "changes": [], "stop": 4} == page.run("app.state()")
     told = "document.getElementById('status').textContent"
-    page.wait(f"{told}.includes('not known here: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
+    page.wait(f"{told}.includes('unknown settings: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
     page.open(".model=nobody")
-    page.wait(f"{told}.includes('not known here: nobody. coulomb')")
+    page.wait(f"{told}.includes('unknown settings: nobody. coulomb')")
     page.run("Object.defineProperty(navigator, 'clipboard', { value: undefined })")
     page.click("#link")
     page.wait(f"{told}.includes('The link is in the address bar')")
@@ -363,7 +363,10 @@ def test_a_refused_value_shows_the_message_of_the_fmu(page):
 def test_an_invalid_number_is_reported_and_changes_nothing(page):
     page.open(".model=stickslip&m=20")
     field, alert = "document.getElementById('field-m').value", "document.getElementById('alert')"
-    for name, text, sentence in (("m", "", "m takes a number: it stays 20 kg."), (".stop", "-1", "stays 16 s long")):
+    for name, text, sentence in (
+        ("m", "", "m must be a number; it remains 20 kg."),
+        (".stop", "-1", "it remains 16 s"),
+    ):
         page.type_number(name, text)
         assert sentence in page.run(f"{alert}.textContent")
         assert page.run(f"[{field}, app.state().values, app.state().stop]") == ["20", {"m": 20}, 16]

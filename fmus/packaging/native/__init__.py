@@ -1,19 +1,21 @@
-"""From the numerics in Python to an FMU that needs no Python: frozen to C, compiled for every platform.
+"""Translates the numerics from Python to C and compiles them to FMUs that need no Python, for every platform.
 
-    layout.py        the live model object becomes one struct and its initial image
-    kinds.py         what a name may stand for, and how C spells it
-    expressions.py, statements.py    one function of the numerics, specialised to the kinds of its arguments
-    program.py       all functions that the FMI layer reaches, each once
-    tangent.py       a model differentiated along a direction
-    interface.py     the declared variables and the sentences, as C tables
-    numerics.h, text.h               written by hand: Python's arithmetic, Python's numbers as text
-    instance.h, calls.h, fmi2.c, fmi3.c    what an instance is; FMI 2.0 and 3.0, first what they have in common
-    sources.py       the folder sources/ of an FMU, which any tool can compile
-    compiler.py, universal.py        the binaries
-    fmu.py           the file
+    struct_layout.py             the model object as structs with initializers
+    c_types.py                   types of values and their C spelling
+    expressions.py, statements.py    translate one function for given argument types
+    call_graph.py                all functions that the FMI layer reaches
+    entry_points.py              the functions that the FMI layer calls
+    directional_derivative.py    differentiates a model (forward mode)
+    model_header.py              model.h: the generated code, the variables and the messages
+    python_arithmetic.h, text_buffer.h, stderr_output.h    Python's arithmetic, number formatting, messages
+    variable.h, saved_state.h, instance.h, common_functions.h, fmi2.c, fmi3.c    the FMI layer
+    sources.py                   the folder sources/ of an FMU, which any C compiler can build
+    compiler.py, universal_binary.py    the binaries
+    diagnostics.py               error messages for source that cannot be translated
+    fmu.py                       the FMU file
 
-The C does what CPython does, to the last bit: the same operations in the same order, and where Python raises, a
-fault flag ends the function at the same statement.
+The C code does what CPython does, bit for bit: the same operations in the same order. Where Python raises an exception,
+a fault flag ends the function at the same statement.
 """
 
 from .fmu import build

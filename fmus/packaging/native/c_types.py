@@ -1,4 +1,4 @@
-"""What a name may stand for in the numerics, and how C spells it."""
+"""Types of values in the numerics and their C spelling."""
 
 from dataclasses import dataclass
 from math import copysign, inf
@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 @dataclass(frozen=True)
 class Scalar:
-    """A number that lives at run time."""
+    """A number that is known at run time only."""
 
     name: str  # in Python
     c: str
@@ -19,14 +19,14 @@ FLOAT, INT, BOOL = Scalar("float", "double"), Scalar("int", "int64_t"), Scalar("
 
 @dataclass(frozen=True)
 class FloatArray:
-    """A list of floats, of fixed length."""
+    """A list of floats of fixed length."""
 
     length: int
 
 
 @dataclass(frozen=True)
 class ScalarTuple:
-    """The numbers that a function returns together."""
+    """The numbers of a tuple that a function returns; a struct in C."""
 
     parts: tuple[Scalar, ...]
 
@@ -37,7 +37,7 @@ class ScalarTuple:
 
 @dataclass(frozen=True)
 class StructPointer:
-    """An object that the model owns, known by its class; at run time a pointer to its struct."""
+    """An object that the model owns; in C, a pointer to the struct of its class."""
 
     cls: type
 
@@ -48,17 +48,17 @@ class StructPointer:
 
 @dataclass(frozen=True)
 class CompileTimeValue:
-    """Known while compiling: a number, a function, a class, a module."""
+    """A value known during translation: a number, a function, a class or a module."""
 
     value: object
 
 
 @dataclass(frozen=True)
 class BoundMethod:
-    """A function with the object that it is called on."""
+    """A method and the object that it is called on."""
 
     function: FunctionType
-    owner: str  # the pointer, as C text
+    owner: str  # C text of the pointer
     cls: type
 
 
@@ -66,25 +66,25 @@ CType: TypeAlias = Scalar | FloatArray | ScalarTuple | StructPointer | CompileTi
 
 
 def scalar_type_of(value: object) -> Scalar | None:
-    """The kind of a Python number; None for anything else."""
+    """Return the type of a Python number, or None for other values."""
     return {float: FLOAT, int: INT, bool: BOOL}.get(type(value))
 
 
 def c_spelling(ctype: CType | None) -> str:
-    """The C type of a variable or a result."""
+    """Return the C spelling of a type."""
     return (
         "void" if ctype is None else ctype.c if isinstance(ctype, (Scalar, ScalarTuple, StructPointer)) else "double *"
     )
 
 
 def c_declaration(ctype: CType, name: str) -> str:
-    """The declaration of a variable or a parameter."""
+    """Return the declaration of a variable or parameter."""
     c = c_spelling(ctype)
     return f"{c}{name}" if c.endswith("*") else f"{c} {name}"
 
 
 def c_literal(value: object) -> str:
-    """A Python number as C reads it."""
+    """Return a Python number as a C literal."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):

@@ -1,4 +1,4 @@
-"""All the functions that an entry reaches, each specialised to the kinds of its arguments, callees first."""
+"""Functions reachable from the entry points, specialised to the types of their arguments; callees come first."""
 
 from dataclasses import dataclass
 from itertools import count
@@ -11,7 +11,7 @@ from .struct_layout import StructLayout
 
 @dataclass(frozen=True)
 class CFunction:
-    """A C function: its name, its result, whether it leaves all objects as they are, whether it may fault."""
+    """A translated function: C name, result type, whether it has no side effects and whether it can fault."""
 
     name: str
     result: CType | None
@@ -20,28 +20,28 @@ class CFunction:
 
 
 class CallGraph:
-    """The numerics of one live model object, and of what else makes a run."""
+    """The functions of a model object and of the other objects of an instance, as C."""
 
     def __init__(self, model: object, *others: object) -> None:
         self.layout = StructLayout(model, *others)
-        self._functions: dict[tuple[object, ...], CFunction | None] = {}  # None: begun
+        self._functions: dict[tuple[object, ...], CFunction | None] = {}  # None: translation has started
         self._texts: list[str] = []
-        self._groups: dict[str, ScalarTuple] = {}
+        self._tuples: dict[str, ScalarTuple] = {}
         self._names: set[str] = set()
 
     def add_model_entry_point(self, name: str, function: FunctionType, *arg_types: CType) -> CFunction:
-        """A function of the model and of more, to be called from outside by `name`."""
+        """Add an entry point whose first argument is the model, under the given C name."""
         return self.add_entry_point(function, [self.layout.model, *arg_types], name)
 
     def add_entry_point(self, function: FunctionType, arg_types: list[CType], name: str = "") -> CFunction:
-        """A function to be called from outside: each of them has a fault flag, whatever the model."""
+        """Add an entry point. Entry points always have a fault flag."""
         body = FunctionTranslator(self, function, arg_types)
         body.can_fault = True
-        done = self._functions[(function, *arg_types)] = self._add(body, name or self._unique_name(function))
-        return done
+        compiled = self._functions[(function, *arg_types)] = self._add(body, name or self._unique_name(function))
+        return compiled
 
     def specialise(self, function: FunctionType, arg_types: list[CType]) -> CFunction | None:
-        """The C function for a function of the numerics and the kinds of its arguments; None while it is begun."""
+        """Translate a function for given argument types; None means that it is recursive."""
         key = (function, *arg_types)
         if key not in self._functions:
             self._functions[key] = None
@@ -50,7 +50,7 @@ class CallGraph:
 
     def _add(self, body: FunctionTranslator, name: str) -> CFunction:
         if isinstance(body.result, ScalarTuple):
-            self._groups[body.result.c] = body.result
+            self._tuples[body.result.c] = body.result
         self._texts.append(body.text(name))
         return CFunction(name, body.result, body.is_pure, body.can_fault)
 
@@ -65,9 +65,9 @@ class CallGraph:
         return name
 
     def text(self) -> str:
-        """Structs, then functions."""
-        groups = [
+        """Return the C text: structs, then functions."""
+        tuples = [
             f"{c} {{ {' '.join(f'{part.c} _{i};' for i, part in enumerate(ctype.parts))} }};\n"
-            for c, ctype in self._groups.items()
+            for c, ctype in self._tuples.items()
         ]
-        return "\n".join([self.layout.struct_definitions(), *groups, *self._texts])
+        return "\n".join([self.layout.struct_definitions(), *tuples, *self._texts])

@@ -1,14 +1,14 @@
-/* The calls that both versions of FMI have, in the hands of an instance: what each does, said once.
+/* The functions that FMI 2.0 and 3.0 have in common.
  *
- * Who includes this says what FMI(name) and STATE_FUNCTION(before, after) are called, and what a Handle, a Boolean, a Byte, a
- * String and a StateHandle are there.
+ * The including file defines the names FMI(name), STATE_FUNCTION(before, after) and DESERIALIZE_FUNCTION and the types
+ * Handle, Boolean, Byte, String and StateHandle.
  */
 #ifndef COMMON_FUNCTIONS_H
 #define COMMON_FUNCTIONS_H
 
 #include "instance.h"
 
-/* ---- from instantiation to the end */
+/* ---- life cycle */
 
 void FMI(FreeInstance)(Handle instance) { free(instance); }
 
@@ -74,35 +74,36 @@ Status FMI(SetContinuousStates)(Handle instance, const double states[], size_t n
     return STATUS_OK;
 }
 
-/* What is found of the present point, in a row of the model; NaN where there is nothing to calculate with, for a state
- * that the importer's solver only tries may be anything.  No function but of FMI: a call takes half as long. */
-#define DEFINE_VALUES_GETTER(NAME, found, COUNT)                                                                              \
-    Status FMI(Get##NAME)(Handle instance, double values[], size_t n)                                              \
-    {                                                                                                            \
-        REQUIRE_PHASE(instance, IN_ANY_PHASE);                                                                                      \
-        REQUIRE_MODEL_EXCHANGE;                                                                                           \
-        State *state = &self->state;                                                                               \
-        bool fault = false;                                                                                      \
-        if (n != (COUNT)) return refuse(self, WRONG_LENGTH, __func__, "the number of values");                     \
-        if (n && !values) return refuse(self, NULL_POINTER, __func__, "the address of the values");                  \
-        int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);                                     \
-        if (status == OK && !fault) model_exchange_update_##found(&state->model, &fault);                                     \
-        bool is_there = status == OK && !fault;                                                                  \
-        for (size_t i = 0; i < n; i++) values[i] = is_there ? state->model.model_exchange.found[i] : NAN;              \
-        return status == OK || state->run.phase < RUNNING ? STATUS_OK : fail_run(self, status, NAN, NAN);                \
+/* Define a function that reads an array of the model at the current point, NaN if it cannot be calculated: the
+ * importer's solver may try states without finite results. A macro because a helper function doubles the time of a
+ * call. */
+#define DEFINE_VALUES_GETTER(NAME, found, COUNT)                                                          \
+    Status FMI(Get##NAME)(Handle instance, double values[], size_t n)                                     \
+    {                                                                                                     \
+        REQUIRE_PHASE(instance, IN_ANY_PHASE);                                                            \
+        REQUIRE_MODEL_EXCHANGE;                                                                           \
+        State *state = &self->state;                                                                      \
+        bool fault = false;                                                                               \
+        if (n != (COUNT)) return refuse(self, WRONG_LENGTH, __func__, "the number of values");            \
+        if (n && !values) return refuse(self, NULL_POINTER, __func__, "the address of the values");         \
+        int64_t status = model_exchange_prepare(&state->run, &state->model, &fault);                              \
+        if (status == OK && !fault) model_exchange_update_##found(&state->model, &fault);                              \
+        bool is_valid = status == OK && !fault;                                                           \
+        for (size_t i = 0; i < n; i++) values[i] = is_valid ? state->model.model_exchange.found[i] : NAN;       \
+        return status == OK || state->run.phase < RUNNING ? STATUS_OK : fail_run(self, status, NAN, NAN); \
     }
 
 DEFINE_VALUES_GETTER(ContinuousStates, states, STATES)
 DEFINE_VALUES_GETTER(NominalsOfContinuousStates, nominals, STATES)
 DEFINE_VALUES_GETTER(EventIndicators, indicators, INDICATORS)
 
-/* ---- state */
+/* ---- saved states */
 
 Status STATE_FUNCTION(Get, )(Handle instance, StateHandle *state)
 {
     REQUIRE_PHASE(instance, IN_ANY_PHASE);
     REQUIRE_ADDRESS(state);
-    self->state.run.outputs_current = false; /* here and there, outputs are calculated anew */
+    self->state.run.outputs_current = false; /* outputs are calculated again, here and after restoring */
     return store_state(self, &self->state, state, __func__);
 }
 
@@ -151,7 +152,7 @@ Status DESERIALIZE_FUNCTION(Handle instance, const Byte serializedState[], size_
     REQUIRE_ADDRESS(serializedState);
     REQUIRE_ADDRESS(state);
     if (size != sizeof(SavedState)) return refuse_state(self);
-    SavedState *saved = malloc(sizeof *saved); /* for bytes may lie where a state cannot */
+    SavedState *saved = malloc(sizeof *saved); /* a copy, because the bytes may be misaligned */
     if (!saved) return refuse(self, NO_MEMORY, __func__, "");
     memcpy(saved, serializedState, size);
     const State *own = matching_state(self, saved);
@@ -160,12 +161,12 @@ Status DESERIALIZE_FUNCTION(Handle instance, const Byte serializedState[], size_
     return status;
 }
 
-/* ---- what no FMU of ours offers, as its description says */
+/* ---- functions that the FMU does not support, according to its model description */
 
 #define DEFINE_NOT_OFFERED(NAME, ...)                   \
-    Status FMI(NAME)(__VA_ARGS__)                     \
-    {                                                 \
-        REQUIRE_PHASE(instance, IN_ANY_PHASE);                           \
+    Status FMI(NAME)(__VA_ARGS__)                       \
+    {                                                   \
+        REQUIRE_PHASE(instance, IN_ANY_PHASE);          \
         return refuse(self, NOT_SUPPORTED, __func__, ""); \
     }
 

@@ -1,4 +1,4 @@
-"""The binaries of a native FMU, for every platform on any machine, by the compiler in the package ziglang."""
+"""Compiles the binaries of native FMUs with the package ziglang, which cross-compiles for every platform."""
 
 import math
 import os
@@ -13,25 +13,33 @@ from .. import BuildError
 from .expressions import MAY_RAISE, NEVER_RAISING
 from .universal_binary import make_universal_binary
 
-# One rounding for each operation, and every function of libm from the machine that runs the FMU: the compiler would
-# replace those of constants by values that are right in one more digit, and not the same.
-INTRINSICS = {math.fabs, math.copysign, math.sqrt}  # instructions of the processor, and exact
+# Round after every operation, and call libm at run time: for constant arguments the compiler would insert its own
+# results, which can differ in the last digit.
+INTRINSICS = {math.fabs, math.copysign, math.sqrt}  # processor instructions with exact results
 LIBM = [function.__name__ for function in (*NEVER_RAISING, *MAY_RAISE) if function not in INTRINSICS]
 BIT_EXACT = ("-O2", "-ffp-contract=off", *(f"-fno-builtin-{name}" for name in LIBM))
-UNUSED_WARNINGS_OFF = (
-    "-Wno-unused-parameter",
-    "-Wno-unused-but-set-variable",
-)  # by a branch of the numerics that is not needed
-FMI_HEADER_WARNINGS_OFF = ("-Wno-strict-prototypes",)  # in the headers of FMI 3.0
+# Folded branches leave unused names behind.
+UNUSED_WARNINGS_OFF = ("-Wno-unused-parameter", "-Wno-unused-but-set-variable")
+FMI_HEADER_WARNINGS_OFF = ("-Wno-strict-prototypes",)  # the headers of FMI 3.0 declare functions without prototypes
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *UNUSED_WARNINGS_OFF, *FMI_HEADER_WARNINGS_OFF)
-# Of libraries those that are named alone: the compiler's own, which nothing of ours calls, takes it longer than ours.
+# Link only the libraries named explicitly: building the compiler's runtime takes longer than building the FMU.
 SHARED_LIBRARY = ("-shared", "-fPIC", "-fvisibility=hidden", "-nostdlib", "-Wl,-z,defs")
 
 
 @dataclass(frozen=True)
 class Platform:
-    """The suffix of its libraries; for each processor that it serves the folder of FMI 3.0 (of FMI 2.0 there is one for
-    all, under our name), and the compiler's name; options and sources of its own."""
+    """A platform that FMUs are built for.
+
+    Parameters
+    ----------
+    suffix
+        Suffix of shared libraries.
+    targets
+        Compiler target of each processor, by the folder of binaries/ in FMI 3.0. In FMI 2.0 there is one folder per
+        platform.
+    options, sources
+        Additional linker options and C sources.
+    """
 
     suffix: str
     targets: dict[str, str]
@@ -39,7 +47,7 @@ class Platform:
     sources: tuple[str, ...] = ()
 
 
-# The C runtime of Windows 10 and later as it is, and the headers that the compiler has for it.
+# Windows 10 and later: link the Universal C Runtime directly, with the headers from the compiler package.
 UCRT = (
     *("-isystem", "{compiler}/lib/libc/include/any-windows-any", "-D__USE_MINGW_ANSI_STDIO=0"),
     *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("convert", "heap", "math", "private", "stdio", "string")),
@@ -59,36 +67,41 @@ DEFAULT_PLATFORMS = ("linux64", "win64", "darwin64")
 
 
 def compile_binaries(name: str, files: Mapping[str, str], main: str, platform: str, fmi: str) -> dict[str, bytes]:
-    """Path and content of what is in binaries/ of the FMU `name` for a platform, in a version of FMI."""
-    suffix, slices = PLATFORMS[platform].suffix, compile_libraries(name, files, main, platform)
+    """Compile an FMU for a platform. Returns paths in the FMU, below binaries/, and contents."""
+    suffix, libraries = PLATFORMS[platform].suffix, compile_libraries(name, files, main, platform)
     if fmi == "2":
-        whole = make_universal_binary(list(slices.values())) if len(slices) > 1 else next(iter(slices.values()))
-        slices = {platform: whole}
-    return {f"binaries/{folder}/{name}{suffix}": content for folder, content in slices.items()}
+        combined = (
+            make_universal_binary(list(libraries.values())) if len(libraries) > 1 else next(iter(libraries.values()))
+        )
+        libraries = {platform: combined}
+    return {f"binaries/{folder}/{name}{suffix}": content for folder, content in libraries.items()}
 
 
 def compile_libraries(name: str, files: Mapping[str, str], main: str, platform: str) -> dict[str, bytes]:
-    """The libraries from the source `main`, which depend on nothing else, by the folders of FMI 3.0."""
+    """Compile the source `main` for the processors of a platform. Returns libraries by folder of FMI 3.0."""
     chosen, out = PLATFORMS[platform], f"{name}{PLATFORMS[platform].suffix}"
     own = {source: Path(__file__).with_name(source).read_text(encoding="utf-8") for source in chosen.sources}
     options = (*SHARED_LIBRARY, *own, *chosen.options)
     return {
-        place: compile_and_link({**files, **own}, main, target, out, options)
-        for place, target in chosen.targets.items()
+        folder: compile_and_link({**files, **own}, main, target, out, options)
+        for folder, target in chosen.targets.items()
     }
 
 
 def find_compiler() -> Path:
-    """The folder of the package ziglang."""
-    found = find_spec("ziglang")
-    if found is None or not found.submodule_search_locations:
-        raise BuildError("Native FMUs need the compiler in the package ziglang: try pip install -e '.[native]'.")
-    return Path(found.submodule_search_locations[0])
+    """Return the folder of the package ziglang; raise BuildError if it is not installed."""
+    spec = find_spec("ziglang")
+    if spec is None or not spec.submodule_search_locations:
+        raise BuildError("Native FMUs need the C compiler in the package ziglang: pip install -e '.[native]'.")
+    return Path(spec.submodule_search_locations[0])
 
 
 def compile_and_link(files: Mapping[str, str], main: str, target: str, out: str, options: Iterable[str]) -> bytes:
-    """What the compiler makes of the source `main` for a target; `out` is a name without a folder, so that none gets
-    in, and an option may name the compiler's folder."""
+    """Compile and link the source `main` for a target; return the library.
+
+    `out` is a file name without a folder, so that no path of this machine gets into the library. Options may contain
+    {name} and {compiler}, the folder of the compiler.
+    """
     package = find_compiler()
     options = [option.format(name=Path(out).stem, compiler=package) for option in options]
     with TemporaryDirectory() as folder:
@@ -96,9 +109,10 @@ def compile_and_link(files: Mapping[str, str], main: str, target: str, out: str,
             (Path(folder) / file).write_text(text, encoding="utf-8", newline="\n")
         command = [str(package / "zig"), "cc", "-target", target, *STRICT, *BIT_EXACT, *options, "-s"]
         command += [main, "-o", out]
-        # It keeps a store at home, which services have not; what it makes of ours stays out, or the store would grow.
-        stores = {"HOME": gettempdir(), "ZIG_LOCAL_CACHE_DIR": f"{folder}/store"} | os.environ
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=stores)
-        if done.returncode:
-            raise BuildError(f"{out} does not compile for {target}:\n{done.stderr.strip()}")
+        # The compiler caches its own parts in the home directory, which a service may not have. Objects of FMUs go to
+        # the temporary folder, so that the cache does not grow.
+        caches = {"HOME": gettempdir(), "ZIG_LOCAL_CACHE_DIR": f"{folder}/cache"} | os.environ
+        completed = subprocess.run(command, cwd=folder, capture_output=True, text=True, env=caches)
+        if completed.returncode:
+            raise BuildError(f"{out} does not compile for {target}:\n{completed.stderr.strip()}")
         return (Path(folder) / out).read_bytes()

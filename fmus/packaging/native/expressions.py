@@ -1,7 +1,7 @@
-"""One expression of the numerics as C text, with the kind that Python would give it.
+"""Translates a Python expression of the numerics to C and infers its type.
 
-What is known while compiling is calculated by Python itself, here.  A call with effects is taken out of its
-expression and put on a line before it, which is refused where that would change what Python does.
+Constant subexpressions are evaluated here, by Python. A call with side effects moves to a line of its own before the
+statement; if that changed the order of evaluation, the translation fails.
 """
 
 import ast
@@ -36,10 +36,10 @@ from .diagnostics import UnsupportedConstructError, unsupported
 if TYPE_CHECKING:
     from .call_graph import CallGraph
 
-# How tightly C binds; arithmetic binds in the same order in Python.
+# Operator precedence of C, lowest first. For arithmetic, Python's is the same.
 CONDITIONAL, OR, AND, EQUALITY, RELATIONAL, ADDITIVE, MULTIPLICATIVE, UNARY, PRIMARY = range(9)
 
-NEVER_RAISING = (math.fabs, math.copysign, math.atan, math.atan2, math.tanh)  # those that never raise
+NEVER_RAISING = (math.fabs, math.copysign, math.atan, math.atan2, math.tanh)  # functions that raise no exception
 MAY_RAISE = (
     *(math.sqrt, math.sin, math.cos, math.tan, math.asin, math.acos, math.sinh, math.cosh),
     *(math.exp, math.expm1, math.log, math.log1p, math.pow, math.fmod),
@@ -61,48 +61,50 @@ COMPARISONS: dict[type, tuple[str, int]] = {
 }
 
 FAULT_CHECK = "if (*fault) {leave}"
+# Literals and local constants: evaluating them later gives the same value.
 STABLE_TEXT = re.compile(r"-?\d[\w.+-]*|-?INFINITY|NAN|true|false|_\d+")
 
 
 @dataclass(frozen=True)
 class CExpression:
-    """The kind of an expression, its C text, and how tightly that binds."""
+    """An expression: its type, its C text and the precedence of its outermost operator."""
 
     ctype: CType
     text: str = ""
     precedence: int = PRIMARY
 
     def as_operand(self, precedence: int) -> str:
-        """The text as an operand of an operator of that level."""
+        """Return the text, in parentheses if it is an operand of an operator of higher precedence."""
         return self.text if self.precedence >= precedence else f"({self.text})"
 
 
 class ExpressionTranslator(ast.NodeVisitor):
-    """Expressions in the body of one function."""
+    """Translator for the expressions of one function."""
 
     def __init__(self, call_graph: "CallGraph", function: FunctionType) -> None:
         self.call_graph, self.function = call_graph, function
         self.local_types: dict[str, CType] = {}
-        self.assigned_names: set[str] = set()  # the names that have a value here, whatever way led here
+        self.assigned_names: set[str] = set()  # names that are assigned on every path to this statement
         self.lines: list[str] = []
         self.depth = 1
         self.temporaries = count(1)
         self.is_pure = True
-        self.can_fault = False  # somewhere in the function
-        # of the statement at hand:
-        self.may_fault = False  # something in it may fault
-        self.effects_allowed = True  # nothing so far that a call with effects could change or precede
-        self.conditional_depth = 0  # depth of parts that are evaluated only sometimes
-        self.statement_call: ast.AST | None = None  # a call that needs no line of its own
+        self.can_fault = False  # anywhere in the function
+        # State of the current statement:
+        self.may_fault = False  # part of it can fault, and no check has been emitted since
+        self.effects_allowed = True  # nothing evaluated so far can be changed by a call, or fault
+        self.conditional_depth = 0  # nesting depth of operands that are evaluated conditionally
+        self.statement_call: ast.AST | None = None  # a call that is the whole right-hand side
 
     def unsupported(self, node: ast.AST, why: str, instead: str) -> UnsupportedConstructError:
+        """Return the error for a node of this function."""
         return unsupported(self.function, node, why, instead)
 
     def generic_visit(self, node: ast.AST) -> NoReturn:
-        raise self.unsupported(node, "is outside the subset", "write it with numbers, attributes, calls and if")
+        raise self.unsupported(node, "cannot be translated to C", "use numbers, attributes, calls and if")
 
     def fault_argument(self) -> str:
-        """The argument by which a helper or a function can raise the fault flag."""
+        """Return the argument for the fault flag, and note that the statement can fault."""
         self.may_fault = self.can_fault = True
         self.effects_allowed = False
         return "fault"
@@ -113,27 +115,27 @@ class ExpressionTranslator(ast.NodeVisitor):
         self.lines.append("    " * self.depth + line)
 
     def emit_temporary(self, ctype: CType, text: str) -> str:
-        """Keep a value on a line of its own."""
+        """Store a value in a new local constant."""
         name = f"_{next(self.temporaries)}"
         self.emit(f"const {c_declaration(ctype, name)} = {text};")
         return name
 
     def in_local(self, value: CExpression) -> CExpression:
-        """The same value, in a name of its own unless it is a number or has one."""
+        """Store a value in a local, unless it is a literal or a local already."""
         if STABLE_TEXT.fullmatch(value.text):
             return value
         return CExpression(value.ctype, self.emit_temporary(value.ctype, value.text))
 
     def emit_fault_check(self) -> None:
-        """Leave the function if the line before has raised the fault flag."""
+        """Return from the function if the previous line has set the fault flag."""
         if self.may_fault:
             self.emit(FAULT_CHECK)
         self.may_fault = False
 
-    # ---- numbers and truth
+    # ---- numbers and conditions
 
     def run_time_number(self, node: ast.expr) -> CExpression:
-        """An expression that must be a number at run time."""
+        """Translate an expression that must be a number."""
         return self.to_run_time(node, self.visit(node))
 
     def to_run_time(self, node: ast.AST, value: CExpression) -> CExpression:
@@ -142,20 +144,20 @@ class ExpressionTranslator(ast.NodeVisitor):
             text = c_literal(ctype.value)
             return CExpression(scalar, text, UNARY if text.startswith("-") else PRIMARY)
         if not isinstance(ctype, Scalar):
-            raise self.unsupported(node, "is no number", "use a float, an int or a bool")
+            raise self.unsupported(node, "is not a number", "use a float, an int or a bool")
         return value
 
     def arithmetic_operand(self, node: ast.expr, value: CExpression) -> CExpression:
         value = self.to_run_time(node, value)
         if value.ctype is BOOL:
-            raise self.unsupported(node, "is a bool in a calculation", "write 1 if ... else 0")
+            raise self.unsupported(node, "is a bool in arithmetic", "write 1 if ... else 0")
         return value
 
     def boolean(self, node: ast.expr) -> CExpression:
-        """An expression that must be a bool; what a model fixes has been settled when it was written out."""
+        """Translate an expression that must be a bool. Conditions on model constants were folded before."""
         value = self.run_time_number(node)
         if value.ctype is not BOOL:
-            raise self.unsupported(node, "is used as a truth value", "compare it")
+            raise self.unsupported(node, "is used as a condition but is not a bool", "compare it")
         return value
 
     # ---- names
@@ -166,51 +168,51 @@ class ExpressionTranslator(ast.NodeVisitor):
     def visit_Name(self, node: ast.Name) -> CExpression:
         if node.id in self.local_types:
             if node.id not in self.assigned_names:
-                raise self.unsupported(node, "may have no value here", "assign it on every way to this line")
+                raise self.unsupported(node, "may be unassigned here", "assign it on every path to this line")
             return CExpression(self.local_types[node.id], node.id)
         for names in (self.function.__globals__, vars(builtins)):
             if node.id in names:
                 return CExpression(CompileTimeValue(names[node.id]))
-        raise self.unsupported(node, "is unknown", "assign it before")
+        raise self.unsupported(node, "is undefined", "assign it first")
 
     def visit_Attribute(self, node: ast.Attribute) -> CExpression:
         owner = self.visit(node.value)
         if isinstance(owner.ctype, CompileTimeValue):
             if not hasattr(owner.ctype.value, node.attr):
-                raise self.unsupported(node, "does not exist", "look for a slip of the pen")
+                raise self.unsupported(node, "does not exist", "check the spelling")
             return CExpression(CompileTimeValue(getattr(owner.ctype.value, node.attr)))
         if not isinstance(owner.ctype, StructPointer):
             raise self.unsupported(node, "is an attribute of a number", "use the number itself")
         cls = owner.ctype.cls
-        place = f"{owner.text[1:]}.{node.attr}" if owner.text.startswith("&") else f"{owner.text}->{node.attr}"
+        lvalue = f"{owner.text[1:]}.{node.attr}" if owner.text.startswith("&") else f"{owner.text}->{node.attr}"
         field = self.call_graph.layout.fields[cls].get(node.attr)
         if isinstance(field, StructPointer):
-            return CExpression(field, "&" + place, UNARY)
+            return CExpression(field, "&" + lvalue, UNARY)
         if field:
             self.effects_allowed = False
-            return CExpression(field, place)
-        found = inspect.getattr_static(cls, node.attr, None)
-        if isinstance(found, FunctionType):
-            return CExpression(BoundMethod(found, owner.text, cls))
-        if scalar_type_of(found):
-            return CExpression(CompileTimeValue(found))
-        raise self.unsupported(node, f"is no number and no method of {cls.__name__}", "set it in __init__")
+            return CExpression(field, lvalue)
+        attribute = inspect.getattr_static(cls, node.attr, None)
+        if isinstance(attribute, FunctionType):
+            return CExpression(BoundMethod(attribute, owner.text, cls))
+        if scalar_type_of(attribute):
+            return CExpression(CompileTimeValue(attribute))
+        raise self.unsupported(node, f"is neither a number nor a method of {cls.__name__}", "set it in __init__")
 
     def visit_Subscript(self, node: ast.Subscript) -> CExpression:
         row, index = self.visit(node.value), self.visit(node.slice)
         if not isinstance(row.ctype, FloatArray):
-            raise self.unsupported(node, "is no element of a list of floats", "make the list in __init__")
+            raise self.unsupported(node, "is not an element of a list of floats", "create the list in __init__")
         if isinstance(index.ctype, CompileTimeValue):
             if not (isinstance(index.ctype.value, int) and -row.ctype.length <= index.ctype.value < row.ctype.length):
-                raise self.unsupported(node, f"is outside the list of {row.ctype.length}", "use an index inside")
+                raise self.unsupported(node, f"is out of range for a list of {row.ctype.length}", "use a valid index")
             return CExpression(FLOAT, f"{row.text}[{index.ctype.value % row.ctype.length}]")
         if index.ctype is not INT:
-            raise self.unsupported(node, "has an index that is no int", "use an int")
-        place = f"py_index({index.text}, {row.ctype.length}, {self.fault_argument()})"
+            raise self.unsupported(node, "has an index that is not an int", "use an int")
+        index_text = f"py_index({index.text}, {row.ctype.length}, {self.fault_argument()})"
         if not self.conditional_depth:
-            place = self.emit_temporary(INT, place)
+            index_text = self.emit_temporary(INT, index_text)
             self.emit_fault_check()
-        return CExpression(FLOAT, f"{row.text}[{place}]")
+        return CExpression(FLOAT, f"{row.text}[{index_text}]")
 
     # ---- operators
 
@@ -222,7 +224,7 @@ class ExpressionTranslator(ast.NodeVisitor):
             known: Any = value.ctype.value
             return CExpression(CompileTimeValue(-known if isinstance(node.op, ast.USub) else known))
         if not isinstance(node.op, ast.USub):
-            raise self.unsupported(node, "is outside the subset", "leave the operator out")
+            raise self.unsupported(node, "has an operator that cannot be translated to C", "remove the operator")
         return CExpression(self.arithmetic_operand(node.operand, value).ctype, "-" + value.as_operand(PRIMARY), UNARY)
 
     def visit_BinOp(self, node: ast.BinOp) -> CExpression:
@@ -245,31 +247,35 @@ class ExpressionTranslator(ast.NodeVisitor):
                 ctype, f"{left.as_operand(precedence)} {sign} {right.as_operand(precedence + 1)}", precedence
             )
         if ctype is INT:
-            raise self.unsupported(node, "calculates with two ints", "make one of them a float")
+            raise self.unsupported(node, "has two int operands", "make one of them a float")
         if operation is ast.Div and divisor:
             return CExpression(FLOAT, f"{left.as_operand(MULTIPLICATIVE)} / {right.as_operand(UNARY)}", MULTIPLICATIVE)
         if operation is ast.Div:
             return CExpression(FLOAT, f"py_divide({left.text}, {right.text}, {self.fault_argument()})")
         if operation is ast.Pow:
             return CExpression(FLOAT, f"py_pow({left.text}, {right.text}, {self.fault_argument()})")
-        raise self.unsupported(node, "has an operator outside the subset", "use + - * / or **")
+        raise self.unsupported(node, "has an operator that cannot be translated to C", "use + - * / or **")
 
     def fold(self, node: ast.AST, function: Callable[..., Any], *values: object) -> object:
-        """What Python calculates from known numbers."""
+        """Evaluate an operation on constants in Python."""
         if not all(scalar_type_of(value) for value in values):
-            raise self.unsupported(node, "calculates with what is no number", "use floats and ints")
+            raise self.unsupported(node, "has an operand that is not a number", "use floats and ints")
         try:
             return function(*values)
         except (ArithmeticError, ValueError) as error:
-            raise self.unsupported(node, f"fails: {error}", "change the constants") from error
+            raise self.unsupported(node, f"raises an exception: {error}", "change the constants") from error
 
     def visit_Compare(self, node: ast.Compare) -> CExpression:
         nodes = [node.left, *node.comparators]
         if any(type(op) not in COMPARISONS for op in node.ops):
-            raise self.unsupported(node, "has an operator outside the subset", "compare numbers with < <= > >= == !=")
+            raise self.unsupported(
+                node, "has an operator that cannot be translated to C", "compare numbers with < <= > >= == !="
+            )
         for middle in nodes[1:-1]:
             if any(isinstance(part, ast.Call) for part in ast.walk(middle)):
-                raise self.unsupported(node, "has a call in the middle", "give the call a line of its own")
+                raise self.unsupported(
+                    node, "has a call in the middle of a chained comparison", "call the function on a separate line"
+                )
         values = [
             self.run_time_number(nodes[0]),
             self.run_time_number(nodes[1]),
@@ -285,7 +291,7 @@ class ExpressionTranslator(ast.NodeVisitor):
     def visit_conditional(
         self, visit: Callable[[ast.expr], CExpression], nodes: Sequence[ast.expr]
     ) -> list[CExpression]:
-        """Expressions that are evaluated only sometimes."""
+        """Translate operands that are evaluated conditionally."""
         self.conditional_depth += 1
         values = [visit(node) for node in nodes]
         self.conditional_depth -= 1
@@ -300,7 +306,7 @@ class ExpressionTranslator(ast.NodeVisitor):
         test = self.boolean(node.test)
         yes, no = self.visit_conditional(self.run_time_number, (node.body, node.orelse))
         if yes.ctype != no.ctype:
-            raise self.unsupported(node, "has values of two kinds", "make both a float, or both an int")
+            raise self.unsupported(node, "has branches of different types", "make both a float or both an int")
         return CExpression(
             yes.ctype, f"{test.as_operand(OR)} ? {yes.as_operand(OR)} : {no.as_operand(CONDITIONAL)}", CONDITIONAL
         )
@@ -310,7 +316,7 @@ class ExpressionTranslator(ast.NodeVisitor):
     def visit_Call(self, node: ast.Call) -> CExpression:
         effects_allowed = self.effects_allowed
         if node.keywords or any(isinstance(argument, ast.Starred) for argument in node.args):
-            raise self.unsupported(node, "has arguments by name", "give them by position")
+            raise self.unsupported(node, "has keyword or starred arguments", "pass them by position")
         called = self.super_method(node) or self.visit(node.func).ctype
         values = [self.visit(argument) for argument in node.args]
         if isinstance(called, BoundMethod):
@@ -321,10 +327,10 @@ class ExpressionTranslator(ast.NodeVisitor):
             return self.translate_call(node, called.value, values, effects_allowed)
         if isinstance(called, CompileTimeValue) and isinstance(called.value, (BuiltinFunctionType, type)):
             return self.translate_builtin(node, called.value, values)
-        raise self.unsupported(node, "calls what is no function", "call a function of the numerics or of math")
+        raise self.unsupported(node, "does not call a function", "call a function of the numerics or of math")
 
     def super_method(self, node: ast.Call) -> BoundMethod | None:
-        """The method that super().name stands for."""
+        """Find the method that super().name refers to."""
         match node.func:
             case ast.Attribute(value=ast.Call(func=ast.Name(id="super"), args=[]), attr=name):
                 ctype = self.local_types["self"]
@@ -334,17 +340,17 @@ class ExpressionTranslator(ast.NodeVisitor):
                 for cls in lineage[lineage.index(home) + 1 :]:
                     if name in vars(cls):
                         return BoundMethod(vars(cls)[name], "self", ctype.cls)
-                raise self.unsupported(node, "has no such method above", "look for a slip of the pen")
+                raise self.unsupported(node, "does not exist in a base class", "check the spelling")
         return None
 
     def translate_call(
         self, node: ast.Call, function: FunctionType, values: list[CExpression], effects_allowed: bool
     ) -> CExpression:
-        """A call of a function of the numerics, specialised to the kinds of its arguments."""
+        """Translate a call of a function of the numerics, specialised to the types of its arguments."""
         count = function.__code__.co_argcount
         if len(values) != count or function.__code__.co_kwonlyargcount or function.__defaults__:
             raise self.unsupported(
-                node, f"gives {len(values)} arguments to a function of {count}", "give every argument"
+                node, f"passes {len(values)} arguments to a function of {count}", "pass every argument"
             )
         given = [
             self.to_run_time(node, value)
@@ -353,11 +359,13 @@ class ExpressionTranslator(ast.NodeVisitor):
             for value in values
         ]
         if not all(isinstance(value.ctype, (Scalar, StructPointer, CompileTimeValue)) for value in given):
-            raise self.unsupported(node, "passes several numbers as one", "pass each, or the object that owns them")
+            raise self.unsupported(
+                node, "passes a tuple or list as one argument", "pass each number, or the object that owns them"
+            )
         compiled = self.call_graph.specialise(function, [value.ctype for value in given])
         if compiled is None:
-            raise self.unsupported(node, "calls a function that is still running", "write a loop")
-        if self.may_fault and not compiled.is_pure:  # a fault in the arguments keeps the call from having effects
+            raise self.unsupported(node, "is recursive", "write a loop")
+        if self.may_fault and not compiled.is_pure:  # after a fault in the arguments, the call must not have effects
             given = [self.in_local(value) if isinstance(value.ctype, Scalar) else value for value in given]
             self.emit_fault_check()
         texts = [value.text for value in given if not isinstance(value.ctype, CompileTimeValue)]
@@ -370,7 +378,7 @@ class ExpressionTranslator(ast.NodeVisitor):
             if self.statement_call is not node:
                 if self.conditional_depth or not effects_allowed:
                     raise self.unsupported(
-                        node, "has effects in the middle of an expression", "give the call a line of its own"
+                        node, "has side effects within an expression", "call the function on a separate line"
                     )
                 if compiled.result:
                     text = self.emit_temporary(compiled.result, text)
@@ -379,20 +387,24 @@ class ExpressionTranslator(ast.NodeVisitor):
         return CExpression(compiled.result or CompileTimeValue(None), text)
 
     def translate_builtin(self, node: ast.Call, function: Callable[..., Any], values: list[CExpression]) -> CExpression:
-        """A function of math, or one of the few built-in ones."""
+        """Translate a call of a function of math or one of the supported built-in functions."""
         allowed = (*NEVER_RAISING, *MAY_RAISE, *PREDICATES, abs, min, max, float)
         if function not in allowed:
-            raise self.unsupported(node, "is no call of the subset", "use abs, min, max, float or one of C in math")
+            raise self.unsupported(
+                node,
+                "calls a function that cannot be translated to C",
+                "use abs, min, max, float or a function of math that C has",
+            )
         if function in (min, max):
             if len(values) < 2:
-                raise self.unsupported(node, "needs numbers to choose from", "give two or more")
+                raise self.unsupported(node, "has a single argument", "pass two or more numbers")
         elif len(values) != ARGUMENT_COUNTS.get(function, 1):
-            raise self.unsupported(node, "has the wrong number of arguments", "look into the documentation of math")
+            raise self.unsupported(node, "has the wrong number of arguments", "see the documentation of math")
         values = [self.arithmetic_operand(argument, value) for argument, value in zip(node.args, values, strict=True)]
         texts = ", ".join(value.text for value in values)
         if function in (min, max, abs):
             if {value.ctype for value in values} != {FLOAT}:
-                raise self.unsupported(node, "takes floats only here", "write a conditional")
+                raise self.unsupported(node, "has an argument that is not a float", "write a conditional expression")
             name = {min: "py_min", max: "py_max", abs: "fabs"}[function]
             text = values[0].text
             for value in values[1:]:
@@ -408,6 +420,6 @@ class ExpressionTranslator(ast.NodeVisitor):
 
 
 def make_tuple(values: Sequence[CExpression]) -> CExpression:
-    """Several numbers together."""
+    """Combine several numbers in a struct."""
     ctype = ScalarTuple(tuple(value.ctype for value in values if isinstance(value.ctype, Scalar)))
     return CExpression(ctype, f"({ctype.c}){{{', '.join(value.text for value in values)}}}")

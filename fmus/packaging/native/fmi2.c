@@ -1,5 +1,6 @@
-/* FMI 2.0, co-simulation and model exchange, of the model in model.h: common_functions.h and instance.h say what a call does. */
-#define _POSIX_C_SOURCE 200809L /* beside C99: signal masks */
+/* The FMI 2.0 interface of the model in model.h, for co-simulation and model exchange. The functions that both versions
+ * of FMI share are in common_functions.h, their implementation is in instance.h. */
+#define _POSIX_C_SOURCE 200809L /* for signal masks, which C99 does not have */
 
 #include "fmi2Functions.h"
 
@@ -19,19 +20,19 @@ typedef fmi2FMUstate StateHandle;
 
 static const FmiType REAL = {"Real", true}, INTEGER = {"Integer", false};
 
-/* The message is taken for a printf format. */
-static void log_to_host(const Host *host, const char *name, const char *sentence)
+/* The logger interprets the message as a printf format, so escape percent signs. */
+static void log_to_host(const Host *host, const char *name, const char *message)
 {
     TextBuffer format = {0};
     if (!host->logger) return;
-    for (const char *c = sentence; *c; c++) {
-        char piece[3] = {*c, *c == '%' ? '%' : '\0', '\0'};
-        append(&format, piece);
+    for (const char *c = message; *c; c++) {
+        char escaped[3] = {*c, *c == '%' ? '%' : '\0', '\0'};
+        append(&format, escaped);
     }
     host->logger(host->componentEnvironment, name, fmi2Error, "logStatusError", format.buffer);
 }
 
-/* ---- from instantiation to the end */
+/* ---- life cycle */
 
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
@@ -41,10 +42,11 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
                               fmi2Boolean visible, fmi2Boolean loggingOn)
 {
-    static const fmi2CallbackFunctions silent = {0};
+    static const fmi2CallbackFunctions no_callbacks = {0};
     (void)fmuResourceLocation, (void)visible;
-    int running = fmuType == fmi2ModelExchange ? IN_MODEL_EXCHANGE : IN_STEP_MODE;
-    return instantiate(instanceName, fmuGUID, functions ? functions : &silent, running, loggingOn, __func__);
+    int simulation_phases = fmuType == fmi2ModelExchange ? IN_MODEL_EXCHANGE : IN_STEP_MODE;
+    const Host *host = functions ? functions : &no_callbacks;
+    return instantiate(instanceName, fmuGUID, host, simulation_phases, loggingOn, __func__);
 }
 
 fmi2Status fmi2SetupExperiment(fmi2Component component, fmi2Boolean toleranceDefined, fmi2Real tolerance,
@@ -72,7 +74,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component component)
 
 /* ---- values */
 
-/* As much of a count as an fmi2Integer can hold. */
+/* An integer variable, limited to the range of fmi2Integer. */
 static fmi2Integer saturated_integer(const Instance *self, fmi2ValueReference reference)
 {
     int64_t value = read_integer(self, reference);
@@ -103,20 +105,20 @@ fmi2Status fmi2SetInteger(fmi2Component component, const fmi2ValueReference vr[]
     WRITE_VALUES(self, &INTEGER, vr, nvr, value);
 }
 
-/* No variable is a Boolean or a String. */
-#define DEFINE_EMPTY_ACCESSORS(TYPE)                                                                                         \
-    fmi2Status fmi2Get##TYPE(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2##TYPE value[])  \
-    {                                                                                                                 \
-        REQUIRE_PHASE(component, IN_ANY_PHASE);                                                                                        \
-        (void)value;                                                                                                  \
-        REFUSE_REFERENCES(self, vr, nvr, #TYPE);                                                                               \
-    }                                                                                                                 \
-    fmi2Status fmi2Set##TYPE(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,                      \
-                             const fmi2##TYPE value[])                                                                \
-    {                                                                                                                 \
-        REQUIRE_PHASE(component, BEFORE_TERMINATION);                                                                                     \
-        (void)value;                                                                                                  \
-        REFUSE_REFERENCES(self, vr, nvr, #TYPE);                                                                               \
+/* There are no Boolean or String variables. */
+#define DEFINE_EMPTY_ACCESSORS(TYPE)                                                                                 \
+    fmi2Status fmi2Get##TYPE(fmi2Component component, const fmi2ValueReference vr[], size_t nvr, fmi2##TYPE value[]) \
+    {                                                                                                                \
+        REQUIRE_PHASE(component, IN_ANY_PHASE);                                                                      \
+        (void)value;                                                                                                 \
+        REFUSE_REFERENCES(self, vr, nvr, #TYPE);                                                                     \
+    }                                                                                                                \
+    fmi2Status fmi2Set##TYPE(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,                     \
+                             const fmi2##TYPE value[])                                                               \
+    {                                                                                                                \
+        REQUIRE_PHASE(component, BEFORE_TERMINATION);                                                                \
+        (void)value;                                                                                                 \
+        REFUSE_REFERENCES(self, vr, nvr, #TYPE);                                                                     \
     }
 
 DEFINE_EMPTY_ACCESSORS(Boolean)
@@ -141,7 +143,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component component, const fmi2StatusKind s, fm
     return fmi2OK;
 }
 
-/* The motion never ends by itself. */
+/* The model never terminates the simulation. */
 fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s, fmi2Boolean *value)
 {
     REQUIRE_PHASE(component, IN_ANY_PHASE);
@@ -151,7 +153,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component component, const fmi2StatusKind s,
     return fmi2OK;
 }
 
-/* What the inputs are to be from the present point on; each derivative goes its way until it is set anew. */
+/* Set derivatives of inputs at the current point. Each input follows its polynomial until it is set again. */
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueReference vr[], size_t nvr,
                                        const fmi2Integer order[], const fmi2Real value[])
 {
@@ -161,15 +163,15 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component component, const fmi2ValueR
     bool fault = false;
     if (nvr && (!vr || !order || !value)) return refuse(self, NULL_POINTER, __func__, "vr, order or value");
     for (size_t i = 0; i < nvr; i++) {
-        bool has_any = vr[i] < VARIABLES && variables[vr[i]].order_offset != NO_OFFSET;
-        if (has_any && 1 <= order[i] && order[i] <= MAX_INPUT_ORDER && isfinite(value[i])) continue;
+        bool has_derivatives = vr[i] < VARIABLES && variables[vr[i]].order_offset != NO_OFFSET;
+        if (has_derivatives && 1 <= order[i] && order[i] <= MAX_INPUT_ORDER && isfinite(value[i])) continue;
         return refuse_call(self, NO_INPUT_DERIVATIVE, &(Call){.function = __func__, .reference = vr[i]});
     }
     for (size_t i = 0; i < nvr && !fault; i++) {
         const Variable *variable = &variables[vr[i]];
         int64_t *highest = input_order(state, variable);
         double *derivative = (double *)((char *)&state->model + variable->derivatives_offset) + order[i];
-        if (*derivative == value[i] && *highest <= order[i]) continue; /* it stays what it is */
+        if (*derivative == value[i] && *highest <= order[i]) continue; /* unchanged */
         call_sequence_note_change(&state->run, &state->model, &fault);
         *derivative = value[i];
         if (*highest < order[i]) *highest = order[i];
@@ -220,17 +222,17 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component component, const fmi2Value
     return get_directional_derivative(self, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown, __func__);
 }
 
-/* ---- what this FMU does not offer, as its description says */
+/* ---- functions that this FMU does not support, according to its model description */
 
 DEFINE_NOT_OFFERED(CancelStep, Handle instance)
 
-/* Every step is done when fmi2DoStep returns, so there is nothing more to tell. */
-#define DEFINE_NO_STATUS(NAME, TYPE)                                                           \
-    fmi2Status fmi2Get##NAME(fmi2Component component, const fmi2StatusKind s, TYPE *value)    \
-    {                                                                                         \
-        REQUIRE_PHASE(component, IN_ANY_PHASE);                                                                \
-        (void)s, (void)value;                                                                 \
-        return fmi2Discard;                                                                   \
+/* fmi2DoStep never returns fmi2Pending, so there is no status to report. */
+#define DEFINE_NO_STATUS(NAME, TYPE)                                                       \
+    fmi2Status fmi2Get##NAME(fmi2Component component, const fmi2StatusKind s, TYPE *value) \
+    {                                                                                      \
+        REQUIRE_PHASE(component, IN_ANY_PHASE);                                            \
+        (void)s, (void)value;                                                              \
+        return fmi2Discard;                                                                \
     }
 
 DEFINE_NO_STATUS(Status, fmi2Status)

@@ -1,14 +1,15 @@
-/* FMI 3.0, co-simulation and model exchange, of the model in model.h: common_functions.h and instance.h say what a call does. */
-#define _POSIX_C_SOURCE 200809L /* beside C99: signal masks */
+/* The FMI 3.0 interface of the model in model.h, for co-simulation and model exchange. The functions that both versions
+ * of FMI share are in common_functions.h, their implementation is in instance.h. */
+#define _POSIX_C_SOURCE 200809L /* for signal masks, which C99 does not have */
 
 #include "fmi3Functions.h"
 
 typedef struct {
     fmi3InstanceEnvironment environment;
     fmi3LogMessageCallback log;
-    fmi3IntermediateUpdateCallback intermediate_update; /* called in every step, if it is there */
-    bool event_mode_used;                        /* events of a communication step */
-    bool early_return_allowed;                        /* early */
+    fmi3IntermediateUpdateCallback intermediate_update; /* called after every internal step, unless NULL */
+    bool event_mode_used;
+    bool early_return_allowed;
 } Host;
 typedef fmi3Status Status;
 typedef fmi3Instance Handle;
@@ -25,13 +26,13 @@ typedef fmi3FMUState StateHandle;
 
 static const FmiType FLOAT64 = {"Float64", true}, INT64 = {"Int64", false};
 
-static void log_to_host(const Host *host, const char *name, const char *sentence)
+static void log_to_host(const Host *host, const char *name, const char *message)
 {
     (void)name;
-    if (host->log) host->log(host->environment, fmi3Error, "logStatusError", sentence);
+    if (host->log) host->log(host->environment, fmi3Error, "logStatusError", message);
 }
 
-/* ---- from instantiation to the end */
+/* ---- life cycle */
 
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
@@ -56,9 +57,11 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
 {
     Host host = {instanceEnvironment, logMessage, intermediateUpdate, eventModeUsed, earlyReturnAllowed};
     (void)resourcePath, (void)visible;
-    (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables; /* all can be read then */
-    int running = IN_STEP_MODE | (intermediateUpdate ? 1 << INTERMEDIATE : 0) | (eventModeUsed ? 1 << EVENT : 0);
-    return instantiate(instanceName, instantiationToken, &host, running, loggingOn, __func__);
+    /* All variables are available in intermediate updates. */
+    (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
+    int simulation_phases =
+        IN_STEP_MODE | (intermediateUpdate ? 1 << INTERMEDIATE : 0) | (eventModeUsed ? 1 << EVENT : 0);
+    return instantiate(instanceName, instantiationToken, &host, simulation_phases, loggingOn, __func__);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -93,7 +96,7 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 
 /* ---- values */
 
-/* Every variable is one number. */
+/* All variables are scalars. */
 #define REQUIRE_SCALARS \
     if (nValues != nValueReferences) return refuse(self, WRONG_LENGTH, __func__, "the number of values")
 
@@ -120,7 +123,8 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     REQUIRE_SCALARS;
     for (size_t i = 0; self->state.run.phase == INTERMEDIATE && valueReferences && i < nValueReferences; i++) {
         uint32_t reference = valueReferences[i];
-        bool is_input = reference < VARIABLES && variables[reference].is_state_or_input && !variables[reference].is_calculated;
+        bool is_input = reference < VARIABLES && variables[reference].is_state_or_input &&
+                        !variables[reference].is_calculated;
         if (!is_input) return refuse_phase(self, BEFORE_TERMINATION, __func__);
     }
     WRITE_VALUES(self, &FLOAT64, valueReferences, nValueReferences, values);
@@ -134,20 +138,20 @@ fmi3Status fmi3SetInt64(fmi3Instance instance, const fmi3ValueReference valueRef
     WRITE_VALUES(self, &INT64, valueReferences, nValueReferences, values);
 }
 
-#define DEFINE_EMPTY_ACCESSORS(TYPE)                                                                                     \
-    fmi3Status fmi3Get##TYPE(fmi3Instance instance, const fmi3ValueReference valueReferences[],                   \
-                             size_t nValueReferences, fmi3##TYPE values[], size_t nValues)                        \
-    {                                                                                                             \
-        REQUIRE_PHASE(instance, IN_READABLE_PHASE);                                                                                \
-        (void)values, (void)nValues;                                                                              \
-        REFUSE_REFERENCES(self, valueReferences, nValueReferences, #TYPE);                                                 \
-    }                                                                                                             \
-    fmi3Status fmi3Set##TYPE(fmi3Instance instance, const fmi3ValueReference valueReferences[],                   \
-                             size_t nValueReferences, const fmi3##TYPE values[], size_t nValues)                  \
-    {                                                                                                             \
-        REQUIRE_PHASE(instance, BEFORE_TERMINATION);                                                                                  \
-        (void)values, (void)nValues;                                                                              \
-        REFUSE_REFERENCES(self, valueReferences, nValueReferences, #TYPE);                                                 \
+#define DEFINE_EMPTY_ACCESSORS(TYPE)                                                             \
+    fmi3Status fmi3Get##TYPE(fmi3Instance instance, const fmi3ValueReference valueReferences[],  \
+                             size_t nValueReferences, fmi3##TYPE values[], size_t nValues)       \
+    {                                                                                            \
+        REQUIRE_PHASE(instance, IN_READABLE_PHASE);                                              \
+        (void)values, (void)nValues;                                                             \
+        REFUSE_REFERENCES(self, valueReferences, nValueReferences, #TYPE);                       \
+    }                                                                                            \
+    fmi3Status fmi3Set##TYPE(fmi3Instance instance, const fmi3ValueReference valueReferences[],  \
+                             size_t nValueReferences, const fmi3##TYPE values[], size_t nValues) \
+    {                                                                                            \
+        REQUIRE_PHASE(instance, BEFORE_TERMINATION);                                             \
+        (void)values, (void)nValues;                                                             \
+        REFUSE_REFERENCES(self, valueReferences, nValueReferences, #TYPE);                       \
     }
 
 DEFINE_EMPTY_ACCESSORS(Float32)
@@ -205,7 +209,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance)
     return fmi3OK;
 }
 
-/* They are evaluated when they are updated, and when an output is read. */
+/* Nothing to do: discrete states are evaluated when they are updated or an output is read. */
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
     REQUIRE_PHASE(instance, 1 << INITIALISING | 1 << EVENT);
@@ -245,19 +249,20 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance)
     return fmi3OK;
 }
 
-/* Let the importer look at the present point, where a leap ends or the first begins, set inputs from there on, and say
- * where it wants to stop. */
+/* Call the importer's intermediate update at the start of a communication step and after each internal step. It may
+ * read values, set inputs from here on and request an early return. */
 static void call_intermediate_update(Instance *self, bool finished)
 {
     struct ModelExchange *exchange = &self->state.model.model_exchange;
-    double now = self->state.model.solver.t, wanted = now;
-    bool wants = false;
+    double now = self->state.model.solver.t, return_time = now;
+    bool return_requested = false;
     if (!self->host.intermediate_update) return;
     self->state.run.phase = INTERMEDIATE;
-    self->host.intermediate_update(self->host.environment, now, true, true, finished, self->host.early_return_allowed, &wants, &wanted);
+    self->host.intermediate_update(self->host.environment, now, true, true, finished, self->host.early_return_allowed,
+                                   &return_requested, &return_time);
     self->state.run.phase = RUNNING;
-    if (!self->host.early_return_allowed || !wants || !(wanted < exchange->step_end)) return;
-    if (wanted > now) exchange->step_end = wanted;
+    if (!self->host.early_return_allowed || !return_requested || !(return_time < exchange->step_end)) return;
+    if (return_time > now) exchange->step_end = return_time;
     else if (finished) exchange->step_end = now;
 }
 
@@ -303,13 +308,13 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 
 DEFINE_VALUES_GETTER(ContinuousStateDerivatives, rates, STATES)
 
-#define DEFINE_COUNT_GETTER(NAME, COUNT)                                                    \
-    fmi3Status fmi3GetNumberOf##NAME(fmi3Instance instance, size_t *number)      \
-    {                                                                            \
-        REQUIRE_PHASE(instance, IN_ANY_PHASE);                                                    \
-        REQUIRE_ADDRESS(number);                                                            \
-        *number = COUNT;                                                         \
-        return fmi3OK;                                                           \
+#define DEFINE_COUNT_GETTER(NAME, COUNT)                                    \
+    fmi3Status fmi3GetNumberOf##NAME(fmi3Instance instance, size_t *number) \
+    {                                                                       \
+        REQUIRE_PHASE(instance, IN_ANY_PHASE);                              \
+        REQUIRE_ADDRESS(number);                                            \
+        *number = COUNT;                                                    \
+        return fmi3OK;                                                      \
     }
 
 DEFINE_COUNT_GETTER(ContinuousStates, STATES)
@@ -327,7 +332,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     return get_directional_derivative(self, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__);
 }
 
-/* One direction for each known. */
+/* Combine one directional derivative per known. */
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
                                     const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                     size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
@@ -335,7 +340,9 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     REQUIRE_PHASE(instance, IN_ANY_PHASE);
     if (nSeed != nUnknowns) return refuse(self, WRONG_LENGTH, __func__, "the length of seed");
     if (nSensitivity != nKnowns) return refuse(self, WRONG_LENGTH, __func__, "the length of sensitivity");
-    if (check_derivative_references(self, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__)) return fmi3Error;
+    if (check_derivative_references(self, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity, __func__)) {
+        return fmi3Error;
+    }
     for (size_t j = 0; j < nKnowns; j++) {
         struct Tangent tangent = {0};
         *tangent_value(&tangent, knowns[j]) = 1.0;
@@ -356,31 +363,32 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance, const fmi3ValueRefere
     return read_output_derivatives(self, valueReferences, nValueReferences, orders, values, __func__);
 }
 
-/* ---- what this FMU does not offer, as its description says */
+/* ---- functions that this FMU does not support, according to its model description */
 
 typedef const fmi3ValueReference References[];
 
 DEFINE_NOT_OFFERED(EnterConfigurationMode, Handle instance)
 DEFINE_NOT_OFFERED(ExitConfigurationMode, Handle instance)
 DEFINE_NOT_OFFERED(GetNumberOfVariableDependencies, Handle instance, fmi3ValueReference valueReference,
-                 size_t *nDependencies)
+                   size_t *nDependencies)
 DEFINE_NOT_OFFERED(GetVariableDependencies, Handle instance, fmi3ValueReference dependent,
-                 size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
-                 size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
+                   size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
+                   size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
 DEFINE_NOT_OFFERED(GetIntervalDecimal, Handle instance, References valueReferences, size_t nValueReferences,
-                 fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+                   fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
 DEFINE_NOT_OFFERED(GetIntervalFraction, Handle instance, References valueReferences, size_t nValueReferences,
-                 fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
+                   fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
 DEFINE_NOT_OFFERED(GetShiftDecimal, Handle instance, References valueReferences, size_t nValueReferences,
-                 fmi3Float64 shifts[])
+                   fmi3Float64 shifts[])
 DEFINE_NOT_OFFERED(GetShiftFraction, Handle instance, References valueReferences, size_t nValueReferences,
-                 fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+                   fmi3UInt64 counters[], fmi3UInt64 resolutions[])
 DEFINE_NOT_OFFERED(SetIntervalDecimal, Handle instance, References valueReferences, size_t nValueReferences,
-                 const fmi3Float64 intervals[])
+                   const fmi3Float64 intervals[])
 DEFINE_NOT_OFFERED(SetIntervalFraction, Handle instance, References valueReferences, size_t nValueReferences,
-                 const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+                   const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 DEFINE_NOT_OFFERED(SetShiftDecimal, Handle instance, References valueReferences, size_t nValueReferences,
-                 const fmi3Float64 shifts[])
+                   const fmi3Float64 shifts[])
 DEFINE_NOT_OFFERED(SetShiftFraction, Handle instance, References valueReferences, size_t nValueReferences,
-                 const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-DEFINE_NOT_OFFERED(ActivateModelPartition, Handle instance, fmi3ValueReference clockReference, fmi3Float64 activationTime)
+                   const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+DEFINE_NOT_OFFERED(ActivateModelPartition, Handle instance, fmi3ValueReference clockReference,
+                   fmi3Float64 activationTime)

@@ -1,10 +1,10 @@
-"""The native FMU in a file: the same description, no Python inside, the same bytes for the same content.
+"""Builds native FMU files: the same model description as the Python FMU, no Python inside, reproducible bytes.
 
 modelDescription.xml
 binaries/<platform>/<name>.{so,dll,dylib}
-sources/                                  what they were made from, for any other platform
-documentation/, extra/                    page and licence, certified result
-model.png                                 the icon; FMI 3.0: terminalsAndIcons/, with the flange
+sources/                                  the C sources, for any other platform
+documentation/, extra/                    documentation, licence and certified result
+model.png                                 the icon; in FMI 3.0 terminalsAndIcons/, with the terminal
 """
 
 from collections.abc import Sequence
@@ -31,10 +31,10 @@ from .sources import MAIN_SOURCE, collect_sources, render_build_description, ren
 LICENSE = "documentation/licenses/license.txt"
 ICON_PATHS = {"2": "model.png", "3": "terminalsAndIcons/icon.png"}
 USAGE_NOTE = """\
-<p>In model exchange the importer's solver takes the place of ours, and <code>solver.*</code> says nothing; where
-friction is dry, the mode changes at events, which the importer finds by <code>events.to_rest</code> and
-<code>events.to_break_away</code>. In FMI 3.0 co-simulation, too, it may handle events itself: a step returns early at
-stick and slip.</p>
+<p>In model exchange the importer's solver integrates the model, and <code>solver.*</code> has no meaning. With dry
+friction, the mode changes at events, which the importer locates with the event indicators <code>events.to_rest</code>
+and <code>events.to_break_away</code>. In FMI 3.0 co-simulation the importer can handle events as well: a step returns
+early at stick and slip.</p>
 """
 
 
@@ -46,17 +46,27 @@ def build(
     platforms: Sequence[str] = (),
     fmi: str = "2",
 ) -> Path:
-    """Write the FMU of a model, by name or path, for the platforms (none: the usual ones) and a version of FMI, into
-    `folder`.
+    """Build the native FMU of a model and write it to `folder`, replacing an older one atomically.
 
-    An older one is replaced whole or not at all.  Methods and friction laws may be chosen, as for the Python FMU.
+    Parameters
+    ----------
+    model
+        Name or path of the model.
+    folder
+        Output folder.
+    methods, laws
+        Labels of the methods and friction laws to include; none: all.
+    platforms
+        Platforms to compile for; none: DEFAULT_PLATFORMS.
+    fmi
+        Version of FMI: "2" or "3".
     """
     platforms = platforms or DEFAULT_PLATFORMS
     for platform in platforms:
         if platform not in PLATFORMS:
-            raise BuildError(f"There is no platform {platform!r}; known are {', '.join(PLATFORMS)}.")
+            raise BuildError(f"There is no platform {platform!r}; choose from {', '.join(PLATFORMS)}.")
     date = build_date()
-    source = replace(find_model(model), ramps=fmi == "2")  # FMI 3.0 has no derivatives of inputs
+    source = replace(find_model(model), ramps=fmi == "2")  # FMI 3.0 cannot set derivatives of inputs
     name, cls = source.name, lowered_model(source, select_features(source, methods, laws))
     files, description = generate_c_sources(cls, name, date, fmi)
     declared = declared_variables(cls)
@@ -75,7 +85,7 @@ def build(
 
 
 def generate_c_sources(model: type[VariableOwner], name: str, date: datetime, fmi: str) -> tuple[dict[str, str], bytes]:
-    """The C sources of a model, and the description that goes with them."""
+    """Return the C sources of a model by file name, and the matching modelDescription.xml."""
     files = collect_sources(model, fmi)
     if fmi == "3":
         root = fromstring(describe3(model, name, digest(files), date))

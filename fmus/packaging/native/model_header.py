@@ -1,4 +1,4 @@
-"""The C header of one model: its numerics, the rules, its declared variables, the sentences."""
+"""Generates model.h: the numerics of a model and of its FMI calls, its variables and the messages."""
 
 import inspect
 from collections.abc import Mapping
@@ -27,8 +27,8 @@ from .entry_points import entry_point_types
 HEADER = """\
 /* {sentence}
  *
- * Frozen from {file}.py and the runtime of friction-fmus: structs for the model and what it owns, its numerics, the
- * rules of its run, its declared variables and all that is said.
+ * Generated from {file}.py and the runtime of friction-fmus: structs of the model and the objects it owns, its
+ * numerics, the sequence of FMI calls, the variables and the messages.
  */
 #ifndef MODEL_H
 #define MODEL_H
@@ -52,11 +52,11 @@ enum {{ VARIABLES = {count}, DECLARED = {declared}, T_NEXT = {ahead}, STATES = {
 static const Variable variables[VARIABLES] = {{
 {table}}};
 
-/* What of an instance makes its run. */
+/* The state of an instance, which getting and setting FMU states copies. */
 typedef struct {{
     Model model;
     struct RunState run;
-    int64_t rejection_count; /* how many values were refused so far */
+    int64_t rejection_count; /* number of invalid values set so far */
     RejectedValue rejected[VARIABLES];
 }} State;
 
@@ -70,7 +70,7 @@ enum {{ MEMBERS = {count_of_members} }};
 static const Member members[MEMBERS] = {{
 {members}}};
 
-/* Why the run cannot go on, in a communication step of h from t. */
+/* Append why the run cannot continue, in a communication step of size h from t. */
 static void append_run_message(TextBuffer *text, int64_t status,
                                const struct RunState *run, const Model *model, double t, double h)
 {{
@@ -78,7 +78,7 @@ static void append_run_message(TextBuffer *text, int64_t status,
 {statuses}    }}
 }}
 
-/* Why a variable cannot be set to a value. */
+/* Append why a variable cannot be set to a value. */
 static void append_value_message(TextBuffer *text, int64_t reason, const Variable *variable, double value)
 {{
     switch (reason) {{
@@ -89,7 +89,7 @@ enum {{ PHASES = {count_of_phases} }};
 
 static const char *const phases[PHASES] = {{{phases}}};
 
-/* Why a call is refused. */
+/* Append why a call is refused. */
 static void append_call_message(TextBuffer *text, int64_t reason, const Call *call)
 {{
     switch (reason) {{
@@ -98,7 +98,7 @@ static void append_call_message(TextBuffer *text, int64_t reason, const Call *ca
 
 #endif
 """
-FIELD_CODE = {  # field of a sentence -> what adds it to the text
+FIELD_CODE = {  # field of a message -> C call that appends it
     **{name: f"append_real(text, {name})" for name in ("t", "h")},
     **{name: f"append_real(text, run->{name}_time)" for name in ("start", "stop")},
     **{"now": "append_real(text, model->solver.t)", "t0": "append_real(text, model->solver.step.t0)"},
@@ -107,30 +107,34 @@ FIELD_CODE = {  # field of a sentence -> what adds it to the text
     **{name: f"append(text, call->{name})" for name in ("function", "word", "phase")},
     "reference": "append_integer(text, call->reference)",
 }
-PYTHON_ONLY_STATUSES = (INTERRUPTED,)  # statuses of other kinds
-DERIVATIVE_ATTRIBUTES = ("rate", "polynomial.order", "polynomial.derivatives")  # of an input that has derivatives
+PYTHON_ONLY_STATUSES = (INTERRUPTED,)  # only the Python FMU has these
+DERIVATIVE_ATTRIBUTES = (
+    "rate",
+    "polynomial.order",
+    "polynomial.derivatives",
+)  # attributes of an input with derivatives
 
 
 def render_model_header(model: type[VariableOwner], fmi: str) -> str:
-    """The text of model.h, for a version of FMI."""
-    thing = model_exchange_instance(model)
-    run = sibling_module(model, "runtime.call_sequence").RunState(thing.tolerance)
-    declared = all_variables(thing)
-    to, propagate = build_tangent_function(model, thing, declared)
-    call_graph = CallGraph(thing, run, to)
+    """Return the text of model.h for a version of FMI."""
+    instance = model_exchange_instance(model)
+    run = sibling_module(model, "runtime.call_sequence").RunState(instance.tolerance)
+    declared = all_variables(instance)
+    tangent, propagate = build_tangent_function(model, instance, declared)
+    call_graph = CallGraph(instance, run, tangent)
     call_graph.add_model_entry_point("propagate_tangent", propagate, StructPointer(Tangent))
     for function, arg_types in entry_point_types(model, StructPointer(type(run)), call_graph.layout.model, fmi).items():
         call_graph.add_entry_point(function, arg_types)
     layout = call_graph.layout
     names = [name for name, _ in declared]
-    numbers = [("run", type(run)), ("model", type(thing))]
-    members = [(path, ctype) for prefix, cls in numbers for path, ctype in layout.iter_scalars(cls, f"{prefix}.")]
+    roots = [("run", type(run)), ("model", type(instance))]
+    members = [(path, ctype) for prefix, cls in roots for path, ctype in layout.iter_scalars(cls, f"{prefix}.")]
     members = [(path, ctype) for path, ctype in members if ctype in (INT, BOOL)]
-    statuses = {status: sentence for status, sentence in RUN_MESSAGES.items() if status not in PYTHON_ONLY_STATUSES}
-    broken = dict(enumerate(thing.rules, FIRST_RULE + 1))
-    own = {
+    statuses = {status: message for status, message in RUN_MESSAGES.items() if status not in PYTHON_ONLY_STATUSES}
+    violated_rules = dict(enumerate(instance.rules, FIRST_RULE + 1))
+    rule_fields = {
         name: f"{'append_real' if ctype is FLOAT else 'append_integer'}(text, model->{name})"
-        for name, ctype in layout.fields[type(thing)].items()
+        for name, ctype in layout.fields[type(instance)].items()
     }
     return HEADER.format(
         sentence=(inspect.getdoc(model) or "").splitlines()[0],
@@ -139,20 +143,20 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         codes="".join(f"    {name} = {code},\n" for name, code in vars(codes).items() if name.isupper()),
         numerics=call_graph.text(),
         run=layout.initializer(run, "        "),
-        image=layout.initializer(thing, "        "),
+        image=layout.initializer(instance, "        "),
         items="".join(_items_array(name, meaning) for name, meaning in declared if meaning.items),
         count=len(names),
-        declared=len(variables(thing)),
+        declared=len(variables(instance)),
         ahead=names.index("solver.t_next"),
         states=len(derivative_indices(declared)),
         indicators=len(event_indicator_indices(declared)),
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {c_literal(ctype is BOOL)}}},\n" for path, ctype in members),
         table="".join(
-            _variable_row(name, meaning, tangent_fields(declared), hasattr(thing, f"{name}_rate"))
+            _variable_row(name, meaning, tangent_fields(declared), hasattr(instance, f"{name}_rate"))
             for name, meaning in declared
         ),
-        statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(broken, own),
+        statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(violated_rules, rule_fields),
         values=_switch_cases(VALUE_MESSAGES, FIELD_CODE),
         calls=_switch_cases(CALL_MESSAGES, FIELD_CODE),
         phases=", ".join(string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
@@ -161,6 +165,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
 
 
 def _items_array(name: str, meaning: VariableDeclaration) -> str:
+    """Return the C array with the values of an enumeration."""
     values = ", ".join(str(value) for _, value, _ in meaning.items)
     return f"static const int64_t {_items_array_name(name)}[] = {{{values}}};\n"
 
@@ -169,9 +174,11 @@ def _items_array_name(name: str) -> str:
     return f"items_of_{name.replace('.', '_')}"
 
 
-def _variable_row(name: str, meaning: VariableDeclaration, tangent_fields: dict[str, str], ramps: bool) -> str:
-    """One variable in the table."""
-    words = (name, meaning.text, meaning.unit_suffix, meaning.allowed)
+def _variable_row(
+    name: str, meaning: VariableDeclaration, tangent_fields: dict[str, str], has_derivatives: bool
+) -> str:
+    """Return the table row of a variable."""
+    texts = (name, meaning.text, meaning.unit_suffix, meaning.allowed)
     flags = (
         meaning.type == "Real",
         meaning.causality not in SETTABLE_CAUSALITIES,
@@ -187,26 +194,28 @@ def _variable_row(name: str, meaning: VariableDeclaration, tangent_fields: dict[
         else "NULL, NULL"
     )
     parts = [
-        *map(string_literal, words),
+        *map(string_literal, texts),
         f"offsetof(Model, {attribute_path(name)})",
         f"offsetof(struct Tangent, {tangent_fields[name]})" if name in tangent_fields else "NO_OFFSET",
         *map(c_literal, flags),
-        ", ".join(f"offsetof(Model, {name}_{part})" if ramps else "NO_OFFSET" for part in DERIVATIVE_ATTRIBUTES),
+        ", ".join(
+            f"offsetof(Model, {name}_{part})" if has_derivatives else "NO_OFFSET" for part in DERIVATIVE_ATTRIBUTES
+        ),
         *(c_literal(float(bound)) for bound in bounds),
         items,
     ]
     return f"    {{{', '.join(parts)}}},\n"
 
 
-def _switch_cases(sentences: Mapping[int, str], places: Mapping[str, str]) -> str:
-    """The cases of a switch over sentences with fields in them."""
+def _switch_cases(messages: Mapping[int, str], field_code: Mapping[str, str]) -> str:
+    """Return the cases of a switch over messages with fields."""
     lines = []
-    for case, sentence in sentences.items():
+    for case, message in messages.items():
         lines.append(f"    case {case}:\n")
-        for words, field, _, _ in Formatter().parse(sentence):
-            if words:
-                lines.append(f"        append(text, {string_literal(words)});\n")
+        for literal_text, field, _, _ in Formatter().parse(message):
+            if literal_text:
+                lines.append(f"        append(text, {string_literal(literal_text)});\n")
             if field:
-                lines.append(f"        {places[field]};\n")
+                lines.append(f"        {field_code[field]};\n")
         lines.append("        break;\n")
     return "".join(lines)

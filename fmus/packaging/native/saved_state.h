@@ -1,8 +1,8 @@
-/* A saved state: what of an instance makes its run, under a seal.
+/* A saved FMU state: the State of an instance with the GUID of the FMU and a checksum.
  *
- * Bytes come back from files and networks, and so do pointers from importers.  A saved state is believed if it carries
- * the GUID of this very FMU, if its checksum holds, and if nothing in it could lead the code astray: no truth value but
- * 0 and 1, no refused value that is not there, no value out of its range, no present point outside the step.
+ * Serialized states come back from files and networks and may be damaged. A state is accepted only if it has the GUID
+ * of this FMU, its checksum is right and its content is consistent: bools are 0 or 1, the invalid values match their
+ * count, parameters are in their ranges and the current time lies within the internal step.
  */
 #ifndef SAVED_STATE_H
 #define SAVED_STATE_H
@@ -14,12 +14,12 @@
 #include "model.h"
 
 typedef struct {
-    uint64_t checksum; /* of all bytes that follow */
+    uint64_t checksum; /* of all following bytes */
     char guid[sizeof MODEL_GUID];
     State state;
 } SavedState;
 
-#define MAX_INTEGER 9007199254740992 /* an int of the numerics: no sum of two such overflows, and a double holds it */
+#define MAX_INTEGER 9007199254740992 /* 2^53: doubles represent it exactly, and the sum of two does not overflow */
 
 /* ---- values */
 
@@ -43,17 +43,17 @@ static bool is_allowed_value(const Variable *variable, double value)
     return call_sequence_is_in_range(value, variable->low, variable->high, variable->above, variable->below, &fault);
 }
 
-/* ---- the seal */
+/* ---- checksum */
 
-/* A sum of bytes in eights.  Each eight is mixed in by steps that can be undone: so a change within one is seen for
- * certain, and any other but for one in 2^64. */
+/* Checksum over words of eight bytes. Every mixing step is invertible, so a change within one word is always detected;
+ * other changes are missed with a probability of 2^-64. */
 static uint64_t checksum_of(const void *bytes, size_t size)
 {
     uint64_t sum = size;
     for (size_t i = 0; i < size; i += sizeof sum) {
-        uint64_t eight = 0;
-        memcpy(&eight, (const char *)bytes + i, size - i < sizeof eight ? size - i : sizeof eight);
-        sum = (sum ^ eight) * UINT64_C(0x9E3779B97F4A7C15);
+        uint64_t word = 0;
+        memcpy(&word, (const char *)bytes + i, size - i < sizeof word ? size - i : sizeof word);
+        sum = (sum ^ word) * UINT64_C(0x9E3779B97F4A7C15);
         sum ^= sum >> 32;
     }
     return sum;
@@ -72,12 +72,13 @@ static void write_saved_state(SavedState *saved, const State *state)
     saved->checksum = payload_checksum(saved);
 }
 
-/* Whether a block of memory was made here; nothing is read beyond the first difference. */
-static bool has_model_guid(const SavedState *saved) { return saved && !strncmp(saved->guid, MODEL_GUID, sizeof MODEL_GUID); }
+/* Check whether the pointer refers to a state of this FMU. Reads no byte after the first difference. */
+static bool has_model_guid(const SavedState *saved)
+{
+    return saved && !strncmp(saved->guid, MODEL_GUID, sizeof MODEL_GUID);
+}
 
-/* ---- the structure */
-
-/* Whether a byte can be read as a bool. */
+/* ---- validation */
 static bool is_bool(const void *byte) { return *(const unsigned char *)byte <= 1; }
 
 static bool are_members_valid(const State *state)
@@ -91,42 +92,45 @@ static bool are_members_valid(const State *state)
     return true;
 }
 
-/* Values out of range are never in the model, but among the refused. */
+/* The model never holds a value out of range; such values are in State.rejected. */
 static bool are_values_valid(const Model *model)
 {
     for (const Variable *variable = variables; variable < variables + VARIABLES; variable++) {
-        bool is_free = variable->is_real && variable->is_calculated;
-        if (!is_free && !is_allowed_value(variable, variable_value(model, variable))) return false;
+        bool is_unbounded = variable->is_real && variable->is_calculated;
+        if (!is_unbounded && !is_allowed_value(variable, variable_value(model, variable))) return false;
     }
     return true;
 }
 
 static bool are_rejections_valid(const State *state)
 {
-    int64_t refusals = 0;
+    int64_t n_rejected = 0;
     if (state->rejection_count < 0 || state->rejection_count > MAX_INTEGER) return false;
     for (int i = 0; i < VARIABLES; i++) {
-        const RejectedValue *refusal = &state->rejected[i];
-        if (refusal->reason == OK) continue;
-        if (refusal->reason < CALCULATED || refusal->reason > OUT_OF_RANGE) return false;
-        if (refusal->sequence < 1 || refusal->sequence > state->rejection_count) return false;
-        if (!variables[i].is_real && !(fabs(refusal->value) <= 2147483648.0)) return false; /* an fmi2Integer */
-        refusals++;
+        const RejectedValue *rejected = &state->rejected[i];
+        if (rejected->reason == OK) continue;
+        if (rejected->reason < CALCULATED || rejected->reason > OUT_OF_RANGE) return false;
+        if (rejected->sequence < 1 || rejected->sequence > state->rejection_count) return false;
+        if (!variables[i].is_real && !(fabs(rejected->value) <= 2147483648.0)) return false; /* fmi2Integer */
+        n_rejected++;
     }
-    return refusals == state->run.n_invalid_values;
+    return n_rejected == state->run.n_invalid_values;
 }
 
 static bool is_state_valid(State *state)
 {
     bool fault = false;
-    return are_members_valid(state) && !state->run.outputs_current && are_values_valid(&state->model) && are_rejections_valid(state) &&
+    return are_members_valid(state) && !state->run.outputs_current && are_values_valid(&state->model) &&
+           are_rejections_valid(state) &&
            call_sequence_is_valid_state(&state->run, &state->model, state->run.interface == MODEL_EXCHANGE, &fault) && !fault;
 }
 
-/* The state under the seal; NULL if it is broken in any way. */
+/* Return the state, or NULL if it is invalid in any way. */
 static const State *valid_state(SavedState *saved)
 {
-    return has_model_guid(saved) && saved->checksum == payload_checksum(saved) && is_state_valid(&saved->state) ? &saved->state : NULL;
+    bool is_valid = has_model_guid(saved) && saved->checksum == payload_checksum(saved) &&
+                    is_state_valid(&saved->state);
+    return is_valid ? &saved->state : NULL;
 }
 
 #endif

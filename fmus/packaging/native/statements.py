@@ -1,7 +1,7 @@
-"""The body of one function of the numerics as C statements.
+"""Translates the body of one function of the numerics to C statements.
 
-Names are declared at the top, as in Python they live as long as the function.  A statement in which something may
-fault is followed by a check that leaves the function, just where Python's exception would.
+Local variables are declared at the top, because Python's have function scope. A statement that can fault is followed by
+a check that returns from the function, at the point where Python raises the exception.
 """
 
 import ast
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
 
 
 class FunctionTranslator(ExpressionTranslator):
-    """One function, specialised to the kinds of its arguments."""
+    """Translator for one function, specialised to the types of its arguments."""
 
     def __init__(self, call_graph: "CallGraph", function: FunctionType, arg_types: list[CType]) -> None:
         super().__init__(call_graph, function)
         self.result: CType | None = None
-        self.has_return = False  # a return was seen, so the result is known
-        self.assigned_at_breaks: list[list[set[str]]] = []  # for every loop around: what has a value at its breaks
+        self.has_return = False  # a return was translated, so the result type is known
+        self.assigned_at_breaks: list[list[set[str]]] = []  # per enclosing loop: names assigned at each of its breaks
         tree = function_tree(function)
         self.summary = (ast.get_docstring(tree) or "").replace("*/", "* /").splitlines()[:1]
         self.parameters = [argument.arg for argument in tree.args.args]
@@ -34,10 +34,10 @@ class FunctionTranslator(ExpressionTranslator):
             self.declare_local(tree, name, ctype)
             self.assigned_names.add(name)
         if self.translate_block(tree.body) and self.result:
-            raise self.unsupported(tree, "may end without a return", "return a value on every way")
+            raise self.unsupported(tree, "may end without a return", "return a value on every path")
 
     def text(self, name: str) -> str:
-        """The C function."""
+        """Return the C function."""
         parameters = [
             c_declaration(self.local_types[p], p)
             for p in self.parameters
@@ -53,15 +53,15 @@ class FunctionTranslator(ExpressionTranslator):
         return "".join(f"{line}\n" for line in lines)
 
     def declarations(self) -> list[str]:
-        """The local names, a line for each kind."""
-        arg_types: dict[str, list[str]] = {}
+        """Declare the local variables, one line per type."""
+        names_by_type: dict[str, list[str]] = {}
         for name, ctype in self.local_types.items():
             if name not in self.parameters:
-                arg_types.setdefault(c_spelling(ctype), []).append(name)
-        return [f"    {declaration_list(c, names)}" for c, names in arg_types.items()]
+                names_by_type.setdefault(c_spelling(ctype), []).append(name)
+        return [f"    {declaration_list(c, names)}" for c, names in names_by_type.items()]
 
     def zero_result(self) -> str:
-        """What is returned with the fault flag up."""
+        """Return the result of a function that faults."""
         return f"({self.result.c}){{0}}" if isinstance(self.result, ScalarTuple) else "0"
 
     # ---- lines
@@ -71,24 +71,24 @@ class FunctionTranslator(ExpressionTranslator):
             head = f"{self.lines.pop().strip()} {head}"
         self.emit(head + " {")
         self.depth += 1
-        falls = body()
+        end_reached = body()
         self.depth -= 1
         self.emit("}")
-        return falls
+        return end_reached
 
     def begin_statement(self) -> None:
-        """Nothing of the statement at hand has been seen yet."""
+        """Reset the state of the current statement."""
         self.may_fault, self.effects_allowed, self.statement_call = False, True, None
 
     def translate_block(self, statements: list[ast.stmt]) -> bool:
-        """Statements in a row; whether their end is reached.  What comes after a return is left out."""
+        """Translate statements; return whether control reaches their end. Skips unreachable statements."""
         for statement in statements:
             self.begin_statement()
             if not self.visit(statement):
                 return False
         return True
 
-    # ---- statements: each tells whether the next one is reached
+    # ---- statements: each method returns whether control reaches the next statement
 
     def visit_Pass(self, node: ast.Pass) -> bool:
         return True
@@ -101,7 +101,7 @@ class FunctionTranslator(ExpressionTranslator):
         if not isinstance(node.value, ast.Call) or (
             isinstance(value.ctype, CompileTimeValue) and value.ctype.value is not None
         ):
-            raise self.unsupported(node, "has no effect", "leave it out")
+            raise self.unsupported(node, "has no effect", "remove it")
         self.emit(f"{value.text};" if value.ctype == CompileTimeValue(None) else f"(void){value.as_operand(UNARY)};")
         self.emit_fault_check()
         return True
@@ -110,15 +110,13 @@ class FunctionTranslator(ExpressionTranslator):
         value = self.right_hand_side(node.value) if node.value else None
         ctype = value.ctype if value else None
         if self.has_return and ctype != self.result:
-            raise self.unsupported(
-                node, "returns something else than the return before", "return the same kind of numbers"
-            )
+            raise self.unsupported(node, "returns another type than the previous return", "return the same types")
         self.result, self.has_return = ctype, True
         self.emit(f"return {value.text};" if value else "return;")
         return False
 
     def right_hand_side(self, node: ast.expr) -> CExpression:
-        """The right-hand side of an assignment or what is returned."""
+        """Translate the right-hand side of an assignment or a returned value."""
         if isinstance(node, ast.Tuple):
             return make_tuple([self.run_time_number(part) for part in node.elts])
         self.statement_call = node
@@ -129,7 +127,9 @@ class FunctionTranslator(ExpressionTranslator):
         match node:
             case ast.Assign(targets=[ast.Tuple(elts=targets)], value=ast.Tuple(elts=values)):
                 if len(targets) != len(values):
-                    raise self.unsupported(node, "has more or fewer values than names", "write one for each")
+                    raise self.unsupported(
+                        node, "has a different number of values than names", "write one value per name"
+                    )
                 self.assign_parallel(targets, values)
                 return True
         value = self.right_hand_side(node.value)
@@ -144,21 +144,21 @@ class FunctionTranslator(ExpressionTranslator):
         return True
 
     def assign_parallel(self, targets: list[ast.expr], values: list[ast.expr]) -> None:
-        """a, b = x, y: all values come first where the order can be told."""
-        found = [self.run_time_number(value) for value in values]
-        later = [names_in(value) for value in values]
-        apart = all(not names_in(target) & set().union(*later[i + 1 :]) for i, target in enumerate(targets))
-        calls = any(isinstance(part, ast.Call) for value in values for part in ast.walk(value))
-        fields = not all(isinstance(target, ast.Name) for target in targets)  # which a call may read
-        if self.may_fault or not apart or (calls and fields):
-            found = [self.in_local(value) for value in found]
+        """Translate a, b = x, y. Values are stored first if an assignment could change a later one."""
+        translated = [self.run_time_number(value) for value in values]
+        names_read = [names_in(value) for value in values]
+        independent = all(not names_in(target) & set().union(*names_read[i + 1 :]) for i, target in enumerate(targets))
+        has_calls = any(isinstance(part, ast.Call) for value in values for part in ast.walk(value))
+        has_attributes = not all(isinstance(target, ast.Name) for target in targets)  # a call could read them
+        if self.may_fault or not independent or (has_calls and has_attributes):
+            translated = [self.in_local(value) for value in translated]
             self.emit_fault_check()
-        for target, value in zip(targets, found, strict=True):
+        for target, value in zip(targets, translated, strict=True):
             self.assign(target, value)
 
     def unpack(self, target: ast.Tuple, value: CExpression) -> None:
         if not isinstance(value.ctype, ScalarTuple) or len(value.ctype.parts) != len(target.elts):
-            raise self.unsupported(target, "does not fit what is returned", "write one name for each number")
+            raise self.unsupported(target, "does not match the returned tuple", "write one name per number")
         for i, (part, ctype) in enumerate(zip(target.elts, value.ctype.parts, strict=True)):
             self.assign(part, CExpression(ctype, f"{value.text}._{i}"))
 
@@ -170,36 +170,37 @@ class FunctionTranslator(ExpressionTranslator):
 
     def assign(self, target: ast.expr, value: CExpression) -> None:
         if isinstance(target, ast.Name):
-            if target.id == "_":  # not wanted
+            if target.id == "_":  # ignored
                 return
             self.declare_local(target, target.id, value.ctype)
             self.assigned_names.add(target.id)
-            place = target.id
+            lvalue = target.id
         else:
             self.is_pure = False
-            if self.may_fault:  # then nothing is assigned
+            if self.may_fault:  # after a fault nothing is assigned
                 value = self.in_local(value)
                 self.emit_fault_check()
             effects_allowed = self.effects_allowed
-            found = self.visit(target)
+            attribute = self.visit(target)
             self.effects_allowed = effects_allowed
-            self.require_same_type(target, found.ctype, value.ctype)
-            place = found.text
-        self.emit(f"{place} = {value.text};")
+            self.require_same_type(target, attribute.ctype, value.ctype)
+            lvalue = attribute.text
+        self.emit(f"{lvalue} = {value.text};")
         self.emit_fault_check()
 
     def declare_local(self, node: ast.AST, name: str, ctype: CType) -> None:
-        """Take a name into use; it keeps its kind for life."""
+        """Declare a local variable; its type never changes."""
         if name in C_NAMES:
-            raise self.unsupported(node, f"uses {name}, a word of C", "take another name")
+            raise self.unsupported(node, f"uses {name}, a C keyword or macro", "use another name")
         self.require_same_type(node, self.local_types.setdefault(name, ctype), ctype)
 
     def require_same_type(self, node: ast.AST, old: CType, new: CType) -> None:
+        """Raise an error if a variable would change its type."""
         if old == new and isinstance(new, (Scalar, StructPointer, CompileTimeValue)):
             return
-        words = [getattr(ctype, "name", "no number") for ctype in (old, new)]
+        words = [getattr(ctype, "name", "non-number") for ctype in (old, new)]
         instead = "write 0.0, not 0" if (old, new) == (FLOAT, INT) else "use another name"
-        raise self.unsupported(node, f"is assigned a {words[1]} where there was a {words[0]}", instead)
+        raise self.unsupported(node, f"is assigned a {words[1]} but has the type {words[0]}", instead)
 
     # ---- branches and loops
 
@@ -210,31 +211,31 @@ class FunctionTranslator(ExpressionTranslator):
         test = self.boolean(node.test)
         condition = self.condition_text(test)
         before = set(self.assigned_names)
-        falls = self.emit_block(f"{word} ({condition})", lambda: self.translate_block(node.body))
+        end_reached = self.emit_block(f"{word} ({condition})", lambda: self.translate_block(node.body))
         after, self.assigned_names = self.assigned_names, before
         if node.orelse:
-            falls_else = self.translate_else(node.orelse)
-            if not (falls and falls_else):
-                after = self.assigned_names if falls_else else after
+            end_reached_else = self.translate_else(node.orelse)
+            if not (end_reached and end_reached_else):
+                after = self.assigned_names if end_reached_else else after
                 self.assigned_names = after
-                return falls or falls_else
-        self.assigned_names = self.assigned_names & after if falls else self.assigned_names
+                return end_reached or end_reached_else
+        self.assigned_names = self.assigned_names & after if end_reached else self.assigned_names
         return True
 
     def translate_else(self, statements: list[ast.stmt]) -> bool:
-        """else; or else if, where the test needs no line of its own."""
+        """Translate an else branch, as else if where the condition needs no line of its own."""
         match statements:
             case [ast.If(test=test) as inner]:
                 lines, self.lines = self.lines, []
                 self.boolean(test)
-                plain, self.lines = not self.lines and not self.may_fault, lines
+                is_simple, self.lines = not self.lines and not self.may_fault, lines
                 self.begin_statement()
-                if plain:
+                if is_simple:
                     return self.translate_if(inner, "else if")
         return self.emit_block("else", lambda: self.translate_block(statements))
 
     def condition_text(self, test: CExpression) -> str:
-        """The text of a test, kept in a name of its own if it may fault."""
+        """Return the text of a condition, stored in a local if it can fault."""
         if not self.may_fault:
             return test.text
         name = self.emit_temporary(test.ctype, test.text)
@@ -243,7 +244,7 @@ class FunctionTranslator(ExpressionTranslator):
 
     def visit_While(self, node: ast.While) -> bool:
         if node.orelse:
-            raise self.unsupported(node, "has an else", "use a flag")
+            raise self.unsupported(node, "has an else branch", "use a flag")
         before = set(self.assigned_names)
         self.assigned_at_breaks.append([])
         lines, self.lines = self.lines, []
@@ -261,10 +262,10 @@ class FunctionTranslator(ExpressionTranslator):
             return self.translate_block(node.body)
 
         self.emit_block(head, body)
-        ways = self.assigned_at_breaks.pop()
+        break_sets = self.assigned_at_breaks.pop()
         if endless:
-            self.assigned_names = set.intersection(*ways) if ways else before
-            return bool(ways)
+            self.assigned_names = set.intersection(*break_sets) if break_sets else before
+            return bool(break_sets)
         self.assigned_names = before
         return True
 
@@ -273,9 +274,11 @@ class FunctionTranslator(ExpressionTranslator):
             case ast.For(target=ast.Name(), iter=ast.Call(func=ast.Name(id="range"), args=args), orelse=[]):
                 bounds = [self.run_time_number(argument) for argument in args]
             case _:
-                raise self.unsupported(node, "is no loop over a range", "write for i in range(n)")
+                raise self.unsupported(node, "is not a loop over a range", "write for i in range(n)")
         if len(bounds) not in (1, 2) or any(bound.ctype is not INT for bound in bounds):
-            raise self.unsupported(node, "has another range than of one or two ints", "write range(n) or range(m, n)")
+            raise self.unsupported(
+                node, "has a range with other arguments than one or two ints", "write range(n) or range(m, n)"
+            )
         low, high = (self.in_local(bound).text for bound in [CExpression(INT, "0"), *bounds][-2:])
         self.emit_fault_check()
         counter, before = f"_{next(self.temporaries)}", set(self.assigned_names)
@@ -301,12 +304,12 @@ class FunctionTranslator(ExpressionTranslator):
 
 
 def names_in(node: ast.expr) -> set[str]:
-    """The names and attributes in an expression."""
+    """Return the names and attributes in an expression."""
     names = {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
     return names - {"self"} | {part.attr for part in ast.walk(node) if isinstance(part, ast.Attribute)}
 
 
 def declaration_list(c: str, names: list[str]) -> str:
-    """double a, b;  or  struct Methods *a, *b;"""
+    """Declare several variables: double a, b; or struct Methods *a, *b;"""
     star = "*" if c.endswith("*") else ""
     return f"{c.rstrip('*').rstrip()} " + ", ".join(star + name for name in names) + ";"

@@ -1,4 +1,4 @@
-/* Sentences to standard error, wherever that may lead; names as loggers expect them. */
+/* Messages to standard error, even when it is closed or a broken pipe; instance names as valid UTF-8. */
 #ifndef STDERR_OUTPUT_H
 #define STDERR_OUTPUT_H
 
@@ -10,12 +10,12 @@
 
 #if defined(_WIN32)
 
-/* Declared here, for windows.h takes words like far from the numerics. */
+/* Declared here because windows.h defines macros such as `far`, which clash with names in the generated code. */
 __declspec(dllimport) void *__stdcall GetStdHandle(unsigned long which);
 __declspec(dllimport) int __stdcall WriteFile(void *file, const void *bytes, unsigned long length,
                                               unsigned long *written, void *overlapped);
 
-/* Not through the C runtime, which ends the process when standard error is closed. */
+/* Bypass the C runtime, which ends the process if standard error is closed. */
 static void write_to_stderr(const char *line, size_t length)
 {
     unsigned long written;
@@ -27,23 +27,24 @@ static void write_to_stderr(const char *line, size_t length)
 #include <signal.h>
 #include <unistd.h>
 
-/* A pipe that nobody reads any more sends a signal that ends the process: it is held back in this thread, of which
- * sigprocmask is true on Linux and macOS, and taken away. */
+/* Writing to a pipe without a reader raises SIGPIPE, which would end the process. Block the signal in this thread and
+ * consume it, unless it was pending before: then it belongs to the importer. (On Linux and macOS, sigprocmask affects
+ * the calling thread only.) */
 static void write_to_stderr(const char *line, size_t length)
 {
-    sigset_t broken, before, pending;
-    int awaited, taken;
-    sigemptyset(&broken);
-    sigaddset(&broken, SIGPIPE);
-    sigprocmask(SIG_BLOCK, &broken, &before);
+    sigset_t sigpipe, old_mask, pending;
+    int was_pending, signal_number;
+    sigemptyset(&sigpipe);
+    sigaddset(&sigpipe, SIGPIPE);
+    sigprocmask(SIG_BLOCK, &sigpipe, &old_mask);
     sigpending(&pending);
-    awaited = sigismember(&pending, SIGPIPE); /* by the importer, whose it stays */
+    was_pending = sigismember(&pending, SIGPIPE);
     for (ssize_t written; length && (written = write(STDERR_FILENO, line, length)) > 0; length -= (size_t)written) {
         line += written;
     }
     sigpending(&pending);
-    if (!awaited && sigismember(&pending, SIGPIPE)) sigwait(&broken, &taken);
-    sigprocmask(SIG_SETMASK, &before, NULL);
+    if (!was_pending && sigismember(&pending, SIGPIPE)) sigwait(&sigpipe, &signal_number);
+    sigprocmask(SIG_SETMASK, &old_mask, NULL);
 }
 
 #else
@@ -52,7 +53,7 @@ static void write_to_stderr(const char *line, size_t length) { fwrite(line, 1, l
 
 #endif
 
-/* The length of the character of UTF-8 that begins here; 0 if none does (RFC 3629, section 4). */
+/* Length in bytes of the UTF-8 character at c, or 0 if the bytes are not valid UTF-8 (RFC 3629, section 4). */
 static size_t utf8_length(const unsigned char *c)
 {
     size_t length = *c < 0x80 ? 1 : *c < 0xC2 ? 0 : *c < 0xE0 ? 2 : *c < 0xF0 ? 3 : *c < 0xF5 ? 4 : 0;
@@ -66,7 +67,8 @@ static size_t utf8_length(const unsigned char *c)
     return length;
 }
 
-/* The name in UTF-8, which loggers expect: any other byte is told as \xff.  There is room for four times the length. */
+/* Copy a name as valid UTF-8, which loggers expect. Other bytes become escapes such as \xff, so the copy needs up to
+ * four times the length. */
 static void copy_as_utf8(char *copy, const char *name)
 {
     while (*name) {
@@ -79,13 +81,13 @@ static void copy_as_utf8(char *copy, const char *name)
     *copy = '\0';
 }
 
-/* On standard error, whatever has become of it. */
-static void print_to_stderr(const char *instance, const char *sentence)
+/* Print "model (instance): message" to standard error. */
+static void print_to_stderr(const char *instance, const char *message)
 {
-    size_t length = strlen(MODEL_NAME) + strlen(instance) + strlen(sentence) + strlen(" (): \n");
+    size_t length = strlen(MODEL_NAME) + strlen(instance) + strlen(message) + strlen(" (): \n");
     char *line = malloc(length + 1);
     if (!line) return;
-    snprintf(line, length + 1, "%s (%s): %s\n", MODEL_NAME, instance, sentence);
+    snprintf(line, length + 1, "%s (%s): %s\n", MODEL_NAME, instance, message);
     write_to_stderr(line, length);
     free(line);
 }

@@ -1,4 +1,4 @@
-"""The live model object as C data: a struct for each class of object that it owns, and its initial image."""
+"""The model object as C data: one struct per class of object, and initializers with their current values."""
 
 from collections.abc import Iterator
 
@@ -6,36 +6,36 @@ from ..reserved_names import C_NAMES
 from .c_types import FLOAT, CType, FloatArray, Scalar, StructPointer, c_declaration, c_literal, scalar_type_of
 from .diagnostics import UnsupportedConstructError
 
-EMPTY_MEMBER = "nothing"  # the member of a struct that has no other, for C has no empty ones
+EMPTY_MEMBER = "nothing"  # the member of a struct without fields: C has no empty structs
 
 
 class StructLayout:
-    """The fields of every class, owned classes first."""
+    """The fields of every class; owned classes come before their owners."""
 
     def __init__(self, model: object, *others: object) -> None:
         self.fields: dict[type, dict[str, CType]] = {}
         self._seen: set[int] = set()
-        self.model, *_ = [self._add(thing, type(thing).__name__) for thing in (model, *others)]
+        self.model, *_ = [self._add(instance, type(instance).__name__) for instance in (model, *others)]
 
-    def _add(self, thing: object, path: str) -> StructPointer:
-        if id(thing) in self._seen:
+    def _add(self, instance: object, path: str) -> StructPointer:
+        if id(instance) in self._seen:
             raise UnsupportedConstructError(
-                f"{path} is reached in two ways; an object is owned by one other: make it anew."
+                f"{path} refers to an object that another attribute owns; create a new object."
             )
-        self._seen.add(id(thing))
-        fields = {name: self._type_of(value, f"{path}.{name}") for name, value in vars(thing).items()}
-        cls = type(thing)
+        self._seen.add(id(instance))
+        fields = {name: self._type_of(value, f"{path}.{name}") for name, value in vars(instance).items()}
+        cls = type(instance)
         if self.fields.setdefault(cls, fields) != fields:
             raise UnsupportedConstructError(
-                f"{path} has other attributes than another {cls.__name__}; give all of them in __init__."
+                f"{path} has different attributes from another {cls.__name__}; set all of them in __init__."
             )
         if any(other is not cls and other.__name__ == cls.__name__ for other in self.fields):
-            raise UnsupportedConstructError(f"{path}: two classes are called {cls.__name__}; rename one.")
+            raise UnsupportedConstructError(f"{path}: two classes have the name {cls.__name__}; rename one.")
         return StructPointer(cls)
 
     def _type_of(self, value: object, path: str) -> CType:
         if (name := path.rsplit(".", 1)[-1]) in C_NAMES:
-            raise UnsupportedConstructError(f"{path}: {name} is a word of C; take another name.")
+            raise UnsupportedConstructError(f"{path}: {name} is a C keyword or macro; use another name.")
         if ctype := scalar_type_of(value):
             return ctype
         if isinstance(value, list) and value and all(scalar_type_of(item) is FLOAT for item in value):
@@ -43,11 +43,11 @@ class StructLayout:
         if hasattr(value, "__dict__") and not callable(value):
             return self._add(value, path)
         raise UnsupportedConstructError(
-            f"{path} is {value!r}; an attribute is a float, int, bool, list of floats or an object."
+            f"{path} is {value!r}; an attribute must be a float, int, bool, list of floats or object."
         )
 
     def iter_scalars(self, cls: type, prefix: str = "") -> Iterator[tuple[str, Scalar]]:
-        """Dotted name and kind of every number, but for those in lists, of a class and of what it owns."""
+        """Yield dotted name and type of every number of a class and of the objects it owns, except those in lists."""
         for name, ctype in self.fields[cls].items():
             if isinstance(ctype, StructPointer):
                 yield from self.iter_scalars(ctype.cls, f"{prefix}{name}.")
@@ -55,7 +55,7 @@ class StructLayout:
                 yield prefix + name, ctype
 
     def struct_definitions(self) -> str:
-        """The structs."""
+        """Return the definitions of the structs."""
         texts = []
         for cls, fields in self.fields.items():
             members = (
@@ -65,20 +65,20 @@ class StructLayout:
             texts.append(f"struct {cls.__name__} {{\n{members}}};\n")
         return "\n".join(texts)
 
-    def initializer(self, thing: object, indent: str = "    ") -> str:
-        """The initialiser of a struct with the present values of an object."""
-        deeper = indent + "    "
-        rows = []
-        for name, ctype in self.fields[type(thing)].items():
-            value = getattr(thing, name)
+    def initializer(self, instance: object, indent: str = "    ") -> str:
+        """Return the initializer of a struct with the current values of an object."""
+        inner_indent = indent + "    "
+        lines = []
+        for name, ctype in self.fields[type(instance)].items():
+            value = getattr(instance, name)
             if isinstance(ctype, Scalar):
                 text = c_literal(value)
             elif isinstance(ctype, FloatArray):
                 text = "{" + ", ".join(map(c_literal, value)) + "}"
             else:
-                text = self.initializer(value, deeper)
-            rows.append(f"{indent}.{name} = {text},\n")
-        return "{\n" + ("".join(rows) or f"{indent}.{EMPTY_MEMBER} = 0,\n") + indent[4:] + "}"
+                text = self.initializer(value, inner_indent)
+            lines.append(f"{indent}.{name} = {text},\n")
+        return "{\n" + ("".join(lines) or f"{indent}.{EMPTY_MEMBER} = 0,\n") + indent[4:] + "}"
 
 
 def _member(ctype: CType, name: str) -> str:

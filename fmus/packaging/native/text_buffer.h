@@ -1,4 +1,5 @@
-/* Sentences, with numbers as Python's repr writes them: the fewest digits that read back as the same double. */
+/* A fixed-size text buffer. Numbers are written like Python's repr: the fewest digits that read back as the same
+ * double. */
 #ifndef TEXT_BUFFER_H
 #define TEXT_BUFFER_H
 
@@ -10,14 +11,14 @@
 
 typedef struct {
     size_t length;
-    char buffer[2048]; /* longer than any sentence; what is too long is cut */
+    char buffer[2048]; /* longer than any message; longer text is truncated */
 } TextBuffer;
 
-static inline void append(TextBuffer *text, const char *piece)
+static inline void append(TextBuffer *text, const char *addition)
 {
-    size_t space = sizeof text->buffer - 1 - text->length, length = strlen(piece);
+    size_t space = sizeof text->buffer - 1 - text->length, length = strlen(addition);
     if (length > space) length = space;
-    memcpy(text->buffer + text->length, piece, length);
+    memcpy(text->buffer + text->length, addition, length);
     text->length += length;
     text->buffer[text->length] = '\0';
 }
@@ -29,7 +30,8 @@ static inline void append_integer(TextBuffer *text, int64_t number)
     append(text, digits);
 }
 
-/* One more in the last of some decimal digits; true if that made one digit more. */
+/* Increment a string of decimal digits in its last place. Returns 1 if the carry runs through all digits; the digits
+ * are then 1000... and the decimal exponent must grow by one. */
 static inline int increment_digits(char *digits, int length)
 {
     for (int i = length - 1; i >= 0; i--) {
@@ -43,36 +45,38 @@ static inline int increment_digits(char *digits, int length)
     return 1;
 }
 
-/* Whether 0.d1d2d3... times ten to the power reads back as the number; free of any decimal point. */
-static inline int round_trips(const char *digits, int power, double number)
+/* Check whether 0.d1d2d3... * 10^exponent reads back as the number. The text passed to strtod has no decimal point, so
+ * the result does not depend on the locale. */
+static inline int round_trips(const char *digits, int exponent, double number)
 {
-    char plain[40];
-    snprintf(plain, sizeof plain, "%se%d", digits, power - (int)strlen(digits));
-    return strtod(plain, NULL) == number;
+    char decimal[40];
+    snprintf(decimal, sizeof decimal, "%se%d", digits, exponent - (int)strlen(digits));
+    return strtod(decimal, NULL) == number;
 }
 
-/* The digits of a positive number and its power: number = 0.d1d2d3... * 10^power. */
+/* Find the shortest digits of a positive number. Returns the exponent: number = 0.d1d2d3... * 10^exponent. */
 static inline int shortest_digits(double number, char digits[20])
 {
     for (int length = 1;; length++) {
-        char full[40];
-        int power, found = 0;
-        snprintf(full, sizeof full, "%.*e", length - 1, number);
-        for (const char *c = full; *c != 'e'; c++) { /* whatever stands for the decimal point */
-            if (*c >= '0' && *c <= '9') digits[found++] = *c;
+        char scientific[40];
+        int exponent, n_digits = 0;
+        snprintf(scientific, sizeof scientific, "%.*e", length - 1, number);
+        for (const char *c = scientific; *c != 'e'; c++) { /* skip the decimal point, which depends on the locale */
+            if (*c >= '0' && *c <= '9') digits[n_digits++] = *c;
         }
-        digits[found] = '\0';
-        power = atoi(strchr(full, 'e') + 1) + 1;
-        if (length == 17 || round_trips(digits, power, number)) return power;
-        power += increment_digits(digits, found); /* beside a power of two the neighbours are not equally far */
-        if (round_trips(digits, power, number)) return power;
+        digits[n_digits] = '\0';
+        exponent = atoi(strchr(scientific, 'e') + 1) + 1;
+        if (length == 17 || round_trips(digits, exponent, number)) return exponent;
+        /* At a power of two the spacing of doubles differs above and below, so try the next decimal as well. */
+        exponent += increment_digits(digits, n_digits);
+        if (round_trips(digits, exponent, number)) return exponent;
     }
 }
 
 static inline void append_real(TextBuffer *text, double number)
 {
-    char digits[20], piece[40];
-    int power, length;
+    char digits[20], formatted[40];
+    int exponent, length;
     if (isnan(number)) {
         append(text, "nan");
         return;
@@ -83,20 +87,20 @@ static inline void append_real(TextBuffer *text, double number)
         append(text, number == 0.0 ? "0.0" : "inf");
         return;
     }
-    power = shortest_digits(number, digits);
+    exponent = shortest_digits(number, digits);
     length = (int)strlen(digits);
     while (length > 1 && digits[length - 1] == '0') digits[--length] = '\0';
-    if (power < -3 || power > 16) {
-        snprintf(piece, sizeof piece, "%c%s%se%c%02d", digits[0], length > 1 ? "." : "", digits + 1,
-                 power > 0 ? '+' : '-', abs(power - 1));
-    } else if (power <= 0) {
-        snprintf(piece, sizeof piece, "0.%.*s%s", -power, "0000", digits);
-    } else if (power >= length) {
-        snprintf(piece, sizeof piece, "%s%.*s.0", digits, power - length, "0000000000000000");
+    if (exponent < -3 || exponent > 16) {
+        snprintf(formatted, sizeof formatted, "%c%s%se%c%02d", digits[0], length > 1 ? "." : "", digits + 1,
+                 exponent > 0 ? '+' : '-', abs(exponent - 1));
+    } else if (exponent <= 0) {
+        snprintf(formatted, sizeof formatted, "0.%.*s%s", -exponent, "0000", digits);
+    } else if (exponent >= length) {
+        snprintf(formatted, sizeof formatted, "%s%.*s.0", digits, exponent - length, "0000000000000000");
     } else {
-        snprintf(piece, sizeof piece, "%.*s.%s", power, digits, digits + power);
+        snprintf(formatted, sizeof formatted, "%.*s.%s", exponent, digits, digits + exponent);
     }
-    append(text, piece);
+    append(text, formatted);
 }
 
 #endif

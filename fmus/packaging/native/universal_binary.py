@@ -1,20 +1,20 @@
-"""A universal binary of macOS: libraries for several processors in one file (Apple, mach-o/fat.h)."""
+"""Universal binaries of macOS: libraries for several processors in one file (Apple, mach-o/fat.h)."""
 
 from struct import pack, unpack_from
 
-MAGIC, MAGIC_OF_A_SLICE = 0xCAFEBABE, 0xFEEDFACF
-ALIGNMENT = 14  # as a power of two: the page of arm64, and a multiple of that of x86_64
+FAT_MAGIC, MACHO_MAGIC = 0xCAFEBABE, 0xFEEDFACF
+ALIGNMENT = 14  # exponent of two: the page size of arm64, a multiple of that of x86_64
 
 
 def make_universal_binary(slices: list[bytes]) -> bytes:
-    """The file that holds the slices; each tells its processor itself."""
-    place = 1 << ALIGNMENT
-    head, body = pack(">II", MAGIC, len(slices)), b""
+    """Combine libraries into one file. The header of each library has its processor type."""
+    offset = 1 << ALIGNMENT
+    header, body = pack(">II", FAT_MAGIC, len(slices)), b""
     for content in slices:
-        magic, processor, kind = unpack_from("<III", content)
-        if magic != MAGIC_OF_A_SLICE:
-            raise ValueError("a slice is no 64-bit Mach-O file")
-        head += pack(">IIIII", processor, kind, place, len(content), ALIGNMENT)
+        magic, processor, subtype = unpack_from("<III", content)
+        if magic != MACHO_MAGIC:
+            raise ValueError("not a 64-bit Mach-O file")
+        header += pack(">IIIII", processor, subtype, offset, len(content), ALIGNMENT)
         body += content + bytes(-len(content) % (1 << ALIGNMENT))
-        place = (1 << ALIGNMENT) + len(body)
-    return head.ljust(1 << ALIGNMENT, b"\0") + body
+        offset = (1 << ALIGNMENT) + len(body)
+    return header.ljust(1 << ALIGNMENT, b"\0") + body

@@ -1,4 +1,4 @@
-/* A declared variable; its value reference is its place in the table of model.h. */
+/* A declared variable. Its value reference is its index in the table in model.h. */
 #ifndef VARIABLE_H
 #define VARIABLE_H
 
@@ -11,36 +11,38 @@
 #define NO_OFFSET SIZE_MAX
 
 typedef struct {
-    const char *name, *text;
-    const char *unit, *allowed; /* the unit behind a number, and the range, in words */
-    size_t offset; /* in the model */
-    size_t tangent_offset;  /* in a direction; NO_OFFSET if it has none */
-    bool is_real;  /* a double; otherwise an int64_t */
+    const char *name, *text;       /* text: the description */
+    const char *unit, *allowed;    /* unit suffix and allowed range, as in messages */
+    size_t offset;                 /* in Model */
+    size_t tangent_offset;         /* in struct Tangent; NO_OFFSET without a derivative */
+    bool is_real;                  /* a double; otherwise an int64_t */
     bool is_calculated, is_fixed;
-    bool is_nan_after_failure;   /* reads NaN once the run has failed */
-    bool is_updated_on_read; /* tells of the solver, and is brought up to date when it is read */
-    bool is_state_or_input;       /* a state or an input: one along which there are derivatives */
-    size_t rate_offset, order_offset, derivatives_offset; /* of an input, in the model: its present rate, and its course; or NO_OFFSET */
-    double low, high, above, below;     /* low <= value <= high, above < value < below */
-    const int64_t *items, *items_end; /* of an enumeration */
+    bool is_nan_after_failure;     /* reads NaN after the run has failed */
+    bool is_updated_on_read;       /* solver and event statistics */
+    bool is_state_or_input;        /* allowed as a known in directional derivatives */
+    /* Of an input that can be interpolated, in Model: its time derivative, the order of its polynomial and the
+     * polynomial's derivatives; otherwise NO_OFFSET. */
+    size_t rate_offset, order_offset, derivatives_offset;
+    double low, high, above, below;   /* low <= value <= high, above < value < below */
+    const int64_t *items, *items_end; /* values of an enumeration */
 } Variable;
 
-/* A value that was set and cannot be used; the earliest is told first. */
+/* A value that was set and is invalid. The message reports the one that was set first. */
 typedef struct {
-    int64_t reason; /* OK where there is none */
+    int64_t reason;   /* OK: the value of this variable is valid */
     double value;
-    int64_t sequence;
+    int64_t sequence; /* counts invalid values in the order of the calls */
 } RejectedValue;
 
-/* An int or a bool of the numerics, as a member of the state. */
+/* An int or a bool in State, for validation of saved states. */
 typedef struct {
     size_t offset;
     bool is_bool; /* otherwise an int64_t */
 } Member;
 
-/* What is told of a call that is refused. */
+/* Fields of a message about a refused call. */
 typedef struct {
-    const char *function, *word; /* what it is about: a type, an address, phases */
+    const char *function, *word; /* word: a type, an argument or the allowed phases */
     const char *phase;
     uint32_t reference;
 } Call;

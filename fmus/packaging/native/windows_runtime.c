@@ -1,12 +1,14 @@
-/* What our libraries for Windows need beside its C runtime (UCRT), whose functions of mathematics are those of every
- * program there, Python among them.  The compiler's own layer over it would bring others, and takes minutes to make. */
+/* Functions that our Windows libraries need in addition to the Universal C Runtime (UCRT). Linking UCRT directly uses
+ * the same math functions as every other program on the machine, including Python. The compiler's MinGW layer would
+ * bring its own and takes minutes to build. */
 #include <stdarg.h>
 #include <stddef.h>
 
 int __stdio_common_vsprintf(unsigned long long options, char *text, size_t size, const char *format, void *locale,
                             va_list values);
 
-/* In UCRT a function that Microsoft's headers write out (stdio.h); 2: as the standard has it, ended by a zero. */
+/* UCRT does not export snprintf: Microsoft's stdio.h defines it inline. Option 2 selects the behaviour of the C
+ * standard: the text is always null-terminated. */
 int snprintf(char *text, size_t size, const char *format, ...)
 {
     va_list values;
@@ -17,7 +19,7 @@ int snprintf(char *text, size_t size, const char *format, ...)
     return length;
 }
 
-/* Where Windows enters the library: nothing is to be done. */
+/* Entry point of the library; there is nothing to initialise. */
 int __stdcall DllMainCRTStartup(void *library, unsigned long reason, void *reserved)
 {
     (void)library, (void)reason, (void)reserved;

@@ -1,11 +1,11 @@
-"""The page that runs: models as WebAssembly in one HTML file, which needs nothing but a browser.
+"""Builds the live page: models as WebAssembly in one HTML file that needs nothing but a browser.
 
-    portrait.py      what the page knows of a model: its variables, and what moves, from its declaration
-    presets.py       published cases, from the scenes
-    wasm.py          the native sources, compiled for the browser
-    page.py          the file: page.html, style.css and script/*.js, put together
+    model_json.py    a model for the page, in JSON: variables, and what to draw
+    presets.py       published cases, from scene files
+    wasm.py          compiles the native C sources for the browser
+    html_page.py     combines page.html, style.css and script/*.js to one file
 
-The script is modules, in the order of MODULES in page.py, each importing only from those before it.
+The modules in script/ are concatenated in the order of MODULES in html_page.py; each imports only from earlier ones.
 """
 
 from .html_page import build

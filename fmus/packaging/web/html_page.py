@@ -1,4 +1,4 @@
-"""The file: models, style and script put together, and a policy that lets the page load nothing."""
+"""Builds the HTML file from models, style and script, with a content security policy that blocks all requests."""
 
 import json
 from base64 import b64encode
@@ -46,9 +46,18 @@ def build(
     laws: Sequence[str] = (),
     scenes: Iterable[Path] = (),
 ) -> Path:
-    """Write the page of these models, with the published cases among the scenes, into `folder`.
+    """Build the live page of models and write it to `folder`.
 
-    Methods and friction laws may be chosen, as for an FMU.
+    Parameters
+    ----------
+    sources
+        The models.
+    folder
+        Output folder.
+    methods, laws
+        Labels of the methods and friction laws to include; none: all.
+    scenes
+        Scene files. Those with published values of one of the models become presets.
     """
     with ThreadPoolExecutor() as pool:
         models = list(pool.map(lambda source: model_with_code(source, methods, laws), sources))
@@ -61,15 +70,15 @@ def build(
 
 
 def model_with_code(source: ModelFile, methods: Sequence[str], laws: Sequence[str]) -> ModelJson:
-    """All that the page needs of a model."""
+    """Return a model for the page, with its compiled code."""
     model = lowered_model(source, select_features(source, methods, laws))
     files, description = generate_c_sources(model, source.name, build_date(), "2")
-    told = build_model_json(source, model)
-    return told | {"guid": fromstring(description).attrib["guid"], "code": compile_to_base64(source.name, files)}
+    described = build_model_json(source, model)
+    return described | {"guid": fromstring(description).attrib["guid"], "code": compile_to_base64(source.name, files)}
 
 
 def render_page(data: object) -> str:
-    """The HTML text around the data."""
+    """Return the HTML text of the page."""
     style = (HERE / "style.css").read_text(encoding="utf-8")
     code = bundle_script()
     policy = (
@@ -77,17 +86,17 @@ def render_page(data: object) -> str:
         "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
     text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    frame = Template((HERE / "page.html").read_text(encoding="utf-8"))
-    return frame.substitute(policy=policy, style=style, script=code, data=text)
+    template = Template((HERE / "page.html").read_text(encoding="utf-8"))
+    return template.substitute(policy=policy, style=style, script=code, data=text)
 
 
 def bundle_script() -> str:
-    """The modules in one: what they import from each other stands before it."""
+    """Concatenate the JavaScript modules, without their imports and exports."""
     texts = ((HERE / "script" / f"{name}.js").read_text(encoding="utf-8") for name in MODULES)
     lines = (line.removeprefix("export ") for text in texts for line in text.splitlines())
     return "\n".join(line for line in lines if not line.startswith("import "))
 
 
 def csp_hash(text: str) -> str:
-    """A text, as a policy names it."""
+    """Return the hash of an inline script or style for the content security policy."""
     return f"'sha256-{b64encode(sha256(text.encode()).digest()).decode()}'"

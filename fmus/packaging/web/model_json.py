@@ -1,4 +1,4 @@
-"""What the page knows of a model: its variables, and what moves, read from its declaration and never from its name."""
+"""Describes a model for the page, in JSON: variables and moving bodies, derived from the declaration of the model."""
 
 import re
 from inspect import cleandoc
@@ -16,11 +16,11 @@ from ..model_description import declared_variables
 from ..units import unit_of
 
 FORCES = ("N", "N.m")
-ModelJson = dict[str, Any]  # as it stands in the page, in JSON
+ModelJson = dict[str, Any]  # an object of the JSON data in the page
 
 
 def build_model_json(source: ModelFile, model: type[VariableOwner]) -> ModelJson:
-    """The model of an author's file, as it is written out: words, default run, variables and bodies."""
+    """Describe a model: documentation, default experiment, variables and bodies."""
     title, *blocks = cleandoc(model.__doc__ or "").split("\n\n")
     return {
         "name": source.name,
@@ -34,71 +34,71 @@ def build_model_json(source: ModelFile, model: type[VariableOwner]) -> ModelJson
 
 
 def variable_json(name: str, meaning: VariableDeclaration) -> ModelJson:
-    """A declared variable; its value in the unit `shown` is `factor` times that in SI."""
+    """Describe a variable. Its value in the unit `display_unit` is `factor` times its value in SI units."""
     unit = unit_of(name, meaning.unit or "1")
-    shown = {
+    described = {
         "name": name,
         "symbol": typeset(re.sub(r"(?<=[a-z])0$", "_0", name)),
         "type": meaning.type,
         "causality": meaning.causality,
         "text": meaning.text,
         "unit": meaning.unit,
-        "shown": readable_unit(meaning.display or meaning.unit),
+        "display_unit": readable_unit(meaning.display or meaning.unit),
         "factor": unit.factor if meaning.display else 1.0,
-        "powers": [unit.kg, unit.m, unit.s, unit.rad],
+        "unit_exponents": [unit.kg, unit.m, unit.s, unit.rad],
         "start": meaning.start,
         "fixed": meaning.variability == "fixed",
         "allowed": readable_unit(meaning.allowed),
         "items": [{"label": label, "value": value, "text": text} for label, value, text in meaning.items],
     }
     bounds = {"low": meaning.low, "high": meaning.high, "above": meaning.above, "below": meaning.below}
-    return shown | {word: bound for word, bound in bounds.items() if isfinite(bound)}
+    return described | {key: bound for key, bound in bounds.items() if isfinite(bound)}
 
 
 def list_bodies(analysis: ModelAnalysis) -> list[ModelJson]:
-    """Whatever has a position, and what acts on it; a model without any shows its first state and its rate."""
-    found = [body_json(analysis, x) for x in analysis.positions]
+    """Describe the bodies of a model, one per position; without any, the first state and its derivative."""
+    described = [body_json(analysis, x) for x in analysis.positions]
     x = analysis.states[0]
-    return found or [{"kind": "none", "position": x.name, "speed": analysis.rate[x].name}]
+    return described or [{"kind": "none", "position": x.name, "speed": analysis.rate[x].name}]
 
 
 def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
-    """One of them: `kind` is block, pendulum or rotor; the rest are names of variables, where there are any."""
+    """Describe a body: `kind` is block, pendulum or rotor; the other items are names of variables."""
     v = analysis.rate[x]
     a = next((e for s, e in analysis.rate.items() if s is v), None)
     law: Operand = a.expression if isinstance(a, Output) else 0.0
     restoring, damping = differentiate(law, {x: 1.0}), differentiate(law, {v: 1.0})
-    turns, bends = x.unit == "rad", depends_on(restoring, (x,))
+    is_angle, is_nonlinear = x.unit == "rad", depends_on(restoring, (x,))
     frictions = [c for c in analysis.contacts if depends_on(c.slip, (v,))] or [
         e for e in analysis.outputs if is_friction_force(e, v)
     ]
     linked = [y.name for y in analysis.positions if y is not x and depends_on(law, (y,))]
     drives = [d for d in analysis.drivers if depends_on(law, (d,))]
-    found = {
-        "kind": "pendulum" if turns and bends else "rotor" if turns else "block",
+    items = {
+        "kind": "pendulum" if is_angle and is_nonlinear else "rotor" if is_angle else "block",
         "position": x.name,
         "speed": v.name,
         "acceleration": a.name if a is not None else "",
         "driver": next((d.name for d in drives), ""),
         "driver_speed": next((d.constant_rate.name for d in drives), ""),
         "linked": linked,
-        "spring": not bends and not is_same_expression(restoring, 0.0) and bool(drives or not linked),
+        "spring": not is_nonlinear and not is_same_expression(restoring, 0.0) and bool(drives or not linked),
         "dampers": [] if depends_on(damping, (v,)) else scaling_parameters(damping),
         "friction": next((e.name for e in frictions), ""),
         "mode": next((c.mode.name for c in frictions if isinstance(c, Contact)), ""),
         "start": x.start_expression.name if isinstance(x.start_expression, Fixed) else "",
         "input": next((e.name for e in analysis.inputs if depends_on(law, (e,))), ""),
     }
-    return {word: value for word, value in found.items() if value}
+    return {key: value for key, value in items.items() if value}
 
 
 def scaling_parameters(e: Operand) -> list[str]:
-    """The parameters in an expression that are no mass or inertia: any of them at zero makes it zero."""
+    """Return the parameters in a damping coefficient, except masses, inertias and lengths: if one is zero, so is it."""
     return [
         leaf.name for leaf in variables_in(e) if isinstance(leaf, Parameter) and leaf.unit not in ("kg", "kg.m2", "m")
     ]
 
 
 def is_friction_force(e: Output, v: State | Output) -> bool:
-    """Whether an output is a force that hangs on the speed, and not in proportion."""
+    """Check whether an output is a force or torque that depends nonlinearly on the speed."""
     return e.unit in FORCES and depends_on(differentiate(e, {v: 1.0}), (v,))

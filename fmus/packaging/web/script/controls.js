@@ -1,130 +1,131 @@
-// Sliders, number fields and choices, made from the declared variables.
+// Sliders, number fields and drop-down lists for the variables of a model.
 
-import { told } from "./plot.js";
-import { named } from "./state.js";
+import { formatNumber } from "./plot.js";
+import { findVariable } from "./state.js";
 
-const STEPS = 400; // of a slider
-const DIGITS = 7; // that a number field shows
-const WIDER = 2; // where nothing bounds a slider: so many times the size that is usual
+const SLIDER_STEPS = 400;
+const FIELD_DIGITS = 7;
+const UNBOUNDED_RANGE = 2; // range of a slider without bounds, in typical sizes of the variable
 
-// An element with attributes, and what is in it.
-export function make(name, attributes = {}, ...children) {
-  const made = document.createElement(name);
+// Create an element with attributes and children.
+export function makeElement(name, attributes = {}, ...children) {
+  const element = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) {
-    if (key === "html") made.innerHTML = value; // only what the page brings along
-    else if (typeof value === "boolean") made.toggleAttribute(key, value);
-    else made.setAttribute(key, value);
+    if (key === "html") element.innerHTML = value; // only HTML from the build
+    else if (typeof value === "boolean") element.toggleAttribute(key, value);
+    else element.setAttribute(key, value);
   }
-  made.append(...children);
-  return made;
+  element.append(...children);
+  return element;
 }
 
-// Where a slider begins and ends, in SI units, and whether in equal ratios.  `usual` is the size of what is zero.
-export function span(variable, usual) {
+// The range of a slider in SI units and whether it is logarithmic. `typicalSize` applies to variables that start at zero.
+export function sliderRange(variable, typicalSize) {
   const { start, unit } = variable;
   const low = variable.low ?? variable.above;
   const high = variable.high ?? variable.below;
   if (variable.above === 0 && start > 0) return { low: start / 10, high: Math.min(start * 10, high ?? Infinity), log: true };
   if (unit === "rad" && low === undefined) return { low: -Math.PI, high: Math.PI, log: false };
-  const size = WIDER * (Math.abs(start) || usual || 1);
+  const size = UNBOUNDED_RANGE * (Math.abs(start) || typicalSize || 1);
   return { low: low ?? -size, high: high ?? size * (low === undefined ? 1 : 1.5), log: false };
 }
 
-function placeOf(value, { low, high, log }) {
-  const share = log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
-  return Math.round(STEPS * Math.min(Math.max(share || 0, 0), 1));
+function sliderPosition(value, { low, high, log }) {
+  const fraction = log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+  return Math.round(SLIDER_STEPS * Math.min(Math.max(fraction || 0, 0), 1));
 }
 
-// The value at a place of a slider, in three digits of what the slider spans.
-function valueAtPlace(place, { low, high, log }, factor) {
-  const share = place / STEPS;
-  if (log) return Number((low * (high / low) ** share * factor).toPrecision(3)) / factor;
-  const digits = Math.max(0, Math.ceil(-Math.log10(((high - low) * factor) / STEPS)) + 1);
-  return Number(((low + share * (high - low)) * factor).toFixed(Math.min(digits, 12))) / factor;
+// The value at a slider position, rounded to three digits of the slider's range.
+function sliderValue(position, { low, high, log }, factor) {
+  const fraction = position / SLIDER_STEPS;
+  if (log) return Number((low * (high / low) ** fraction * factor).toPrecision(3)) / factor;
+  const digits = Math.max(0, Math.ceil(-Math.log10(((high - low) * factor) / SLIDER_STEPS)) + 1);
+  return Number(((low + fraction * (high - low)) * factor).toFixed(Math.min(digits, 12))) / factor;
 }
 
-// Gives the size that a variable usually has, where its start is zero: from the default run `main`, by its unit.
-export function sizes(main) {
+// Return a function that estimates the typical size of a variable from its unit and the results of the default run.
+export function typicalSizes(main) {
   const { modelInfo } = main.fmu;
   const [{ position, speed }] = modelInfo.bodies;
-  const first = (unit) => modelInfo.variables.find((each) => each.unit === unit && each.start > 0)?.start ?? 1;
-  const length = named(modelInfo, position).unit === "m" ? main.largest(position) : first("m");
-  const bases = [first("kg"), length, main.largest(position) / main.largest(speed), 1];
-  return ({ unit, powers }) => {
-    const alike = main.reals.filter((name) => named(modelInfo, name).unit === unit).map((name) => main.largest(name));
-    const size = Math.max(0, ...alike) || powers.reduce((product, power, i) => product * bases[i] ** power, 1);
+  const firstStart = (unit) => modelInfo.variables.find((variable) => variable.unit === unit && variable.start > 0)?.start ?? 1;
+  const length = findVariable(modelInfo, position).unit === "m" ? main.largestMagnitude(position) : firstStart("m");
+  const baseSizes = [firstStart("kg"), length, main.largestMagnitude(position) / main.largestMagnitude(speed), 1];
+  return ({ unit, unit_exponents }) => {
+    const sameUnit = main.reals.filter((name) => findVariable(modelInfo, name).unit === unit).map((name) => main.largestMagnitude(name));
+    const size = Math.max(0, ...sameUnit) || unit_exponents.reduce((product, exponent, i) => product * baseSizes[i] ** exponent, 1);
     return Number.isFinite(size) && size > 0 ? Number(size.toPrecision(1)) : 1;
   };
 }
 
-// One row: name, words, number, unit, slider.  `onChange(value)` is told the value in SI, `refuse(sentence)` what was
-// typed that is no number.
+// One row of the form: symbol, description, number field, unit and slider. Calls onChange(value) with the value in SI
+// units, and onError(message) if the input is not a number.
 export class Field {
-  constructor(variable, usual, onChange, refuse) {
-    const { name, text, shown, factor, symbol, allowed } = variable;
-    Object.assign(this, { variable, span: span(variable, usual) });
+  constructor(variable, typicalSize, onChange, onError) {
+    const { name, text, display_unit, factor, symbol, allowed } = variable;
+    Object.assign(this, { variable, range: sliderRange(variable, typicalSize) });
     const id = `field-${name}`;
-    const words = `${text}${shown ? `, in ${shown}` : ""}`;
-    this.number = make("input", { type: "number", step: "any", id, inputmode: "decimal", title: `${name}: ${allowed}` });
-    this.slider = make("input", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${name}: ${words}` });
-    const label = make("label", { for: id }, make("b", { html: symbol }), ` ${text}`);
-    this.element = make("div", { class: "field" }, label, make("span", { class: "entry" }, this.number, make("span", { class: "unit" }, shown)), this.slider);
-    this.slider.addEventListener("input", () => this.take(valueAtPlace(Number(this.slider.value), this.span, factor), onChange));
+    const description = `${text}${display_unit ? `, in ${display_unit}` : ""}`;
+    this.number = makeElement("input", { type: "number", step: "any", id, inputmode: "decimal", title: `${name}: ${allowed}` });
+    this.slider = makeElement("input", { type: "range", min: 0, max: SLIDER_STEPS, step: 1, "aria-label": `${name}: ${description}` });
+    const label = makeElement("label", { for: id }, makeElement("b", { html: symbol }), ` ${text}`);
+    this.element = makeElement("div", { class: "field" }, label, makeElement("span", { class: "entry" }, this.number, makeElement("span", { class: "unit" }, display_unit)), this.slider);
+    this.slider.addEventListener("input", () => this.changeTo(sliderValue(Number(this.slider.value), this.range, factor), onChange));
     this.number.addEventListener("change", () => {
-      const { value } = this.number; // "" if it is no number
-      if (value) return this.take(value === this.begun ? variable.start : Number(value) / factor, onChange);
-      this.number.value = this.shown;
-      refuse(`${name} takes a number: it stays ${`${this.shown} ${shown}`.trim()}.`);
+      const { value } = this.number; // "" if it is not a number
+      if (value) return this.changeTo(value === this.initialText ? variable.start : Number(value) / factor, onChange);
+      this.number.value = this.text;
+      onError(`${name} must be a number; it remains ${`${this.text} ${display_unit}`.trim()}.`);
     });
-    this.begun = this.spelled(variable.start);
+    this.initialText = this.formatValue(variable.start);
   }
 
-  spelled(value) {
-    return String(Number((value * this.variable.factor).toPrecision(DIGITS)));
+  formatValue(value) {
+    return String(Number((value * this.variable.factor).toPrecision(FIELD_DIGITS)));
   }
 
-  take(value, onChange) {
-    this.put(value);
+  changeTo(value, onChange) {
+    this.show(value);
     onChange(value);
   }
 
-  // Show a value in SI, which changes nothing.
-  put(value) {
-    const { shown, factor } = this.variable;
-    this.shown = this.spelled(value);
-    if (this.number.value !== this.shown) this.number.value = this.shown;
-    this.slider.value = placeOf(value, this.span);
-    this.slider.setAttribute("aria-valuetext", `${told(value * factor)} ${shown}`);
+  // Show a value in SI units, without calling onChange.
+  show(value) {
+    const { display_unit, factor } = this.variable;
+    this.text = this.formatValue(value);
+    if (this.number.value !== this.text) this.number.value = this.text;
+    this.slider.value = sliderPosition(value, this.range);
+    this.slider.setAttribute("aria-valuetext", `${formatNumber(value * factor)} ${display_unit}`);
   }
 }
 
-// A list to choose from: [value, text] pairs under a label.
+// A drop-down list with a label.
 export class Choice {
   constructor(id, text, onChange) {
-    this.list = make("select", { id });
-    this.element = make("div", { class: "choice" }, make("label", { for: id }, text), this.list);
+    this.list = makeElement("select", { id });
+    this.element = makeElement("div", { class: "choice" }, makeElement("label", { for: id }, text), this.list);
     this.list.addEventListener("change", () => onChange(this.list.value));
   }
 
-  fill(pairs, chosen) {
-    const key = JSON.stringify(pairs);
-    if (key !== this.key) this.list.replaceChildren(...pairs.map(([value, text, title]) => make("option", { value, ...(title && { title }) }, text)));
+  // Fill the list with options [value, text, title] and select one.
+  fill(options, selected) {
+    const key = JSON.stringify(options);
+    if (key !== this.key) this.list.replaceChildren(...options.map(([value, text, title]) => makeElement("option", { value, ...(title && { title }) }, text)));
     this.key = key;
-    this.list.value = String(chosen);
-    this.element.hidden = pairs.length < 2;
+    this.list.value = String(selected);
+    this.element.hidden = options.length < 2;
   }
 }
 
 export const TOLERANCES = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
 
-// The pairs for a choice of a relative tolerance; zero is that of the model.
-export function tolerances(modelInfo, chosen) {
-  const all = chosen && !TOLERANCES.includes(chosen) ? [chosen, ...TOLERANCES] : TOLERANCES;
-  const power = (value) => value.toExponential().replace("-", "−");
-  return [[0, `default, ${power(modelInfo.tolerance)}`], ...all.map((each) => [each, power(each)])];
+// The options for a relative tolerance; zero is the default of the model.
+export function toleranceOptions(modelInfo, selected) {
+  const all = selected && !TOLERANCES.includes(selected) ? [selected, ...TOLERANCES] : TOLERANCES;
+  const format = (value) => value.toExponential().replace("-", "−");
+  return [[0, `default, ${format(modelInfo.tolerance)}`], ...all.map((rtol) => [rtol, format(rtol)])];
 }
 
-// The pairs for an enumeration.
-export function items(variable) {
+// The options for an enumeration.
+export function itemOptions(variable) {
   return variable ? variable.items.map(({ label, value, text }) => [value, label, text]) : [];
 }

@@ -1,12 +1,12 @@
-// The diagrams in their places: what the panels say is drawn, each under its title.
+// The diagrams on the page, each below its title.
 
-import { make } from "./controls.js";
-import { panels, spotted } from "./panels.js";
+import { makeElement } from "./controls.js";
+import { buildPanels, cursorReadings } from "./panels.js";
 import { Plot, readColours } from "./plot.js";
 
 export class Diagrams {
   constructor(host, onSeek) {
-    Object.assign(this, { host, onSeek, plots: new Map() }); // key of a diagram -> {plot, figure, heading, reading, panel}
+    Object.assign(this, { host, onSeek, plots: new Map() }); // by key: {plot, figure, heading, reading, panel}
     readColours();
   }
 
@@ -15,46 +15,47 @@ export class Diagrams {
     this.host.replaceChildren();
   }
 
-  draw(session, state, tools) {
-    const found = panels(session, state, tools);
-    for (const [key, { figure }] of this.plots) figure.hidden = !found.some((panel) => panel.key === key);
-    const fresh = found.filter(({ key }) => !this.plots.has(key));
-    for (const { key } of fresh) this.plots.set(key, this.made(key));
-    if (fresh.length) this.host.append(...found.map(({ key }) => this.plots.get(key).figure)); // in their order
-    for (const panel of found) {
-      const known = this.plots.get(panel.key);
-      if (known.panel?.title !== panel.title) {
-        known.heading.innerHTML = panel.symbol ? `<b>${panel.symbol}</b> ` : ""; // made by the builder
-        known.heading.append(panel.title);
+  // Draw the diagrams of a state; `options` has `envelopes`.
+  draw(session, state, options) {
+    const panels = buildPanels(session, state, options);
+    for (const [key, { figure }] of this.plots) figure.hidden = !panels.some((panel) => panel.key === key);
+    const added = panels.filter(({ key }) => !this.plots.has(key));
+    for (const { key } of added) this.plots.set(key, this.createDiagram(key));
+    if (added.length) this.host.append(...panels.map(({ key }) => this.plots.get(key).figure)); // restores the order
+    for (const panel of panels) {
+      const diagram = this.plots.get(panel.key);
+      if (diagram.panel?.title !== panel.title) {
+        diagram.heading.innerHTML = panel.symbol ? `<b>${panel.symbol}</b> ` : ""; // HTML from the build
+        diagram.heading.append(panel.title);
       }
-      known.panel = panel;
-      known.plot.show(panel.content);
+      diagram.panel = panel;
+      diagram.plot.show(panel.content);
     }
   }
 
-  made(key) {
-    const heading = make("span");
-    const reading = make("span", { class: "reading" });
-    const host = make("div", { class: "plot" });
-    const figure = make("figure", { id: `panel-${key}` }, make("figcaption", {}, heading, reading), host);
+  createDiagram(key) {
+    const heading = makeElement("span");
+    const reading = makeElement("span", { class: "reading" });
+    const host = makeElement("div", { class: "plot" });
+    const figure = makeElement("figure", { id: `panel-${key}` }, makeElement("figcaption", {}, heading, reading), host);
     return { plot: new Plot(host, key === "phase" ? null : this.onSeek), figure, heading, reading };
   }
 
-  // Put the cursor at t in s.
-  point(session, t) {
-    for (const { plot, panel, reading } of this.shown()) {
-      const { spot, readings } = spotted(panel, session, t);
-      plot.point(spot);
-      reading.replaceChildren(...readings.map(({ text, colour }) => make("span", { class: colour }, text)));
+  // Move the cursor to a time in s.
+  moveCursor(session, t) {
+    for (const { plot, panel, reading } of this.visible()) {
+      const { cursor, readings } = cursorReadings(panel, session, t);
+      plot.moveCursor(cursor);
+      reading.replaceChildren(...readings.map(({ text, colour }) => makeElement("span", { class: colour }, text)));
     }
   }
 
-  shown() {
+  visible() {
     return [...this.plots.values()].filter(({ figure }) => !figure.hidden);
   }
 
-  // Draw all anew, in the colours that there are now.
-  paint() {
+  // Redraw everything in the current colours.
+  repaint() {
     readColours();
     for (const { plot } of this.plots.values()) plot.paint();
   }

@@ -1,81 +1,84 @@
-// The hand in the mechanism: it puts a body, pulls it or pushes it.
+// Dragging a body: sets its start position, pulls it with a force, or gives it a kick.
 
-import { change, CLOSE } from "./overrides.js";
-import { named, valueAt } from "./state.js";
+import { addChange, MIN_CHANGE_SPACING } from "./overrides.js";
+import { findVariable, valueAt } from "./state.js";
 
-const SHORT = 1 / 40; // of a run: how long a kick lasts
+const KICK_DURATION = 1 / 40; // of the run
 
 export class DragController {
-  // `page` has state, modelInfo and session, and can put(variable, value), edited(), play() and wake().
+  // `page` has state, modelInfo and session, and the functions setVariable(variable, value), restartEdited(), play() and
+  // requestFrame().
   constructor(page) {
-    Object.assign(this, { page, pull: null }); // pull: while a body is dragged
+    Object.assign(this, { page, active: null }); // active: the drag in progress
   }
 
-  // A push on the first body that takes main, as hard as its forces are.
+  // Apply a force pulse to the first body with an input, twice the largest force of the run.
   kick() {
     const { state, modelInfo } = this.page;
-    const body = modelInfo.bodies.find((each) => each.input);
+    const body = modelInfo.bodies.find(({ input }) => input);
     if (!body) return;
-    const rest = valueAt(modelInfo, state, body.input, state.t);
-    change(state, body.input, rest + 2 * this.strength(body), state.t);
-    change(state, body.input, rest, Math.min(state.t + SHORT * state.stop, state.stop));
-    this.page.edited();
+    const restForce = valueAt(modelInfo, state, body.input, state.t);
+    addChange(state, body.input, restForce + 2 * this.largestForce(body), state.t);
+    addChange(state, body.input, restForce, Math.min(state.t + KICK_DURATION * state.stop, state.stop));
+    this.page.restartEdited();
     this.page.play();
   }
 
-  // At the start a body is put where it shall begin; later it is pulled along, as by a spring.
+  // Start dragging. At time zero this sets the start position; later it pulls the body with a virtual spring.
   grab(body) {
     const { state, modelInfo, playing } = this.page;
-    const place = state.t === 0 && !playing && named(modelInfo, body.start);
-    if (place) this.pull = { place };
+    const startVariable = state.t === 0 && !playing && findVariable(modelInfo, body.start);
+    if (startVariable) this.active = { startVariable };
     else if (body.input) {
-      this.pull = { body, rest: valueAt(modelInfo, state, body.input, state.t), stiffness: this.stiffness(body) };
+      this.active = { body, restForce: valueAt(modelInfo, state, body.input, state.t), stiffness: this.stiffness(body) };
       this.page.play();
     }
   }
 
-  move(to) {
-    if (!this.pull) return;
-    this.pull.to = to;
-    this.page.wake();
+  move(target) {
+    if (!this.active) return;
+    this.active.target = target;
+    this.page.requestFrame();
   }
 
   drop() {
-    if (!this.pull) return;
-    const { place, body, rest } = this.pull;
+    if (!this.active) return;
+    const { startVariable, body, restForce } = this.active;
     const { state } = this.page;
-    this.pull = null;
-    if (!place) {
+    this.active = null;
+    if (!startVariable) {
       const last = state.changes.findLast(({ name }) => name === body.input);
-      change(state, body.input, rest, Math.max(state.t, (last?.t ?? 0) + 1.01 * CLOSE * state.stop)); // however short it was
-      this.page.edited();
+      // The force lasts for a minimum time, so that the end of the pull does not replace it.
+      addChange(state, body.input, restForce, Math.max(state.t, (last?.t ?? 0) + 1.01 * MIN_CHANGE_SPACING * state.stop));
+      this.page.restartEdited();
     }
     this.page.play();
   }
 
-  // What the pull does in a frame.
-  act() {
+  // Apply the drag; called once per frame.
+  update() {
     const { state, session } = this.page;
-    const { place, body, to, rest, stiffness } = this.pull;
-    if (to === undefined || !session.runs.main.reaches(state.t)) return; // the last change is still being run
-    if (place) {
-      this.page.put(place, Number((to * place.factor).toPrecision(3)) / place.factor);
+    const { startVariable, body, target, restForce, stiffness } = this.active;
+    if (target === undefined || !session.runs.main.hasReached(state.t)) return; // the last change is still being simulated
+    if (startVariable) {
+      this.page.setVariable(startVariable, Number((target * startVariable.factor).toPrecision(3)) / startVariable.factor);
       return;
     }
-    const apart = to - session.runs.main.at(body.position, state.t);
-    change(state, body.input, rest + Number((stiffness * apart).toPrecision(3)), state.t);
-    this.page.edited();
+    const extension = target - session.runs.main.at(body.position, state.t);
+    addChange(state, body.input, restForce + Number((stiffness * extension).toPrecision(3)), state.t);
+    this.page.restartEdited();
   }
 
-  // The largest force on a body in the run, by the unit of its input.
-  strength(body) {
+  // The largest force (or torque) in the run, among outputs with the unit of the input.
+  largestForce(body) {
     const { session, modelInfo } = this.page;
-    const { unit } = named(modelInfo, body.input);
+    const { unit } = findVariable(modelInfo, body.input);
     const { main } = session.runs;
-    return Math.max(0, ...main.reals.filter((name) => named(modelInfo, name).unit === unit).map((name) => main.largest(name))) || 1;
+    return Math.max(0, ...main.reals.filter((name) => findVariable(modelInfo, name).unit === unit).map((name) => main.largestMagnitude(name))) || 1;
   }
 
+  // The stiffness of the virtual spring.
   stiffness(body) {
-    return (4 * this.strength(body)) / (this.page.session.runs.main.largest(body.position) || 1);
+    return (4 * this.largestForce(body)) / (this.page.session.runs.main.largestMagnitude(body.position) || 1);
   }
 }

@@ -1,92 +1,92 @@
-// All that can be set: lists, sliders and number fields, made for a model and kept at what is in force.
+// The form with all settings: lists, sliders and number fields.
 
-import { Choice, Field, items, make, tolerances } from "./controls.js";
-import { told } from "./plot.js";
-import { beside, inForce, named, settable, valueAt } from "./state.js";
+import { Choice, Field, itemOptions, makeElement, toleranceOptions } from "./controls.js";
+import { formatNumber } from "./plot.js";
+import { comparisonSettings, effectiveValues, findVariable, settableVariables, valueAt } from "./state.js";
 
-const DIRECT = { // lists of their own: variable, words, words for the run beside
-  friction: ["friction", "Friction law", "its law"],
-  method: ["solver.method", "Method", "its method"],
-  rtol: ["solver.rtol", "Tolerance", "its tolerance"],
+const SOLVER_LISTS = { // id: variable, label, label for the comparison run
+  friction: ["friction", "Friction law", "2nd run: law"],
+  method: ["solver.method", "Method", "2nd run: method"],
+  rtol: ["solver.rtol", "Tolerance", "2nd run: tolerance"],
 };
 
 export class Form {
-  // `act` is told what people do: preset(name), choose(name, value), beside(words), body(number), put(variable, value),
-  // length(s), forget(), refuse(sentence).
-  constructor(models, presets, act) {
-    Object.assign(this, { models, presets, act, fields: new Map() });
+  // `actions` has the functions to call on input: preset(name), choose(name, value), compare(values), body(index),
+  // setVariable(variable, value), setStopTime(seconds), clearChanges(), reportError(message).
+  constructor(models, presets, actions) {
+    Object.assign(this, { models, presets, actions, fields: new Map() });
     const list = (id, text, onChange) => [id, new Choice(id, text, onChange)];
-    const direct = Object.entries(DIRECT);
+    const solverLists = Object.entries(SOLVER_LISTS);
     this.lists = Object.fromEntries([
-      list("preset", "Published case", act.preset),
-      ...direct.map(([id, [name, text]]) => list(id, text, (value) => act.choose(name, Number(value)))),
-      list("comparison", "Beside it", (model) => act.beside({ model })),
-      ...direct.map(([id, [name, , text]]) => list(`comparison-${id}`, text, (value) => act.beside({ [name]: Number(value) }))),
-      list("body", "Body", (value) => act.body(Number(value))),
+      list("preset", "Published case", actions.preset),
+      ...solverLists.map(([id, [name, text]]) => list(id, text, (value) => actions.choose(name, Number(value)))),
+      list("comparison", "Compare with", (model) => actions.compare({ model })),
+      ...solverLists.map(([id, [name, , text]]) => list(`comparison-${id}`, text, (value) => actions.compare({ [name]: Number(value) }))),
+      list("body", "Body", (value) => actions.body(Number(value))),
     ]);
   }
 
-  // The fields of another model; `usual` gives the size of a variable that starts at zero.
-  build(modelInfo, usual) {
-    const { act, fields } = this;
+  // Create the fields of a model; `typicalSize` estimates the size of variables that start at zero.
+  build(modelInfo, typicalSize) {
+    const { actions, fields } = this;
     fields.clear();
-    const rows = { fields: [], rare: [] };
-    const place = (variable, field) => {
+    const rows = { fields: [], "solver-fields": [] };
+    const addField = (variable, field) => {
       fields.set(variable.name, field);
-      rows[variable.name.includes(".") ? "rare" : "fields"].push(field.element);
+      rows[variable.name.includes(".") ? "solver-fields" : "fields"].push(field.element);
     };
-    const own = settable(modelInfo).filter(({ name }) => !Object.values(DIRECT).some(([direct]) => direct === name));
-    for (const variable of own.filter(({ type }) => type === "Real")) {
-      place(variable, new Field(variable, usual(variable), (value) => act.put(variable, value), act.refuse));
+    const variables = settableVariables(modelInfo).filter(({ name }) => !Object.values(SOLVER_LISTS).some(([listed]) => listed === name));
+    for (const variable of variables.filter(({ type }) => type === "Real")) {
+      addField(variable, new Field(variable, typicalSize(variable), (value) => actions.setVariable(variable, value), actions.reportError));
     }
-    for (const variable of own.filter(({ type }) => type !== "Real")) {
-      const choice = new Choice(`field-${variable.name}`, variable.text, (value) => act.choose(variable.name, Number(value)));
-      place(variable, { element: choice.element, put: (value) => choice.fill(items(variable), value) });
+    for (const variable of variables.filter(({ type }) => type !== "Real")) {
+      const choice = new Choice(`field-${variable.name}`, variable.text, (value) => actions.choose(variable.name, Number(value)));
+      addField(variable, { element: choice.element, show: (value) => choice.fill(itemOptions(variable), value) });
     }
-    const length = { name: ".stop", symbol: "T", text: "length of the run", shown: "s", factor: 1, unit: "s", above: 0, start: modelInfo.stop, allowed: "above 0" };
-    place(length, new Field(length, 0, act.length, act.refuse));
+    const stopTime = { name: ".stop", symbol: "T", text: "stop time", display_unit: "s", factor: 1, unit: "s", above: 0, start: modelInfo.stop, allowed: "above 0" };
+    addField(stopTime, new Field(stopTime, 0, actions.setStopTime, actions.reportError));
     for (const [id, elements] of Object.entries(rows)) document.getElementById(id).replaceChildren(...elements);
   }
 
-  // What is in force; with `live`, at the cursor.
-  show(state, live) {
+  // Show the values of a state, at the cursor time if `atCursor`.
+  show(state, atCursor) {
     const modelInfo = this.models.get(state.model);
-    const now = inForce(modelInfo, state.values);
-    if (live) this.follow(modelInfo, state);
-    else for (const [name, field] of this.fields) field.put(name === ".stop" ? state.stop : now[name]);
+    const values = effectiveValues(modelInfo, state.values);
+    if (atCursor) this.follow(modelInfo, state);
+    else for (const [name, field] of this.fields) field.show(name === ".stop" ? state.stop : values[name]);
     const { preset, comparison, body } = this.lists;
-    preset.fill([["", "none: my own"], ...[...this.presets.values()].map(({ name, title }) => [name, `${name}: ${title}`])], state.preset);
+    preset.fill([["", "none (custom settings)"], ...[...this.presets.values()].map(({ name, title }) => [name, `${name}: ${title}`])], state.preset);
     body.fill(modelInfo.bodies.map(({ position }, i) => [i, position]), state.body);
     const comparable = [...this.models.values()].filter(({ bodies }) => bodies[0].position === modelInfo.bodies[0].position);
-    comparison.fill([["", "nothing"], ...comparable.map(({ name }) => [name, name === state.model ? `${name}, otherwise` : name])], state.comparison?.model ?? "");
-    this.fill("", modelInfo, now);
-    const theirs = state.comparison && this.models.get(state.comparison.model);
-    this.fill("comparison-", theirs, theirs ? inForce(theirs, beside(this.models, state).values) : {});
-    this.tellChanges(modelInfo, state.changes);
+    comparison.fill([["", "nothing"], ...comparable.map(({ name }) => [name, name === state.model ? `${name}, other settings` : name])], state.comparison?.model ?? "");
+    this.fillSolverLists("", modelInfo, values);
+    const other = state.comparison && this.models.get(state.comparison.model);
+    this.fillSolverLists("comparison-", other, other ? effectiveValues(other, comparisonSettings(this.models, state).values) : {});
+    this.showChanges(modelInfo, state.changes);
   }
 
-  // The fields at the cursor.
+  // Show the values at the cursor time.
   follow(modelInfo, state) {
-    for (const [name, field] of this.fields) field.put(name === ".stop" ? state.stop : valueAt(modelInfo, state, name, state.t));
+    for (const [name, field] of this.fields) field.show(name === ".stop" ? state.stop : valueAt(modelInfo, state, name, state.t));
   }
 
-  fill(prefix, owner, values) {
-    for (const [id, [name]] of Object.entries(DIRECT)) {
-      const pairs = id === "rtol" ? tolerances : (modelInfo) => items(named(modelInfo, name));
-      this.lists[prefix + id].fill(owner ? pairs(owner, values[name]) : [], values[name]);
+  fillSolverLists(prefix, modelInfo, values) {
+    for (const [id, [name]] of Object.entries(SOLVER_LISTS)) {
+      const options = id === "rtol" ? toleranceOptions : (model) => itemOptions(findVariable(model, name));
+      this.lists[prefix + id].fill(modelInfo ? options(modelInfo, values[name]) : [], values[name]);
     }
   }
 
-  tellChanges(modelInfo, changes) {
-    const [place, { length }] = [document.getElementById("changes"), changes];
-    place.hidden = !length;
+  showChanges(modelInfo, changes) {
+    const [paragraph, { length }] = [document.getElementById("changes"), changes];
+    paragraph.hidden = !length;
     if (!length) return;
     const last = changes.slice(-3).map(({ t, name, value }) => {
-      const { factor, shown } = named(modelInfo, name);
-      return `${name} = ${told(value * factor)} ${shown} at ${told(t)} s`;
+      const { factor, display_unit } = findVariable(modelInfo, name);
+      return `${name} = ${formatNumber(value * factor)} ${display_unit} at ${formatNumber(t)} s`;
     });
-    const clear = make("button", { type: "button" }, "Forget changes");
-    clear.addEventListener("click", this.act.forget);
-    place.replaceChildren(`${length} change${length > 1 ? "s" : ""} while it runs; last: ${last.join("; ")}. `, clear);
+    const clear = makeElement("button", { type: "button" }, "Clear changes");
+    clear.addEventListener("click", this.actions.clearChanges);
+    paragraph.replaceChildren(`${length} change${length > 1 ? "s" : ""} during the run; last: ${last.join("; ")}. `, clear);
   }
 }

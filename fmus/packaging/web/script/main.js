@@ -1,194 +1,196 @@
-// The page: what people do becomes the state, the state becomes runs, the runs become pictures.
+// The page: user input changes the state, the state determines the runs, and the runs are drawn.
 
-import { make, sizes } from "./controls.js";
+import { makeElement, typicalSizes } from "./controls.js";
 import { Session } from "./session.js";
 import { Diagrams } from "./diagrams.js";
-import { asPublished, besideAtFirst, change, choose, put } from "./overrides.js";
+import { presetState, initialComparison, addChange, chooseItem, setValue } from "./overrides.js";
 import { Form } from "./form.js";
 import { DragController } from "./drag.js";
 import { Mechanism } from "./mechanism.js";
-import { told } from "./plot.js";
-import { fresh, inForce, read, valueAt, written } from "./state.js";
-import { cost, decay, events, published, setting } from "./tables.js";
-import { csv, picture, save } from "./export.js";
+import { formatNumber } from "./plot.js";
+import { defaultState, effectiveValues, decodeState, valueAt, encodeState } from "./state.js";
+import { costTable, decayTable, describeSettings, eventTable, publishedTable } from "./tables.js";
+import { save, toCsv, toPng } from "./export.js";
 
-const SLICE = 8; // ms of a frame for the runs
-const SETTLED = 300; // ms without a change after which tables, link and words follow
-const framed = location.protocol === "about:";
+const SLICE = 8; // ms per frame for simulation
+const SUMMARY_DELAY = 300; // ms without a change before tables, link and status are updated
+const isEmbedded = location.protocol === "about:";
 const $$ = (id) => document.getElementById(id);
 
 const data = JSON.parse($$("data").textContent);
 const session = new Session(data);
-const page = { session, state: null, modelInfo: null, playing: false, put: take, edited, play, wake };
+const page = { session, state: null, modelInfo: null, playing: false, setVariable, restartEdited, play, requestFrame };
 const drag = new DragController(page);
 const mechanism = new Mechanism($$("mechanism"), drag);
 const diagrams = new Diagrams($$("panels"), seek);
 const form = new Form(session.models, session.presets, {
-  preset: (name) => (session.presets.has(name) ? enter(ofPreset(name)) : edited()),
-  choose: (name, value) => { choose(page.modelInfo, page.state.values, name, value); edited(); },
-  beside: takeOther,
+  preset: (name) => (session.presets.has(name) ? showState(stateOfPreset(name)) : restartEdited()),
+  choose: (name, value) => { chooseItem(page.modelInfo, page.state.values, name, value); restartEdited(); },
+  compare: setComparison,
   body: (number) => { page.state.body = number; restart(); },
-  put: take,
-  length: takeLength,
-  forget: () => { page.state.changes = []; edited(); },
-  refuse: (sentence) => { refused = sentence; drawAlert(); },
+  setVariable,
+  setStopTime,
+  clearChanges: () => { page.state.changes = []; restartEdited(); },
+  reportError: (message) => { inputError = message; drawAlert(); },
 });
-let latest = null; // state that was to be entered
-let unknown = ""; // a sentence about what a link has
-let refused = ""; // a sentence about what was typed
-let waiting = false; // a frame is asked for
+let requestedState = null; // the state shown last, possibly still compiling
+let linkWarning = ""; // unknown parts of a link
+let inputError = ""; // an invalid number
+let frameRequested = false;
 let stale = { curves: true, cursor: true };
-let before = 0; // time of the last frame in ms
-let settling = 0;
+let lastFrame = 0; // time of the last frame in ms
+let summaryTimer = 0;
 
-// ---- the state, and what follows from it
+// ---- state
 
-async function enter(next, lost = []) {
+// Show a state; `unknownKeys` are parts of a link that were ignored.
+async function showState(next, unknownKeys = []) {
   if (page.playing) play(false);
-  latest = next;
-  await Promise.all([next.model, ...(next.comparison ? [next.comparison.model] : [])].map((name) => session.ready(name)));
-  if (latest !== next) return; // somebody has chosen another since
+  requestedState = next;
+  await Promise.all([next.model, ...(next.comparison ? [next.comparison.model] : [])].map((name) => session.compile(name)));
+  if (requestedState !== next) return; // another state was selected in the meantime
   const changed = next.model !== page.state?.model;
   page.state = next;
   page.modelInfo = session.models.get(next.model);
-  if (changed) arrange();
-  unknown = lost.length ? `The link has what is not known here: ${lost.join(", ")}. ` : "";
+  if (changed) buildControls();
+  linkWarning = unknownKeys.length ? `The link contains unknown settings: ${unknownKeys.join(", ")}. ` : "";
   restart();
 }
 
-// Go where a link leads: to a state, or to a published case by its name alone; the first model without.
-async function follow(hash) {
-  const found = read(hash, session.models);
-  const words = new URLSearchParams(hash.slice(1));
-  const preset = words.get(".preset");
-  if (found) await enter(found.state, found.lost);
-  else if (session.presets.has(preset)) await enter(ofPreset(preset));
-  else await enter(fresh(session.models.values().next().value), [words.get(".model")].filter(Boolean));
+// Show what a link contains: a state, a published case by its name, or else the first model.
+async function followLink(hash) {
+  const decoded = decodeState(hash, session.models);
+  const parameters = new URLSearchParams(hash.slice(1));
+  const preset = parameters.get(".preset");
+  if (decoded) await showState(decoded.state, decoded.unknownKeys);
+  else if (session.presets.has(preset)) await showState(stateOfPreset(preset));
+  else await showState(defaultState(session.models.values().next().value), [parameters.get(".model")].filter(Boolean));
 }
 
-function ofPreset(name) {
+function stateOfPreset(name) {
   const preset = session.presets.get(name);
-  return asPublished(preset, session.models.get(preset.model));
+  return presetState(preset, session.models.get(preset.model));
 }
 
-// Controls and mechanism of another model.
-function arrange() {
+// Build controls and mechanism for another model.
+function buildControls() {
   const { modelInfo } = page;
   document.querySelector(`input[name=model][value="${modelInfo.name}"]`).checked = true;
   $$("name").textContent = modelInfo.name;
   $$("title").textContent = modelInfo.title;
-  $$("equations").innerHTML = modelInfo.text; // made by the builder
+  $$("equations").innerHTML = modelInfo.text; // HTML from the build
   mechanism.build(modelInfo);
   $$("kick").hidden = !modelInfo.bodies.some((body) => body.input);
-  session.restart(fresh(modelInfo));
+  session.restart(defaultState(modelInfo));
   session.runs.main.advance();
-  form.build(modelInfo, sizes(session.runs.main));
+  form.build(modelInfo, typicalSizes(session.runs.main));
   diagrams.clear();
 }
 
 function restart() {
   session.restart(page.state);
-  refused = "";
+  inputError = "";
   stale = { curves: true, cursor: true };
-  settle();
+  scheduleSummary();
   showControls();
-  wake();
+  requestFrame();
 }
 
-// A published case is main until something is changed.
-function edited() {
-  page.state.preset = unknown = "";
+// Restart after a change: the state is no longer a published case.
+function restartEdited() {
+  page.state.preset = linkWarning = "";
   restart();
 }
 
-// A value from a slider, a number field or the drag: from the start, or from the cursor on.
-function take(variable, value) {
+// Set a variable from a control or by dragging, from the start or from the cursor time on.
+function setVariable(variable, value) {
   const { state, modelInfo } = page;
-  if (!variable.fixed && live() && state.t > 0) change(state, variable.name, value, state.t);
-  else put(modelInfo, state.values, variable.name, value);
-  edited();
+  if (!variable.fixed && changesAtCursor() && state.t > 0) addChange(state, variable.name, value, state.t);
+  else setValue(modelInfo, state.values, variable.name, value);
+  restartEdited();
 }
 
-function takeLength(seconds) {
+function setStopTime(seconds) {
   const { state } = page;
   if (seconds > 0) Object.assign(state, { stop: seconds, t: Math.min(state.t, seconds) });
-  edited();
-  if (!(seconds > 0)) refused = `A run takes more than 0 s: it stays ${told(state.stop)} s long.`;
+  restartEdited();
+  if (!(seconds > 0)) inputError = `The stop time must be above 0 s; it remains ${formatNumber(state.stop)} s.`;
 }
 
-async function takeOther({ model, ...values }) {
+async function setComparison({ model, ...values }) {
   const { state, modelInfo } = page;
   if (model === "") state.comparison = null;
   else if (model) {
-    await session.ready(model);
-    state.comparison = { model, values: besideAtFirst(modelInfo, state, model) };
-  } else for (const [name, value] of Object.entries(values)) choose(session.models.get(state.comparison.model), state.comparison.values, name, value);
+    await session.compile(model);
+    state.comparison = { model, values: initialComparison(modelInfo, state, model) };
+  } else for (const [name, value] of Object.entries(values)) chooseItem(session.models.get(state.comparison.model), state.comparison.values, name, value);
   restart();
 }
 
-// Whether what is set acts from the cursor on.
-function live() {
+// Whether changes apply from the cursor time on.
+function changesAtCursor() {
   return page.playing || $$("live").checked;
 }
 
 function showControls() {
   const { state, modelInfo } = page;
-  form.show(state, live());
-  mechanism.equip(Object.fromEntries(Object.keys(inForce(modelInfo, {})).map((name) => [name, valueAt(modelInfo, state, name, state.t)])));
+  form.show(state, changesAtCursor());
+  mechanism.showDampers(Object.fromEntries(Object.keys(effectiveValues(modelInfo, {})).map((name) => [name, valueAt(modelInfo, state, name, state.t)])));
 }
 
 // ---- frames
 
-function wake() {
-  if (waiting) return;
-  waiting = true;
+function requestFrame() {
+  if (frameRequested) return;
+  frameRequested = true;
   requestAnimationFrame(frame);
 }
 
 function frame(now) {
-  waiting = false;
-  const passed = before ? Math.min((now - before) / 1000, 0.1) : 0;
-  before = now;
-  if (page.playing) advance(passed);
-  if (drag.pull) drag.act();
-  if (session.work(SLICE)) stale.curves = true;
+  frameRequested = false;
+  const elapsed = lastFrame ? Math.min((now - lastFrame) / 1000, 0.1) : 0;
+  lastFrame = now;
+  if (page.playing) advanceCursor(elapsed);
+  if (drag.active) drag.update();
+  if (session.advance(SLICE)) stale.curves = true;
   const { main } = session.runs;
   if (stale.curves) drawAlert();
   if (main.time.length && stale.curves) {
     mechanism.fit(main);
-    diagrams.draw(session, page.state, { turns: $$("turns").checked });
+    diagrams.draw(session, page.state, { envelopes: $$("envelopes").checked });
   }
-  if (main.time.length && (stale.curves || stale.cursor) && main.reaches(page.state.t)) {
+  if (main.time.length && (stale.curves || stale.cursor) && main.hasReached(page.state.t)) {
     drawCursor();
     stale.cursor = false;
   }
   stale.curves = !main.time.length;
-  if (page.playing || drag.pull || !session.done) wake();
-  else before = 0;
-  if (!session.done) settle();
+  if (page.playing || drag.active || !session.done) requestFrame();
+  else lastFrame = 0;
+  if (!session.done) scheduleSummary();
 }
 
-function advance(passed) {
+// Move the cursor during playback.
+function advanceCursor(elapsed) {
   const { state } = page;
-  const end = session.runs.main.time.at(-1) ?? 0; // of what there is
-  state.t = Math.max(state.t, Math.min(state.t + passed * Number($$("speed").value), end));
+  const end = session.runs.main.time.at(-1) ?? 0; // simulated so far
+  state.t = Math.max(state.t, Math.min(state.t + elapsed * Number($$("speed").value), end));
   stale.cursor = true;
   if (state.t >= state.stop || (session.runs.main.done && state.t >= end)) play(false);
 }
 
-// What a run was refused for; the diagrams of the last main that went stay, and are faint.
+// Show the error of a run. The diagrams of the last successful run remain, dimmed.
 function drawAlert() {
   const { main, comparison } = session.runs;
-  $$("alert").textContent = refused || main.failure || comparison?.failure || "";
+  $$("alert").textContent = inputError || main.failure || comparison?.failure || "";
   $$("alert").hidden = !$$("alert").textContent;
-  for (const id of ["panels", "mechanism"]) $$(id).classList.toggle("gone", !main.time.length);
+  for (const id of ["panels", "mechanism"]) $$(id).classList.toggle("stale", !main.time.length);
 }
 
 function drawCursor() {
   const { state, modelInfo } = page;
   const { main } = session.runs;
   const t = Math.min(state.t, main.time.at(-1));
-  diagrams.point(session, t);
+  diagrams.moveCursor(session, t);
   mechanism.move((name) => (main.modes.includes(name) ? main.columns[name][main.row(t)] : main.at(name, t)));
   $$("scrub").value = Math.round((1000 * state.t) / state.stop);
   $$("clock").textContent = `${state.t.toFixed(state.stop < 10 ? 3 : 2)} s`;
@@ -196,77 +198,77 @@ function drawCursor() {
   if (page.playing && state.changes.length) form.follow(modelInfo, state);
 }
 
-// Tables, link and words, when nothing has changed for a while.
-function settle() {
-  clearTimeout(settling);
-  settling = setTimeout(() => {
-    if (!session.done) return settle();
+// Update tables, link and status when nothing has changed for a while.
+function scheduleSummary() {
+  clearTimeout(summaryTimer);
+  summaryTimer = setTimeout(() => {
+    if (!session.done) return scheduleSummary();
     const { state } = page;
     const { main } = session.runs;
-    const made = main.time.length ? [published, cost, decay, events].map((table) => table(session, state)) : [];
-    $$("tables").replaceChildren(...made.filter(Boolean));
-    remember();
-    const ran = main.failure ? "" : `${setting(main)}: ${main.events.length} events in ${told(state.stop)} s.`;
-    if (!page.playing) $$("status").textContent = unknown + ran;
-  }, SETTLED);
+    const tables = main.time.length ? [publishedTable, costTable, decayTable, eventTable].map((table) => table(session, state)) : [];
+    $$("tables").replaceChildren(...tables.filter(Boolean));
+    updateAddress();
+    const summary = main.failure ? "" : `${describeSettings(main)}: ${main.events.length} events in ${formatNumber(state.stop)} s.`;
+    if (!page.playing) $$("status").textContent = linkWarning + summary;
+  }, SUMMARY_DELAY);
 }
 
-// ---- what people do
+// ---- user actions
 
 function seek(t) {
   page.state.t = t;
   stale.cursor = true;
   if ($$("live").checked) showControls();
-  settle();
-  wake();
+  scheduleSummary();
+  requestFrame();
 }
 
 function play(playing = true) {
   const { state } = page;
   if (playing && state.t >= state.stop) state.t = 0;
-  before = 0;
+  lastFrame = 0;
   page.playing = playing;
   $$("play").textContent = playing ? "Pause" : "Play";
   $$("play").setAttribute("aria-pressed", String(playing));
   if (!playing) {
     showControls();
-    settle();
+    scheduleSummary();
   }
-  wake();
+  requestFrame();
 }
 
-for (const [id, act] of Object.entries({
+for (const [id, action] of Object.entries({
   play: () => play(!page.playing),
   kick: () => drag.kick(),
-  reset: () => enter(fresh(page.modelInfo)),
+  reset: () => showState(defaultState(page.modelInfo)),
   print: () => print(),
-  csv: () => save(new Blob([csv(session.runs.main, session.runs.comparison)], { type: "text/csv" }), `${page.state.model}.csv`),
-  png: async () => save(await picture(diagrams.shown(), setting(session.runs.main)), `${page.state.model}.png`),
+  csv: () => save(new Blob([toCsv(session.runs.main, session.runs.comparison)], { type: "text/csv" }), `${page.state.model}.csv`),
+  png: async () => save(await toPng(diagrams.visible(), describeSettings(session.runs.main)), `${page.state.model}.png`),
   link: copyLink,
-})) $$(id).addEventListener("click", act);
+})) $$(id).addEventListener("click", action);
 $$("scrub").addEventListener("input", () => seek((page.state.stop * $$("scrub").value) / 1000));
 $$("live").addEventListener("change", showControls);
-$$("turns").addEventListener("change", () => { stale.curves = true; wake(); });
+$$("envelopes").addEventListener("change", () => { stale.curves = true; requestFrame(); });
 
-// The address carries the state; within another page it is not ours.
-function remember() {
-  if (!framed) history.replaceState(null, "", written(page.state));
+// Store the state in the address. A page embedded in another one leaves the address alone.
+function updateAddress() {
+  if (!isEmbedded) history.replaceState(null, "", encodeState(page.state));
 }
 
 async function copyLink() {
-  remember();
-  let place = "clipboard";
+  updateAddress();
+  let target = "copied to the clipboard";
   try {
     await navigator.clipboard.writeText(location.href);
   } catch {
-    place = "address bar"; // there is no clipboard, or it is not ours to write
+    target = "in the address bar"; // the clipboard is unavailable or access is denied
   }
-  $$("status").textContent = `The link is in the ${place}: it carries all that is set.`;
+  $$("status").textContent = `The link is ${target}; it contains all settings.`;
 }
 
-addEventListener("hashchange", ({ newURL }) => { // the address may by now be that of the state again
+addEventListener("hashchange", ({ newURL }) => { // the state may have replaced the address since
   const { hash } = new URL(newURL);
-  if (hash !== written(page.state)) follow(hash);
+  if (hash !== encodeState(page.state)) followLink(hash);
 });
 addEventListener("keydown", (event) => {
   if (event.key !== " " || event.target.closest("button, input, select, summary, a")) return;
@@ -274,21 +276,21 @@ addEventListener("keydown", (event) => {
   $$("play").click();
 });
 
-// Paper is white, whatever the screen is.
+// Print on white, also from a dark screen.
 for (const [event, paper] of [["beforeprint", true], ["afterprint", false]]) {
-  addEventListener(event, () => { document.documentElement.classList.toggle("paper", paper); diagrams.paint(); });
+  addEventListener(event, () => { document.documentElement.classList.toggle("paper", paper); diagrams.repaint(); });
 }
-for (const look of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(look).addEventListener("change", () => diagrams.paint());
+for (const query of ["(prefers-color-scheme: dark)", "(forced-colors: active)"]) matchMedia(query).addEventListener("change", () => diagrams.repaint());
 
-// ---- begin
+// ---- start
 
 $$("version").textContent = data.version;
-$$("link").hidden = framed;
+$$("link").hidden = isEmbedded;
 for (const [name, modelInfo] of session.models) {
-  const choice = make("input", { type: "radio", name: "model", value: name });
-  choice.addEventListener("change", () => enter(fresh(modelInfo)));
-  $$("models").append(make("label", {}, choice, name));
+  const choice = makeElement("input", { type: "radio", name: "model", value: name });
+  choice.addEventListener("change", () => showState(defaultState(modelInfo)));
+  $$("models").append(makeElement("label", {}, choice, name));
 }
 $$("choices").append(...Object.values(form.lists).map(({ element }) => element));
-globalThis.app = { session, plots: diagrams.plots, seek, state: () => page.state }; // for the console
-await follow(location.hash);
+globalThis.app = { session, plots: diagrams.plots, seek, state: () => page.state }; // for tests and the console
+await followLink(location.hash);

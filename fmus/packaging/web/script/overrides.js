@@ -1,53 +1,54 @@
-// What people do to the state of the page.
+// Changes of the state by the user: values, changes during playback, enumerations, comparison.
 
-import { fresh, inForce, named } from "./state.js";
+import { defaultState, effectiveValues, findVariable } from "./state.js";
 
-export const CLOSE = 1 / 400; // of a run: changes of one variable nearer than that are one
+export const MIN_CHANGE_SPACING = 1 / 400; // of the run; closer changes of a variable replace each other
 
-// A value from the start on.
-export function put(modelInfo, values, name, value) {
-  if (value === named(modelInfo, name).start) delete values[name];
+// Set a value from the start.
+export function setValue(modelInfo, values, name, value) {
+  if (value === findVariable(modelInfo, name).start) delete values[name];
   else values[name] = value;
 }
 
-// A value from t in s on: what would change it later is gone, and what did just before.
-export function change(state, name, value, t) {
-  const kept = state.changes.filter((each) => each.name !== name || each.t <= t);
-  const same = kept.findLast((each) => each.name === name && t - each.t < CLOSE * state.stop);
-  if (same) same.value = value;
-  else kept.push({ t, name, value });
-  state.changes = kept.sort((a, b) => a.t - b.t);
+// Set a value from t in s on. Removes later changes of the variable and replaces one just before.
+export function addChange(state, name, value, t) {
+  const remaining = state.changes.filter((change) => change.name !== name || change.t <= t);
+  const recent = remaining.findLast((change) => change.name === name && t - change.t < MIN_CHANGE_SPACING * state.stop);
+  if (recent) recent.value = value;
+  else remaining.push({ t, name, value });
+  state.changes = remaining.sort((a, b) => a.t - b.t);
 }
 
-// A law or a method.  The closed form holds for the hybrid law: whoever takes one of the two chooses the other, too.
-export function choose(modelInfo, values, name, value) {
-  put(modelInfo, values, name, value);
-  const [method, law] = ["solver.method", "friction"].map((each) => named(modelInfo, each));
-  const [exact, hybrid] = [labelled(method, "exact"), labelled(law, "hybrid")];
-  const now = inForce(modelInfo, values);
+// Set a friction law, a method or another enumeration. The exact method requires the hybrid law, so choosing one of them
+// changes the other if necessary.
+export function chooseItem(modelInfo, values, name, value) {
+  setValue(modelInfo, values, name, value);
+  const [method, law] = ["solver.method", "friction"].map((variable) => findVariable(modelInfo, variable));
+  const [exact, hybrid] = [valueOfLabel(method, "exact"), valueOfLabel(law, "hybrid")];
+  const now = effectiveValues(modelInfo, values);
   if (exact === undefined || hybrid === undefined || now["solver.method"] !== exact || now.friction === hybrid) return;
   if (name === "friction") values["solver.method"] = method.items.find((item) => item.value !== exact)?.value ?? exact;
   else values.friction = hybrid;
 }
 
-// The value of the item of that label.
-export function labelled(variable, label) {
+// The value of an enumeration item by its label.
+export function valueOfLabel(variable, label) {
   return variable?.items.find((item) => item.label === label)?.value;
 }
 
-// What stands beside a run at first: of the same model its next law or method, of another what it has by itself.
-export function besideAtFirst(modelInfo, state, model) {
+// Initial values of a comparison run: for the same model another law and method, for another model its defaults.
+export function initialComparison(modelInfo, state, model) {
   if (model !== state.model) return {};
-  const now = inForce(modelInfo, state.values);
-  const other = (name, but) => named(modelInfo, name)?.items.find(({ label, value }) => label !== but && value !== now[name])?.value;
-  const [law, method] = [other("friction"), other("solver.method", "exact")];
+  const now = effectiveValues(modelInfo, state.values);
+  const alternative = (name, excluded) => findVariable(modelInfo, name)?.items.find(({ label, value }) => label !== excluded && value !== now[name])?.value;
+  const [law, method] = [alternative("friction"), alternative("solver.method", "exact")];
   return { ...(law !== undefined && { friction: law }), ...(method !== undefined && { "solver.method": method }) };
 }
 
 // The state of a published case.
-export function asPublished(preset, modelInfo) {
-  const state = { ...fresh(modelInfo), preset: preset.name, stop: preset.stop ?? modelInfo.stop };
-  const chosen = Object.entries(preset.labels).map(([name, label]) => [name, labelled(named(modelInfo, name), label)]);
-  for (const [name, value] of [...Object.entries(preset.values), ...chosen]) put(modelInfo, state.values, name, value);
+export function presetState(preset, modelInfo) {
+  const state = { ...defaultState(modelInfo), preset: preset.name, stop: preset.stop ?? modelInfo.stop };
+  const chosen = Object.entries(preset.labels).map(([name, label]) => [name, valueOfLabel(findVariable(modelInfo, name), label)]);
+  for (const [name, value] of [...Object.entries(preset.values), ...chosen]) setValue(modelInfo, state.values, name, value);
   return state;
 }

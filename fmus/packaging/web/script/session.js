@@ -1,75 +1,80 @@
-// The runs behind the page, for one state of it: the run itself, the one beside it, the motion as it would be without
-// changes, the published case as it was published, and by the model's own law, method and tolerance the quick one:
-// what is seen at once where another takes its time, and the closed form where there is one.
+// The runs behind the page, for one state:
+//
+//   main         the run itself
+//   comparison   the run to compare it with
+//   unchanged    the run without the changes made during playback
+//   published    a published case, with the published grid
+//   preview      the same values with the model's default law, method and tolerance: shown while a slow run is under way
+//   reference    the preview or main run, if the default method is exact
 
 import { Fmu } from "./fmu.js";
 import { Run } from "./run.js";
-import { beside, named } from "./state.js";
+import { comparisonSettings, findVariable } from "./state.js";
 import { load } from "./wasm.js";
 
-export const POINTS = 1600; // of the grid
+export const POINTS = 1600; // grid steps
 
 export class Session {
   constructor(data) {
     this.models = new Map(data.models.map((modelInfo) => [modelInfo.name, modelInfo]));
     this.presets = new Map(data.presets.map((preset) => [preset.name, preset]));
-    this.codes = new Map();
+    this.code = new Map(); // compiled modules by model
     this.fmus = new Map();
     this.runs = {};
   }
 
-  // Compile a model, if it is not yet.
-  async ready(name) {
-    if (!this.codes.has(name)) this.codes.set(name, load(this.models.get(name).code));
-    this.codes.set(name, await this.codes.get(name));
+  // Compile a model, unless it is compiled already.
+  async compile(name) {
+    if (!this.code.has(name)) this.code.set(name, load(this.models.get(name).code));
+    this.code.set(name, await this.code.get(name));
   }
 
   fmu(name, role) {
     const key = `${name} ${role}`;
-    if (!this.fmus.has(key)) this.fmus.set(key, new Fmu(this.models.get(name), this.codes.get(name)));
+    if (!this.fmus.has(key)) this.fmus.set(key, new Fmu(this.models.get(name), this.code.get(name)));
     return this.fmus.get(key);
   }
 
-  // Begin all runs anew; the models must be ready.
+  // Restart all runs. The models must be compiled.
   restart(state) {
     const { values, changes, stop } = state;
     const modelInfo = this.models.get(state.model);
-    const run = (role, setting = {}, model = state.model) =>
+    const createRun = (role, setting = {}, model = state.model) =>
       new Run(this.fmu(model, role), { values, changes, stop, points: POINTS, ...setting });
-    const own = Object.entries(values).filter(([name]) => name !== "friction" && !name.startsWith("solver."));
+    const defaults = Object.entries(values).filter(([name]) => name !== "friction" && !name.startsWith("solver."));
     const runs = {};
-    if (own.length < Object.keys(values).length) runs.preview = run("preview", { values: Object.fromEntries(own) });
-    runs.main = run("main");
+    if (defaults.length < Object.keys(values).length) runs.preview = createRun("preview", { values: Object.fromEntries(defaults) });
+    runs.main = createRun("main");
     if (isExact(modelInfo)) runs.reference = runs.preview ?? runs.main;
-    if (state.comparison) runs.comparison = run("comparison", beside(this.models, state), state.comparison.model);
-    if (changes.length) runs.unchanged = run("unchanged", { changes: [] });
+    if (state.comparison) runs.comparison = createRun("comparison", comparisonSettings(this.models, state), state.comparison.model);
+    if (changes.length) runs.unchanged = createRun("unchanged", { changes: [] });
     const preset = this.presets.get(state.preset);
-    if (preset) runs.published = run("published", { points: preset.grid ? Math.round(stop / preset.grid) : 0 });
-    [this.runs, this.seen] = [runs, 0];
+    if (preset) runs.published = createRun("published", { points: preset.grid ? Math.round(stop / preset.grid) : 0 });
+    [this.runs, this.pointsShown] = [runs, 0];
   }
 
   get done() {
     return Object.values(this.runs).every((run) => run.done);
   }
 
-  // Advance what is not done for so many ms, half of them at most the quick one; whether there is more to see: a run
-  // has ended, or has twice the points.
-  work(slice) {
-    const begun = performance.now();
-    const waiting = new Set(Object.values(this.runs).filter((run) => !run.done));
-    for (const run of waiting) {
-      const quick = run === this.runs.preview;
-      if (!run.advance(begun + (quick ? slice / 2 : slice)) && !quick) break;
+  // Advance unfinished runs for a time slice in ms, the preview for at most half of it. Returns whether there is more to
+  // draw: a run has ended, or the number of points has doubled.
+  advance(slice) {
+    const begin = performance.now();
+    const unfinished = new Set(Object.values(this.runs).filter((run) => !run.done));
+    for (const run of unfinished) {
+      const isPreview = run === this.runs.preview;
+      if (!run.advance(begin + (isPreview ? slice / 2 : slice)) && !isPreview) break;
     }
     const points = Object.values(this.runs).reduce((sum, run) => sum + run.time.length, 0);
-    const more = points >= 2 * this.seen || [...waiting].some((run) => run.done);
-    if (more) this.seen = points;
+    const more = points >= 2 * this.pointsShown || [...unfinished].some((run) => run.done);
+    if (more) this.pointsShown = points;
     return more;
   }
 }
 
-// Whether a model by itself has its motion in closed form.
+// Whether the default method of a model is the closed form.
 function isExact(modelInfo) {
-  const { items, start } = named(modelInfo, "solver.method");
+  const { items, start } = findVariable(modelInfo, "solver.method");
   return items.some(({ label, value }) => label === "exact" && value === start);
 }

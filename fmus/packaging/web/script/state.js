@@ -1,90 +1,90 @@
-// The state of the page: all that a link carries.  Values are in SI units, by the names of variables; keys of the page
-// begin with a dot, which no variable does.
+// The state of the page, as stored in links. Values are in SI units, by names of variables. Keys of the page itself start
+// with a dot; no variable does.
 
-const BESIDE = ".compare."; // before the names of what the run beside has
+const COMPARISON_PREFIX = ".compare."; // of the variables of the comparison run
 
-export function fresh(modelInfo) {
+export function defaultState(modelInfo) {
   return { model: modelInfo.name, values: {}, changes: [], stop: modelInfo.stop, t: 0, body: 0, comparison: null, preset: "" };
 }
 
-// A variable by its name.
-export function named(modelInfo, name) {
+export function findVariable(modelInfo, name) {
   return modelInfo.variables.find((variable) => variable.name === name);
 }
 
-export function settable(modelInfo) {
+export function settableVariables(modelInfo) {
   return modelInfo.variables.filter(({ causality }) => causality === "parameter" || causality === "input");
 }
 
-// Start value of every settable variable, and what is set.
-export function inForce(modelInfo, values) {
-  return { ...Object.fromEntries(settable(modelInfo).map(({ name, start }) => [name, start])), ...values };
+// The values of all settable variables: the given ones, otherwise the start values.
+export function effectiveValues(modelInfo, values) {
+  return { ...Object.fromEntries(settableVariables(modelInfo).map(({ name, start }) => [name, start])), ...values };
 }
 
-// The value of a variable at a time in s: what the last change before it made of it.
+// The value of a variable at a time in s, after the changes up to then.
 export function valueAt(modelInfo, state, name, t) {
   const last = state.changes.filter((change) => change.name === name && change.t <= t).at(-1);
-  return last ? last.value : inForce(modelInfo, state.values)[name];
+  return last ? last.value : effectiveValues(modelInfo, state.values)[name];
 }
 
-// What the run beside takes: the values of the same names, and its own law, method and tolerance.
-export function beside(models, state) {
-  const [mine, theirs] = [models.get(state.model), models.get(state.comparison.model)];
-  const known = new Map(settable(theirs).map((variable) => [variable.name, variable]));
-  const same = mine === theirs;
-  const takes = (name) => known.has(name) && (same || (known.get(name).type === "Real" && !name.includes(".")));
-  const shared = Object.entries(inForce(mine, state.values)).filter(([name]) => takes(name));
-  const changes = state.changes.filter(({ name }) => takes(name));
+// Values and changes of the comparison run. It shares the physical values with the same names; friction law, method and
+// tolerance are its own, unless the model is the same.
+export function comparisonSettings(models, state) {
+  const [own, other] = [models.get(state.model), models.get(state.comparison.model)];
+  const known = new Map(settableVariables(other).map((variable) => [variable.name, variable]));
+  const same = own === other;
+  const isShared = (name) => known.has(name) && (same || (known.get(name).type === "Real" && !name.includes(".")));
+  const shared = Object.entries(effectiveValues(own, state.values)).filter(([name]) => isShared(name));
+  const changes = state.changes.filter(({ name }) => isShared(name));
   return { values: { ...Object.fromEntries(shared), ...state.comparison.values }, changes };
 }
 
-export function written(state) {
-  const words = new URLSearchParams({ ".model": state.model });
-  for (const [name, value] of Object.entries(state.values)) words.set(name, value);
-  for (const { t, name, value } of state.changes) words.append(".change", `${t} ${name} ${value}`);
-  words.set(".stop", state.stop);
-  if (state.t) words.set(".t", state.t);
-  if (state.body) words.set(".body", state.body);
-  if (state.preset) words.set(".preset", state.preset);
+export function encodeState(state) {
+  const parameters = new URLSearchParams({ ".model": state.model });
+  for (const [name, value] of Object.entries(state.values)) parameters.set(name, value);
+  for (const { t, name, value } of state.changes) parameters.append(".change", `${t} ${name} ${value}`);
+  parameters.set(".stop", state.stop);
+  if (state.t) parameters.set(".t", state.t);
+  if (state.body) parameters.set(".body", state.body);
+  if (state.preset) parameters.set(".preset", state.preset);
   if (state.comparison) {
-    words.set(".compare", state.comparison.model);
-    for (const [name, value] of Object.entries(state.comparison.values)) words.set(BESIDE + name, value);
+    parameters.set(".compare", state.comparison.model);
+    for (const [name, value] of Object.entries(state.comparison.values)) parameters.set(COMPARISON_PREFIX + name, value);
   }
-  return `#${words}`;
+  return `#${parameters}`;
 }
 
-// The state in a link, and the words of it that mean nothing here; null without a model.
-export function read(hash, models) {
-  const words = new URLSearchParams(hash.replace(/^#/, ""));
-  const modelInfo = models.get(words.get(".model"));
+// Decode a link. Returns {state, unknownKeys}, or null if the link names no model.
+export function decodeState(hash, models) {
+  const parameters = new URLSearchParams(hash.replace(/^#/, ""));
+  const modelInfo = models.get(parameters.get(".model"));
   if (!modelInfo) return null;
-  const state = fresh(modelInfo);
-  const lost = [];
-  const isNumber = (word) => Boolean(word?.trim()) && isFinite(word);
-  const number = (key, fallback) => (isNumber(words.get(key)) ? Number(words.get(key)) : fallback);
-  const takes = (owner, name, word) => {
-    const variable = settable(owner).find((each) => each.name === name);
-    const among = variable?.items.length ? variable.items.some(({ value }) => value === Number(word)) : variable;
-    return among && isNumber(word);
+  const state = defaultState(modelInfo);
+  const unknownKeys = [];
+  const isNumber = (text) => Boolean(text?.trim()) && isFinite(text);
+  const number = (key, fallback) => (isNumber(parameters.get(key)) ? Number(parameters.get(key)) : fallback);
+  const isValid = (owner, name, text) => {
+    const variable = settableVariables(owner).find((item) => item.name === name);
+    const isKnown = variable?.items.length ? variable.items.some(({ value }) => value === Number(text)) : variable;
+    return isKnown && isNumber(text);
   };
-  const comparison = models.get(words.get(".compare"));
+  const comparison = models.get(parameters.get(".compare"));
   if (comparison) state.comparison = { model: comparison.name, values: {} };
-  for (const [key, word] of words) {
-    const theirs = key.startsWith(BESIDE);
+  for (const [key, text] of parameters) {
+    const isComparison = key.startsWith(COMPARISON_PREFIX);
     if (key === ".change") {
-      const [t, name, value] = word.split(" ");
-      if (takes(modelInfo, name, value) && isNumber(t) && Number(t) >= 0) state.changes.push({ t: Number(t), name, value: Number(value) });
-      else lost.push(word);
-    } else if (theirs || !key.startsWith(".")) {
-      const [owner, values, name] = theirs ? [comparison, state.comparison?.values, key.slice(BESIDE.length)] : [modelInfo, state.values, key];
-      if (owner && takes(owner, name, word)) values[name] = Number(word);
-      else lost.push(key);
+      const [t, name, value] = text.split(" ");
+      if (isValid(modelInfo, name, value) && isNumber(t) && Number(t) >= 0) state.changes.push({ t: Number(t), name, value: Number(value) });
+      else unknownKeys.push(text);
+    } else if (isComparison || !key.startsWith(".")) {
+      const [owner, values, name] = isComparison ? [comparison, state.comparison?.values, key.slice(COMPARISON_PREFIX.length)] : [modelInfo, state.values, key];
+      if (owner && isValid(owner, name, text)) values[name] = Number(text);
+      else unknownKeys.push(key);
     }
   }
   state.changes.sort((a, b) => a.t - b.t);
   state.stop = number(".stop", state.stop) > 0 ? number(".stop", state.stop) : modelInfo.stop;
   state.t = Math.min(Math.max(number(".t", 0), 0), state.stop);
   state.body = modelInfo.bodies[number(".body", 0)] ? number(".body", 0) : 0;
-  state.preset = words.get(".preset") ?? "";
-  return { state, lost };
+  state.preset = parameters.get(".preset") ?? "";
+  return { state, unknownKeys };
 }

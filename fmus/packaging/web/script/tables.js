@@ -1,23 +1,23 @@
-// The numbers under the diagrams, as tables.
+// The tables below the diagrams.
 
-import { make } from "./controls.js";
+import { makeElement } from "./controls.js";
 import { COUNTS } from "./fmu.js";
-import { decayBetween, difference, figures, forceByEnergy, turningPoints } from "./measure.js";
-import { told } from "./plot.js";
-import { inForce } from "./state.js";
+import { decayBetween, difference, frictionFromEnergy, measureQuantities, turningPoints } from "./measure.js";
+import { formatNumber } from "./plot.js";
+import { effectiveValues } from "./state.js";
 
-const LISTED = 60; // events
+const MAX_LISTED_EVENTS = 60;
 const UNITS = { ms: 1e-3, s: 1, deg: Math.PI / 180, "lbf.in": 0.45359237 * 9.80665 * 0.0254 };
-const FIGURES = { // name of a figure -> words, unit
+const QUANTITIES = { // name in scene files: label, unit
   steps: ["steps (time points)", ""],
   mean_step: ["mean step", "s"],
-  run_time: ["run time here", "s"],
+  run_time: ["run time on this computer", "s"],
   x_0: ["first peak", "m"],
   x_n: ["last peak", "m"],
-  sample_0: ["first peak, as sampled", "m"],
-  sample_n: ["last peak, as sampled", "m"],
+  sample_0: ["first peak, sampled", "m"],
+  sample_n: ["last peak, sampled", "m"],
   first_slip: ["first slip", "s"],
-  slip_time: ["duration of a slip", "s"],
+  slip_time: ["slip duration", "s"],
   zeta: ["damping ratio", ""],
   f: ["friction force", "N"],
   T_f: ["joint torque", "N·m"],
@@ -26,104 +26,104 @@ const FIGURES = { // name of a figure -> words, unit
   peak_acceleration: ["peak acceleration", "m/s²"],
 };
 
-function table(caption, heads, rows) {
-  const head = make("tr", {}, ...heads.map((text) => make("th", { scope: "col" }, text)));
-  const body = rows.map(([first, ...cells]) => make("tr", {}, make("th", { scope: "row" }, first), ...cells.map((cell) => make("td", {}, cell))));
-  return make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": caption },
-    make("table", {}, make("caption", {}, caption), make("thead", {}, head), make("tbody", {}, ...body)));
+function table(caption, headings, rows) {
+  const head = makeElement("tr", {}, ...headings.map((text) => makeElement("th", { scope: "col" }, text)));
+  const body = rows.map(([first, ...cells]) => makeElement("tr", {}, makeElement("th", { scope: "row" }, first), ...cells.map((cell) => makeElement("td", {}, cell))));
+  return makeElement("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": caption },
+    makeElement("table", {}, makeElement("caption", {}, caption), makeElement("thead", {}, head), makeElement("tbody", {}, ...body)));
 }
 
-// Law and method of a run, in words.
-export function setting(run) {
-  const values = inForce(run.fmu.modelInfo, run.setting.values);
+// Model, friction law, method and tolerance of a run.
+export function describeSettings(run) {
+  const values = effectiveValues(run.fmu.modelInfo, run.setting.values);
   const label = (name) => run.fmu.variables.get(name)?.items.find(({ value }) => value === values[name])?.label;
   const rtol = values["solver.rtol"] ? `rtol ${values["solver.rtol"]}` : "";
   return [run.fmu.modelInfo.name, label("friction"), label("solver.method"), rtol].filter(Boolean).join(", ");
 }
 
-// What the runs took, and how far they are apart.
-export function cost(session, state) {
+// Steps, run times and errors of the runs.
+export function costTable(session, state) {
   const { main, comparison, reference } = session.runs;
   const runs = [main, comparison].filter(Boolean);
   const body = session.models.get(state.model).bodies[state.body];
-  const { shown, factor } = main.fmu.variables.get(body.position);
+  const { display_unit, factor } = main.fmu.variables.get(body.position);
   const rows = [
-    ...Object.entries(COUNTS).map(([name, words]) => [words, ...runs.map((run) => String(run.counts?.[name] ?? ""))]),
-    ["run time here, drawing points included", ...runs.map((run) => `${told(1000 * run.seconds, 2)} ms`)],
+    ...Object.entries(COUNTS).map(([name, label]) => [label, ...runs.map((run) => String(run.counts?.[name] ?? ""))]),
+    ["run time, including grid points", ...runs.map((run) => `${formatNumber(1000 * run.seconds, 2)} ms`)],
   ];
-  const off = (run) => (run === reference ? "is the closed form" : `${told(difference(reference, run, body.position).largest * factor, 3)} ${shown}`);
-  const alike = (run) => run.fmu.modelInfo === reference?.fmu.modelInfo;
-  if (reference?.done) rows.push([`largest error of ${body.position} against the closed form`, ...runs.map((run) => (alike(run) ? off(run) : ""))]);
+  const largestError = (run) => (run === reference ? "closed form" : `${formatNumber(difference(reference, run, body.position).largest * factor, 3)} ${display_unit}`);
+  const hasReference = (run) => run.fmu.modelInfo === reference?.fmu.modelInfo;
+  if (reference?.done) rows.push([`largest error of ${body.position} against the closed form`, ...runs.map((run) => (hasReference(run) ? largestError(run) : ""))]);
   if (comparison?.columns[body.position] && comparison.columns[body.speed]) {
-    const apart = (name) => {
+    const largestDifference = (name) => {
       const variable = main.fmu.variables.get(name);
-      return `${told(difference(main, comparison, name).largest * variable.factor, 3)} ${variable.shown}`;
+      return `${formatNumber(difference(main, comparison, name).largest * variable.factor, 3)} ${variable.display_unit}`;
     };
-    rows.push([`largest difference in ${body.position}`, "", apart(body.position)], [`largest difference in ${body.speed}`, "", apart(body.speed)]);
+    rows.push([`largest difference in ${body.position}`, "", largestDifference(body.position)], [`largest difference in ${body.speed}`, "", largestDifference(body.speed)]);
   }
-  return table("What it costs", ["", ...runs.map(setting)], rows);
+  return table("Cost and accuracy", ["", ...runs.map(describeSettings)], rows);
 }
 
-// A published case beside what this page measures.
-export function published(session, state) {
+// Published values and the values measured in this run.
+export function publishedTable(session, state) {
   const preset = session.presets.get(state.preset);
   const run = session.runs.published;
   if (!preset || !run?.done || run.failure) return null;
   const modelInfo = session.models.get(state.model);
-  const measured = figures(run, modelInfo.bodies[0], preset.decay, inForce(modelInfo, state.values));
-  const rows = Object.entries(preset.published).filter(([name]) => name !== "source").map(([name, figure]) => compared(name, figure, measured[name]));
-  return table(preset.title, ["", "measured here", `published (${preset.published.source})`, "difference"], rows);
+  const measured = measureQuantities(run, modelInfo.bodies[0], preset.decay, effectiveValues(modelInfo, state.values));
+  const rows = Object.entries(preset.published).filter(([name]) => name !== "source").map(([name, published]) => comparisonRow(name, published, measured[name]));
+  return table(preset.title, ["", "this run", `published (${preset.published.source})`, "difference"], rows);
 }
 
-function compared(name, figure, value) {
-  const [words, own] = FIGURES[name] ?? [name, ""];
-  const [number, unit] = Array.isArray(figure) ? figure : [figure, own];
-  const factor = Array.isArray(figure) ? UNITS[unit] : 1;
-  if (value === undefined) return [words, "–", `${number} ${unit}`, ""];
+function comparisonRow(name, published, value) {
+  const [label, defaultUnit] = QUANTITIES[name] ?? [name, ""];
+  const [number, unit] = Array.isArray(published) ? published : [published, defaultUnit];
+  const factor = Array.isArray(published) ? UNITS[unit] : 1;
+  if (value === undefined) return [label, "–", `${number} ${unit}`, ""];
   const digits = Math.max(5, String(number).replace(".", "").replace(/^0+/, "").length);
-  const plain = typeof number === "number";
-  const [size, small] = !plain && own === "s" && Math.abs(value) < 1 ? [1e3 * value, "ms"] : [value / factor, unit];
-  const apart = plain && name !== "run_time" ? `${told(100 * (value / factor / number - 1), 2)} %` : name === "run_time" ? "elsewhere" : "";
-  return [words, `${told(size, digits)} ${small.replace(".", "·")}`, `${number} ${plain ? unit.replace(".", "·") : ""}`.trim(), apart];
+  const isNumber = typeof number === "number";
+  const [size, shownUnit] = !isNumber && defaultUnit === "s" && Math.abs(value) < 1 ? [1e3 * value, "ms"] : [value / factor, unit];
+  const deviation = isNumber && name !== "run_time" ? `${formatNumber(100 * (value / factor / number - 1), 2)} %` : name === "run_time" ? "other computer" : "";
+  return [label, `${formatNumber(size, digits)} ${shownUnit.replace(".", "·")}`, `${number} ${isNumber ? unit.replace(".", "·") : ""}`.trim(), deviation];
 }
 
-// What the turning points say.
-export function decay(session, state) {
+// Decay measured from the turning points.
+export function decayTable(session, state) {
   const { main } = session.runs;
   const modelInfo = session.models.get(state.model);
   const body = modelInfo.bodies[state.body];
-  const { shown, factor } = main.fmu.variables.get(body.position);
+  const { display_unit, factor } = main.fmu.variables.get(body.position);
   const turning = turningPoints(main.time, main.columns[body.position], main.columns[body.speed]);
-  const falling = turning.filter(({ x }, i) => i === 0 || Math.abs(x) < Math.abs(turning[i - 1].x));
-  const [first, last] = [falling[0], falling.at(-1)];
-  const between = falling.length > 2 && decayBetween(Math.abs(first.x), Math.abs(last.x), (falling.length - 1) / 2);
-  if (!between) return null;
-  const size = (x) => `${told(Math.abs(x) * factor, 6)} ${shown}`;
+  const decreasing = turning.filter(({ x }, i) => i === 0 || Math.abs(x) < Math.abs(turning[i - 1].x));
+  const [first, last] = [decreasing[0], decreasing.at(-1)];
+  const decay = decreasing.length > 2 && decayBetween(Math.abs(first.x), Math.abs(last.x), (decreasing.length - 1) / 2);
+  if (!decay) return null;
+  const size = (x) => `${formatNumber(Math.abs(x) * factor, 6)} ${display_unit}`;
   const rows = [
     ["turning points", String(turning.length)],
-    ["the first, the last that is smaller than the main before", `${size(first.x)}, ${size(last.x)}`],
-    ["logarithmic decrement of a cycle", told(between.delta, 6)],
-    ["damping ratio that would give it", told(between.zeta, 6)],
-    ["loss of amplitude in a cycle", size(between.loss)],
+    ["first, and last that is smaller than the one before", `${size(first.x)}, ${size(last.x)}`],
+    ["logarithmic decrement per cycle", formatNumber(decay.delta, 6)],
+    ["equivalent damping ratio", formatNumber(decay.zeta, 6)],
+    ["amplitude loss per cycle", size(decay.loss)],
   ];
   const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output");
   if (energy) {
-    const force = forceByEnergy(main, body, energy.name, falling);
-    rows.push([`friction by the energy lost on the way (mean of all losses)`, `${told(force, 6)} ${shown === "deg" ? "N·m" : "N"}`]);
+    const force = frictionFromEnergy(main, body, energy.name, decreasing);
+    rows.push(["mean friction from energy loss (all losses)", `${formatNumber(force, 6)} ${display_unit === "deg" ? "N·m" : "N"}`]);
   }
-  return table("What the decay says", ["", "measured"], rows);
+  return table("Decay", ["", "measured"], rows);
 }
 
-// The events, each with its time.
-export function events(session, state) {
+// The events with their times.
+export function eventTable(session, state) {
   const { main } = session.runs;
   const body = session.models.get(state.model).bodies[state.body];
   if (!main.events.length) return null;
-  const word = { "-1": "slides backward", 0: "sticks", 1: "slides forward" };
-  const rows = main.events.slice(0, LISTED).map(({ t, row }, i) => [String(i + 1), String(t), body.mode ? word[main.columns[body.mode][row]] : ""]);
+  const stateAfter = { "-1": "slides backward", 0: "sticks", 1: "slides forward" };
+  const rows = main.events.slice(0, MAX_LISTED_EVENTS).map(({ t, row }, i) => [String(i + 1), String(t), body.mode ? stateAfter[main.columns[body.mode][row]] : ""]);
   const more = main.events.length - rows.length;
-  const made = table("Events", ["", "t in s", "from then on it"], rows);
-  made.classList.add("long");
-  if (more > 0) made.append(make("p", {}, `and ${more} more: the CSV file has them all.`));
-  return made;
+  const eventList = table("Events", ["", "t in s", "then it"], rows);
+  eventList.classList.add("long");
+  if (more > 0) eventList.append(makeElement("p", {}, `${more} more events; the CSV file contains all.`));
+  return eventList;
 }
