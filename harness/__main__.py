@@ -1,10 +1,10 @@
-"""python -m harness: the commands, and how they end.  What a user can cause ends in one sentence and a status."""
+"""Entry point of `python -m harness`. Errors that a user can cause end with one sentence and an exit status."""
 
 import os
 import sys
 from pathlib import Path
 
-if Path(sys.path[0]) != Path(__file__).parents[1]:  # a model in the folder that one is in may be called math.py
+if Path(sys.path[0]) != Path(__file__).parents[1]:  # a model in the current directory may be named math.py
     sys.path += [str(Path(__file__).parents[1]), sys.path.pop(0)]
 
 import click
@@ -19,7 +19,10 @@ COMPLETION = "_FRICTION_FMUS_COMPLETE"  # the environment variable that click's 
 
 
 def main() -> None:
-    """Run the command line; not by click's own main, which has its own end for an interrupt."""
+    """Run the command line.
+
+    click's own main() is not used because it handles Ctrl-C differently.
+    """
     try:
         with interruptible():
             from .commands import commands
@@ -36,22 +39,23 @@ def main() -> None:
     except click.ClickException as error:
         error.show()
         sys.exit(error.exit_code)
-    except click.exceptions.Exit as end:
-        sys.exit(end.exit_code)
+    except click.exceptions.Exit as exit_request:
+        sys.exit(exit_request.exit_code)
     except HarnessError as error:
         fail(str(error), error.status)
     except MemoryError:
-        fail("there is not enough memory")
-    except OSError as error:  # of a file that nobody foresaw, or of standard output: full, or its reader gone
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # or the interpreter would try, and complain, once more
-        where = f"{error.filename}: " if error.filename else ""
-        fail(f"{where}{error.strerror or error}", quiet=isinstance(error, BrokenPipeError))
+        fail("out of memory")
+    except OSError as error:  # an unexpected file error, or standard output is full or closed
+        # otherwise the interpreter flushes standard output again at exit and prints a second error
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        prefix = f"{error.filename}: " if error.filename else ""
+        fail(f"{prefix}{error.strerror or error}", quiet=isinstance(error, BrokenPipeError))
 
 
-def fail(sentence: str, status: int = 1, quiet: bool = False) -> None:
-    """End with a sentence on standard error."""
+def fail(message: str, status: int = 1, quiet: bool = False) -> None:
+    """Print an error message to standard error and exit."""
     if not quiet:
-        print(f"Error: {sentence}", file=sys.stderr)
+        print(f"Error: {message}", file=sys.stderr)
     sys.exit(status)
 
 

@@ -1,1 +1,1 @@
-"""This process and those that it starts: signals, children, temporary folders."""
+"""Signals, child processes and temporary directories."""

@@ -1,7 +1,7 @@
-"""Ctrl-C and SIGTERM: both end a command at once, its files and processes gone, with the status that a shell expects.
+"""Ctrl-C and SIGTERM end a command at once, remove its files and processes and return the usual exit status.
 
-Both become KeyboardInterrupt, which takes everything down as an error does.  Something may swallow it on the way, as a
-function called from C or somebody else's FMU in Python does: what goes on for long asks `check` now and then.
+Both signals raise KeyboardInterrupt. C callbacks and FMUs in Python may swallow that exception, so loops that run for
+long call `check_interrupt`.
 """
 
 import atexit
@@ -20,70 +20,71 @@ from typing import Any
 from ..errors import HarnessError
 
 SIGNALS = (SIGINT, SIGTERM)
-RECEIVED_SIGNALS: list[int] = []  # signals, in the order in which they came
-GRACE_PERIOD = 0.2  # s; Ctrl-C is for child processes too, and that one of them has ended may be known before
+RECEIVED_SIGNALS: list[int] = []  # in order of arrival
+GRACE_PERIOD = 0.2  # s; Ctrl-C also reaches child processes, whose end may be noticed before the signal
 
 
 class CommandInterruptedError(HarnessError):
-    """Ended from outside; what remains to be said of it is one sentence."""
+    """A signal ended the command."""
 
-    def __init__(self, sentence: str = "") -> None:
+    def __init__(self, message: str = "") -> None:
         number = RECEIVED_SIGNALS[0] if RECEIVED_SIGNALS else SIGINT
-        super().__init__(sentence or ("interrupted" if number == SIGINT else "terminated"))
+        super().__init__(message or ("interrupted" if number == SIGINT else "terminated"))
         self.status = 128 + number
 
 
 def handle_signal(number: int, frame: Any) -> None:
-    """The handler of both signals."""
+    """Record a signal and raise KeyboardInterrupt."""
     record_signal(number, frame)
     raise KeyboardInterrupt
 
 
 def ignore_unraisable_interrupt(unraisable: Any) -> None:
-    """The hook for exceptions that Python cannot raise where they occur, as in a callback; an interrupt is kept."""
+    """Report exceptions that Python cannot raise, as in callbacks. An interrupt is recorded already."""
     if not isinstance(unraisable.exc_value, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)
 
 
 def check_interrupt() -> None:
-    """KeyboardInterrupt if a signal has come."""
+    """Raise KeyboardInterrupt if a signal has been received."""
     if RECEIVED_SIGNALS:
         raise KeyboardInterrupt
 
 
 def record_signal(number: int, frame: Any) -> None:
-    """The handler of both while something is begun that could not be ended half begun."""
+    """Record a signal without raising; the handler within `defer_signals`."""
     RECEIVED_SIGNALS.append(number)
-    logging.disable()  # what Dask would log of connections that end is no news
+    logging.disable()  # Dask would log closed connections
 
 
 @contextmanager
 def defer_signals() -> Iterator[None]:
-    """Within, a signal waits until the end: for what must not be left half done."""
-    listening = current_thread() is main_thread() and [
+    """Defer signals to the end of the block, for actions that must not be left half done."""
+    handled = current_thread() is main_thread() and [
         each for each in SIGNALS if signal.getsignal(each) == handle_signal
     ]
     before = len(RECEIVED_SIGNALS)
-    for number in listening or ():
+    for number in handled or ():
         signal.signal(number, record_signal)
     try:
         yield
     finally:
-        for number in listening or ():
+        for number in handled or ():
             signal.signal(number, handle_signal)
-    if listening and len(RECEIVED_SIGNALS) > before:
+    if handled and len(RECEIVED_SIGNALS) > before:
         raise KeyboardInterrupt
 
 
 @contextmanager
 def ignore_sigint() -> Iterator[None]:
-    """Processes and threads that are started within never hear a Ctrl-C; the signal waits until the end."""
-    from multiprocessing import resource_tracker  # later than `finish` is registered, so that it cleans up before
+    """Make processes and threads that start in the block ignore SIGINT. Defer the signal in this process."""
+    # imported after `exit_after_signal` is registered, so that its own cleanup runs first
+    from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # which multiprocessing would start within, and unblock what is blocked here
+    resource_tracker.ensure_running()  # multiprocessing would start it in the block, and unblock the signal
     mask = getattr(signal, "pthread_sigmask", lambda how, signals: None)  # none on Windows
     with defer_signals():
-        mask(signal.SIG_BLOCK, [SIGINT])  # which is inherited
+        mask(signal.SIG_BLOCK, [SIGINT])  # child processes inherit it
         try:
             yield
         finally:
@@ -91,29 +92,32 @@ def ignore_sigint() -> Iterator[None]:
 
 
 def exit_after_signal() -> None:
-    """The last of all that is done at the exit: Python would else tell, for any interrupt in the midst of an import,
-    that SIGINT killed it, and an FMU in Python that passes an interrupt on may do so late."""
+    """Exit at once after a signal.
+
+    Python would otherwise report SIGINT again for an interrupt during an import, and an FMU in Python may pass on an
+    interrupt late.
+    """
     if RECEIVED_SIGNALS:
         os._exit(128 + RECEIVED_SIGNALS[0])
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Within, both signals are heard, unless they were to be ignored, and end in Interrupted."""
-    for number, usual in zip(SIGNALS, (default_int_handler, SIG_DFL), strict=True):
-        if signal.getsignal(number) == usual:
+    """Handle both signals in the block, unless they are ignored, and raise CommandInterruptedError."""
+    for number, default in zip(SIGNALS, (default_int_handler, SIG_DFL), strict=True):
+        if signal.getsignal(number) == default:
             signal.signal(number, handle_signal)
     sys.unraisablehook = ignore_unraisable_interrupt
-    atexit.register(exit_after_signal)  # the first to be registered is the last to be called
+    atexit.register(exit_after_signal)  # registered first, called last
     try:
         yield
         check_interrupt()
-    except BaseException as error:  # what a signal made fail may say anything
+    except BaseException as error:  # a signal can cause any other error
         if isinstance(error, (OSError, EOFError)):
             sleep(GRACE_PERIOD)
         if isinstance(error, KeyboardInterrupt) or (
             RECEIVED_SIGNALS and not isinstance(error, CommandInterruptedError)
         ):
-            clear_frames(error.__traceback__)  # which hold a context that was entered and not yet begun: it is left
+            clear_frames(error.__traceback__)  # closes context managers that were entered but not started
             raise CommandInterruptedError from None
         raise

@@ -1,6 +1,6 @@
-"""Waiting for what other threads and processes do, so that a signal leaves no lock of theirs held.
+"""Waiting for other threads and processes such that a signal leaves no lock held.
 
-Between two lines of concurrent.futures it would: whoever wants the lock next, and the command with it, waits for ever.
+A signal between two lines of concurrent.futures would leave its lock acquired, and the command would wait forever.
 """
 
 from collections.abc import Callable, Collection, Generator, Iterable
@@ -15,7 +15,7 @@ Result = TypeVar("Result")
 
 
 def wait_for_any(futures: Collection[Future[Result]]) -> set[Future[Result]]:
-    """Those that have ended once one has, or after OFTEN s."""
+    """Return the futures that are done, once one is done or after `POLL_INTERVAL` s."""
     with defer_signals():
         return wait(futures, timeout=POLL_INTERVAL, return_when=FIRST_COMPLETED).done
 
@@ -23,7 +23,7 @@ def wait_for_any(futures: Collection[Future[Result]]) -> set[Future[Result]]:
 def map_in_threads(
     workers: int, function: Callable[[Item], Result], items: Iterable[Item]
 ) -> Generator[Result, None, None]:
-    """function(item) of all items in their order, from so many threads."""
+    """Yield function(item) for all items, in order, computed by `workers` threads."""
     with ThreadPoolExecutor(workers) as pool:
         with defer_signals():
             futures = [pool.submit(function, item) for item in items]

@@ -1,4 +1,4 @@
-"""A program in a process of its own, with a temporary folder of its own: both end with the command that started it."""
+"""Programs in child processes with temporary directories of their own. Both end with the command that started them."""
 
 import json
 import os
@@ -15,13 +15,13 @@ from ..errors import HarnessError
 from .interrupt import check_interrupt, defer_signals
 from .temporary_directory import temporary_directory
 
-PROJECT_ROOT = Path(__file__).parents[2]  # of the harness, and of what builds FMUs
+PROJECT_ROOT = Path(__file__).parents[2]  # contains harness and build_fmus
 RequestT = TypeVar("RequestT")
-POLL_INTERVAL = 0.1  # s between two looks at whether a signal has come: a thread that waits does not hear it
+POLL_INTERVAL = 0.1  # s between two checks for signals, which a blocked thread does not notice
 
 
 class SubprocessTimeoutError(HarnessError):
-    """It has not ended in time; `done` is the process with what it had answered and said until it was ended."""
+    """The process timed out and was killed. `process` holds its output up to then."""
 
     def __init__(self, timeout: float, done: subprocess.CompletedProcess[str]) -> None:
         super().__init__(f"no answer after {timeout:g} s")
@@ -35,57 +35,78 @@ def run_subprocess(
     timeout: float = inf,
     meanwhile: Callable[[], object] = check_interrupt,
 ) -> subprocess.CompletedProcess[str]:
-    """The ended process, what it answered to the text on its standard input, and what it said; Hangs after `timeout`
-    s.  Its temporary files are where every compiler and library can read their path.  What is done `meanwhile` checks
-    whether a signal has come."""
-    late = monotonic() + timeout
+    """Run a command and return the completed process.
+
+    The command's temporary files are in a directory whose path every compiler and library can read.
+
+    Parameters
+    ----------
+    command : sequence of str
+        Program and arguments.
+    text : str
+        Standard input.
+    environment : mapping
+        Environment variables.
+    timeout : float
+        Time limit in s.
+    meanwhile : callable
+        Called while waiting; must check for signals.
+
+    Raises
+    ------
+    SubprocessTimeoutError
+        If the process runs longer than `timeout`. The process group is killed.
+    """
+    deadline = monotonic() + timeout
     process = None
-    with temporary_directory("child-") as folder, TemporaryFile("w+", encoding="utf-8") as asked:
-        asked.write(text)  # all at once: what a pipe has no room for, a second communicate would not write
-        asked.seek(0)
+    with temporary_directory("child-") as directory, TemporaryFile("w+", encoding="utf-8") as standard_input:
+        standard_input.write(text)  # not a pipe: communicate() does not resume writing after its timeout
+        standard_input.seek(0)
         try:
             with defer_signals():
                 process = subprocess.Popen(
                     command,
-                    stdin=asked,
+                    stdin=standard_input,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.PIPE,
                     encoding="utf-8",
                     errors="replace",
-                    env={**environment, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(folder))},
-                    start_new_session=True,  # a Ctrl-C is for this process alone, which then ends that one
+                    env={**environment, **dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(directory))},
+                    start_new_session=True,  # Ctrl-C reaches this process only, which then kills the child
                 )
-            while monotonic() <= late:
+            while monotonic() <= deadline:
                 try:
-                    answered, said = process.communicate(timeout=POLL_INTERVAL)
-                    return subprocess.CompletedProcess(command, process.returncode, answered, said)
+                    stdout, stderr = process.communicate(timeout=POLL_INTERVAL)
+                    return subprocess.CompletedProcess(command, process.returncode, stdout, stderr)
                 except subprocess.TimeoutExpired:
                     meanwhile()
         except BaseException:
             if process:
                 kill_process_group(process)
             raise
-        answered, said = kill_process_group(process)
-        raise SubprocessTimeoutError(timeout, subprocess.CompletedProcess(command, process.returncode, answered, said))
+        stdout, stderr = kill_process_group(process)
+        raise SubprocessTimeoutError(timeout, subprocess.CompletedProcess(command, process.returncode, stdout, stderr))
 
 
 def run_module(module: str, text: str, *arguments: str, **how: Any) -> subprocess.CompletedProcess[str]:
-    """The same of a module of ours, wherever one is."""
+    """Run a module of this project with the present interpreter, from any working directory; see `run_subprocess`."""
     path = os.pathsep.join(filter(None, (str(PROJECT_ROOT), os.environ.get("PYTHONPATH", ""))))
     return run_subprocess([sys.executable, "-m", module, *arguments], text, os.environ | {"PYTHONPATH": path}, **how)
 
 
 def serve_request(request: Callable[..., RequestT], answer: Callable[[RequestT], Any]) -> None:
-    """In such a module: answer the one request on standard input, both in JSON.  What is printed meanwhile, as by FMUs,
-    is no answer, and goes to standard error."""
-    answers = os.fdopen(os.dup(1), "w")
+    """In a child process, read one JSON request from standard input and write the JSON answer to standard output.
+
+    Other output, such as that of FMUs, is redirected to standard error.
+    """
+    output = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
-    json.dump(answer(request(**json.load(sys.stdin))), answers)
-    answers.close()
+    json.dump(answer(request(**json.load(sys.stdin))), output)
+    output.close()
 
 
 def kill_process_group(process: subprocess.Popen[str]) -> tuple[str, str]:
-    """Kill a process and, where there are groups of them, those that it started; what it answered and said."""
+    """Kill a process and, on POSIX, its process group. Return its standard output and standard error."""
     if os.name == "posix":
         os.killpg(process.pid, 9)
     else:

@@ -1,4 +1,4 @@
-"""Temporary folders, where every library can read their path."""
+"""Temporary directories with paths that every library can read."""
 
 import os
 from collections.abc import Iterator
@@ -14,34 +14,36 @@ FALLBACK_DIRECTORIES = (
 )
 
 
-def has_plain_uri(folder: Path) -> bool:
-    """Whether the URI of a folder needs no escape but that of the blank."""
-    return "%" not in folder.absolute().as_uri().replace("%20", "")
+def has_plain_uri(directory: Path) -> bool:
+    """Return whether the URI of a directory needs no escape except that of a space."""
+    return "%" not in directory.absolute().as_uri().replace("%20", "")
 
 
 def temporary_root() -> Path:
-    """The folder of temporary files: the usual one, or, if that is not plain, another one that is, if there is one."""
+    """Return the system's temporary directory, or a fallback if its path is not plain."""
     try:
         usual = Path(gettempdir())
     except OSError:
-        raise HarnessError("there is no temporary folder that can be written; name one, as in TMPDIR=/tmp") from None
+        raise HarnessError("no temporary directory is writable; set one, as in TMPDIR=/tmp") from None
     if has_plain_uri(usual):
         return usual
-    return next((Path(place) for place in FALLBACK_DIRECTORIES if os.access(place, os.W_OK | os.X_OK)), usual)
+    return next((Path(path) for path in FALLBACK_DIRECTORIES if os.access(path, os.W_OK | os.X_OK)), usual)
 
 
 @contextmanager
 def temporary_directory(prefix: str = "fmu-") -> Iterator[Path]:
-    """A temporary folder, gone afterwards."""
-    held = None
+    """Create a temporary directory and remove it on exit."""
+    directory = None
     try:
         try:
             with defer_signals():
-                held = TemporaryDirectory(prefix=prefix, dir=temporary_root())
+                directory = TemporaryDirectory(prefix=prefix, dir=temporary_root())
         except OSError as error:
-            raise HarnessError(f"cannot write into the temporary folder {temporary_root()}: {error.strerror}") from None
-        yield Path(held.name)
+            raise HarnessError(
+                f"cannot write to the temporary directory {temporary_root()}: {error.strerror}"
+            ) from None
+        yield Path(directory.name)
     finally:
-        if held:
+        if directory:
             with defer_signals():
-                held.cleanup()
+                directory.cleanup()

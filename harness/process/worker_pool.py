@@ -1,8 +1,6 @@
-"""Worker processes of this machine, asked again and again: they end with the command that started them, also when it is
-killed, hear no Ctrl-C, and what they print goes nowhere.
+"""Worker pool. Workers exit with the parent, ignore SIGINT and discard what they print.
 
-Each is asked through a pipe of its own, and only while it waits there: no thread stands between, which could wait for
-ever for one that was killed.
+Each worker has its own pipe, so a killed worker cannot deadlock the others.
 """
 
 import multiprocessing
@@ -23,57 +21,57 @@ from ..errors import HarnessError
 from .interrupt import ignore_sigint
 from .subprocess_runner import POLL_INTERVAL
 
-MAX_SOCKET_DIRECTORY = (
-    70  # bytes, of the path of temporary files: below it is a socket, whose path may have 107 (unix(7))
-)
-PROCESS_LOCK = (
-    Lock()
-)  # a start looks after all processes there are, and may take the exit code of one that is waited for
+# bytes; the fork server puts a socket below the temporary directory, and its path is limited to 107 bytes (unix(7))
+MAX_SOCKET_DIRECTORY = 70
+# starting a process polls all others, and may take the exit code of one that another thread is joining
+PROCESS_LOCK = Lock()
 
 
 class WorkerDiedError(HarnessError):
-    """The process has crashed."""
+    """A worker process crashed."""
 
 
 def process_context(preload: Sequence[str]) -> Any:
-    """How processes are made: forked from a server that has imported what is named, where there is one and its socket
-    has room for its path."""
-    short = len(os.fsencode(tempfile.gettempdir())) <= MAX_SOCKET_DIRECTORY
-    if not short or "forkserver" not in multiprocessing.get_all_start_methods():
+    """Return the multiprocessing context: a fork server that has imported `preload`, or spawn.
+
+    Spawn is used where there is no fork server, or where the path of its socket would be too long.
+    """
+    path_is_short = len(os.fsencode(tempfile.gettempdir())) <= MAX_SOCKET_DIRECTORY
+    if not path_is_short or "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")
-    made = multiprocessing.get_context("forkserver")
-    made.set_forkserver_preload(["__main__", *preload])
-    return made
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["__main__", *preload])
+    return context
 
 
 class Worker:
-    """A process that does one thing after the other, with its temporary files in a folder."""
+    """A process that runs one task after the other, with its temporary files in `folder`."""
 
     def __init__(self, context: Any, folder: Path) -> None:
-        self.connection, there = context.Pipe()
-        self.process = context.Process(target=run_tasks, args=(there, str(folder)), daemon=True)
+        self.connection, child_connection = context.Pipe()
+        self.process = context.Process(target=run_tasks, args=(child_connection, str(folder)), daemon=True)
         with PROCESS_LOCK, ignore_sigint():
             self.process.start()
-        there.close()
+        child_connection.close()
 
     def send_task(self, function: Callable[..., Any], *arguments: Any) -> None:
-        """Have function(*arguments) done, in the folder where this process is."""
+        """Start function(*arguments) in the worker, in the present working directory."""
         with self.raise_if_died():
             self.connection.send((Path.cwd(), function, arguments))
 
     def has_result(self, timeout: float) -> bool:
-        """Whether there is an answer within so many seconds."""
+        """Return whether a result arrives within `timeout` s."""
         with self.raise_if_died():
             return self.connection.poll(timeout)
 
     def receive_result(self) -> Any:
-        """What the function returned, or the exception that it raised."""
+        """Return what the function returned, or the exception that it raised."""
         with self.raise_if_died():
             return self.connection.recv()
 
     @contextmanager
     def raise_if_died(self) -> Iterator[None]:
-        """Died, if it has crashed."""
+        """Turn a broken connection into WorkerDiedError."""
         try:
             yield
         except (EOFError, OSError):
@@ -81,7 +79,7 @@ class Worker:
             raise WorkerDiedError(f"the process died with exit code {self.process.exitcode}") from None
 
     def kill(self) -> None:
-        """Kill it, whatever it does."""
+        """Kill the process, whatever it is doing."""
         with PROCESS_LOCK:
             self.process.kill()
             self.process.join()
@@ -89,9 +87,9 @@ class Worker:
 
 
 class WorkerPool:
-    """Up to so many of them, with temporary files in `folder`.
+    """Up to `size` workers, with temporary files in `folder`.
 
-    `died` is what a task raises during which its process died; another one takes its place.
+    `death_errors` are the exceptions of a task whose worker died. The pool replaces a dead worker.
     """
 
     death_errors: tuple[type[Exception], ...] = (WorkerDiedError,)
@@ -103,76 +101,76 @@ class WorkerPool:
         self.pending: deque[tuple[Future[Any], Callable[..., Any], tuple[Any, ...]]] = deque()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """What function(*arguments) will return, from one of them."""
+        """Queue function(*arguments) and return its future."""
         future: Future[Any] = Future()
         self.pending.append((future, function, arguments))
         self.dispatch()
         return future
 
     def dispatch(self) -> None:
-        """Ask those that have nothing to do."""
+        """Give queued tasks to idle workers."""
         while self.pending and len(self.busy) < self.size:
             future, function, arguments = self.pending.popleft()
-            hand = self.idle.pop() if self.idle else Worker(self.context, self.folder)
+            worker = self.idle.pop() if self.idle else Worker(self.context, self.folder)
             try:
-                hand.send_task(function, *arguments)
+                worker.send_task(function, *arguments)
             except WorkerDiedError as died:
                 future.set_exception(died)
             else:
-                self.busy[hand.connection] = hand, future
+                self.busy[worker.connection] = worker, future
 
     def wait_for_any(self, futures: Collection[Future[Any]]) -> set[Future[Any]]:
-        """Those that have ended once one has, or after OFTEN s."""
+        """Return the futures that are done, once one is done or after `POLL_INTERVAL` s."""
         ready = wait([*self.busy], POLL_INTERVAL)
-        for here in [each for each in self.busy if each in ready]:
-            hand, future = self.busy.pop(here)
+        for connection in [each for each in self.busy if each in ready]:
+            worker, future = self.busy.pop(connection)
             try:
-                found = hand.receive_result()
-                self.idle.append(hand)
+                result = worker.receive_result()
+                self.idle.append(worker)
             except WorkerDiedError as died:
-                found = died
-            if isinstance(found, BaseException):
-                future.set_exception(found)
+                result = died
+            if isinstance(result, BaseException):
+                future.set_exception(result)
             else:
-                future.set_result(found)
+                future.set_result(result)
         self.dispatch()
         return {future for future in futures if future.done()}
 
     def kill(self) -> None:
-        """Kill them, whatever they do."""
+        """Kill all workers, whatever they are doing."""
         for process in multiprocessing.active_children():
             process.kill()
             process.join()
 
 
-def run_tasks(there: Connection, folder: str) -> None:
-    """Send what comes of each call."""
+def run_tasks(connection: Connection, folder: str) -> None:
+    """Run tasks from the connection and send back their results."""
     initialize_worker(folder)
     while True:
         try:
-            place, function, arguments = there.recv()
-        except EOFError:  # who asks is gone
+            directory, function, arguments = connection.recv()
+        except EOFError:  # the parent is gone
             exit_with_parent(folder)
-        os.chdir(place)
+        os.chdir(directory)
         try:
-            found = function(*arguments)
+            result = function(*arguments)
         except Exception as error:
-            found = error
-        there.send(found)
+            result = error
+        connection.send(result)
 
 
 def initialize_worker(folder: str) -> None:
-    """The first that each process does."""
+    """Set up the process: signals, temporary files, output, and the exit with its parent."""
     signal(SIGINT, SIG_IGN)
     tempfile.tempdir = folder
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for number in (1, 2):
-        os.dup2(nowhere, number)
+    null_device = os.open(os.devnull, os.O_WRONLY)
+    for descriptor in (1, 2):
+        os.dup2(null_device, descriptor)
     Thread(target=exit_with_parent, args=(folder,), daemon=True).start()
 
 
 def exit_with_parent(folder: str) -> None:
-    """End with the process that started this one, which could not tidy up."""
+    """Wait for the parent to end, remove its temporary files and exit."""
     parent = multiprocessing.parent_process()
     if parent:
         parent.join()

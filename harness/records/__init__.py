@@ -1,1 +1,1 @@
-"""What people measured, read from the files that they have: tables of any kind, their headings, units and clocks."""
+"""Measured records, read from tables in many file formats: headings, units and time stamps."""

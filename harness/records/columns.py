@@ -1,7 +1,7 @@
-"""Which columns of a table are the time and the motion, what was measured, and in which unit.
+"""Selection of the time and motion columns of a table, the measured quantity, and its unit.
 
-A heading tells name and unit, as in `x [mm]`, `theta (deg)`, `Linear Acceleration z (m/s^2)` or `x / mm`.  The unit
-tells the quantity, otherwise the name does; both may be overruled.
+Headings contain a name and a unit, as in `x [mm]`, `theta (deg)`, `Linear Acceleration z (m/s^2)` or `x / mm`. The
+quantity follows from the unit, otherwise from the name. Options override both.
 """
 
 import re
@@ -20,7 +20,7 @@ from .units import COUNT_NAMES, TIMES, find_unit, parse_per_count, time_unit_siz
 
 HEADING = re.compile(r"^\s*(.*?)\s*(?:[\[(]([^\[\]()]*(?:\([^()]*\))?)[\])])?\s*$")
 SLASH_HEADING = re.compile(r"^\s*(.*?)\s+(?:/|in)\s+(\S+)\s*$")
-BRACKET_HEADING = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]+)[\])]\s*(.*)$")  # of which run follows, as in `x (mm) Run #1`
+BRACKET_HEADING = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]+)[\])]\s*(.*)$")  # followed by a run, as in `x (mm) Run #1`
 TIME_NAME = re.compile(
     r"^(t|times?|zeit|temps|tiempo|tid|timestamp|datetime|date|elapsed|seconds|epoch)(?![^\W_])|(time|zeit|stamp)$",
     re.I,
@@ -34,16 +34,31 @@ QUANTITY_NAMES = (
     re.compile(r"^(v|vel|velocity|speed|omega|gyro|gyroscope|rate)\b|velocity|gyroscope|speed", re.I),
     re.compile(r"^(a|acc|accel|accelerometer|alpha|a[xyz])\b|acceleration|accelerometer|accel|^a_|^acc", re.I),
 )
-EXPONENT = re.compile("[dD](?=[-+0-9])")  # of Fortran
-MAGNITUDE_NAME = re.compile(r"\b(abs|absolute|magnitude|norm)\b", re.I)  # of a vector: it has no sign
+EXPONENT = re.compile("[dD](?=[-+0-9])")  # Fortran
+MAGNITUDE_NAME = re.compile(r"\b(abs|absolute|magnitude|norm)\b", re.I)  # of a vector; has no sign
 MAX_MISSING_SHARE = 0.2  # share of the samples
-RATE_SUFFIXES = ("", "/s", "/s2")  # what the unit of a derivative adds to that of the position
+RATE_SUFFIXES = ("", "/s", "/s2")  # appended to the unit of the position
 
 
 @dataclass(frozen=True)
 class ColumnOptions:
-    """What the user says about the columns: their headings (`names` where the file has none), the quantity, and the
-    units that stand above those in the file."""
+    """Options for the columns of a file.
+
+    Attributes
+    ----------
+    time, position : str or None
+        Headings of the time and motion columns.
+    quantity : str or None
+        Measured quantity: position, velocity or acceleration.
+    unit, time_unit : str or None
+        Units that override those in the file.
+    per_count : str or None
+        Size and unit of one count of an encoder.
+    names : str or None
+        Headings, separated by commas, for a file without headings.
+    begin, end : float
+        Time interval in s.
+    """
 
     time: str | None = None
     position: str | None = None
@@ -58,7 +73,7 @@ class ColumnOptions:
 
 @dataclass(frozen=True)
 class Column:
-    """A column at its place in a table: its heading as it stands in the file, and the name and the unit in that."""
+    """Column of a table: index, heading, and the name and unit in the heading."""
 
     index: int
     heading: str
@@ -67,40 +82,54 @@ class Column:
 
     @property
     def order(self) -> int | None:
-        """The order of the derivative that the heading tells, by its unit or else by its name."""
-        found = find_unit(self.unit) if self.unit else None
-        return found.order if found else order_from_name(self.name)
+        """Return the order of the derivative that the unit, or else the name, indicates."""
+        unit = find_unit(self.unit) if self.unit else None
+        return unit.order if unit else order_from_name(self.name)
 
 
 def read_record(source: str, columns: ColumnOptions, name: str) -> Record:
-    """The record in a file, from `columns.begin` to `columns.end` in s; SceneError in one sentence if it is not one."""
-    return record_of(load_table(source, columns.names), columns, name)
+    """Read a record from a file.
 
+    Parameters
+    ----------
+    source : str
+        Path of the file; "-" for standard input.
+    columns : ColumnOptions
+    name : str
+        Name of the record.
 
-def record_of(table: Table, columns: ColumnOptions, name: str) -> Record:
-    """The same of a table that has been read."""
+    Raises
+    ------
+    SceneError
+        If the file contains no record.
+    """
+    table = load_table(source, columns.names)
     if len(table.column_headings) < 2:
-        raise SceneError(f"{table.name} has one column that is not empty; time and position are needed")
+        raise SceneError(f"{table.name} has only one column that is not empty; time and position are required")
     if not any(table.column_headings):
-        raise SceneError(f"{table.name} has no heading; name its columns, as in --columns 't [s],x [mm]'")
-    parts = [Column(place, head, *split_heading(head)) for place, head in enumerate(table.column_headings)]
-    clock = find_time_column(table, parts, columns)
-    signal, notes = find_signal_column(table, parts, columns, clock)
-    label, unit = signal.name or signal.heading, columns.unit or signal.unit
-    x = parse_numbers(table, signal.index)
-    order, base, size, guessed = resolve_unit(label, unit, columns, table.name)
-    t = read_times(table, clock, columns)
-    if columns.time is None and not (TIME_NAME.search(clock.name) or clock.unit):
-        notes.append(f"{clock.heading} is taken for the time; --time takes another.")
-    keep = np.isfinite(t) & np.isfinite(x)
-    missing = int(len(t) - keep.sum())
+        raise SceneError(f"{table.name} has no heading; give the names of its columns, as in --columns 't [s],x [mm]'")
+    candidates = [
+        Column(index, heading, *split_heading(heading)) for index, heading in enumerate(table.column_headings)
+    ]
+    time_column = find_time_column(table, candidates, columns)
+    motion_column, notes = find_signal_column(table, candidates, columns, time_column)
+    label, unit = motion_column.name or motion_column.heading, columns.unit or motion_column.unit
+    x = parse_numbers(table, motion_column.index)
+    order, base, size, assumption = resolve_unit(label, unit, columns, table.name)
+    t = read_times(table, time_column, columns)
+    if columns.time is None and not (TIME_NAME.search(time_column.name) or time_column.unit):
+        notes.append(f"{time_column.heading} is used as time; --time selects another column.")
+    is_complete = np.isfinite(t) & np.isfinite(x)
+    missing = int(len(t) - is_complete.sum())
     if missing > MAX_MISSING_SHARE * len(t):
-        raise SceneError(f"{table.name}: {missing} of {len(t)} rows have no number for {clock.heading} or {label}")
+        raise SceneError(
+            f"{table.name}: {missing} of {len(t)} rows have no number for {time_column.heading} or {label}"
+        )
     if missing:
-        notes.append(f"{missing} of {len(t)} rows have a missing cell and are left out.")
-    t, rounded = undo_time_rounding(t)
-    notes += filter(None, (rounded, guessed))
-    t, x = t[keep], size * x[keep]
+        notes.append(f"{missing} of {len(t)} rows have a missing cell and are skipped.")
+    t, rounding = undo_time_rounding(t)
+    notes += filter(None, (rounding, assumption))
+    t, x = t[is_complete], size * x[is_complete]
     record = Record(name, t, x, base + RATE_SUFFIXES[order], order, base, tuple(notes)).select(
         columns.begin, columns.end
     )
@@ -109,154 +138,171 @@ def record_of(table: Table, columns: ColumnOptions, name: str) -> Record:
 
 
 def read_numeric(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
-    """Headings and numbers (rows, columns) of a file that has nothing but numbers; NaN where one is missing."""
+    """Return the headings and numbers (rows, columns) of a purely numeric file; NaN for missing cells."""
     table = load_table(str(path))
     if not all(table.column_headings):
-        raise SceneError(f"{table.name} has no heading; its first line must name the columns, as in t [s],x [mm]")
+        raise SceneError(
+            f"{table.name} has no heading; its first line must contain the names of the columns, as in t [s],x [mm]"
+        )
     return table.column_headings, np.column_stack([parse_numbers(table, i) for i in range(len(table.column_headings))])
 
 
-def split_heading(head: str) -> tuple[str, str | None]:
-    """Name and unit of a heading: x [mm], x / mm, x_mm, millis."""
-    found = HEADING.match(head)
-    name, unit = (found[1], found[2]) if found else (head, None)
+def split_heading(heading: str) -> tuple[str, str | None]:
+    """Return name and unit of a heading: x [mm], x / mm, x_mm, millis."""
+    match = HEADING.match(heading)
+    name, unit = (match[1], match[2]) if match else (heading, None)
     if unit is None:
-        for found in (SLASH_HEADING.match(name), BRACKET_HEADING.match(name)):
-            if found and (find_unit(found[2]) or time_unit_size(found[2])):
-                return " ".join(filter(None, (found[1], *found.groups()[2:]))), found[2]
+        for match in (SLASH_HEADING.match(name), BRACKET_HEADING.match(name)):
+            if match and (find_unit(match[2]) or time_unit_size(match[2])):
+                return " ".join(filter(None, (match[1], *match.groups()[2:]))), match[2]
         words = re.split(r"[ _,:]+|(?<=[a-z])(?=[A-Z])", name)
         for i in range(1, len(words)):
-            first, last = " ".join(words[:i]), "/".join(words[i:])
+            stem, suffix = " ".join(words[:i]), "/".join(words[i:])
             if (
-                time_unit_size(last)
-                if TIME_NAME.search(first)
-                else len(last) > 1 and last.lower() != "in" and find_unit(last)
+                time_unit_size(suffix)
+                if TIME_NAME.search(stem)
+                else len(suffix) > 1 and suffix.lower() != "in" and find_unit(suffix)
             ):
-                return first, last
+                return stem, suffix
         if len(name) > 1 and name.lower() not in ("in", "min") and (time_unit_size(name) or find_unit(name)):
             return name, name
     return name, unit or None
 
 
-def find_column(asked: str, table: Table, parts: Sequence[Column]) -> Column:
-    """The column of that heading: as it stands in the file, or by its name without the unit."""
-    for heads in (
+def find_column(heading: str, table: Table, candidates: Sequence[Column]) -> Column:
+    """Return the column with a heading, given in full or without its unit."""
+    for headings in (
         list(table.column_headings),
-        [head.strip() for head in table.column_headings],
-        [part.name for part in parts],
+        [text.strip() for text in table.column_headings],
+        [part.name for part in candidates],
     ):
-        for fold in (str, str.lower):
-            matches = [part for part, head in zip(parts, heads, strict=True) if fold(head) == fold(asked)]
+        for normalize in (str, str.lower):
+            matches = [
+                part for part, text in zip(candidates, headings, strict=True) if normalize(text) == normalize(heading)
+            ]
             if matches:
                 return matches[0]
-    raise SceneError(f"{table.name}: {unknown_name_message('column', asked, filter(None, table.column_headings))}")
+    raise SceneError(f"{table.name}: {unknown_name_message('column', heading, filter(None, table.column_headings))}")
 
 
-def find_time_column(table: Table, parts: Sequence[Column], columns: ColumnOptions) -> Column:
-    """The one that is asked for, named or measured as a time; otherwise the first that has a heading."""
+def find_time_column(table: Table, candidates: Sequence[Column], columns: ColumnOptions) -> Column:
+    """Return the requested time column; otherwise one that is named or measured as a time; otherwise the first."""
     if columns.time is not None:
-        return find_column(columns.time, table, parts)
-    clocks = [part for part in parts if TIME_NAME.search(part.name)]
-    clocks = [part for part in clocks if not DATE_NAME.search(part.name)] or clocks
-    measured = [part for part in parts if part.unit and time_unit_size(part.unit) and find_unit(part.unit) is None]
-    both = [part for part in clocks if part in measured]
-    return (both or clocks or measured or [part for part in parts if part.heading])[0]
+        return find_column(columns.time, table, candidates)
+    by_name = [part for part in candidates if TIME_NAME.search(part.name)]
+    by_name = [part for part in by_name if not DATE_NAME.search(part.name)] or by_name
+    by_unit = [part for part in candidates if part.unit and time_unit_size(part.unit) and find_unit(part.unit) is None]
+    both = [part for part in by_name if part in by_unit]
+    return (both or by_name or by_unit or [part for part in candidates if part.heading])[0]
 
 
 def find_signal_column(
-    table: Table, parts: Sequence[Column], columns: ColumnOptions, clock: Column
+    table: Table, candidates: Sequence[Column], columns: ColumnOptions, time_column: Column
 ) -> tuple[Column, list[str]]:
-    """The column of the motion: a position rather than a velocity or an acceleration; of several the liveliest."""
+    """Return the motion column and notes on the choice.
+
+    A position is preferred to a velocity or an acceleration. Of several, the one with the largest deviation is chosen.
+    """
     if columns.position is not None:
-        return find_column(columns.position, table, parts), []
-    others = [part for part in parts if part is not clock]
+        return find_column(columns.position, table, candidates), []
+    others = [part for part in candidates if part is not time_column]
     others = [part for part in others if part.heading and not TIME_NAME.search(part.name)] or others
-    later = (part.index for part in parts[clock.index + 1 :] if TIME_NAME.search(part.name))
-    next_t = next(later, len(parts))  # of several runs beside each other that of this time
-    others = [part for part in others if clock.index < part.index < next_t] or others
+    next_times = (part.index for part in candidates[time_column.index + 1 :] if TIME_NAME.search(part.name))
+    next_time = next(next_times, len(candidates))  # with several runs side by side, use that of this time column
+    others = [part for part in others if time_column.index < part.index < next_time] or others
     if columns.quantity is not None:
-        wanted: int | None = QUANTITIES.index(columns.quantity)
+        order: int | None = QUANTITIES.index(columns.quantity)
     else:
-        wanted = min((part.order for part in others if part.order is not None), default=None)
-    chosen = [part for part in others if part.order == wanted]
+        order = min((part.order for part in others if part.order is not None), default=None)
+    chosen = [part for part in others if part.order == order]
     chosen = [part for part in chosen if not MAGNITUDE_NAME.search(part.name)] or chosen or others
     if chosen[0].order is None:
-        return chosen[0], []  # nothing is known of any: the first
-    first = [part for part in chosen if part.unit == chosen[0].unit]
-    if len(first) == 1 or (wanted == 0 and first[0].name.lower() in ("x", "theta")):
-        return first[0], []
-    spans = [np.nanstd(parse_numbers(table, part.index, strict=False)) for part in first]
-    best = first[int(np.argmax(spans))]
-    names = ", ".join(part.heading for part in first)
-    return best, [f"Of {names} the one that moves most is taken: {best.heading}; --position takes another."]
+        return chosen[0], []  # no heading indicates a quantity: use the first
+    same_unit = [part for part in chosen if part.unit == chosen[0].unit]
+    if len(same_unit) == 1 or (order == 0 and same_unit[0].name.lower() in ("x", "theta")):
+        return same_unit[0], []
+    deviations = [np.nanstd(parse_numbers(table, part.index, strict=False)) for part in same_unit]
+    liveliest = same_unit[int(np.argmax(deviations))]
+    names = ", ".join(part.heading for part in same_unit)
+    return liveliest, [f"Of {names} the one that varies most is used: {liveliest.heading}; --position selects another."]
 
 
 def order_from_name(name: str) -> int | None:
-    """The order of the derivative that a name tells."""
+    """Return the order of the derivative that a name indicates, or None."""
     return next((order for order in (2, 1, 0) if QUANTITY_NAMES[order].search(name)), None)
 
 
 def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str) -> tuple[int, str, float, str]:
-    """Order, base unit and size in it of a column, and what had to be guessed."""
-    asked = None if columns.quantity is None else QUANTITIES.index(columns.quantity)
-    named, size = order_from_name(name), 1.0
+    """Return the order, base unit and SI factor of a column, and a note on what had to be assumed."""
+    requested = None if columns.quantity is None else QUANTITIES.index(columns.quantity)
+    order_of_name, size = order_from_name(name), 1.0
     if columns.per_count is not None:
         size, unit = parse_per_count(columns.per_count)
     if unit is None:
         hint = {None: "--unit mm or deg", 0: "--unit mm or deg", 1: "--unit mm/s or deg/s", 2: "--unit m/s2 or g"}
         raise SceneError(
-            f"{name} has no unit in the heading of {file}; name it, as in {hint[named if asked is None else asked]}"
+            f"{name} has no unit in the heading of {file}; set it, as in "
+            f"{hint[order_of_name if requested is None else requested]}"
         )
     if unit.lower() in COUNT_NAMES:
-        raise SceneError(f"{name} is in {unit}; say what one of them is, as in --per-count 0.36deg or 0.001mm")
-    found = find_unit(unit)
-    if found is None:
-        told = next((order for order in (asked, named) if order is not None), None)
-        order, rate = told or 0, RATE_SUFFIXES[told or 0]
+        raise SceneError(f"{name} is in {unit}; set the size of one count, as in --per-count 0.36deg or 0.001mm")
+    known_unit = find_unit(unit)
+    if known_unit is None:
+        indicated = next((order for order in (requested, order_of_name) if order is not None), None)
+        order, rate = indicated or 0, RATE_SUFFIXES[indicated or 0]
         base = unit.removesuffix(rate) if unit.endswith(rate) else f"{unit}.s{order if order > 1 else ''}"
-        doubt = (
-            f"{name} in {unit} is taken for a position, in {unit}; --quantity velocity or acceleration says otherwise."
+        assumption = (
+            f"{name} in {unit} is assumed to be a position; --quantity velocity or acceleration overrides this."
         )
-        return order, base, 1.0, doubt if told is None else ""
-    order = found.order if asked is None else asked
-    if asked is not None and asked != found.order:
+        return order, base, 1.0, assumption if indicated is None else ""
+    order = known_unit.order if requested is None else requested
+    if requested is not None and requested != known_unit.order:
         raise SceneError(
-            f"--quantity {columns.quantity}: {unit}, the unit of {name}, is that of {with_article(QUANTITIES[found.order])}"
+            f"--quantity {columns.quantity}: {unit}, the unit of {name}, measures "
+            f"{with_article(QUANTITIES[known_unit.order])}"
         )
-    if named is not None and found.order < named and asked is None and columns.unit is None:
+    if order_of_name is not None and known_unit.order < order_of_name and requested is None and columns.unit is None:
         raise SceneError(
-            f"{name} has the name of {with_article(QUANTITIES[named])} and the unit of {with_article(QUANTITIES[found.order])}, {unit}: say "
-            "--quantity, and --unit where the one in the file is wrong"
+            f"{name} has the name of {with_article(QUANTITIES[order_of_name])} and the unit of "
+            f"{with_article(QUANTITIES[known_unit.order])}, {unit}: set --quantity, and --unit if "
+            "that in the file is wrong"
         )
-    return order, found.base, size * found.size, ""
+    return order, known_unit.base, size * known_unit.size, ""
 
 
 def with_article(noun: str) -> str:
+    """Return a noun with its indefinite article."""
     return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
 
 
-def read_times(table: Table, clock: Column, columns: ColumnOptions) -> np.ndarray:
-    """Times (n,) in s."""
-    cells = table.columns[clock.index]
-    first = next((cell for cell in cells if isinstance(cell, str) and cell), None)
-    if first is not None and ":" in first and TIMESTAMP.match(first):
+def read_times(table: Table, time_column: Column, columns: ColumnOptions) -> np.ndarray:
+    """Return times (n,) in s."""
+    cells = table.columns[time_column.index]
+    first_text = next((cell for cell in cells if isinstance(cell, str) and cell), None)
+    if first_text is not None and ":" in first_text and TIMESTAMP.match(first_text):
         return parse_timestamps(cells, table.name)  # type: ignore[arg-type]
-    unit = columns.time_unit or clock.unit
-    size = time_unit_size(unit or "s")  # s: every simulation program and nearly every instrument
+    unit = columns.time_unit or time_column.unit
+    size = time_unit_size(unit or "s")  # default s, as in nearly all programs and instruments
     if unit and not size:
-        raise SceneError(unknown_name_message(f"unit of {clock.name}", unit, TIMES))
-    t = parse_numbers(table, clock.index)
-    some = t[np.isfinite(t)]
-    if unit is None and len(some) and ((some == np.round(some)).all() or some.max() > MAX_PLAUSIBLE_TIME):
+        raise SceneError(unknown_name_message(f"unit of {time_column.name}", unit, TIMES))
+    t = parse_numbers(table, time_column.index)
+    finite = t[np.isfinite(t)]
+    if unit is None and len(finite) and ((finite == np.round(finite)).all() or finite.max() > MAX_PLAUSIBLE_TIME):
         raise SceneError(
-            f"{table.name}: {clock.name} has whole or huge numbers and no unit: say what one is, as in --time-unit ms, "
-            "s, or 0.01s of samples that are counted"
+            f"{table.name}: {time_column.name} has integer or very large numbers and no unit: set one, as in "
+            "--time-unit ms, s, or 0.01s for sample numbers"
         )
     return t * size
 
 
 def parse_numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
-    """The numbers (n,) of a column, NaN where one is missing; SceneError where a cell is neither, if `strict`."""
+    """Return the numbers (n,) of a column, NaN for missing cells.
+
+    Raises
+    ------
+    SceneError
+        If `strict` and a cell is neither a number nor missing.
+    """
     cells: Cells = table.columns[i]
     if isinstance(cells, np.ndarray):
         return cells
@@ -265,22 +311,22 @@ def parse_numbers(table: Table, i: int, strict: bool = True) -> np.ndarray:
         return np.array([cell.replace(",", ".") for cell in cells] if everywhere else cells, dtype=float)
     except ValueError:
         pass
-    found = np.full(len(cells), np.nan)
-    there = [cell for cell in cells if cell.lower() not in MISSING]
-    commas = [cell for cell in there if "," in cell]
-    thousands = len(commas) < len(there) and all(
-        GROUPED_NUMBER.match(cell) and cell.strip("+-")[0] != "0" for cell in commas
+    numbers = np.full(len(cells), np.nan)
+    present = [cell for cell in cells if cell.lower() not in MISSING]
+    with_comma = [cell for cell in present if "," in cell]
+    comma_groups = len(with_comma) < len(present) and all(
+        GROUPED_NUMBER.match(cell) and cell.strip("+-")[0] != "0" for cell in with_comma
     )
-    for at, cell in enumerate(cells):
+    for index, cell in enumerate(cells):
         if cell.lower() in MISSING:
             continue
         grouped = GROUPED_NUMBER.match(cell)
-        if grouped and (grouped[2] or grouped[3] or grouped[1] == "'" or (grouped[1] == "," and thousands)):
+        if grouped and (grouped[2] or grouped[3] or grouped[1] == "'" or (grouped[1] == "," and comma_groups)):
             cell = cell.replace(grouped[1], "")
         try:
-            found[at] = float(EXPONENT.sub("e", cell.replace(",", ".")))
+            numbers[index] = float(EXPONENT.sub("e", cell.replace(",", ".")))
         except ValueError:
             if strict:
-                row = f"row {table.line + 1 + at}, column {table.column_headings[i]}"
+                row = f"row {table.line + 1 + index}, column {table.column_headings[i]}"
                 raise SceneError(f"{table.name}: '{cell[:40]}' in {row}, is not a number") from None
-    return found
+    return numbers

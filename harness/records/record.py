@@ -1,4 +1,4 @@
-"""A record of a free decay: what was measured, when, and in which unit."""
+"""Record of a free decay: measured values over time."""
 
 from dataclasses import dataclass, replace
 from typing import Self
@@ -7,15 +7,28 @@ import numpy as np
 
 from ..errors import SceneError
 
-QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative that was recorded
+QUANTITIES = ("position", "velocity", "acceleration")  # by the order of the derivative
 MIN_SAMPLES = 12  # samples
-MAX_VALUE = 1e100  # squares of it are numbers still
+MAX_VALUE = 1e100  # its square is finite
 
 
 @dataclass(frozen=True)
 class Record:
-    """Values `x` (n,) in `unit` at the times `t` (n,) in s, rising; `order` 0, 1 or 2 says of which derivative of the
-    position, whose own unit is `base` (m, rad, or what a sensor gives).  `notes`: what was done on reading."""
+    """Measured values.
+
+    Attributes
+    ----------
+    t : numpy.ndarray
+        Times (n,) in s, increasing.
+    x : numpy.ndarray
+        Values (n,) in `unit`.
+    order : int
+        Order of the derivative of the position that was measured: 0, 1 or 2.
+    base : str
+        Unit of the position: m, rad, or that of a sensor.
+    notes : tuple of str
+        Assumptions and corrections made when reading.
+    """
 
     name: str
     t: np.ndarray
@@ -27,28 +40,37 @@ class Record:
 
     @property
     def quantity(self) -> str:
+        """Return the measured quantity."""
         return QUANTITIES[self.order]
 
     def format_time(self, t: float) -> str:
-        """A time in s as a sentence has it: to a hundred thousandth of the record, however late its clock."""
+        """Return a time in s for messages, with a resolution of 1e-5 of the record."""
         return f"{t:.{max(5 - int(np.ceil(np.log10(np.ptp(self.t)))), 0)}f}"
 
     def select(self, begin: float, end: float) -> Self:
-        """The samples from `begin` to `end` in s."""
-        inside = (self.t >= begin) & (self.t <= end)
-        return replace(self, t=self.t[inside], x=self.x[inside])
+        """Return the samples from `begin` to `end` in s."""
+        in_range = (self.t >= begin) & (self.t <= end)
+        return replace(self, t=self.t[in_range], x=self.x[in_range])
 
 
 def check_record(record: Record) -> None:
-    """Samples enough, finite, and later each than the one before; SceneError where not."""
+    """Check that a record has enough finite samples at increasing times.
+
+    Raises
+    ------
+    SceneError
+        If it has not.
+    """
     if len(record.t) < MIN_SAMPLES:
-        raise SceneError(f"{record.name} has {len(record.t)} samples in this stretch; {MIN_SAMPLES} or more are needed")
+        raise SceneError(
+            f"{record.name} has {len(record.t)} samples in this interval; at least {MIN_SAMPLES} are required"
+        )
     for name, values in (("time", record.t), (record.quantity, record.x)):
         if not np.isfinite(values).all():
             raise SceneError(f"{record.name}: {name} is not finite in sample {int(np.argmin(np.isfinite(values)))}")
         if np.abs(values).max() > MAX_VALUE:
-            raise SceneError(f"{record.name}: {name} is as large as {np.abs(values).max():.3g}, which nothing measures")
-    late = np.flatnonzero(np.diff(record.t) <= 0)
-    if len(late):
-        at = float(record.t[late[0]])
-        raise SceneError(f"{record.name}: time does not rise after t = {at!r} s; sort the rows, one for each time")
+            raise SceneError(f"{record.name}: {name} is as large as {np.abs(values).max():.3g}, which is not plausible")
+    not_increasing = np.flatnonzero(np.diff(record.t) <= 0)
+    if len(not_increasing):
+        time = float(record.t[not_increasing[0]])
+        raise SceneError(f"{record.name}: time does not rise after t = {time!r} s; sort the rows and keep one per time")

@@ -1,7 +1,6 @@
-"""The table in a file of any kind: text, spreadsheet (.xlsx, .xls, .ods), MATLAB's .mat of either sort, numpy's .npz;
-any of them packed by gzip.
+"""Reads tables from files: text, spreadsheets (.xlsx, .xls, .ods), MATLAB .mat, numpy .npz, or any of them gzipped.
 
-The kind is told by the first bytes, so that standard input can be any of them.
+The format is detected from the first bytes, so standard input works for all of them.
 """
 
 import gzip
@@ -24,8 +23,7 @@ Cells = list[Any] | np.ndarray
 
 @dataclass(frozen=True)
 class Table:
-    """The columns of a file by their headings, which may be empty; `line` is the number of the line or row before
-    them."""
+    """Columns of a file with their headings, which may be empty; `line` is the line number before the first row."""
 
     name: str
     column_headings: tuple[str, ...]
@@ -33,9 +31,21 @@ class Table:
     line: int = 0
 
 
-def load_table(source: str, names: str | None = None) -> Table:
-    """The table of the file `source`, or of standard input where that is "-"; `names` are the headings, with commas
-    between, where the file has none.  SceneError in one sentence where there is none."""
+def load_table(source: str, headings: str | None = None) -> Table:
+    """Load the table in a file.
+
+    Parameters
+    ----------
+    source : str
+        Path; "-" for standard input.
+    headings : str, optional
+        Headings, separated by commas, that replace those in the file.
+
+    Raises
+    ------
+    SceneError
+        If the file contains no table.
+    """
     path = Path(source)
     name = "standard input" if source == "-" else path.name
     data = sys.stdin.buffer.read() if source == "-" else read_content(path)
@@ -47,40 +57,42 @@ def load_table(source: str, names: str | None = None) -> Table:
         raise
     except ImportError as error:
         raise SceneError(f"{name} needs {error.name} to be read: {INSTALL_COMMAND}") from None
-    except Exception as error:  # those who wrote the readers raise what they meet in a damaged file
+    except Exception as error:  # the readers raise arbitrary exceptions for damaged files
         raise SceneError(f"{name} cannot be read: {first_line(error)}") from None
-    if names is None:
+    if headings is None:
         return table
-    heads = tuple(part.strip() for part in names.split(","))
-    if len(heads) != len(table.columns):
+    names = tuple(part.strip() for part in headings.split(","))
+    if len(names) != len(table.columns):
         raise SceneError(
-            f"--columns names {len(heads)} columns, and {name} has {len(table.columns)} that are not empty"
+            f"--columns names {len(names)} columns, and {name} has {len(table.columns)} that are not empty"
         )
-    return Table(name, heads, table.columns, table.line)
+    return Table(name, names, table.columns, table.line)
 
 
 def read_content(path: Path) -> bytes:
-    """The bytes of a file."""
+    """Return the bytes of a file."""
     try:
         return path.read_bytes()
     except (OSError, ValueError) as error:
-        said = getattr(error, "strerror", None) or str(error)
-        near = []
+        reason = getattr(error, "strerror", None) or str(error)
+        matches = []
         if isinstance(error, FileNotFoundError) and path.parent.is_dir():
-            near = get_close_matches(path.name, [each.name for each in path.parent.iterdir()], n=1)
-        hint = f" (nearest: '{near[0]}')" if near else ""
-        raise SceneError(f"cannot read {path}: {said}{hint}") from None
+            matches = get_close_matches(path.name, [sibling.name for sibling in path.parent.iterdir()], n=1)
+        hint = f" (nearest: '{matches[0]}')" if matches else ""
+        raise SceneError(f"cannot read {path}: {reason}{hint}") from None
 
 
 def parse_table_file(data: bytes, name: str) -> Table:
-    """The table in these bytes."""
+    """Parse a table in any format."""
     if data.startswith(b"\x1f\x8b"):
         return parse_table_file(gzip.decompress(data), name)
     if data.startswith(b"PK"):
         with ZipFile(io.BytesIO(data)) as archive:
             tables = [member for member in archive.namelist() if member.lower().endswith((".csv", ".tsv", ".txt"))]
         if tables:
-            raise SceneError(f"{name} is an archive: unpack it and name what is in it, as in {format_value(tables[0])}")
+            raise SceneError(
+                f"{name} is an archive: unpack it and specify a file in it, as in {format_value(tables[0])}"
+            )
         return table_from_arrays(read_npz(data), name) if b".npy" in data[:200] else read_workbook(data, name)
     if data.startswith(b"\xd0\xcf\x11\xe0"):
         return read_workbook(data, name)
@@ -92,87 +104,93 @@ def parse_table_file(data: bytes, name: str) -> Table:
     return table_from_rows(heads, rows, line, name)
 
 
-def table_from_rows(heads: list[str], rows: list[list[Any]], line: int, name: str) -> Table:
-    """A table from its rows; what a short row lacks is missing, and what only stands beside the first rows is left."""
-    width = max(len(heads), len(rows[0]))
+def table_from_rows(headings: list[str], rows: list[list[Any]], line: int, name: str) -> Table:
+    """Return a table from its rows. Short rows are padded; columns without heading and values are dropped."""
+    width = max(len(headings), len(rows[0]))
     for number, row in enumerate(rows, line + 1):
         if len(row) > width and any(str(cell).strip() for cell in row[width:]):
             raise SceneError(f"{name}: row {number} has {len(row)} cells where the heading has {width}")
     columns = zip(*(row if len(row) == width else [*row, *[""] * width][:width] for row in rows), strict=True)
-    heads = [*heads, *[""] * (width - len(heads))]
+    headings = [*headings, *[""] * (width - len(headings))]
     middle = slice(len(rows) // 2, len(rows) // 2 + text_table.SAMPLE_LINES)
-    kept = [(h, list(c)) for h, c in zip(heads, columns, strict=True) if any(c if h else c[middle])]
-    return Table(name, tuple(head for head, _ in kept), tuple(cells for _, cells in kept), line)
+    columns_with_headings = [(h, list(c)) for h, c in zip(headings, columns, strict=True) if any(c if h else c[middle])]
+    return Table(
+        name, tuple(head for head, _ in columns_with_headings), tuple(cells for _, cells in columns_with_headings), line
+    )
 
 
 def read_workbook(data: bytes, name: str) -> Table:
-    """The longest table in the sheets of a workbook, the first of equal ones."""
+    """Return the longest table in the sheets of a workbook."""
     from python_calamine import CalamineWorkbook
 
-    book = CalamineWorkbook.from_filelike(io.BytesIO(data))
-    found = []
-    for each in book.sheet_names:
-        rows = [[str(cell).strip() for cell in row] for row in book.get_sheet_by_name(each).to_python()]
-        first = text_table.find_first_number_row(rows)
-        if first is not None:
-            found.append((rows, first))
-    if not found:
+    workbook = CalamineWorkbook.from_filelike(io.BytesIO(data))
+    candidates = []
+    for sheet_name in workbook.sheet_names:
+        rows = [[str(cell).strip() for cell in row] for row in workbook.get_sheet_by_name(sheet_name).to_python()]
+        first_row = text_table.find_first_number_row(rows)
+        if first_row is not None:
+            candidates.append((rows, first_row))
+    if not candidates:
         raise SceneError(f"{name} has no sheet with a heading and rows of numbers")
-    rows, first = max(found, key=lambda each: len(each[0]) - each[1])
-    return table_from_rows(text_table.find_headings(rows[:first], len(rows[first])), rows[first:], first, name)
+    rows, first_row = max(candidates, key=lambda sheet_name: len(sheet_name[0]) - sheet_name[1])
+    return table_from_rows(
+        text_table.find_headings(rows[:first_row], len(rows[first_row])), rows[first_row:], first_row, name
+    )
 
 
 def read_npz(data: bytes) -> dict[str, Any]:
-    with np.load(io.BytesIO(data), allow_pickle=False) as found:
-        return {name: found[name] for name in found.files}
+    """Return the arrays of a .npz file."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}
 
 
 def read_mat(data: bytes) -> dict[str, Any]:
+    """Return the variables of a .mat file up to version 7.2."""
     from scipy.io import loadmat
 
     return {key: value for key, value in loadmat(io.BytesIO(data), simplify_cells=True).items() if key[:2] != "__"}
 
 
 def read_hdf5(data: bytes) -> dict[str, Any]:
-    """The data sets of an HDF5 file, as MATLAB writes them since version 7.3."""
+    """Return the numeric data sets of an HDF5 file, such as a .mat file of version 7.3."""
     import h5py
 
-    found: dict[str, Any] = {}
+    datasets: dict[str, Any] = {}
 
     def visit(path: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not path.startswith("#"):
-            found[path.replace("/", ".")] = item[()]
+            datasets[path.replace("/", ".")] = item[()]
 
     with h5py.File(io.BytesIO(data), "r") as file:
         file.visititems(visit)
-    return found
+    return datasets
 
 
-def table_from_arrays(found: dict[str, Any], name: str) -> Table:
-    """The columns among named arrays: vectors, and matrices by their columns, of the length that most have."""
+def table_from_arrays(arrays: dict[str, Any], name: str) -> Table:
+    """Return a table from named arrays: vectors and columns of matrices with the most frequent length."""
     columns: list[tuple[str, np.ndarray]] = []
-    for key, value in flatten_arrays(found):
+    for key, value in flatten_arrays(arrays):
         if value.ndim == 1 or min(value.shape) == 1:
             columns.append((key, value.ravel()))
         elif value.ndim == 2:
-            tall = value if value.shape[0] >= value.shape[1] else value.T
-            columns += [(f"{key}{i + 1}", tall[:, i]) for i in range(tall.shape[1])]
+            matrix = value if value.shape[0] >= value.shape[1] else value.T
+            columns += [(f"{key}{i + 1}", matrix[:, i]) for i in range(matrix.shape[1])]
     lengths = [len(values) for _, values in columns if len(values) > 2]
     length = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
-    kept = [(key, values) for key, values in columns if len(values) == length]
-    if len(kept) < 2:
+    selected = [(key, values) for key, values in columns if len(values) == length]
+    if len(selected) < 2:
         raise SceneError(
-            f"{name} has no two arrays of one length; time and position are needed (it has {', '.join(found)})"
+            f"{name} has no two arrays of equal length; time and position are required (it has {', '.join(arrays)})"
         )
-    return Table(name, tuple(key for key, _ in kept), tuple(values for _, values in kept))
+    return Table(name, tuple(key for key, _ in selected), tuple(values for _, values in selected))
 
 
-def flatten_arrays(found: dict[str, Any], above: str = "") -> list[tuple[str, np.ndarray]]:
-    """Arrays of numbers by name, those inside of structures as structure.field."""
+def flatten_arrays(values: dict[str, Any], prefix: str = "") -> list[tuple[str, np.ndarray]]:
+    """Return numeric arrays by name, those in structures as structure.field."""
     arrays = []
-    for key, value in found.items():
+    for key, value in values.items():
         if isinstance(value, dict):
-            arrays += flatten_arrays(value, f"{above}{key}.")
+            arrays += flatten_arrays(value, f"{prefix}{key}.")
         elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and 1 <= value.ndim <= 2 and value.size:
-            arrays.append((above + key, value.astype(float)))
+            arrays.append((prefix + key, value.astype(float)))
     return arrays

@@ -1,4 +1,4 @@
-"""Units of what a sensor writes: which derivative of which position, and how large in SI."""
+"""Units of measured motions: order of the derivative, base unit and factor to SI."""
 
 import re
 from typing import NamedTuple
@@ -21,11 +21,11 @@ UNIT_SYNONYMS = {
 }  # fmt: skip
 
 
-CHARACTER_SUBSTITUTES = str.maketrans("º˚µμ²⁻¹·*", "°°uu2-1  ", "^")  # what stands for what, and what for nothing
+CHARACTER_SUBSTITUTES = str.maketrans("º˚µμ²⁻¹·*", "°°uu2-1  ", "^")  # replaced and removed characters
 
 
 class MotionUnit(NamedTuple):
-    """What a unit measures: the `order` of the derivative of a position in `base` (m or rad), and its size in SI."""
+    """Unit of a motion: `order` of the derivative of a position in `base` (m or rad), and its `size` in SI units."""
 
     order: int
     base: str
@@ -33,7 +33,7 @@ class MotionUnit(NamedTuple):
 
 
 def normalize_unit(text: str) -> str:
-    """A unit as the tables below write it: µm is um, m·s⁻², m s^-2 and m/s/s are m/s2."""
+    """Return a unit in the notation of the tables: µm becomes um; m·s⁻², m s^-2 and m/s/s become m/s2."""
     text = re.sub(r"\s+", " ", text.replace("**", "").translate(CHARACTER_SUBSTITUTES).strip())
     text = re.sub(r"[ .]?s-2$|/s/s$|/\(s2\)$|/sec2$", "/s2", text)
     text = re.sub(r"[ .]s-1$|/sec$", "/s", text)
@@ -41,16 +41,16 @@ def normalize_unit(text: str) -> str:
 
 
 def find_unit(text: str) -> MotionUnit | None:
-    """The unit of that name, or None where it is none of a motion."""
+    """Return a unit of motion by name, or None."""
     name = normalize_unit(text)
     if name not in UNITS:
         name = name.lower()
-    stem, slash, over = name.partition("/")
-    return UNITS.get(UNIT_SYNONYMS.get(stem, stem) + slash + over)
+    numerator, slash, denominator = name.partition("/")
+    return UNITS.get(UNIT_SYNONYMS.get(numerator, numerator) + slash + denominator)
 
 
 def time_unit_size(text: str) -> float | None:
-    """The size of a unit of time in s, of so many of them as in 0.01s, or None where it is none."""
+    """Return the size in s of a unit of time, also of a multiple as in 0.01s, or None."""
     number, name = re.fullmatch(r"([0-9.]*(?:e-?[0-9]+)?)(.*)", normalize_unit(text).lower(), re.S).groups()  # type: ignore[union-attr]
     size = TIMES.get(UNIT_SYNONYMS.get(name, name))
     try:
@@ -60,15 +60,15 @@ def time_unit_size(text: str) -> float | None:
 
 
 def parse_per_count(text: str) -> tuple[float, str]:
-    """The size and the unit of one count, as in 0.36deg or 1e-3 mm."""
-    found = re.fullmatch(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*", text)
-    if not found or find_unit(found[2]) is None:
-        raise SceneError(f"--per-count {text}: what one count is has a number and a unit, as in 0.36deg or 0.001mm")
-    return float(found[1]), found[2]
+    """Return size and unit of one count, as in 0.36deg or 1e-3 mm."""
+    match = re.fullmatch(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*", text)
+    if not match or find_unit(match[2]) is None:
+        raise SceneError(f"--per-count {text}: give a number and a unit, as in 0.36deg or 0.001mm")
+    return float(match[1]), match[2]
 
 
 def build_unit_table() -> dict[str, MotionUnit]:
-    """Every unit, with its rates."""
+    """Return all units and their time derivatives."""
     bases = ((LENGTHS, "m"), (ANGLES, "rad"))
     units = {
         name + rate: MotionUnit(order, base, size)

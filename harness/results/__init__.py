@@ -1,1 +1,1 @@
-"""What is left of a run: folders, files, where they came from, quantities with their units, the look of figures."""
+"""Results: folders, CSV, JSON and NetCDF files, provenance, quantities with units, and the style of figures."""

@@ -1,12 +1,12 @@
-"""Result folders, replaced whole or not at all.
+"""Result folders, which are replaced completely or not at all.
 
-A result is written into a folder beside the old one, which then takes its place.  On Linux the two are exchanged in one
-step of the file system (renameat2, RENAME_EXCHANGE), on macOS likewise (renamex_np, RENAME_SWAP): whoever looks finds
-the old result or the new one at any moment, also after a kill.  Elsewhere, and on a file system that knows no exchange,
-it takes two steps, and a kill between them leaves the old result under another name, where the next run finds it.
+A result is written to a new folder beside the old one, and the two are then exchanged. On Linux (renameat2,
+RENAME_EXCHANGE) and macOS (renamex_np, RENAME_SWAP) the exchange is atomic: any reader, at any moment and after a kill,
+finds either the old or the new result. Elsewhere, and on file systems without exchange, it takes two steps. A kill
+between them leaves the old result under another name, from which the next run restores it.
 
-What a killed run left is removed by the next one into the same place.  What another one still writes is not: its folder
-is locked, where there are locks (fcntl).
+A run removes what killed runs left in the same place, but not folders that another process is writing: these are locked
+where locks exist (fcntl).
 """
 
 import ctypes
@@ -27,130 +27,148 @@ from .provenance import FILE, load_provenance, note_replaced_result
 if sys.platform != "win32":
     import fcntl
 
-OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of something else may be replaced
-FRESH, OLD = ".new", ".old"  # endings of the folders beside, after the name of the result and eight letters
+OVERWRITE = ContextVar("overwrite", default=False)  # whether a result of another source may be replaced
+FRESH, OLD = ".new", ".old"  # suffixes of temporary folders, after the result's name and eight characters
 AT_FDCWD, RENAME_EXCHANGE, RENAME_SWAP = -100, 2, 2  # of Linux and macOS
 
 
 @contextmanager
-def replace_folder(folder: Path, ours: Sequence[str], source: str = "") -> Iterator[Path]:
-    """A new folder beside `folder` to write into; it takes its place if nothing is raised, and is removed otherwise.
-    Its account tells what was there before, by the first of the files that are `ours`.
+def replace_folder(folder: Path, own_files: Sequence[str], source: str = "") -> Iterator[Path]:
+    """Yield a new folder; it replaces `folder` if nothing is raised, and is removed otherwise.
 
-    Refused with HarnessError if the old folder is a link, holds a file not named in `ours`, which would be lost, or,
-    unless that is what the user wants, a result of another `source`.
+    The provenance of the new result describes how it differs from the old one.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Result folder.
+    own_files : sequence of str
+        Files that a result may contain, the one to compare first.
+    source : str
+        Source of the result, as in its provenance.
+
+    Raises
+    ------
+    HarnessError
+        If the old folder is a link, contains other files, or is a result of another `source` without OVERWRITE.
     """
     try:
-        drawn = (name.replace(".svg", ".png") for name in ours)  # as earlier versions drew them
-        ours = (*ours, *drawn, FILE)
-        check_replaceable(folder, ours)
+        png_files = (name.replace(".svg", ".png") for name in own_files)  # figures of earlier versions
+        own_files = (*own_files, *png_files, FILE)
+        check_replaceable(folder, own_files)
         check_same_source(folder, source)
-        missing = [each for each in folder.absolute().parents if not each.exists()]
+        missing = [parent for parent in folder.absolute().parents if not parent.exists()]
         folder.parent.mkdir(parents=True, exist_ok=True)
-        clean_up(folder, ours)
+        clean_up(folder, own_files)
     except OSError as error:
         raise HarnessError(f"cannot write below {folder.parent}: {error.strerror}; choose another --out") from None
-    fresh, held = None, ExitStack()
+    new_folder, resources = None, ExitStack()
     try:
         with defer_signals():
-            fresh = create_locked_folder(folder, held)
-        yield fresh
-        note_replaced_result(folder, fresh, ours[0])
-        swap_in(fresh, folder)
+            new_folder = create_locked_folder(folder, resources)
+        yield new_folder
+        note_replaced_result(folder, new_folder, own_files[0])
+        swap_in(new_folder, folder)
     except OSError as error:
         raise HarnessError(f"cannot write {folder}: {error.strerror or error}; choose another --out") from None
     finally:
         with defer_signals():
-            if fresh:
-                rmtree(fresh, ignore_errors=True)
-            held.close()
-            with suppress(OSError):  # they are needed
-                for each in missing:
-                    each.rmdir()
+            if new_folder:
+                rmtree(new_folder, ignore_errors=True)
+            resources.close()
+            with suppress(OSError):  # not empty
+                for parent in missing:
+                    parent.rmdir()
 
 
-def check_replaceable(folder: Path, ours: Collection[str]) -> None:
-    """HarnessError if something is in the way that is no result."""
+def check_replaceable(folder: Path, own_files: Collection[str]) -> None:
+    """Raise HarnessError if `folder` is not a result."""
     if folder.is_symlink():
-        raise HarnessError(f"{folder} is a link, which a result does not replace; remove it or choose another --out")
+        raise HarnessError(f"{folder} is a link and is not replaced; remove it or choose another --out")
     if folder.exists():
-        held = [file.name for file in folder.iterdir()] if folder.is_dir() else ["a file of that name"]
-        foreign = sorted(set(held) - set(ours))
-        if foreign:
-            raise HarnessError(f"{folder} holds {foreign[0]}, which is not a result; move it or choose another --out")
+        names = [file.name for file in folder.iterdir()] if folder.is_dir() else ["a file of that name"]
+        other_files = sorted(set(names) - set(own_files))
+        if other_files:
+            raise HarnessError(
+                f"{folder} holds {other_files[0]}, which is not part of a result; move it or choose another --out"
+            )
 
 
-def check_same_source(folder: Path, source: str, account: str = FILE) -> None:
-    """HarnessError if a result of another source is there, and the user did not say that it may be replaced."""
-    older = load_provenance(folder, account)
-    if older.get("source", source) != source and not OVERWRITE.get():
-        made = f"`{older['command']}`" + (f", from {older['source']}" if older["source"] else "")
+def check_same_source(folder: Path, source: str, file_name: str = FILE) -> None:
+    """Raise HarnessError if a result of another source exists, unless OVERWRITE is set."""
+    old = load_provenance(folder, file_name)
+    if old.get("source", source) != source and not OVERWRITE.get():
+        origin = f"`{old['command']}`" + (f", from {old['source']}" if old["source"] else "")
         raise HarnessError(
-            f"{folder} holds the result of {made}: keep it and name another --out, or replace it with --overwrite"
+            f"{folder} holds the result of {origin}; choose another --out, or replace it with --overwrite"
         )
 
 
-def create_locked_folder(folder: Path, held: ExitStack) -> Path:
-    """A new folder beside, whose lock is `held`."""
+def create_locked_folder(folder: Path, resources: ExitStack) -> Path:
+    """Create a new folder beside the result and lock it; `resources` holds the lock."""
     while True:
-        # absolute: an interrupt may come while fmpy, which loads a library, is in its folder
-        fresh = Path(mkdtemp(prefix=f".{folder.name}-", suffix=FRESH, dir=folder.parent.absolute()))
-        fresh.chmod(0o755)  # mkdtemp gives 0o700
-        held.enter_context(lock_folder(fresh, wait=True))
-        if fresh.exists():  # nobody took it for one that was left, before it was locked
-            return fresh
-        held.close()
+        # absolute: fmpy changes the working directory while it loads a library, and a signal may arrive then
+        new_folder = Path(mkdtemp(prefix=f".{folder.name}-", suffix=FRESH, dir=folder.parent.absolute()))
+        new_folder.chmod(0o755)  # mkdtemp creates it with 0o700
+        resources.enter_context(lock_folder(new_folder, wait=True))
+        if new_folder.exists():  # no other process removed it before it was locked
+            return new_folder
+        resources.close()
 
 
 @contextmanager
 def lock_folder(folder: Path, wait: bool = False) -> Iterator[None]:
-    """Within, the folder is locked, where there are locks; OSError if another process has it, and one does not wait."""
+    """Lock a folder, where locks exist; raise OSError if another process has locked it and `wait` is false."""
     if sys.platform == "win32":
         yield
         return
     lock = os.open(folder, os.O_RDONLY)
     try:
-        with suppress(OSError) if wait else nullcontext():  # of a file system without locks
+        with suppress(OSError) if wait else nullcontext():  # file systems without locks
             fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
     finally:
         os.close(lock)
 
 
-def clean_up(folder: Path, ours: Collection[str]) -> None:
-    """Put back what a kill left between the two steps of an exchange, and remove what else killed runs left."""
-    beside = re.compile(rf"\.{re.escape(folder.name)}-[a-z0-9_]{{8}}({FRESH}|{OLD})")
-    for left in sorted(folder.parent.iterdir()):
-        if beside.fullmatch(left.name) and left.is_dir() and {file.name for file in left.iterdir()} <= set(ours):
-            with suppress(OSError), lock_folder(left):  # or somebody writes it
-                if left.suffix == OLD and not folder.exists():
-                    left.rename(folder)
-                rmtree(left, ignore_errors=True)
+def clean_up(folder: Path, own_files: Collection[str]) -> None:
+    """Restore a result after a kill between the two steps of an exchange, and remove what killed runs left."""
+    pattern = re.compile(rf"\.{re.escape(folder.name)}-[a-z0-9_]{{8}}({FRESH}|{OLD})")
+    for leftover in sorted(folder.parent.iterdir()):
+        if (
+            pattern.fullmatch(leftover.name)
+            and leftover.is_dir()
+            and {file.name for file in leftover.iterdir()} <= set(own_files)
+        ):
+            with suppress(OSError), lock_folder(leftover):  # another process is writing it
+                if leftover.suffix == OLD and not folder.exists():
+                    leftover.rename(folder)
+                rmtree(leftover, ignore_errors=True)
 
 
-def swap_in(fresh: Path, folder: Path) -> None:
-    """Put the fresh folder where the old one is, which is left in its place; the old one stays if that fails."""
+def swap_in(new_folder: Path, folder: Path) -> None:
+    """Replace `folder` by the new folder; keep the old one if that fails."""
     if not folder.exists():
-        fresh.rename(folder)
-    elif not exchange_folders(fresh, folder):
-        old = fresh.with_suffix(OLD)
+        new_folder.rename(folder)
+    elif not exchange_folders(new_folder, folder):
+        old = new_folder.with_suffix(OLD)
         with defer_signals():
             folder.rename(old)
             try:
-                fresh.rename(folder)
+                new_folder.rename(folder)
             except OSError:
                 old.rename(folder)
                 raise
             rmtree(old, ignore_errors=True)
 
 
-def exchange_folders(one: Path, two: Path) -> bool:
-    """Whether two folders have taken each other's place, in one step."""
-    ours, theirs = os.fsencode(one), os.fsencode(two)
+def exchange_folders(first: Path, second: Path) -> bool:
+    """Exchange two folders atomically; return whether that was possible."""
+    first_path, second_path = os.fsencode(first), os.fsencode(second)
     try:
-        system = ctypes.CDLL(None)
+        libc = ctypes.CDLL(None)
         if sys.platform == "darwin":
-            return system.renamex_np(ours, theirs, RENAME_SWAP) == 0
-        return system.renameat2(AT_FDCWD, ours, AT_FDCWD, theirs, RENAME_EXCHANGE) == 0
-    except (AttributeError, OSError, TypeError):  # another system, or an older one
+            return libc.renamex_np(first_path, second_path, RENAME_SWAP) == 0
+        return libc.renameat2(AT_FDCWD, first_path, AT_FDCWD, second_path, RENAME_EXCHANGE) == 0
+    except (AttributeError, OSError, TypeError):  # not supported by the system
         return False

@@ -1,4 +1,4 @@
-"""Where a result came from: a file in its folder that names what was run, with which values, by which versions."""
+"""Provenance of a result: a file in its folder with the command, versions, input files and parameters."""
 
 import json
 import platform
@@ -18,10 +18,15 @@ from .files import to_json
 FILE = "provenance.json"
 HARNESS = "friction-fmus"
 REPLACED = "replaced"
-IMPLIED_SCENE_KEYS = {"values", "name", "file", "source"}  # of a scene: in its parameters, or in what it was made from
+IMPLIED_SCENE_KEYS = {
+    "values",
+    "name",
+    "file",
+    "source",
+}  # keys of a scene that follow from its parameters or input files
 PACKAGES = (HARNESS, "fmpy", "numpy", "scipy")
 
-Parameters = Mapping[str, tuple[object, str]]  # by name: the value in force, and its unit
+Parameters = Mapping[str, tuple[object, str]]  # effective value and unit by name
 
 
 def write_provenance(
@@ -33,9 +38,24 @@ def write_provenance(
     source: str = "",
     command: str | None = None,
 ) -> None:
-    """Write into a folder of results where they come from: the digests of the `files` that were read, FMUs and
-    records, all `parameters` in force, the `scene` as it was run, and the `source` that was named."""
-    told = {
+    """Write the provenance of a result.
+
+    Parameters
+    ----------
+    folder : pathlib.Path
+        Result folder.
+    files : iterable of pathlib.Path
+        FMUs and records that were read; their digests are stored.
+    parameters : mapping, optional
+        Effective value and unit by name.
+    scene : object, optional
+        The scene that was run.
+    name : str
+        Name of the file.
+    source : str
+        Source of the result, as given on the command line.
+    """
+    content = {
         "source": source,
         "command": shlex.join(["python", "-m", "harness", *sys.argv[1:]]) if command is None else command,
         "date": datetime.now().astimezone().isoformat(timespec="seconds"),
@@ -45,30 +65,34 @@ def write_provenance(
         "parameters": {name: {"value": value, "unit": unit} for name, (value, unit) in (parameters or {}).items()},
         "scene": scene,
     }
-    (folder / name).write_text(to_json(told) + "\n", encoding="utf-8")
+    (folder / name).write_text(to_json(content) + "\n", encoding="utf-8")
 
 
 def prefix_parameters(parts: Mapping[str, Parameters]) -> Parameters:
-    """The parameters of several parts, each by the name of its own before it."""
-    return {f"{part}: {name}": told for part, each in parts.items() for name, told in each.items()}
+    """Return the parameters of several parts, prefixed with the part's name."""
+    return {
+        f"{part}: {name}": parameter for part, parameters in parts.items() for name, parameter in parameters.items()
+    }
 
 
 def describe_sources(*sources: str) -> str:
-    """What a result was made from, for its account: paths of what is there in full, other words as they are."""
-    return ", ".join(str(Path(each).resolve()) if Path(each).exists() else each for each in sources)
+    """Return sources for the provenance: absolute paths of existing files, other words unchanged."""
+    return ", ".join(str(Path(source).resolve()) if Path(source).exists() else source for source in sources)
 
 
 def file_digest(file: Path) -> str:
+    """Return the SHA-256 digest of a file."""
     return sha256(file.read_bytes()).hexdigest()
 
 
 def package_versions() -> dict[str, str]:
-    """Of the harness, and of what its numbers hang on."""
+    """Return the versions of the harness and of the packages that determine its numbers."""
     return {package: package_version(package) for package in PACKAGES} | {"python": platform.python_version()}
 
 
 @cache
 def package_version(package: str) -> str:
+    """Return the version of an installed package."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -76,87 +100,111 @@ def package_version(package: str) -> str:
 
 
 def load_provenance(folder: Path, name: str = FILE) -> dict[str, Any]:
-    """What a folder of results says of its origin; nothing where it does not."""
+    """Return the provenance of a result; empty if there is none or it is incomplete."""
     try:
-        told = json.loads((folder / name).read_text(encoding="utf-8"))
+        content = json.loads((folder / name).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
-    return told if isinstance(told, dict) and is_complete(told) else {}
+    return content if isinstance(content, dict) and is_complete(content) else {}
 
 
-def is_complete(told: dict[str, Any]) -> bool:
-    """Whether all is there that others ask for."""
-    texts = all(isinstance(told.get(name), str) for name in ("command", "date"))
-    tables = all(isinstance(told.get(name), dict) for name in ("files", "parameters")) and "scene" in told
-    return texts and tables and all(isinstance(each, dict) and len(each) == 2 for each in told["parameters"].values())
+def is_complete(content: dict[str, Any]) -> bool:
+    """Return whether provenance has all required keys."""
+    texts = all(isinstance(content.get(name), str) for name in ("command", "date"))
+    tables = all(isinstance(content.get(name), dict) for name in ("files", "parameters")) and "scene" in content
+    return (
+        texts
+        and tables
+        and all(isinstance(parameter, dict) and len(parameter) == 2 for parameter in content["parameters"].values())
+    )
 
 
-def note_replaced_result(older: Path, fresh: Path, file: str) -> None:
-    """Let the account of a fresh result tell of the older one whose place it takes: what that was made with, if it was
-    not the same; otherwise, of a scene, whether the file of both is the same."""
-    before, after = load_provenance(older), load_provenance(fresh)
+def note_replaced_result(old_folder: Path, new_folder: Path, file: str) -> None:
+    """Add a note to the provenance of a new result about the old one that it replaces.
+
+    The note lists the settings in which they differ. If there are none, the note of a scene states whether the first
+    result file is identical.
+    """
+    before, after = load_provenance(old_folder), load_provenance(new_folder)
     if not before or not after:
         return
-    had = [
+    differences = [
         format_parameter(name, **each)
         for name, each in before["parameters"].items()
         if each != after["parameters"].get(name)
     ]
-    scene, now = before["scene"] or {}, after["scene"] or {}
-    kept = [name for name in scene if name in IMPLIED_SCENE_KEYS or scene[name] == now.get(name)]
-    had += [format_option(name, value) for name, value in scene.items() if name not in kept]
-    had += [f"another {name}" for name, told in before["files"].items() if told != after["files"].get(name)]
-    if had:
-        sentence = f"It takes the place of the result of {before['date']}, which had {', '.join(sorted(had))}."
+    scene, new_scene = before["scene"] or {}, after["scene"] or {}
+    unchanged = [name for name in scene if name in IMPLIED_SCENE_KEYS or scene[name] == new_scene.get(name)]
+    differences += [format_option(name, value) for name, value in scene.items() if name not in unchanged]
+    differences += [f"another {name}" for name, value in before["files"].items() if value != after["files"].get(name)]
+    if differences:
+        sentence = f"It replaces the result of {before['date']}, which had {', '.join(sorted(differences))}."
     elif scene:
-        same = (older / file).is_file() and file_digest(older / file) == file_digest(fresh / file)
-        told = "the same, bit for bit" if same else "not the same to the last bit"
-        sentence = f"The result of {before['date']} was {told}."
+        same = (old_folder / file).is_file() and file_digest(old_folder / file) == file_digest(new_folder / file)
+        comparison = "the same, bit for bit" if same else "not the same bit for bit"
+        sentence = f"The result of {before['date']} was {comparison}."
     else:
         return
-    (fresh / FILE).write_text(to_json(after | {REPLACED: sentence}) + "\n", encoding="utf-8")
+    (new_folder / FILE).write_text(to_json(after | {REPLACED: sentence}) + "\n", encoding="utf-8")
 
 
 def format_option(name: str, value: object) -> str:
-    """What was asked, in words."""
+    """Return the setting of an option in words."""
     return name if value is True else f"{name} = {value}" if value else f"no {name}"
 
 
 def replacement_note(folder: Path) -> str:
-    """What a result says of the one whose place it took; empty where there was none."""
+    """Return the note about the replaced result; empty if there was none."""
     return str(load_provenance(folder).get(REPLACED, ""))
 
 
 def load_verified_provenance(folder: Path) -> dict[str, Any]:
-    """What a folder of results says of its origin; HarnessError if it says nothing, or if a file is not what it was."""
-    told = load_provenance(folder)
-    if not told:
-        raise HarnessError(f"{folder} holds no result that tells what made it: name one with a whole {FILE}")
-    for name, before in told["files"].items():
+    """Return the provenance of a result after verifying its input files.
+
+    Raises
+    ------
+    HarnessError
+        If there is no provenance, or if an input file is missing or has changed.
+    """
+    content = load_provenance(folder)
+    if not content:
+        raise HarnessError(f"{folder} contains no result with a complete {FILE}: choose another one")
+    for name, stored_digest in content["files"].items():
         file = Path(name)
         if not file.is_file():
-            raise HarnessError(f"{file}, from which this was made, is not here: run from the folder where it is")
-        if (now := file_digest(file)) != before:
+            raise HarnessError(f"{file}, an input of this result, does not exist: run from its original folder")
+        if (present_digest := file_digest(file)) != stored_digest:
             raise HarnessError(
-                f"{file} has changed since this was made from it (sha256 {before[:12]} then, {now[:12]} now): put it "
-                f"back, or make a new result with `{told['command']}`"
+                f"{file} has changed since it was used for this result (sha256 {stored_digest[:12]} then, "
+                f"{present_digest[:12]} now): put it "
+                f"back, or create a new result with `{content['command']}`"
             )
-    return told
+    return content
 
 
 def summarize_provenance(file: Path) -> tuple[str, ...]:
-    """What a reader of the results wants to know of such a file, if it is there; ValueError, KeyError or TypeError if
-    it holds something else."""
+    """Return sentences about the origin of a result for readers; none without a file.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError
+        If the file contains something else.
+    """
     if not file.is_file():
         return ()
-    told = json.loads(file.read_text(encoding="utf-8"))
-    files = [f"{Path(name).name} (sha256 {digest[:12]})" for name, digest in told["files"].items()]
-    versions = told["versions"]
-    made = f"harness {versions[HARNESS]}, fmpy {versions['fmpy']}, Python {versions['python']}, {told['platform']}"
-    origin = f"Made from {', '.join(files) or 'no file'} by {made}, on {told['date'][:10]}: {told['command']}"
-    values = [format_parameter(name, **each) for name, each in told["parameters"].items()]
+    content = json.loads(file.read_text(encoding="utf-8"))
+    files = [f"{Path(name).name} (sha256 {digest[:12]})" for name, digest in content["files"].items()]
+    versions = content["versions"]
+    versions_text = (
+        f"harness {versions[HARNESS]}, fmpy {versions['fmpy']}, Python {versions['python']}, {content['platform']}"
+    )
+    origin = (
+        f"Made from {', '.join(files) or 'no file'} by {versions_text}, on {content['date'][:10]}: {content['command']}"
+    )
+    values = [format_parameter(name, **each) for name, each in content["parameters"].items()]
     return (origin, f"Parameters: {', '.join(values)}.") if values else (origin,)
 
 
 def format_parameter(name: str, value: object, unit: str) -> str:
+    """Return a parameter as "name = value unit"."""
     return f"{name} = {value} {unit}" if unit not in ("", "1") else f"{name} = {value}"

@@ -1,22 +1,22 @@
-"""A number with its name, unit and sentence, as measured or as published."""
+"""Quantities: numbers with name, unit and description, measured or published."""
 
 from dataclasses import dataclass
 from math import ceil, isfinite, log10, pi
 
-# Units in which figures are published: the SI unit and the size of one in it.
+# Units of published quantities: SI unit and size in it.
 PUBLISHED_UNITS = {
     "ms": ("s", 1e-3),
     "deg": ("rad", pi / 180),
     "lbf.in": ("N.m", 0.45359237 * 9.80665 * 0.0254),
 }
 
-MAX_ASYMMETRY = 0.1  # of an interval: beyond, its ends are told rather than its half
-MAX_DIGITS = 8  # digits, in which ends that are nearer to each other are alike
+MAX_ASYMMETRY = 0.1  # relative to the width; more asymmetric intervals are written by their ends
+MAX_DIGITS = 8  # of a value with an interval
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """One measured number: `name` as in a scene's [published], `value` in `unit` (SI), `text` for people."""
+    """Measured number: `name` as in the [published] table of a scene, `value` in the SI `unit`, description `text`."""
 
     name: str
     value: float
@@ -24,14 +24,14 @@ class Quantity:
     text: str
 
     def formatted(self) -> tuple[str, str]:
-        """Value and unit as people read them: five digits, times below a second in ms."""
+        """Return value and unit for display: five digits, times below a second in ms."""
         value, unit = self.value, self.unit
         if unit == "s" and abs(value) < 1:
             value, unit = 1e3 * value, "ms"
         return format_number(value), "" if unit == "1" else unit
 
     def to_unit(self, unit: str) -> float:
-        """The value in another unit of the table; KeyError if it does not measure the same thing."""
+        """Return the value in another unit; raise KeyError if the unit has another dimension."""
         if unit == self.unit:
             return self.value
         base, size = PUBLISHED_UNITS[unit]
@@ -42,32 +42,35 @@ class Quantity:
 
 @dataclass(frozen=True)
 class AnalysisResult:
-    """What an analysis has found."""
+    """Quantities that an analysis measured."""
 
     quantities: tuple[Quantity, ...]
 
 
 def display_unit(unit: str) -> tuple[str, float]:
-    """The unit in which people look at what is in a `unit`, degrees for angles and their rates, and its size in it."""
+    """Return the unit for display, degrees for angles and their derivatives, and its size in the given unit."""
     return (unit.replace("rad", "deg"), pi / 180) if unit in ("rad", "rad/s", "rad/s2") else (unit, 1.0)
 
 
 def format_number(value: float, digits: int = 5) -> str:
-    """A number with so many digits; a count with all of its own."""
+    """Return a number with the given digits; an integer with all of its digits."""
     return str(value) if isinstance(value, int) else f"{value:.{digits}g}"
 
 
 def format_interval(value: float, low: float, high: float) -> str:
-    """A value, with the digits that its interval leaves, and half of it; its ends where they are not alike; the value
-    alone where there is none (NaN or infinity)."""
-    below, above = value - low, high - value
-    if not isfinite(above):
+    """Return a value with its interval for display.
+
+    The digits follow from the margin. The interval is written as ± half of its width, or by its ends if
+    asymmetric. Without an interval (NaN or infinity) the value is returned alone.
+    """
+    lower_margin, upper_margin = value - low, high - value
+    if not isfinite(upper_margin):
         return f"{value:.5g}"
     if value == 0:
         return f"< {high:.2g}"
-    margin = max(below, above)
+    margin = max(lower_margin, upper_margin)
     digits = min(max(ceil(log10(abs(value) / margin)) + 1, 1), MAX_DIGITS) if margin > 0 else MAX_DIGITS
-    if digits == MAX_DIGITS or abs(above - below) <= MAX_ASYMMETRY * (above + below):
+    if digits == MAX_DIGITS or abs(upper_margin - lower_margin) <= MAX_ASYMMETRY * (upper_margin + lower_margin):
         return f"{value:.{digits}g} ± {margin:.2g}"
     digits = max(digits, 2)
     return f"{value:.{digits}g} ({low:.{digits}g} to {high:.{digits}g})"

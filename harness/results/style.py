@@ -1,4 +1,4 @@
-"""The look of every figure: colours, sizes, headings of axes."""
+"""Style of all figures: colours, sizes, axis labels."""
 
 import re
 import textwrap
@@ -14,7 +14,7 @@ from matplotlib import artist, rc_context
 
 from .files import column_heading
 
-artist.kwdoc = lambda artist: ""  # the lists of properties in all docstrings, a third of what is still to be imported
+artist.kwdoc = lambda artist: ""  # skips generating property lists for docstrings, a third of the import time
 
 from matplotlib.axes import Axes as Axes  # noqa: E402
 from matplotlib.axis import Axis  # noqa: E402
@@ -23,10 +23,10 @@ from matplotlib.figure import Figure  # noqa: E402
 from matplotlib.lines import Line2D  # noqa: E402
 from matplotlib.text import Text  # noqa: E402
 
-# Okabe and Ito's colours, which stay apart for colour-blind readers.
+# Colours of Okabe and Ito, distinguishable for colour-blind readers.
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
-GREY = "#777777"  # of what is only there to compare with
-# Methods of one family have one colour.
+GREY = "#777777"  # references for comparison
+# Methods of a family share a colour.
 METHOD_COLOURS = {
     "exact": "#000000",
     **dict.fromkeys(("ode23", "RK23"), BLUE),
@@ -47,10 +47,10 @@ STYLE: dict[Any, Any] = {
     "lines.linewidth": 1.2,
     "legend.framealpha": 0.9,
     "legend.fontsize": 8,
-    "svg.fonttype": "none",  # letters stay letters
-    "svg.hashsalt": "friction",  # the same drawing is the same file
+    "svg.fonttype": "none",  # keep text as text
+    "svg.hashsalt": "friction",  # reproducible files
 }
-DARK = {  # what stands for a colour where the reader's screen is dark
+DARK = {  # colours for a dark screen
     "#ffffff": "#1d2125",
     "#000000": "#e6e8ea",
     "#dddddd": "#343a40",
@@ -66,8 +66,8 @@ DARK_RULES = "".join(
     for part in ("fill", "stroke")
 )
 DARK_STYLE = f"@media screen and (prefers-color-scheme: dark) {{\ntext {{ fill: {DARK['#000000']} }}\n{DARK_RULES}}}\n"
-MAX_VECTOR_MARKERS = 1000  # points with a mark each: more are one image in the drawing
-LEGEND_ABOVE: dict[str, Any] = {  # of a legend above its panel, where it hides nothing
+MAX_VECTOR_MARKERS = 1000  # more markers are rasterized
+LEGEND_ABOVE: dict[str, Any] = {  # legend above its panel, where it hides nothing
     "loc": "lower right",
     "bbox_to_anchor": (1.0, 1.0),
     "frameon": False,
@@ -75,12 +75,10 @@ LEGEND_ABOVE: dict[str, Any] = {  # of a legend above its panel, where it hides 
     "columnspacing": 1.2,
     "handlelength": 1.4,
 }
-MAX_DRAWN_VALUE = 1e150  # that is drawn
-MAX_TEXT_LENGTH = 500  # letters of a text that are drawn
-LINE_BREAKS = re.compile(
-    r"(\s+|(?<=[._\]]))"
-)  # where a text may go on in the next line: a model's names have no blanks
-UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # in XML: a path may be no text
+MAX_DRAWN_VALUE = 1e150  # larger values are not drawn
+MAX_TEXT_LENGTH = 500  # characters of a text that are drawn
+LINE_BREAKS = re.compile(r"(\s+|(?<=[._\]]))")  # possible line breaks; names of variables have no blanks
+UNWRITABLE = re.compile(r"[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")  # characters that XML does not allow
 WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
 
 
@@ -88,11 +86,18 @@ WIDTH, HEIGHT = 5.5, 2.3  # inches of one column and of one panel
 def open_figure(
     path: Path, width: float, height: float, layout: Literal["constrained"] | None = "constrained"
 ) -> Iterator[Figure]:
-    """A figure in this look, of a size in inches; saved as SVG, light or dark as the reader's screen is, when all has
-    been drawn.  Without a `layout`, which measures all of it twice to find the margins, these are given.
+    """Yield a figure and save it as SVG on exit. The SVG follows the light or dark scheme of the reader's screen.
 
-    Names and titles are drawn letter by letter, whatever is in them.  What nobody can draw, such as letters that the
-    font lacks and numbers near the end of their range, is left out of the picture without a word.
+    Texts are drawn literally. Missing glyphs and numbers that cannot be drawn are left out without a warning.
+
+    Parameters
+    ----------
+    path : pathlib.Path
+        SVG file.
+    width, height : float
+        Size in inches.
+    layout : str or None
+        Layout engine; None for fixed margins, which saves drawing everything twice.
     """
     with rc_context(STYLE), warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
@@ -101,59 +106,59 @@ def open_figure(
         for text in find_texts(figure):
             text.set_parse_math(False)
             text.set_text(UNWRITABLE.sub("\N{REPLACEMENT CHARACTER}", text.get_text()[:MAX_TEXT_LENGTH]))
-        for part, within in ((figure, figure.texts), *((axes, find_texts(axes)) for axes in figure.axes)):
-            place = part.get_window_extent()
-            for text in within:
-                wrap_text(text, place.height if text.get_rotation() == 90 else place.width)
+        for parent, texts in ((figure, figure.texts), *((axes, find_texts(axes)) for axes in figure.axes)):
+            extent = parent.get_window_extent()
+            for text in texts:
+                wrap_text(text, extent.height if text.get_rotation() == 90 else extent.width)
         for axes in figure.axes:
-            for crowd in filter(is_crowded, (*axes.lines, *axes.collections)):
-                crowd.set_rasterized(True)
+            for dense in filter(is_crowded, (*axes.lines, *axes.collections)):
+                dense.set_rasterized(True)
         if engine := figure.get_layout_engine():
             engine.execute(figure)
-            figure.set_layout_engine(None)  # with one, all is drawn twice
-        drawn = StringIO()
-        figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
-    short = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d\d)\d+", r"\1", line[0]), drawn.getvalue())
-    path.write_text(short.replace("</style>", f"{DARK_STYLE}</style>", 1), encoding="utf-8")
+            figure.set_layout_engine(None)  # otherwise everything is drawn twice
+        svg = StringIO()
+        figure.savefig(svg, format="svg", metadata={"Date": None, "Creator": None})
+    rounded = re.sub(r' d="[^"]*"', lambda line: re.sub(r"(\.\d\d)\d+", r"\1", line[0]), svg.getvalue())
+    path.write_text(rounded.replace("</style>", f"{DARK_STYLE}</style>", 1), encoding="utf-8")
 
 
-def is_crowded(within: artist.Artist) -> bool:
-    """Whether something is drawn in so many pieces that nobody wants each of them in a file."""
-    if isinstance(within, Line2D):
-        return within.get_marker() not in ("None", None) and np.size(within.get_xdata()) > MAX_VECTOR_MARKERS
-    return isinstance(within, QuadMesh)
+def is_crowded(element: artist.Artist) -> bool:
+    """Return whether an artist has so many elements that it should be rasterized."""
+    if isinstance(element, Line2D):
+        return element.get_marker() not in ("None", None) and np.size(element.get_xdata()) > MAX_VECTOR_MARKERS
+    return isinstance(element, QuadMesh)
 
 
-def find_texts(within: artist.Artist) -> Iterator[Text]:
-    """All texts in a figure but the numbers at its axes, where powers are set as mathematics."""
-    for child in within.get_children():
+def find_texts(parent: artist.Artist) -> Iterator[Text]:
+    """Yield all texts in a figure except tick labels, where powers are set as mathematics."""
+    for child in parent.get_children():
         if isinstance(child, Text):
             yield child
         elif isinstance(child, Axis):
-            yield from (child.label, child.offsetText)  # to ask for all of its children makes its ticks, each time anew
+            yield from (child.label, child.offsetText)  # get_children() would create ticks each time
         else:
             yield from find_texts(child)
 
 
-def wrap_text(text: Text, place: float) -> None:
-    """Break what is longer than its `place`, in pixels, into lines."""
+def wrap_text(text: Text, width: float) -> None:
+    """Break a text that is longer than `width` pixels into lines."""
     extent, lines = text.get_window_extent(), text.get_text().splitlines()
-    if (longest := max(extent.width, extent.height)) > place:
-        folded = textwrap.TextWrapper(max(1, int(max(map(len, lines)) * place / longest)))
+    if (longest := max(extent.width, extent.height)) > width:
+        folded = textwrap.TextWrapper(max(1, int(max(map(len, lines)) * width / longest)))
         folded.wordsep_re = LINE_BREAKS
         text.set_text("\n".join(map(folded.fill, lines)))
 
 
 def mask_undrawable(y: np.ndarray) -> np.ndarray:
-    """Values (n,) without those so large that differences of them have no number, which no axis can show."""
+    """Return values (n,) with NaN for those that are too large for an axis."""
     return np.where(np.abs(y) < MAX_DRAWN_VALUE, y, np.nan)
 
 
 def axis_label(name: str, unit: str) -> str:
-    """The heading of an axis."""
+    """Return the label of an axis."""
     return column_heading(name, format_unit(unit))
 
 
 def format_unit(unit: str) -> str:
-    """A unit as figures show it."""
+    """Return a unit as figures show it."""
     return unit.replace("2", "²").replace(".", "·")

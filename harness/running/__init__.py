@@ -1,1 +1,1 @@
-"""Built FMUs, ours or anybody's, run through fmpy; its only home."""
+"""Runs built FMUs, of this project or external, through fmpy. No other package imports fmpy."""

@@ -1,4 +1,4 @@
-"""FMUs in a host in C (host.c), which the system's compiler makes on the spot."""
+"""Runs FMUs in a C program (host.c), compiled on demand by the system's compiler."""
 
 import os
 import shutil
@@ -22,12 +22,12 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
 class MissingToolError(HarnessError):
-    """What this machine lacks."""
+    """A tool or a build is missing on this machine."""
 
 
 @dataclass(frozen=True)
 class Library:
-    """The library of an FMU, its value references by name, and what the host passes and loads with it."""
+    """Library of an FMU, its value references by name, and what the host needs to load it."""
 
     file: Path
     references: dict[str, int]
@@ -37,7 +37,7 @@ class Library:
 
     @property
     def command(self) -> list[str]:
-        """The host with this library."""
+        """Return the command that runs the host with this library."""
         return [str(build_host()), str(self.file), self.guid, self.resources]
 
     @property
@@ -47,40 +47,42 @@ class Library:
 
 @cache
 def load_library(fmu: Path) -> Library:
-    """That of a built FMU for Linux; with one in Python its interpreter is loaded too."""
-    folder = PROCESS_RESOURCES.enter_context(unpack(fmu))
-    libraries = list((folder / "binaries" / "linux64").glob("*.so"))
+    """Unpack a built FMU for Linux and return its library; for an FMU in Python, preload its interpreter."""
+    directory = PROCESS_RESOURCES.enter_context(unpack(fmu))
+    libraries = list((directory / "binaries" / "linux64").glob("*.so"))
     if len(libraries) != 1:
         raise MissingToolError(f"not built: {fmu.name} for linux64")
-    loaded = {}
-    if is_python_fmu(folder):
+    extra_environment = {}
+    if is_python_fmu(directory):
         if not PYTHON_LIBRARY.is_file():
             raise MissingToolError("not installed: Python as a shared library")
-        loaded["LD_PRELOAD"] = str(PYTHON_LIBRARY)
-    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
-    references = {each.attrib["name"]: int(each.attrib["valueReference"]) for each in root.iter("ScalarVariable")}
-    return Library(libraries[0], references, root.attrib["guid"], (folder / "resources").as_uri(), loaded)
+        extra_environment["LD_PRELOAD"] = str(PYTHON_LIBRARY)
+    root = ElementTree.parse(directory / "modelDescription.xml").getroot()
+    references = {
+        variable.attrib["name"]: int(variable.attrib["valueReference"]) for variable in root.iter("ScalarVariable")
+    }
+    return Library(libraries[0], references, root.attrib["guid"], (directory / "resources").as_uri(), extra_environment)
 
 
 @cache
 def build_host() -> Path:
-    """The host, as a program."""
+    """Compile the host and return its path."""
     return compile_source(Path(__file__).with_name("host.c"), "host", (), ("-ldl", "-lm"))
 
 
 def compile_source(source: Path, name: str, options: tuple[str, ...], libraries: tuple[str, ...]) -> Path:
-    """A program or a library from one source."""
+    """Compile a program or a library from one source file and return its path."""
     file = program_directory() / name
     command = [find_compiler(), "-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", *options, "-I", str(HEADERS)]
-    done = run_subprocess([*command, str(source), "-o", str(file), *libraries])
-    if done.returncode:
-        lines = [line for line in done.stderr.splitlines() if "error" in line] or [f"{command[0]} gives no reason"]
+    process = run_subprocess([*command, str(source), "-o", str(file), *libraries])
+    if process.returncode:
+        lines = [line for line in process.stderr.splitlines() if "error" in line] or [f"{command[0]} gives no reason"]
         raise MissingToolError(f"{source.name} does not compile here: {lines[0]}")
     return file
 
 
 def find_compiler() -> str:
-    """The system's compiler."""
+    """Return the system's C compiler; raise MissingToolError if there is none."""
     if COMPILER is None:
         raise MissingToolError("not installed: a C compiler (try apt-get install gcc)")
     return COMPILER
@@ -88,5 +90,5 @@ def find_compiler() -> str:
 
 @cache
 def program_directory() -> Path:
-    """The folder of what was compiled."""
+    """Return the directory of compiled programs."""
     return PROCESS_RESOURCES.enter_context(temporary_directory("host-"))

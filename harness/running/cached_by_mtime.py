@@ -1,4 +1,4 @@
-"""What is made of an FMU once, as long as its file is not changed: studies ask for it again and again."""
+"""Cache of per-FMU results, invalidated when the file changes."""
 
 from collections.abc import Callable, Hashable
 from functools import cache, wraps
@@ -9,14 +9,14 @@ Result = TypeVar("Result")
 
 
 def cached_by_mtime(make: Callable[..., Result]) -> Callable[..., Result]:
-    """make(fmu, ...) of a file that is there, remembered by its path, the time of its last change, and the rest."""
+    """Decorate make(fmu, ...) with a cache keyed by path, modification time and arguments. The file must exist."""
 
     @cache
-    def known(fmu: Path, changed: int, *more: Hashable) -> Result:
-        return make(fmu, *more)
+    def cached(fmu: Path, mtime: int, *arguments: Hashable) -> Result:
+        return make(fmu, *arguments)
 
     @wraps(make)
-    def asked(fmu: Path, *more: Hashable) -> Result:
-        return known(fmu.absolute(), fmu.stat().st_mtime_ns, *more)
+    def lookup(fmu: Path, *arguments: Hashable) -> Result:
+        return cached(fmu.absolute(), fmu.stat().st_mtime_ns, *arguments)
 
-    return asked
+    return lookup

@@ -1,7 +1,7 @@
-"""Runs a built FMI 2.0 FMU through fmpy, as it is wanted.
+"""Runs FMI 2.0 FMUs of this project through fmpy.
 
-The FMU's solver runs free of the communication points.  A step to `solver.t_next` ends where the solver's own step
-ends, so following it shows every step and event through the standard interface alone.
+The solver of the FMU does not depend on the communication points. A step to `solver.t_next` ends where an internal step
+ends, so following it records every internal step and event through the standard interface.
 """
 
 import io
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 from fmpy import fmi2
-from fmpy.fmi1 import FMICallException as FMICallException  # which those that run step by step catch
+from fmpy.fmi1 import FMICallException as FMICallException  # re-exported for callers that step by themselves
 
 from ..errors import HarnessError, SceneError, first_line
 from .description import read_description, resolve_time_span
@@ -29,16 +29,16 @@ from .trajectory import ModeChanges, SolverSteps, Statistics, Trajectory
 from .unpacking import unpack
 from .variable_values import enumeration_labels, variable_unit
 
-ProgressCallback = Callable[[float], None]  # told how far the run is, as a share of it
+ProgressCallback = Callable[[float], None]  # receives the progress of a run, from 0 to 1
 
-WARNING, ERROR = 1, 3  # fmi2Status; above a warning it is a failure
+WARNING, ERROR = 1, 3  # fmi2Status; any status above a warning is a failure
 MAX_POINTS = 10_000_000  # of a grid
 REPORT_INTERVAL = 4096  # communication points
 
 
 @dataclass(frozen=True)
 class RunPlan:
-    """What a run does: from `start` to `stop` in s, and the variables read at each communication point."""
+    """Resolved run: times in s, and the variables to read at each communication point."""
 
     spec: RunSpec
     variables: dict[str, Any]
@@ -50,8 +50,9 @@ class RunPlan:
 
 @dataclass(frozen=True)
 class RecordedSamples:
-    """What one pass leaves: time, a row of reals and of integers for each communication point, and the rows where an
-    internal step ends (the start included)."""
+    """Raw samples of one pass: time, one row of reals and of integers per communication point, and the rows at which
+    internal steps end, start included.
+    """
 
     time: "array[float]" = field(default_factory=lambda: array("d"))
     reals: "array[float]" = field(default_factory=lambda: array("d"))
@@ -60,100 +61,124 @@ class RecordedSamples:
 
 
 def simulate(spec: RunSpec, report: ProgressCallback = lambda share: None) -> Trajectory:
-    """The run that is wanted; HarnessError with the FMU's sentence if it fails, SceneError if it has not got that."""
-    with open_instance(spec) as (found, fmu, heard):
+    """Run an FMU as specified.
+
+    Parameters
+    ----------
+    spec : RunSpec
+    report : callable
+        Receives the progress of the run, from 0 to 1.
+
+    Raises
+    ------
+    SceneError
+        If the specification names variables or values that the FMU does not have.
+    HarnessError
+        If the run fails, with the message of the FMU.
+    """
+    with open_instance(spec) as (description, fmu, log):
         try:
-            return run_repeats(plan_run(spec, found), fmu, report)
+            return run_repeats(plan_run(spec, description), fmu, report)
         except FMICallException as error:
-            raise HarnessError(heard.error_message or f"{spec.fmu.name}: {error}") from None
+            raise HarnessError(log.error_message or f"{spec.fmu.name}: {error}") from None
 
 
 @dataclass(frozen=True)
 class LogCapture:
-    """What an FMU says: `messages` of its log as (status, text), and what is `spoken` on standard error."""
+    """Log messages of an FMU as (status, text), and its standard error."""
 
     messages: list[tuple[int, str]]
     stderr: io.StringIO
 
     @property
     def error_message(self) -> str:
-        """The last that is more than a warning; empty if it says nothing."""
+        """Return the last message above a warning, or the last line on standard error; empty if there is neither."""
         logged = [text for status, text in self.messages if status > WARNING]
         return (logged or self.stderr.getvalue().strip().splitlines() or [""])[-1]
 
     def clear(self) -> None:
+        """Discard all messages."""
         self.messages.clear()
         self.stderr.seek(self.stderr.truncate(0))
 
 
 @contextmanager
 def capture_stderr() -> Iterator[io.StringIO]:
-    """What an FMU says on standard error is heard here alone, for the sentence stands in its log, too; one that is not
-    in Python writes past Python, and to nobody."""
-    spoken = io.StringIO()
-    with ExitStack() as back, redirect_stderr(spoken):
-        with suppress(OSError):  # there is none
-            own = os.dup(2)
-            back.callback(os.close, own)
-            back.callback(os.dup2, own, 2)
-            with open(os.devnull, "w") as nobody:
-                os.dup2(nobody.fileno(), 2)
-        yield spoken
+    """Capture standard error of FMUs in Python and discard that of others.
+
+    The log contains the same messages.
+    """
+    captured = io.StringIO()
+    with ExitStack() as restore, redirect_stderr(captured):
+        with suppress(OSError):  # there is no standard error
+            saved = os.dup(2)
+            restore.callback(os.close, saved)
+            restore.callback(os.dup2, saved, 2)
+            with open(os.devnull, "w") as null:
+                os.dup2(null.fileno(), 2)
+        yield captured
 
 
 def read_own_description(spec: RunSpec) -> Any:
-    """What the FMU says of itself; HarnessError if it cannot be read, SceneError if it does not fit what is wanted."""
-    found = read_description(spec.fmu)
-    if found.fmiVersion != "2.0" or found.coSimulation is None:
+    """Return the model description of an FMU of this project.
+
+    Raises
+    ------
+    HarnessError
+        If it cannot be read or is not FMI 2.0 co-simulation.
+    SceneError
+        If the specification does not fit the FMU.
+    """
+    description = read_description(spec.fmu)
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
         raise HarnessError(f"{spec.fmu.name} is not an FMI 2.0 co-simulation FMU")
-    check_fmu(spec, {variable.name: variable for variable in found.modelVariables})
-    return found
+    check_fmu(spec, {variable.name: variable for variable in description.modelVariables})
+    return description
 
 
 @contextmanager
 def open_instance(spec: RunSpec) -> Iterator[tuple[Any, Any, LogCapture]]:
-    """The description and a fresh instance of the FMU, and what it says; its files and its library are gone
-    afterwards."""
-    found = read_own_description(spec)
-    with unpack(spec.fmu) as folder, load_instance(spec, found, folder) as (fmu, heard):
-        yield found, fmu, heard
+    """Unpack and instantiate an FMU; yield its description, the instance and its log. Remove the files on exit."""
+    description = read_own_description(spec)
+    with unpack(spec.fmu) as folder, load_instance(spec, description, folder) as (fmu, log):
+        yield description, fmu, log
 
 
 @contextmanager
-def load_instance(spec: RunSpec, found: Any, folder: Path) -> Iterator[tuple[Any, LogCapture]]:
-    """The same of an FMU so described, whose files are in a folder and stay there."""
+def load_instance(spec: RunSpec, description: Any, folder: Path) -> Iterator[tuple[Any, LogCapture]]:
+    """Instantiate an unpacked FMU; yield the instance and its log. The files stay."""
     functions, messages = shared_callbacks()
     messages.clear()
-    with capture_stderr() as spoken:
+    with capture_stderr() as stderr:
         try:
             fmu = fmi2.FMU2Slave(
-                guid=found.guid,
+                guid=description.guid,
                 unzipDirectory=str(folder),
-                modelIdentifier=found.coSimulation.modelIdentifier,
+                modelIdentifier=description.coSimulation.modelIdentifier,
                 instanceName=spec.model,
             )
             fmu.instantiate(callbacks=functions, loggingOn=True)
         except Exception as error:  # fmpy raises bare Exceptions
             raise HarnessError(f"{spec.fmu.name} cannot be loaded: {first_line(error)}") from None
         try:
-            yield fmu, LogCapture(messages, spoken)
+            yield fmu, LogCapture(messages, stderr)
         finally:
             fmu.freeInstance()
 
 
 @cache
 def shared_callbacks() -> tuple[fmi2.fmi2CallbackFunctions, list[tuple[int, str]]]:
-    """Callbacks, and the list to which their logger adds (status, text) of every message.
+    """Return the FMI callbacks, and the list that collects log messages as (status, text).
 
-    Made once: fmpy's proxy, which fills in the arguments of a message, calls the last logger it was given, for ever.
+    They are created once: fmpy's logger proxy always calls the logger that it was given last.
     """
     messages: list[tuple[int, str]] = []
 
-    def keep(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
+    def log_message(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
         messages.append((status, text.decode("utf-8", "replace")))
 
     functions = fmi2.fmi2CallbackFunctions()
-    functions.logger = fmi2.fmi2CallbackLoggerTYPE(keep)
+    functions.logger = fmi2.fmi2CallbackLoggerTYPE(log_message)
     functions.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
     functions.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
     fmi2.addLoggerProxy(byref(functions))
@@ -161,7 +186,7 @@ def shared_callbacks() -> tuple[fmi2.fmi2CallbackFunctions, list[tuple[int, str]
 
 
 def plan_run(spec: RunSpec, description: Any) -> RunPlan:
-    """The plan of a run: what it names, and what follows the solver's steps."""
+    """Resolve times and variables of a run; add the variables that expose internal steps and events."""
     variables = {variable.name: variable for variable in description.modelVariables}
     start, stop = resolve_time_span(spec, description)
     check_inputs(spec.inputs, variables)
@@ -169,7 +194,7 @@ def plan_run(spec: RunSpec, description: Any) -> RunPlan:
         spec = replace(spec, grid=(stop - start) / spec.equal_steps or None)
     if spec.grid is not None and (points := (stop - start) / spec.grid) > MAX_POINTS:
         sentence = f"grid = {spec.grid!r} s makes {points:.6g} points from {start!r} s to {stop!r} s"
-        raise SceneError(f"{sentence}; at most {MAX_POINTS}: take a larger one")
+        raise SceneError(f"{sentence}; the limit is {MAX_POINTS}: choose a larger grid")
     names = list(spec.outputs)
     if spec.follow:
         extra = ("solver.t_next", "solver.rejected", "events.count", "events.t_last", find_mode_output(variables))
@@ -179,27 +204,30 @@ def plan_run(spec: RunSpec, description: Any) -> RunPlan:
 
 
 def find_mode_output(variables: dict[str, Any]) -> str:
-    """The output that is the mode of friction, the only one that is an integer; empty where there is none."""
-    return next((name for name, one in variables.items() if (one.causality, one.type) == ("output", "Integer")), "")
+    """Return the friction mode, which is the only integer output; empty if there is none."""
+    return next(
+        (name for name, variable in variables.items() if (variable.causality, variable.type) == ("output", "Integer")),
+        "",
+    )
 
 
 def run_repeats(plan: RunPlan, fmu: Any, report: ProgressCallback) -> Trajectory:
-    """Run the plan as often as is asked, on one instance; keep the last pass, and the fastest time."""
+    """Run the plan `repeat` times on one instance; return the last run with the fastest time."""
     repeat = plan.spec.repeat
     values = resolve_settings(plan.spec, plan.variables)
     seconds = []
-    for turn in range(repeat):
-        if turn:
+    for repeat_index in range(repeat):
+        if repeat_index:
             fmu.reset()
         initialize(fmu, values, plan.start, plan.stop)
-        begun = perf_counter()
-        trace = record_run(plan, fmu, report, turn)
-        seconds.append(perf_counter() - begun)
+        started = perf_counter()
+        trace = record_run(plan, fmu, report, repeat_index)
+        seconds.append(perf_counter() - started)
     return build_trajectory(plan, fmu, trace, min(seconds))
 
 
 def initialize(fmu: Any, values: Iterable[tuple[Any, float]], start: float, stop: float | None) -> None:
-    """Set the values of variables, and initialise; times in s."""
+    """Set values and initialize an instance; times in s."""
     for variable, value in values:
         set_variable(fmu, variable, value)
     fmu.setupExperiment(startTime=start, stopTime=stop)
@@ -208,17 +236,17 @@ def initialize(fmu: Any, values: Iterable[tuple[Any, float]], start: float, stop
 
 
 def set_variable(fmu: Any, variable: Any, value: float) -> None:
-    """Set one variable."""
+    """Set a real, integer or enumeration variable."""
     if variable.type == "Real":
         fmu.setReal([variable.valueReference], [value])
     else:
         fmu.setInteger([variable.valueReference], [int(value)])
 
 
-def record_run(plan: RunPlan, fmu: Any, report: ProgressCallback, turn: int) -> RecordedSamples:
-    """Step from start to stop, and record every communication point; `turn` passes came before.
+def record_run(plan: RunPlan, fmu: Any, report: ProgressCallback, repeat_index: int) -> RecordedSamples:
+    """Step from start to stop and record every communication point.
 
-    The arrays and the C functions are bound once, since at a few microseconds a step looking them up would show.
+    The arrays and C functions are looked up once, because a step takes only microseconds.
     """
     component = c_void_p(fmu.component)
     do_step, get_real, get_integer = fmu.dll.fmi2DoStep, fmu.dll.fmi2GetReal, fmu.dll.fmi2GetInteger
@@ -241,26 +269,20 @@ def record_run(plan: RunPlan, fmu: Any, report: ProgressCallback, turn: int) -> 
 
     start, stop, grid, follow = plan.start, plan.stop, plan.spec.grid, plan.spec.follow
     next_at = plan.reals.index("solver.t_next") if follow else 0
-    nearly = 1e-9 * grid if grid else 0.0  # a grid point this close to the end of a step is that end
-    t, point, turns = start, 1, 0
+    tolerance = 1e-9 * grid if grid else 0.0  # grid points this close to the end of a step coincide with it
+    t, point, n_steps = start, 1, 0
     record(t)
     while t < stop:
         target, ends = stop, False
         if grid:
-            while start + point * grid <= t + nearly:
+            while start + point * grid <= t + tolerance:
                 point += 1
-            if start + point * grid < stop - nearly:
+            if start + point * grid < stop - tolerance:
                 target = start + point * grid
-        if signals:
-            target = min(target, signals.next_jump(t))
-        # an input that was set at an event restarts the solver there, up to a rounding before it
-        passed = signals is not None and reals[next_at] <= t + nearly
-        if follow and reals[next_at] <= target + nearly and not passed:
+        if follow and reals[next_at] <= target + tolerance:
             target, ends = min(reals[next_at], stop), True
         if not target > t:
-            raise HarnessError(f"{plan.spec.fmu.name}: solver.t_next = {target!r} s does not lie after t = {t!r} s")
-        if signals:
-            signals.apply(0.5 * (t + target))
+            raise HarnessError(f"{plan.spec.fmu.name}: solver.t_next = {target!r} s is not after t = {t!r} s")
         status = do_step(component, t, target - t, 1)
         if status > WARNING:
             raise FMICallException("fmi2DoStep", status)
@@ -268,9 +290,9 @@ def record_run(plan: RunPlan, fmu: Any, report: ProgressCallback, turn: int) -> 
         record(t)
         if ends:
             trace.step_ends.append(len(trace.time) - 1)
-        turns += 1
-        if turns % REPORT_INTERVAL == 0:
-            report((turn + (t - start) / (stop - start)) / plan.spec.repeat)
+        n_steps += 1
+        if n_steps % REPORT_INTERVAL == 0:
+            report((repeat_index + (t - start) / (stop - start)) / plan.spec.repeat)
     return trace
 
 
@@ -281,60 +303,60 @@ def input_signals(plan: RunPlan, fmu: Any) -> InputSignals | None:
 
 
 def make_buffer(variables: dict[str, Any], names: list[str], kind: Any) -> tuple[int, Any, Any]:
-    """Number, value references and room for the values of the named variables."""
+    """Return the number of variables, their value references and a buffer for their values."""
     n = len(names)
     return n, (c_uint * n)(*(variables[name].valueReference for name in names)), (kind * n)()
 
 
 def build_trajectory(plan: RunPlan, fmu: Any, trace: RecordedSamples, seconds: float) -> Trajectory:
-    """The run that a trace shows."""
+    """Build the trajectory of a run from its samples."""
     spec, variables = plan.spec, plan.variables
     time = np.array(trace.time)
-    read: dict[str, np.ndarray] = {}
+    samples: dict[str, np.ndarray] = {}
     for names, values in ((plan.reals, trace.reals), (plan.integers, trace.integers)):
-        read |= zip(names, np.array(values).reshape(len(time), len(names)).T, strict=True)
-    columns = {name: read[name] for name in spec.outputs}
+        samples |= zip(names, np.array(values).reshape(len(time), len(names)).T, strict=True)
+    columns = {name: samples[name] for name in spec.outputs}
     for name, column in columns.items():
-        lost = np.flatnonzero(~np.isfinite(column))
-        if len(lost) and variables[name].causality == "output":
-            raise HarnessError(f"{spec.fmu.name}: {name} is {column[lost[0]]} at t = {time[lost[0]]} s")
+        invalid = np.flatnonzero(~np.isfinite(column))
+        if len(invalid) and variables[name].causality == "output":
+            raise HarnessError(f"{spec.fmu.name}: {name} is {column[invalid[0]]} at t = {time[invalid[0]]} s")
     steps = events = None
     if spec.follow:
         ends = np.array(trace.step_ends)
-        steps = SolverSteps(time[ends], np.diff(time[ends]), np.diff(read["solver.rejected"][ends]))
-    settled = read_parameters(plan, fmu)
-    if spec.follow and settled.get("friction") == "hybrid":
-        at = np.flatnonzero(np.diff(read["events.count"])) + 1
-        mode = read[find_mode_output(variables)]
-        events = ModeChanges(np.append(time[0], read["events.t_last"][at]), np.append(mode[0], mode[at]))
-    taken, refused, evaluated = (
+        steps = SolverSteps(time[ends], np.diff(time[ends]), np.diff(samples["solver.rejected"][ends]))
+    effective = read_parameters(plan, fmu)
+    if spec.follow and effective.get("friction") == "hybrid":
+        at = np.flatnonzero(np.diff(samples["events.count"])) + 1
+        mode = samples[find_mode_output(variables)]
+        events = ModeChanges(np.append(time[0], samples["events.t_last"][at]), np.append(mode[0], mode[at]))
+    accepted, rejected, evaluations = (
         read_integer(plan, fmu, f"solver.{name}") for name in ("steps", "rejected", "evaluations")
     )
     return Trajectory(
         spec=spec,
         time=time,
         columns=columns,
-        units={name: variable_unit(variables[name]) for name in [*columns, *settled]},
+        units={name: variable_unit(variables[name]) for name in [*columns, *effective]},
         descriptions={name: variables[name].description or name for name in columns},
-        parameters=settled,
+        parameters=effective,
         steps=steps,
         events=events,
-        statistics=Statistics(taken, refused, evaluated, seconds),
+        statistics=Statistics(accepted, rejected, evaluations, seconds),
     )
 
 
 def read_parameters(plan: RunPlan, fmu: Any) -> dict[str, float | str]:
-    """The value of every parameter in the run: reals in their SI unit, enumerations by label."""
-    found: dict[str, float | str] = {}
+    """Return the value of every parameter: reals in SI units, enumerations by label."""
+    values: dict[str, float | str] = {}
     for name, variable in plan.variables.items():
         if variable.causality == "parameter":
             if variable.type == "Enumeration":
-                found[name] = enumeration_labels(variable)[read_integer(plan, fmu, name)]
+                values[name] = enumeration_labels(variable)[read_integer(plan, fmu, name)]
             else:
-                found[name] = fmu.getReal([variable.valueReference])[0]
-    return found
+                values[name] = fmu.getReal([variable.valueReference])[0]
+    return values
 
 
 def read_integer(plan: RunPlan, fmu: Any, name: str) -> int:
-    """The present value of an integer or enumeration."""
+    """Return the present value of an integer or enumeration."""
     return fmu.getInteger([plan.variables[name].valueReference])[0]

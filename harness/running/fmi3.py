@@ -1,8 +1,8 @@
-"""Runs a built FMI 3.0 FMU through fmpy, both ways; the only file that knows fmpy's FMI 3.0.
+"""Runs FMI 3.0 FMUs of this project through fmpy.
 
-Co-simulation: the FMU's own solver.  Model exchange: fmpy's CVode (BDF with Jacobians by differences, the absolute
-tolerance being the relative one times the FMU's nominals).  fmpy lets it take 500 steps from one point to the next,
-and where friction at rest is no more than sliding friction it does not see a turn that only touches v = 0.
+Co-simulation uses the solver of the FMU. Model exchange uses fmpy's CVode: BDF with finite-difference Jacobians; the
+absolute tolerance is the relative one times the nominal values of the FMU. fmpy limits CVode to 500 steps between two
+output points. Where static friction does not exceed sliding friction, CVode misses reversals that only touch v = 0.
 """
 
 import os
@@ -24,17 +24,15 @@ from .unpacking import unpack
 
 MODEL_EXCHANGE, CO_SIMULATION = "ModelExchange", "CoSimulation"
 EVALUATIONS = "solver.evaluations"  # of the FMU's own solver
-SUNDIALS_LOG_VARIABLES = (
-    "SUNLOGGER_ERROR_FILENAME",
-    "SUNLOGGER_WARNING_FILENAME",
-)  # CVode would write what fmpy raises
+# fmpy raises the messages that CVode would print
+SUNDIALS_LOG_VARIABLES = ("SUNLOGGER_ERROR_FILENAME", "SUNLOGGER_WARNING_FILENAME")
 
 
 class CountingModel(FMU3Model):
-    """An instance for model exchange that counts its right-hand sides, and whose inputs can be led along."""
+    """Model exchange instance that counts right-hand sides and can update its inputs whenever the time is set."""
 
     evaluations = 0
-    driven_input: Any = None  # the inputs that are
+    driven_input: Any = None  # inputs to update with the time
 
     def setTime(self, time: float) -> None:
         super().setTime(time)
@@ -52,19 +50,27 @@ class CountingModel(FMU3Model):
 
 @dataclass(frozen=True)
 class RecordedRun:
-    """What fmpy recorded: `rows` is a structured array of `time` in s and the outputs by name (SI units), in model
-    exchange with a row before and one after each event; and the right-hand sides evaluated."""
+    """Outputs that fmpy recorded.
+
+    Attributes
+    ----------
+    rows : numpy.ndarray
+        Structured array of `time` in s and the outputs by name in SI units. Model exchange records a row before and one
+        after each event.
+    evaluations : int
+        Evaluations of the right-hand side.
+    """
 
     rows: np.ndarray
     evaluations: int
 
     def sample_at(self, times: np.ndarray, names: Sequence[str]) -> np.ndarray:
-        """The outputs of those names, (n, names), at the recorded times nearest to n times in s."""
+        """Return the named outputs, (n, names), at the recorded times nearest to `times` (n,) in s."""
         nearest = np.abs(self.rows["time"][:, None] - times).argmin(axis=0)
         return np.column_stack([self.rows[name][nearest] for name in names])
 
     def find_changes(self, name: str) -> list[tuple[float, int]]:
-        """Every change of an integer output, as (time in s, new value)."""
+        """Return every change of an integer output as (time in s, new value)."""
         times, values = self.rows["time"], self.rows[name]
         after = np.flatnonzero(np.diff(values)) + 1
         return list(zip(times[after].tolist(), values[after].tolist(), strict=True))
@@ -72,7 +78,7 @@ class RecordedRun:
 
 @dataclass(frozen=True)
 class Fmi3Instance:
-    """A live instance of the FMU in a folder, fresh before each run."""
+    """Instance of an unpacked FMU that is reset after each run."""
 
     interface: str
     fmu: Any
@@ -91,10 +97,30 @@ class Fmi3Instance:
         signals: np.ndarray | None = None,
         drive_inputs: bool = False,
     ) -> RecordedRun:
-        """A run from the start to the stop, recorded at every interval (all in s); without rtol that of the FMU's
-        default experiment.  Inputs follow `signals`, a structured array of `time` and theirs, in straight lines and,
-        where a time stands twice, jumps; `led` along wherever the solver looks, or held by fmpy within its steps.
-        HarnessError if it fails or outlasts `timeout` s."""
+        """Run the FMU and record outputs.
+
+        Parameters
+        ----------
+        values : dict
+            Values to set before the run, by variable name.
+        outputs : sequence of str
+            Variables to record.
+        start, stop, interval : float
+            Start, stop and output interval in s.
+        rtol : float, optional
+            Relative tolerance; by default that of the FMU's default experiment.
+        timeout : float, optional
+            Time limit of the run in s.
+        signals : numpy.ndarray, optional
+            Structured array of `time` and inputs, interpolated linearly. A repeated time is a jump.
+        drive_inputs : bool
+            Whether inputs follow the signals at every evaluation; otherwise fmpy holds them during each solver step.
+
+        Raises
+        ------
+        HarnessError
+            If the run fails or exceeds `timeout`.
+        """
         if drive_inputs:
             self.fmu.driven_input = Input(self.fmu, self.description, signals)
         try:
@@ -113,52 +139,57 @@ class Fmi3Instance:
                 fmu_instance=self.fmu,
                 step_finished=check_status,
             )
-        except RuntimeError as error:  # the path of CVode's source stands before its sentence
-            sentence = str(error).rpartition(": ")[2]
-            raise HarnessError(f"fmpy's CVode (500 steps from point to point at most): {sentence}") from None
-        last = rows["time"][-1]
-        if last < stop - 0.5 * interval:
-            raise HarnessError(f"at t = {last:.3g} s" + (f" after {timeout:g} s of run time" if timeout else ""))
+        except RuntimeError as error:  # the path of CVode's source precedes its message
+            message = str(error).rpartition(": ")[2]
+            raise HarnessError(f"fmpy's CVode (500 steps from point to point at most): {message}") from None
+        end = rows["time"][-1]
+        if end < stop - 0.5 * interval:
+            raise HarnessError(f"at t = {end:.3g} s" + (f" after {timeout:g} s of run time" if timeout else ""))
         evaluations = self.fmu.evaluations if self.interface == MODEL_EXCHANGE else int(rows[EVALUATIONS][-1])
         self.fmu.reset()
         return RecordedRun(rows, evaluations)
 
 
 def check_status(time: float, recorder: Any) -> bool:
-    """Go on, unless a signal has come: CVode's callbacks swallow what it raises."""
+    """Continue the run, unless a signal was received: callbacks of CVode swallow its exception."""
     check_interrupt()
     return True
 
 
 def fmi3_path(fmu: Path) -> Path:
-    """The FMI 3.0 FMU of the same model, beside that of FMI 2.0."""
+    """Return the path of the native FMI 3.0 FMU of the same model."""
     return fmu.parent / "native" / "fmi3" / fmu.name
 
 
 @contextmanager
-def open_fmi3_instance(file: Path, way: str) -> Iterator[Fmi3Instance]:
-    """An instance of the FMU, its files and its library gone afterwards; HarnessError with the FMU's own sentence, or
-    fmpy's, if something fails."""
+def open_fmi3_instance(file: Path, interface: str) -> Iterator[Fmi3Instance]:
+    """Unpack and instantiate an FMU; free the instance and remove the files on exit.
+
+    Raises
+    ------
+    HarnessError
+        With the FMU's own message, or fmpy's, if anything fails.
+    """
     if not file.is_file():
         raise HarnessError(f"not built: {file} (python build_fmus.py --fmi 3)")
     os.environ |= dict.fromkeys(SUNDIALS_LOG_VARIABLES, os.devnull)
-    said: list[str] = []
+    logged: list[str] = []
 
-    def hear(environment: Any, status: int, category: bytes, message: bytes) -> None:
-        said.append(message.decode(errors="replace"))
+    def log_message(environment: Any, status: int, category: bytes, message: bytes) -> None:
+        logged.append(message.decode(errors="replace"))
 
     try:
         with unpack(file) as folder:
-            found = read_description(file)
-            fmu = (CountingModel if way == MODEL_EXCHANGE else FMU3Slave)(
-                guid=found.guid, unzipDirectory=str(folder), modelIdentifier=file.stem, instanceName=file.stem
+            description = read_description(file)
+            fmu = (CountingModel if interface == MODEL_EXCHANGE else FMU3Slave)(
+                guid=description.guid, unzipDirectory=str(folder), modelIdentifier=file.stem, instanceName=file.stem
             )
-            fmu.instantiate(loggingOn=True, logMessage=hear)
+            fmu.instantiate(loggingOn=True, logMessage=log_message)
             try:
-                yield Fmi3Instance(way, fmu, found, str(folder))
+                yield Fmi3Instance(interface, fmu, description, str(folder))
             finally:
                 fmu.freeInstance()
     except Exception as error:  # fmpy raises bare Exceptions, and those of zip and XML readers
-        if isinstance(error, HarnessError) and not said:
+        if isinstance(error, HarnessError) and not logged:
             raise
-        raise HarnessError(said[-1] if said else f"{file.name}: {first_line(error)}") from None
+        raise HarnessError(logged[-1] if logged else f"{file.name}: {first_line(error)}") from None

@@ -1,6 +1,6 @@
-"""One run of an FMU, step by step as told, to its end or to its refusal; what studies of stability and errors ask for.
+"""Sessions with one FMU of this project: given communication steps and value changes, to the end or to an error.
 
-Values go to the FMU as they are, unchecked: what it makes of NaN is the question.
+Values are not checked before they are set, since studies of stability and errors also set NaN.
 """
 
 from collections.abc import Iterable, Iterator
@@ -22,22 +22,22 @@ from .run_spec import RunSpec
 from .unpacking import unpack_once
 from .variable_values import enumeration_labels
 
-CommunicationSteps = list[tuple[float, float]]  # communication steps: from, size in s
-ScheduledChanges = dict[float, dict[str, float]]  # values by the time from which they hold, in s
+CommunicationSteps = list[tuple[float, float]]  # communication steps as (start, size) in s
+ScheduledChanges = dict[float, dict[str, float]]  # values to set, by time in s
 
 
 @dataclass(frozen=True)
 class FmuInfo:
-    """What an FMU offers: its methods, the start value of every parameter and input, and the enumerations by label."""
+    """Capabilities of an FMU: methods, start values of parameters and inputs, enumerations, default stop in s."""
 
     methods: tuple[str, ...]
-    default_method: str  # method
+    default_method: str  # a method
     start_values: dict[str, float]
     enumerations: dict[str, dict[str, int]]
     stop: float
 
     def resolve_labels(self, values: dict[str, Any]) -> dict[str, float]:
-        """Values with their labels made numbers."""
+        """Replace enumeration labels by numbers."""
         return {
             name: self.enumerations[name][value] if isinstance(value, str) else value for name, value in values.items()
         }
@@ -45,7 +45,7 @@ class FmuInfo:
 
 @dataclass(frozen=True)
 class InitialValues:
-    """What is set before a run; stop is None where the importer does not know it."""
+    """Values to set before a run; `stop` is None if the importer does not provide it."""
 
     model: str
     values: dict[str, float]
@@ -55,7 +55,7 @@ class InitialValues:
 
 @dataclass(frozen=True)
 class RunCounts:
-    """Changes of mode, internal steps accepted and refused, right-hand sides."""
+    """Changes of mode, accepted and rejected steps, and evaluations of the right-hand side."""
 
     events: int
     steps: int
@@ -65,10 +65,17 @@ class RunCounts:
 
 @dataclass(frozen=True)
 class CompletedRun:
-    """A run that came to its end: `x`, `v`, `energy` (n,) after each communication step, the start included; no energy
-    where the FMU tells none.
+    """Completed run.
 
-    `t_last` is the time of the last event in s, the start where there was none.
+    Attributes
+    ----------
+    x, v, energy : numpy.ndarray
+        Position, velocity and energy (n,) after each communication step, start included; no energy if the FMU has none.
+    t_last : float
+        Time of the last event in s; the start time without events.
+    counts : RunCounts
+    seconds : float
+        Run time in s.
     """
 
     x: np.ndarray
@@ -81,7 +88,7 @@ class CompletedRun:
 
 @dataclass(frozen=True)
 class RefusedRun:
-    """A run that was refused: the FMU's sentence, and whether every calculated Real reads NaN."""
+    """Run that the FMU refused: its message, and whether all calculated Reals are NaN."""
 
     message: str
     all_nan: bool
@@ -89,120 +96,142 @@ class RefusedRun:
 
 @dataclass(frozen=True)
 class RefusalSummary:
-    """Many of them: how many were tried, and what went wrong."""
+    """Number of values that were tried, and a description of each failure."""
 
     n_tried: int
     failures: tuple[str, ...]
 
 
 def read_info(model: str) -> FmuInfo:
-    """The card of a model's FMU."""
+    """Return the capabilities of a model's FMU."""
     description = read_own_description(RunSpec(find_fmu(model)))
     settable = [variable for variable in description.modelVariables if variable.causality in ("parameter", "input")]
-    enumerations = {v.name: v for v in settable if v.type == "Enumeration"}
+    enumerations = {variable.name: variable for variable in settable if variable.type == "Enumeration"}
     choices = {
-        name: {label: number for number, label in enumeration_labels(v).items()} for name, v in enumerations.items()
+        name: {label: number for number, label in enumeration_labels(variable).items()}
+        for name, variable in enumerations.items()
     }
-    defaults = {v.name: int(v.start) if v.name in choices else float(v.start) for v in settable}
+    defaults = {
+        variable.name: int(variable.start) if variable.name in choices else float(variable.start)
+        for variable in settable
+    }
     methods = {number: label for label, number in choices["solver.method"].items()}
     default = methods[int(defaults["solver.method"])]
     return FmuInfo(tuple(methods.values()), default, defaults, choices, float(description.defaultExperiment.stopTime))
 
 
 class FmuSession:
-    """An instance of an FMU that can be run anew and anew."""
+    """Instance of an FMU that can be reset and run again."""
 
-    def __init__(self, description: Any, fmu: Any, heard: LogCapture) -> None:
-        self.fmu, self.log = fmu, heard
+    def __init__(self, description: Any, fmu: Any, log: LogCapture) -> None:
+        self.fmu, self.log = fmu, log
         self.variables = {variable.name: variable for variable in description.modelVariables}
         motion = find_roles(self.variables)
         if "velocity" not in motion:
-            raise HarnessError(f"{description.modelName}: no output is the rate of a position, as derivative= says it")
+            raise HarnessError(f"{description.modelName}: no output is declared as the derivative of a position")
         self.outputs = (motion["position"], motion["velocity"], *(["energy"] if "energy" in self.variables else []))
 
     def initialize(self, setting: InitialValues) -> None:
+        """Set values and initialize the instance."""
         values = ((self.variables[name], value) for name, value in setting.values.items())
         initialize(self.fmu, values, setting.start, setting.stop)
 
     def set_values(self, values: dict[str, float]) -> None:
+        """Set variables by name."""
         for name, value in values.items():
             set_variable(self.fmu, self.variables[name], value)
 
     def find_reals(self, *causalities: str) -> list[str]:
-        """The names of the Reals of some causalities."""
-        return [v.name for v in self.variables.values() if v.type == "Real" and v.causality in causalities]
+        """Return the names of the Reals with the given causalities."""
+        return [
+            variable.name
+            for variable in self.variables.values()
+            if variable.type == "Real" and variable.causality in causalities
+        ]
 
     def get_reals(self, names: Iterable[str]) -> list[float]:
+        """Return the values of Reals by name."""
         return self.fmu.getReal([self.variables[name].valueReference for name in names])
 
     def get_count(self, name: str) -> int:
+        """Return an Integer; 0 if the FMU has no such variable."""
         return self.fmu.getInteger([self.variables[name].valueReference])[0] if name in self.variables else 0
 
     def read_refusal(self) -> RefusedRun:
-        """What the FMU said when it refused."""
+        """Return the error message of the FMU and the state of its outputs."""
         return RefusedRun(self.log.error_message, all(map(isnan, self.get_reals(self.find_reals("output", "local")))))
 
     def reset(self) -> None:
-        """A new beginning."""
+        """Reset the instance and discard its messages."""
         self.log.clear()
         self.fmu.reset()
 
 
 @contextmanager
 def open_session(model: str) -> Iterator[FmuSession]:
-    """A fresh instance of a model's FMU, whose words are kept from the terminal."""
+    """Instantiate a model's FMU and capture its messages."""
     spec = RunSpec(find_fmu(model))
-    found = read_own_description(spec)
-    with load_instance(spec, found, unpack_once(spec.fmu)) as (fmu, heard):
-        yield FmuSession(found, fmu, heard)
+    description = read_own_description(spec)
+    with load_instance(spec, description, unpack_once(spec.fmu)) as (fmu, log):
+        yield FmuSession(description, fmu, log)
 
 
 def run_steps(
     setting: InitialValues, calls: CommunicationSteps, changes: ScheduledChanges
 ) -> CompletedRun | RefusedRun:
-    """Make the calls, with values changed at the times that `changes` holds; a row is read after each."""
-    with open_session(setting.model) as it:
-        begun = perf_counter()
+    """Run communication steps and record states after each.
+
+    Parameters
+    ----------
+    setting : InitialValues
+    calls : list of (float, float)
+        Communication steps as (start, size) in s.
+    changes : dict
+        Values to set at a time in s, by time.
+    """
+    with open_session(setting.model) as session:
+        started = perf_counter()
         try:
-            it.initialize(setting)
-            rows = [it.get_reals(it.outputs)]
+            session.initialize(setting)
+            rows = [session.get_reals(session.outputs)]
             for t, h in calls:
-                it.set_values(changes.get(t, {}))
-                it.fmu.doStep(t, h)
-                rows.append(it.get_reals(it.outputs))
+                session.set_values(changes.get(t, {}))
+                session.fmu.doStep(t, h)
+                rows.append(session.get_reals(session.outputs))
         except FMICallException:
-            return it.read_refusal()
-        seconds = perf_counter() - begun
+            return session.read_refusal()
+        seconds = perf_counter() - started
         x, v, *energy = np.array(rows).T
-        t_last = it.get_reals(["events.t_last"])[0] if "events.t_last" in it.variables else setting.start
+        t_last = session.get_reals(["events.t_last"])[0] if "events.t_last" in session.variables else setting.start
         counts = [
-            it.get_count(name) for name in ("events.count", "solver.steps", "solver.rejected", "solver.evaluations")
+            session.get_count(name)
+            for name in ("events.count", "solver.steps", "solver.rejected", "solver.evaluations")
         ]
         return CompletedRun(x, v, energy[0] if energy else None, t_last, RunCounts(*counts), seconds)
 
 
 def inject_nonfinite(setting: InitialValues) -> RefusalSummary:
-    """NaN and both infinities in every Real that can be set, before the run and in the midst of it, one at a time.
+    """Set NaN and both infinities in every settable Real, before and during a run, one at a time.
 
-    Each must be refused with a sentence that names it, and leave an FMU that runs again after a reset.
+    The FMU must refuse each with a message that starts with the variable's name, and must run again after a reset.
     """
-    wrong, tried = [], 0
-    with open_session(setting.model) as it:
-        for name, value, late in product(it.find_reals("parameter", "input"), (nan, inf, -inf), (False, True)):
-            tried += 1
-            it.reset()
+    failures, n_tried = [], 0
+    with open_session(setting.model) as session:
+        for name, value, in_run in product(session.find_reals("parameter", "input"), (nan, inf, -inf), (False, True)):
+            n_tried += 1
+            session.reset()
             try:
-                it.initialize(setting if late else replace(setting, values={**setting.values, name: value}))
-                it.fmu.doStep(0.0, 0.01)
-                if late:
-                    it.set_values({name: value})
-                    it.fmu.doStep(0.01, 0.01)
-                wrong.append(f"{name} = {value} was taken{' in mid-run' * late}")
+                session.initialize(setting if in_run else replace(setting, values={**setting.values, name: value}))
+                session.fmu.doStep(0.0, 0.01)
+                if in_run:
+                    session.set_values({name: value})
+                    session.fmu.doStep(0.01, 0.01)
+                failures.append(f"{name} = {value} was accepted{' during the run' * in_run}")
             except FMICallException:
-                refusal = it.read_refusal()
+                refusal = session.read_refusal()
                 if not (refusal.message.startswith(f"{name} = ") and refusal.all_nan):
-                    wrong.append(f"{name} = {value}: {refusal.message or 'no sentence'}")
-        it.reset()
-        it.initialize(setting)
-        it.fmu.doStep(0.0, 0.01)
-    return RefusalSummary(tried, tuple(wrong))
+                    failures.append(f"{name} = {value}: {refusal.message or 'no sentence'}")
+        session.reset()
+        session.initialize(setting)
+        session.fmu.doStep(0.0, 0.01)
+    return RefusalSummary(n_tried, tuple(failures))

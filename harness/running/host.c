@@ -1,4 +1,4 @@
-/* A host that is not Python: plays FMI calls, one a line from standard input, on the library of an FMU.
+/* FMI 2.0 host without Python: executes FMI calls on the library of an FMU, one per line of standard input.
  *
  *     host LIBRARY GUID RESOURCES
  *
@@ -7,15 +7,15 @@
  *     I getr REFERENCE...    I pass REFERENCE J TO   I save                  I restore             I reset
  *     I free                 I time REPEAT STOP STEPS WORD...                0 end                   0 unload
  *
- * I and J are numbers of instances.  step answers its status, getr the values; whatever else fails ends the host.  end
- * writes a NUL to both streams: so far goes what is asked.
+ * I and J are indices of instances. step prints the status, getr the values; any other failure exits. end writes a NUL
+ * to both output streams, which marks the end of the output of a request.
  *
- * time runs from t = 0 to STOP in so many equal communication steps, several times.  The word R=VALUE sets the Real of
- * value reference R before each run; the word R has that Real read at every point.  It answers the seconds of the
- * fastest run, initialisation and reading included, and the values at every point of the last one.
+ * time simulates from t = 0 to STOP in STEPS equal communication steps, REPEAT times. A word R=VALUE sets the Real with
+ * value reference R before each run; a word R reads that Real at every point. It prints the run time of the fastest run
+ * in s, including initialization and reading, and the values at every point of the last run.
  *
- * calls asks what an importer's solver asks in model exchange, each TURNS times, several times.  It answers the seconds
- * of a call in the fastest: to set the time, to set the states, to get the derivatives, to get the indicators.
+ * calls measures the model exchange calls of a solver, TURNS calls at a time. It prints the shortest time per call in
+ * s: to set the time, to set the states, to get the derivatives, to get the event indicators.
  */
 #define _POSIX_C_SOURCE 199309L
 #include <dlfcn.h>
@@ -28,7 +28,7 @@
 
 #include "fmi2FunctionTypes.h"
 
-enum { INSTANCES = 4, WORDS = 64, LINE = 4096, OFTEN = 500 };
+enum { INSTANCES = 4, WORDS = 64, LINE = 4096, REPETITIONS = 500 };
 
 #define FUNCTIONS(f)                                                                                               \
     f(Instantiate) f(FreeInstance) f(SetupExperiment) f(EnterInitializationMode) f(ExitInitializationMode) f(Reset) \
@@ -56,8 +56,8 @@ static void die(const char *what, const char *why)
 #define DO(call) \
     if (fmi.call > fmi2Warning) die("fmi2" #call, "does not return OK")
 
-static void hear(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
-                 fmi2String message, ...)
+static void log_message(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status,
+                        fmi2String category, fmi2String message, ...)
 {
     (void)environment, (void)instance, (void)status, (void)category;
     va_list values;
@@ -68,9 +68,9 @@ static void hear(fmi2ComponentEnvironment environment, fmi2String instance, fmi2
     va_end(values);
 }
 
-static const fmi2CallbackFunctions callbacks = {hear, calloc, free, NULL, NULL};
+static const fmi2CallbackFunctions callbacks = {log_message, calloc, free, NULL, NULL};
 
-/* A word R or R=VALUE. */
+/* Append a word R or R=VALUE. */
 static void add(Reals *reals, const char *word)
 {
     const char *value = strchr(word, '=');
@@ -78,7 +78,7 @@ static void add(Reals *reals, const char *word)
     reals->references[reals->count++] = (fmi2ValueReference)strtoul(word, NULL, 10);
 }
 
-static void tell(const fmi2Real *values, size_t count)
+static void print_values(const fmi2Real *values, size_t count)
 {
     printf("values");
     for (size_t n = 0; n < count; n++) printf(" %.17g", values[n]);
@@ -92,7 +92,7 @@ static double now(void)
     return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
-/* The seconds of one run; what is read at each point goes to `out`, row by row. */
+/* Return the time of one run in s; write the values at each point to `out`, row by row. */
 static double run(fmi2Component c, const Reals *set, const Reals *read, double stop, int steps, double *out)
 {
     double begun = now(), t = 0.0;
@@ -110,7 +110,7 @@ static double run(fmi2Component c, const Reals *set, const Reals *read, double s
     return now() - begun;
 }
 
-static void take_time(fmi2Component c, char **words, int count)
+static void time_runs(fmi2Component c, char **words, int count)
 {
     Reals set = {.count = 0}, read = {.count = 0};
     int repeat = atoi(words[0]), steps = atoi(words[2]);
@@ -118,20 +118,20 @@ static void take_time(fmi2Component c, char **words, int count)
     for (int n = 3; n < count; n++) add(strchr(words[n], '=') ? &set : &read, words[n]);
     double *out = malloc(((size_t)steps + 1) * read.count * sizeof *out);
     if (!out) die("time", "no memory");
-    for (int i = 0; i <= repeat; i++) { /* one more, to warm up */
+    for (int i = 0; i <= repeat; i++) { /* the first one warms up */
         double seconds = run(c, &set, &read, stop, steps, out);
         if (i == 1 || (i && seconds < fastest)) fastest = seconds;
         DO(Reset(c));
     }
     printf("seconds %.9g\n", fastest);
-    for (int i = 0; i <= steps; i++) tell(out + (size_t)i * read.count, read.count);
+    for (int i = 0; i <= steps; i++) print_values(out + (size_t)i * read.count, read.count);
     free(out);
 }
 
 #define TIME(call)                                                       \
     do {                                                                 \
         double fastest = INFINITY;                                       \
-        for (int i = 0; i < OFTEN; i++) {                                \
+        for (int i = 0; i < REPETITIONS; i++) {                          \
             double begun = now();                                        \
             for (long turn = 0; turn < turns; turn++) DO(call);          \
             fastest = fmin(fastest, now() - begun);                      \
@@ -155,7 +155,7 @@ static void time_calls(fmi2Component c, size_t states, size_t indicators, long t
     printf("\n");
 }
 
-static void play(const char *command, int i, char **words, int count, char **host)
+static void execute(const char *command, int i, char **words, int count, char **host)
 {
     static fmi2Component instances[INSTANCES];
     static fmi2FMUstate states[INSTANCES];
@@ -170,7 +170,7 @@ static void play(const char *command, int i, char **words, int count, char **hos
     } else if (IS("begin")) {
         status = fmi.SetupExperiment(c, fmi2False, 0.0, count ? strtod(words[0], NULL) : 0.0, fmi2False, 0.0);
         if (status == fmi2OK) status = fmi.EnterInitializationMode(c);
-        if (status == fmi2OK) fmi.ExitInitializationMode(c); /* what it refuses, the steps refuse too */
+        if (status == fmi2OK) fmi.ExitInitializationMode(c); /* an error here appears again in the steps */
     } else if (IS("step")) {
         printf("status %d\n", fmi.DoStep(c, strtod(words[0], NULL), strtod(words[1], NULL), fmi2True));
     } else if (IS("setr")) {
@@ -180,14 +180,14 @@ static void play(const char *command, int i, char **words, int count, char **hos
     } else if (IS("getr")) {
         for (int n = 0; n < count; n++) add(&read, words[n]);
         status = fmi.GetReal(c, read.references, read.count, read.values);
-        tell(read.values, read.count);
+        print_values(read.values, read.count);
     } else if (IS("pass")) {
         add(&read, words[0]);
         add(&read, words[2]);
         status = fmi.GetReal(c, read.references, 1, read.values);
         if (status == fmi2OK) status = fmi.SetReal(instances[atoi(words[1])], read.references + 1, 1, read.values);
     } else if (IS("time")) {
-        take_time(c, words, count);
+        time_runs(c, words, count);
     } else if (IS("calls")) {
         time_calls(c, strtoul(words[0], NULL, 10), strtoul(words[1], NULL, 10), atol(words[2]));
     } else if (IS("reset")) {
@@ -211,7 +211,7 @@ int main(int argc, char **argv)
     if (argc != 4) die("usage", "host LIBRARY GUID RESOURCES < calls");
     void *library = dlopen(argv[1], RTLD_NOW | RTLD_LOCAL);
     if (!library) die("dlopen", dlerror());
-#define FIND(name) *(void **)&fmi.name = dlsym(library, "fmi2" #name); /* the CVODE FMU has no states to save */
+#define FIND(name) *(void **)&fmi.name = dlsym(library, "fmi2" #name); /* NULL if missing: not all FMUs save states */
     FUNCTIONS(FIND)
     while (fgets(line, sizeof line, stdin)) {
         int count = 0;
@@ -220,9 +220,9 @@ int main(int argc, char **argv)
         if (!strcmp(words[1], "unload")) {
             if (dlclose(library)) die("dlclose", dlerror());
         } else if (!strcmp(words[1], "end")) {
-            if (putchar('\0') || fflush(stdout) || fputc('\0', stderr)) die("end", "cannot be told");
+            if (putchar('\0') || fflush(stdout) || fputc('\0', stderr)) die("end", "cannot write");
         } else {
-            play(words[1], atoi(words[0]), words + 2, count - 2, argv);
+            execute(words[1], atoi(words[0]), words + 2, count - 2, argv);
         }
     }
     return fflush(stdout) ? 1 : 0;

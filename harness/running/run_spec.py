@@ -1,4 +1,4 @@
-"""What to run: an FMU, what to set in it, and what to record."""
+"""Specification of a run: the FMU, values to set, outputs to record."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -10,7 +10,7 @@ from ..scenes.roles import find_roles
 from ..scenes.scene import Scene
 from .inputs import Inputs
 
-# Keys of a scene that are short for a variable of the FMU.
+# Keys of a scene that set a variable of the FMU.
 SHORT_KEYS = {
     "method": "solver.method",
     "law": "friction",
@@ -18,21 +18,39 @@ SHORT_KEYS = {
     "atol": "solver.atol",
     "h_max": "solver.h_max",
 }
-DEFAULT_EQUAL_STEPS = 4096  # communication steps of a scene that says nothing of them: enough to draw and to measure
+DEFAULT_EQUAL_STEPS = 4096  # communication steps of a scene without grid and follow
 
 
 @dataclass(frozen=True)
 class RunSpec:
-    """One run of an FMU, from `start` to `stop` in s (None: its own).
+    """Specification of one run of an FMU.
 
-    `values` are set by the names of variables, enumerations by label or number; `inputs` is a table over time.  The
-    communication points are those of the `grid` (a step in s, if there is one; `even`: without one, that of so many
-    steps), and where it is to `follow` them the ends of the solver's own steps.  It is timed as often as it is to
-    `repeat`.
-
-    Somebody else's FMU does not show its solver's steps: what is followed are ever shorter ones, until two results
-    agree to the `tolerance`.  It is run by model exchange if `exchange` or if it offers nothing else; if `lenient` also
-    when it breaks the standard; and one call of it may take `timeout` s.
+    Attributes
+    ----------
+    fmu : pathlib.Path
+    outputs : tuple of str
+        Outputs to record.
+    values : mapping
+        Values to set by variable name; enumerations by label or number.
+    start, stop : float or None
+        Start and stop in s; None for those of the FMU.
+    grid : float or None
+        Communication step in s.
+    equal_steps : int
+        Number of equal communication steps if there is no `grid`.
+    follow : bool
+        Whether to step to the ends of internal steps as well. An external FMU does not expose them; its communication
+        steps are refined instead until two results agree to the `tolerance`.
+    repeat : int
+        Number of timed repetitions.
+    tolerance : float
+        Tolerance of the step refinement of external FMUs.
+    exchange : bool
+        Whether to use model exchange; automatic if the FMU offers nothing else. External FMUs only.
+    lenient : bool
+        Whether to run an FMU that violates the standard.
+    timeout : float
+        Time limit in s of one FMI call of an external FMU.
     """
 
     fmu: Path
@@ -52,27 +70,27 @@ class RunSpec:
 
     @property
     def model(self) -> str:
+        """Return the name of the model."""
         return self.fmu.stem
 
     @property
     def motion_outputs(self) -> dict[str, str]:
-        """The output that plays each role, of those recorded."""
+        """Return the recorded output of each role: position, velocity, acceleration."""
         return find_roles(self.outputs)
 
 
 def spec_from_scene(scene: Scene) -> RunSpec:
-    """The run that a scene asks for."""
-    short = {name: getattr(scene, key) for key, name in SHORT_KEYS.items() if getattr(scene, key) is not None}
-    for name in short:
+    """Return the run specification of a scene."""
+    by_key = {name: getattr(scene, key) for key, name in SHORT_KEYS.items() if getattr(scene, key) is not None}
+    for name in by_key:
         if name in scene.values:
-            raise SceneError(f"{name} is set twice, in [values] and above: leave one out")
-    even = DEFAULT_EQUAL_STEPS if scene.follow is None else 0
-    own: dict[str, Any] = {
-        "inputs": {},
+            raise SceneError(f"{name} is set twice, in [values] and by its key: remove one")
+    equal_steps = DEFAULT_EQUAL_STEPS if scene.follow is None else 0
+    derived: dict[str, Any] = {
         "fmu": scene.file,
-        "values": short | scene.values,
-        "equal_steps": even,
+        "values": by_key | scene.values,
+        "equal_steps": equal_steps,
         "follow": scene.follows_solver_steps,
     }
-    same = {each.name: getattr(scene, each.name) for each in fields(RunSpec) if each.name not in own}
-    return RunSpec(**same, **own)
+    copied = {each.name: getattr(scene, each.name) for each in fields(RunSpec) if each.name not in derived}
+    return RunSpec(**copied, **derived)

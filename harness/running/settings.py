@@ -1,4 +1,4 @@
-"""What a run sets and records, checked against the variables that the FMU declares."""
+"""Checks of outputs and values against the variables of an FMU."""
 
 from typing import Any
 
@@ -10,20 +10,20 @@ REQUIRED_VARIABLES = ("solver.t_next", "solver.steps", "solver.rejected", "solve
 
 
 def check_fmu(run: RunSpec, variables: dict[str, Any]) -> None:
-    """It is one of these FMUs, and every output to record is one of its outputs or locals."""
+    """Check that the FMU is one of this project and has the outputs to record."""
     for name in REQUIRED_VARIABLES:
         if name not in variables:
-            raise SceneError(f"{run.fmu.name} has no variable {name}; the harness runs the FMUs of this project only")
+            raise SceneError(f"{run.fmu.name} has no variable {name}: it is not an FMU of this project")
     readable = [name for name, variable in variables.items() if variable.causality in ("output", "local")]
     check_names("output", run.outputs, readable)
 
 
 def resolve_settings(run: RunSpec, variables: dict[str, Any]) -> list[tuple[Any, float | int]]:
-    """The variables to set before the run and their values, each within its declared range."""
+    """Return variables and values to set before the run, checked against their declared ranges."""
     settable = [name for name, variable in variables.items() if variable.causality in ("parameter", "input")]
     for key, name in SHORT_KEYS.items():
         if name in run.values and name not in variables:
-            asked = f"{key} = {format_value(run.values[name])}"
-            raise SceneError(f"{asked}: {run.model} has nothing to choose there; leave {key} out")
+            setting = f"{key} = {format_value(run.values[name])}"
+            raise SceneError(f"{setting}: {run.model} has no such choice; remove {key}")
     check_names("name in [values]", run.values, settable)
     return [(variables[name], convert_value(variables[name], value)) for name, value in run.values.items()]

@@ -1,4 +1,4 @@
-"""What anyone's FMU, or a file, shows of a motion: a trajectory."""
+"""Signals of an FMU or a file, for comparison."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,9 +11,21 @@ from .trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Signals:
-    """`columns` name to (n,) over `time` (n,) in s, with their units; the times of `events` and the modes that begin
-    there (m, 2), the start included, where they are known.  `note`, `file` and `parameters` say where it
-    came from, `failed` why it is not whole."""
+    """Signals over time, from a run or a file.
+
+    Attributes
+    ----------
+    time : numpy.ndarray
+        Time (n,) in s.
+    columns, units : dict
+        Signals (n,) and units, by name.
+    events : numpy.ndarray or None
+        Times in s and modes (m, 2), start included, if known.
+    note, file, parameters
+        Origin of the signals.
+    failure : str
+        Reason why they are incomplete; empty if they are complete.
+    """
 
     name: str
     time: np.ndarray
@@ -27,9 +39,9 @@ class Signals:
 
 
 def signals_from_trajectory(run: Trajectory) -> Signals:
-    """The trajectory of a run."""
+    """Return the signals of a run."""
     events = None if run.events is None else np.column_stack([run.events.t, run.events.mode])
     note = run.note or (f"solver: {run.settings_label}" if run.settings_label else "")
     units = {name: run.units[name] for name in run.columns}
-    fmu, told = run.spec.fmu, run.effective_parameters
-    return Signals(run.spec.model, run.time, run.columns, units, events, note, fmu, told, run.failure)
+    fmu, parameters = run.spec.fmu, run.effective_parameters
+    return Signals(run.spec.model, run.time, run.columns, units, events, note, fmu, parameters, run.failure)

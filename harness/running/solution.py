@@ -1,4 +1,4 @@
-"""What one solver answers to one problem, whichever way it was asked."""
+"""Solution of one problem by one solver."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,17 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Solution:
-    """The states `motion` (n, states), position and speed first, at the n points asked for (SI units), changes of mode
-    `events` as (time in s, new mode), None where the solver was not asked for them, and the right-hand sides and
-    Jacobians that were evaluated."""
+    """Solution of a problem at given points.
+
+    Attributes
+    ----------
+    states : numpy.ndarray
+        States (n, states) at the n points in SI units, position and velocity first.
+    events : list of (float, int) or None
+        Changes of mode as (time in s, new mode); None if the solver does not report them.
+    evaluations : int
+        Evaluations of right-hand sides and Jacobians.
+    """
 
     states: np.ndarray
     events: list[tuple[float, int]] | None

@@ -1,7 +1,6 @@
-"""Runs an SSP archive with fmpy's reader, in a process of its own; JSON in and out, as of the other engines
-(harness/studies/coupled/engine.py).
+"""Runs an SSP archive with fmpy in a child process; JSON input and output as for the other co-simulation engines.
 
-It reads the set of parameters only where it is told to, and shows no values before the first step.
+fmpy reads a parameter set only if it is passed explicitly, and records no values before the first step.
 """
 
 from typing import Any
@@ -15,15 +14,15 @@ from ..process.temporary_directory import temporary_directory
 
 
 def run(archive: str, step: float, count: int, read: list[tuple[str, str, int]], values: str) -> list[list[float]]:
-    """The rows of a run."""
-    with temporary_directory("ssv-") as folder, ZipFile(archive) as content:
+    """Run the archive and return one row per step."""
+    with temporary_directory("ssv-") as directory, ZipFile(archive) as content:
         name = "resources/parameters.ssv"
         parameters: Any = None
         if name in content.namelist():
-            parameters = read_ssv(content.extract(name, folder))
+            parameters = read_ssv(content.extract(name, directory))
         rows = simulate_ssp(archive, stop_time=(count - 0.5) * step, step_size=step, parameter_set=parameters)
     return [[float(row[f"{element}.{variable}"]) for element, variable, _ in read] for row in rows]
 
 
 if __name__ == "__main__":
-    serve_request(dict, lambda asked: run(**asked))
+    serve_request(dict, lambda request: run(**request))

@@ -1,8 +1,8 @@
-"""A run through fmpy in equal communication steps, all outputs recorded, in two loops.
+"""Run times of two co-simulation loops with equal communication steps that record all outputs.
 
-`usual` is fmpy's own, simulate_fmu, which everybody gets; `direct` is the harness's, which calls the library with
-nothing between.  A communication step is what the steps of a run add to it: the difference between a run in 1600 steps
-and one in a single step, shared among them.  The solver's own steps do not depend on it; they are in whole runs.
+`time_fmpy_loop` measures fmpy's simulate_fmu; `time_direct_loop` measures the loop of this harness, which calls the
+library directly. The cost of a communication step is the difference between a run in 1600 steps and one in a single
+step, per step. The internal steps of the solver are the same in both runs.
 """
 
 from pathlib import Path
@@ -18,7 +18,7 @@ REPEATS = 10
 
 
 def time_fmpy_loop(file: Path, steps: int) -> float:
-    """Run time in s of fmpy's loop, the shortest of several runs of one instance."""
+    """Return the run time in s of fmpy's loop, the fastest of several runs of one instance."""
     with open_instance(RunSpec(file)) as (description, fmu, _):
         stop = float(description.defaultExperiment.stopTime)
 
@@ -36,15 +36,15 @@ def time_fmpy_loop(file: Path, steps: int) -> float:
 
 
 def time_direct_loop(file: Path, steps: int) -> float:
-    """Run time in s of the harness's loop, from initialisation on, the shortest of several runs of one instance."""
+    """Return the run time in s of the harness's loop, from initialization on, the fastest of several runs."""
     description = read_own_description(RunSpec(file))
     stop = float(description.defaultExperiment.stopTime)
     outputs = tuple(v.name for v in description.modelVariables if v.causality == "output")
-    cost = simulate(RunSpec(file, outputs, stop=stop, grid=stop / steps, follow=False, repeat=REPEATS)).statistics
-    assert cost  # ours tell it
-    return cost.seconds
+    statistics = simulate(RunSpec(file, outputs, stop=stop, grid=stop / steps, follow=False, repeat=REPEATS)).statistics
+    assert statistics  # FMUs of this project provide them
+    return statistics.seconds
 
 
-def time_per_step(many: float, one: float) -> float:
-    """The time of a communication step, from that of a run in 1600 and of a run in one."""
-    return (many - one) / (COMMUNICATION_STEPS - 1)
+def time_per_step(many_steps: float, one_step: float) -> float:
+    """Return the time of one communication step, from the times of a run in 1600 steps and of a run in one."""
+    return (many_steps - one_step) / (COMMUNICATION_STEPS - 1)

@@ -1,4 +1,4 @@
-"""What a run leaves: time, columns, steps, events, cost, and what was wanted."""
+"""Trajectory of a run: time, columns, steps, events, statistics and the specification."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,7 +22,7 @@ MOST_PANELS = 8  # of a plot that names no outputs
 
 @dataclass(frozen=True)
 class SolverSteps:
-    """The solver's own steps: `t` (n + 1,) their ends in s, start included; `h` (n,) in s; `rejected` (n,) refusals."""
+    """Internal steps: ends `t` (n + 1,) in s, start included; sizes `h` (n,) in s; `rejected` attempts (n,)."""
 
     t: np.ndarray
     h: np.ndarray
@@ -31,7 +31,7 @@ class SolverSteps:
 
 @dataclass(frozen=True)
 class ModeChanges:
-    """Changes of mode: `mode` (n,) holds from `t` (n,) in s on; the first entry is the start."""
+    """Changes of mode: `mode` (n,) holds from `t` (n,) in s on. The first entry is the start."""
 
     t: np.ndarray
     mode: np.ndarray
@@ -39,7 +39,7 @@ class ModeChanges:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Accepted steps, refused steps, right-hand sides, and the `seconds` of stepping in the fastest repeat."""
+    """Accepted and rejected steps, evaluations of the right-hand side, run time in s of the fastest repetition."""
 
     steps: int
     rejected: int
@@ -56,8 +56,28 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """One run: `time` (n,) in s, `columns` name to (n,); `units` of these and of the parameters; `steps`, `events` and
-    `cost` where the FMU shows them.  `note` says how exact it is, and `failed` why it is not whole."""
+    """Result of one run.
+
+    Attributes
+    ----------
+    spec : RunSpec
+    time : numpy.ndarray
+        Time (n,) in s.
+    columns : dict
+        Recorded outputs (n,) by name.
+    units : dict
+        Units of columns and parameters by name.
+    descriptions : dict
+        Descriptions of columns by name.
+    parameters : dict
+        Effective values by name.
+    steps, events, statistics : optional
+        Present if the FMU exposes them.
+    note : str
+        Estimated accuracy.
+    failure : str
+        Reason why the run is incomplete; empty if it is complete.
+    """
 
     spec: RunSpec
     time: np.ndarray
@@ -73,7 +93,7 @@ class Trajectory:
 
     @property
     def settings_label(self) -> str:
-        """Method, law and tolerance in force, for titles; nothing of somebody's FMU."""
+        """Return method, friction law and tolerance for titles; empty for external FMUs."""
         words = [str(self.parameters[name]) for name in ("solver.method", "friction") if name in self.parameters]
         if "solver.rtol" in self.spec.values:
             words.append(f"rtol {self.spec.values['solver.rtol']:g}")
@@ -81,7 +101,7 @@ class Trajectory:
 
     @property
     def effective_parameters(self) -> dict[str, tuple[object, str]]:
-        """The value of every parameter, and its unit."""
+        """Return value and unit of every parameter, by name."""
         return {name: (value, self.units[name]) for name, value in self.parameters.items()}
 
     def __repr__(self) -> str:
@@ -194,23 +214,23 @@ class Trajectory:
             )
 
     def column_of_role(self, role: str) -> np.ndarray:
-        """The recorded position, velocity or acceleration (n,)."""
+        """Return the recorded position, velocity or acceleration (n,)."""
         return self.columns[self.spec.motion_outputs[role]]
 
     def get_parameter(self, name: str, purpose: str) -> float:
-        """A parameter's value in the run; HarnessError if the model has none of that name."""
+        """Return a parameter's value; raise HarnessError if the model does not have it."""
         value = self.parameters.get(name)
         if not isinstance(value, float):
             raise HarnessError(
-                f"{purpose} needs the parameter '{name}', which {self.spec.model} does not have: leave it out"
+                f"{purpose} needs the parameter '{name}', which {self.spec.model} does not have: remove it"
             )
         return value
 
-    def write_tables(self, folder: Path) -> None:
-        """Write trajectory.csv, and steps.csv and events.csv where there are any."""
-        write_signals(folder / "trajectory.csv", self.time, self.columns, self.units)
+    def save(self, directory: Path) -> None:
+        """Write trajectory.csv, and steps.csv and events.csv if there are steps and events."""
+        write_signals(directory / "trajectory.csv", self.time, self.columns, self.units)
         if self.steps:
             columns = [self.steps.t[1:], self.steps.h, self.steps.rejected]
-            write_csv(folder / "steps.csv", ["t [s]", "h [s]", "rejected"], columns)
+            write_csv(directory / "steps.csv", ["t [s]", "h [s]", "rejected"], columns)
         if self.events:
-            write_csv(folder / "events.csv", ["t [s]", "mode"], [self.events.t, self.events.mode])
+            write_csv(directory / "events.csv", ["t [s]", "mode"], [self.events.t, self.events.mode])

@@ -1,8 +1,8 @@
-"""An FMU's files in a temporary folder whose path its library can read.
+"""Unpacks FMUs into temporary directories whose path their library can read.
 
-The libraries of pythonfmu and pythonfmu3 take the folder of the resources out of a URI in which they decode %20 and
-nothing else: any other escape, and a missing folder, ends in a crash or a hang (0.7.0 and 0.3.4).  So temporary files
-lie where the URI needs no escape, and an FMU in Python that lacks what its library would look for is refused.
+The libraries of pythonfmu 0.7.0 and pythonfmu3 0.3.4 decode only %20 in the URI of the resources; other escapes, and a
+missing directory, crash or hang. Temporary files therefore lie where the URI needs no escape, and FMUs in Python that
+lack required files are refused.
 """
 
 import atexit
@@ -20,51 +20,57 @@ from ..scenes.fmu_files import check_built
 from .cached_by_mtime import cached_by_mtime
 
 SCRIPT_NAME_FILE = (
-    "slavemodule.txt"  # the file that names an FMU's script; the libraries of both packages hold its name
+    "slavemodule.txt"  # names the script of an FMU in Python; the libraries of both packages contain its name
 )
-PROCESS_RESOURCES = ExitStack()  # folders that last as long as the process
+PROCESS_RESOURCES = ExitStack()  # directories that exist until the process ends
 atexit.register(PROCESS_RESOURCES.close)
 
 
 @contextmanager
 def unpack(fmu: Path) -> Iterator[Path]:
-    """The folder of an FMU's files; HarnessError if it cannot be unpacked, or if its library would crash."""
+    """Unpack an FMU and remove its files on exit.
+
+    Raises
+    ------
+    HarnessError
+        If the FMU cannot be unpacked, or its library would crash.
+    """
     check_built(fmu)
-    with temporary_directory() as folder:
+    with temporary_directory() as directory:
         try:
             with ZipFile(fmu) as archive:
                 size = sum(each.file_size for each in archive.infolist())
-            if size > disk_usage(folder).free:
-                raise OSError(f"its {size:.3g} bytes are more than the temporary folder has room for")
-            fmpy.extract(fmu, folder)
+            if size > disk_usage(directory).free:
+                raise OSError(f"its {size:.3g} bytes do not fit into the temporary directory")
+            fmpy.extract(fmu, directory)
         except Exception as error:  # fmpy raises bare Exceptions, and those of zip readers
             raise HarnessError(f"{fmu.name} cannot be unpacked: {first_line(error)}") from None
-        if is_python_fmu(folder):
-            check_python_fmu(fmu, folder)
-        yield folder
+        if is_python_fmu(directory):
+            check_python_fmu(fmu, directory)
+        yield directory
 
 
 @cached_by_mtime
 def unpack_once(fmu: Path) -> Path:
-    """The same of a file that is there, for as long as the process lasts."""
+    """Unpack an FMU for as long as the process lasts."""
     return PROCESS_RESOURCES.enter_context(unpack(fmu))
 
 
-def is_python_fmu(folder: Path) -> bool:
-    """Whether an unpacked FMU is run by the library of pythonfmu or pythonfmu3."""
-    libraries = folder.glob("binaries/*/*.*")
+def is_python_fmu(directory: Path) -> bool:
+    """Return whether an unpacked FMU uses the library of pythonfmu or pythonfmu3."""
+    libraries = directory.glob("binaries/*/*.*")
     return any(SCRIPT_NAME_FILE.encode() in library.read_bytes() for library in libraries if library.is_file())
 
 
-def check_python_fmu(fmu: Path, folder: Path) -> None:
-    """What the library of an FMU in Python relies on without looking."""
-    if not has_plain_uri(folder):
+def check_python_fmu(fmu: Path, directory: Path) -> None:
+    """Check the files that the library of an FMU in Python requires but does not check itself."""
+    if not has_plain_uri(directory):
         raise HarnessError(
-            f"{fmu.name} is an FMU in Python, which cannot be run from {folder}: its library reads plain letters only; "
-            "name another temporary folder, as in TMPDIR=/tmp"
+            f"{fmu.name} is an FMU in Python, which cannot be run from {directory}: its library reads plain characters "
+            "only; set another temporary directory, as in TMPDIR=/tmp"
         )
-    named = folder / "resources" / SCRIPT_NAME_FILE
-    script = named.read_text(encoding="utf-8", errors="replace").split("\n")[0] if named.is_file() else ""
-    if not script or not (named.parent / f"{script}.py").is_file():
+    name_file = directory / "resources" / SCRIPT_NAME_FILE
+    script = name_file.read_text(encoding="utf-8", errors="replace").split("\n")[0] if name_file.is_file() else ""
+    if not script or not (name_file.parent / f"{script}.py").is_file():
         missing = f"resources/{script}.py" if script else f"resources/{SCRIPT_NAME_FILE}"
         raise HarnessError(f"{fmu.name} lacks {missing}, without which an FMU in Python crashes: build it again")

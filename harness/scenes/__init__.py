@@ -1,1 +1,1 @@
-"""What people write: scenes, and what they couple."""
+"""Scenes: TOML files that specify runs and coupled systems."""

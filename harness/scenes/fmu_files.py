@@ -1,4 +1,4 @@
-"""Where built FMUs are."""
+"""Locations of built FMUs."""
 
 from pathlib import Path
 
@@ -8,23 +8,27 @@ FOLDERS = (Path("fmus"), Path(__file__).parents[2] / "fmus")
 
 
 def find_fmu(name: str) -> Path:
-    """Where the FMU of a model is, or will be once it is built; a model is named, or is a file that lies anywhere."""
+    """Return the path of a model's FMU, built or not. A model is given by its name or by a .py or .fmu file."""
     if (path := Path(name)).suffix in (".py", ".fmu"):
         return path.with_suffix(".fmu")
     if not (names := list_models()):
-        raise SceneError("there are no models here: run from the folder of the project, or name fmu = 'a/file.fmu'")
+        raise SceneError("no models found: run from the project directory, or set fmu = 'path/to/file.fmu'")
     check_names("model", [name], names)
     return next((file for folder in FOLDERS for file in folder.glob(f"{name}.fmu")), Path("fmus") / f"{name}.fmu")
 
 
 def list_models() -> set[str]:
-    """The names of the models here, built or not."""
-    return {file.stem for folder in FOLDERS for ending in ("*.fmu", "[!_]*.py") for file in folder.glob(ending)}
+    """Return the names of all models, built or not."""
+    return {file.stem for folder in FOLDERS for pattern in ("*.fmu", "[!_]*.py") for file in folder.glob(pattern)}
 
 
 def check_built(fmu: Path, error: type[HarnessError] = HarnessError) -> None:
-    """The FMU is there."""
+    """Check that the FMU exists."""
     if not fmu.is_file():
         model = fmu.with_suffix(".py")
-        what, which = ("it", f" {model}") if model.is_file() and fmu.parent not in FOLDERS else ("the FMUs", "")
-        raise error(f"there is no {fmu}: build {what} with `python build_fmus.py{which}`, or name another file")
+        object_name, argument = (
+            ("it", f" {model}") if model.is_file() and fmu.parent not in FOLDERS else ("the FMUs", "")
+        )
+        raise error(
+            f"there is no {fmu}: build {object_name} with `python build_fmus.py{argument}`, or specify another file"
+        )

@@ -1,27 +1,28 @@
-"""A scene: what to run, what to record, what to measure, what to draw.  Read from a TOML file:
+"""Scenes: what to run, record, analyze and plot. Format of the TOML file:
 
-    title = "..."             one line for people
-    about = "..."             what its model does, for the report
-    model = "smd"             fmus/smd.fmu below the present folder or the project; or fmu = "path/from/this/file.fmu"
-    start, stop               s; left out: the FMU's own
-    method, law               solver.method and friction by name; left out: the FMU's own
-    rtol, atol, h_max         solver.rtol, solver.atol (m), solver.h_max (s); left out: the FMU's own
-    outputs = ["x", "v"]      the columns to record
+    title = "..."             one line
+    about = "..."             description of the model, for the report
+    model = "smd"             fmus/smd.fmu in the working directory or the project; or fmu = "path/from/here.fmu"
+    start, stop               s; default: those of the FMU
+    method, law               solver.method and friction by name; default: those of the FMU
+    rtol, atol, h_max         solver.rtol, solver.atol (m), solver.h_max (s); default: those of the FMU
+    outputs = ["x", "v"]      columns to record
     grid                      communication step in s
-    follow = true             visit the ends of the solver's own steps as well; without a grid: these alone
-                              both left out: 4096 even steps and the solver's own
-    repeat = 3                time the run as often, and report the fastest
-    tolerance = 1e-6          to which an FMU is run that does not show its solver's steps; and of such a one also
-    exchange, lenient = true  run it by model exchange; run it though it breaks the standard
-    timeout = 60             s, for one call of it
+    follow = true             step to the ends of internal steps as well; without a grid: to these only
+                              default without follow and grid: 4096 equal steps and the internal steps
+    repeat = 3                run several times and report the shortest run time
+    tolerance = 1e-6          tolerance of the step refinement for FMUs that do not expose their solver's steps; for
+                              such FMUs also:
+    exchange, lenient = true  use model exchange; run an FMU that violates the standard
+    timeout = 60              time limit of one FMI call in s
     analyses = ["decay"]      decay, slip, steps
-    plots = ["phase"]         position, velocity, acceleration, phase, steps, any output by its name; [] for none;
-                              left out: every output, and the phase plane
-    [values]                  parameters and inputs by name, SI units; enumerations by name
-    [decay]                   gives = "zeta", "f" or "T_f"; first = peaks to skip; cycles = how many to use (all)
-    [published]               source = "..."; measured names with a number, [number, "unit"] or words
+    plots = ["phase"]         position, velocity, acceleration, phase, steps, or any output; [] for none;
+                              default: every output and the phase plane
+    [values]                  parameters and inputs by name, SI units; enumerations by label
+    [decay]                   gives = "zeta", "f" or "T_f"; first = peaks to skip; cycles = cycles to use (all)
+    [published]               source = "..."; published quantities: a number, [number, "unit"] or a text
 
-Only title, outputs and one of model and fmu are needed.
+Required are title, outputs, and either model or fmu.
 """
 
 from dataclasses import dataclass, field, fields, replace
@@ -50,9 +51,9 @@ from .schema import (
 
 SHIPPED = Path(__file__).parent
 MAX_REPEATS = 1000
-MAX_DEFAULT_PLOTS = 6  # over time that are drawn unasked
+MAX_DEFAULT_PLOTS = 6  # time plots by default
 
-# What may be asked for, and the roles that it needs among the outputs.
+# Available analyses and plots, and the roles that they need among the outputs.
 ANALYSES: dict[str, tuple[str, ...]] = {"decay": ("position", "velocity"), "slip": ("velocity",), "steps": ()}
 PLOTS: dict[str, tuple[str, ...]] = {
     "position": ("position",),
@@ -64,6 +65,7 @@ PLOTS: dict[str, tuple[str, ...]] = {
 
 
 def is_published(value: Any) -> bool:
+    """Return whether a value is a number, [number, "unit"] or a text."""
     pair = isinstance(value, list) and len(value) == 2 and is_number(value[0]) and is_text(value[1])
     return pair or is_number(value) or is_text(value)
 
@@ -79,7 +81,7 @@ PUBLISHED_VALUE = Constraint(is_published, "a number, [number, 'unit'] or a text
 
 @dataclass(frozen=True)
 class DecayOptions:
-    """The table [decay]: what its peaks are to give, the peaks to skip and the cycles to use, None for all."""
+    """Table [decay]: the quantity to compute, the number of peaks to skip, and the cycles to use (None for all)."""
 
     gives: Annotated[str | None, DECAY_RESULT] = None
     first: Annotated[int, NATURAL_NUMBER] = 0
@@ -88,7 +90,7 @@ class DecayOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class SceneKeys:
-    """The keys of the file; None means what the FMU itself says."""
+    """Keys of a scene file; None stands for the default of the FMU."""
 
     title: Annotated[str, TITLE]
     outputs: Annotated[tuple[str, ...], NAMES]
@@ -118,8 +120,7 @@ class SceneKeys:
 
 @dataclass(frozen=True, kw_only=True)
 class Scene(SceneKeys):
-    """One scene, under the name of its file, with the file of its FMU; `source`: where it was read, or its own name
-    if it comes with the harness."""
+    """Scene with its name, its FMU, and its source: the path of the scene file, or its name if it is built in."""
 
     name: str
     source: str
@@ -128,17 +129,23 @@ class Scene(SceneKeys):
 
     @property
     def follows_solver_steps(self) -> bool:
-        """Whether the ends of the solver's own steps are visited."""
+        """Return whether the run steps to the ends of internal steps."""
         return self.grid is None if self.follow is None else self.follow
 
 
 def shipped_scenes() -> list[Path]:
-    """The files of the scenes that come with the harness, by name."""
+    """Return the files of the built-in scenes, sorted by name."""
     return sorted(SHIPPED.glob("*.toml"), key=lambda file: file.stem)
 
 
 def load_scene(scene: str | Path) -> Scene:
-    """The scene of a shipped name or of a file; SceneError says what is wrong with it."""
+    """Load a scene by built-in name or by file.
+
+    Raises
+    ------
+    SceneError
+        If the scene is invalid.
+    """
     path = Path(scene)
     if path.suffix != ".toml":
         path = SHIPPED / f"{scene}.toml"
@@ -153,19 +160,20 @@ def load_scene(scene: str | Path) -> Scene:
         raise SceneError(f"scene {path.stem}: {error}") from None
 
 
-def scene_from_provenance(told: dict[str, Any]) -> Scene:
-    """The scene that a result says was run; SceneError if it does not."""
+def scene_from_provenance(stored: dict[str, Any]) -> Scene:
+    """Return the scene of a stored result; raise SceneError if the result has none."""
     try:
-        table = {each.name: told[each.name] for each in fields(SceneKeys) if told[each.name] not in (None, "")}
-        table["decay"] = {name: value for name, value in told["decay"].items() if value is not None}
-        path, source, file = Path(told["name"]), str(told["source"]), Path(told["file"])
+        stored = {"timeout": stored.get("patience")} | stored  # results of earlier versions
+        table = {each.name: stored[each.name] for each in fields(SceneKeys) if stored[each.name] not in (None, "")}
+        table["decay"] = {name: value for name, value in stored["decay"].items() if value is not None}
+        path, source, file = Path(stored["name"]), str(stored["source"]), Path(stored["file"])
     except (AttributeError, KeyError, TypeError):
-        raise SceneError("its provenance.json holds no scene: run the command that stands there") from None
+        raise SceneError("its provenance.json contains no scene: run the command in it instead") from None
     return replace(build_scene(path, table, source), file=file, name=path.name)
 
 
 def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
-    """A scene from the table that its file holds."""
+    """Build a scene from the table in its file."""
     keys = parse_table(table, SceneKeys)
     plots = default_plots(keys.outputs) if keys.plots is None else keys.plots
     check_names("name in analyses", keys.analyses, ANALYSES)
@@ -176,7 +184,7 @@ def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
 
 
 def default_plots(outputs: tuple[str, ...]) -> tuple[str, ...]:
-    """The plots of a scene that names none."""
+    """Return the plots of a scene that names none."""
     motion = find_roles(outputs)
     names = {output: role for role, output in motion.items()}
     phase = ("phase",) if all(role in motion for role in PLOTS["phase"]) else ()
@@ -184,30 +192,32 @@ def default_plots(outputs: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def check_requirements(scene: Scene) -> None:
-    """What the scene asks for goes together."""
+    """Check that the keys of a scene are consistent."""
     motion = find_roles(scene.outputs)
     if not scene.outputs:
-        raise SceneError("outputs is empty; name at least one, as in outputs = ['x', 'v']")
-    for kind, names, needs in ("analysis", scene.analyses, ANALYSES), ("plot", scene.plots, PLOTS):
+        raise SceneError("outputs is empty; give at least one, as in outputs = ['x', 'v']")
+    for category, names, required_roles in ("analysis", scene.analyses, ANALYSES), ("plot", scene.plots, PLOTS):
         for name in names:
-            for role in needs.get(name, ()):
+            for role in required_roles.get(name, ()):
                 if role not in motion:
-                    wanted = " or ".join(ROLES[role])
-                    raise SceneError(f"the {kind} '{name}' needs the {role}: add {wanted} to the outputs")
+                    candidates = " or ".join(ROLES[role])
+                    raise SceneError(f"the {category} '{name}' needs the {role}: add {candidates} to the outputs")
             if name == "steps" and not scene.follows_solver_steps:
-                raise SceneError(f"the {kind} 'steps' needs follow = true, or no grid")
+                raise SceneError(f"the {category} 'steps' needs follow = true, or no grid")
     if not scene.follows_solver_steps and scene.grid is None:
-        raise SceneError("follow = false needs a grid: name the communication step, as in grid = 0.01")
+        raise SceneError("follow = false needs a grid: set the communication step, as in grid = 0.01")
     if ("decay" in scene.analyses) != (scene.decay.gives is not None):
-        raise SceneError("the analysis 'decay' and the table [decay] with gives = 'zeta', 'f' or 'T_f' come together")
+        raise SceneError(
+            "the analysis 'decay' needs the table [decay] with gives = 'zeta', 'f' or 'T_f', and vice versa"
+        )
     if scene.published and not is_text(scene.published.get("source")):
         raise SceneError("[published] needs a source, as in source = 'MATLAB ode23'")
 
 
 def locate_fmu(path: Path, keys: SceneKeys) -> Path:
-    """Where the FMU is, or will be once it is built."""
+    """Return the path of the FMU, built or not."""
     if keys.model is not None and keys.fmu is None:
         return find_fmu(keys.model)
     if keys.fmu is not None and keys.model is None:
         return path.parent / keys.fmu
-    raise SceneError("name one of model (as in model = 'smd') and fmu (the path of a file)")
+    raise SceneError("set either model (as in model = 'smd') or fmu (the path of a file)")

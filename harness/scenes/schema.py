@@ -1,8 +1,7 @@
-"""The one check of what people write: a table of TOML becomes a dataclass, or one sentence says where it is wrong.
+"""Validation of TOML files: converts a table to a dataclass, or reports the first error in one sentence.
 
-The dataclass is the schema: keys, tables in tables, and beside each type, as in `Annotated[float, POSITIVE]`, what a
-value must be and the words for that.  cattrs walks the table.  (It finds the place of what is wrong, tables by name
-included; msgspec leaves such names out, and pydantic is some forty times its size.)
+The dataclass is the schema. Types carry constraints, as in `Annotated[float, POSITIVE]`. cattrs converts the table: its
+errors include the keys of nested tables, which those of msgspec do not, and pydantic is about forty times larger.
 """
 
 import tomllib
@@ -25,49 +24,54 @@ from cattrs.gen import make_dict_structure_fn, make_mapping_structure_fn, overri
 
 from ..errors import SceneError, format_value, unknown_name_message
 
-LIST_HINT = "`python -m harness list` shows the scenes that there are"
+LIST_HINT = "`python -m harness list` lists the available scenes"
 MAX_TITLE_LENGTH = 200  # letters
-MAX_FILE_BYTES = 1_000_000  # bytes of a file that somebody wrote
+MAX_FILE_BYTES = 1_000_000  # bytes
 Schema = TypeVar("Schema")
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """What a value must be, and the words for it."""
+    """Condition for a value, and its description."""
 
     accepts: Callable[[Any], bool]
     description: str
 
 
 def is_text(value: object) -> bool:
+    """Return whether a value is a non-empty string."""
     return isinstance(value, str) and bool(value)
 
 
 def is_title(value: object) -> bool:
+    """Return whether a value is a single line of limited length."""
     text = str(value)
     return is_text(value) and len(text) <= MAX_TITLE_LENGTH and text.splitlines() == [text] and "\0" not in text
 
 
 def is_number(value: object) -> bool:
+    """Return whether a value is a finite number."""
     try:
         return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
-    except OverflowError:  # an integer beyond all floats
+    except OverflowError:  # an integer beyond the range of floats
         return False
 
 
-def is_whole(value: object, least: float, most: float) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
+def is_whole(value: object, minimum: float, maximum: float) -> bool:
+    """Return whether a value is an integer within limits."""
+    return isinstance(value, int) and not isinstance(value, bool) and minimum <= value <= maximum
 
 
 def is_names(value: object) -> bool:
+    """Return whether a value is a list of distinct non-empty strings."""
     return isinstance(value, list) and all(map(is_text, value)) and len(set(value)) == len(value)
 
 
-TITLE = Constraint(is_title, f"a text of one line and at most {MAX_TITLE_LENGTH} letters")
+TITLE = Constraint(is_title, f"a text of one line and at most {MAX_TITLE_LENGTH} characters")
 TEXT = Constraint(is_text, "a text")
 NUMBER = Constraint(is_number, "a finite number")
 POSITIVE = Constraint(lambda value: is_number(value) and value > 0, "a finite number above 0")
-NAMES = Constraint(is_names, "a list of different names")
+NAMES = Constraint(is_names, "a list of distinct names")
 FLAG = Constraint(lambda value: isinstance(value, bool), "true or false")
 TABLE = Constraint(lambda value: isinstance(value, dict), "a table")
 LIST = Constraint(lambda value: isinstance(value, list), "a list")
@@ -77,50 +81,52 @@ CONVERTER = Converter(forbid_extra_keys=True)
 
 
 def find_constraint(annotation: Any) -> Constraint | None:
-    """The kind that stands beside a type."""
-    return next((each for each in getattr(annotation, "__metadata__", ()) if isinstance(each, Constraint)), None)
+    """Return the constraint of an annotated type, or None."""
+    return next((item for item in getattr(annotation, "__metadata__", ()) if isinstance(item, Constraint)), None)
 
 
-def make_checked_hook(kind: Constraint, then: Hook) -> Hook:
-    """What refuses a value that is not of its kind, and goes on with one that is."""
+def make_checked_hook(constraint: Constraint, convert: Hook) -> Hook:
+    """Return a hook that checks a constraint before it converts."""
 
     def hook(value: Any, annotation: Any) -> Any:
-        if not kind.accepts(value):
-            raise ValueError(f"{format_value(value)} is not {kind.description}")
-        return then(value, annotation)
+        if not constraint.accepts(value):
+            raise ValueError(f"{format_value(value)} is not {constraint.description}")
+        return convert(value, annotation)
 
     return hook
 
 
 def make_value_hook(annotation: Any) -> Hook:
-    """A value stays as it is; a list, which could be changed, becomes a tuple."""
-    kind = find_constraint(annotation)
-    assert kind is not None
-    return make_checked_hook(kind, lambda value, _: tuple(value) if isinstance(value, list) else value)
+    """Return a hook that keeps a value; a list becomes a tuple."""
+    constraint = find_constraint(annotation)
+    assert constraint is not None
+    return make_checked_hook(constraint, lambda value, _: tuple(value) if isinstance(value, list) else value)
 
 
 def make_table_hook(annotation: Any) -> Hook:
-    """A table whose keys are the fields of a dataclass; `from_` stands for the key `from`."""
+    """Return a hook for a table whose keys are the fields of a dataclass; the field `from_` holds the key `from`."""
     renamed: Any = {name: override(rename=name.rstrip("_")) for name in field_names(annotation) if name.endswith("_")}
     return make_checked_hook(TABLE, make_dict_structure_fn(annotation, CONVERTER, **renamed))
 
 
 def field_names(schema: Any) -> list[str]:
+    """Return the names of the fields of a dataclass."""
     return [each.name for each in fields(schema)]
 
 
 def make_mapping_hook(annotation: Any) -> Hook:
-    """A table whose keys are free, and whose values are alike."""
+    """Return a hook for a table with arbitrary keys and values of one type."""
     return make_checked_hook(TABLE, make_mapping_structure_fn(annotation, CONVERTER))
 
 
 def make_list_hook(annotation: Any) -> Hook:
-    """A list whose items are alike."""
-    alike: Any = GenericAlias(list, get_args(annotation)[:1])
-    return make_checked_hook(LIST, lambda value, _: tuple(CONVERTER.structure(value, alike)))
+    """Return a hook for a list with items of one type."""
+    list_type: Any = GenericAlias(list, get_args(annotation)[:1])
+    return make_checked_hook(LIST, lambda value, _: tuple(CONVERTER.structure(value, list_type)))
 
 
 def has_origin(container: Any) -> Callable[[Any], bool]:
+    """Return a predicate for generic types of a container."""
     return lambda annotation: get_origin(annotation) is container
 
 
@@ -133,55 +139,55 @@ for concerns, hooks in (
     CONVERTER.register_structure_hook_factory(concerns, hooks)  # type: ignore[arg-type]
 
 
-def parse_table(written: dict[str, Any], schema: type[Schema]) -> Schema:
-    """A table as its schema says; SceneError in one sentence if it does not fit."""
+def parse_table(table: dict[str, Any], schema: type[Schema]) -> Schema:
+    """Convert a table to its schema; raise SceneError with the most helpful error if it does not fit."""
     try:
-        return CONVERTER.structure(written, schema)
+        return CONVERTER.structure(table, schema)
     except BaseValidationError as error:
         raise SceneError(min(find_faults(error))[1]) from None
 
 
-def find_faults(error: Exception, where: str = "") -> Iterator[tuple[int, str]]:
-    """What is wrong at a place and below it, a sentence each; a key that nobody knows explains most: rank 0."""
+def find_faults(error: Exception, path: str = "") -> Iterator[tuple[int, str]]:
+    """Yield (rank, message) for each error in a table; an unknown key explains most and has rank 0."""
     if isinstance(error, ClassValidationError | IterableValidationError):
-        placed, others = error.group_exceptions()
-        for each, note in placed:
+        with_notes, without_notes = error.group_exceptions()
+        for nested, note in with_notes:
             key = note.index if isinstance(note, IterableValidationNote) else note.name.rstrip("_")
-            yield from find_faults(each, join_key_path(where, key))
-        for each in others:
-            yield from find_faults(each, where)
+            yield from find_faults(nested, join_key_path(path, key))
+        for nested in without_notes:
+            yield from find_faults(nested, path)
     elif isinstance(error, ForbiddenExtraKeysError):
         allowed = [name.rstrip("_") for name in field_names(error.cl)]
-        yield 0, unknown_name_message(f"key in [{where}]" if where else "key", min(error.extra_fields), allowed)
+        yield 0, unknown_name_message(f"key in [{path}]" if path else "key", min(error.extra_fields), allowed)
     elif isinstance(error, KeyError):
-        yield 2, f"the key '{where}' is missing"
+        yield 2, f"the key '{path}' is missing"
     else:
-        yield 1, f"{where} = {error}"
+        yield 1, f"{path} = {error}"
 
 
-def join_key_path(where: str, key: str | int) -> str:
-    """The place of a key, or of an item counted from 0."""
+def join_key_path(path: str, key: str | int) -> str:
+    """Return the path of a key, or of a list item counted from 0."""
     if isinstance(key, int):
-        return f"{where}[{key}]"
+        return f"{path}[{key}]"
     name = key if key.isidentifier() else format_value(key)
-    return f"{where}.{name}" if where else name
+    return f"{path}.{name}" if path else name
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The table in a TOML file; SceneError in one sentence if there is none."""
+    """Return the table in a TOML file; raise SceneError if it cannot be read."""
     try:
         if path.exists() and not path.is_file():
             raise SceneError(f"cannot read the scene {path}: not a file; {LIST_HINT}")
         if path.stat().st_size > MAX_FILE_BYTES:
-            raise SceneError(f"scene {path.stem}: more than {MAX_FILE_BYTES} bytes are no scene; {LIST_HINT}")
+            raise SceneError(f"scene {path.stem}: the file is larger than {MAX_FILE_BYTES} bytes; {LIST_HINT}")
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise SceneError(f"cannot read the scene {path}: {error.strerror}; {LIST_HINT}") from None
     except UnicodeDecodeError:
-        raise SceneError(f"scene {path.stem}: not a text file in UTF-8: save it as one") from None
+        raise SceneError(f"scene {path.stem}: not a text file in UTF-8: save it in UTF-8") from None
     except RecursionError:
-        raise SceneError(f"scene {path.stem}: not valid TOML: brackets too deep in each other") from None
+        raise SceneError(f"scene {path.stem}: not valid TOML: brackets are nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise SceneError(f"scene {path.stem}: not valid TOML: {error}") from None
     except ValueError:
-        raise SceneError(f"scene {path.stem}: an integer of thousands of digits: write it as in 1e300") from None
+        raise SceneError(f"scene {path.stem}: an integer has thousands of digits: write it as in 1e300") from None

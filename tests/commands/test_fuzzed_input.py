@@ -325,7 +325,7 @@ def test_a_record_is_read_from_a_named_pipe(tmp_path):
     os.mkfifo(tmp_path / "63")
     writer = threading.Thread(target=(tmp_path / "63").write_text, args=("t [s],x [m]\n0.5,1\n1.5,2\n",))
     writer.start()
-    assert ended("decay", tmp_path / "63") == (2, "63 has 2 samples in this stretch; 12 or more are needed")
+    assert ended("decay", tmp_path / "63") == (2, "63 has 2 samples in this interval; at least 12 are required")
     writer.join()
 
 

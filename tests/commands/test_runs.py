@@ -212,7 +212,7 @@ def test_the_grid_does_not_change_the_solver_steps(scene):
         (BASE + "[values]\nm = nan", 2, "m = nan is outside its range"),
         (BASE + "[values]\nx = 1", 2, "unknown name in [values] 'x'"),
         (BASE + 'law = "sgn"', 2, "unknown value of friction 'sgn'; allowed: hybrid, threshold"),
-        (BASE.replace("stickslip", "smd") + 'law = "sign"', 2, "law = 'sign': smd has nothing to choose there"),
+        (BASE.replace("stickslip", "smd") + 'law = "sign"', 2, "law = 'sign': smd has no such choice"),
         (BASE + "stop = -1", 2, "stop = -1 s is not after start = 0.0 s"),
         (BASE + "[values]\nmu_d = 0.95", 1, "mu_d is 0.95, above mu_s = 0.9"),
         (BASE + 'law = "threshold"\nmethod = "exact"', 1, "closed form"),

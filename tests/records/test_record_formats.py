@@ -134,7 +134,7 @@ ASKED = {
 PENDULUMS = ("stamps.csv", "gyroscope.csv", "encoder.csv")
 QUANTITIES = {"phone.csv": "acceleration", "accelerometer-in-g.csv": "acceleration", "gyroscope.csv": "velocity"}
 SAID = {
-    "logger.csv": "rounded to 0.01 s; they are spread evenly, one each 0.0125004 s, which is sure to about 8e-05",
+    "logger.csv": "0.0125004 s apart. This step, and any frequency, has a relative uncertainty of about 8e-05",
     "holes.csv": "3 of 600 rows have a missing cell",
     "cut-off.csv": "1 of 601 rows have a missing cell",
     "phone.csv": "Linear Acceleration z (m/s^2)",
@@ -302,14 +302,14 @@ ROWS = "\n".join(f"{i},{i}" for i in range(20))
     [
         (f"t,x\n{ROWS}", ColumnOptions(), "x has no unit"),
         (f"t,a\n{ROWS}", ColumnOptions(), "as in --unit m/s2 or g"),
-        (f"millivolts,x [m]\n{ROWS}", ColumnOptions(), "millivolts has whole or huge numbers and no unit"),
+        (f"millivolts,x [m]\n{ROWS}", ColumnOptions(), "millivolts has integer or very large numbers and no unit"),
         (f"t,x [m]\n{ROWS.replace(',', '763770000123.5,')}", ColumnOptions(), "as in --time-unit ms, s, or 0.01s"),
         (f"t [s],x [m]\n{ROWS}", ColumnOptions(position="y"), "unknown column 'y'"),
         (f"t [h/m],x [m]\n{ROWS}", ColumnOptions(), "unknown unit of t 'h/m'"),
         (f"t [s],x [m]\n{ROWS}\n20,abc", ColumnOptions(), "'abc' in row 22, column x [m], is not a number"),
         (f"t [s],x [m]\n{ROWS}\n20,1,2", ColumnOptions(), "row 22 has 3 cells where the heading has 2"),
         (f"t [s],x [m]\n{ROWS}\n5,5", ColumnOptions(), "time does not rise after t = 19.0 s"),
-        (f"t [s],x [m]\n{ROWS}\n20,1e200", ColumnOptions(), "which nothing measures"),
+        (f"t [s],x [m]\n{ROWS}\n20,1e200", ColumnOptions(), "which is not plausible"),
         (f"t [s],x [m]\n{ROWS}", ColumnOptions(begin=15), "has 5 samples"),
         (
             f"t [s],x [m]\n{ROWS.replace(',1', ',').replace(',3', ',')}\n20,\n21,\n22,\n23,",
@@ -319,13 +319,13 @@ ROWS = "\n".join(f"{i},{i}" for i in range(20))
         (ROWS, ColumnOptions(), "--columns 't [s],x [mm]'"),
         (ROWS, ColumnOptions(names="t"), "--columns names 1 columns, and record.csv has 2"),
         ("", ColumnOptions(), "is empty"),
-        ("Dear Sir,\nno table.\n", ColumnOptions(), "has no table"),
+        ("Dear Sir,\nno table.\n", ColumnOptions(), "contains no table"),
         (f"t [s],count [counts]\n{ROWS}", ColumnOptions(), "--per-count"),
-        (f"t [s],count [counts]\n{ROWS}", ColumnOptions(per_count="half a turn"), "has a number and a unit"),
+        (f"t [s],count [counts]\n{ROWS}", ColumnOptions(per_count="half a turn"), "give a number and a unit"),
         (f"t [s],acceleration [mm]\n{ROWS}", ColumnOptions(), "the name of an acceleration and the unit of a position"),
-        (f"t [s],a [m/s^2]\n{ROWS}", ColumnOptions(quantity="position"), "is that of an acceleration"),
-        ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, ColumnOptions(names="t,x [m]"), "is no time stamp"),
-        ('t [s],"x [m]\n' + ROWS, ColumnOptions(), "has no table"),
+        (f"t [s],a [m/s^2]\n{ROWS}", ColumnOptions(quantity="position"), "measures an acceleration"),
+        ("2026-11-21T15:18:03,1\n2026-21-11T15:18:03,2\n" * 9, ColumnOptions(names="t,x [m]"), "is not a time stamp"),
+        ('t [s],"x [m]\n' + ROWS, ColumnOptions(), "contains no table"),
     ],
 )
 def test_a_file_without_a_record_is_refused_in_one_sentence(tmp_path, text, columns, sentence):
@@ -430,4 +430,4 @@ def test_an_unknown_unit_is_kept_and_reported(tmp_path):
     path.write_text("t [s],sensor [V]\n" + rows(T, X))
     record = read_record(str(path), ColumnOptions(), "record")
     assert (record.unit, record.order) == ("V", 0)
-    assert "taken for a position" in record.notes[0]
+    assert "assumed to be a position" in record.notes[0]

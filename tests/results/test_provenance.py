@@ -181,10 +181,10 @@ def test_a_result_whose_fmu_changed_or_vanished_is_not_reproduced(workspace, fmu
     shutil.copy(fmus / "coulomb.fmu", workspace / "mine.fmu")
     done = harness(workspace, "run", "results/mine")
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    assert "mine.fmu has changed since this was made from it" in done.stderr
+    assert "mine.fmu has changed since it was used for this result" in done.stderr
     assert "`python -m harness run mine.toml`" in done.stderr
     (workspace / "mine.fmu").unlink()
-    assert "mine.fmu, from which this was made, is not here" in harness(workspace, "run", "results/mine").stderr
+    assert "mine.fmu, an input of this result, does not exist" in harness(workspace, "run", "results/mine").stderr
     assert files(workspace / "results/mine") == before
 
 
@@ -221,7 +221,7 @@ def test_a_result_of_another_scene_is_replaced_only_with_overwrite(workspace, fm
     done = harness(workspace, *second)
     assert (done.returncode, done.stderr.count("\n"), done.stdout) == (1, 1, "")
     assert f"results/{folder} holds the result of `python -m harness {' '.join(first)}`" in done.stderr
-    assert "name another --out, or replace it with --overwrite" in done.stderr
+    assert "choose another --out, or replace it with --overwrite" in done.stderr
     assert files(workspace / "results" / folder) == before
     source = told(workspace / "results" / folder)["source"]
     assert harness(workspace, *second, "--overwrite").returncode == 0
@@ -235,7 +235,7 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
     assert "place" not in harness(workspace, "run", "mine.toml").stdout
     (workspace / "mine.toml").write_text(MINE.replace("3.0", "4.0").replace("1.0", "2.0"))
     said = harness(workspace, "run", "mine.toml", COLUMNS="200").stdout
-    assert re.search(r"It takes the place of the result of [-\dT:+]+, which had c = 3.0 N.s/m, .*stop = 1.0", said)
+    assert re.search(r"It replaces the result of [-\dT:+]+, which had c = 3.0 N.s/m, .*stop = 1.0", said)
 
 
 @pytest.mark.parametrize(
@@ -252,7 +252,7 @@ def test_a_result_with_other_options_is_not_replaced_silently(workspace, argumen
     assert harness(workspace, *arguments, *older).returncode == 0
     done = harness(workspace, *arguments, *newer, COLUMNS="200")
     assert (done.returncode, done.stderr) == (0, "")
-    assert re.search(rf"It takes the place of the result of [-\dT:+]+, which had {had}\b", done.stdout)
+    assert re.search(rf"It replaces the result of [-\dT:+]+, which had {had}\b", done.stdout)
 
 
 def test_a_folder_without_provenance_is_not_run_again(workspace, swung):
@@ -265,6 +265,6 @@ def test_a_folder_without_provenance_is_not_run_again(workspace, swung):
             account.write_text(content)
         done = harness(workspace, "run", "results/smd")
         assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-        assert "results/smd holds no result that tells what made it" in done.stderr
+        assert "results/smd contains no result with a complete provenance.json" in done.stderr
         if not content:
             assert harness(workspace, "run", "smd").returncode == 0

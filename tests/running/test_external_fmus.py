@@ -98,7 +98,7 @@ def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
 def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such(run):
     done, rows = run("FixedStep", blank=True)
     fine(done)
-    assert "its own step is fixed, at 0.1 s, its error unknown" in done.stdout
+    assert "fixed internal step of 0.1 s, error unknown" in done.stdout
     assert rows["x"][-1] == pytest.approx(0.9**100)  # 41 % off
     assert abs(0.9**100 / exp(-10) - 1) > 0.4
 
@@ -178,19 +178,19 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
             "Falling",
             ["--set", "height=1.22625"],
             0.5,
-            "fmi2Terminated is true at t = 0.5 s: the stone is on the ground",
+            "fmi2Terminated at t = 0.5 s: the stone is on the ground",
         ),
         (
             "Fmi3Midpoint",
             ["--set", "limit=0.5", "--tolerance", "1e-3"],
             0.5,
-            "fmi3DoStep answered terminateSimulation at t = 0.5",
+            "fmi3DoStep returned terminateSimulation at t = 0.5",
         ),
     ],
 )
 def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run, name, arguments, end, told):
     done, rows = run(name, *arguments, blank=True)
-    refused(done, 1, f"{name}.fmu: it ends itself: ", told, f"until then is in results/{name}")
+    refused(done, 1, f"{name}.fmu: it terminated the simulation: ", told, f"until then is in results/{name}")
     assert rows["t [s]"][-1] == pytest.approx(end, abs=1e-3)
     assert len(rows["t [s]"]) > 60
 
@@ -198,11 +198,11 @@ def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run,
 @pytest.mark.parametrize(
     ("kind", "told"),
     [
-        (1, "a call of it has not come back within 1.5 s (--timeout waits longer), after t = 0.5 s"),
-        (2, "its binary has crashed (Segmentation fault), after t = 0.5 s"),
-        (3, "fmi2DoStep answered Fatal at t = 0.5 s: "),
+        (1, "a call did not return within 1.5 s (--timeout sets the limit), after t = 0.5 s"),
+        (2, "its binary crashed (Segmentation fault), after t = 0.5 s"),
+        (3, "fmi2DoStep returned Fatal at t = 0.5 s: "),
         (5, "x is nan at t = 0.515625 s"),
-        (6, "it ends itself: fmi2DoStep answered Discard, and fmi2Terminated is true at t = 0.5 s"),
+        (6, "it terminated the simulation: fmi2DoStep returned Discard with fmi2Terminated at t = 0.5 s"),
     ],
 )
 def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run, kind, told):
@@ -231,7 +231,7 @@ def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
 def test_the_output_of_an_fmu_is_reported_and_harmless(run):
     done, rows = run("Faulty", "--set", "kind=4", "--json")
     fine(done)
-    assert "it prints: I am at 1.0" in json.loads(done.stdout)["note"]
+    assert "it printed: I am at 1.0" in json.loads(done.stdout)["note"]
     assert rows["x"][-1] == 1.0
 
 
@@ -240,7 +240,7 @@ def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
     refused(
         done,
         1,
-        "NonConforming.fmu breaks the FMI standard in 2 places:",
+        "NonConforming.fmu violates the FMI standard in 2 places:",
         '"count" (line 16)',
         '"up" (line 19)',
         "--lenient",
@@ -260,7 +260,7 @@ def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
         ("Midpoint", ["--set", "k=1e999"], 2, "k = inf is outside its range"),
         ("Midpoint", ["--stop", "-1"], 2, "stop = -1.0 s is not after start"),
         ("Midpoint", ["--exchange"], 1, "offers co-simulation; model exchange is not among them"),
-        ("Switching", ["--set", "enabled=5"], 2, "enabled = 5.0 is no truth; allowed: true, false"),
+        ("Switching", ["--set", "enabled=5"], 2, "enabled = 5.0 is not a Boolean; use true or false"),
         ("Switching", ["--set", "most=1.5"], 2, "most = 1.5 is outside its range; allowed: any whole number"),
         ("Switching", ["--set", "most=3000000000"], 2, "any whole number, at least -2147483648 and at most 2147483647"),
         ("Arrays", ["--set", "begin=1,2,3"], 2, "begin = '1,2,3' has 3 elements, not 2"),
@@ -290,22 +290,26 @@ def described(change):
         (
             "Midpoint",
             described(lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"')),
-            "is an FMU of FMI 1.0",
+            "has FMI version 1.0",
         ),
         ("Midpoint", described(lambda text: text.replace('"v"', '"x"')), 'The variable name "x" (line'),
         ("Midpoint", described(lambda text: text.replace(' start="40"', "")), 'Variable "k" (line'),
         ("Midpoint", described(lambda text: text.replace("<ModelVariables", "<Nonsense")), "cannot be read: "),
-        ("Midpoint", described(lambda text: text.replace('stopTime="1.0"', "")), "names no stop time; name one"),
+        ("Midpoint", described(lambda text: text.replace('stopTime="1.0"', "")), "has no default stop time; set one"),
         *[
             (
                 "Midpoint",
                 described(lambda text, times=times: text.replace('startTime="0.0" stopTime="1.0"', times)),
-                "are no times to step to",
+                "there are too few floating-point times",
             )
             for times in ('startTime="0.0" stopTime="INF"', 'startTime="1e17" stopTime="100000000000000016"')
         ],
-        ("Midpoint", described(lambda text: text.replace('index="1"', 'index="77"')), "lacks what it names"),
-        ("Midpoint", described(lambda text: text.replace('fmiVersion="2.0"', "")), "lacks what it names, or a version"),
+        ("Midpoint", described(lambda text: text.replace('index="1"', 'index="77"')), "lacks a required element"),
+        (
+            "Midpoint",
+            described(lambda text: text.replace('fmiVersion="2.0"', "")),
+            "lacks a required element or the FMI version",
+        ),
         ("Midpoint", {"modelDescription.xml": None}, 'cannot be read: "There is no item'),
         (
             "Midpoint",
@@ -355,7 +359,7 @@ def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, external_fmu_folde
         archive.writestr("resources/huge", b"")
         archive.infolist()[-1].file_size = 2**60
     done, _ = run("huge.fmu")
-    refused(done, 1, "huge.fmu", "more than the temporary folder has room for")
+    refused(done, 1, "huge.fmu", "do not fit into the temporary directory")
 
 
 @pytest.mark.parametrize("values", [(1.0, 2.0), (1e308, -1e308)])

@@ -28,7 +28,7 @@ def stepped(answer):
 def test_an_unauthorised_early_return_is_refused():
     times, said = stepped(lambda t, h: (False, False, t > 0.3, t + h / 2))
     assert times == [0.0, 0.25, 0.5]
-    assert said == "fmi3DoStep returned early, which it was not allowed"
+    assert said == "fmi3DoStep returned early without permission"
 
 
 @pytest.mark.parametrize(
@@ -37,12 +37,12 @@ def test_an_unauthorised_early_return_is_refused():
 def test_a_termination_time_lies_within_the_step(told, last):
     times, said = stepped(lambda t, h: (False, t == 0.5, t == 0.5, told))
     assert (times[-1], times) == (last, sorted(times))
-    assert said == "it ends itself: fmi3DoStep answered terminateSimulation"
+    assert said == "it terminated the simulation: fmi3DoStep returned terminateSimulation"
 
 
 @pytest.mark.parametrize("told", [NAN, 1.9, -HUGE])
 def test_an_event_in_the_past_or_at_infinity_is_refused(told):
-    with pytest.raises(HarnessError, match=re.escape(f"tells its next event for {told:.9g} s, at t = 2 s")):
+    with pytest.raises(HarnessError, match=re.escape(f"sets its next event to {told:.9g} s, at t = 2 s")):
         update_discrete_states(lambda: (False, False, False, False, True, told), 2.0)
 
 

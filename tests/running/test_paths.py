@@ -71,7 +71,7 @@ def test_a_python_fmu_without_the_files_of_its_library_is_refused(fmus, tmp_path
 
 def test_an_unwritable_temporary_folder_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
-    with pytest.raises(HarnessError, match="cannot write into the temporary folder"), temporary_directory():
+    with pytest.raises(HarnessError, match="cannot write to the temporary directory"), temporary_directory():
         pass
 
 

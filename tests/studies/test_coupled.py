@@ -178,7 +178,7 @@ def test_an_invalid_archive_is_reported(couple, tmp_path):
                 '{ between = ["a", "b"], k = 40.0 }', '{ from = "a.F_spring", to = "b", factor = 2.0 }'
             ),
             2,
-            "a force is passed on with factor = 1, not 2.0",
+            "a connected force needs factor = 1, got 2.0",
         ),
         (PAIR + 'connections = [{ from = "a.x", to = "b", factor = 1.0 }]\n', 2, "part b is driven twice"),
         (PAIR + 'connections = [{ from = "a.mode", to = "b", factor = 1.0 }]\n', 2, "unknown output 'mode'"),

@@ -174,7 +174,7 @@ def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path, monkeypa
     folder = tmp_path / "precision"
     folder.mkdir()
     write_provenance(folder, [], name="smd.json")
-    with pytest.raises(HarnessError, match="keep it and name another --out, or replace it with --overwrite"):
+    with pytest.raises(HarnessError, match="choose another --out, or replace it with --overwrite"):
         run_survey(["smd"], QUICK, tmp_path, print)
 
 

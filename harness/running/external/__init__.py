@@ -1,1 +1,1 @@
-"""Runs somebody else's FMU, in a process of its own: what hangs, crashes or prints there is a sentence here."""
+"""Runs external FMUs in a child process, so that a hang, crash or output of the FMU is reported in one sentence."""

@@ -1,4 +1,4 @@
-"""The process that holds the FMU: reads a request on standard input, and leaves rows and an answer in the room."""
+"""Child process that runs an external FMU: reads a request from standard input, writes rows and a result to files."""
 
 import faulthandler
 import json
@@ -32,29 +32,35 @@ from .request import (
 from .sample_rows import RowRecorder, StringTable, read_rows
 from .step_refinement import refine
 
-REPORT_INTERVAL = 0.2  # s between two signs of life
-MAX_OUTPUT_BYTES = 1_000_000  # bytes of what the FMU prints that are kept
-REMAINING_SHARE = 0.8  # of the bar that shows the progress, after each pass
+REPORT_INTERVAL = 0.2  # s between progress reports
+MAX_OUTPUT_BYTES = 1_000_000  # of FMU output that are kept
+REMAINING_SHARE = 0.8  # of the progress bar after each run
 
 
 class Watchdog:
-    """Tells from time to time that this process is alive; while it does not, a watchdog runs."""
+    """Reports progress and ends the process if one FMI call takes longer than the timeout."""
 
-    def __init__(self, room: Path, timeout: float) -> None:
-        self.timeout_file, self.progress_file = (room / TIMEOUT_FILE).open("w"), (room / PROGRESS_FILE).open("w")
+    def __init__(self, directory: Path, timeout: float) -> None:
+        self.timeout_file, self.progress_file = (
+            (directory / TIMEOUT_FILE).open("w"),
+            (directory / PROGRESS_FILE).open("w"),
+        )
         self.timeout, self.next, self.progress, self.n_runs = timeout, 0.0, 0.0, 0
         self.parent = os.getppid()
 
-    def report_progress(self, share: float | None = None) -> None:
-        """So far is the pass, as a share of it; how many there will be nobody knows."""
+    def report_progress(self, progress: float | None = None) -> None:
+        """Report the progress of the present run, from 0 to 1, and reset the watchdog.
+
+        The number of runs is unknown: each run takes a fixed share of what remains of the progress bar.
+        """
         now = perf_counter()
         if now < self.next:
             return
         self.next = now + REPORT_INTERVAL
-        if os.getppid() != self.parent:  # it was killed, and nobody waits
+        if os.getppid() != self.parent:  # the parent was killed
             os._exit(1)
         faulthandler.dump_traceback_later(self.timeout, exit=True, file=self.timeout_file)
-        self.progress = self.progress if share is None else share
+        self.progress = self.progress if progress is None else progress
         self.progress_file.seek(0)
         self.progress_file.write(f"{1 - REMAINING_SHARE ** (self.n_runs + self.progress):.6f}")
         self.progress_file.flush()
@@ -64,64 +70,61 @@ class Watchdog:
 
 
 class ExternalFmu:
-    """Runs the FMU pass by pass, each on an instance of its own."""
+    """Runs an external FMU, each time with a new instance."""
 
-    def __init__(self, asked: ExternalRunRequest, room: Path, life: Watchdog) -> None:
-        self.request, self.directory, self.life = asked, room, life
-        self.description = fmpy.read_model_description(asked.folder, validate=False)
+    def __init__(self, request: ExternalRunRequest, directory: Path, watchdog: Watchdog) -> None:
+        self.request, self.directory, self.watchdog = request, directory, watchdog
+        self.description = fmpy.read_model_description(request.folder, validate=False)
         variables = {variable.name: variable for variable in self.description.modelVariables}
-        self.variables = [(variables[name], tuple(shape)) for name, shape in asked.outputs.items()]
-        self.strings = StringTable(room / STRINGS_FILE)
+        self.variables = [(variables[name], tuple(shape)) for name, shape in request.outputs.items()]
+        self.strings = StringTable(directory / STRINGS_FILE)
 
     def run(self, h: float, tolerance: float) -> RefinementRun:
-        """One pass with a communication step in s and a tolerance."""
-        number = self.life.n_runs
+        """Run the FMU with a communication step in s and a tolerance."""
+        number = self.watchdog.n_runs
         path = self.directory / f"{ROWS_PREFIX}{number}"
         del MESSAGES[:]
-        self.life.next = 0.0
-        self.life.report_progress(0.0)
-        why: Exception | None = None
+        self.watchdog.next = 0.0
+        self.watchdog.report_progress(0.0)
+        cause: Exception | None = None
         try:
             self.step(path, h, tolerance)
         except FMICallException as error:
             status = dict(enumerate(STATUS_NAMES)).get(error.status, error.status)
-            why = HarnessError(f"{error.function} answered {status}")
+            cause = HarnessError(f"{error.function} returned {status}")
         except Exception as error:  # fmpy raises bare Exceptions
-            why = error
-        sentence = first_line(why) if why else ""
+            cause = error
+        message = first_line(cause) if cause else ""
         path.touch()
         rows = read_rows(path, self.variables)
-        for older in self.directory.glob(f"{ROWS_PREFIX}*") if not sentence else ():
+        for older in self.directory.glob(f"{ROWS_PREFIX}*") if not message else ():
             if older != path:
-                older.unlink()  # nobody needs it beside one that is whole
-        if sentence:
-            at = f" at t = {rows.time[-1]:.9g} s" if len(rows.time) and " at t = " not in sentence else ""
-            sentence = ": ".join(filter(None, (sentence + at, last_error_message())))
-        self.life.n_runs += 1
+                older.unlink()  # superseded by a complete run
+        if message:
+            where = f" at t = {rows.time[-1]:.9g} s" if len(rows.time) and " at t = " not in message else ""
+            message = ": ".join(filter(None, (message + where, last_error_message())))
+        self.watchdog.n_runs += 1
         return RefinementRun(
-            number, rows, sentence, isinstance(why, TerminatedError), isinstance(why, StepRefusedError)
+            number, rows, message, isinstance(cause, TerminatedError), isinstance(cause, StepRefusedError)
         )
 
     def step(self, path: Path, h: float, tolerance: float) -> None:
-        """The same; whatever ends it is raised."""
-        asked, found = self.request, self.description
-        fmu = instantiate(found, asked.folder, asked.exchange)
-        initialize(fmu, found, asked.values, asked.start, asked.stop, tolerance)
-        sample = RowRecorder(fmu, found.fmiVersion, self.variables, path, self.strings).record
-        signals = self.input_signals(fmu)
-        span, heed = TimeGrid(asked.start, asked.stop, h), self.life.report_progress
+        """Run a new instance and record its rows; exceptions propagate."""
+        request, description = self.request, self.description
+        fmu = instantiate(description, request.folder, request.exchange)
+        initialize(fmu, description, request.values, request.start, request.stop, tolerance)
+        record = RowRecorder(fmu, description.fmiVersion, self.variables, path, self.strings).record
+        times, report_progress = TimeGrid(request.start, request.stop, h), self.watchdog.report_progress
         try:
-            if asked.exchange:
-                integrate(fmu, found, span, tolerance, sample, heed, signals)
+            if request.exchange:
+                integrate(fmu, description, times, tolerance, record, report_progress)
             else:
-                cosimulate(fmu, found.fmiVersion, span, sample, heed, signals)
-        except (
-            TerminatedError,
-            StepRefusedError,
-        ):  # what has failed may crash in whatever is called next: the process's end frees it
+                cosimulate(fmu, description.fmiVersion, times, record, report_progress)
+        except (TerminatedError, StepRefusedError):
+            # after any other failure the next call may crash; the exit frees the instance
             fmu.freeInstance()
             raise
-        with suppress(FMICallException):  # all that was wanted is there
+        with suppress(FMICallException):  # all results are recorded
             fmu.terminate()
         fmu.freeInstance()
 
@@ -138,22 +141,22 @@ class ExternalFmu:
 
 
 def main() -> None:
-    """Answer one request."""
-    asked = ExternalRunRequest(**json.load(sys.stdin))
-    room = Path(asked.directory)
-    said = os.open(room / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-    for stream in (1, 2):  # whatever the FMU prints
-        os.dup2(said, stream)
-    life = Watchdog(room, asked.timeout)
-    life.report_progress(0.0)
+    """Handle one request."""
+    request = ExternalRunRequest(**json.load(sys.stdin))
+    directory = Path(request.directory)
+    output = os.open(directory / OUTPUT_FILE, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+    for stream in (1, 2):  # redirect output of the FMU
+        os.dup2(output, stream)
+    watchdog = Watchdog(directory, request.timeout)
+    watchdog.report_progress(0.0)
     try:
-        host = ExternalFmu(asked, room, life)
-        answer = refine(asked, host.description, host.run)
+        external_fmu = ExternalFmu(request, directory, watchdog)
+        result = refine(request, external_fmu.description, external_fmu.run)
     except Exception as error:
-        answer = RefinementResult(None, "", first_line(error))
-    written = room / f"{RESULT_FILE}.new"
-    written.write_text(json.dumps(asdict(answer)), encoding="utf-8")
-    written.rename(room / RESULT_FILE)
+        result = RefinementResult(None, "", first_line(error))
+    temporary_file = directory / f"{RESULT_FILE}.new"
+    temporary_file.write_text(json.dumps(asdict(result)), encoding="utf-8")
+    temporary_file.rename(directory / RESULT_FILE)
     os._exit(0)  # an FMU that has failed may crash when its library is unloaded
 
 

@@ -1,4 +1,4 @@
-"""One pass of model exchange, by fmpy's CVode: BDF, with Jacobians by differences."""
+"""Model exchange of an external FMU with fmpy's CVode: BDF with finite-difference Jacobians."""
 
 from collections.abc import Callable
 from math import inf
@@ -11,13 +11,13 @@ from ...errors import HarnessError
 from ..inputs import InputSignals
 from .refinement_run import TerminatedError, TimeGrid
 
-MAX_CVODE_STEPS = 100_000  # of CVode from one point to the next
+MAX_CVODE_STEPS = 100_000  # between two output points
 MAX_EVENTS = 1000  # at one time
-TIME_TOLERANCE = 1e-9  # share of a communication step: times this close are one
+TIME_TOLERANCE = 1e-9  # relative to the communication step
 
 
 class CheckedCVode(CVodeSolver):
-    """The same, which ends where a call of the FMU fails, and says so now and then."""
+    """CVode that reports progress and stops at a failed FMI call."""
 
     error: Exception | None = None
 
@@ -33,7 +33,7 @@ class CheckedCVode(CVodeSolver):
         return self.call_checked(super().g, *arguments)
 
     def call_checked(self, call: Callable[..., int], *arguments: Any) -> int:
-        """What ctypes would print and swallow is kept."""
+        """Call the FMU and keep its exception, which ctypes would print and swallow."""
         try:
             self.report_progress()
             return call(*arguments)
@@ -42,87 +42,85 @@ class CheckedCVode(CVodeSolver):
             return -1
 
     def step(self, t: float, target: float) -> tuple[bool, Any, float]:
-        """To the target or to the next event, times in s."""
+        """Integrate from t to the target or to the next event; times in s."""
         try:
             return super().step(t, target)
-        except (RuntimeError, TypeError) as error:  # the path of CVode's source stands before its sentence
+        except (RuntimeError, TypeError) as error:  # the path of CVode's source precedes its message
             raise self.error or HarnessError(f"fmpy's CVode: {str(error).rpartition(': ')[2]}") from None
 
 
 def integrate(
     fmu: Any,
-    found: Any,
+    description: Any,
     span: TimeGrid,
     rtol: float,
-    sample: Callable[[float], None],
-    heed: Callable[..., Any],
-    signals: InputSignals | None = None,
+    record: Callable[[float], None],
+    report_progress: Callable[..., Any],
 ) -> None:
-    """Integrate and sample at even points, and before and after each event; Ended if the FMU ends itself."""
+    """Integrate and record rows at equidistant points, and before and after each event.
+
+    Raises
+    ------
+    TerminatedError
+        If the FMU terminates the simulation.
+    """
     start, stop, h = span.start, span.stop, span.h
-    old = found.fmiVersion == "2.0"
-    if signals:
-        signals.apply(start, after_event=True)
-    update = fmu.newDiscreteStates if old else fmu.updateDiscreteStates
-    upcoming = update_discrete_states(update, start)
+    is_fmi2 = description.fmiVersion == "2.0"
+    update = fmu.newDiscreteStates if is_fmi2 else fmu.updateDiscreteStates
+    next_event = update_discrete_states(update, start)
     fmu.enterContinuousTimeMode()
     solver = CheckedCVode(
-        heed,
-        nx=found.numberOfContinuousStates,
-        nz=found.numberOfEventIndicators,
+        report_progress,
+        nx=description.numberOfContinuousStates,
+        nz=description.numberOfEventIndicators,
         get_x=fmu.getContinuousStates,
         set_x=fmu.setContinuousStates,
-        get_dx=fmu.getDerivatives if old else fmu.getContinuousStateDerivatives,
+        get_dx=fmu.getDerivatives if is_fmi2 else fmu.getContinuousStateDerivatives,
         get_z=fmu.getEventIndicators,
         get_nominals=fmu.getNominalsOfContinuousStates,
         set_time=fmu.setTime,
-        input=signals or Input(fmu, found, None),
+        input=Input(fmu, description, None),
         startTime=start,
         maxStep=(stop - start) / 50,
         relativeTolerance=rtol,
         maxNumSteps=MAX_CVODE_STEPS,
     )
-    t, point, count, still = start, 1, max(1, round((stop - start) / h)), 0
-    near = TIME_TOLERANCE * h
-    sample(t)
+    t, point, count, n_stalled = start, 1, max(1, round((stop - start) / h)), 0
+    tolerance = TIME_TOLERANCE * h
+    record(t)
     while t < stop:
         target = stop if point >= count else start + point * h
-        jump = signals.next_jump(t) if signals else inf
-        goal = min(target, upcoming, jump)
+        goal = min(target, next_event)
         event, _, reached = solver.step(t, goal)
-        before, t = t, goal if abs(reached - goal) <= near else reached
+        previous, t = t, goal if abs(reached - goal) <= tolerance else reached
         fmu.setTime(t)
-        if signals:
-            signals.apply(t)
-        heed(span.progress(t))
-        stepped = ended = False
-        if found.modelExchange.needsCompletedIntegratorStep:
-            stepped, ended = fmu.completedIntegratorStep()
-        sample(t)
-        if ended:
-            raise TerminatedError(t, "it answered terminateSimulation to a completed step")
-        if event or stepped or t >= min(upcoming, jump):
+        report_progress(span.progress(t))
+        stepped = terminated = False
+        if description.modelExchange.needsCompletedIntegratorStep:
+            stepped, terminated = fmu.completedIntegratorStep()
+        record(t)
+        if terminated:
+            raise TerminatedError(t, "it returned terminateSimulation from a completed step")
+        if event or stepped or t >= next_event:
             fmu.enterEventMode()
-            if signals:
-                signals.apply(t, after_event=True)
-            upcoming = update_discrete_states(update, t)
+            next_event = update_discrete_states(update, t)
             fmu.enterContinuousTimeMode()
             solver.reset(t)
-            sample(t)
-        still = 0 if t > before else still + 1
-        if still > MAX_EVENTS:
+            record(t)
+        n_stalled = 0 if t > previous else n_stalled + 1
+        if n_stalled > MAX_EVENTS:
             raise HarnessError(f"{MAX_EVENTS} events in a row at t = {t:.9g} s")
         point += t >= target
 
 
 def update_discrete_states(update: Callable[[], tuple[bool, bool, bool, bool, bool, float]], t: float) -> float:
-    """The time of the next event in s, inf if there is none, after all that happens at an event."""
+    """Iterate the discrete states at an event; return the time of the next event in s, inf if there is none."""
     for _ in range(MAX_EVENTS):
-        again, ended, _, _, defined, upcoming = update()
-        if ended:
-            raise TerminatedError(t, "it answered terminateSimulation to an event")
-        if defined and not upcoming >= t:
-            raise HarnessError(f"it tells its next event for {upcoming:.9g} s, at t = {t:.9g} s")
-        if not again and not (defined and upcoming == t):
-            return upcoming if defined else inf
+        needs_update, terminated, _, _, is_defined, next_event = update()
+        if terminated:
+            raise TerminatedError(t, "it returned terminateSimulation from an event")
+        if is_defined and not next_event >= t:
+            raise HarnessError(f"it sets its next event to {next_event:.9g} s, at t = {t:.9g} s")
+        if not needs_update and not (is_defined and next_event == t):
+            return next_event if is_defined else inf
     raise HarnessError(f"its discrete states do not settle at t = {t:.9g} s")

@@ -1,4 +1,4 @@
-"""One pass, from start to stop, and how it may end before."""
+"""Single runs of a step refinement, and early ends."""
 
 from dataclasses import dataclass
 
@@ -7,21 +7,22 @@ from .sample_rows import SampleRows
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """From `start` to `stop` in steps of `h`, all in s."""
+    """Times from `start` to `stop` in steps of `h`, in s."""
 
     start: float
     stop: float
     h: float
 
     def progress(self, t: float) -> float:
-        """How far a time is, as a share of it."""
+        """Return the progress at a time, from 0 to 1."""
         return (t - self.start) / (self.stop - self.start)
 
 
 @dataclass(frozen=True)
 class RefinementRun:
-    """The number of a pass, its rows, and the sentence why it is not whole, empty if it is: the FMU has `ended` itself,
-    has `refused` a step, or has failed."""
+    """Number and rows of a run. If it is incomplete, `message` contains the reason: the FMU terminated the simulation,
+    refused a step, or failed.
+    """
 
     number: int
     rows: SampleRows
@@ -31,12 +32,12 @@ class RefinementRun:
 
 
 class TerminatedError(Exception):
-    """The FMU has ended the simulation, at `t` in s if it tells."""
+    """The FMU terminated the simulation, at `t` in s if known."""
 
-    def __init__(self, t: float | None, how: str) -> None:
-        super().__init__(f"it ends itself: {how}")
+    def __init__(self, t: float | None, reason: str) -> None:
+        super().__init__(f"it terminated the simulation: {reason}")
         self.t = t
 
 
 class StepRefusedError(Exception):
-    """The FMU does not take a step of this size; it may take a shorter one."""
+    """The FMU rejected a step of this size; a shorter one may succeed."""

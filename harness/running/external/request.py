@@ -1,26 +1,46 @@
-"""What the process that holds an FMU is asked, and what it answers; both as JSON."""
+"""Request to the child process that runs an external FMU, and its result; both in JSON."""
 
 from dataclasses import dataclass, field
 from typing import Any
 
+# names of files in the directory
 RESULT_FILE, PROGRESS_FILE, OUTPUT_FILE, TIMEOUT_FILE, STRINGS_FILE = (
-    "answer.json",
-    "share",
-    "said",
-    "hung",
-    "texts",
-)  # files in the room
-ROWS_PREFIX = "rows-"  # and the number of a pass
+    "result.json",
+    "progress",
+    "output",
+    "timeout",
+    "strings",
+)
+ROWS_PREFIX = "rows-"  # followed by the number of a run
 COARSEST_STEPS = 64  # communication steps
 
 
 @dataclass(frozen=True)
 class ExternalRunRequest:
-    """Run the FMU that is unpacked in a `folder`, and write rows of its `outputs`, names with their shapes,
-    into a `room`.
+    """Request to run an unpacked FMU and write rows of its outputs.
 
-    The communication steps are those of the `grid` in s, or, None, ever shorter ones, so many in the `coarsest` pass,
-    until two results agree to the `tolerance`.  A call that takes more than `timeout` s hangs.
+    Attributes
+    ----------
+    folder : str
+        Directory of the unpacked FMU.
+    directory : str
+        Directory for results.
+    exchange : bool
+        Model exchange instead of co-simulation.
+    start, stop : float
+        Times in s.
+    tolerance : float
+        Tolerance for the agreement of two results.
+    timeout : float
+        Time limit of one FMI call in s.
+    grid : float or None
+        Communication step in s; None to refine it.
+    coarsest : int
+        Communication steps of the coarsest run.
+    values : dict
+        Values to set, by variable name.
+    outputs : dict
+        Shapes of the outputs, by variable name.
     """
 
     folder: str
@@ -39,7 +59,7 @@ class ExternalRunRequest:
 
 @dataclass(frozen=True)
 class RefinementResult:
-    """The number of the pass to take, None if there is none; how exact it is, and what it lacks, empty if nothing."""
+    """Selected run, None if there is none; a note on its accuracy; the reason for failure, empty if it is complete."""
 
     run_number: int | None
     note: str

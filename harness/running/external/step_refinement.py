@@ -1,8 +1,8 @@
-"""How exact somebody's FMU is, which does not tell its error: runs of ever shorter steps, until two results agree.
+"""Refines steps until two results agree, to estimate the error of an external FMU.
 
-By co-simulation the communication steps are halved, by model exchange the tolerance of the solver is taken ten times
-smaller.  Where halving changes nothing at all, the FMU has steps of its own, and its error cannot be seen from outside;
-unless a smaller tolerance, which it is told at the start, does change something.
+Co-simulation halves the communication step; model exchange divides the solver tolerance by ten. If halving changes
+nothing, the FMU has internal steps whose error is not visible from outside, unless a smaller tolerance passed at the
+start changes the result.
 """
 
 from collections.abc import Callable
@@ -16,163 +16,177 @@ from .request import ExternalRunRequest, RefinementResult
 from .sample_rows import SampleRows
 
 MAX_STEPS = 2**18  # communication steps
-STEPS_TO_SEE_INTERNAL_STEP = 2**12  # communication steps in which a step of the FMU's own shows
-MIN_OUTPUT_STEPS = 512  # communication steps at least, to draw and to measure by
-MAX_TOLERANCE_REDUCTIONS = 6  # of the tolerance of model exchange, at most
-TOLERANCE_FACTOR, MIN_TOLERANCE = (
-    0.1,
-    1e-13,
-)  # the tolerance that an FMU is told, as a share of ours; that of any solver
+STEPS_TO_SEE_INTERNAL_STEP = 2**12  # communication steps that make internal steps visible
+MIN_OUTPUT_STEPS = 512  # minimum number of output points
+MAX_TOLERANCE_REDUCTIONS = 6  # of model exchange
+TOLERANCE_FACTOR = 0.1  # tolerance passed to the FMU, relative to that of the run
+MIN_TOLERANCE = 1e-13  # of any solver
 
-RunFunction = Callable[[float, float], RefinementRun]  # with a communication step in s, and a tolerance
+RunFunction = Callable[[float, float], RefinementRun]  # (communication step in s, tolerance)
 
 
-def refine(asked: ExternalRunRequest, found: Any, run: RunFunction) -> RefinementResult:
-    """The pass to take, with what is known of its error."""
-    span = asked.stop - asked.start
-    if asked.exchange:
+def refine(request: ExternalRunRequest, description: Any, run: RunFunction) -> RefinementResult:
+    """Run the FMU with refined steps and select a run.
+
+    Parameters
+    ----------
+    request : ExternalRunRequest
+    description : ModelDescription
+    run : callable
+        Runs the FMU with a communication step in s and a tolerance; returns a RefinementRun.
+    """
+    duration = request.stop - request.start
+    if request.exchange:
         return refine_tolerance(
-            asked, asked.grid or span / (asked.coarsest * ceil(MIN_OUTPUT_STEPS / asked.coarsest)), run
+            request, request.grid or duration / (request.coarsest * ceil(MIN_OUTPUT_STEPS / request.coarsest)), run
         )
-    own = float(found.coSimulation.fixedInternalStepSize or 0.0)
-    if own > 0.0:
-        one = run(own * ceil(span / own / MAX_STEPS), solver_tolerance(asked))
-        return accept_run(one, f"its own step is fixed, at {own:g} s as it declares, its error unknown")
-    if asked.grid:
-        one = run(asked.grid, solver_tolerance(asked))
-        return accept_run(one, f"communication step {asked.grid:g} s, as asked, its error unknown")
-    answer = refine_steps(asked, run)
-    usual = found.defaultExperiment.stepSize if found.defaultExperiment else None
-    if answer.run_number is None and usual:  # it has not taken one step
-        one = run(float(usual), solver_tolerance(asked))
-        if not one.message:
-            declared = f"communication step {float(usual):g} s, as it declares, its error unknown"
-            return accept_run(one, f"{declared}: {answer.failure}")
+    fixed_step = float(description.coSimulation.fixedInternalStepSize or 0.0)
+    if fixed_step > 0.0:
+        result = run(fixed_step * ceil(duration / fixed_step / MAX_STEPS), solver_tolerance(request))
+        return accept_run(result, f"declared fixed internal step of {fixed_step:g} s, error unknown")
+    if request.grid:
+        result = run(request.grid, solver_tolerance(request))
+        return accept_run(result, f"requested communication step of {request.grid:g} s, error unknown")
+    answer = refine_steps(request, run)
+    default_step = description.defaultExperiment.stepSize if description.defaultExperiment else None
+    if answer.run_number is None and default_step:  # no run advanced by a step
+        result = run(float(default_step), solver_tolerance(request))
+        if not result.message:
+            note = f"declared communication step of {float(default_step):g} s, error unknown"
+            return accept_run(result, f"{note}: {answer.failure}")
     return answer
 
 
-def accept_run(one: RefinementRun, note: str) -> RefinementResult:
-    return RefinementResult(one.number, note, one.message)
+def accept_run(result: RefinementRun, note: str) -> RefinementResult:
+    """Select a run."""
+    return RefinementResult(result.number, note, result.message)
 
 
-def solver_tolerance(asked: ExternalRunRequest) -> float:
-    """The tolerance for an FMU with a solver of its own."""
-    return TOLERANCE_FACTOR * asked.tolerance
+def solver_tolerance(request: ExternalRunRequest) -> float:
+    """Return the tolerance to pass to an FMU with its own solver."""
+    return TOLERANCE_FACTOR * request.tolerance
 
 
-def refine_steps(asked: ExternalRunRequest, run: RunFunction) -> RefinementResult:
-    """Communication steps are halved until two results agree at the times of the coarsest."""
-    span, steps, off = asked.stop - asked.start, asked.coarsest, inf
-    before: RefinementRun | None = None
-    while steps <= max(MAX_STEPS, 2 * asked.coarsest):
-        now = run(span / steps, solver_tolerance(asked))
-        if now.message and not (now.terminated or now.step_refused):
-            return keep_longest_run(before, now)
-        if before and not (now.step_refused or before.step_refused):
-            off = max_difference(before.rows, now.rows, asked)
-            if off == 0.0:
-                return refine_solver_tolerance(asked, span / steps, now, run)
-            if off <= asked.tolerance and steps >= MIN_OUTPUT_STEPS:
-                h = span / steps
+def refine_steps(request: ExternalRunRequest, run: RunFunction) -> RefinementResult:
+    """Halve the communication step until two results agree at the times of the coarsest."""
+    duration, steps, difference = request.stop - request.start, request.coarsest, inf
+    previous: RefinementRun | None = None
+    while steps <= max(MAX_STEPS, 2 * request.coarsest):
+        current = run(duration / steps, solver_tolerance(request))
+        if current.message and not (current.terminated or current.step_refused):
+            return keep_longest_run(previous, current)
+        if previous and not (current.step_refused or previous.step_refused):
+            difference = max_difference(previous.rows, current.rows, request)
+            if difference == 0.0:
+                return refine_solver_tolerance(request, duration / steps, current, run)
+            if difference <= request.tolerance and steps >= MIN_OUTPUT_STEPS:
+                h = duration / steps
                 return accept_run(
-                    now, f"communication step {h:.4g} s; half of it changes no output by more than {off:.2g}"
+                    current, f"communication step {h:.4g} s; halving it changes no output by more than {difference:.2g}"
                 )
-        before, steps = now, 2 * steps
-    if now.step_refused:
-        return keep_longest_run(None, now)
-    return no_agreement(f"the last halving, to {steps // 2} communication steps,", now, off, asked)
+        previous, steps = current, 2 * steps
+    if current.step_refused:
+        return keep_longest_run(None, current)
+    return no_agreement(f"the last halving, to {steps // 2} communication steps,", current, difference, request)
 
 
-def no_agreement(what: str, now: RefinementRun, off: float, asked: ExternalRunRequest) -> RefinementResult:
-    """The last pass, and that it does not agree with the one before."""
-    change = f"{what} still changes an output by {off:.2g} of its largest value"
+def no_agreement(
+    change: str, current: RefinementRun, difference: float, request: ExternalRunRequest
+) -> RefinementResult:
+    """Select the last run and report that it differs from the previous one."""
+    message = f"{change} still changes an output by {difference:.2g} of its largest value"
     return RefinementResult(
-        now.number, "", f"{change}, more than the tolerance of {asked.tolerance:g}; raise --tolerance"
+        current.number, "", f"{message}, more than the tolerance of {request.tolerance:g}; raise --tolerance"
     )
 
 
-def keep_longest_run(before: RefinementRun | None, now: RefinementRun) -> RefinementResult:
-    """Why the last pass is not whole, with the one of the two that came farther."""
-    begun = [each for each in (now, before) if each and len(each.rows.time) > 1]
-    best = max(begun, key=lambda each: float(each.rows.time[-1]), default=None)
-    return RefinementResult(best.number if best else None, "", now.message)
+def keep_longest_run(previous: RefinementRun | None, current: RefinementRun) -> RefinementResult:
+    """Report why the last run is incomplete and select the longer of the two."""
+    candidates = [each for each in (current, previous) if each and len(each.rows.time) > 1]
+    longest = max(candidates, key=lambda each: float(each.rows.time[-1]), default=None)
+    return RefinementResult(longest.number if longest else None, "", current.message)
 
 
 def refine_solver_tolerance(
-    asked: ExternalRunRequest, h: float, now: RefinementRun, run: RunFunction
+    request: ExternalRunRequest, h: float, current: RefinementRun, run: RunFunction
 ) -> RefinementResult:
-    """Halving has changed nothing at all."""
-    if not any(np.ptp(column) for column in now.rows.columns.values()):
-        return accept_run(now, f"communication step {h:.4g} s; no output changes")
-    tolerance = solver_tolerance(asked)
+    """Reduce the tolerance passed to the FMU after halving the communication step changed nothing."""
+    if not any(np.ptp(column) for column in current.rows.columns.values()):
+        return accept_run(current, f"communication step {h:.4g} s; no output changes")
+    tolerance = solver_tolerance(request)
     for _ in range(3):
         tolerance = max(tolerance / 100, MIN_TOLERANCE)
-        finer = run((asked.stop - asked.start) / max(STEPS_TO_SEE_INTERNAL_STEP, 4 * asked.coarsest), tolerance)
-        if finer.message and not finer.terminated:
-            return keep_longest_run(now, finer)
-        off = max_difference(now.rows, finer.rows, asked)
-        if off == 0.0:
-            own = find_fixed_step(finer.rows)
-            what = f"its own step is fixed, at {own:.3g} s" if own else "it takes steps of its own"
-            change = "neither shorter communication steps nor a smaller tolerance change anything at all"
-            return accept_run(finer, f"{what}, its error unknown: {change}")
-        if off <= asked.tolerance:
-            note = f"it takes steps of its own, by the tolerance that it is told, {tolerance:.2g}"
-            return accept_run(finer, f"{note}; a hundred times as much changes no output by more than {off:.2g}")
-        now = finer
-    return no_agreement(f"a hundredth of the tolerance that it is told, {tolerance:.2g},", now, off, asked)
+        refined = run((request.stop - request.start) / max(STEPS_TO_SEE_INTERNAL_STEP, 4 * request.coarsest), tolerance)
+        if refined.message and not refined.terminated:
+            return keep_longest_run(current, refined)
+        difference = max_difference(current.rows, refined.rows, request)
+        if difference == 0.0:
+            fixed_step = find_fixed_step(refined.rows)
+            kind = f"fixed internal step of {fixed_step:.3g} s" if fixed_step else "internal steps"
+            reason = "neither shorter communication steps nor a smaller tolerance change the result"
+            return accept_run(refined, f"{kind}, error unknown: {reason}")
+        if difference <= request.tolerance:
+            note = f"internal steps, controlled by a tolerance of {tolerance:.2g}"
+            return accept_run(refined, f"{note}; a hundred times that changes no output by more than {difference:.2g}")
+        current = refined
+    return no_agreement(f"a reduction of its tolerance by 100, to {tolerance:.2g},", current, difference, request)
 
 
-def find_fixed_step(rows: SampleRows) -> float | None:
-    """The own step of an FMU in s, seen where its numbers stand still between even times; None if they do not."""
-    moves = np.zeros(len(rows.time) - 1, bool)
-    for column in rows.columns.values():
+def find_fixed_step(samples: SampleRows) -> float | None:
+    """Return the fixed internal step of an FMU in s, or None.
+
+    It is visible where outputs stay constant between equidistant times.
+    """
+    changes = np.zeros(len(samples.time) - 1, bool)
+    for column in samples.columns.values():
         if column.dtype.kind == "f":
-            moves |= np.diff(column) != 0
-    at = np.flatnonzero(moves)
-    gaps = np.diff(at)
-    if len(at) < 3 or gaps.min() < 2 or np.ptp(gaps) > 1:
+            changes |= np.diff(column) != 0
+    indices = np.flatnonzero(changes)
+    gaps = np.diff(indices)
+    if len(indices) < 3 or gaps.min() < 2 or np.ptp(gaps) > 1:
         return None
-    return float((rows.time[at[-1]] - rows.time[at[0]]) / (len(at) - 1))
+    return float((samples.time[indices[-1]] - samples.time[indices[0]]) / (len(indices) - 1))
 
 
-def refine_tolerance(asked: ExternalRunRequest, h: float, run: RunFunction) -> RefinementResult:
-    """The tolerance of the solver is taken ten times smaller until two results agree at the points."""
-    rtol, off = asked.tolerance, inf
-    before: RefinementRun | None = None
+def refine_tolerance(request: ExternalRunRequest, h: float, run: RunFunction) -> RefinementResult:
+    """Divide the solver tolerance by ten until two results agree at the output points."""
+    rtol, difference = request.tolerance, inf
+    previous: RefinementRun | None = None
     for _ in range(MAX_TOLERANCE_REDUCTIONS):
-        now = run(h, rtol)
-        if now.message and not now.terminated:
-            return keep_longest_run(before, now)
-        if before:
-            off = max_difference(before.rows, now.rows, asked)
-            if off <= asked.tolerance:
-                what = f"fmpy's CVode at rtol {rtol:.2g}; ten times as much changes no output by more than {off:.2g}"
-                return accept_run(now, what)
-        before, rtol = now, max(rtol / 10, MIN_TOLERANCE)
-    return no_agreement("a tenth of the tolerance of fmpy's CVode", now, off, asked)
+        current = run(h, rtol)
+        if current.message and not current.terminated:
+            return keep_longest_run(previous, current)
+        if previous:
+            difference = max_difference(previous.rows, current.rows, request)
+            if difference <= request.tolerance:
+                note = (
+                    f"fmpy's CVode at rtol {rtol:.2g}; ten times that changes no output by more than {difference:.2g}"
+                )
+                return accept_run(current, note)
+        previous, rtol = current, max(rtol / 10, MIN_TOLERANCE)
+    return no_agreement("a reduction of the tolerance of fmpy's CVode by 10", current, difference, request)
 
 
-@np.errstate(over="ignore")  # what numpy says of that would be told as printed by the FMU
-def max_difference(one: SampleRows, two: SampleRows, asked: ExternalRunRequest) -> float:
-    """The largest difference of two passes, as a share of each variable's largest value, at the coarsest times."""
-    end = min(each.time[-1] if len(each.time) else asked.start for each in (one, two))
-    at = np.linspace(asked.start, asked.stop, asked.coarsest + 1)
-    at = at[at <= end + 1e-9 * (asked.stop - asked.start)]
-    if len(at) < 2:
+@np.errstate(over="ignore")  # a warning of numpy would appear as output of the FMU
+def max_difference(first: SampleRows, second: SampleRows, request: ExternalRunRequest) -> float:
+    """Return the largest difference of two runs at the coarsest times, relative to each variable's largest value."""
+    end = min(each.time[-1] if len(each.time) else request.start for each in (first, second))
+    times = np.linspace(request.start, request.stop, request.coarsest + 1)
+    times = times[times <= end + 1e-9 * (request.stop - request.start)]
+    if len(times) < 2:
         return inf
-    worst = 0.0
-    for name, column in two.columns.items():
+    largest = 0.0
+    for name, column in second.columns.items():
         left, right = (
-            one.columns[name][last_rows_before(one.time, at)].astype(float),
-            column[last_rows_before(two.time, at)].astype(float),
+            first.columns[name][last_rows_before(first.time, times)].astype(float),
+            column[last_rows_before(second.time, times)].astype(float),
         )
-        size = float(np.abs(right).max())
-        worst = max(worst, float(np.abs(left - right).max()) / size if size else float(np.abs(left).max() > 0))
-    return worst
+        scale = float(np.abs(right).max())
+        largest = max(largest, float(np.abs(left - right).max()) / scale if scale else float(np.abs(left).max() > 0))
+    return largest
 
 
-def last_rows_before(time: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """The last rows at the times, or just before."""
-    near = 1e-9 * (time[-1] - time[0])
-    return np.searchsorted(time, at + near, "right") - 1
+def last_rows_before(time: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the index of the last row at or just before each time."""
+    tolerance = 1e-9 * (time[-1] - time[0])
+    return np.searchsorted(time, times + tolerance, "right") - 1

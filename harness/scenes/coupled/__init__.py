@@ -1,1 +1,1 @@
-"""Coupled scenes."""
+"""Scenes of coupled models."""

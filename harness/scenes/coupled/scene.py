@@ -1,22 +1,23 @@
-"""A coupled scene: parts, and the springs and connections between them.  Read from a TOML file:
+"""Coupled scenes: parts, and the springs and connections between them. Format of the TOML file:
 
-    title = "..."                      one line for people
+    title = "..."                      one line
     stop = 4.0                         s
-    steps = [0.02, 0.01, 0.005]        communication steps in s, the finest one is drawn
-    [parts.left]                       one table for each part
-    model = "smd"                      one whose closed form is known: smd, coulomb or stickslip
-    values = {m = 2.0, x0 = 0.1}       its parameters, SI units
-    [[springs]]                        a spring and damper between two parts, without force at equal positions
+    steps = [0.02, 0.01, 0.005]        communication steps in s; the shortest is plotted
+    [parts.left]                       one table per part
+    model = "smd"                      a model with a closed-form solution: smd, coulomb or stickslip
+    values = {m = 2.0, x0 = 0.1}       parameters in SI units
+    [[springs]]                        spring and damper between two parts, without force at equal positions
     between = ["left", "right"]
     k = 40.0                           N/m
-    c = 0.1                            N s/m, 0 without
-    [[connections]]                    an output that drives the F_ext of another part, times a factor
-    from = "left.x"                    x or v; or F_spring with the factor 1
+    c = 0.1                            N s/m, default 0
+    [[connections]]                    an output that drives F_ext of another part, times a factor
+    from = "left.x"                    x, v, or F_spring with factor 1
     to = "right"
     factor = 40.0
 
-Every spring, and every factor, is an FMU of its own (fmus/more/spring.py), for few tools heed factors in an archive:
-into it come the speeds of its two ends, out of it the forces on them.  A connection is a spring with one end held.
+Every spring and every factor becomes an FMU of its own (fmus/more/spring.py), because few tools support factors in
+archives. Its inputs are the velocities of its ends, its outputs the forces on them. A factor is a spring with one end
+fixed.
 """
 
 import re
@@ -32,11 +33,11 @@ from ..schema import NUMBER, POSITIVE, TEXT, TITLE, Constraint, is_names, is_num
 FOLDER = Path(__file__).parent
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 MAX_STEPS = 1_000_000
-SOURCES = ("x", "v", "F_spring")  # outputs that a connection may come from
+SOURCES = ("x", "v", "F_spring")  # outputs that can be connected
 
 
 NOT_NEGATIVE = Constraint(lambda value: is_number(value) and value >= 0, "a finite number, at least 0")
-PAIR = Constraint(lambda value: is_names(value) and len(value) == 2, "a list of two different names")
+PAIR = Constraint(lambda value: is_names(value) and len(value) == 2, "a list of two distinct names")
 STEPS = Constraint(
     lambda value: isinstance(value, list) and bool(value) and all(map(POSITIVE.accepts, value)),
     "a list of finite numbers above 0",
@@ -71,7 +72,7 @@ class ConnectionKeys:
 
 @dataclass(frozen=True)
 class CoupledKeys:
-    """The keys of the file."""
+    """Keys of the file."""
 
     title: Annotated[str, TITLE]
     stop: Annotated[float, POSITIVE]
@@ -83,7 +84,7 @@ class CoupledKeys:
 
 @dataclass(frozen=True)
 class Part:
-    """One FMU of the scene, and the values that differ from its own."""
+    """FMU of the scene, and the values to set."""
 
     name: str
     model: str
@@ -93,14 +94,16 @@ class Part:
 
 @dataclass(frozen=True)
 class CoupledSpring:
-    """A spring (`k` in N/m) and damper (`c` in N s/m) from the part `a` to the part `b`; `acts` says on which of them,
-    and with which sign.  Without a part at an end that is held at zero."""
+    """Spring (`k` in N/m) and damper (`c` in N s/m) from part `a` to part `b`; an end without a part is fixed.
+
+    `force_ends` lists the ends that exert a force, and the parts on which they act.
+    """
 
     a: str
     b: str
     k: float
     c: float
-    force_ends: tuple[tuple[str, str], ...]  # a flange, and the part on which its force acts
+    force_ends: tuple[tuple[str, str], ...]  # (end, part on which its force acts)
 
     @property
     def name(self) -> str:
@@ -111,7 +114,7 @@ class CoupledSpring:
 
 @dataclass(frozen=True)
 class Connection:
-    """The `output` of the part `source` is the `entry` of the part `sink`."""
+    """Connection from the `output` of the part `source` to the `input` of the part `sink`."""
 
     source: str
     output: str
@@ -121,7 +124,7 @@ class Connection:
 
 @dataclass(frozen=True)
 class CoupledScene:
-    """The scene."""
+    """Validated coupled scene."""
 
     name: str
     title: str
@@ -129,32 +132,46 @@ class CoupledScene:
     steps: tuple[float, ...]
     parts: tuple[Part, ...]
     springs: tuple[CoupledSpring, ...]
-    direct_connections: tuple[Connection, ...]  # from part to part, as they are
+    direct_connections: tuple[Connection, ...]  # from part to part without a factor
 
     @property
     def identifier(self) -> str:
-        """Its name as an identifier."""
+        """Return the name of the scene as an identifier."""
         return re.sub(r"\W", "_", self.name, flags=re.ASCII)
 
     @property
     def connections(self) -> tuple[Connection, ...]:
-        """All of them, those with the springs included."""
-        found = list(self.direct_connections)
-        for each in self.springs:
-            for end, part in (("a", each.a), ("b", each.b)):
-                found += [Connection(part, "v", each.name, f"v_{end}")] if part else []
-            found += [Connection(each.name, f"F_{end}", part, "F_ext") for end, part in each.force_ends]
-        return tuple(found)
+        """Return all connections, including those of the springs."""
+        connections = list(self.direct_connections)
+        for spring in self.springs:
+            for end, part in (("a", spring.a), ("b", spring.b)):
+                connections += [Connection(part, "v", spring.name, f"v_{end}")] if part else []
+            connections += [Connection(spring.name, f"F_{end}", part, "F_ext") for end, part in spring.force_ends]
+        return tuple(connections)
 
 
 def shipped_coupled_scenes() -> list[Path]:
-    """The coupled scenes that come with the harness."""
+    """Return the files of the built-in coupled scenes."""
     return sorted(FOLDER.glob("*.toml"))
 
 
 def load_coupled_scene(source: str, models: Collection[str], stop: float | None = None) -> CoupledScene:
-    """The scene of a shipped name or a file, of such models, to another stop if one is named; SceneError in one
-    sentence if it is not one."""
+    """Load a coupled scene.
+
+    Parameters
+    ----------
+    source : str
+        Built-in name, or path of a .toml file.
+    models : collection of str
+        Models that are allowed.
+    stop : float, optional
+        Stop time in s that replaces that of the file.
+
+    Raises
+    ------
+    SceneError
+        If the scene is invalid.
+    """
     path = Path(source)
     if path.suffix != ".toml":
         names = {file.stem: file for file in shipped_coupled_scenes()}
@@ -171,56 +188,66 @@ def load_coupled_scene(source: str, models: Collection[str], stop: float | None 
 
 
 def build_coupled_scene(path: Path, keys: CoupledKeys, models: Collection[str]) -> CoupledScene:
-    """The scene that the keys of its file say."""
+    """Build a coupled scene from the keys of its file."""
     if not keys.parts:
-        raise SceneError("parts is empty; name each part in a table of its own, as in [parts.left]")
+        raise SceneError("parts is empty; add a table for each part, as in [parts.left]")
     for name, part in keys.parts.items():
         if not NAME.fullmatch(name):
-            raise SceneError(f"part {format_value(name)}: a name has letters, digits and _, and begins with a letter")
+            raise SceneError(
+                f"part {format_value(name)}: a name consists of letters, digits and _, and begins with a letter"
+            )
         if part.model not in models:
             raise SceneError(f"part {name}: {unknown_name_message('model', part.model, models)}")
-    springs, passed = [], []
+    springs, direct = [], []
     for spring in keys.springs:
-        one, two = (check_part(name, keys.parts) for name in spring.between)
-        springs.append(CoupledSpring(one, two, float(spring.k), float(spring.c), (("a", one), ("b", two))))
-    for each in keys.connections:
-        source, _, output = each.from_.partition(".")
+        first, second = (check_part(name, keys.parts) for name in spring.between)
+        springs.append(CoupledSpring(first, second, float(spring.k), float(spring.c), (("a", first), ("b", second))))
+    for connection in keys.connections:
+        source, _, output = connection.from_.partition(".")
         if output not in SOURCES:
-            raise SceneError(f"from = {format_value(each.from_)}: {unknown_name_message('output', output, SOURCES)}")
-        source, sink, factor = check_part(source, keys.parts), check_part(each.to, keys.parts), float(each.factor)
+            raise SceneError(
+                f"from = {format_value(connection.from_)}: {unknown_name_message('output', output, SOURCES)}"
+            )
+        source, sink, factor = (
+            check_part(source, keys.parts),
+            check_part(connection.to, keys.parts),
+            float(connection.factor),
+        )
         if output != "F_spring":
             size, end = abs(factor), "b" if factor > 0 else "a"
             k, c = (size, 0.0) if output == "x" else (0.0, size)
             springs.append(CoupledSpring(source, "", k, c, ((end, sink),)))
         elif factor == 1.0:
-            passed.append(Connection(source, output, sink, "F_ext"))
+            direct.append(Connection(source, output, sink, "F_ext"))
         else:
-            raise SceneError(f"from = {format_value(each.from_)}: a force is passed on with factor = 1, not {factor!r}")
+            raise SceneError(
+                f"from = {format_value(connection.from_)}: a connected force needs factor = 1, got {factor!r}"
+            )
     scene = CoupledScene(
-        path.stem, keys.title, float(keys.stop), check_communication_steps(keys), (), tuple(springs), tuple(passed)
+        path.stem, keys.title, float(keys.stop), check_communication_steps(keys), (), tuple(springs), tuple(direct)
     )
-    driven = [each.sink for each in scene.connections]
+    driven = [connection.sink for connection in scene.connections]
     twice = [name for name in keys.parts if driven.count(name) > 1]
     if twice:
-        raise SceneError(f"part {twice[0]} is driven twice; an input takes one connection")
+        raise SceneError(f"part {twice[0]} is driven twice; an input accepts one connection")
     values = {name: {key: float(value) for key, value in part.values.items()} for name, part in keys.parts.items()}
     parts = tuple(Part(name, part.model, find_fmu(part.model), values[name]) for name, part in keys.parts.items())
     return replace(scene, parts=parts)
 
 
 def check_communication_steps(keys: CoupledKeys) -> tuple[float, ...]:
-    """The communication steps in s, the longest first."""
+    """Return the communication steps in s, the longest first; raise SceneError for invalid numbers of steps."""
     steps = tuple(sorted(map(float, keys.steps), reverse=True))
     for step in steps:
         if not 1 <= keys.stop / step <= MAX_STEPS:
             raise SceneError(
-                f"steps: {step!r} s makes {keys.stop / step:.6g} steps to the stop; from 1 to {MAX_STEPS} are allowed"
+                f"steps: {step!r} s gives {keys.stop / step:.6g} steps to the stop; 1 to {MAX_STEPS} are allowed"
             )
     return steps
 
 
 def check_part(name: str, parts: Collection[str]) -> str:
-    """The name of a part that there is."""
+    """Return the name of a part; raise SceneError if there is none of that name."""
     if name not in parts:
         raise SceneError(unknown_name_message("part", name, parts))
     return name
