@@ -1,4 +1,4 @@
-"""The command line: one file a command, all that there are; parse, one call, print."""
+"""Command line: one file per command. A command parses its options, calls one function and prints the result."""
 
 from importlib import import_module
 from pkgutil import iter_modules
@@ -9,9 +9,9 @@ from .run import outcome_as_json
 from .terminal import Terminal, result_options
 
 
-def print_version(context: click.Context, option: click.Parameter, wanted: bool) -> None:
-    """Print the versions that every result tells, and end."""
-    if wanted:
+def print_version(context: click.Context, option: click.Parameter, requested: bool) -> None:
+    """Print the package versions that provenance.json records, then exit."""
+    if requested:
         from ..results.provenance import package_versions
 
         click.echo(", ".join(f"{name} {number}" for name, number in package_versions().items()))
@@ -19,12 +19,12 @@ def print_version(context: click.Context, option: click.Parameter, wanted: bool)
 
 
 class FullHelpGroup(click.Group):
-    """Whose help cuts no sentence short."""
+    """Command group whose help prints the first sentence of each command in full."""
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
-        """Each command, and the first sentence of its help."""
+        """List each command with the first sentence of its help."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, each.get_short_help_str(limit=1000)) for name, each in self.commands.items()])
+            formatter.write_dl([(name, item.get_short_help_str(limit=1000)) for name, item in self.commands.items()])
 
 
 @click.group(cls=FullHelpGroup, invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -34,10 +34,10 @@ class FullHelpGroup(click.Group):
 )
 @click.pass_context
 def commands(context: click.Context, terminal: Terminal) -> None:
-    """Run the built FMUs, measure what they do, and set it beside what was published.
+    """Run FMUs with dry friction, measure them, and compare the results with published values.
 
-    Without a command: every published case.  Exit status 0: all well, 1: a run failed, 2: wrong usage,
-    130 and 143: ended by Ctrl-C and by SIGTERM, with nothing left half done.
+    Without a command, all published cases are run.  Exit status: 0 success, 1 a run or check failed, 2 wrong usage,
+    130 interrupted by Ctrl-C, 143 terminated by SIGTERM.  An interrupted command leaves no incomplete results.
 
     \b
     Examples:
@@ -46,7 +46,9 @@ def commands(context: click.Context, terminal: Terminal) -> None:
       python -m harness run my-scene.toml --out elsewhere
       python -m harness list
     """
-    context.default_map = dict.fromkeys(commands.commands, vars(terminal))  # before the command, they hold for it too
+    context.default_map = dict.fromkeys(
+        commands.commands, vars(terminal)
+    )  # options before the command apply to it as well
     if context.invoked_subcommand is None:
         from ..studies.run import study
         from ..studies.run.table import results_table
@@ -54,9 +56,9 @@ def commands(context: click.Context, terminal: Terminal) -> None:
         names = study.published_scene_names()
         with terminal.progress(len(names)) as report:
             outcomes = list(study.run_scenes(names, terminal.out, report))
-        told = [outcome_as_json(outcome, terminal.out) for outcome in outcomes]
+        rows = [outcome_as_json(outcome, terminal.out) for outcome in outcomes]
         failed = (outcome.error for outcome in outcomes if outcome.error)
-        terminal.print_result(told, results_table(outcomes, everything=False), folder=terminal.out, failed=failed)
+        terminal.print_result(rows, results_table(outcomes, everything=False), folder=terminal.out, failed=failed)
 
 
 for file in iter_modules(__path__):

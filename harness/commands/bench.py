@@ -1,4 +1,4 @@
-"""bench: the numbers to reach."""
+"""bench: benchmarks with targets."""
 
 import click
 
@@ -8,7 +8,7 @@ from .terminal import Terminal, result_options
 @click.command()
 @result_options
 def bench(terminal: Terminal) -> None:
-    """Measure the numbers to reach, each beside what it is compared with in the same run.
+    """Run the benchmarks.  Each is measured against its target and against a peer in the same run.
 
     \b
     Example:
@@ -17,7 +17,7 @@ def bench(terminal: Terminal) -> None:
     from ..studies.bench import study as work
     from ..studies.bench.table import benchmark_table
 
-    chosen = work.all_benchmarks()
-    with terminal.progress(len(chosen)) as report:
-        found = work.run_benchmarks(chosen, terminal.out, report)
-    terminal.print_result(found, benchmark_table(found), folder=terminal.out / work.FOLDER)
+    selected = work.all_benchmarks()
+    with terminal.progress(len(selected)) as report:
+        benchmarks = work.run_benchmarks(selected, terminal.out, report)
+    terminal.print_result(benchmarks, benchmark_table(benchmarks), folder=terminal.out / work.FOLDER)

@@ -1,4 +1,4 @@
-"""compare: how far two results or FMUs are apart."""
+"""compare: differences between two results or FMUs."""
 
 from functools import partial
 from pathlib import Path
@@ -10,37 +10,41 @@ from .terminal import FiniteFloat, Terminal, result_options, run_options
 
 
 @click.command()
-@click.argument("one", metavar="A")
-@click.argument("two", metavar="B")
+@click.argument("first", metavar="A")
+@click.argument("second", metavar="B")
 @run_options
 @click.option(
-    "--rtol", "--within", type=FiniteFloat(min=0), help="Share of its largest value by which each may differ."
+    "--rtol",
+    "--within",
+    type=FiniteFloat(min=0),
+    help="Allowed difference, relative to the largest value.",
 )
-@click.option("--atol", type=FiniteFloat(min=0), help="What each may differ by on top, in its unit.")
+@click.option("--atol", type=FiniteFloat(min=0), help="Allowed difference on top, in the unit of the variable.")
 @result_options
-def compare(one: str, two: str, rtol: float | None, atol: float | None, terminal: Terminal, **how: Any) -> None:
-    """Show how far A and B are apart: FMUs of any origin (FMI 2.0, 3.0), scenes, result folders or files, those of
-    other tools too (fmpy's CSV; OpenModelica's and Dymola's .csv and .mat; any table whose first column is the time).
+def compare(
+    first: str, second: str, rtol: float | None, atol: float | None, terminal: Terminal, **options: Any
+) -> None:
+    """Compare A and B, variable by variable.  Each is an FMU (FMI 2.0 or 3.0), a scene, a result folder, or a file:
+    CSV of fmpy, .csv or .mat of OpenModelica or Dymola, or any table whose first column is time.
 
-    What can be run is run to the times of the other.  Between its samples a variable follows its rate where that was
-    recorded, otherwise it stays between its neighbours, and what is whole numbers holds.  Exit status 0: no difference
-    is larger than rtol and atol allow together, if either is given, and events match; 1: one is, or a run failed;
-    2: wrong usage.
+    FMUs and scenes are run at the times of the other side.  Between samples, a variable is interpolated with its rate
+    if the rate was recorded, otherwise monotonically; integers are held.  With --rtol or --atol, exit status 1 means
+    that a difference exceeds the tolerance, events do not match, or a run failed.
 
     \b
     Examples:
       python -m harness compare results/stickslip results/stickslip-threshold
-      python -m harness compare fmus/coulomb.fmu theirs.fmu --stop 2
+      python -m harness compare fmus/coulomb.fmu other.fmu --stop 2
       python -m harness compare results/smd measured.csv --rtol 1e-3 --atol 1e-6
     """
     from ..running.run_spec import RunSpec
     from ..studies.compare import study
 
     with terminal.progress(1) as report:
-        asked = RunSpec(Path(), **how)
-        found, folder = study.run_comparison((one, two), asked, terminal.out, partial(report, "compare"))
-    failed = [each.failure for each in (found.one, found.two) if each.failure]
+        spec = RunSpec(Path(), **options)
+        comparison, folder = study.run_comparison((first, second), spec, terminal.out, partial(report, "compare"))
+    failed = [side.failure for side in (comparison.one, comparison.two) if side.failure]
     if rtol is not None or atol is not None:
-        failed += found.violations(rtol or 0.0, atol or 0.0)
-    shown = (study.difference_table(found), "", *study.summary_lines(found))
-    terminal.print_result(study.comparison_as_json(found), *shown, folder=folder, failed=failed)
+        failed += comparison.violations(rtol or 0.0, atol or 0.0)
+    output = (study.difference_table(comparison), "", *study.summary_lines(comparison))
+    terminal.print_result(study.comparison_as_json(comparison), *output, folder=folder, failed=failed)

@@ -1,4 +1,4 @@
-"""couple: several FMUs in one scene."""
+"""couple: several coupled FMUs."""
 
 from functools import partial
 
@@ -9,31 +9,34 @@ from .terminal import POSITIVE, Terminal, result_options
 
 @click.command()
 @click.argument("scene")
-@click.option("--stop", type=POSITIVE, help="Stop time in s (the one that it names).")
+@click.option("--stop", type=POSITIVE, help="Stop time in s. Default: that of the scene.")
 @result_options
 def couple(scene: str, stop: float | None, terminal: Terminal) -> None:
-    """Couple the FMUs of a SCENE: written as an SSP archive, run by Ecos beside a monolithic reference, and by libcosim
-    and fmpy where they can.
+    """Couple the FMUs of a SCENE.  The scene is written as an SSP archive, run by Ecos, libcosim and fmpy, and compared
+    with a monolithic reference.
 
-    SCENE is two-masses, driven, chain, or the path of a TOML file; harness/scenes/coupled/scene.py says what it may
-    hold.  Or it is the path of an archive (.ssp) of anyone's, which is run beside its own finest run.
+    SCENE is two-masses, driven, chain, the path of a TOML file (keys: see harness/scenes/coupled/scene.py), or the path
+    of an SSP archive (.ssp).  An archive is compared with its own run at the smallest communication step.
 
     \b
     Examples:
       python -m harness couple two-masses
       python -m harness couple my-pair.toml --out elsewhere
-      python -m harness couple theirs.ssp --stop 10
+      python -m harness couple other.ssp --stop 10
     """
     from ..studies.coupled.study import run_coupled
 
     with terminal.progress(1) as report:
-        found, folder = run_coupled(scene, terminal.out, stop, partial(report, scene))
-    engines = {name: {"largest error": off, "why not": why} for name, (_, off, why) in found.engines.items()}
-    told = {"steps": found.steps, "errors": found.errors, "order": found.order, "engines": engines, "folder": folder}
-    shown = [
-        f"communication step [s]   largest error{f' [{found.unit}]' if found.unit else ''}",
-        *(f"{step:<24g} {error:.3e}" for step, error in zip(found.steps, found.errors, strict=False)),
-        f"The error falls with the power {found.order:.2f} of the step.",
-        *(f"{name:<24} {why or f'{off:.3e} with the finest step'}" for name, (_, off, why) in found.engines.items()),
+        study, folder = run_coupled(scene, terminal.out, stop, partial(report, scene))
+    engines = {name: {"largest error": error, "why not": why} for name, (_, error, why) in study.engines.items()}
+    result = {"steps": study.steps, "errors": study.errors, "order": study.order, "engines": engines, "folder": folder}
+    output = [
+        f"communication step [s]   largest error{f' [{study.unit}]' if study.unit else ''}",
+        *(f"{step:<24g} {error:.3e}" for step, error in zip(study.steps, study.errors, strict=False)),
+        f"Order of convergence: {study.order:.2f}.",
+        *(
+            f"{name:<24} {why or f'{error:.3e} at the smallest step'}"
+            for name, (_, error, why) in study.engines.items()
+        ),
     ]
-    terminal.print_result(told, *shown, folder=folder)
+    terminal.print_result(result, *output, folder=folder)

@@ -1,4 +1,4 @@
-"""decay: damping, dry friction and drag of a record or a scene."""
+"""decay: identify damping, dry friction and drag from a record or a scene."""
 
 from functools import partial
 from typing import Any
@@ -10,25 +10,25 @@ from .terminal import POSITIVE, Terminal, result_options
 
 @click.command()
 @click.argument("source", metavar="FILE|SCENE|-")
-@click.option("--time", help="Heading of the time, as it stands in the file (t, time, ..., or the first column).")
-@click.option("--position", help="Heading of what is to be fitted, as it stands in the file (x, theta, ...).")
-@click.option("--velocity", help="The same, of a velocity.")
+@click.option("--time", help="Heading of the time column. Default: t, time, ..., or the first column.")
+@click.option("--position", help="Heading of the column to fit. Default: x, theta, ...")
+@click.option("--velocity", help="Heading of the column to fit if it is a velocity.")
 @click.option(
     "--quantity",
     type=click.Choice(("position", "velocity", "acceleration")),
-    help="What was measured, where its unit does not tell (an angle is a position).",
+    help="Measured quantity, if it does not follow from the unit (an angle is a position).",
 )
-@click.option("--unit", help="Its unit where the heading has none, as in mm, deg/s or g.")
-@click.option("--per-count", metavar="SIZE", help="What one count is, as in 0.36deg or 0.001mm.")
-@click.option("--time-unit", help="Unit of the time where the heading has none (s), as in ms, or 0.01s of samples.")
-@click.option("--columns", "names", metavar="NAMES", help="Headings where the file has none: 't [s],x [mm]'.")
-@click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Leave out what is before, in s.")
-@click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Leave out what is after, in s.")
-@click.option("--k", type=POSITIVE, help="Stiffness, N/m (N.m/rad): gives friction force.")
-@click.option("--m", type=POSITIVE, help="Mass, kg (kg.m2), in place of k.")
-@click.option("--pendulum", is_flag=True, help="The restoring torque is k sin(theta), k = m g a.")
-@click.option("--drag/--no-drag", default=True, show_default=True, help="Try the laws with quadratic drag.")
-@click.option("--drift", is_flag=True, help="Let the rest position (or the offset of a sensor) drift steadily.")
+@click.option("--unit", help="Unit of the column, if the heading has none: mm, deg/s, g, ...")
+@click.option("--per-count", metavar="SIZE", help="Size of one count: 0.36deg, 0.001mm, ...")
+@click.option("--time-unit", help="Unit of time, if the heading has none: ms, or 0.01s for sample numbers. Default: s.")
+@click.option("--columns", "names", metavar="NAMES", help="Headings, if the file has none: 't [s],x [mm]'.")
+@click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Ignore samples before this time in s.")
+@click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Ignore samples after this time in s.")
+@click.option("--k", type=POSITIVE, help="Stiffness in N/m or N.m/rad; required for the friction force.")
+@click.option("--m", type=POSITIVE, help="Mass in kg, or moment of inertia in kg.m2; an alternative to --k.")
+@click.option("--pendulum", is_flag=True, help="The restoring torque is k sin(theta), with k = m g a.")
+@click.option("--drag/--no-drag", default=True, show_default=True, help="Fit the models with quadratic drag as well.")
+@click.option("--drift", is_flag=True, help="Fit a linear drift of the rest position or sensor offset.")
 @result_options
 def decay(
     source: str,
@@ -41,22 +41,22 @@ def decay(
     terminal: Terminal,
     **columns: Any,
 ) -> None:
-    """Tell damping, dry friction and drag from the decay in a FILE with columns, or in the run of a SCENE.
+    """Identify damping, dry friction and drag from a measured decay in FILE, or from a run of SCENE.
 
-    A FILE is text with any delimiter, a spreadsheet (.xlsx, .ods), a .mat or .npz file; - is standard input.  Headings
-    tell names and units, as in "x [mm]" or "Gyroscope z (rad/s)"; a unit tells whether it is a position, a velocity or
-    an acceleration.  The record may start and end anywhere, be noisy, uneven in time, with a gap, and off its rest
-    position.
+    FILE is text with any delimiter, a spreadsheet (.xlsx, .ods), a .mat or .npz file; - reads standard input.  Names
+    and units are taken from headings such as "x [mm]" or "Gyroscope z (rad/s)"; the unit determines whether the column
+    is a position, a velocity or an acceleration.  The record may start and end at any time; noise, uneven sampling,
+    gaps and an offset are allowed.
 
-    Zeta, r = f/k and b = q/m are told with 95 % intervals, which hold whatever the law; what is in doubt is said, and
-    what is not the free decay of one oscillator is refused.
+    The results are zeta, r = f/k and b = q/m with 95 % confidence intervals.  Remarks point out doubtful results.  A
+    record that is not the free decay of one oscillator is rejected.
 
     \b
     Examples:
       a phone on a spring:    python -m harness decay "Raw Data.csv" --m 0.35
       a spreadsheet:          python -m harness decay swing.xlsx --position "laser (mm)" --k 157.9
       a pendulum's encoder:   python -m harness decay swing.txt --pendulum --per-count 0.36deg --columns t,count
-      a column of a pipe:     zcat swing.gz | python -m harness decay - --unit mm --from 2.5
+      standard input:         zcat swing.gz | python -m harness decay - --unit mm --from 2.5
       a scene:                python -m harness decay coulomb
     """
     from ..analyses.decay.estimates import KnownParameters
@@ -65,15 +65,15 @@ def decay(
     from ..studies.decay.table import decay_table, summary_lines
 
     if k is not None and m is not None:
-        raise click.UsageError("--k and --m: give one of them; the frequency tells the other")
+        raise click.UsageError("--k and --m: give only one of them; the other follows from the frequency")
     if velocity is not None:
         if columns["position"] is not None or columns["quantity"] not in (None, "velocity"):
-            raise click.UsageError("--velocity: one column is fitted; leave out --position and --quantity")
+            raise click.UsageError("--velocity: only one column is fitted; omit --position and --quantity")
         columns |= {"position": velocity, "quantity": "velocity"}
-    asked, known = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
+    columns_spec, known = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
     with decays.gc_paused(), terminal.progress(1) as report:
-        progressed = partial(report, "standard input" if source == "-" else source)
-        found, folder = decays.identify_decay(source, asked, known, drag, drift, terminal.out, progressed)
+        progress = partial(report, "standard input" if source == "-" else source)
+        result, folder = decays.identify_decay(source, columns_spec, known, drag, drift, terminal.out, progress)
     terminal.print_result(
-        decays.identified_as_json(found), decay_table(found), "", *summary_lines(found), folder=folder
+        decays.identified_as_json(result), decay_table(result), "", *summary_lines(result), folder=folder
     )

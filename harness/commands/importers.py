@@ -1,4 +1,4 @@
-"""importers: the FMUs in tools that others wrote."""
+"""importers: check the FMUs in other tools."""
 
 from pathlib import Path
 
@@ -11,9 +11,9 @@ from .terminal import Terminal, result_options
 @click.option("--fmus", type=click.Path(file_okay=False, path_type=Path), default=Path("fmus"), show_default=True)
 @result_options
 def importers(fmus: Path, terminal: Terminal) -> None:
-    """Run the FMUs of a folder in tools that others wrote, and set their answers beside fmpy's.
+    """Run the FMUs of a folder in other simulation tools, and compare the results with those of fmpy.
 
-    Exit status 1 if a check fails.  A tool that is not installed is named.
+    Tools that are not installed are listed and skipped.  Exit status 1 if a check fails.
 
     \b
     Examples:
@@ -26,5 +26,5 @@ def importers(fmus: Path, terminal: Terminal) -> None:
     with terminal.progress(len(IMPORTERS)) as report:
         rows = work.run_importer_checks(fmus, terminal.out, report)
     failed = (f"{row.importer}, {row.check}: {', '.join(row.failed)}" for row in rows if row.failed)
-    shown = (work.importer_table(rows), *work.legend_lines(rows))
-    terminal.print_result(rows, *shown, folder=terminal.out / work.FOLDER, failed=failed)
+    output = (work.importer_table(rows), *work.legend_lines(rows))
+    terminal.print_result(rows, *output, folder=terminal.out / work.FOLDER, failed=failed)

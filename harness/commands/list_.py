@@ -1,4 +1,4 @@
-"""list: the scenes that there are."""
+"""list: the scenes that come with the harness."""
 
 import click
 
@@ -8,7 +8,7 @@ from .terminal import Terminal, json_option
 @click.command("list")
 @json_option
 def list_(as_json: bool) -> None:
-    """List the scenes that come with the harness: those to `run`, and those of several FMUs to `couple`.
+    """List the scenes that come with the harness: single FMUs for `run`, coupled FMUs for `couple`.
 
     \b
     Example:

@@ -1,4 +1,4 @@
-"""precision: what accuracy costs."""
+"""precision: error against run time."""
 
 import click
 
@@ -8,13 +8,13 @@ from .terminal import Terminal, result_options
 @click.command()
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
 @result_options
-@click.option("--quick", is_flag=True, help="Three tolerances only, and little patience.")
+@click.option("--quick", is_flag=True, help="Three tolerances and short time limits.")
 def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
-    """Show what accuracy costs: error against run time and right-hand sides, for each MODEL (without one: all of ours).
+    """Measure error against run time and right-hand side evaluations for each MODEL.  Default: all shipped models.
 
-    A MODEL is a name, or the path of a file (belt.py, whose FMU lies beside it, or belt.fmu).  What somebody else has
-    not written a second time is held against its certified result (belt.csv, see references), or against two of its
-    own methods, where they agree.
+    MODEL is a name or the path of a file: belt.py with belt.fmu beside it, or belt.fmu.  A shipped model is compared
+    with an independent reference.  Any other model is compared with its certified result (belt.csv, see references), or
+    with the solution on which two of its own methods agree.
 
     \b
     Examples:
@@ -28,23 +28,23 @@ def precision(models: tuple[str, ...], terminal: Terminal, quick: bool) -> None:
     from ..studies.precision.survey import FOLDER, run_survey
 
     with terminal.progress(len(models or MODELS) + 1) as report:
-        found = run_survey(models or MODELS, QUICK if quick else FULL, terminal.out, report)
-    told = {
-        "points": {study.model: study.points for study in found.studies},
-        "laws": found.deviations,
-        "anchors": found.literature,
-        "advice": found.advice,
-        "missing": found.missing,
+        result = run_survey(models or MODELS, QUICK if quick else FULL, terminal.out, report)
+    data = {
+        "points": {study.model: study.points for study in result.studies},
+        "laws": result.deviations,
+        "anchors": result.literature,
+        "advice": result.advice,
+        "missing": result.missing,
     }
     errors = (
-        tables.exchange_table(found.studies),
-        tables.deviation_table(found.deviations),
-        tables.literature_table(found.literature),
+        tables.exchange_table(result.studies),
+        tables.deviation_table(result.deviations),
+        tables.literature_table(result.literature),
     )
-    shown = [
-        each
-        for table in (*map(tables.work_precision_table, found.studies), *errors)
+    output = [
+        block
+        for table in (*map(tables.work_precision_table, result.studies), *errors)
         if table.rows
-        for each in (table, "")
+        for block in (table, "")
     ]
-    terminal.print_result(told, *shown, *found.advice, *found.missing, folder=terminal.out / FOLDER)
+    terminal.print_result(data, *output, *result.advice, *result.missing, folder=terminal.out / FOLDER)

@@ -1,4 +1,4 @@
-"""references: certified results for models of one's own."""
+"""references: certified results for user models."""
 
 from pathlib import Path
 
@@ -14,11 +14,12 @@ FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 @quiet_option
 @json_option
 def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
-    """Write the certified result of the model in each FILE.py, whose FMU is built, beside it: FILE.csv.
+    """Compute the certified result of the model in each FILE.py and write it to FILE.csv.  The FMU must be built.
 
-    The default run is made by two methods that share no formula; where they agree, the FMU carries the result from its
-    next build on, and its page shows it.  Where it sticks, FILE-events.csv has the changes of mode.  Our own models
-    come by closed forms, series and other people's solvers, under all of their laws, in some minutes.
+    The default run is solved by two methods that share no formula.  If they agree, FILE.csv is written, and
+    FILE-events.csv with the changes of mode if the model sticks; the next build includes them in the FMU and on its
+    page.  The shipped models use closed forms, power series and independent solvers instead, for each friction law;
+    this takes some minutes.
 
     \b
     Example:
@@ -26,6 +27,6 @@ def references(files: tuple[Path, ...], quiet: bool, as_json: bool) -> None:
     """
     from ..references.certification import certify
 
-    made = [one for file in files for one in certify(file)]
-    shown = (f"{one.path}, relative difference {one.difference:.1e}" for one in made)
-    Terminal(quiet, as_json).print_result(made, *shown)
+    results = [result for file in files for result in certify(file)]
+    output = (f"{result.path}, relative difference {result.difference:.1e}" for result in results)
+    Terminal(quiet, as_json).print_result(results, *output)

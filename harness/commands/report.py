@@ -1,4 +1,4 @@
-"""report: one page of all results."""
+"""report: an HTML page of all results."""
 
 from pathlib import Path
 
@@ -8,14 +8,14 @@ from .terminal import json_option, out_option, print_json, quiet_option
 
 
 @click.command()
-@out_option("Folder of the results; the page is written into it.")
+@out_option("Folder with the results; the page is written to it.")
 @quiet_option
 @json_option
 def report(out: Path, quiet: bool, as_json: bool) -> None:
-    """Make one page of all results there are: report.html, which needs nothing else.
+    """Write report.html, a self-contained page of all results.
 
-    It runs nothing; it says which results are missing, and the commands that make them.  The page that runs is in it,
-    where `python build_fmus.py --web` has written it.
+    Nothing is run: missing results are listed with the commands that produce them.  The page includes the interactive
+    web page if `python build_fmus.py --web` has built it.
 
     \b
     Example:
@@ -26,10 +26,10 @@ def report(out: Path, quiet: bool, as_json: bool) -> None:
     from ..scenes.scene import load_scene, shipped_scenes
 
     scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
-    found = write_report(out, [PublishedScene(scene.name, scene.file.stem, scene.about) for scene in scenes])
+    page = write_report(out, [PublishedScene(scene.name, scene.file.stem, scene.about) for scene in scenes])
     if as_json:
-        print_json({"page": str(found.path), "missing": [name for name, _ in found.missing]})
+        print_json({"page": str(page.path), "missing": [name for name, _ in page.missing]})
     elif not quiet:
-        for name, command in found.missing:
-            click.echo(f"Missing: {name}; make it with `{command}`")
-        click.echo(f"Report in {found.path}")
+        for name, command in page.missing:
+            click.echo(f"Missing: {name}; run `{command}`")
+        click.echo(f"Report in {page.path}")

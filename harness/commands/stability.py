@@ -1,4 +1,4 @@
-"""stability: stiff and extreme scenes."""
+"""stability: stiff and extreme cases."""
 
 import click
 
@@ -9,11 +9,12 @@ from .terminal import Terminal, result_options
 @click.argument("models", metavar="[MODEL]...", nargs=-1)
 @result_options
 def stability(models: tuple[str, ...], terminal: Terminal) -> None:
-    """Run stiff and extreme scenes with every method: each ends right, or is refused with a sentence.
+    """Run stiff and extreme cases with every method.  Each must finish within its error bound, or be rejected with an
+    error message.
 
-    They are those of each MODEL (without one: all there are).  A MODEL is a name, or the path of a file (belt.py, whose
-    FMU lies beside it, or belt.fmu): then its numbers are varied, and what two of its methods agree about is right.
-    Exit status 1 if one ends otherwise.
+    MODEL is a name or the path of a file: belt.py with belt.fmu beside it, or belt.fmu.  Default: all shipped models.
+    For a file, the parameters are varied, and the reference is the solution on which two of its methods agree.  Exit
+    status 1 if a case fails.
 
     \b
     Examples:
@@ -24,10 +25,10 @@ def stability(models: tuple[str, ...], terminal: Terminal) -> None:
     from ..studies.stability import table as tables
     from ..studies.stability.study import FOLDER, grouped_cases, run_stability
 
-    chosen = grouped_cases(models=models)
-    with terminal.progress(sum(map(len, chosen))) as report:
-        rows, regions = run_stability(terminal.out, report, chosen, describe_sources(*models))
-    told = [{"scene": row.case.label, "passed": row.passed, "ended": row.ended} for row in rows]
-    shown = (tables.error_table(rows), "", tables.refusal_table(rows), "", tables.summary(rows, regions))
-    wrong = (f"{row.case.label}: {row.text}" for row in rows if not row.passed)
-    terminal.print_result(told, *shown, folder=terminal.out / FOLDER, failed=wrong)
+    groups = grouped_cases(models=models)
+    with terminal.progress(sum(map(len, groups))) as report:
+        rows, regions = run_stability(terminal.out, report, groups, describe_sources(*models))
+    results = [{"scene": row.case.label, "passed": row.passed, "ended": row.ended} for row in rows]
+    output = (tables.error_table(rows), "", tables.refusal_table(rows), "", tables.summary(rows, regions))
+    failures = (f"{row.case.label}: {row.text}" for row in rows if not row.passed)
+    terminal.print_result(results, *output, folder=terminal.out / FOLDER, failed=failures)

@@ -1,4 +1,4 @@
-"""sweep: many runs over parameters."""
+"""sweep: parameter sweeps."""
 
 import os
 from collections.abc import Iterator
@@ -15,23 +15,27 @@ from .terminal import Terminal, result_options, run_options
 if TYPE_CHECKING:
     from ..studies.sweep.result_files import SweepResult
 
-MAX_FAILURE_KINDS = 10  # kinds of failures
+MAX_FAILURE_KINDS = 10  # kinds of failures printed
 WORKERS = click.IntRange(1, 1024)
 
 
 @click.command()
 @click.argument("model")
 @click.option(
-    "--vary", multiple=True, required=True, metavar="NAME=LO:HI:N", help="What to vary; :log at the end, or a,b,c."
+    "--vary",
+    multiple=True,
+    required=True,
+    metavar="NAME=LO:HI:N",
+    help="Parameter to vary; append :log, or list a,b,c.",
 )
-@click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="What to set in every run.")
+@click.option("--set", "values", multiple=True, metavar="NAME=VALUE", help="Value set in every run.")
 @click.option(
-    "--random", type=click.IntRange(min=1), help="So many points of a Latin hypercube; then --vary NAME=LO:HI."
+    "--random", type=click.IntRange(min=1), help="Number of points of a Latin hypercube; requires --vary NAME=LO:HI."
 )
-@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Of the Latin hypercube.")
-@click.option("--measure", help="What to measure, with commas between (final, and events where the FMU counts them).")
+@click.option("--seed", type=click.IntRange(min=0), default=1, show_default=True, help="Seed of the Latin hypercube.")
+@click.option("--measure", help="Measures, separated by commas. Default: final, and events if the FMU counts them.")
 @click.option("--workers", type=WORKERS, default=lambda: os.cpu_count() or 1, help="Processes on this machine.")
-@click.option("--scheduler", metavar="ADDRESS", help="An existing Dask cluster, as in tcp://host:8786.")
+@click.option("--scheduler", metavar="ADDRESS", help="Scheduler of a running Dask cluster: tcp://host:8786.")
 @click.option("--name", help="Name of the result folder.")
 @run_options
 @result_options
@@ -48,43 +52,47 @@ def sweep(
     terminal: Terminal,
     **options: Any,
 ) -> None:
-    """Run MODEL (a name, or the path of anyone's FMU) over many parameters, and measure every run.
+    """Run MODEL, a name or the path of an FMU, over ranges of parameters and measure every run.
 
-    Measures of every FMU: final, smallest, largest, run_time; of ours also events, steps, evaluations, peak_speed, and
-    where the model has them slips, period, unsteady, stuck, rest, zeta, f_over_k.  Exit status 1 if a run fails.
-    Interrupted, the same command goes on where it was.
+    Measures for every FMU: final, smallest, largest, run_time.  For FMUs of this project also events, steps,
+    evaluations and peak_speed, and depending on the model slips, period, unsteady, stuck, rest, zeta and f_over_k.
+    Exit status 1 if a run fails.  To resume an interrupted sweep, repeat the command.
 
     \b
     Examples:
       python -m harness sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.5:60 --measure slips,period
       python -m harness sweep pacejka --vary x_m=0.001:0.1:40:log --measure unsteady,steps
-      python -m harness sweep theirs.fmu --vary mu=0,0.1,0.2 --measure final,largest
+      python -m harness sweep other.fmu --vary mu=0,0.1,0.2 --measure final,largest
       python -m harness sweep coulomb --vary f=0.1:2 --vary k=50:500 --random 1000 --scheduler tcp://host:8786
     """
     if name is not None and (name.startswith(".") or Path(name).name != name):
-        raise click.UsageError(f"--name {name[:MAX_VALUE_LENGTH]}: the name of one folder, without dots before it")
-    if find_spec("xarray") is None:  # of which the figure is made, when all runs are done
+        raise click.UsageError(
+            f"--name {name[:MAX_VALUE_LENGTH]}: must be a single folder name that does not start with a dot"
+        )
+    if find_spec("xarray") is None:  # checked before the runs: the figure needs it afterwards
         raise HarnessError("a sweep needs xarray: python -m pip install 'friction-fmus[sweep]'")
     from ..studies.sweep import result_files as sweep_file
 
     measures = tuple(dict.fromkeys(word.strip() for word in measure.split(","))) if measure is not None else ()
-    asked = sweep_file.SweepRequest(model, vary, values, random, seed, measures, name, options)
+    request = sweep_file.SweepRequest(model, vary, values, random, seed, measures, name, options)
     with terminal.progress(1) as report:
-        swept = sweep_file.run_sweep(asked, terminal.out, scheduler, workers, partial(report, model))
-    fresh = swept.runs - swept.n_resumed
-    shown = [f"{swept.runs} runs, {swept.n_resumed} of them done before, {swept.failed} failed"]
-    if swept.damaged:
-        shown.append(f"{swept.damaged} damaged lines of the earlier sweep's journal were left out, and run again")
-    if fresh:
-        shown.append(f"{fresh} runs in {swept.seconds:.3g} s: {fresh / swept.seconds:.4g} runs/s")
-    terminal.print_result(swept, *shown, folder=swept.folder, failed=describe_failures(swept) if swept.failed else ())
+        result = sweep_file.run_sweep(request, terminal.out, scheduler, workers, partial(report, model))
+    n_new = result.runs - result.n_resumed
+    output = [f"{result.runs} runs, {result.n_resumed} of them resumed, {result.failed} failed"]
+    if result.damaged:
+        output.append(f"{result.damaged} damaged lines of the journal were ignored; their runs were repeated")
+    if n_new:
+        output.append(f"{n_new} runs in {result.seconds:.3g} s: {n_new / result.seconds:.4g} runs/s")
+    terminal.print_result(
+        result, *output, folder=result.folder, failed=describe_failures(result) if result.failed else ()
+    )
 
 
-def describe_failures(swept: "SweepResult") -> Iterator[str]:
-    """How runs failed, alike ones together."""
-    yield f"{swept.failed} of {swept.runs} runs failed; each has its sentence in {swept.folder / 'sweep.csv'}"
-    for each in swept.failures[:MAX_FAILURE_KINDS]:
-        where = ", ".join(f"{name} = {value!r}" for name, value in each.where.items())
-        yield f"{each.runs} like {where}: {each.sentence}"
-    if len(swept.failures) > MAX_FAILURE_KINDS:
-        yield f"and {len(swept.failures) - MAX_FAILURE_KINDS} other kinds"
+def describe_failures(result: "SweepResult") -> Iterator[str]:
+    """Yield one sentence for each kind of failure."""
+    yield f"{result.failed} of {result.runs} runs failed; see the error column of {result.folder / 'sweep.csv'}"
+    for failure in result.failures[:MAX_FAILURE_KINDS]:
+        where = ", ".join(f"{name} = {value!r}" for name, value in failure.where.items())
+        yield f"{failure.runs} run{'s' * (failure.runs > 1)}, such as {where}: {failure.sentence}"
+    if len(result.failures) > MAX_FAILURE_KINDS:
+        yield f"and {len(result.failures) - MAX_FAILURE_KINDS} other kinds of failures"

@@ -1,6 +1,6 @@
-"""What the commands share at the terminal: options, the progress bar, tables, numbers as JSON.
+"""Options, progress bar and output (tables or JSON) that the commands share.
 
-What takes long to import is imported where it is used: help and small commands start at once.
+Slow imports are local to functions, so that help and short commands start at once.
 """
 
 import os
@@ -20,24 +20,25 @@ import click
 from ..errors import HarnessError
 from ..process.interrupt import check_interrupt
 from ..process.temporary_directory import temporary_root
+from .renamed_option import FORMER_TIMEOUT, RenamedOption
 
 
 def out_option(text: str) -> Callable[..., Any]:
-    """The option that names the folder of results, and what is said of it."""
+    """Return the option --out with a help text."""
     folder = click.Path(file_okay=False, path_type=Path)
     return click.option("--out", type=folder, default=Path("results"), show_default=True, help=text)
 
 
-default_out_option = out_option("Folder that receives one folder for each scene.")
+default_out_option = out_option("Folder for the results, with one subfolder per scene.")
 quiet_option = click.option("--quiet", is_flag=True, help="Print errors only.")
-json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON, and nothing else.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print only the result, as JSON.")
 
 
-def allow_overwrite(context: click.Context, option: click.Parameter, wanted: bool) -> None:
-    """Say so where results are written."""
+def allow_overwrite(context: click.Context, option: click.Parameter, requested: bool) -> None:
+    """Allow results to be replaced in this process."""
     from ..results.folder import OVERWRITE as allowed
 
-    allowed.set(allowed.get() or wanted)
+    allowed.set(allowed.get() or requested)
 
 
 overwrite_option = click.option(
@@ -45,27 +46,27 @@ overwrite_option = click.option(
     is_flag=True,
     expose_value=False,
     callback=allow_overwrite,
-    help="Replace the result of something else.",
+    help="Replace an existing result of another scene, FMU or file.",
 )
 
 
 def result_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options of all commands that have results: they become its `terminal`."""
+    """Add the options of all commands with results; the command receives them as `terminal`."""
 
     @wraps(command)
-    def told(out: Path, quiet: bool, as_json: bool, **others: Any) -> Any:
+    def wrapper(out: Path, quiet: bool, as_json: bool, **others: Any) -> Any:
         return command(terminal=Terminal(quiet, as_json, out), **others)
 
-    return default_out_option(overwrite_option(quiet_option(json_option(told))))
+    return default_out_option(overwrite_option(quiet_option(json_option(wrapper))))
 
 
 class FiniteFloat(click.FloatRange):
-    """A finite number, in a range or not; click lets NaN through, which is in no range."""
+    """A finite number, optionally in a range. click accepts NaN."""
 
     name = "number"
 
     def _describe_range(self) -> str:
-        """Of a range without ends click says that it ends at None."""
+        """Return no text for an unbounded range, which click describes as None."""
         return "" if self.min is self.max is None else super()._describe_range()
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
@@ -76,30 +77,40 @@ class FiniteFloat(click.FloatRange):
 
 
 FINITE, POSITIVE = FiniteFloat(), FiniteFloat(min=0, min_open=True)
-STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s (the FMU's own).")
-EXTERNAL_FMU_OPTIONS = (  # what is said of an FMU that does not show its solver's steps
-    click.option("--tolerance", type=POSITIVE, default=1e-6, show_default=True, help="To which it is run, relative."),
-    click.option("--exchange", is_flag=True, help="Run it by model exchange, where it offers both."),
-    click.option("--lenient", is_flag=True, help="Run it though it breaks the standard."),
-    click.option("--timeout", type=POSITIVE, default=60.0, show_default=True, help="For one call of it, in s."),
+STOP_OPTION = click.option("--stop", type=FINITE, help="Stop time in s. Default: that of the FMU.")
+EXTERNAL_FMU_OPTIONS = (  # for FMUs that do not expose their solver steps
+    click.option("--tolerance", type=POSITIVE, default=1e-6, show_default=True, help="Relative tolerance of the run."),
+    click.option("--exchange", is_flag=True, help="Use model exchange if the FMU offers both interfaces."),
+    click.option("--lenient", is_flag=True, help="Run the FMU even if it violates the FMI standard."),
+    click.option(
+        *("--timeout", FORMER_TIMEOUT, "timeout"),
+        cls=RenamedOption,
+        type=POSITIVE,
+        default=60.0,
+        show_default=True,
+        help="Seconds allowed for one FMI call.",
+    ),
 )
 
 
 def run_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options of commands that run anyone's FMUs: fields of a Specification."""
+    """Add the options of commands that run FMUs; they are fields of a Specification."""
     for option in reversed((STOP_OPTION, *EXTERNAL_FMU_OPTIONS)):
         command = option(command)
     return command
 
 
 def prepare_process() -> None:
-    """Let standard output take every letter, a closed stream be an empty one, temporary files lie where every library
-    finds them, and numpy's products be summed by one thread: several sum in another order, and mostly wait."""
+    """Prepare this process for a command.
+
+    Unencodable characters are replaced, closed standard streams become empty ones, every library uses the same
+    temporary folder, and BLAS uses one thread: several threads change the order of summation and mostly wait.
+    """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for name in ("stdin", "stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
-            setattr(sys, name, open(os.devnull, "r+", encoding="utf-8"))  # noqa: SIM115 - as long as the process
+            setattr(sys, name, open(os.devnull, "r+", encoding="utf-8"))  # noqa: SIM115 - open until the process exits
         elif isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="replace")
     tempfile.tempdir = os.environ["TMPDIR"] = str(temporary_root())
@@ -107,13 +118,13 @@ def prepare_process() -> None:
 
 @contextmanager
 def progress(quiet: bool, total: int) -> Iterator[Callable[[str, float], None]]:
-    """A bar on standard error, gone at the end; yields what tells it the present scene and its share done."""
+    """Show a progress bar on standard error; yield a callback that takes the current scene and its fraction done."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(file=sys.stderr)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    if quiet or not console.is_terminal:  # a bar that is told to be silent writes an empty line, until rich 14.2
+    if quiet or not console.is_terminal:  # a disabled bar writes an empty line before rich 14.2
         yield lambda name, share: check_interrupt()
         return
     with (
@@ -141,7 +152,7 @@ def print_json(result: Any) -> None:
 
 @dataclass(frozen=True)
 class Terminal:
-    """How a command answers: errors only if `quiet`, JSON only if `as_json`; `out`: the folder of its results."""
+    """Output of a command: only errors if `quiet`, only JSON if `as_json`; `out` is the folder for results."""
 
     quiet: bool
     as_json: bool
@@ -151,22 +162,38 @@ class Terminal:
         return progress(self.quiet or self.as_json, total)
 
     def print_result(self, result: Any, *shown: Any, folder: Path | None = None, failed: Iterable[str] = ()) -> None:
-        """Print a result as JSON, or, unless all is to be quiet, the tables and sentences that people are shown; last
-        what is said of the older result in its folder, and where that is.  HarnessError if something has `failed`."""
+        """Print the result as JSON, or as tables and sentences unless quiet.
+
+        Parameters
+        ----------
+        result
+            Data for JSON output.
+        *shown
+            Tables and sentences to print otherwise.
+        folder
+            Folder of the result; printed last, with a note if an earlier result was replaced.
+        failed
+            Error messages.
+
+        Raises
+        ------
+        HarnessError
+            If `failed` is not empty.
+        """
         from rich.console import Console
         from rich.table import Table
 
         if self.as_json:
             print_json(result)
         elif not self.quiet:
-            console = Console(markup=False, highlight=False)  # units and names have brackets, too
-            for each in shown:
-                for column in each.columns if isinstance(each, Table) else ():
-                    column.overflow = "fold"  # a name that is cut is not told
-                console.print(each)
+            console = Console(markup=False, highlight=False)  # brackets in units and names are not markup
+            for block in shown:
+                for column in block.columns if isinstance(block, Table) else ():
+                    column.overflow = "fold"  # wrap long names instead of cutting them
+                console.print(block)
             if folder:
                 from ..results.provenance import replacement_note
 
                 console.print("\n".join(filter(None, (replacement_note(folder), f"Results in {folder}"))))
-        if sentences := [*failed]:
-            raise HarnessError("\n".join(sentences))
+        if messages := [*failed]:
+            raise HarnessError("\n".join(messages))

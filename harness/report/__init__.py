@@ -1,1 +1,1 @@
-"""The report: one self-contained page about all results on disk."""
+"""Report: a self-contained HTML page of all results on disk."""

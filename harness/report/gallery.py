@@ -1,4 +1,4 @@
-"""What the page begins with: the oscillators, each with a picture of its motion and of its phase plane."""
+"""Gallery at the top of the page: each oscillator with its motion and its phase plane."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from .svg_curve import draw_curve
 
 @dataclass(frozen=True)
 class GalleryEntry:
-    """A model in words and two drawings, with the name of the published case that they show."""
+    """A model with its description, two drawings, and the name of the published case that they show."""
 
     name: str
     text: str
@@ -21,9 +21,11 @@ class GalleryEntry:
 
 
 def build_gallery(scenes: Sequence[PublishedScene], results: Path) -> tuple[GalleryEntry, ...]:
-    """The published cases that say what their model does, as far as they have been run; one that cannot be read is
-    told of further down."""
-    found = []
+    """Return the published cases that have a description and results.
+
+    Unreadable results are skipped; their section reports them.
+    """
+    entries = []
     for scene in scenes:
         path = results / scene.name / TRAJECTORY_FILE
         if not scene.about or not path.is_file():
@@ -34,5 +36,5 @@ def build_gallery(scenes: Sequence[PublishedScene], results: Path) -> tuple[Gall
             drawings = draw_curve(t, x, f"{name}: position over time"), draw_curve(x, v, f"{name}: speed over position")
         except (OSError, ValueError):
             continue
-        found.append(GalleryEntry(name, scene.about, scene.name, drawings))
-    return tuple(found)
+        entries.append(GalleryEntry(name, scene.about, scene.name, drawings))
+    return tuple(entries)

@@ -1,4 +1,4 @@
-"""The page itself; the only home of HTML in the harness."""
+"""Writes the HTML page. All HTML of the harness is in page.html."""
 
 import os
 import platform
@@ -20,49 +20,53 @@ FILE = "report.html"
 TEMPLATE = Environment(
     loader=PackageLoader(__package__, "."), autoescape=True, undefined=StrictUndefined, trim_blocks=True
 ).get_template("page.html")
-LIVE_PAGE = Path("fmus/web/index.html")  # the page that runs, where it has been built
+LIVE_PAGE = Path("fmus/web/index.html")  # the interactive page, if it has been built
 ADVICE = (
-    "Dry friction that must hold: the law hybrid. Stick and slip are modes, what is stuck does not creep, and every "
-    "change of mode is an event at its own time.",
-    "Where the model is linear between events: the method exact. It costs least, and is right to rounding.",
-    "The laws sign and threshold are there to show what the usual shortcuts cost: they chatter.",
-    "The magic formula where a smooth curve is wanted: the method rodas, since it is stiff.",
+    "For dry friction with sticking use the law hybrid: stick and slip are modes, a stuck body does not creep, and "
+    "every change of mode is located as an event.",
+    "If the model is linear between events, use the method exact: it is the fastest and accurate to rounding.",
+    "The laws sign and threshold show the cost of common approximations: they chatter.",
+    "For a smooth friction curve use the magic formula with the method rodas, because it is stiff.",
 )
 
 
 @dataclass(frozen=True)
 class ReportPage:
-    """Where the page was written, and what it could not show: name and command of each."""
+    """Path of the written page, and the missing results: name and command of each."""
 
     path: Path
     missing: tuple[tuple[str, str], ...]
 
 
 def write_report(results: Path, scenes: Sequence[PublishedScene]) -> ReportPage:
-    """Write the page of all results below a folder into it; HarnessError if there are none."""
-    found = build_sections(results, scenes)
-    if not any(part.grid or part.pictures or part.unreadable for section in found for part in section.parts):
-        raise HarnessError(
-            f"there are no results in {results}: make some with `python -m harness`, or name another --out"
-        )
+    """Write the page of all results in a folder to that folder.
+
+    Raises
+    ------
+    HarnessError
+        If there are no results or the page cannot be written.
+    """
+    page_sections = build_sections(results, scenes)
+    if not any(part.grid or part.pictures or part.unreadable for section in page_sections for part in section.parts):
+        raise HarnessError(f"no results in {results}: run `python -m harness`, or choose another --out")
     path = results / FILE
-    fresh = path.with_suffix(".new")
+    temporary = path.with_suffix(".new")
     try:
-        fresh.write_text(
-            render_page(found, build_gallery(scenes, results), results), encoding="utf-8", errors="replace"
+        temporary.write_text(
+            render_page(page_sections, build_gallery(scenes, results), results), encoding="utf-8", errors="replace"
         )
-        fresh.replace(path)
+        temporary.replace(path)
     except OSError as error:
         raise HarnessError(f"cannot write {path}: {error.strerror}") from None
-    return ReportPage(path, tuple(gap for section in found for gap in section.missing))
+    return ReportPage(path, tuple(gap for section in page_sections for gap in section.missing))
 
 
-def render_page(found: list[Section], sketches: tuple[GalleryEntry, ...], results: Path) -> str:
-    """The HTML text of a page that lies in the folder of the results."""
-    measured = [part.sentences for section in found if section.name == "precision" for part in section.parts]
+def render_page(page_sections: list[Section], sketches: tuple[GalleryEntry, ...], results: Path) -> str:
+    """Return the HTML of the page; its links are relative to the results folder."""
+    measured = [part.sentences for section in page_sections if section.name == "precision" for part in section.parts]
     return TEMPLATE.render(
-        beside=lambda file: quote(os.fsencode(Path(os.path.relpath(file, results)).as_posix())),
-        sections=found,
+        relative_link=lambda file: quote(os.fsencode(Path(os.path.relpath(file, results)).as_posix())),
+        sections=page_sections,
         sketches=sketches,
         advice=ADVICE,
         measured=[split_clauses(sentence) for sentences in measured for sentence in sentences],
@@ -73,7 +77,7 @@ def render_page(found: list[Section], sketches: tuple[GalleryEntry, ...], result
 
 
 def split_clauses(sentence: str) -> tuple[str, list[str]]:
-    """A long piece of advice: the model that it is about, and its clauses, each of which may hold brackets.
+    """Split a long recommendation into the model and its clauses; semicolons in parentheses do not separate clauses.
 
     >>> clauses("smd: use exact (1e-15; ode45 2 times); no more.")
     ('smd', ['use exact (1e-15; ode45 2 times)', 'no more'])

@@ -1,4 +1,4 @@
-"""What the report shows, read from results on disk; what is not there is named with the command that makes it."""
+"""Sections of the report, read from results on disk; missing results are listed with their commands."""
 
 import csv
 import json
@@ -19,12 +19,12 @@ from ..results.quantity import format_interval as spelled_interval
 from ..results.step_sizes import step_size_quantities as step_sizes
 
 TRAJECTORY_FILE = "trajectory.csv"
-SHORTEST = 12  # decimals cut from long numbers in cells
+MIN_LENGTH = 12  # cells longer than this are shortened to four digits
 
 
 @dataclass(frozen=True)
 class PublishedScene:
-    """A scene with figures that others published: its name, that of its model, and what this does, where it says so."""
+    """A scene with published values: its name, its model, and a description of the model (may be empty)."""
 
     name: str
     model: str
@@ -33,7 +33,7 @@ class PublishedScene:
 
 @dataclass(frozen=True)
 class Picture:
-    """An SVG file, the same as a data address, and its text alternative."""
+    """An SVG file, its content as a data URL, and its text alternative."""
 
     file: Path
     data: str
@@ -42,7 +42,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class TableCells:
-    """A table: its headings and its rows of texts."""
+    """A table: headings and rows of text."""
 
     heads: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -50,7 +50,7 @@ class TableCells:
 
 @dataclass(frozen=True)
 class SectionItem:
-    """A piece of a section: heading, sentences, table and pictures, as far as there are any, sentences on
+    """A piece of a section: heading, sentences, table and pictures, if any, sentences on
     their origin, and files of its numbers; `lost` if its results could not be read, which a sentence says."""
 
     title: str
@@ -64,7 +64,7 @@ class SectionItem:
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the page; `missing` names what its results lack, and the commands that make them."""
+    """A section of the page; `missing` lists missing results and the commands that create them."""
 
     name: str
     title: str
@@ -74,274 +74,296 @@ class Section:
 
 
 def build_sections(results: Path, scenes: Sequence[PublishedScene]) -> list[Section]:
-    """Every section, from the results below a folder; those of the published scenes stand first."""
-    found = [
-        *(oscillators(scenes, results), runs(scenes, results), decays(results), steps(scenes, results)),
-        *(precision(scenes, results), stability(results), importers(results), sweeps(results)),
-        *(comparisons(results), coupled(results), bench(results)),
+    """Return all sections for the results in a folder, published scenes first."""
+    sections = [
+        *(oscillators_section(scenes, results), runs_section(scenes, results)),
+        *(decay_section(results), steps_section(scenes, results)),
+        *(precision_section(scenes, results), stability_section(results), importers_section(results)),
+        *(sweeps_section(results), comparisons_section(results), coupled_section(results), bench_section(results)),
     ]
-    return [each for each in found if each.parts or each.missing]
+    return [section for section in sections if section.parts or section.missing]
 
 
-def section(name: str, title: str, intro: str, parts: list[SectionItem], lack: str, command: str) -> Section:
-    """A section that lacks nothing as soon as it has a part."""
-    return Section(name, title, intro, tuple(parts), () if parts else ((lack, f"python -m harness {command}"),))
+def make_section(
+    name: str, title: str, intro: str, parts: list[SectionItem], missing_name: str, command: str
+) -> Section:
+    """Return a section whose results are missing if it has no parts."""
+    return Section(name, title, intro, tuple(parts), () if parts else ((missing_name, f"python -m harness {command}"),))
 
 
-def items(results: Path, pattern: str, show: Callable[[Path], SectionItem]) -> list[SectionItem]:
-    """What is shown of every file of a pattern below a folder; of the folder that holds it, where that is free."""
+def read_items(results: Path, pattern: str, show: Callable[[Path], SectionItem]) -> list[SectionItem]:
+    """Return an item for every file that matches a pattern, or for its folder if the pattern has a wildcard."""
     files = sorted(results.glob(pattern))
-    return [read(file.parent if "*" in pattern else file, show) for file in files]
+    return [read_item(file.parent if "*" in pattern else file, show) for file in files]
 
 
-def read(place: Path, make: Callable[[Path], SectionItem]) -> SectionItem:
-    """What is made of a file or folder of results; a sentence in its place if that holds something else."""
+def read_item(path: Path, make: Callable[[Path], SectionItem]) -> SectionItem:
+    """Return the item of a file or folder of results, or an item with the reason why it cannot be read."""
     try:
-        part = make(place)
-        return replace(part, origin=origin(place), files=numbers(place)) if part.grid or part.pictures else part
-    except Exception as error:  # it may hold anything: half of a file, another version's, somebody else's
+        part = make(path)
+        return replace(part, origin=read_origin(path), files=csv_files(path)) if part.grid or part.pictures else part
+    except Exception as error:  # the content may be truncated, of another version or of another program
         return SectionItem(
-            place.name,
-            (f"{place} cannot be shown ({type(error).__name__}: {first_line(error)[:100]}).",),
+            path.name,
+            (f"{path} cannot be shown ({type(error).__name__}: {first_line(error)[:100]}).",),
             unreadable=True,
         )
 
 
-def origin(place: Path) -> tuple[str, ...]:
-    """Where the results at a place came from: told in their folder, or in a file of their own beside them."""
-    own = place.with_suffix(".json")
+def read_origin(path: Path) -> tuple[str, ...]:
+    """Return the provenance of results, from their folder or from a JSON file of the same name."""
+    own = path.with_suffix(".json")
     return provenance.summarize_provenance(
-        own if own.is_file() else (place if place.is_dir() else place.parent) / provenance.FILE
+        own if own.is_file() else (path if path.is_dir() else path.parent) / provenance.FILE
     )
 
 
-def numbers(place: Path) -> tuple[Path, ...]:
-    """The CSV files of the results at a place: those in its folder, or those whose names begin with its own."""
-    return tuple(sorted(place.glob("*.csv") if place.is_dir() else place.parent.glob(f"{place.stem}*.csv")))
+def csv_files(path: Path) -> tuple[Path, ...]:
+    """Return the CSV files of results: those in the folder, or those whose names start with the name of the file."""
+    return tuple(sorted(path.glob("*.csv") if path.is_dir() else path.parent.glob(f"{path.stem}*.csv")))
 
 
-def oscillators(scenes: Sequence[PublishedScene], results: Path) -> Section:
+def oscillators_section(scenes: Sequence[PublishedScene], results: Path) -> Section:
     parts, missing = [], []
     for scene in scenes:
-        said = (scene.about,) if scene.about else ()
+        sentences = (scene.about,) if scene.about else ()
         if (results / scene.name / "quantities.csv").is_file():
-            parts.append(read(results / scene.name, partial(oscillator, said)))
+            parts.append(read_item(results / scene.name, partial(oscillator_item, sentences)))
         else:
             missing.append((scene.name, f"python -m harness run {scene.name}"))
-            parts += [SectionItem(scene.name, said)] if said else []
-    intro = "What each of them does, with figures measured here beside those that were published."
+            parts += [SectionItem(scene.name, sentences)] if sentences else []
+    intro = "Each model with its measured quantities next to the published values."
     return Section("oscillators", "The oscillators", intro, tuple(parts), tuple(missing))
 
 
-def oscillator(said: tuple[str, ...], folder: Path) -> SectionItem:
-    picture = drawn(folder / "figure.svg", f"{folder.name}: position, velocity and phase plane of the run")
-    return SectionItem(folder.name, said, table(folder / "quantities.csv", cut=False), picture)
+def oscillator_item(sentences: tuple[str, ...], folder: Path) -> SectionItem:
+    picture = read_picture(folder / "figure.svg", f"{folder.name}: position, velocity and phase plane of the run")
+    return SectionItem(folder.name, sentences, read_table(folder / "quantities.csv", cut=False), picture)
 
 
-def runs(scenes: Sequence[PublishedScene], results: Path) -> Section:
-    """What was run besides: scenes and FMUs of whoever reads the page."""
+def runs_section(scenes: Sequence[PublishedScene], results: Path) -> Section:
+    """Section of runs without published values: user scenes and FMUs."""
     cases = [scene.name for scene in scenes]
-    found = sorted(file.parent for file in results.glob(f"[!.]*/{TRAJECTORY_FILE}"))
-    others = [folder for folder in found if folder.name not in cases or not (folder / "quantities.csv").is_file()]
-    intro = "Scenes and FMUs of one's own, from their first value to their last."
-    return Section("runs", "Other runs", intro, tuple(read(folder, own) for folder in others), ())
+    folders = sorted(file.parent for file in results.glob(f"[!.]*/{TRAJECTORY_FILE}"))
+    others = [folder for folder in folders if folder.name not in cases or not (folder / "quantities.csv").is_file()]
+    intro = "User scenes and FMUs, with first and last values."
+    return Section("runs", "Other runs", intro, tuple(read_item(folder, run_item) for folder in others), ())
 
 
-def own(folder: Path) -> SectionItem:
-    figures, recorded = folder / "quantities.csv", table(folder / TRAJECTORY_FILE)
-    rows = tuple(zip(recorded.heads, recorded.rows[0], recorded.rows[-1], strict=True))
-    grid = table(figures, cut=False) if figures.is_file() else TableCells(("", "first", "last"), rows)
-    return SectionItem(
-        folder.name, (), grid, drawn(folder / "figure.svg", f"{folder.name}: the plots that its scene names")
-    )
+def run_item(folder: Path) -> SectionItem:
+    quantities, trajectory = folder / "quantities.csv", read_table(folder / TRAJECTORY_FILE)
+    rows = tuple(zip(trajectory.heads, trajectory.rows[0], trajectory.rows[-1], strict=True))
+    grid = read_table(quantities, cut=False) if quantities.is_file() else TableCells(("", "first", "last"), rows)
+    return SectionItem(folder.name, (), grid, read_picture(folder / "figure.svg", f"{folder.name}: plots of the run"))
 
 
-def decays(results: Path) -> Section:
-    intro = "Damping and dry friction told apart, by the whole signal and by its turning points, with 95 % margins."
-    parts = items(results, "decay/[!.]*/decay.json", decay)
-    return section("decay", "Decay", intro, parts, "a decay", "decay coulomb")
+def decay_section(results: Path) -> Section:
+    intro = "Damping, dry friction and drag from the whole signal and from its turning points, with 95 % intervals."
+    parts = read_items(results, "decay/[!.]*/decay.json", decay_item)
+    return make_section("decay", "Decay", intro, parts, "a decay", "decay coulomb")
 
 
-def decay(folder: Path) -> SectionItem:
-    found = json.loads((folder / "decay.json").read_text(encoding="utf-8"))
-    ways = [{one["name"]: interval(one) for one in found[way]} for way in ("fit", "turning_points", "published")]
+def decay_item(folder: Path) -> SectionItem:
+    data = json.loads((folder / "decay.json").read_text(encoding="utf-8"))
+    estimates = [
+        {quantity["name"]: format_estimate(quantity) for quantity in data[by_name]}
+        for by_name in ("fit", "turning_points", "published")
+    ]
     rows = tuple(
-        (one["text"], *(way.get(one["name"], "") for way in ways), "" if one["unit"] == "1" else one["unit"])
-        for one in found["fit"]
+        (
+            quantity["text"],
+            *(by_name.get(quantity["name"], "") for by_name in estimates),
+            "" if quantity["unit"] == "1" else quantity["unit"],
+        )
+        for quantity in data["fit"]
     )
     grid = TableCells(("", "whole signal", "turning points", "first and last peak", "unit"), rows)
-    said = found["sentence"]
-    text = f"Decay of {found['record']}: signal, turning points, envelope and fit, and residuals. {said}"
-    return SectionItem(found["record"], (said, *found["remarks"]), grid, drawn(folder / "figure.svg", text))
+    summary = data["sentence"]
+    text = f"Decay of {data['record']}: signal, turning points, envelope and fit, and residuals. {summary}"
+    return SectionItem(data["record"], (summary, *data["remarks"]), grid, read_picture(folder / "figure.svg", text))
 
 
-def steps(scenes: Sequence[PublishedScene], results: Path) -> Section:
+def steps_section(scenes: Sequence[PublishedScene], results: Path) -> Section:
     cases = [results / scene.name for scene in scenes if (results / scene.name / "steps.csv").is_file()]
-    made = [read(case, sizes) for case in cases]
-    rows = [row for part in made if part.grid for row in part.grid.rows]
-    heads = next((part.grid.heads for part in made if part.grid), ())
-    parts = [SectionItem("The solver's own steps", (), TableCells(heads, tuple(rows)))] if rows else []
-    parts += [part for part in made if not part.grid]
+    items = [read_item(case, steps_item) for case in cases]
+    rows = [row for part in items if part.grid for row in part.grid.rows]
+    heads = next((part.grid.heads for part in items if part.grid), ())
+    parts = [SectionItem("Internal steps of the solver", (), TableCells(heads, tuple(rows)))] if rows else []
+    parts += [part for part in items if not part.grid]
     intro = (
-        "Seen through solver.t_next, whatever the communication step. Where friction is a jump that the solver is not "
-        "told of, its steps collapse at every reversal; where stick and slip are modes, they do not."
+        "Internal steps, read from solver.t_next, independent of the communication step. If friction jumps without an "
+        "event, the steps collapse at every reversal; with stick and slip as modes they do not."
     )
     return Section("steps", "Steps", intro, tuple(parts), () if rows else (("steps", "python -m harness"),))
 
 
-def sizes(folder: Path) -> SectionItem:
-    """The row of one case."""
-    _, h, rejected = np.array(table(folder / "steps.csv", cut=False).rows, float).T
-    told = step_sizes(h, int(rejected.sum()))
-    row = (folder.name, *(" ".join(each.formatted()).strip() for each in told))
-    return SectionItem(folder.name, grid=TableCells(("case", *(each.text for each in told)), (row,)))
+def steps_item(folder: Path) -> SectionItem:
+    """Return the table row of one case."""
+    _, h, rejected = np.array(read_table(folder / "steps.csv", cut=False).rows, float).T
+    quantities = step_sizes(h, int(rejected.sum()))
+    row = (folder.name, *(" ".join(quantity.formatted()).strip() for quantity in quantities))
+    return SectionItem(folder.name, grid=TableCells(("case", *(quantity.text for quantity in quantities)), (row,)))
 
 
-def precision(scenes: Sequence[PublishedScene], results: Path) -> Section:
+def precision_section(scenes: Sequence[PublishedScene], results: Path) -> Section:
     parts, missing, folder = [], [], results / "precision"
     models = {scene.model for scene in scenes}
     for model in sorted(models | {file.stem for file in folder.glob("*.svg")}):
         if not (folder / f"{model}.svg").is_file():
             missing.append((model, f"python -m harness precision {model}"))
             continue
-        parts.append(read(folder / model, tradeoff))
+        parts.append(read_item(folder / model, precision_item))
         if model in models and not (folder / f"{model}-exchange.csv").is_file():
-            again = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
-            missing.append((f"{model} in model exchange", again))
-    parts += items(folder, "anchors.csv", partial(whole, "Anchors from the literature"))
-    intro = "Error against run time and against right-hand sides; lower left is better. References are certified."
+            command = f"python build_fmus.py {model} --fmi 3 && python -m harness precision {model}"
+            missing.append((f"{model} in model exchange", command))
+    parts += read_items(folder, "anchors.csv", partial(table_item, "Problems from the literature"))
+    intro = "Error against run time and right-hand side evaluations; lower left is better. References are certified."
     return Section("precision", "Error against run time", intro, tuple(parts), tuple(missing))
 
 
-def tradeoff(place: Path) -> SectionItem:
-    """One model's, whose files begin with its name."""
-    picture = drawn(
-        place.with_suffix(".svg"), f"{place.name}: run time and right-hand sides over the largest error, by method"
+def precision_item(path: Path) -> SectionItem:
+    """Return the item of one model, whose files start with its name."""
+    picture = read_picture(
+        path.with_suffix(".svg"),
+        f"{path.name}: run time and right-hand side evaluations over the largest error, by method",
     )
-    text, exchanged = place.with_suffix(".txt"), place.with_name(f"{place.name}-exchange.csv")
-    said = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
-    return SectionItem(place.name, said, table(exchanged) if exchanged.is_file() else None, picture)
+    text, exchanged = path.with_suffix(".txt"), path.with_name(f"{path.name}-exchange.csv")
+    sentences = (text.read_text(encoding="utf-8").strip(),) if text.is_file() else ()
+    return SectionItem(path.name, sentences, read_table(exchanged) if exchanged.is_file() else None, picture)
 
 
-def stability(results: Path) -> Section:
-    intro = "Every case either finishes within its error bound or is refused with a sentence: none hangs, none lies."
-    parts = items(results, "stability/stability.csv", endings)
-    return section("stability", "Stability", intro, parts, "stability", "stability")
+def stability_section(results: Path) -> Section:
+    intro = "Every case either finishes within its error bound or is rejected with an error message; none hangs."
+    parts = read_items(results, "stability/stability.csv", stability_item)
+    return make_section("stability", "Stability", intro, parts, "stability", "stability")
 
 
-def endings(file: Path) -> SectionItem:
-    found = table(file, cut=False)
-    at = {name: i for i, name in enumerate(found.heads)}
-    counts = Counter((row[at["model"]], row[at["method"]], row[at["ended"]]) for row in found.rows)
+def stability_item(file: Path) -> SectionItem:
+    cells = read_table(file, cut=False)
+    column = {name: i for i, name in enumerate(cells.heads)}
+    counts = Counter((row[column["model"]], row[column["method"]], row[column["ended"]]) for row in cells.rows)
     kinds = sorted({ending for _, _, ending in counts})
     pairs = sorted({(model, method) for model, method, _ in counts})
     rows = tuple((*pair, *(str(counts[(*pair, kind)]) for kind in kinds)) for pair in pairs)
-    picture = drawn(
-        file.with_name("region.svg"), "Steps of each method over the speed at the peak of the friction curve"
+    picture = read_picture(
+        file.with_name("region.svg"),
+        "Internal steps of each method over x_m, the speed of maximum friction",
     )
-    text = f"{len(found.rows)} stiff and extreme cases; how each ended:"
-    return SectionItem("Endings", (text,), TableCells(("model", "method", *kinds), rows), picture)
+    text = f"{len(cells.rows)} stiff and extreme cases; number of each outcome:"
+    return SectionItem("Outcomes", (text,), TableCells(("model", "method", *kinds), rows), picture)
 
 
-def importers(results: Path) -> Section:
-    parts = items(results, "importers/importers.csv", partial(whole, "Checks"))
-    intro = "The same FMUs in other tools, beside fmpy."
-    return section("importers", "Importers", intro, parts, "importers", "importers")
+def importers_section(results: Path) -> Section:
+    parts = read_items(results, "importers/importers.csv", partial(table_item, "Checks"))
+    intro = "The same FMUs in other tools, compared with fmpy."
+    return make_section("importers", "Importers", intro, parts, "importers", "importers")
 
 
-def sweeps(results: Path) -> Section:
+def sweeps_section(results: Path) -> Section:
     command = "sweep stickslip --vary mu_d=0.3:0.9:60 --vary v_driver=0.01:0.1:60 --measure slips"
-    intro = "What happens over many parameters; known boundaries are dashed."
-    return section("sweeps", "Sweeps", intro, items(results, "sweep/[!.]*/sweep.csv", swept), "a sweep", command)
+    intro = "Parameter sweeps; known boundaries are dashed."
+    return make_section(
+        "sweeps", "Sweeps", intro, read_items(results, "sweep/[!.]*/sweep.csv", sweep_item), "a sweep", command
+    )
 
 
-def swept(folder: Path) -> SectionItem:
+def sweep_item(folder: Path) -> SectionItem:
     with (folder / "sweep.csv").open(encoding="utf-8", newline="") as file:
-        rows = csv.reader(file)  # one at a time: there may be millions
+        rows = csv.reader(file)  # read row by row: there may be millions
         heads = next(rows)
-        place = heads.index("error")
-        failed = Counter(bool(row[place]) for row in rows)
-    measured = ", ".join(heads[:place])
+        error_column = heads.index("error")
+        failed = Counter(bool(row[error_column]) for row in rows)
+    measured = ", ".join(heads[:error_column])
     text = f"{failed.total()} runs, {failed[True]} failed. Columns: {measured}."
-    return SectionItem(folder.name, (text,), None, drawn(folder / "figure.svg", f"Sweep {folder.name}. {text}"))
+    return SectionItem(folder.name, (text,), None, read_picture(folder / "figure.svg", f"Sweep {folder.name}. {text}"))
 
 
-def comparisons(results: Path) -> Section:
-    intro, command = "How far two results or two FMUs are apart.", "compare results/coulomb results/coulomb-sign"
-    parts = items(results, "compare/[!.]*/compare.json", comparison)
-    return section("compare", "Comparisons", intro, parts, "a comparison", command)
+def comparisons_section(results: Path) -> Section:
+    intro, command = "Differences between two results or FMUs.", "compare results/coulomb results/coulomb-sign"
+    parts = read_items(results, "compare/[!.]*/compare.json", comparison_item)
+    return make_section("compare", "Comparisons", intro, parts, "a comparison", command)
 
 
-def comparison(folder: Path) -> SectionItem:
-    found = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
-    figures = {"largest": ".3e", "rms": ".3e", "relative": ".2e"}
+def comparison_item(folder: Path) -> SectionItem:
+    data = json.loads((folder / "compare.json").read_text(encoding="utf-8"))
+    formats = {"largest": ".3e", "rms": ".3e", "relative": ".2e"}
     rows = tuple(
-        (one["name"], *(digits(one[key], how) for key, how in figures.items()), one["unit"])
-        for one in found["variables"]
+        (variable["name"], *(format_cell(variable[key], spec) for key, spec in formats.items()), variable["unit"])
+        for variable in data["variables"]
     )
     grid = TableCells(("variable", "largest", "rms", "relative", "unit"), rows)
-    title = f"{found['one']['name']} and {found['two']['name']}"
-    said = tuple(filter(None, (found["one"]["note"], found["two"]["note"], found["events"])))
-    return SectionItem(title, said, grid, drawn(folder / "figure.svg", f"{title}, and their difference"))
+    title = f"{data['one']['name']} and {data['two']['name']}"
+    notes = tuple(filter(None, (data["one"]["note"], data["two"]["note"], data["events"])))
+    return SectionItem(title, notes, grid, read_picture(folder / "figure.svg", f"{title}, and their difference"))
 
 
-def coupled(results: Path) -> Section:
-    intro = "Several FMUs joined, run by an existing engine, beside one model of the whole."
-    parts = items(results, "coupled/[!.]*/error.csv", pair)
-    return section("coupled", "Coupled", intro, parts, "a coupled scene", "couple two-masses")
+def coupled_section(results: Path) -> Section:
+    intro = "Coupled FMUs, run by existing engines and compared with one model of the whole system."
+    parts = read_items(results, "coupled/[!.]*/error.csv", coupled_item)
+    return make_section("coupled", "Coupled", intro, parts, "a coupled scene", "couple two-masses")
 
 
-def pair(folder: Path) -> SectionItem:
-    alternative = f"Coupled scene {folder.name}: positions beside the monolithic reference, and error over the step"
-    return SectionItem(folder.name, (), table(folder / "error.csv"), drawn(folder / "figure.svg", alternative))
+def coupled_item(folder: Path) -> SectionItem:
+    alternative = (
+        f"Coupled scene {folder.name}: positions with the monolithic reference, and error over the communication step"
+    )
+    return SectionItem(
+        folder.name, (), read_table(folder / "error.csv"), read_picture(folder / "figure.svg", alternative)
+    )
 
 
-def bench(results: Path) -> Section:
-    parts = items(results, "bench/bench.csv", partial(whole, "Reached and seen"))
-    intro = "What was to be reached, and what was measured beside it."
-    return section("bench", "Numbers", intro, parts, "numbers", "bench")
+def bench_section(results: Path) -> Section:
+    parts = read_items(results, "bench/bench.csv", partial(table_item, "Targets and measurements"))
+    intro = "Targets, measured values and baselines of the same run."
+    return make_section("bench", "Benchmarks", intro, parts, "benchmarks", "bench")
 
 
-def whole(title: str, file: Path) -> SectionItem:
-    """All of a table."""
-    return SectionItem(title, (), table(file))
+def table_item(title: str, file: Path) -> SectionItem:
+    """Return an item with a whole table."""
+    return SectionItem(title, (), read_table(file))
 
 
-def drawn(file: Path, text: str) -> tuple[Picture, ...]:
-    """The picture in a file, if there is one."""
+def read_picture(file: Path, text: str) -> tuple[Picture, ...]:
+    """Return the picture in a file, or nothing if there is no file.
+
+    Raises
+    ------
+    ValueError
+        If the file is not a complete SVG drawing.
+    """
     if not file.is_file():
         return ()
     data = file.read_bytes()
     if not (b"<svg" in data and data.rstrip().endswith(b"</svg>")):
-        raise ValueError(f"{file.name} is not a whole SVG drawing")
+        raise ValueError(f"{file.name} is not a complete SVG drawing")
     return (Picture(file, f"data:image/svg+xml;base64,{b64encode(data).decode()}", text),)
 
 
-def table(file: Path, cut: bool = True) -> TableCells:
-    """The table in a CSV file; `cut`: long numbers to four digits."""
+def read_table(file: Path, cut: bool = True) -> TableCells:
+    """Return the table in a CSV file; if `cut`, long numbers are shortened to four digits."""
     with file.open(encoding="utf-8", newline="") as text:
         heads, *rows = csv.reader(text)
     if any(len(row) != len(heads) for row in rows):
-        raise ValueError(f"a row of {file.name} has more or fewer cells than its heading")
-    return TableCells(tuple(heads), tuple(tuple(shortened(cell) if cut else cell for cell in row) for row in rows))
+        raise ValueError(f"the rows of {file.name} and its heading differ in length")
+    return TableCells(tuple(heads), tuple(tuple(shorten(cell) if cut else cell for cell in row) for row in rows))
 
 
-def shortened(cell: str) -> str:
-    """A number of many digits with four of them."""
+def shorten(cell: str) -> str:
+    """Shorten a long number to four digits."""
     try:
-        return f"{float(cell):.4g}" if len(cell) > SHORTEST else cell
+        return f"{float(cell):.4g}" if len(cell) > MIN_LENGTH else cell
     except ValueError:
         return cell
 
 
-def digits(number: float | None, how: str) -> str:
-    """A number written so; none where JSON had no number for it."""
-    return "not finite" if number is None else f"{number:{how}}"
+def format_cell(number: float | None, spec: str) -> str:
+    """Format a number, which is None in JSON if it is not finite."""
+    return "not finite" if number is None else f"{number:{spec}}"
 
 
-def interval(one: dict[str, Any]) -> str:
-    """Value and 95 % interval."""
-    if one["value"] is None:
+def format_estimate(estimate: dict[str, Any]) -> str:
+    """Format a value with its 95 % interval."""
+    if estimate["value"] is None:
         return "not finite"
-    low, high = (nan if one[end] is None else one[end] for end in ("low", "high"))
-    return spelled_interval(one["value"], low, high)
+    low, high = (nan if estimate[end] is None else estimate[end] for end in ("low", "high"))
+    return spelled_interval(estimate["value"], low, high)

@@ -1,1 +1,1 @@
-"""Each one thing that the harness studies: the study, its table and its figure in one place."""
+"""Studies: each package holds one study with its tables and figures."""

@@ -20,7 +20,7 @@ def test_stick_before_and_rest_after_the_motion_are_excluded():
     )
     found = fit_decay(Record("held", 0.004 * np.arange(len(held)), held), KnownParameters())
     assert values(found.estimates)["r"] == pytest.approx(0.005, rel=1e-3)
-    assert "are left out" in remarks_text(found)
+    assert "are excluded" in remarks_text(found)
 
 
 def test_a_push_before_the_motion_is_excluded_and_reported():

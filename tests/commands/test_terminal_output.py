@@ -103,7 +103,7 @@ TABLES = {  # whose commands take long, filled with long words
                 [Benchmark("16 s of " + 9 * "words ", 0.0123, "s", 0.02, (Baseline("an empty FMU in Python", 0.1),))]
             )
         ],
-        "to reach",
+        "target",
     ),
     "importers": (
         [

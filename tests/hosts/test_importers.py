@@ -65,12 +65,12 @@ def test_an_fmu_unsuitable_for_the_checks_is_skipped_with_a_reason(tmp_path, mon
     monkeypatch.setattr(table, "IMPORTERS", ())
     path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
     (tmp_path / "rotor_brake.fmu").symlink_to(build_user_model(path) / "rotor_brake.fmu")
-    with pytest.raises(HarnessError, match="the checks want a mass m, an input, and an output of its unit"):
+    with pytest.raises(HarnessError, match="the checks require a mass m, an input, and an output of the same unit"):
         table.run_checks(tmp_path, print)
     path = next(path for path in LARGER_MODELS if path.stem == "belt")
     (tmp_path / "belt.fmu").symlink_to(build_user_model(path) / "belt.fmu")
     first, *_ = table.run_checks(tmp_path, print)
-    assert (first.importer, first.reason.split(",")[0]) == ("rotor_brake.fmu", "the checks want a mass m")
+    assert (first.importer, first.reason.split(",")[0]) == ("rotor_brake.fmu", "the checks require a mass m")
 
 
 def test_a_crash_or_timeout_affects_only_its_own_check(monkeypatch):
@@ -105,7 +105,7 @@ def test_a_crash_or_timeout_affects_only_its_own_check(monkeypatch):
             told[name] = str(wrong)
     assert told == {
         **{name: (name, f"{name} speaks") for name in ("one", "two", "three")},
-        **{"crash": "exit status -11: a reason", "hang": "hangs for 300 s", "leak": "exit status -6: a reason"},
+        **{"crash": "exit status -11: a reason", "hang": "no answer after 300 s", "leak": "exit status -6: a reason"},
     }
     assert asked == [names[:3], ["two"], names[3:], names[4:]]
     assert [table.name_with_version(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]
@@ -115,9 +115,9 @@ def test_an_excluded_tool_is_listed_with_the_reason():
     said = table.legend_lines(
         [table.CheckResult("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")]
     )
-    assert "Ecos was not asked: it is not installed: pip install -e '.[importers]'" in said
+    assert "Ecos was skipped: it is not installed: pip install -e '.[importers]'" in said
 
 
 def test_fmus_of_another_fmi_version_are_refused_in_one_sentence():
-    with pytest.raises(HarnessError, match=r"\.fmu is of FMI 3\.0; the importers are asked with FMUs of FMI 2\.0"):
+    with pytest.raises(HarnessError, match=r"\.fmu is an FMU for FMI 3\.0; the checks require FMI 2\.0"):
         table.run_checks(fmi3_fixtures.build_fmi3_fmus(), lambda name, share: None)

@@ -132,7 +132,7 @@ def test_the_csv_holds_every_value_and_the_provenance_every_parameter(tmp_path, 
     assert load_provenance(tmp_path / FOLDER)["parameters"]["smd: c"] == {"value": 2.0, "unit": "N.s/m"}
     with (tmp_path / FOLDER / FILE).open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [(row["measured"], row["its value"]) for row in rows] == [("2e-06", "5e-06"), ("2e-06", "")]
+    assert [(row["measured"], row["baseline value"]) for row in rows] == [("2e-06", "5e-06"), ("2e-06", "")]
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
@@ -215,7 +215,7 @@ def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene,
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_model_exchange_call_is_timed_against_that_of_a_reference_fmu(both_kinds, tmp_path, monkeypatch):
     """An FMU of ours stands for theirs, whose sources are not here: that is told."""
-    assert model_exchange.call_overhead("smd").baselines[0].name.startswith("not here: Reference-FMUs")
+    assert model_exchange.call_overhead("smd").baselines[0].name.startswith("not found: Reference-FMUs")
     sled = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
     monkeypatch.setattr(model_exchange, "build_bouncing_ball", lambda acceleration: sled)
     monkeypatch.setattr(model_exchange, "REPEATS", 10)

@@ -157,7 +157,7 @@ def test_an_external_archive_is_compared_with_its_finest_run(run, user_folder):
 
 def test_an_invalid_archive_is_reported(couple, tmp_path):
     (tmp_path / "no.ssp").write_text("no archive")
-    for name, sentence in (("no.ssp", "no.ssp cannot be read"), ("gone.ssp", "there is no gone.ssp")):
+    for name, sentence in (("no.ssp", "no.ssp cannot be read"), ("gone.ssp", "gone.ssp does not exist")):
         done = couple(name)
         assert sentence in done.stderr
         assert done.stderr.count("\n") == 1

@@ -50,7 +50,7 @@ def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples(tmp_pa
     assert shares.get_xlabel() == "amplitude [deg]"
     drawn = {line.get_label(): line.get_data() for line in signal.lines}
     assert np.degrees(1.0) == pytest.approx(np.max(drawn["record"][1]), rel=5e-3)
-    assert len(drawn.get("left out", [[]])[0]) == len(record.t) - len(found.t)
+    assert len(drawn.get("excluded", [[]])[0]) == len(record.t) - len(found.t)
     assert found.record.format_time(1.7e9 + 0.0125) == "1700000000.0125"
 
 
@@ -116,7 +116,7 @@ from harness.studies.decay.study import write_results
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
-write_results(fit_decay(swung(0.02), KnownParameters()), Path.cwd())
+write_results(identify(swung(0.02), Known()), Path.cwd())
 print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harness.scenes") if name in sys.modules])
 """
     done = subprocess.run(
@@ -137,7 +137,7 @@ print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harnes
         (["decay", "nosuch"], 2, "unknown scene 'nosuch'"),
         (["decay", "nosuch.csv"], 2, "cannot read nosuch.csv"),
         (["decay", "x.csv", "--k", "1", "--m", "1"], 2, "--k and --m"),
-        (["decay", "x.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: one column is fitted"),
+        (["decay", "x.csv", "--velocity", "v", "--position", "x"], 2, "--velocity: only one column is fitted"),
     ],
 )
 def test_a_wrong_command_line_is_one_sentence(fmus, tmp_path, arguments, status, sentence):

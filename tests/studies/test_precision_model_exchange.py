@@ -171,7 +171,7 @@ def test_the_command_shows_both_interfaces_and_error_against_tolerance(twice):
     heads, *table = csv.reader(files["smd-exchange.csv"].splitlines())
     assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "smd [1]"]
     assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
-    printed = said.partition("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol")[2]
+    printed = said.partition("FMI 3.0 model exchange with fmpy's CVode: largest error by rtol")[2]
     told = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
     assert told == [[advice.format_power(float(number)) if number else "-" for number in row] for row in table]
 

@@ -260,7 +260,7 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
     assert region.stiffness.tolist() == [0.1, 0.03]
     assert error_table(rows).row_count > 20
     assert refusal_table(rows).row_count > 5
-    assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as they should.")
+    assert summary(rows, []).startswith(f"{len(rows)} of {len(rows)} ended as expected.")
 
 
 def test_a_long_path_of_temporary_files_is_supported(tmp_path):
@@ -310,7 +310,7 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
     assert commands.build("relax.py", folder=tmp_path).returncode == 0
     done = commands.harness(tmp_path, "stability", "relax.py")
     assert (done.returncode, done.stdout) == (1, "")
-    said = "no state is the rate of another, and the scenes are about positions and speeds"
+    said = "no state is the rate of another one; the cases need a position and a speed"
     assert done.stderr == f"Error: relax.py: {said}\n"
     done = commands.harness(tmp_path, "precision", "relax.py", "--quick", blank=True)
     assert (done.returncode, done.stderr) == (0, "")

@@ -90,7 +90,7 @@ def test_a_map_is_labelled_for_xarray_and_pandas_for_any_number_of_workers(harne
     for workers in (1, 4):
         done = harness(*MAP, "--workers", workers, "--out", f"out{workers}", blank=workers == 1)
         assert (done.returncode, done.stderr) == (0, "")
-        assert "12 runs, 0 of them done before, 0 failed" in done.stdout
+        assert "12 runs, 0 of them resumed, 0 failed" in done.stdout
     one, four = (sweep_folder(tmp_path / f"out{workers}", "stickslip-mu_d-v_driver") for workers in (1, 4))
     for file in ("sweep.nc", "sweep.csv"):
         assert (one / file).read_bytes() == (four / file).read_bytes()
@@ -110,10 +110,13 @@ def test_failed_runs_are_reported_on_screen_in_files_and_in_the_exit_status(harn
     vary = ("--vary", "mu_d=0.5:1:5", "--vary", "m=-1,2")
     done = harness("sweep", "stickslip", *vary, "--set", "k=100", "--workers", 1, "--name", "mine")
     assert done.returncode == 1
-    assert "10 runs, 0 of them done before, 6 failed" in done.stdout
+    assert "10 runs, 0 of them resumed, 6 failed" in done.stdout
     first, *kinds = done.stderr.splitlines()
-    assert first.startswith("Error: 6 of 10 runs failed; each has its sentence in ")
-    assert [kind.partition(":")[0] for kind in kinds] == ["5 like mu_d = 0.5, m = -1.0", "1 like mu_d = 1.0, m = 2.0"]
+    assert first.startswith("Error: 6 of 10 runs failed; see the error column of ")
+    assert [kind.partition(":")[0] for kind in kinds] == [
+        "5 runs, such as mu_d = 0.5, m = -1.0",
+        "1 run, such as mu_d = 1.0, m = 2.0",
+    ]
     assert "m = -1.0" in kinds[0].partition(":")[2]
     assert kinds[1].endswith("lower mu_d or raise mu_s")
     data = open_sweep(tmp_path / "results/sweep/mine")
@@ -205,9 +208,9 @@ def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(harness, 
         (
             ["stickslip", "--vary", "mu_d=1:2:3"],
             1,
-            "none of three runs of the sweep comes to its end: mu_d is 1.0, above",
+            "three test runs of the sweep failed: mu_d is 1.0, above",
         ),
-        (["stickslip", "--vary", "friction=1.5,2"], 2, "friction is a choice"),
+        (["stickslip", "--vary", "friction=1.5,2"], 2, "friction is an enumeration"),
     ],
 )
 def test_an_invalid_sweep_is_one_sentence(harness, tmp_path, arguments, status, sentence):

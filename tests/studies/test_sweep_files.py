@@ -36,7 +36,7 @@ def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path)
         with kept.open():
             for first in range(0, len(sweep.points), 200):
                 kept.add(Block(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"}))
-        (failure,) = writing.save(sweep, kept, about, folder)
+        (failure,) = writing.write_files(sweep, kept, about, folder)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert failure.runs == len(sweep.points) // 200
@@ -103,5 +103,5 @@ def test_a_boundary_beyond_arithmetic_is_refused(tmp_path, quantity):
     with ZipFile(tmp_path / "odd.fmu", "w") as archive:
         table = f'[[boundaries]]\ntext = "a"\nbelow = "b"\nquantity = "{quantity}"\n'
         archive.writestr("documentation/boundaries.toml", table)
-    with pytest.raises(HarnessError, match=r"odd\.fmu: documentation/boundaries\.toml is not understood"):
+    with pytest.raises(HarnessError, match=r"odd\.fmu: documentation/boundaries\.toml is invalid"):
         read_boundaries(tmp_path / "odd.fmu", ("m",), {})

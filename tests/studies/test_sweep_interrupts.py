@@ -125,7 +125,7 @@ def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, whole, tmp_path):
 
     done = harness(*LONG)
     assert (done.returncode, done.stderr) == (0, "")
-    assert f"100 runs, {kept} of them done before" in done.stdout
+    assert f"100 runs, {kept} of them resumed" in done.stdout
     assert files(tmp_path) == whole
     assert journal(tmp_path) is None
     bound = tmp_path / "bound"  # workers are reached through pipes; a socket that has a file for an address is no port
@@ -166,7 +166,7 @@ def test_an_unresponsive_scheduler_is_reported(monkeypatch):
     """After 10 s, of which a test waits for one."""
     client, address = distributed.Client, "tcp://127.0.0.1:1"
     monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=timeout / 10))
-    with pytest.raises(HarnessError, match=f"no scheduler answers at {address}"), study.open_workers(address, 1, 1):
+    with pytest.raises(HarnessError, match=f"no scheduler found at {address}"), study.open_workers(address, 1, 1):
         pass
 
 

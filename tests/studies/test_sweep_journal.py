@@ -69,7 +69,7 @@ def test_a_damaged_journal_is_reported_and_its_runs_are_repeated(harness, tmp_pa
     sweep.journal(tmp_path / "results/sweep").path.write_bytes(b"garbage\n" + line(0, [[1.0]], {}))
     done = harness(*arguments, blank=True)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "4 runs, 0 of them done before, 0 failed" in done.stdout
+    assert "4 runs, 0 of them resumed, 0 failed" in done.stdout
     assert "2 damaged lines" in done.stdout
     name = "sweep/mine/sweep.csv"
     assert (tmp_path / "results" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
@@ -77,5 +77,5 @@ def test_a_damaged_journal_is_reported_and_its_runs_are_repeated(harness, tmp_pa
 
 def test_an_unusable_journal_is_reported(tmp_path):
     (tmp_path / "folder").mkdir()
-    with pytest.raises(HarnessError, match=r"journal .*folder cannot be used: Is a directory"):
+    with pytest.raises(HarnessError, match=r"cannot use the journal .*folder: Is a directory"):
         Journal(tmp_path / "folder", 1, 1)

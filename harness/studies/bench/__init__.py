@@ -1,1 +1,1 @@
-"""The numbers to reach, each beside what it is compared with in the same run."""
+"""Benchmarks, each against a target and a baseline of the same run."""

@@ -1,4 +1,4 @@
-"""The benchmark's errors: built FMUs through fmpy against answers by a second route (truth.py)."""
+"""Accuracy benchmarks: built FMUs through fmpy against independent references."""
 
 from collections.abc import Callable
 from functools import partial
@@ -24,7 +24,7 @@ CLOSED = Baseline("closed form in 120 digits")
 
 
 def accuracy_benchmarks() -> list[Callable[[], Benchmark]]:
-    """What to measure, in the order of the design's table."""
+    """Return the accuracy benchmarks."""
     cards = {model: read_info(model) for model in MODELS}
     closed = [model for model in MODELS if "exact" in cards[model].methods]
     return [
@@ -34,8 +34,8 @@ def accuracy_benchmarks() -> list[Callable[[], Benchmark]]:
             for model in closed
             if "friction" in cards[model].enumerations
         ),
-        partial(last_event_error, "coulomb", {"f": 1e-7}, 300_000, swings),
-        partial(last_event_error, "stickslip", {}, 200_000, slips),
+        partial(last_event_error, "coulomb", {"f": 1e-7}, 300_000, turning_time),
+        partial(last_event_error, "stickslip", {}, 200_000, slip_event_time),
         *(
             partial(default_run_error, "pendulum", cards["pendulum"], "pin_load", load, 1e-9)
             for load in ("weight", "reaction")
@@ -46,66 +46,75 @@ def accuracy_benchmarks() -> list[Callable[[], Benchmark]]:
     ]
 
 
-def moved(setting: InitialValues, times: list[float]) -> CompletedRun:
-    """The motion through the times; HarnessError with the FMU's sentence if it is refused."""
-    ending = run_steps(setting, [(t, ahead - t) for t, ahead in pairwise(times)], {})
-    if not isinstance(ending, CompletedRun):
-        raise HarnessError(f"{setting.model}: {ending.message}")
-    return ending
+def run_through_times(setting: InitialValues, times: list[float]) -> CompletedRun:
+    """Run with communication points at `times`; HarnessError with the message of the FMU if it fails."""
+    outcome = run_steps(setting, [(t, ahead - t) for t, ahead in pairwise(times)], {})
+    if not isinstance(outcome, CompletedRun):
+        raise HarnessError(f"{setting.model}: {outcome.message}")
+    return outcome
 
 
-def error(model: str, its: FmuInfo, chosen: dict[str, float | str]) -> float:
-    """The largest error of the default experiment, as a share of the largest value."""
-    values = its.resolve_labels({**its.start_values, **chosen})
-    answer = compute_reference(model, [(0.0, its.stop, values)], CommunicationGrid(0.0, its.stop, POINTS))
-    motion = moved(InitialValues(model, values, stop=its.stop), answer.times.tolist())
+def max_error(model: str, read_info: FmuInfo, chosen: dict[str, float | str]) -> float:
+    """Return the largest error of the default experiment, relative to the largest value."""
+    values = read_info.resolve_labels({**read_info.start_values, **chosen})
+    answer = compute_reference(model, [(0.0, read_info.stop, values)], CommunicationGrid(0.0, read_info.stop, POINTS))
+    motion = run_through_times(InitialValues(model, values, stop=read_info.stop), answer.times.tolist())
     return answer.error(motion.x, motion.v)
 
 
-def exact_run_error(model: str, its: FmuInfo) -> Benchmark:
-    return Benchmark(f"{model}, exact: whole run", error(model, its, {}), "1", 1e-13, (CLOSED,))
+def exact_run_error(model: str, read_info: FmuInfo) -> Benchmark:
+    return Benchmark(f"{model}, exact: whole run", max_error(model, read_info, {}), "1", 1e-13, (CLOSED,))
 
 
-def default_run_error(model: str, its: FmuInfo, name: str, value: float | str, reach: float) -> Benchmark:
-    """A model with its own method and tolerance."""
-    beside = Baseline("scipy Radau at 1e-11" if problem(model).is_stiff else "scipy DOP853 at 1e-13")
-    return Benchmark(f"{model}, default, {name} {value}", error(model, its, {name: value}), "1", reach, (beside,))
+def default_run_error(model: str, read_info: FmuInfo, name: str, value: float | str, target: float) -> Benchmark:
+    """Measure the error with the default method and tolerance of the model."""
+    baseline = Baseline("scipy Radau at 1e-11" if equations_of(model).stiff else "scipy DOP853 at 1e-13")
+    return Benchmark(
+        f"{model}, default, {name} {value}", max_error(model, read_info, {name: value}), "1", target, (baseline,)
+    )
 
 
-def event_time_error(model: str, its: FmuInfo) -> Benchmark:
-    """The largest error of the time of an event, relative to it."""
-    answer = compute_reference(model, [(0.0, its.stop, its.start_values)], CommunicationGrid(0.0, its.stop, 1))
-    found = EmbeddedModel.create(load_model_class(find_fmu(model)), {}, "exact", 0.0).find_mode_changes(its.stop)
-    if [mode for _, mode in found] != [mode for _, mode in answer.events]:
-        raise HarnessError(f"{model}: the modes after its events are not the true ones")
-    off = max(abs(t / true - 1) for (t, _), (true, _) in zip(found, answer.events, strict=True))
-    return Benchmark(f"{model}, exact: times of {len(found)} events", off, "1", 1e-14, (CLOSED,))
+def event_time_error(model: str, read_info: FmuInfo) -> Benchmark:
+    """Measure the largest relative error of event times."""
+    reference = compute_reference(
+        model, [(0.0, read_info.stop, read_info.start_values)], CommunicationGrid(0.0, read_info.stop, 1)
+    )
+    event_list = EmbeddedModel.create(load_model_class(find_fmu(model)), {}, "exact", 0.0).find_mode_changes(
+        read_info.stop
+    )
+    if [mode for _, mode in event_list] != [mode for _, mode in reference.events]:
+        raise HarnessError(f"{model}: the modes after events are wrong")
+    largest_error = max(
+        abs(t / t_reference - 1) for (t, _), (t_reference, _) in zip(event_list, reference.events, strict=True)
+    )
+    return Benchmark(f"{model}, exact: times of {len(event_list)} events", largest_error, "1", 1e-14, (CLOSED,))
 
 
 def last_event_error(model: str, values: dict[str, float], number: int, law: Callable[[Any, int], Any]) -> Benchmark:
-    """How far off the time of the last of many events is, in units of its last place."""
-    inside = EmbeddedModel.create(load_model_class(find_fmu(model)), values, "exact", 0.0)
-    true, next_one = (law(inside.model, n) for n in (number, number + 1))
-    stop = float((true + next_one) / 2)
-    inside.compute_states([stop * i / 10 for i in range(10)] + [stop])
-    inside.model.solver.report(inside.model.events)
-    events = inside.model.events
+    """Measure the error of the time of the last of many events, in units in the last place."""
+    embedded_model = EmbeddedModel.create(load_model_class(find_fmu(model)), values, "exact", 0.0)
+    t_reference, next_one = (law(embedded_model.model, n) for n in (number, number + 1))
+    stop = float((t_reference + next_one) / 2)
+    embedded_model.compute_states([stop * i / 10 for i in range(10)] + [stop])
+    embedded_model.model.solver.report(embedded_model.model.events)
+    events = embedded_model.model.events
     if events.count != number:
         raise HarnessError(f"{model}: {events.count} events, not {number}")
-    off = float(abs(events.t_last - true)) / ulp(events.t_last)
-    what = f"{model}, exact: the last of {number} events, units in the last place"
-    return Benchmark(what, off, "1", 4.0, (CLOSED,))
+    largest_error = float(abs(events.t_last - t_reference)) / ulp(events.t_last)
+    name = f"{model}, exact: the last of {number} events, units in the last place"
+    return Benchmark(name, largest_error, "1", 4.0, (CLOSED,))
 
 
-def swings(model: Any, number: int) -> Any:
-    """When a mass on a spring turns for the n-th time: after as many half periods."""
+def turning_time(model: Any, number: int) -> Any:
+    """Return the time of the n-th turning point of a mass on a spring: n half periods."""
     return number * mp.pi * mp.sqrt(mp.mpf(model.m) / mp.mpf(model.k))
 
 
-def slips(model: Any, number: int) -> Any:
-    """When the sled breaks away (odd) or sticks (even) for the n-th time.
+def slip_event_time(model: Any, number: int) -> Any:
+    """Return the time of the n-th event of the sled: break-away if n is odd, stop if n is even.
 
-    It sticks while the stretch of its spring grows from 2 d - h to h, which friction holds, and slips about d.
+    While the sled sticks, the elongation of its spring grows from 2 d - h to h, the limit of static friction; while it
+    slips, the elongation oscillates about d.
     """
     k, u, w = mp.mpf(model.k), mp.mpf(model.v_driver), mp.sqrt(mp.mpf(model.k) / mp.mpf(model.m))
     h, d = (mp.mpf(mu) * mp.mpf(model.m) * mp.mpf(model.g) / k for mu in (model.mu_s, model.mu_d))
@@ -113,27 +122,29 @@ def slips(model: Any, number: int) -> Any:
     return h / u + (number - 1) // 2 * (slip + stick) + (0 if number % 2 else slip)
 
 
-def between_grids(model: str, its: FmuInfo) -> Benchmark:
-    """The largest difference at shared times between an even grid and a random one, as a share of the largest."""
-    even = [its.stop * i / 200 for i in range(201)]
-    draw = Random(model)
-    both = sorted({*even, *(draw.uniform(0.0, its.stop) for _ in range(777))})
-    setting = InitialValues(model, its.start_values, stop=its.stop)
-    one, other = moved(setting, even), moved(setting, both)
-    shared = np.searchsorted(both, even)
+def between_grids(model: str, read_info: FmuInfo) -> Benchmark:
+    """Measure the largest relative difference at common times between runs on a uniform and on a random grid."""
+    uniform = [read_info.stop * i / 200 for i in range(201)]
+    random = Random(model)
+    both = sorted({*uniform, *(random.uniform(0.0, read_info.stop) for _ in range(777))})
+    setting = InitialValues(model, read_info.start_values, stop=read_info.stop)
+    one, other = run_through_times(setting, uniform), run_through_times(setting, both)
+    shared = np.searchsorted(both, uniform)
     parts = ((one.x, other.x), (one.v, other.v))
-    off = max(float(np.abs(a - b[shared]).max() / np.abs(a).max()) for a, b in parts)
-    return Benchmark(f"{model}, default: difference between two grids", off, "1", 1e-12, (Baseline("each other"),))
+    largest_error = max(float(np.abs(a - b[shared]).max() / np.abs(a).max()) for a, b in parts)
+    return Benchmark(
+        f"{model}, default: difference between two grids", largest_error, "1", 1e-12, (Baseline("each other"),)
+    )
 
 
-def stuck_drift(model: str, its: FmuInfo, chosen: dict[str, float]) -> Benchmark:
-    """How far a stuck body gets."""
-    setting = InitialValues(model, {**its.start_values, **chosen}, stop=1e6)
-    x = moved(setting, [1e4 * i for i in range(101)]).x
-    off = float(np.abs(x - x[0]).max())
-    return Benchmark(f"{model}, stuck for 1e6 s: displacement", off, problem(model).unit, 0.0, ())
+def stuck_drift(model: str, read_info: FmuInfo, chosen: dict[str, float]) -> Benchmark:
+    """Measure the displacement of a stuck body."""
+    setting = InitialValues(model, {**read_info.start_values, **chosen}, stop=1e6)
+    x = run_through_times(setting, [1e4 * i for i in range(101)]).x
+    displacement = float(np.abs(x - x[0]).max())
+    return Benchmark(f"{model}, stuck for 1e6 s: displacement", displacement, equations_of(model).unit, 0.0, ())
 
 
-def problem(model: str) -> OdeProblem:
-    """The equations of a model, as they are written a second time."""
+def equations_of(model: str) -> OdeProblem:
+    """Return the reference equations of a model."""
     return next(case.problem for case in CASES if case.model == model)

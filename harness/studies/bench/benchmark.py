@@ -1,4 +1,4 @@
-"""One number of the benchmark: what was measured, what is to be reached, and what stands beside it."""
+"""One benchmark: measured value, target and baselines."""
 
 import tomllib
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ SETTINGS: dict[str, dict[str, Any]] = tomllib.loads(
 
 @dataclass(frozen=True)
 class Baseline:
-    """What a number is compared with, measured in the same run; `value` is None where it is what the error is from."""
+    """A comparison value from the same run; `value` is None for a remark or the reference of an error."""
 
     name: str
     value: float | None = None
@@ -20,7 +20,7 @@ class Baseline:
 
 @dataclass(frozen=True)
 class Benchmark:
-    """`value` in `unit`, to be at most `reach`."""
+    """A measured `value` in `unit`, which should be at most `target`."""
 
     name: str
     value: float

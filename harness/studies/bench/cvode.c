@@ -1,14 +1,15 @@
-/* The five oscillators by SUNDIALS CVODE: an FMI 2.0 co-simulation FMU of those functions that the host in C calls.
+/* The five oscillators solved by SUNDIALS CVODE: an FMI 2.0 co-simulation FMU with the functions that the C host calls.
  *
  *     y = (x, v),    y' = (v, acceleration),    mode = -1 sliding backward, 0 stuck, 1 sliding forward
  *
- * Dry friction as modes: sliding lasts until the root v = 0, sticking until the root of what friction can hold less the
- * load; CVODE starts again at each.  It runs free of the communication points, and interpolates there.
- * Smooth and dry ones by Adams with fixed-point iteration, the stiff one by BDF with Newton's and the exact Jacobian.
+ * Dry friction is modelled by modes: sliding lasts until the root v = 0, sticking until the load exceeds the limit of
+ * static friction; CVODE is restarted at each event.  Internal steps do not depend on communication points, where the
+ * solution is interpolated.  The stiff model uses BDF with Newton iteration and the exact Jacobian, all others Adams
+ * with fixed-point iteration.
  *
  *     cc -DMODEL=STICKSLIP ...    (SMD, COULOMB, STICKSLIP, PACEJKA, PENDULUM)
- *     cc -DMODEL=STICKSLIP -DPLAIN=1 ...    as importers solve in model exchange: all by BDF, the Jacobian by
- *                                           differences, the position of the driver a state as well
+ *     cc -DMODEL=STICKSLIP -DPLAIN=1 ...    as importers solve in model exchange: BDF with a finite-difference
+ *                                           Jacobian, and the position of the driver as a state
  *
  * SI units; the default experiments.
  */
@@ -44,7 +45,7 @@ enum { X, V, RTOL, ATOL, X_M, FORCE, RATE, VARIABLES }; /* value references */
 #define POUND 0.45359237
 #define INCH 0.0254
 
-/* mass or moment of inertia; what friction can hold at most, and what it is while sliding */
+/* m: mass or moment of inertia; hold, slide: static and sliding friction */
 enum { STATES = 2 + IS_DRIVEN };
 
 #if IS_SLED
@@ -63,8 +64,8 @@ static const double start[STATES] = {0.1, 0.0};
 
 typedef struct {
     double values[VARIABLES], t, B, C, E;
-    double since; /* when the force of the outside began to change at its rate */
-    bool pushed;  /* anew */
+    double ramp_start; /* time at which the external force started to change at its rate */
+    bool input_changed;
     int mode;
     SUNContext context;
     N_Vector y;
@@ -74,10 +75,10 @@ typedef struct {
     void *cvode;
 } Instance;
 
-/* What pulls at the body besides friction and damping, N or N m. */
-static double load(const Instance *it, double t, N_Vector y)
+/* Force or torque on the body without friction and damping, N or N m. */
+static double load(const Instance *instance, double t, N_Vector y)
 {
-    double x = NV_Ith_S(y, 0), force = it->values[FORCE] + it->values[RATE] * (t - it->since);
+    double x = NV_Ith_S(y, 0), force = instance->values[FORCE] + instance->values[RATE] * (t - instance->ramp_start);
 #if MODEL == PENDULUM
     return force - WEIGHT * ARM * sin(x);
 #elif IS_SLED
@@ -87,18 +88,18 @@ static double load(const Instance *it, double t, N_Vector y)
 #endif
 }
 
-static int slopes(sunrealtype t, N_Vector y, N_Vector slope, void *user)
+static int rates(sunrealtype t, N_Vector y, N_Vector slope, void *user)
 {
-    const Instance *it = user;
-    double v = NV_Ith_S(y, 1), resistance = it->mode * slide;
+    const Instance *instance = user;
+    double v = NV_Ith_S(y, 1), resistance = instance->mode * slide;
     if (MODEL == SMD) resistance = 2.0 * v;
     if (MODEL == PACEJKA) {
-        double z = it->B * v;
-        resistance = hold * sin(it->C * atan(z - it->E * (z - atan(z))));
+        double z = instance->B * v;
+        resistance = hold * sin(instance->C * atan(z - instance->E * (z - atan(z))));
     }
-    bool stuck = IS_DRY && it->mode == 0;
+    bool stuck = IS_DRY && instance->mode == 0;
     NV_Ith_S(slope, 0) = stuck ? 0.0 : v;
-    NV_Ith_S(slope, 1) = stuck ? 0.0 : (load(it, t, y) - resistance) / m;
+    NV_Ith_S(slope, 1) = stuck ? 0.0 : (load(instance, t, y) - resistance) / m;
 #if IS_DRIVEN
     NV_Ith_S(slope, 2) = v_driver;
 #endif
@@ -110,8 +111,8 @@ static int derivatives(sunrealtype t, N_Vector y, N_Vector slope, SUNMatrix jaco
                        N_Vector c)
 {
     (void)t, (void)slope, (void)a, (void)b, (void)c;
-    const Instance *it = user;
-    double B = it->B, C = it->C, E = it->E, z = B * NV_Ith_S(y, 1), u = z - E * (z - atan(z));
+    const Instance *instance = user;
+    double B = instance->B, C = instance->C, E = instance->E, z = B * NV_Ith_S(y, 1), u = z - E * (z - atan(z));
     SM_ELEMENT_D(jacobian, 0, 0) = 0.0;
     SM_ELEMENT_D(jacobian, 0, 1) = 1.0;
     SM_ELEMENT_D(jacobian, 1, 0) = -k / m;
@@ -122,98 +123,98 @@ static int derivatives(sunrealtype t, N_Vector y, N_Vector slope, SUNMatrix jaco
 
 static int change_of_mode(sunrealtype t, N_Vector y, sunrealtype *root, void *user)
 {
-    const Instance *it = user;
-    root[0] = it->mode ? NV_Ith_S(y, 1) : hold - fabs(load(it, t, y));
+    const Instance *instance = user;
+    root[0] = instance->mode ? NV_Ith_S(y, 1) : hold - fabs(load(instance, t, y));
     return 0;
 }
 
-/* The mode from here on, where the body stands still; it breaks away if it was stuck. */
-static void settle(Instance *it, bool was_stuck)
+/* Set the mode of a body at rest; a stuck body breaks away. */
+static void resolve_mode(Instance *instance, bool was_stuck)
 {
-    double pull = load(it, it->t, it->y);
-    it->mode = was_stuck || fabs(pull) > hold ? (pull > 0.0) - (pull < 0.0) : 0;
+    double force = load(instance, instance->t, instance->y);
+    instance->mode = was_stuck || fabs(force) > hold ? (force > 0.0) - (force < 0.0) : 0;
 }
 
-static bool begin(Instance *it)
+static bool restart(Instance *instance)
 {
-    bool good = !CVodeReInit(it->cvode, it->t, it->y);
-    int direction = it->mode ? -it->mode : -1;
-    return good && (!IS_DRY || !CVodeSetRootDirection(it->cvode, &direction));
+    bool good = !CVodeReInit(instance->cvode, instance->t, instance->y);
+    int direction = instance->mode ? -instance->mode : -1;
+    return good && (!IS_DRY || !CVodeSetRootDirection(instance->cvode, &direction));
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, const fmi2Real values[])
 {
-    Instance *it = c;
+    Instance *instance = c;
     for (size_t i = 0; i < count; i++) {
-        it->values[references[i]] = values[i];
-        it->pushed |= references[i] == FORCE || references[i] == RATE;
+        instance->values[references[i]] = values[i];
+        instance->input_changed |= references[i] == FORCE || references[i] == RATE;
     }
     return fmi2OK;
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Real values[])
 {
-    const Instance *it = c;
+    const Instance *instance = c;
     for (size_t i = 0; i < count; i++) {
-        values[i] = references[i] <= V ? NV_Ith_S(it->y, references[i]) : it->values[references[i]];
+        values[i] = references[i] <= V ? NV_Ith_S(instance->y, references[i]) : instance->values[references[i]];
     }
     return fmi2OK;
 }
 
 fmi2Status fmi2Reset(fmi2Component c)
 {
-    Instance *it = c;
-    it->values[RTOL] = 1e-6, it->values[ATOL] = 1e-9, it->values[X_M] = 0.01;
-    it->t = it->since = it->values[FORCE] = it->values[RATE] = 0.0;
-    it->pushed = false;
-    for (int i = 0; i < STATES; i++) NV_Ith_S(it->y, i) = start[i];
+    Instance *instance = c;
+    instance->values[RTOL] = 1e-6, instance->values[ATOL] = 1e-9, instance->values[X_M] = 0.01;
+    instance->t = instance->ramp_start = instance->values[FORCE] = instance->values[RATE] = 0.0;
+    instance->input_changed = false;
+    for (int i = 0; i < STATES; i++) NV_Ith_S(instance->y, i) = start[i];
     return fmi2OK;
 }
 
 void fmi2FreeInstance(fmi2Component c)
 {
-    Instance *it = c;
-    CVodeFree(&it->cvode);
-    if (it->linear) SUNLinSolFree(it->linear);
-    if (it->matrix) SUNMatDestroy(it->matrix);
-    if (it->fixed_point) SUNNonlinSolFree(it->fixed_point);
-    if (it->y) N_VDestroy(it->y);
-    SUNContext_Free(&it->context);
-    free(it);
+    Instance *instance = c;
+    CVodeFree(&instance->cvode);
+    if (instance->linear) SUNLinSolFree(instance->linear);
+    if (instance->matrix) SUNMatDestroy(instance->matrix);
+    if (instance->fixed_point) SUNNonlinSolFree(instance->fixed_point);
+    if (instance->y) N_VDestroy(instance->y);
+    SUNContext_Free(&instance->context);
+    free(instance);
 }
 
-static bool prepared(Instance *it)
+static bool create_solver(Instance *instance)
 {
-    if (SUNContext_Create(0, &it->context)) return false;
-    it->y = N_VNew_Serial(STATES, it->context);
-    it->cvode = CVodeCreate(IS_IMPLICIT ? CV_BDF : CV_ADAMS, it->context);
-    if (!it->y || !it->cvode) return false;
-    bool good = !CVodeInit(it->cvode, slopes, 0.0, it->y) && !CVodeSetUserData(it->cvode, it) &&
-                !CVodeSetMaxNumSteps(it->cvode, 1000000);
+    if (SUNContext_Create(0, &instance->context)) return false;
+    instance->y = N_VNew_Serial(STATES, instance->context);
+    instance->cvode = CVodeCreate(IS_IMPLICIT ? CV_BDF : CV_ADAMS, instance->context);
+    if (!instance->y || !instance->cvode) return false;
+    bool good = !CVodeInit(instance->cvode, rates, 0.0, instance->y) && !CVodeSetUserData(instance->cvode, instance) &&
+                !CVodeSetMaxNumSteps(instance->cvode, 1000000);
 #if IS_IMPLICIT
-    it->matrix = SUNDenseMatrix(STATES, STATES, it->context);
-    it->linear = SUNLinSol_Dense(it->y, it->matrix, it->context);
-    good = good && !CVodeSetLinearSolver(it->cvode, it->linear, it->matrix);
+    instance->matrix = SUNDenseMatrix(STATES, STATES, instance->context);
+    instance->linear = SUNLinSol_Dense(instance->y, instance->matrix, instance->context);
+    good = good && !CVodeSetLinearSolver(instance->cvode, instance->linear, instance->matrix);
 #if !PLAIN
-    good = good && !CVodeSetJacFn(it->cvode, derivatives);
+    good = good && !CVodeSetJacFn(instance->cvode, derivatives);
 #endif
 #else
-    it->fixed_point = SUNNonlinSol_FixedPoint(it->y, 0, it->context);
-    good = good && !CVodeSetNonlinearSolver(it->cvode, it->fixed_point);
+    instance->fixed_point = SUNNonlinSol_FixedPoint(instance->y, 0, instance->context);
+    good = good && !CVodeSetNonlinearSolver(instance->cvode, instance->fixed_point);
 #endif
-    return good && (!IS_DRY || !CVodeRootInit(it->cvode, 1, change_of_mode));
+    return good && (!IS_DRY || !CVodeRootInit(instance->cvode, 1, change_of_mode));
 }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
 {
     (void)name, (void)type, (void)guid, (void)resources, (void)callbacks, (void)visible, (void)logging;
-    Instance *it = calloc(1, sizeof *it);
-    if (it && prepared(it)) {
-        fmi2Reset(it);
-        return it;
+    Instance *instance = calloc(1, sizeof *instance);
+    if (instance && create_solver(instance)) {
+        fmi2Reset(instance);
+        return instance;
     }
-    if (it) fmi2FreeInstance(it);
+    if (instance) fmi2FreeInstance(instance);
     return NULL;
 }
 
@@ -221,21 +222,22 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
                                fmi2Boolean has_stop, fmi2Real stop)
 {
     (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
-    Instance *it = c;
-    it->t = it->since = start_time;
+    Instance *instance = c;
+    instance->t = instance->ramp_start = start_time;
     return fmi2OK;
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    Instance *it = c;
-    double x_m = it->values[X_M];
-    it->C = 1.0 + (1.0 - 2.0 * asin(slide / hold) / PI);
-    it->B = 2.0 / (x_m * it->C);
-    it->E = (it->B * x_m - tan(PI / (2.0 * it->C))) / (it->B * x_m - atan(it->B * x_m));
-    it->pushed = false;
-    if (IS_DRY) settle(it, false);
-    return CVodeSStolerances(it->cvode, it->values[RTOL], it->values[ATOL]) || !begin(it) ? fmi2Error : fmi2OK;
+    Instance *instance = c;
+    double x_m = instance->values[X_M];
+    instance->C = 1.0 + (1.0 - 2.0 * asin(slide / hold) / PI);
+    instance->B = 2.0 / (x_m * instance->C);
+    instance->E = (instance->B * x_m - tan(PI / (2.0 * instance->C))) / (instance->B * x_m - atan(instance->B * x_m));
+    instance->input_changed = false;
+    if (IS_DRY) resolve_mode(instance, false);
+    bool failed = CVodeSStolerances(instance->cvode, instance->values[RTOL], instance->values[ATOL]);
+    return failed || !restart(instance) ? fmi2Error : fmi2OK;
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
@@ -247,21 +249,21 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean final)
 {
     (void)final;
-    Instance *it = c;
+    Instance *instance = c;
     double target = t + h;
-    if (it->pushed) {
-        it->pushed = false;
-        it->since = it->t = t;
-        if (IS_DRY && !it->mode) settle(it, false);
-        if (!begin(it)) return fmi2Discard;
+    if (instance->input_changed) {
+        instance->input_changed = false;
+        instance->ramp_start = instance->t = t;
+        if (IS_DRY && !instance->mode) resolve_mode(instance, false);
+        if (!restart(instance)) return fmi2Discard;
     }
-    while (target - it->t > 1e-13 * target) { /* nearer than that it would not start again */
-        int told = CVode(it->cvode, target, it->y, &it->t, CV_NORMAL);
-        if (told < 0) return fmi2Discard;
-        if (told != CV_ROOT_RETURN) break;
-        NV_Ith_S(it->y, 1) = 0.0;
-        settle(it, it->mode == 0);
-        if (!begin(it)) return fmi2Discard;
+    while (target - instance->t > 1e-13 * target) { /* CVODE rejects smaller intervals */
+        int result = CVode(instance->cvode, target, instance->y, &instance->t, CV_NORMAL);
+        if (result < 0) return fmi2Discard;
+        if (result != CV_ROOT_RETURN) break;
+        NV_Ith_S(instance->y, 1) = 0.0;
+        resolve_mode(instance, instance->mode == 0);
+        if (!restart(instance)) return fmi2Discard;
     }
     return fmi2OK;
 }

@@ -1,6 +1,6 @@
-"""An FMU that does nothing, with the variables of another: what a communication step costs before any physics.
+"""An empty FMU with the variables of another one, to measure the overhead of a communication step.
 
-Built by plain pythonfmu, as its documentation shows it, without anything of this project.
+It is built by plain pythonfmu as in its documentation, without code of this project.
 """
 
 from pathlib import Path
@@ -34,7 +34,7 @@ class {name}(Fmi2Slave):
 
 
 def build_empty_fmu(name: str, variables: list[tuple[str, str, str, str]], stop: float, folder: Path) -> Path:
-    """Build <name>.fmu with variables (Real or Integer, name, causality, variability) into a folder; its path."""
+    """Build <name>.fmu with variables (Real or Integer, name, causality, variability); return its path."""
     script = folder / f"{name.lower()}.py"
     script.write_text(SCRIPT.format(name=name, stop=stop, variables=variables), encoding="utf-8")
     return Path(FmuBuilder.build_FMU(script, dest=folder))

@@ -1,4 +1,4 @@
-"""Model exchange: errors beside those of CVODE by hand, answers beside co-simulation's, and what a call costs."""
+"""Benchmarks of model exchange: errors against CVODE in C, differences from co-simulation, and cost of calls."""
 
 import re
 import shutil
@@ -26,7 +26,7 @@ from .native import (
     RUN_TIME_TARGETS,
     Measured,
     build_cvode_fmu,
-    fmu,
+    built_fmu,
     largest_error,
     measure_or_skip,
     run_host,
@@ -35,26 +35,26 @@ from .native import (
 from .scenario import Scenario
 
 TOLERANCES = (1e-6, 1e-8, 1e-10)
-REFERENCE_FMUS = Path("Reference-FMUs")  # a clone in the folder that one is in
+REFERENCE_FMUS = Path("Reference-FMUs")  # a clone in the working directory
 BOUNCING_BALL_SIZES, BOUNCING_BALL_START = (
     (2, 1),
     {"h": 0.175, "v": 0.3},
-)  # states and indicators of BouncingBall, and where it starts
+)  # numbers of states and event indicators; start values
 DEFAULT_SCENARIOS = [Scenario(case) for case in RUN_TIME_TARGETS]
 DRIVEN_SCENARIOS = [
-    Scenario(case, *its) for case in RUN_TIME_TARGETS for its in SETTINGS["led"][CASES_BY_NAME[case].model].items()
+    Scenario(case, *its) for case in RUN_TIME_TARGETS for its in SETTINGS["driven"][CASES_BY_NAME[case].model].items()
 ]
-LATE_SCENARIOS = [Scenario(each.case, each.name, each.values, 1000.0) for each in DRIVEN_SCENARIOS]
+LATE_SCENARIOS = [Scenario(scenario.case, scenario.name, scenario.values, 1000.0) for scenario in DRIVEN_SCENARIOS]
 TIE_SCENARIOS = [Scenario(model, *its) for model, ties in SETTINGS["ties"].items() for its in ties.items()]
 COMPARED_SCENARIOS = [
     scene for scene in (*DEFAULT_SCENARIOS, *DRIVEN_SCENARIOS, *TIE_SCENARIOS) if not scene.has_ramps
-]  # which fmpy holds in co-simulation
+]  # fmpy holds inputs in co-simulation
 CALLS = ("the time", "the states", "the derivatives", "the indicators")
 REPEATS = 20_000
 
 
 def exchange_benchmarks() -> list[Callable[[], Benchmark]]:
-    """What to measure: errors, answers, and calls."""
+    """Return the benchmarks of model exchange."""
     return [
         *(partial(error_ratio_to_cvode, scene) for scene in (*DEFAULT_SCENARIOS, *DRIVEN_SCENARIOS, *LATE_SCENARIOS)),
         *(partial(difference_from_cosimulation, scene) for scene in COMPARED_SCENARIOS),
@@ -63,56 +63,61 @@ def exchange_benchmarks() -> list[Callable[[], Benchmark]]:
 
 
 def error_ratio_to_cvode(scene: Scenario, tolerances: tuple[float, ...] = TOLERANCES) -> Benchmark:
-    """The largest error through importers' CVode, as a multiple of that of CVODE on the same equations with the events
-    written by hand in C: both by BDF with a Jacobian by differences, the position of the driver being a state."""
+    """Measure the largest error of importers' CVode relative to CVODE in C with the events in C.
+
+    Both use BDF with a finite-difference Jacobian; the position of the driver is a state.
+    """
 
     def figures() -> Measured:
-        ratio, told, lacks = 0.0, [], set()
+        ratio, baselines, missing = 0.0, [], set()
         for rtol in tolerances:
-            errors = {"CVODE by hand": error(scene, hand(scene, rtol)), "fmpy": error(scene, fmpy(scene, rtol))}
+            errors = {
+                "CVODE in C": largest_error_of(scene, run_cvode(scene, rtol)),
+                "fmpy": largest_error_of(scene, run_fmpy(scene, rtol)),
+            }
             try:
-                errors["fmusim"] = error(scene, fmusim(scene, rtol))
-            except MissingToolError as why:
-                lacks.add(Baseline(str(why)))
-            by_hand, *theirs = errors.values()
-            ratio = max(ratio, *(each / by_hand for each in theirs))
+                errors["fmusim"] = largest_error_of(scene, run_fmusim(scene, rtol))
+            except MissingToolError as reason:
+                missing.add(Baseline(str(reason)))
+            reference_error, *others = errors.values()
+            ratio = max(ratio, *(error_value / reference_error for error_value in others))
             if scene.is_default:
-                errors["CVODE at its best"] = largest_error(scene.case, time_cvode(scene.case, rtol))
-            words = ", ".join(f"{name} {each:.1e}" for name, each in errors.items())
-            told.append(Baseline(f"errors at rtol {rtol:.0e}: {words}"))
-        return ratio, 3.0, (*told, *lacks)
+                errors["CVODE with Adams or exact Jacobian"] = largest_error(scene.case, time_cvode(scene.case, rtol))
+            text = ", ".join(f"{name} {error_value:.1e}" for name, error_value in errors.items())
+            baselines.append(Baseline(f"errors at rtol {rtol:.0e}: {text}"))
+        return ratio, 3.0, (*baselines, *missing)
 
-    return measure_or_skip(f"{scene}, model exchange: largest error, ratio to CVODE's by hand", "1", figures)
+    return measure_or_skip(f"{scene}, model exchange: largest error, ratio to CVODE in C", "1", figures)
 
 
-def error(scene: Scenario, found: RecordedRun | np.ndarray) -> float:
-    """The largest at the common times, of a recording or of position and speed (n, 2)."""
-    motion = found.sample_at(scene.times, scene.reference_case.outputs) if isinstance(found, RecordedRun) else found
+def largest_error_of(scene: Scenario, result: RecordedRun | np.ndarray) -> float:
+    """Return the largest error of a recording, or of position and speed (n, 2), at the common times."""
+    motion = result.sample_at(scene.times, scene.reference_case.outputs) if isinstance(result, RecordedRun) else result
     return float(relative_errors(motion, scene.reference_motion).max())
 
 
-def hand(scene: Scenario, rtol: float) -> np.ndarray:
-    """Position and speed (n, 2) at the common times, by CVODE."""
+def run_cvode(scene: Scenario, rtol: float) -> np.ndarray:
+    """Run CVODE in C; return position and speed (n, 2) at the common times."""
     its, library = scene.reference_case, build_cvode_fmu(scene.reference_case.model, plain=True)
 
-    def put(**values: float) -> list[str]:
+    def set_values(**values: float) -> list[str]:
         return [f"0 setr {library.references[name]} {value!r}" for name, value in values.items()]
 
     read = "0 getr {} {}".format(*map(library.references.__getitem__, ("x", "v")))
-    led = {t: put(force=value, rate=rate) for t, _, value, rate in scene.lines}
-    common = {*scene.times.tolist()}
-    calls = ["0 new hand quiet", *put(**its.values, rtol=rtol, atol=rtol * its.problem.atol_factor)]
-    calls += [*led.pop(scene.start), f"0 begin {scene.start!r}", read]
-    for t, ahead in pairwise(sorted(common | led.keys())):
-        calls += [*led.get(t, []), f"0 step {t!r} {ahead - t!r}", *[read] * (ahead in common)]
+    input_calls = {t: set_values(force=value, rate=rate) for t, _, value, rate in scene.lines}
+    common_times = {*scene.times.tolist()}
+    calls = ["0 new hand quiet", *set_values(**its.values, rtol=rtol, atol=rtol * its.problem.atol_factor)]
+    calls += [*input_calls.pop(scene.start), f"0 begin {scene.start!r}", read]
+    for t, ahead in pairwise(sorted(common_times | input_calls.keys())):
+        calls += [*input_calls.get(t, []), f"0 step {t!r} {ahead - t!r}", *[read] * (ahead in common_times)]
     answers = run_host(library, "\n".join([*calls, "0 free\n"])).splitlines()
     if {answer for answer in answers if answer.startswith("status")} != {"status 0"}:
-        raise HarnessError(f"{scene}: CVODE by hand gives up")
+        raise HarnessError(f"{scene}: CVODE in C failed")
     return np.array([answer.split()[1:] for answer in answers if answer.startswith("values")], dtype=float)
 
 
-def fmpy(scene: Scenario, rtol: float, way: str = MODEL_EXCHANGE) -> RecordedRun:
-    """A run of the FMI 3.0 FMU through fmpy, its events counted."""
+def run_fmpy(scene: Scenario, rtol: float, way: str = MODEL_EXCHANGE) -> RecordedRun:
+    """Run the FMI 3.0 FMU with fmpy, and count its events."""
     its = scene.reference_case
     outputs = (*its.outputs, *["events.count"] * its.problem.has_dry_friction)
     span = scene.stop, scene.interval, rtol, None, scene.start
@@ -120,75 +125,85 @@ def fmpy(scene: Scenario, rtol: float, way: str = MODEL_EXCHANGE) -> RecordedRun
         return fmu.simulate(scene.numbers, outputs, *span, signals=scene.signals, drive_inputs=scene.has_ramps)
 
 
-def fmusim(scene: Scenario, rtol: float) -> RecordedRun:
-    """A run of the FMI 3.0 FMU through fmusim."""
+def run_fmusim(scene: Scenario, rtol: float) -> RecordedRun:
+    """Run the FMI 3.0 FMU with fmusim."""
     program, its = shutil.which("fmusim"), scene.reference_case
     if program is None:
         raise MissingToolError("not installed: fmusim")
     if scene.has_ramps:
-        raise MissingToolError("fmusim holds an input within its steps")
+        raise MissingToolError("fmusim holds inputs constant within steps")
     if scene.start:
-        raise MissingToolError("fmusim takes times for the same that differ by 1e-5 of them")
+        raise MissingToolError("fmusim does not distinguish times with a relative difference below 1e-5")
     with temporary_directory("fmusim-") as folder:
-        file, led = folder / "out.csv", folder / "in.csv"
+        file, input_file = folder / "out.csv", folder / "in.csv"
         command = [program, "--interface-type", "me", "--solver", "cvode", "--tolerance", repr(rtol)]
         command += ["--start-time", repr(scene.start), "--stop-time", repr(scene.stop)]
         command += ["--output-interval", repr(scene.interval), "--output-file", str(file)]
         command += [word for name, value in scene.numbers.items() for word in ("--start-value", name, repr(value))]
         if scene.signals is not None:
             heads = ",".join(scene.signals.dtype.names or ())
-            np.savetxt(led, scene.signals, "%.17g", ",", header=heads, comments="")
-            command += ["--input-file", str(led)]
-        done = run_subprocess([*command, str(fmi3_fmu(its.model))])
-        if done.returncode:
-            raise HarnessError(" ".join((done.stderr or done.stdout).split()) or "fmusim gives no reason")
+            np.savetxt(input_file, scene.signals, "%.17g", ",", header=heads, comments="")
+            command += ["--input-file", str(input_file)]
+        process = run_subprocess([*command, str(fmi3_fmu(its.model))])
+        if process.returncode:
+            raise HarnessError(
+                " ".join((process.stderr or process.stdout).split()) or "fmusim failed without a message"
+            )
         return RecordedRun(np.genfromtxt(file, delimiter=",", names=True), 0)
 
 
 def difference_from_cosimulation(scene: Scenario) -> Benchmark:
-    """The largest difference of model exchange and co-simulation at common times, as a share of the largest value of
-    each output; without bound if they count different events."""
+    """Measure the largest relative difference between model exchange and co-simulation at the common times; infinite if
+    the numbers of events differ."""
 
     def figures() -> Measured:
-        one, other = (fmpy(scene, 1e-10, way) for way in (MODEL_EXCHANGE, CO_SIMULATION))
+        exchange_run, cosimulation_run = (run_fmpy(scene, 1e-10, way) for way in (MODEL_EXCHANGE, CO_SIMULATION))
         counts = [
-            int(found.rows["events.count"][-1]) if scene.reference_case.problem.has_dry_friction else 0
-            for found in (one, other)
+            int(recording.rows["events.count"][-1]) if scene.reference_case.problem.has_dry_friction else 0
+            for recording in (exchange_run, cosimulation_run)
         ]
-        told = Baseline("{} events in model exchange, {} in co-simulation".format(*counts))
-        apart = relative_errors(
-            *(found.sample_at(scene.times, scene.reference_case.outputs) for found in (one, other))
+        baseline = Baseline("{} events in model exchange, {} in co-simulation".format(*counts))
+        difference = relative_errors(
+            *(
+                recording.sample_at(scene.times, scene.reference_case.outputs)
+                for recording in (exchange_run, cosimulation_run)
+            )
         ).max()
-        return float(apart) if counts[0] == counts[1] else inf, 1e-6, (told,)
+        return float(difference) if counts[0] == counts[1] else inf, 1e-6, (baseline,)
 
     return measure_or_skip(f"{scene}: model exchange at rtol 1e-10, difference from co-simulation", "1", figures)
 
 
 def call_overhead(model: str) -> Benchmark:
-    """A call each of setting the time, the states, and of asking the derivatives and the event indicators, as a
-    multiple of those of BouncingBall with the acceleration of the model written by hand."""
+    """Measure the cost of calls that set time and states and read derivatives and event indicators.
+
+    The target is relative to BouncingBall with the acceleration of the model in C.
+    """
 
     def figures() -> Measured:
-        library, equation = load_library(fmu(model, "native")), SETTINGS["acceleration"][model]
+        library, equation = load_library(built_fmu(model, "native")), SETTINGS["acceleration"][model]
         root = ElementTree.parse(library.file.parents[2] / "modelDescription.xml").getroot()
         states = len(root.findall("ModelStructure/Derivatives/Unknown"))
         indicators = int(root.attrib["numberOfEventIndicators"])
-        plain, theirs = (
-            seconds(build_bouncing_ball(of), *BOUNCING_BALL_SIZES, BOUNCING_BALL_START) for of in ("force", equation)
+        original, reference = (
+            time_calls(build_bouncing_ball(of), *BOUNCING_BALL_SIZES, BOUNCING_BALL_START) for of in ("force", equation)
         )
-        mine = seconds(library, states, indicators, SETTINGS["moving"].get(model, {}))
-        told = [Baseline(f"BouncingBall so, {call}", its) for call, its in zip(CALLS, theirs, strict=True)]
-        told += [Baseline(f"this FMU, {call}", its) for call, its in zip(CALLS, mine, strict=True)]
-        told.append(Baseline(f"ratio to BouncingBall as it is {sum(mine) / sum(plain):.3g}"))
-        return sum(mine) / sum(theirs), 1.1, tuple(told)
+        own = time_calls(library, states, indicators, SETTINGS["moving"].get(model, {}))
+        baselines = [
+            Baseline(f"BouncingBall with this equation, {call}", its)
+            for call, its in zip(CALLS, reference, strict=True)
+        ]
+        baselines += [Baseline(f"this FMU, {call}", its) for call, its in zip(CALLS, own, strict=True)]
+        baselines.append(Baseline(f"ratio to the original BouncingBall {sum(own) / sum(original):.3g}"))
+        return sum(own) / sum(reference), 1.1, tuple(baselines)
 
     return measure_or_skip(
-        f"{model}, model exchange: a call of each kind in C, ratio to a Reference FMU's by hand", "1", figures
+        f"{model}, model exchange: one call of each kind in C, ratio to a Reference FMU", "1", figures
     )
 
 
-def seconds(library: Library, states: int, indicators: int, values: dict[str, float]) -> list[float]:
-    """How long each of the calls takes, in s, with values set."""
+def time_calls(library: Library, states: int, indicators: int, values: dict[str, float]) -> list[float]:
+    """Measure the time of each call in s, with values set."""
     sets = [f"setr {library.references[name]} {value!r}" for name, value in values.items()]
     lines = ["new bench quiet exchange", *sets, "begin", f"calls {states} {indicators} {REPEATS}", "free"]
     done = run_host(library, "".join(f"0 {line}\n" for line in lines))
@@ -197,11 +212,11 @@ def seconds(library: Library, states: int, indicators: int, values: dict[str, fl
 
 @cache
 def build_bouncing_ball(acceleration: str) -> Library:
-    """That of a Reference FMU, compiled from its sources, with an acceleration in C."""
+    """Compile BouncingBall of the Reference FMUs with another acceleration, an expression in C."""
     clone = REFERENCE_FMUS.absolute()
     model, source = clone / "BouncingBall", clone / "src"
     if not model.is_dir():
-        raise MissingToolError(f"not here: {REFERENCE_FMUS} (git clone https://github.com/modelica/Reference-FMUs)")
+        raise MissingToolError(f"not found: {REFERENCE_FMUS} (git clone https://github.com/modelica/Reference-FMUs)")
     (guid,) = re.findall(r'INSTANTIATION_TOKEN "(.*)"', (model / "config.h").read_text(encoding="utf-8"))
     options = ("-std=gnu99", "-DFMI_VERSION=2", "-DDISABLE_PREFIX", f"-I{clone / 'include'}", f"-I{model}")
     others = (str(source / name) for name in ("fmi2Functions.c", "cosimulation.c"))
@@ -212,7 +227,7 @@ def build_bouncing_ball(acceleration: str) -> Library:
 
 
 def fmi3_fmu(model: str) -> Path:
-    """The FMI 3.0 FMU of a model."""
+    """Return the FMI 3.0 FMU of a model."""
     file = fmi3_path(find_fmu(model))
     if not file.is_file():
         raise MissingToolError(f"not built: {file} (python build_fmus.py --fmi 3)")

@@ -1,5 +1,5 @@
-"""The native FMUs beside those in Python, through fmpy and in a host in C, and beside one that integrates with SUNDIALS
-CVODE (cvode.c)."""
+"""Benchmarks of native FMUs against Python FMUs, through fmpy and in a C host, and against an FMU with SUNDIALS CVODE
+(cvode.c)."""
 
 import os
 from collections.abc import Callable
@@ -19,17 +19,17 @@ from ...running.stepping_loops import COMMUNICATION_STEPS, time_direct_loop, tim
 from ...scenes.fmu_files import find_fmu
 from .benchmark import SETTINGS, Baseline, Benchmark
 
-Measured = tuple[float, float, tuple[Baseline, ...]]  # measured, to reach, beside
+Measured = tuple[float, float, tuple[Baseline, ...]]  # value, target, baselines
 
 CASES_BY_NAME = {case.name: case for case in CASES}
 
 RUN_TIME_TARGETS: dict[str, float] = SETTINGS["in_c"]
-TOLERANCES = (1e-4, 1e-6, 1e-8)  # of CVODE, relative
+TOLERANCES = (1e-4, 1e-6, 1e-8)  # relative tolerances of CVODE
 REPEAT, REPEAT_PYTHON = 100, 5
 
 
 def native_benchmarks() -> list[Callable[[], Benchmark]]:
-    """What to measure: runs and communication steps in C, through fmpy, and runs beside CVODE's."""
+    """Return the benchmarks of native FMUs."""
     return [
         *(partial(run_in_c, case) for case in RUN_TIME_TARGETS),
         *(partial(step_in_c, case) for case in RUN_TIME_TARGETS),
@@ -40,7 +40,7 @@ def native_benchmarks() -> list[Callable[[], Benchmark]]:
 
 
 def run_in_c(case: str) -> Benchmark:
-    """One run with 1600 points in the host in C."""
+    """Measure a run with 1600 points in the C host."""
 
     def figures() -> Measured:
         try:
@@ -50,78 +50,82 @@ def run_in_c(case: str) -> Benchmark:
         return time_fmu(case, "native").seconds, RUN_TIME_TARGETS[case], (peer,)
 
     return measure_or_skip(
-        f"{case}, native: {CASES_BY_NAME[case].problem.stop:g} s, {COMMUNICATION_STEPS} points, host in C", "s", figures
+        f"{case}, native: {CASES_BY_NAME[case].problem.stop:g} s, {COMMUNICATION_STEPS} points, C host", "s", figures
     )
 
 
 def step_in_c(case: str) -> Benchmark:
-    """One communication step in the host in C, with position and speed read."""
+    """Measure a communication step in the C host, with position and speed read."""
 
-    def seconds(kind: str) -> float:
-        return time_per_step(time_fmu(case, kind).seconds, time_fmu(case, kind, 1).seconds)
+    def seconds(backend: str) -> float:
+        return time_per_step(time_fmu(case, backend).seconds, time_fmu(case, backend, 1).seconds)
 
-    return measure_or_skip(f"{case}, native: communication step, host in C", "s", partial(duel, seconds))
+    return measure_or_skip(f"{case}, native: communication step, C host", "s", partial(compare_backends, seconds))
 
 
 def run_through_fmpy(model: str) -> Benchmark:
-    """One run with 1600 points through fmpy, all outputs recorded."""
+    """Measure a run with 1600 points through fmpy, with all outputs recorded."""
     seconds = partial(time_through_fmpy, model, steps=COMMUNICATION_STEPS)
     return measure_or_skip(
-        f"{model}, native: {COMMUNICATION_STEPS} points through fmpy, harness's loop", "s", partial(duel, seconds)
+        f"{model}, native: {COMMUNICATION_STEPS} points through fmpy, loop of the harness",
+        "s",
+        partial(compare_backends, seconds),
     )
 
 
 def step_through_fmpy(model: str) -> Benchmark:
-    """One communication step through fmpy, all outputs recorded."""
+    """Measure a communication step through fmpy, with all outputs recorded."""
 
-    def seconds(kind: str) -> float:
+    def seconds(backend: str) -> float:
         return time_per_step(
-            time_through_fmpy(model, kind, steps=COMMUNICATION_STEPS), time_through_fmpy(model, kind, steps=1)
+            time_through_fmpy(model, backend, steps=COMMUNICATION_STEPS), time_through_fmpy(model, backend, steps=1)
         )
 
     return measure_or_skip(
-        f"{model}, native: communication step through fmpy, harness's loop", "s", partial(duel, seconds)
+        f"{model}, native: communication step through fmpy, loop of the harness",
+        "s",
+        partial(compare_backends, seconds),
     )
 
 
 def compare_with_cvode(case: str) -> Benchmark:
-    """Run time and error as shares of CVODE's, the larger of them: below 1 it is both faster and closer.
+    """Measure run time and error relative to CVODE, and return the larger ratio; below 1, both are better.
 
-    The time is compared with CVODE's shortest, the error with its smallest, which is that of another tolerance.
+    The run time is compared with the shortest and the error with the smallest of CVODE over several tolerances.
     """
     method = "BDF" if CASES_BY_NAME[case].problem.is_stiff else "Adams"
 
     def figures() -> Measured:
-        mine, theirs = time_fmu(case, "native"), [time_cvode(case, rtol) for rtol in TOLERANCES]
-        error, errors = largest_error(case, mine), [largest_error(case, each) for each in theirs]
-        share = max(mine.seconds / min(each.seconds for each in theirs), error / min(errors))
-        told = [Baseline(f"this FMU, error {error:.1e}", mine.seconds)]
-        for rtol, each, its in zip(TOLERANCES, theirs, errors, strict=True):
-            told.append(Baseline(f"CVODE FMU, {method} at {rtol:.0e}, error {its:.1e}", each.seconds))
-        return share, 1.0, tuple(told)
+        own, peers = time_fmu(case, "native"), [time_cvode(case, rtol) for rtol in TOLERANCES]
+        error, errors = largest_error(case, own), [largest_error(case, peer) for peer in peers]
+        ratio = max(own.seconds / min(peer.seconds for peer in peers), error / min(errors))
+        baselines = [Baseline(f"this FMU, error {error:.1e}", own.seconds)]
+        for rtol, peer, peer_error in zip(TOLERANCES, peers, errors, strict=True):
+            baselines.append(Baseline(f"CVODE FMU, {method} at {rtol:.0e}, error {peer_error:.1e}", peer.seconds))
+        return ratio, 1.0, tuple(baselines)
 
-    return measure_or_skip(f"{case}, native: larger of run time and error, ratio to the CVODE FMU's", "1", figures)
+    return measure_or_skip(f"{case}, native: larger of run time and error, ratio to the CVODE FMU", "1", figures)
 
 
-def duel(seconds: Callable[[str], float]) -> Measured:
-    """The time of the native FMU, to be below that of the one in Python."""
-    mine, theirs = seconds("native"), seconds("python")
-    return mine, theirs, (Baseline("FMU in Python", theirs),)
+def compare_backends(seconds: Callable[[str], float]) -> Measured:
+    """Compare the native FMU with the Python FMU, whose time is the target."""
+    native, python = seconds("native"), seconds("python")
+    return native, python, (Baseline("FMU in Python", python),)
 
 
 def measure_or_skip(what: str, unit: str, figures: Callable[[], Measured]) -> Benchmark:
-    """The measure of what was measured, to reach and beside; or why nothing is."""
+    """Run a measurement; if a tool is missing, return a benchmark with the reason."""
     try:
-        value, reach, others = figures()
+        value, reach, baselines = figures()
     except MissingToolError as error:
         return Benchmark(what, nan, unit, nan, (Baseline(str(error)),))
-    return Benchmark(what, value, unit, reach, others)
+    return Benchmark(what, value, unit, reach, baselines)
 
 
-def fmu(model: str, kind: str) -> Path:
-    """The built FMU in Python or the native one."""
+def built_fmu(model: str, backend: str) -> Path:
+    """Return the built FMU of a backend: python or native."""
     path, option = find_fmu(model), ""
-    if kind == "native":
+    if backend == "native":
         path, option = path.parent / "native" / path.name, " --native"
     if not path.is_file():
         raise MissingToolError(f"not built: {path} (python build_fmus.py{option})")
@@ -130,7 +134,7 @@ def fmu(model: str, kind: str) -> Path:
 
 @dataclass(frozen=True)
 class Timing:
-    """Run time in s of the fastest, and what was read at every point of the last (points, read)."""
+    """Run time in s of the fastest run, and values of the last run (points, variables)."""
 
     seconds: float
     rows: np.ndarray
@@ -139,7 +143,7 @@ class Timing:
 def time_runs(
     library: Library, values: dict[str, float], read: tuple[str, ...], stop: float, steps: int, repeat: int
 ) -> Timing:
-    """Runs from 0 to the stop in equal steps, one after the other on one instance."""
+    """Time repeated runs of one instance from 0 to `stop` in equal steps."""
     words = [f"{library.references[name]}={value!r}" for name, value in values.items()]
     words += [str(library.references[name]) for name in read]
     calls = f"0 new bench quiet\n0 time {repeat} {stop!r} {steps} {' '.join(words)}\n0 free\n"
@@ -148,21 +152,21 @@ def time_runs(
 
 
 def run_host(library: Library, calls: str) -> str:
-    """What the host in C answers."""
-    done = run_subprocess(library.command, calls, library.environment)
-    if done.returncode:
-        raise HarnessError((done.stderr.splitlines() or [f"{library.file.name} ends the host in C"])[0])
-    return done.stdout
+    """Execute calls in the C host and return its output."""
+    process = run_subprocess(library.command, calls, library.environment)
+    if process.returncode:
+        raise HarnessError((process.stderr.splitlines() or [f"{library.file.name} terminated the C host"])[0])
+    return process.stdout
 
 
-# Measured once, for all rows that show it.
+# Cached, because several benchmarks use the results.
 
 
 @cache
 def build_cvode_fmu(model: str, plain: bool = False) -> Library:
-    """The CVODE FMU, compiled for a model; `plain` as importers solve in model exchange."""
-    looking = [find_compiler(), "-E", "-x", "c", "-", "-o", os.devnull]
-    if run_subprocess(looking, "#include <cvode/cvode.h>\n").returncode:
+    """Compile the CVODE FMU of a model; if `plain`, with the solver settings of importers in model exchange."""
+    command = [find_compiler(), "-E", "-x", "c", "-", "-o", os.devnull]
+    if run_subprocess(command, "#include <cvode/cvode.h>\n").returncode:
         raise MissingToolError("not installed: SUNDIALS for C (on Debian libsundials-dev)")
     options = (f"-DMODEL={model.upper()}", f"-DPLAIN={plain:d}", "-shared", "-fPIC")
     libraries = ("-lsundials_cvode", "-lsundials_nvecserial", "-lm")
@@ -171,29 +175,31 @@ def build_cvode_fmu(model: str, plain: bool = False) -> Library:
 
 
 @cache
-def time_fmu(case: str, kind: str, steps: int = COMMUNICATION_STEPS) -> Timing:
-    """A built FMU with its own method and tolerance in the host in C."""
-    its = CASES_BY_NAME[case]
-    library = load_library(fmu(its.model, kind))
-    repeat = REPEAT if kind == "native" else REPEAT_PYTHON
-    return time_runs(library, its.values, its.outputs, its.problem.stop, steps, repeat)
+def time_fmu(case: str, backend: str, steps: int = COMMUNICATION_STEPS) -> Timing:
+    """Time a built FMU with default method and tolerance in the C host."""
+    case_data = CASES_BY_NAME[case]
+    library = load_library(built_fmu(case_data.model, backend))
+    repeat = REPEAT if backend == "native" else REPEAT_PYTHON
+    return time_runs(library, case_data.values, case_data.outputs, case_data.problem.stop, steps, repeat)
 
 
 @cache
 def time_cvode(case: str, rtol: float) -> Timing:
-    """The CVODE FMU in the host in C."""
-    its = CASES_BY_NAME[case]
-    values = {**its.values, "rtol": rtol, "atol": rtol * its.problem.atol_factor}
-    return time_runs(build_cvode_fmu(its.model), values, ("x", "v"), its.problem.stop, COMMUNICATION_STEPS, REPEAT)
+    """Time the CVODE FMU in the C host."""
+    case_data = CASES_BY_NAME[case]
+    values = {**case_data.values, "rtol": rtol, "atol": rtol * case_data.problem.atol_factor}
+    return time_runs(
+        build_cvode_fmu(case_data.model), values, ("x", "v"), case_data.problem.stop, COMMUNICATION_STEPS, REPEAT
+    )
 
 
 @cache
-def time_through_fmpy(model: str, kind: str, steps: int) -> float:
-    """Run time in s of a built FMU in the harness's loop through fmpy."""
-    return time_direct_loop(fmu(model, kind), steps)
+def time_through_fmpy(model: str, backend: str, steps: int) -> float:
+    """Return the run time in s of a built FMU through fmpy, in the loop of the harness."""
+    return time_direct_loop(built_fmu(model, backend), steps)
 
 
-def largest_error(case: str, found: Timing) -> float:
-    """The largest error at the points of the reference, relative to the largest of position and speed."""
+def largest_error(case: str, timing: Timing) -> float:
+    """Return the largest error at the points of the reference, relative to the largest position and speed."""
     truth = CASES_BY_NAME[case].reference
-    return float(relative_errors(found.rows[:: COMMUNICATION_STEPS // (len(truth.times) - 1)], truth.motion).max())
+    return float(relative_errors(timing.rows[:: COMMUNICATION_STEPS // (len(truth.times) - 1)], truth.motion).max())

@@ -1,4 +1,4 @@
-"""The benchmark's run times: the best of several after a warm-up, peers in the same run and the same process."""
+"""Run-time benchmarks: best of several runs after a warm-up, with peers in the same process."""
 
 from collections.abc import Callable
 from functools import partial
@@ -25,11 +25,11 @@ from .empty_fmu import build_empty_fmu
 
 RTOL, ATOL = 1e-6, 1e-9
 RUNS = 10_000
-STEPS = 500  # of a peer, to take the mean of
+STEPS = 500  # of a peer, averaged
 
 
 def speed_benchmarks() -> list[Callable[[], Benchmark]]:
-    """What to measure, in the order of the design's table."""
+    """Return the run-time benchmarks."""
     sled = load_model_class(find_fmu("stickslip"))
     pacejka = partial(
         time_in_process, "pacejka", load_model_class(find_fmu("pacejka")), "rodas", 8e-3, ("Radau", "BDF")
@@ -45,87 +45,87 @@ def speed_benchmarks() -> list[Callable[[], Benchmark]]:
 
 def time_in_process(
     model: str,
-    carried: type,
+    model_class: type,
     method: str,
-    reach: float,
-    rivals: tuple[str, str],
+    target: float,
+    peer_methods: tuple[str, str],
     problem: OdeProblem,
     values: dict[str, float],
 ) -> Benchmark:
-    """One run with 1600 points, without fmpy; `rivals` are methods of scipy and of CVODE."""
+    """Measure a run with 1600 points without fmpy; `rivals` are methods of scipy and CVODE."""
     times = np.linspace(0.0, problem.stop, COMMUNICATION_STEPS + 1)
-    mine = EmbeddedModel.create(carried, values, method, RTOL, ATOL)
-    seconds = time_fastest_call(partial(mine.compute_states, times.tolist()), 20)
-    beside = []
-    for peer, name in zip(("scipy", "cvode"), rivals, strict=True):
+    embedded_model = EmbeddedModel.create(model_class, values, method, RTOL, ATOL)
+    seconds = time_fastest_call(partial(embedded_model.compute_states, times.tolist()), 20)
+    baselines = []
+    for peer, name in zip(("scipy", "cvode"), peer_methods, strict=True):
         if peer in peer_solvers.missing_packages():
-            beside.append(Baseline(f"{peer} {name}: {peer_solvers.missing_packages()[peer]} is not installed"))
+            baselines.append(Baseline(f"{peer} {name}: {peer_solvers.missing_packages()[peer]} is not installed"))
         else:
-            ask = partial(peer_solvers.solve, peer, name, problem, times, RTOL, ATOL)
-            beside.append(Baseline(f"{peer} {name} at {RTOL:g}", time_fastest_call(ask, 3)))
+            solve = partial(peer_solvers.solve, peer, name, problem, times, RTOL, ATOL)
+            baselines.append(Baseline(f"{peer} {name} at {RTOL:g}", time_fastest_call(solve, 3)))
     setting = ", ".join([model, *(f"{name} {value:g}" for name, value in values.items()), method])
     return Benchmark(
         f"{setting}: {problem.stop:g} s, {COMMUNICATION_STEPS} points, inside Python",
         seconds,
         "s",
-        reach,
-        tuple(beside),
+        target,
+        tuple(baselines),
     )
 
 
-def time_one_step(carried: type) -> Benchmark:
-    """One step of ode23 on the smooth model, and one of scipy's RK23."""
+def time_one_step(model_class: type) -> Benchmark:
+    """Measure one step of ode23 for the smooth model, against scipy's RK23."""
     from scipy.integrate import RK23
 
     problem, rtol = Smd(), 1e-8
-    mine = EmbeddedModel.create(carried, {}, "ode23", rtol, 1e-3 * rtol)
-    seconds = time_fastest_call(partial(mine.compute_states, [0.0, problem.stop]), 10)
-    solver = mine.model.solver
-    solver.report(mine.model.events)
-    rival: Any = RK23(problem.rates(1), 0.0, problem.start, problem.stop, rtol=rtol, atol=1e-3 * rtol)
+    embedded_model = EmbeddedModel.create(model_class, {}, "ode23", rtol, 1e-3 * rtol)
+    seconds = time_fastest_call(partial(embedded_model.compute_states, [0.0, problem.stop]), 10)
+    solver = embedded_model.model.solver
+    solver.report(embedded_model.model.events)
+    peer_solver: Any = RK23(problem.rates(1), 0.0, problem.start, problem.stop, rtol=rtol, atol=1e-3 * rtol)
 
     def steps() -> None:
         for _ in range(STEPS):
-            rival.step()
+            peer_solver.step()
 
     peer = Baseline("scipy RK23", time_fastest_call(steps, 5) / STEPS)
     return Benchmark("smd, ode23: one step", seconds / (solver.steps + solver.rejected), "s", 2e-6, (peer,))
 
 
 def time_communication_step(model: str) -> Benchmark:
-    """A communication step through fmpy with all outputs recorded, as a multiple of that of an empty FMU."""
-    mine = find_fmu(model)
+    """Measure a communication step through fmpy with all outputs recorded, relative to that of an empty FMU."""
+    own = find_fmu(model)
     with TemporaryDirectory(prefix="fmu-") as folder:
-        found = read_description(find_fmu(model))
-        stop = float(found.defaultExperiment.stopTime)
-        variables = found.modelVariables
+        fmu_description = read_description(find_fmu(model))
+        stop = float(fmu_description.defaultExperiment.stopTime)
+        variables = fmu_description.modelVariables
         kinds = {v.name: "Integer" if v.type == "Integer" else "Real" for v in variables}
         traits = [(kinds[v.name], v.name, v.causality, v.variability) for v in variables]
-        nothing = build_empty_fmu(f"Empty{model.capitalize()}", traits, stop, Path(folder))
-        ways = [
+        empty_fmu = build_empty_fmu(f"Empty{model.capitalize()}", traits, stop, Path(folder))
+        variants = [
             (loop, fmu)
             for loop in (stepping_loops.time_fmpy_loop, stepping_loops.time_direct_loop)
-            for fmu in (mine, nothing)
+            for fmu in (own, empty_fmu)
         ]
-        turns = []
-        for _ in range(3):  # in turns: what else runs on the machine hits all
-            turns.append(
-                [stepping_loops.time_per_step(loop(fmu, COMMUNICATION_STEPS), loop(fmu, 1)) for loop, fmu in ways]
+        rounds = []
+        for _ in range(3):  # alternating, so that other load affects all
+            rounds.append(
+                [stepping_loops.time_per_step(loop(fmu, COMMUNICATION_STEPS), loop(fmu, 1)) for loop, fmu in variants]
             )
-    usual, empty, lean, lean_empty = map(min, zip(*turns, strict=True))
-    beside = (
+    usual, empty, lean, lean_empty = map(min, zip(*rounds, strict=True))
+    baselines = (
         Baseline("this FMU", usual),
         Baseline("empty pythonfmu FMU", empty),
-        Baseline("this FMU in the harness's loop", lean),
-        Baseline("empty pythonfmu FMU there", lean_empty),
+        Baseline("this FMU in the loop of the harness", lean),
+        Baseline("empty pythonfmu FMU in the loop of the harness", lean_empty),
     )
-    what = f"{model}: communication step through fmpy, ratio to an empty one"
-    return Benchmark(what, usual / empty, "1", 1.25, beside)
+    name = f"{model}: communication step through fmpy, ratio to an empty one"
+    return Benchmark(name, usual / empty, "1", 1.25, baselines)
 
 
-def time_many_runs(carried: type) -> Benchmark:
-    """10 000 runs of the sled with as many speeds of the driver: final state and number of events."""
-    model = carried()
+def time_many_runs(model_class: type) -> Benchmark:
+    """Measure 10 000 runs of the sled with different driver speeds: final state and number of events."""
+    model = model_class()
     solver = model.solver
 
     def one(v_driver: float) -> tuple[float, float, int]:

@@ -1,4 +1,4 @@
-"""The numbers to reach, each beside what it is compared with in the same run."""
+"""Runs the benchmarks and writes bench.csv."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +16,7 @@ FOLDER, FILE = "bench", "bench.csv"
 
 
 def all_benchmarks() -> list[Callable[[], Benchmark]]:
-    """All that is measured: run times, then those of the native FMUs, then model exchange, then errors."""
+    """Return all benchmarks: run times, native FMUs, model exchange, accuracy."""
     require_reference_packages()
     from .accuracy import accuracy_benchmarks
     from .model_exchange import exchange_benchmarks
@@ -27,24 +27,26 @@ def all_benchmarks() -> list[Callable[[], Benchmark]]:
 
 
 def run_benchmarks(
-    chosen: list[Callable[[], Benchmark]], out: Path, report: Callable[[str, float], None]
+    selected: list[Callable[[], Benchmark]], out: Path, report: Callable[[str, float], None]
 ) -> list[Benchmark]:
-    """Measure the chosen and write out/bench/bench.csv; told of each as it comes."""
+    """Run benchmarks and write out/bench/bench.csv; `report` receives the name of each finished benchmark."""
     with replace_folder(out / FOLDER, (FILE,)) as folder:
-        found = []
-        for measure in chosen:
-            found.append(measure())
-            report(found[-1].name, 1.0)
-        save(found, folder / FILE)
+        results = []
+        for run_benchmark in selected:
+            results.append(run_benchmark())
+            report(results[-1].name, 1.0)
+        save(results, folder / FILE)
         fmus = [fmu for fmu in map(find_fmu, MODELS) if fmu.is_file()]
         write_provenance(folder, fmus, prefix_parameters({fmu.stem: declared_parameters(fmu) for fmu in fmus}))
-    return found
+    return results
 
 
-def save(found: list[Benchmark], path: Path) -> None:
-    """One line for each measure and for each number beside it."""
-    heads = ["what", "measured", "unit", "to reach", "reached", "beside", "its value"]
-    mine = ((each, (each.name, each.value, each.unit, each.target, each.is_met)) for each in found)
+def save(results: list[Benchmark], path: Path) -> None:
+    """Write one row for each baseline of each benchmark."""
+    headings = ["benchmark", "measured", "unit", "target", "met", "baseline", "baseline value"]
+    rows = ((result, (result.name, result.value, result.unit, result.target, result.is_met)) for result in results)
     write_csv_rows(
-        path, heads, ((*cells, beside.name, beside.value) for each, cells in mine for beside in each.baselines)
+        path,
+        headings,
+        ((*cells, baseline.name, baseline.value) for result, cells in rows for baseline in result.baselines),
     )

@@ -1,4 +1,4 @@
-"""The table of the benchmark."""
+"""Table of the benchmarks."""
 
 from collections.abc import Iterable
 from math import isnan
@@ -10,33 +10,33 @@ from rich.text import Text
 from .benchmark import Baseline, Benchmark
 
 
-def benchmark_table(found: Iterable[Benchmark]) -> Table:
-    """Measured, to reach, reached or not, and what stands beside it."""
+def benchmark_table(benchmarks: Iterable[Benchmark]) -> Table:
+    """Return the table of measured values, targets and baselines."""
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    table.add_column("what")
+    table.add_column("benchmark")
     table.add_column("measured", justify="right", no_wrap=True)
-    table.add_column("to reach", justify="right", no_wrap=True)
+    table.add_column("target", justify="right", no_wrap=True)
     table.add_column("")
-    table.add_column("beside")
-    for measure in found:
-        missed = Text("not measured", style="dim") if isnan(measure.value) else Text("missed", style="bold red")
-        verdict = Text("reached") if measure.is_met else missed
-        beside = "\n".join(format_baseline(measure, each) for each in measure.baselines)
-        figures = (format_quantity(number, measure.unit) for number in (measure.value, measure.target))
-        table.add_row(measure.name, *figures, verdict, beside)
+    table.add_column("baseline")
+    for benchmark in benchmarks:
+        missed = Text("not measured", style="dim") if isnan(benchmark.value) else Text("missed", style="bold red")
+        verdict = Text("met") if benchmark.is_met else missed
+        baselines = "\n".join(format_baseline(benchmark, baseline) for baseline in benchmark.baselines)
+        values = (format_quantity(number, benchmark.unit) for number in (benchmark.value, benchmark.target))
+        table.add_row(benchmark.name, *values, verdict, baselines)
     return table
 
 
-def format_baseline(measure: Benchmark, beside: Baseline) -> str:
-    """What stands beside, and how many times the measured number it is."""
-    if beside.value is None:
-        return beside.name
-    ratio = "" if measure.unit == "1" or not measure.value else f", {beside.value / measure.value:.3g} times"
-    return f"{beside.name}: {format_quantity(beside.value, 's')}{ratio}"
+def format_baseline(benchmark: Benchmark, baseline: Baseline) -> str:
+    """Format a baseline with its ratio to the measured value."""
+    if baseline.value is None:
+        return baseline.name
+    ratio = "" if benchmark.unit == "1" or not benchmark.value else f", {baseline.value / benchmark.value:.3g} times"
+    return f"{baseline.name}: {format_quantity(baseline.value, 's')}{ratio}"
 
 
 def format_quantity(value: float, unit: str) -> str:
-    """A number in its unit, seconds in one of a handy size; nothing for what was not measured."""
+    """Format a value with its unit, seconds with a prefix; NaN is empty."""
     if isnan(value):
         return ""
     if unit == "s":

@@ -1,1 +1,1 @@
-"""Two results, or two FMUs of anyone's, side by side."""
+"""Comparison of two results or FMUs."""

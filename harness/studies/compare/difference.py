@@ -1,4 +1,4 @@
-"""How far two trajectories are apart: largest and root-mean-square difference of each variable, and event times."""
+"""Differences of two trajectories: largest and root-mean-square difference of each variable, and event times."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -13,15 +13,31 @@ from .interpolation import Interpolant, ValueBounds
 from .trajectory_sources import common_span
 from .units import conversion_factor
 
-ENOUGH = 0.5  # share of the coarser one's times that are common, which makes interpolation needless
-SAME = 1e-9  # share of the stretch: times this close are one
+MIN_COMMON = 0.5  # fraction of common times from which no interpolation is needed
+TIME_TOLERANCE = 1e-9  # times closer than this fraction of the time span are equal
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One variable: the `largest` difference and where it is (`at`, s), the root mean square, in `unit`; `relative`:
-    the largest over the largest value of either, the `size`.  `left`, `right` (n,): the two at the times compared; of
-    texts 0, and 1 where they differ.  Where one is not a finite number, which is then at `at`, all is NaN."""
+    """Difference of one variable.
+
+    Attributes
+    ----------
+    name, unit
+        Name and unit of the variable.
+    largest
+        Largest absolute difference, NaN if a value is not finite.
+    at
+        Time in s of the largest difference, or of the first value that is not finite.
+    rms
+        Root-mean-square difference.
+    relative
+        `largest` divided by `size`.
+    size
+        Largest absolute value of either side.
+    left, right : (n,)
+        Values of both sides at the times of comparison; for strings 0, or 1 if they differ.
+    """
 
     name: str
     unit: str
@@ -36,8 +52,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two trajectories at the `time` (n,) of comparison, with the `pairs` of their events, None where they are not
-    known."""
+    """Comparison of two trajectories at `time` (n,) in s; `pairs` holds their matched events if they are known."""
 
     one: Signals
     two: Signals
@@ -49,129 +64,141 @@ class Comparison:
 
     @property
     def worst(self) -> float:
-        """The largest relative difference; NaN if any is."""
-        return float(np.max([each.relative for each in self.differences]))
+        """Return the largest relative difference; NaN if any is NaN."""
+        return float(np.max([variable.relative for variable in self.differences]))
 
     def violations(self, rtol: float, atol: float) -> list[str]:
-        """What differs by more than atol, in the unit of each, and rtol of its largest value together; a sentence each,
-        and one about events that do not match."""
-        said = [
-            f"{each.name} differs by {each.largest:.3g}{f' {each.unit}' if each.unit else ''} at t = {each.at:.6g} s, "
-            f"more than {atol + rtol * each.size:.3g}"
-            for each in self.differences
-            if not isnan(each.largest) and each.largest > atol + rtol * each.size
+        """Return messages on variables that differ by more than atol + rtol * size, and on unmatched events."""
+        messages = [
+            f"{variable.name} differs by {variable.largest:.3g}{f' {variable.unit}' if variable.unit else ''} "
+            f"at t = {variable.at:.6g} s, more than {atol + rtol * variable.size:.3g}"
+            for variable in self.differences
+            if not isnan(variable.largest) and variable.largest > atol + rtol * variable.size
         ]
-        lost = [each.name for each in self.differences if isnan(each.largest)]
-        said += [f"{name} holds what is not a finite number, which is in no bound" for name in lost]
+        nonfinite = [variable.name for variable in self.differences if isnan(variable.largest)]
+        messages += [f"{name} has values that are not finite" for name in nonfinite]
         if self.pairs and isnan(self.pairs.shift):
-            said.append(f"their events do not match: {self.events}")
-        return said
+            messages.append(f"their events do not match: {self.events}")
+        return messages
 
     @property
     def events(self) -> str:
-        """What is to be said of them; nothing where they are not known."""
+        """Return a summary of the events; empty if they are unknown."""
         return self.pairs.summary((self.one.name, self.two.name)) if self.pairs else ""
 
 
 def compare(one: Signals, two: Signals) -> Comparison:
-    """Compare what both have, over the time that both cover; HarnessError if that is nothing."""
+    """Compare the common variables over the common time span.
+
+    Raises
+    ------
+    HarnessError
+        If there are no common variables or times.
+    """
     shared = [name for name in one.columns if name in two.columns]
     if not shared:
-        has = [f"{each.name} ({', '.join(each.columns)})" for each in (one, two)]
-        raise HarnessError(f"{' and '.join(has)} have no variable in common")
+        contents = [f"{side.name} ({', '.join(side.columns)})" for side in (one, two)]
+        raise HarnessError(f"{' and '.join(contents)} have no variable in common")
     begin, end = common_span(one, two)
     time, interpolated = times(one, two, begin, end)
     pairs, jumps = events(one, two, begin, end)
-    motions, differences, left_out = tuple(coded(one, two)), [], []
+    motions, differences, left_out = tuple(encode_strings(one, two)), [], []
     for name in shared:
-        unit, factor, differs = units(one, two, name)
-        left_out += [differs] if differs else []
+        unit, factor, remark = units(one, two, name)
+        left_out += [remark] if remark else []
         if unit is not None:
-            ours, theirs = (each.bounds_at(name, time, at) for each, at in zip(motions, jumps, strict=True))
-            left, right = nearest(ours, ValueBounds(factor * theirs.low, factor * theirs.high))
-            if textual(one, name):
+            left_bounds, right_bounds = (
+                side.bounds_at(name, time, at) for side, at in zip(motions, jumps, strict=True)
+            )
+            left, right = closest_values(
+                left_bounds, ValueBounds(factor * right_bounds.low, factor * right_bounds.high)
+            )
+            if is_string(one, name):
                 left, right = np.zeros(len(time)), (left != right).astype(float)
             differences.append(difference(name, unit, time, left, right))
     if not differences:
         raise HarnessError(f"nothing to compare: {'; '.join(left_out)}")
-    for each, other in ((one, two), (two, one)):
-        is_isolated = [name for name in each.columns if name not in other.columns]
-        left_out += [f"only in {each.name}: {', '.join(is_isolated)}"] if is_isolated else []
+    for side, other in ((one, two), (two, one)):
+        is_isolated = [name for name in side.columns if name not in other.columns]
+        left_out += [f"only in {side.name}: {', '.join(is_isolated)}"] if is_isolated else []
     return Comparison(one, two, time, interpolated, tuple(differences), tuple(left_out), pairs)
 
 
 def units(one: Signals, two: Signals, name: str) -> tuple[str | None, float, str]:
-    """The unit in which a variable is compared, None where that cannot be, how large the other's is in it, and what is
-    to be said of that."""
-    left, right = (each.units[name] for each in (one, two))
-    if textual(one, name) != textual(two, name):
-        text, number = (one, two) if textual(one, name) else (two, one)
-        return None, 1.0, f"{name} is a text in {text.name} and a number in {number.name}, and is left out"
+    """Return the unit of comparison (None if impossible), the factor from the second unit to it, and a remark."""
+    left, right = (side.units[name] for side in (one, two))
+    if is_string(one, name) != is_string(two, name):
+        text, number = (one, two) if is_string(one, name) else (two, one)
+        return None, 1.0, f"{name} is a string in {text.name} and a number in {number.name}; skipped"
     if bool(left) != bool(right):
         lacks = (two if left else one).name
-        return left or right, 1.0, f"{name} has no unit in {lacks}; it is taken to be in {left or right}"
+        return left or right, 1.0, f"{name} has no unit in {lacks}; assumed {left or right}"
     factor = conversion_factor(right, left)
     if factor is None:
-        return None, 1.0, f"{name} is in {left} in {one.name} and in {right} in {two.name}, and is left out"
-    return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; it is compared in {left}"
+        return None, 1.0, f"{name} is in {left} in {one.name} and in {right} in {two.name}; skipped"
+    return left, factor, "" if factor == 1.0 else f"{name} is in {right} in {two.name}; compared in {left}"
 
 
-def textual(path: Signals, name: str) -> bool:
+def is_string(path: Signals, name: str) -> bool:
     return path.columns[name].dtype.kind == "U"
 
 
-def coded(one: Signals, two: Signals) -> Iterator[Interpolant]:
-    """Both motions, of a text in both the place among all that either says."""
-    texts = [name for name in one.columns if name in two.columns and textual(one, name) and textual(two, name)]
-    known = {name: np.unique(np.concatenate([each.columns[name] for each in (one, two)])) for name in texts}
-    for each in (one, two):
-        places = {name: np.searchsorted(known[name], each.columns[name]).astype(float) for name in texts}
-        yield Interpolant(replace(each, columns=each.columns | places))
+def encode_strings(one: Signals, two: Signals) -> Iterator[Interpolant]:
+    """Yield interpolants of both trajectories, with strings replaced by numbers."""
+    texts = [name for name in one.columns if name in two.columns and is_string(one, name) and is_string(two, name)]
+    values = {name: np.unique(np.concatenate([side.columns[name] for side in (one, two)])) for name in texts}
+    for side in (one, two):
+        codes = {name: np.searchsorted(values[name], side.columns[name]).astype(float) for name in texts}
+        yield Interpolant(replace(side, columns=side.columns | codes))
 
 
-def nearest(left: ValueBounds, right: ValueBounds) -> tuple[np.ndarray, np.ndarray]:
-    """Of all values (n,) that either side may have, the two that are nearest to each other."""
+def closest_values(left: ValueBounds, right: ValueBounds) -> tuple[np.ndarray, np.ndarray]:
+    """Return the closest pair of values (n,) within the bounds of both sides."""
     one = np.clip(np.maximum(left.low, right.low), left.low, left.high)
     return one, np.clip(one, right.low, right.high)
 
 
 def difference(name: str, unit: str, time: np.ndarray, left: np.ndarray, right: np.ndarray) -> Difference:
-    """The difference of one variable; reckoned in shares of the largest value, which near 1e308 has no square."""
-    lost = ~(np.isfinite(left) & np.isfinite(right))
-    if lost.any():
-        at = float(time[int(np.argmax(lost))])
+    """Return the difference of one variable; values are divided by the largest one to avoid overflow."""
+    nonfinite = ~(np.isfinite(left) & np.isfinite(right))
+    if nonfinite.any():
+        at = float(time[int(np.argmax(nonfinite))])
         return Difference(name, unit, np.nan, at, np.nan, np.nan, np.nan, left, right)
     size = float(max(np.abs(left).max(), np.abs(right).max()))
-    off = np.abs(left / size - right / size) if size else np.zeros(len(time))
-    i, rms = int(np.argmax(off)), float(np.sqrt(np.mean(off * off)))
-    relative = float(off[i])
+    deviation = np.abs(left / size - right / size) if size else np.zeros(len(time))
+    i, rms = int(np.argmax(deviation)), float(np.sqrt(np.mean(deviation * deviation)))
+    relative = float(deviation[i])
     return Difference(name, unit, relative * size, float(time[i]), rms * size, relative, size, left, right)
 
 
 def times(one: Signals, two: Signals, begin: float, end: float) -> tuple[np.ndarray, bool]:
-    """The times of comparison (n,), and whether one is interpolated: those that are common if there are enough of them,
-    else those of the coarser one."""
-    near = SAME * (end - begin)
-    grids = [np.unique(each.time[(each.time >= begin) & (each.time <= end)]) for each in (one, two)]
+    """Return the times of comparison (n,) and whether one side is interpolated.
+
+    These are the common times if there are enough of them, otherwise the times of the coarser side.
+    """
+    tolerance = TIME_TOLERANCE * (end - begin)
+    grids = [np.unique(side.time[(side.time >= begin) & (side.time <= end)]) for side in (one, two)]
     coarser, finer = sorted(grids, key=len)
-    at = np.clip(np.searchsorted(finer, coarser - near), 0, len(finer) - 1)
-    same = coarser[np.abs(finer[at] - coarser) <= near]
-    if len(same) >= ENOUGH * len(coarser):
-        return same, False
+    at = np.clip(np.searchsorted(finer, coarser - tolerance), 0, len(finer) - 1)
+    common = coarser[np.abs(finer[at] - coarser) <= tolerance]
+    if len(common) >= MIN_COMMON * len(coarser):
+        return common, False
     return coarser, True
 
 
 def events(
     one: Signals, two: Signals, begin: float, end: float
 ) -> tuple[EventPairs | None, tuple[np.ndarray, np.ndarray]]:
-    """The events of both in pairs, and the stretches of time in s in which each of the two jumps (k, 2): from the
-    earlier to the later of a pair, and where one alone has an event."""
-    known = [np.zeros((1, 2)) if each.events is None else each.events for each in (one, two)]
-    first, second = (rows[1:][(rows[1:, 0] >= begin) & (rows[1:, 0] <= end)] for rows in known)
+    """Match the events of both sides, and return the time intervals (k, 2) in s in which each side jumps.
+
+    Such an interval extends between the two times of a matched event; an unmatched event is an interval of length zero.
+    """
+    event_tables = [np.zeros((1, 2)) if side.events is None else side.events for side in (one, two)]
+    first, second = (rows[1:][(rows[1:, 0] >= begin) & (rows[1:, 0] <= end)] for rows in event_tables)
     if one.events is None or two.events is None:
         return None, (first[:, [0, 0]], second[:, [0, 0]])
     pairs = match_events(first, second)
-    near = pairs.intervals[pairs.is_isolated(np.sort(np.concatenate([first[:, 0], second[:, 0]])))]
-    own = [rows[~np.isin(rows[:, 0], near)][:, [0, 0]] for rows in (first, second)]
-    left, right = (np.vstack([near, rows]) for rows in own)
+    intervals = pairs.intervals[pairs.is_isolated(np.sort(np.concatenate([first[:, 0], second[:, 0]])))]
+    unmatched = [rows[~np.isin(rows[:, 0], intervals)][:, [0, 0]] for rows in (first, second)]
+    left, right = (np.vstack([intervals, rows]) for rows in unmatched)
     return pairs, (left, right)

@@ -1,16 +1,19 @@
-"""Which events of two motions are the same ones: matched by kind and time."""
+"""Matches events of two trajectories by kind and nearest time."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-MOST = 3  # events that are told one by one
+MAX_LISTED = 3  # unmatched events listed in the summary
 
 
 @dataclass(frozen=True)
 class EventPairs:
-    """Changes of mode as (time in s, new mode): `one`, `two` (k, 2), row by row the same event in both; `only` those
-    that one alone has, and those that the other alone has."""
+    """Matched changes of mode.
+
+    `one` and `two` (k, 2) hold time in s and new mode, with the same event in each row; `unmatched` holds the other
+    events of each side.
+    """
 
     one: np.ndarray
     two: np.ndarray
@@ -18,52 +21,55 @@ class EventPairs:
 
     @property
     def shift(self) -> float:
-        """The largest difference of times in s; NaN if an event is in one alone."""
+        """Return the largest time difference in s; NaN if some events are unmatched."""
         return self.largest_shift if not any(map(len, self.unmatched)) else np.nan
 
     @property
     def largest_shift(self) -> float:
-        """The largest difference of times in s of those in both."""
+        """Return the largest time difference in s of the matched events."""
         return float(np.abs(self.one[:, 0] - self.two[:, 0]).max()) if len(self.one) else 0.0
 
     @property
     def intervals(self) -> np.ndarray:
-        """The times (k, 2) in s between which a matched event happens, from the earlier to the later."""
+        """Return the interval (k, 2) in s between the two times of each matched event."""
         return np.sort(np.column_stack([self.one[:, 0], self.two[:, 0]]), axis=1)
 
     def is_isolated(self, times: np.ndarray) -> np.ndarray:
-        """Of which pairs (k,) both happen before any other of these times, in their order."""
+        """Return for each pair (k,) whether none of the sorted `times` lies between its two times."""
         begin, end = self.intervals.T
         return np.searchsorted(times, end, "left") <= np.searchsorted(times, begin, "right")
 
     def summary(self, names: tuple[str, str]) -> str:
-        """What is to be said of them."""
+        """Return a summary of matched and unmatched events."""
         count = f"{len(self.one)} change{'s' * (len(self.one) != 1)} of mode in both"
-        said = [f"{count}, at most {self.largest_shift:.3g} s apart" if len(self.one) else count]
+        parts = [f"{count}, at most {self.largest_shift:.3g} s apart" if len(self.one) else count]
         for name, rows in zip(names, self.unmatched, strict=True):
-            told = [f"to {mode:g} at t = {t:.6g} s" for t, mode in rows[:MOST]]
-            more = [f"{len(rows) - MOST} more"] * (len(rows) > MOST)
-            said += [f"only in {name}: {', '.join(told + more)}"] if told else []
-        return "; ".join(said)
+            listed = [f"to {mode:g} at t = {t:.6g} s" for t, mode in rows[:MAX_LISTED]]
+            more = [f"{len(rows) - MAX_LISTED} more"] * (len(rows) > MAX_LISTED)
+            parts += [f"only in {name}: {', '.join(listed + more)}"] if listed else []
+        return "; ".join(parts)
 
 
 def match_events(one: np.ndarray, two: np.ndarray) -> EventPairs:
-    """The events of two motions, (n, 2) and (m, 2) in the order of their times: in pairs one after the other if all are
-    of the same kinds, otherwise each with the nearest of its kind, if it is the nearest of that one too."""
+    """Match the events of two trajectories, (n, 2) and (m, 2), sorted by time.
+
+    If both sequences of modes are equal, events are matched in order; otherwise mutual nearest neighbours of the same
+    kind are matched.
+    """
     if len(one) == len(two) and (one[:, 1] == two[:, 1]).all():
         return EventPairs(one, two, (one[:0], two[:0]))
-    chosen: list[tuple[int, int]] = []
+    matches: list[tuple[int, int]] = []
     for kind in np.intersect1d(one[:, 1], two[:, 1]):
         i, j = (np.flatnonzero(rows[:, 1] == kind) for rows in (one, two))
         to, back = nearest(one[i, 0], two[j, 0]), nearest(two[j, 0], one[i, 0])
         mutual = np.flatnonzero(back[to] == np.arange(len(i)))
-        chosen += zip(i[mutual].tolist(), j[to[mutual]].tolist(), strict=True)
-    left, right = np.array(sorted(chosen), int).reshape(-1, 2).T
+        matches += zip(i[mutual].tolist(), j[to[mutual]].tolist(), strict=True)
+    left, right = np.array(sorted(matches), int).reshape(-1, 2).T
     return EventPairs(one[left], two[right], (np.delete(one, left, axis=0), np.delete(two, right, axis=0)))
 
 
 def nearest(times: np.ndarray, among: np.ndarray) -> np.ndarray:
-    """The number of the nearest of some times, in their order, to each."""
+    """Return for each time the index of the nearest one in the sorted array `among`."""
     after = np.clip(np.searchsorted(among, times), 1, max(len(among) - 1, 1))
     before = after - 1
     after = np.minimum(after, len(among) - 1)

@@ -1,4 +1,4 @@
-"""The figure of a comparison: each variable of both above, their difference below."""
+"""Figure of a comparison: both sides of each variable on the left, their difference on the right."""
 
 from pathlib import Path
 
@@ -20,44 +20,47 @@ from ...results.style import (
     open_figure,
 )
 from . import units
-from .difference import Comparison, textual
+from .difference import Comparison, is_string
 
-MOST = 8  # variables drawn, those that differ most
+MAX_VARIABLES = 8  # the variables with the largest relative differences are drawn
 ROUNDING = 64 * np.finfo(float).eps
 
 
-def draw(found: Comparison, path: Path) -> None:
-    """Save the figure, if there is anything but texts to draw."""
-    numbers = [each for each in found.differences if not textual(found.one, each.name)]
-    chosen = sorted(numbers, key=lambda each: -each.relative)[:MOST]
-    if not chosen:
+def draw(comparison: Comparison, path: Path) -> None:
+    """Save the figure; without numeric variables there is none."""
+    numbers = [variable for variable in comparison.differences if not is_string(comparison.one, variable.name)]
+    selected = sorted(numbers, key=lambda variable: -variable.relative)[:MAX_VARIABLES]
+    if not selected:
         return
-    with open_figure(path, 2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(chosen)) as figure:
-        figure.suptitle(f"{found.one.name} and {found.two.name}", fontsize=11)
-        panels = figure.subplots(len(chosen), 2, sharex=True, squeeze=False)
-        for (both, off), each in zip(panels, chosen, strict=True):
-            unit, size = display_unit(each.unit)
-            for side, style in ((found.one, {"color": BLUE}), (found.two, {"color": ORANGE, "linestyle": "--"})):
-                values = mask_undrawable(side.columns[each.name]) * (
-                    units.conversion_factor(side.units[each.name], each.unit) or 1.0
+    with open_figure(path, 2 * WIDTH, 0.8 + 0.9 * HEIGHT * len(selected)) as figure:
+        figure.suptitle(f"{comparison.one.name} and {comparison.two.name}", fontsize=11)
+        panels = figure.subplots(len(selected), 2, sharex=True, squeeze=False)
+        for (values_axes, difference_axes), variable in zip(panels, selected, strict=True):
+            unit, size = display_unit(variable.unit)
+            for side, style in (
+                (comparison.one, {"color": BLUE}),
+                (comparison.two, {"color": ORANGE, "linestyle": "--"}),
+            ):
+                values = mask_undrawable(side.columns[variable.name]) * (
+                    units.conversion_factor(side.units[variable.name], variable.unit) or 1.0
                 )
-                both.plot(side.time, values / size, label=f"{side.name} ", **style)
-            both.set_ylabel(axis_label(each.name, unit))
-            left, right = (mask_undrawable(values) / size for values in (each.left, each.right))
-            off.plot(found.time, left - right, color=GREEN, linewidth=0.8)
-            resolved(off, np.nanmax(np.abs([left, right]), initial=0.0))
-            largest, rms = each.largest / size, each.rms / size
-            off.set_title(f"difference: largest {largest:.3g}, rms {rms:.3g} {format_unit(unit)}")
-            off.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
-            off.axvline(each.at, color=GREY, linestyle=":", linewidth=0.8)
+                values_axes.plot(side.time, values / size, label=f"{side.name} ", **style)
+            values_axes.set_ylabel(axis_label(variable.name, unit))
+            left, right = (mask_undrawable(values) / size for values in (variable.left, variable.right))
+            difference_axes.plot(comparison.time, left - right, color=GREEN, linewidth=0.8)
+            widen_axis(difference_axes, np.nanmax(np.abs([left, right]), initial=0.0))
+            largest, rms = variable.largest / size, variable.rms / size
+            difference_axes.set_title(f"difference: largest {largest:.3g}, rms {rms:.3g} {format_unit(unit)}")
+            difference_axes.ticklabel_format(axis="y", style="sci", scilimits=(-2, 3))
+            difference_axes.axvline(variable.at, color=GREY, linestyle=":", linewidth=0.8)
         panels[0, 0].legend(**LEGEND_ABOVE, ncols=2)
         for axes in panels[-1]:
             axes.set_xlabel("t [s]")
-            axes.set_xlim(np.min(found.time), np.max(found.time))
+            axes.set_xlim(np.min(comparison.time), np.max(comparison.time))
 
 
-def resolved(axes: Axes, largest: float) -> None:
-    """Show a difference that is constant but for what rounding leaves of values up to `largest` as constant."""
+def widen_axis(axes: Axes, largest: float) -> None:
+    """Widen the y axis of a difference that varies only by rounding of values up to `largest`."""
     low, high = axes.get_ylim()
     if high - low < ROUNDING * largest:
         reach = max(ROUNDING * largest, 2 * abs(low), 2 * abs(high))

@@ -1,9 +1,9 @@
-"""What a recorded motion is between its samples, where nothing may be made up.
+"""Interpolation between the samples of a trajectory.
 
-Between two samples a variable follows Hermite's cubic of values and rates where its rate was recorded too, otherwise
-a cubic that never leaves the values of both ends (F. N. Fritsch, J. Butland, A method for constructing local monotone
-piecewise cubic interpolants, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304); a whole number, as a mode, holds until the
-next.  Where it jumps, all between both sides is as good.
+If the rate of a variable was recorded, interpolation is by cubic Hermite polynomials of values and rates, otherwise by
+monotone cubics (F. N. Fritsch, J. Butland, A method for constructing local monotone piecewise cubic interpolants, SIAM
+J. Sci. Stat. Comput. 5 (1984) 300-304).  Integers, such as modes, are held.  Across a jump, every value between both
+sides is accepted.
 """
 
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 from ...running.signals import Signals
 from .units import is_rate_unit
 
-LARGE, REDUCED = 1e150, 2.0**-600  # differences of larger values have no number: they are reckoned in a smaller unit
-ALIKE = 0.02  # share of its way by which a variable may miss the integral of its rate
-PARTS, FILTER = 32, 1.01  # a sum over parts misses no more than that over steps, but for rounding
+LARGE_VALUE, REDUCTION = 1e150, 2.0**-600  # larger values are scaled to avoid overflow
+RATE_TOLERANCE = 0.02  # allowed deviation from the integral of the rate, relative to the total variation
+N_PARTS, ROUNDING_FACTOR = 32, 1.01  # a coarse check over parts, with a factor for rounding
 
 
 @dataclass(frozen=True)
 class ValueBounds:
-    """Values between `low` and `high` (n,): equal where nothing jumps."""
+    """Bounds `low` and `high` (n,) of a variable; they are equal except across jumps."""
 
     low: np.ndarray
     high: np.ndarray
@@ -30,23 +30,32 @@ class ValueBounds:
 
 @dataclass(frozen=True)
 class Interpolant:
-    """What a trajectory is between its samples."""
+    """Interpolates a trajectory between its samples."""
 
     path: Signals
 
     def bounds_at(self, name: str, at: np.ndarray, jumps: np.ndarray) -> ValueBounds:
-        """A variable at the times `at` (n,), which the trajectory covers; `jumps` (k, 2) are the stretches of time in
-        each of which it jumps once, in s."""
+        """Return the bounds of a variable at given times.
+
+        Parameters
+        ----------
+        name
+            Name of the variable.
+        at : (n,)
+            Times in s, within the trajectory.
+        jumps : (k, 2)
+            Time intervals in s, in each of which the variable jumps once.
+        """
         t, y = self.path.time, self.path.columns[name]
         if not np.isfinite(y).all():
             held = y[np.searchsorted(t, at, "right") - 1]
-            held = np.where(np.isin(at, t), held, np.nan)  # nobody knows what lies between
+            held = np.where(np.isin(at, t), held, np.nan)  # unknown between samples
             return ValueBounds(held, held)
         if np.isin(at, t).all() or (y == np.rint(y)).all():
             smooth = y[np.searchsorted(t, at, "right") - 1]
         else:
-            scale = REDUCED if np.abs(y).max() > LARGE else 1.0
-            smooth = follow(t, scale * y, self.rate(name, scale), at) / scale
+            scale = REDUCTION if np.abs(y).max() > LARGE_VALUE else 1.0
+            smooth = interpolate(t, scale * y, self.rate(name, scale), at) / scale
         low, high = smooth.copy(), smooth.copy()
 
         def widen(begin: float, end: float, first: int, last: int) -> None:
@@ -63,37 +72,42 @@ class Interpolant:
         return ValueBounds(low, high)
 
     def rate(self, name: str, scale: float) -> np.ndarray | None:
-        """The recorded rate (n,) of a variable: of a unit per second, with an integral that is the variable's own way;
-        all values times the scale."""
+        """Return the recorded rate (n,) of a variable times `scale`, or None.
+
+        A rate has the unit of the variable per second, and its integral matches the change of the variable.
+        """
         columns, units = self.path.columns, self.path.units
-        h, way = np.diff(self.path.time), np.diff(scale * columns[name])
-        way = np.where(h > 0, way, 0.0)
-        far, ways = ALIKE * np.abs(way).sum(), np.add.reduceat(way, self.parts)
-        found = {}
+        h, change = np.diff(self.path.time), np.diff(scale * columns[name])
+        change = np.where(h > 0, change, 0.0)
+        tolerance, changes = RATE_TOLERANCE * np.abs(change).sum(), np.add.reduceat(change, self.parts)
+        candidates = {}
         for other, integrals in self.integrals.items():
-            if is_rate_unit(units[other], units[name]) and not np.abs(ways - scale * integrals).sum() > FILTER * far:
+            if (
+                is_rate_unit(units[other], units[name])
+                and not np.abs(changes - scale * integrals).sum() > ROUNDING_FACTOR * tolerance
+            ):
                 slope = scale * columns[other]
-                missed = np.abs(way - h * (slope[1:] + slope[:-1]) / 2).sum()
-                if missed <= far:
-                    found[missed] = slope
-        return found[min(found)] if found else None
+                deviation = np.abs(change - h * (slope[1:] + slope[:-1]) / 2).sum()
+                if deviation <= tolerance:
+                    candidates[deviation] = slope
+        return candidates[min(candidates)] if candidates else None
 
     @cached_property
     def parts(self) -> np.ndarray:
-        """Where the parts (p,) begin over which integrals are compared first."""
-        return np.unique(np.linspace(0, len(self.path.time) - 1, PARTS, endpoint=False).astype(int))
+        """Return the first indices (p,) of the parts over which integrals are compared first."""
+        return np.unique(np.linspace(0, len(self.path.time) - 1, N_PARTS, endpoint=False).astype(int))
 
     @cached_property
     def integrals(self) -> dict[str, np.ndarray]:
-        """Of every column that may be a rate its integrals (p,) over the parts."""
+        """Return the integrals (p,) over the parts, for every column that may be a rate."""
         h = np.diff(self.path.time)
         finite = {name: y for name, y in self.path.columns.items() if y.dtype.kind != "U" and np.isfinite(y).all()}
         with np.errstate(over="ignore"):
             return {name: np.add.reduceat(h * (y[1:] / 2 + y[:-1] / 2), self.parts) for name, y in finite.items()}
 
 
-def follow(t: np.ndarray, y: np.ndarray, slope: np.ndarray | None, at: np.ndarray) -> np.ndarray:
-    """The values at the times `at`, of the side that holds afterwards where t stands twice."""
+def interpolate(t: np.ndarray, y: np.ndarray, slope: np.ndarray | None, at: np.ndarray) -> np.ndarray:
+    """Interpolate at the times `at`; if a time occurs twice, its second value counts."""
     holds = np.append(np.diff(t) > 0, True)
     t, y = t[holds], y[holds]
     if slope is None:

@@ -1,4 +1,4 @@
-"""Runs and comparisons of anyone's FMUs and results, in folders of results."""
+"""Compares two FMUs, scenes, result folders or files, and writes the result folder."""
 
 from dataclasses import replace
 from math import isnan
@@ -18,52 +18,55 @@ from .difference import Comparison, compare
 
 
 def run_comparison(
-    sources: tuple[str, str], how: RunSpec, out: Path, report: ProgressCallback
+    sources: tuple[str, str], options: RunSpec, out: Path, report: ProgressCallback
 ) -> tuple[Comparison, Path]:
-    """Compare two FMUs, scenes, result folders or CSV files, and write the differences to out/compare/<one>-<two>;
-    `how` says how FMUs are run."""
+    """Compare two sources and write the differences to out/compare/<one>-<two>; FMUs are run with the options `how`."""
     from .figure import draw
 
     names = trajectory_sources.display_names(sources)
     folder = out / "compare" / "-".join(names).replace("/", "-")
-    with replace_folder(folder, ("compare.json", "figure.svg"), describe_sources(*sources)) as fresh:
+    with replace_folder(folder, ("compare.json", "figure.svg"), describe_sources(*sources)) as new_folder:
         one, two = (
-            replace(each, name=name)
-            for each, name in zip(trajectory_sources.load_both(sources, how, report), names, strict=True)
+            replace(side, name=name)
+            for side, name in zip(trajectory_sources.load_both(sources, options, report), names, strict=True)
         )
-        found = compare(one, two)
-        (fresh / "compare.json").write_text(to_json(comparison_as_json(found)) + "\n", encoding="utf-8")
-        draw(found, fresh / "figure.svg")
+        comparison = compare(one, two)
+        (new_folder / "compare.json").write_text(to_json(comparison_as_json(comparison)) + "\n", encoding="utf-8")
+        draw(comparison, new_folder / "figure.svg")
         values = prefix_parameters({"one": one.parameters, "two": two.parameters})
         write_provenance(
-            fresh, [each.file for each in (one, two) if each.file], values, how, source=describe_sources(*sources)
+            new_folder,
+            [side.file for side in (one, two) if side.file],
+            values,
+            options,
+            source=describe_sources(*sources),
         )
-    return found, folder
+    return comparison, folder
 
 
-def comparison_as_json(found: Comparison) -> dict[str, Any]:
-    """Everything found, for JSON."""
+def comparison_as_json(comparison: Comparison) -> dict[str, Any]:
+    """Return the comparison for JSON output."""
     return {
-        "one": {"name": found.one.name, "note": found.one.note},
-        "two": {"name": found.two.name, "note": found.two.note},
-        "times": len(found.time),
-        "interpolated": found.interpolated,
+        "one": {"name": comparison.one.name, "note": comparison.one.note},
+        "two": {"name": comparison.two.name, "note": comparison.two.note},
+        "times": len(comparison.time),
+        "interpolated": comparison.interpolated,
         "variables": [
-            {name: getattr(each, name) for name in ("name", "unit", "largest", "at", "rms", "relative")}
-            for each in found.differences
+            {name: getattr(variable, name) for name in ("name", "unit", "largest", "at", "rms", "relative")}
+            for variable in comparison.differences
         ],
-        "left_out": list(found.left_out),
-        **events(found),
+        "left_out": list(comparison.left_out),
+        **events(comparison),
     }
 
 
-def events(found: Comparison) -> dict[str, Any]:
-    """The events, for JSON: changes of mode as times in s and new modes, NaN for a shift where one side has more."""
-    pairs = found.pairs
+def events(comparison: Comparison) -> dict[str, Any]:
+    """Return the events for JSON output: time in s and new mode; the shift is NaN if some are unmatched."""
+    pairs = comparison.pairs
     if pairs is None:
         return {"events": "", "event_shift": None}
     return {
-        "events": found.events,
+        "events": comparison.events,
         "event_shift": pairs.shift,
         "matched": {"one": pairs.one.tolist(), "two": pairs.two.tolist(), "shift": pairs.largest_shift},
         "only_one": pairs.unmatched[0].tolist(),
@@ -71,28 +74,28 @@ def events(found: Comparison) -> dict[str, Any]:
     }
 
 
-def difference_table(found: Comparison) -> Table:
-    """The differences, a row for each variable."""
-    shown = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    shown.add_column("")
+def difference_table(comparison: Comparison) -> Table:
+    """Return the table of differences, with one row per variable."""
+    result = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    result.add_column("")
     for head in ("largest difference", "at t [s]", "rms", "relative to largest"):
-        shown.add_column(head, justify="right", no_wrap=True)
-    shown.add_column("", no_wrap=True)
-    for each in found.differences:
-        figures = (f"{each.largest:.3e}", f"{each.at:.6g}", f"{each.rms:.3e}", f"{each.relative:.2e}")
-        shown.add_row(each.name, *figures, each.unit)
-    return shown
+        result.add_column(head, justify="right", no_wrap=True)
+    result.add_column("", no_wrap=True)
+    for variable in comparison.differences:
+        cells = (f"{variable.largest:.3e}", f"{variable.at:.6g}", f"{variable.rms:.3e}", f"{variable.relative:.2e}")
+        result.add_row(variable.name, *cells, variable.unit)
+    return result
 
 
-def summary_lines(found: Comparison) -> list[str]:
-    """How the two came about, what was compared, and what their events say."""
-    how = "those of the coarser one; the other lies between its samples" if found.interpolated else "common to both"
-    said = [f"{each.name}: {each.note}" for each in (found.one, found.two) if each.note]
-    lost = [each for each in found.differences if isnan(each.largest)]
+def summary_lines(comparison: Comparison) -> list[str]:
+    """Return notes on both sides, on the times of comparison, and on events."""
+    grid = "those of the coarser side; the other one is interpolated" if comparison.interpolated else "common to both"
+    notes = [f"{variable.name}: {variable.note}" for variable in (comparison.one, comparison.two) if variable.note]
+    nonfinite = [variable for variable in comparison.differences if isnan(variable.largest)]
     return [
-        *said,
-        f"Compared at {len(found.time)} times ({how}).",
-        *(f"{each.name} is not a finite number at t = {each.at:g} s" for each in lost),
-        *found.left_out,
-        *filter(None, [found.events]),
+        *notes,
+        f"Compared at {len(comparison.time)} times ({grid}).",
+        *(f"{variable.name} is not a finite number at t = {variable.at:g} s" for variable in nonfinite),
+        *comparison.left_out,
+        *filter(None, [comparison.events]),
     ]

@@ -1,5 +1,5 @@
-"""A trajectory from a file: results of this harness, of fmpy, of OpenModelica and Dymola (.csv, .mat), and any table
-whose first column is the time."""
+"""Reads trajectories from result folders, from files of fmpy, OpenModelica and Dymola (.csv, .mat), and from any table
+whose first column is time."""
 
 import csv
 import io
@@ -17,67 +17,75 @@ from ...records.units import TIMES
 from ...running.external.sample_rows import element_names
 from ...running.signals import Signals
 
-LATEST = 1e100  # s, either way
-ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # of an array; its brackets hold no unit
+MAX_TIME = 1e100  # s; largest absolute time
+ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # name of an array element; its brackets do not contain a unit
 BOOLEANS = {"True": 1.0, "False": 0.0, "true": 1.0, "false": 0.0}
 
 Columns = dict[str, np.ndarray]
 
 
 def read_trajectory(path: Path) -> Signals:
-    """The trajectory in a file or a result folder; SceneError in one sentence if there is none."""
+    """Read the trajectory in a file or a result folder.
+
+    Raises
+    ------
+    SceneError
+        If it contains no valid trajectory.
+    """
     file = path / "trajectory.csv" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
-        raise SceneError(f"{path} is no result folder: it has no trajectory.csv")
-    (clock, time), *others = (read_modelica(file) or read_csv(file) or table(file)).items()
+        raise SceneError(f"{path} is not a result folder: trajectory.csv is missing")
+    (clock, time), *others = (read_modelica(file) or read_csv(file) or read_table(file)).items()
     unit = parse_heading(clock)[1] or "s"
     if unit not in TIMES:
-        raise SceneError(f"{file.name}: the first column must be the time, and its unit is '{unit}'")
+        raise SceneError(f"{file.name}: the first column must be time, but its unit is '{unit}'")
     if time.dtype.kind == "U":
-        raise SceneError(f"{file.name}: the first column must be the time, and it holds {format_value(str(time[0]))}")
+        raise SceneError(f"{file.name}: the first column must be time, but it contains {format_value(str(time[0]))}")
     time = time * TIMES[unit]
-    if not ((np.abs(time) < LATEST).all() and (np.diff(time) >= 0).all()):
-        raise SceneError(f"{file.name}: the time in its first column must rise, within {LATEST:g} s")
+    if not ((np.abs(time) < MAX_TIME).all() and (np.diff(time) >= 0).all()):
+        raise SceneError(f"{file.name}: the time in the first column must increase and stay below {MAX_TIME:g} s")
     columns, units = Columns(), dict[str, str]()
-    for head, column in others:
+    for head, parse_column in others:
         name, unit = parse_heading(head)
         if name in columns or name == parse_heading(clock)[0]:
             raise SceneError(f"{file.name}: two columns are named {format_value(name)}")
-        columns[name], units[name] = column, unit
-    return Signals(path.stem, time, columns, units, events(path), file=file)
+        columns[name], units[name] = parse_column, unit
+    return Signals(path.stem, time, columns, units, read_events(path), file=file)
 
 
-def events(path: Path) -> np.ndarray | None:
-    """The events in a result folder, if they are known."""
+def read_events(path: Path) -> np.ndarray | None:
+    """Read the events in a result folder, or return None."""
     file = path / "events.csv"
     if not path.is_dir() or not file.is_file():
         return None
-    known = read_numeric(file)[1]
-    if known.shape[1] != 2 or not np.isfinite(known).all():
-        raise SceneError(f"{file} holds no times and modes")
-    return known
+    read_table = read_numeric(file)[1]
+    if read_table.shape[1] != 2 or not np.isfinite(read_table).all():
+        raise SceneError(f"{file} does not contain times and modes")
+    return read_table
 
 
 def parse_heading(head: str) -> tuple[str, str]:
-    """Name and unit of a heading."""
+    """Split a heading into name and unit."""
     if ELEMENT.fullmatch(head):
         return head, ""
     name, unit = split_heading(head)
     return name, unit or ""
 
 
-def table(file: Path) -> Columns:
-    """What instruments, spreadsheets and MATLAB write; SceneError if it is no table."""
-    heads, numbers = read_numeric(file)
-    twice = [head for i, head in enumerate(heads) if head in heads[:i]]
-    if twice:
-        raise SceneError(f"{file.name}: two columns are named {format_value(twice[0])}")
-    return dict(zip(heads, numbers.T, strict=True))
+def read_table(file: Path) -> Columns:
+    """Read a table of an instrument, a spreadsheet or MATLAB; SceneError if there is none."""
+    heads, parse_numbers = read_numeric(file)
+    duplicates = [head for i, head in enumerate(heads) if head in heads[:i]]
+    if duplicates:
+        raise SceneError(f"{file.name}: two columns are named {format_value(duplicates[0])}")
+    return dict(zip(heads, parse_numbers.T, strict=True))
 
 
 def read_csv(file: Path) -> Columns | None:
-    """The columns by heading of a CSV file with commas, a heading and nothing but rows of its width; numbers, truths,
-    texts, and, as fmpy writes them, arrays with blanks between; None if it is something else."""
+    """Read a CSV file with commas and one heading row, or return None if the file has another form.
+
+    Cells are numbers, Booleans, strings, or arrays separated by blanks, as fmpy writes them.
+    """
     try:
         heads, *rows = csv.reader(io.StringIO(read_content(file).decode("utf-8-sig"), newline=""))
     except (UnicodeDecodeError, ValueError, csv.Error):
@@ -85,28 +93,28 @@ def read_csv(file: Path) -> Columns | None:
     names = [head.strip() for head in heads]
     if not rows or not all(names) or len(set(names)) < len(names) or {len(row) for row in rows} != {len(names)}:
         return None
-    if len(names) < 2 or numbers([row[0] for row in rows]) is None:
+    if len(names) < 2 or parse_numbers([row[0] for row in rows]) is None:
         return None
-    found = Columns()
+    columns = Columns()
     for head, cells in zip(names, zip(*rows, strict=True), strict=True):
-        found |= column(head, [cell.strip() for cell in cells])
-    return found
+        columns |= parse_column(head, [cell.strip() for cell in cells])
+    return columns
 
 
-def column(head: str, cells: list[str]) -> Columns:
-    """One column, or one for each element of an array."""
-    whole = numbers(cells)
+def parse_column(head: str, cells: list[str]) -> Columns:
+    """Parse one column; an array gives one column per element."""
+    values = parse_numbers(cells)
     widths = {len(cell.split()) for cell in cells}
-    if whole is None and len(widths) == 1:
-        parts = [numbers(part) for part in zip(*map(str.split, cells), strict=True)]
-        known = [part for part in parts if part is not None]
-        if len(known) == len(parts):
-            return dict(zip(element_names(head, (len(parts),)), known, strict=True))
-    return {head: np.array(cells) if whole is None else whole}
+    if values is None and len(widths) == 1:
+        parts = [parse_numbers(part) for part in zip(*map(str.split, cells), strict=True)]
+        elements_found = [part for part in parts if part is not None]
+        if len(elements_found) == len(parts):
+            return dict(zip(element_names(head, (len(parts),)), elements_found, strict=True))
+    return {head: np.array(cells) if values is None else values}
 
 
-def numbers(cells: Sequence[str]) -> np.ndarray | None:
-    """The numbers that the cells hold, None where one holds something else."""
+def parse_numbers(cells: Sequence[str]) -> np.ndarray | None:
+    """Parse cells as numbers; None if one is not a number."""
     try:
         return np.array([BOOLEANS[cell] if cell in BOOLEANS else float(cell or "nan") for cell in cells])
     except ValueError:
@@ -114,34 +122,38 @@ def numbers(cells: Sequence[str]) -> np.ndarray | None:
 
 
 def read_modelica(file: Path) -> Columns | None:
-    """The columns of a result of OpenModelica or Dymola, which is a MATLAB file of version 4, also where it was saved
-    anew as 5; None if it is none."""
+    """Read a result file of OpenModelica or Dymola (MATLAB version 4 or 5); return None for other files."""
     data = read_content(file)
-    sure = b"Aclass" in data[:40]
-    if not sure and not data.startswith(b"MATLAB 5.0"):
+    is_modelica = b"Aclass" in data[:40]
+    if not is_modelica and not data.startswith(b"MATLAB 5.0"):
         return None
     from scipy.io import loadmat
 
     try:
-        found: dict[str, Any] = loadmat(io.BytesIO(data), chars_as_strings=False)
-        if "Aclass" not in found:
+        content_of: dict[str, Any] = loadmat(io.BytesIO(data), chars_as_strings=False)
+        if "Aclass" not in content_of:
             return None
-        turned = {"binTrans": True, "binNormal": False}[line(found["Aclass"][3])]
+        transposed = {"binTrans": True, "binNormal": False}[characters_to_text(content_of["Aclass"][3])]
         name, description, info, values = (
-            found[key].T if turned else found[key] for key in ("name", "description", "dataInfo", "data_2")
+            content_of[key].T if transposed else content_of[key]
+            for key in ("name", "description", "dataInfo", "data_2")
         )
         columns = Columns()
-        for text, about, (place, signed, *_) in zip(map(line, name), map(line, description), info, strict=True):
-            if place in (0, 2):  # what changes, and the time
-                unit = re.search(r"\[([^][|:]+)[^][]*\]\s*$", about)
+        for text, comment, (matrix, signed, *_) in zip(
+            map(characters_to_text, name), map(characters_to_text, description), info, strict=True
+        ):
+            if matrix in (0, 2):  # trajectories and time
+                unit = re.search(r"\[([^][|:]+)[^][]*\]\s*$", comment)
                 head = f"{text} [{unit[1]}]" if unit else text
                 columns[head] = np.sign(signed) * values[:, abs(int(signed)) - 1]
         return columns
-    except Exception as error:  # scipy raises what it meets in a damaged file
-        if not sure:
+    except Exception as error:  # scipy raises various exceptions for a damaged file
+        if not is_modelica:
             return None
-        raise SceneError(f"{file.name} is no whole result of OpenModelica or Dymola: {first_line(error)}") from None
+        raise SceneError(
+            f"{file.name} is not a complete result file of OpenModelica or Dymola: {first_line(error)}"
+        ) from None
 
 
-def line(letters: np.ndarray) -> str:
+def characters_to_text(letters: np.ndarray) -> str:
     return "".join(letters).rstrip("\0 ")

@@ -1,4 +1,4 @@
-"""The trajectories that are compared, wherever they come from: a result folder, a file, or a run of any FMU."""
+"""Loads the two trajectories of a comparison from result folders, files, or runs of FMUs and scenes."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,34 +17,40 @@ from ...scenes.fmu_files import check_built, find_fmu
 from ...scenes.scene import load_scene
 from .trajectory_files import read_trajectory
 
-FILES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
-SUFFIXES = (".fmu", ".py", ".toml")  # of what is run
+FILE_SUFFIXES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
+RUN_SUFFIXES = (".fmu", ".py", ".toml")  # sources that are run
 
 
-def load_both(sources: Sequence[str | Signals], how: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
-    """The trajectories of two folders, files, FMUs' paths or scenes.  What can be run is run to the same times, those
-    of the other one if that is recorded or is a scene with a grid, and to the same stop; `how` says the rest."""
-    found = [source if isinstance(source, Signals) else read_recorded(source) for source in sources]
-    runs = [None if each else run_spec_for(str(source), how) for each, source in zip(found, sources, strict=True)]
-    grids = [grid_spacing(each.time) for each in found if each] + [each.grid for each in runs if each]
+def load_both(sources: tuple[str, str], options: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
+    """Load the trajectories of two folders, files, FMUs or scenes.
+
+    FMUs and scenes are run with the communication step of the other side, if it has one, and to the same stop time;
+    other options are in `how`.
+    """
+    recordings = [read_recorded(source) for source in sources]
+    runs = [None if item else run_spec_for(source, options) for item, source in zip(recordings, sources, strict=True)]
+    grids = [grid_spacing(item.time) for item in recordings if item] + [item.grid for item in runs if item]
     grid = next(filter(None, grids), None)
-    ends = [resolve_stop(each, read_description(each.fmu, each.lenient)) for each in runs if each]
-    stops = {*ends, *(float(each.time[-1]) for each in found if each)}
-    stop = how.stop if None in stops or len(stops) == 1 else min(filter(None, stops))
+    ends = [resolve_stop(item, read_description(item.fmu, item.lenient)) for item in runs if item]
+    stops = {*ends, *(float(item.time[-1]) for item in recordings if item)}
+    stop = options.stop if None in stops or len(stops) == 1 else min(filter(None, stops))
     sides = []
-    for each, asked in zip(found, runs, strict=True):
-        if asked:
-            asked = replace(
-                asked, grid=grid, equal_steps=DEFAULT_COMMUNICATION_STEPS, stop=stop if how.stop is None else how.stop
+    for item, spec in zip(recordings, runs, strict=True):
+        if spec:
+            spec = replace(
+                spec,
+                grid=grid,
+                equal_steps=DEFAULT_COMMUNICATION_STEPS,
+                stop=stop if options.stop is None else options.stop,
             )
-            each = signals_from_trajectory(run(asked, report))
-        assert each
-        sides.append(each)
+            item = signals_from_trajectory(run(spec, report))
+        assert item
+        sides.append(item)
     return sides[0], sides[1]
 
 
 def display_names(sources: tuple[str, str]) -> list[str]:
-    """What two sources are called; where they are called alike, with the folders or endings in which they differ."""
+    """Return short names of two sources; equal names are extended by the folders or suffixes in which they differ."""
     paths = [Path(abspath(each)) if Path(each).exists() else Path("scene", each) for each in sources]
     plain = [each if each.is_dir() or each.parts[0] == "scene" else each.with_suffix("") for each in paths]
     alike = plain[0] == plain[1] and paths[0] != paths[1]
@@ -53,36 +59,35 @@ def display_names(sources: tuple[str, str]) -> list[str]:
     return ["/".join(parts[-apart:]) for parts in (one, two)]
 
 
-def run_spec_for(source: str, how: RunSpec) -> RunSpec:
-    """What runs an FMU by its path or by that of its model, or a scene."""
+def run_spec_for(source: str, options: RunSpec) -> RunSpec:
+    """Return the specification to run an FMU, the FMU of a model file, or a scene."""
     if Path(source).suffix in (".fmu", ".py"):
-        return replace(how, fmu=find_fmu(source))
+        return replace(options, fmu=find_fmu(source))
     scene = load_scene(source)
     check_built(scene.file)
     return spec_from_scene(scene)
 
 
 def read_recorded(source: str) -> Signals | None:
-    """The trajectory of a folder or a file; None for what has to be run."""
+    """Read the trajectory of a folder or file; None for sources that are run."""
     path = Path(source)
-    if path.exists() and path.suffix not in SUFFIXES:
+    if path.exists() and path.suffix not in RUN_SUFFIXES:
         return read_trajectory(path)
-    if path.suffix in FILES:
-        raise SceneError(f"there is no {path}: name a file or folder of results that is here, an FMU, or a scene")
+    if path.suffix in FILE_SUFFIXES:
+        raise SceneError(f"{path} does not exist: give an existing file or result folder, an FMU, or a scene")
     return None
 
 
 def grid_spacing(time: np.ndarray) -> float | None:
-    """The communication step in s of which the times (n,) are multiples, but for some that lie between, as of events;
-    None if there is none."""
+    """Return the communication step in s if most of the times (n,) are multiples of one, otherwise None."""
     h = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    places = (time - time[0]) / h if h > 0 else np.full(len(time), np.nan)
-    even = np.abs(places - np.rint(places)) < 1e-6 * np.maximum(places, 1)
-    return h if even.mean() > 0.5 else None
+    multiples = (time - time[0]) / h if h > 0 else np.full(len(time), np.nan)
+    is_multiple = np.abs(multiples - np.rint(multiples)) < 1e-6 * np.maximum(multiples, 1)
+    return h if is_multiple.mean() > 0.5 else None
 
 
 def common_span(one: Signals, two: Signals) -> tuple[float, float]:
-    """The stretch of time in s that both cover; HarnessError if there is none."""
+    """Return the common time span in s; HarnessError if there is none."""
     begin, end = max(one.time[0], two.time[0]), min(one.time[-1], two.time[-1])
     if not end > begin:
         raise HarnessError(f"{one.name} and {two.name} have no time in common")

@@ -1,1 +1,1 @@
-"""Several FMUs, coupled: written as an SSP archive, run by an existing engine, compared with one monolithic model."""
+"""Coupled FMUs: written as an SSP archive, run by existing engines, compared with a monolithic model."""

@@ -1,4 +1,4 @@
-"""How the error of a coupled run falls with its communication step."""
+"""Convergence of a coupled run with its communication step."""
 
 from dataclasses import dataclass, field
 
@@ -7,12 +7,34 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Convergence:
-    """What is `read` (element, variable, value reference) in an archive, with `labels` and `units`, at communication
-    `steps` in s up to the `stop`; its set of `values`.
+    """Convergence study of an archive: settings and results.
 
-    Found are the columns `x` (m, n) at `time` (m,) with the finest step, the `reference` in words and its `truth`
-    (m, n), for each step the largest of the `errors`, and for each engine the last row, its largest error with the
-    finest step, and why there is none.
+    Attributes
+    ----------
+    title
+        Title of the scene.
+    read
+        Recorded variables: element, variable, value reference.
+    labels, units
+        Labels and units of these variables.
+    steps
+        Communication steps in s, decreasing.
+    stop
+        Stop time in s.
+    reference
+        Description of the reference.
+    values
+        Name of the parameter set in the archive.
+    time : (m,)
+        Times in s of the run with the smallest step.
+    x : (m, n)
+        Recorded values of that run.
+    truth : (m, n)
+        Reference values.
+    errors
+        Largest error for each step.
+    engines
+        For each engine: last row, largest error at the smallest step, and the reason if it failed.
     """
 
     title: str
@@ -31,12 +53,12 @@ class Convergence:
 
     @property
     def unit(self) -> str:
-        """That of all that is read, if it has one."""
+        """Return the common unit of the variables, or an empty string."""
         return self.units[0] if len(set(self.units)) == 1 else ""
 
     @property
     def order(self) -> float:
-        """The power of the step with which the error falls, from the two finest steps; NaN with one."""
+        """Return the order of convergence from the two smallest steps; NaN if there is only one."""
         if len(self.errors) < 2 or not all(self.errors[-2:]):
             return float("nan")
         steps = self.steps[: len(self.errors)]

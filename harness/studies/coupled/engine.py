@@ -1,4 +1,4 @@
-"""Engines that run an SSP archive, each in a process of its own: what they are asked and how they answer, in JSON."""
+"""Engines that run an SSP archive, each in a separate process with JSON input and output."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -10,7 +10,7 @@ from ...process.subprocess_runner import SubprocessTimeoutError, run_module
 ENGINE_TIMEOUT = 300.0  # s, for one run
 EXTRA = "python -m pip install 'friction-fmus[coupled]'"
 MAIN_ENGINE = "Ecos"
-ENGINES = {  # module of each
+ENGINES = {  # modules
     "Ecos": f"{__package__}.ecos",
     "libcosim": f"{__package__}.libcosim",
     "fmpy": "harness.running.ssp",
@@ -19,8 +19,8 @@ ENGINES = {  # module of each
 
 @dataclass(frozen=True)
 class EngineRequest:
-    """Run an archive in so many (`count`) equal communication steps of `step` s, with a set of `values` in it, and read
-    after each some variables: element, variable, value reference."""
+    """Run an archive with `count` communication steps of `step` s and the parameter set `values`, and read variables
+    (element, variable, value reference) after each step."""
 
     archive: str
     step: float
@@ -29,17 +29,22 @@ class EngineRequest:
     values: str = "initialValues"
 
 
-def run_engine(engine: str, asked: EngineRequest) -> list[list[float]]:
-    """A row for each communication point, without the start where an engine does not show it; HarnessError with the
-    last words of the engine if it gives none."""
-    failed = f"{engine} could not run {Path(asked.archive).name}"
+def run_engine(engine: str, request: EngineRequest) -> list[list[float]]:
+    """Run an archive and return one row per communication point, without the start if the engine does not record it.
+
+    Raises
+    ------
+    HarnessError
+        If the engine fails or times out; with its last line of output.
+    """
+    failed = f"{engine} could not run {Path(request.archive).name}"
     try:
-        done = run_module(ENGINES[engine], json.dumps(asdict(asked)), timeout=ENGINE_TIMEOUT)
-    except SubprocessTimeoutError as late:
-        raise HarnessError(f"{failed}: {late}") from None
-    if done.returncode or not done.stdout:
-        last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+        process = run_module(ENGINES[engine], json.dumps(asdict(request)), timeout=ENGINE_TIMEOUT)
+    except SubprocessTimeoutError as timeout:
+        raise HarnessError(f"{failed}: {timeout}") from None
+    if process.returncode or not process.stdout:
+        last = (process.stderr.strip().splitlines() or [f"exit status {process.returncode}"])[-1]
         hint = f"; {EXTRA}" if "ModuleNotFoundError" in last else ""
         raise HarnessError(f"{failed}: {last}{hint}")
-    found: list[list[float]] = json.loads(done.stdout)
-    return found
+    rows: list[list[float]] = json.loads(process.stdout)
+    return rows

@@ -1,4 +1,4 @@
-"""An SSP archive that somebody else wrote: what can be read of it, and in which steps it is run."""
+"""Reads a given SSP archive: recorded outputs, communication steps and parameters."""
 
 import zipfile
 from collections.abc import Iterator
@@ -16,36 +16,39 @@ from ...running.description import declared_parameters, read_description
 from ...running.variable_values import REAL_TYPES, parse_element, variable_unit
 from .convergence import Convergence
 
-COARSEST, HALVINGS = 100, 4  # communication steps of the first run
+COARSEST, HALVINGS = 100, 4  # steps of the first run, and number of halvings
 
 
 def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
-    """What is to be run: every real output that the archive names, of every component; `file` becomes a copy that any
-    library can read."""
+    """Return the study to run, which records every Real output of every component; the archive is copied to `file`."""
     if not source.is_file():
-        raise SceneError(f"there is no {source}: name an archive that is here, or a scene of `python -m harness list`")
+        raise SceneError(f"{source} does not exist: give an existing archive, or a scene of `python -m harness list`")
     copy(source, file)
     try:
         with SSP(file, mode="r") as archive, archive.system_structure as structure:
             system, experiment = structure.system, structure.default_experiment
-            found = [
-                (each.name, variable)
-                for each in components(system)
-                for variable in outputs(each, archive.unpacked_path)
+            variables = [
+                (component.name, variable)
+                for component in components(system)
+                for variable in outputs(component, archive.unpacked_path)
             ]
-            sets = [name for part in (system, *components(system)) for name, _ in bound(part, archive.unpacked_path)]
+            sets = [
+                name
+                for part in (system, *components(system))
+                for name, _ in parameter_sets(part, archive.unpacked_path)
+            ]
     except (OSError, KeyError, ValueError, AttributeError, zipfile.BadZipFile, etree.LxmlError) as error:
         raise HarnessError(f"{source.name} cannot be read: {first_line(error)}") from None
     end = stop if stop is not None else experiment and experiment.stop_time
     if not end:
-        raise SceneError(f"{source.name} names no stop time; name one, as in --stop 10")
-    if not found:
-        raise HarnessError(f"{source.name} has no component with a real output")
+        raise SceneError(f"{source.name} has no stop time; give one, as in --stop 10")
+    if not variables:
+        raise HarnessError(f"{source.name} has no component with a Real output")
     return Convergence(
         title=str(system.name),
-        read=tuple((name, variable.name, int(variable.valueReference)) for name, variable in found),
-        labels=tuple(f"{name}.{variable.name}" for name, variable in found),
-        units=tuple(variable_unit(variable) for _, variable in found),
+        read=tuple((name, variable.name, int(variable.valueReference)) for name, variable in variables),
+        labels=tuple(f"{name}.{variable.name}" for name, variable in variables),
+        units=tuple(variable_unit(variable) for _, variable in variables),
         steps=tuple(float(end) / COARSEST / 2**i for i in range(HALVINGS + 1)),
         stop=float(end),
         reference="finest run",
@@ -54,40 +57,42 @@ def read_archive(source: Path, file: Path, stop: float | None) -> Convergence:
 
 
 def outputs(part: Component, folder: Path) -> list[Any]:
-    """The real variables of a component's FMU that are output connectors."""
-    named = [each.name for each in part.connectors if each.kind == "output"]
-    variables = read_description(folder / part.source).modelVariables if named else []
-    return [each for each in variables if each.name in named and each.type in REAL_TYPES]
+    """Return the Real variables of a component that are output connectors."""
+    names = [variable.name for variable in part.connectors if variable.kind == "output"]
+    variables = read_description(folder / part.source).modelVariables if names else []
+    return [variable for variable in variables if variable.name in names and variable.type in REAL_TYPES]
 
 
 def components(system: Any) -> list[Component]:
-    return [each for each in system.elements if isinstance(each, Component)]
+    return [parse_element for parse_element in system.elements if isinstance(parse_element, Component)]
 
 
-def bound(part: Any, folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The name of each set of parameters that a part of an archive binds, and the values in it."""
+def parameter_sets(part: Any, folder: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield name and values of each parameter set that a part of an archive binds."""
     for binding in part.parameter_bindings or ():
         if binding.ssv is not None:
             table = binding.ssv
         else:
             with SSV(folder / binding.source, mode="r") as file:
                 table = file.ssv_elem
-        values = {each["name"]: each["type_value"].parameter.get("value", "") for each in table.parameters}
+        values = {
+            parameter["name"]: parameter["type_value"].parameter.get("value", "") for parameter in table.parameters
+        }
         yield str(table.name), {f"{binding.prefix or ''}{name}": value for name, value in values.items()}
 
 
 def effective_parameters(file: Path) -> dict[str, tuple[object, str]]:
-    """Every parameter of the components of an archive, as its sets say, those of the whole last, and its unit."""
+    """Return value and unit of every parameter, with the sets of the components and then of the system applied."""
     with SSP(file, mode="r") as archive, archive.system_structure as structure:
         folder, parts = archive.unpacked_path, components(structure.system)
-        found = {
-            f"{each.name}.{name}": told
-            for each in parts
-            for name, told in declared_parameters(folder / each.source).items()
+        values_by_name = {
+            f"{part.name}.{name}": value
+            for part in parts
+            for name, value in declared_parameters(folder / part.source).items()
         }
-        for part, own in [*((each, f"{each.name}.") for each in parts), (structure.system, "")]:
-            for _, values in bound(part, folder):
+        for part, prefix in [*((component, f"{component.name}.") for component in parts), (structure.system, "")]:
+            for _, values in parameter_sets(part, folder):
                 for name, value in values.items():
-                    if own + name in found:
-                        found[own + name] = parse_element(value), found[own + name][1]
-    return found
+                    if prefix + name in values_by_name:
+                        values_by_name[prefix + name] = parse_element(value), values_by_name[prefix + name][1]
+    return values_by_name

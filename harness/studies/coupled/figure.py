@@ -1,4 +1,4 @@
-"""The figure of a coupled scene: its motion beside the reference, and the error over the communication step."""
+"""Figure of a coupled scene: motion and reference, and error over the communication step."""
 
 from itertools import cycle
 from pathlib import Path
@@ -8,35 +8,35 @@ import numpy as np
 from ...results.style import BLUE, GREEN, GREY, HEIGHT, ORANGE, WIDTH, axis_label, open_figure
 from .convergence import Convergence
 
-MOST = 8  # names of variables that are drawn, a panel each
-OTHERS = ("#CC79A7", "#56B4E9", "#E69F00")  # colours
+MAX_PANELS = 8  # variables with a panel
+MORE_COLOURS = ("#CC79A7", "#56B4E9", "#E69F00")  # further colours
 
 
-def draw(found: Convergence, path: Path) -> None:
+def draw(study: Convergence, path: Path) -> None:
     """Save the figure."""
-    kinds = [*dict.fromkeys(zip([name for _, name, _ in found.read], found.units, strict=True))][:MOST]
+    kinds = [*dict.fromkeys(zip([name for _, name, _ in study.read], study.units, strict=True))][:MAX_PANELS]
     with open_figure(path, 2.2 * WIDTH, max(1.6, len(kinds)) * HEIGHT) as figure:
-        figure.suptitle(found.title, fontsize=11)
+        figure.suptitle(study.title, fontsize=11)
         left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 2))[0]
         panels = left.subplots(len(kinds), sharex=True, squeeze=False)[:, 0]
         for motion, (name, unit) in zip(panels, kinds, strict=True):
-            columns = [i for i, each in enumerate(found.read) if (each[1], found.units[i]) == (name, unit)]
-            for i, colour in zip(columns, cycle((BLUE, ORANGE, GREEN, *OTHERS)), strict=False):
-                motion.plot(found.time, found.x[:, i], color=colour, label=found.labels[i])
-                motion.plot(found.time, found.truth[:, i], color="black", linestyle=":", linewidth=0.9)
-            motion.plot([], [], color="black", linestyle=":", label=found.reference)
+            columns = [i for i, variable in enumerate(study.read) if (variable[1], study.units[i]) == (name, unit)]
+            for i, colour in zip(columns, cycle((BLUE, ORANGE, GREEN, *MORE_COLOURS)), strict=False):
+                motion.plot(study.time, study.x[:, i], color=colour, label=study.labels[i])
+                motion.plot(study.time, study.truth[:, i], color="black", linestyle=":", linewidth=0.9)
+            motion.plot([], [], color="black", linestyle=":", label=study.reference)
             motion.set_ylabel(axis_label(name, unit))
             motion.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        panels[0].set_title(f"coupled, communication step {1e3 * found.steps[-1]:g} ms")
+        panels[0].set_title(f"coupled, communication step {1e3 * study.steps[-1]:g} ms")
         panels[-1].set_xlabel("t [s]")
         error = right.subplots()
-        h, errors = np.array(found.steps[: len(found.errors)]), np.array(found.errors)
+        h, errors = np.array(study.steps[: len(study.errors)]), np.array(study.errors)
         if errors.any():
             error.loglog(h, errors, "o-", color=ORANGE, label="largest error")
-            error.loglog(h, errors[0] * h / h[0], color=GREY, linestyle="--", label="in proportion to the step")
+            error.loglog(h, errors[0] * h / h[0], color=GREY, linestyle="--", label="order 1")
             error.set_xticks(h, [f"{1e3 * step:g}" for step in h])
             error.xaxis.minorticks_off()
             error.legend()
-        error.set_title(f"error against the {found.reference} (order {found.order:.2f})")
+        error.set_title(f"error against the {study.reference} (order {study.order:.2f})")
         error.set_xlabel("communication step [ms]")
-        error.set_ylabel(axis_label("error", found.unit))
+        error.set_ylabel(axis_label("error", study.unit))

@@ -1,1 +1,1 @@
-"""What a decay says, from a record or a scene to a folder of results."""
+"""Identification of decays from records or scenes."""

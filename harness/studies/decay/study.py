@@ -1,4 +1,4 @@
-"""A measured record or a scene, from its file to what its decay says, in a folder of results."""
+"""Identifies the decay of a measured record or a scene, and writes the result folder."""
 
 import gc
 from collections.abc import Callable, Iterator
@@ -25,7 +25,7 @@ FOLDER = "decay"
 FILES = ("decay.json", "turning-points.csv", "fit.csv", "figure.svg")
 
 
-LoadedRecord = tuple[Record, KnownParameters, dict[str, Any]]  # and what their account tells: files, parameters, scene
+LoadedRecord = tuple[Record, KnownParameters, dict[str, Any]]  # with provenance: files, parameters, scene
 
 
 def identify_decay(
@@ -37,22 +37,21 @@ def identify_decay(
     out: Path,
     report: Callable[[float], None],
 ) -> tuple[DecayIdentification, Path]:
-    """Identify the decay of a record's file or of a scene; results go to out/decay/<name>."""
-    record, force, told = load_record(source, columns, known, report)
-    scene = told.pop("scene", {}) | vars(columns) | vars(known) | {"drag": drag, "drift": drift}
+    """Identify the decay of a record file or a scene, and write the results to out/decay/<name>."""
+    record, properties, provenance_data = load_record(source, columns, known, report)
+    scene = provenance_data.pop("scene", {}) | vars(columns) | vars(known) | {"drag": drag, "drift": drift}
     folder = out / FOLDER / record.name
     named = provenance.describe_sources(source)
-    with replace_folder(folder, FILES, named) as fresh:  # before the fit: what is in the way is told at once
-        found = fit_decay(record, force, drag, drift, report)
-        write_results(found, fresh)
-        provenance.write_provenance(fresh, **told, scene=scene, source=named)
-    return found, folder
+    with replace_folder(folder, FILES, named) as new_folder:  # before the fit, so that conflicts are reported at once
+        identified = fit_decay(record, properties, drag, drift, report)
+        write_results(identified, new_folder)
+        provenance.write_provenance(new_folder, **provenance_data, scene=scene, source=named)
+    return identified, folder
 
 
 @contextmanager
 def gc_paused() -> Iterator[None]:
-    """Without the collection of cycles: importing, fitting and drawing leave few, and to look for them, also when the
-    process ends, takes a quarter of a short command."""
+    """Disable garbage collection of cycles, which takes a quarter of the run time of a short command."""
     gc.disable()
     try:
         yield
@@ -64,7 +63,7 @@ def gc_paused() -> Iterator[None]:
 def load_record(
     source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]
 ) -> LoadedRecord:
-    """The record of a file, or of a run of a scene together with the stiffness that its model has."""
+    """Load the record of a file, or run a scene and take the stiffness from its model."""
     path = Path(source)
     if source == "-":
         return read_record(source, columns, "stdin"), known, {"files": ()}
@@ -72,14 +71,14 @@ def load_record(
         name = path.stem.encode("utf-8", "replace").decode()
         return read_record(source, columns, name), known, {"files": (path,)}
     if path.is_dir():
-        raise SceneError(f"{source} is a folder; name a file in it")
+        raise SceneError(f"{source} is a folder; give a file in it")
     return record_of_scene(source, columns, known, report)
 
 
 def record_of_scene(
     source: str, columns: ColumnOptions, known: KnownParameters, report: Callable[[float], None]
 ) -> LoadedRecord:
-    """The positions in a run of a scene."""
+    """Run a scene and return its position as a record."""
     from ...running.fmi2 import simulate
     from ...running.run_spec import spec_from_scene
     from ...scenes.fmu_files import check_built
@@ -87,58 +86,58 @@ def record_of_scene(
 
     scene = load_scene(source)
     check_built(scene.file)
-    wanted = spec_from_scene(scene)
-    if "position" not in wanted.motion_outputs:
+    spec = spec_from_scene(scene)
+    if "position" not in spec.motion_outputs:
         raise SceneError(f"scene {scene.name}: a decay needs the position among the outputs")
-    run = simulate(wanted, report)
-    unit = run.units[wanted.motion_outputs["position"]]
+    run = simulate(spec, report)
+    unit = run.units[spec.motion_outputs["position"]]
     record = Record(scene.name, run.time, run.column_of_role("position"), unit, 0, unit).select(
         columns.begin, columns.end
     )
     check_record(record)
-    told = {"files": (scene.file,), "parameters": run.effective_parameters, "scene": vars(scene)}
+    provenance_data = {"files": (scene.file,), "parameters": run.effective_parameters, "scene": vars(scene)}
     if known.k is None and known.m is None:
-        with suppress(HarnessError):  # a model without it has no force to tell
+        with suppress(HarnessError):  # a model without stiffness has no friction force
             known = KnownParameters(k=stiffness(run, unit == "rad", "the decay of a scene"), pendulum=unit == "rad")
-    return record, known, told
+    return record, known, provenance_data
 
 
-def write_results(found: DecayIdentification, folder: Path) -> None:
-    """Write numbers, turning points, the fitted motion and the figure."""
+def write_results(identified: DecayIdentification, folder: Path) -> None:
+    """Write decay.json, turning points, fit and figure."""
     from .figure import draw
 
-    unit = found.record.unit
-    loss = measure_energy_loss(found)
-    (folder / "decay.json").write_text(to_json(identified_as_json(found, loss)) + "\n", encoding="utf-8")
+    unit = identified.record.unit
+    loss = measure_energy_loss(identified)
+    (folder / "decay.json").write_text(to_json(identified_as_json(identified, loss)) + "\n", encoding="utf-8")
     write_csv(
         folder / "turning-points.csv",
-        ["t [s]", column_heading("x", found.record.base)],
-        [found.extrema.t, found.extrema.x],
+        ["t [s]", column_heading("x", identified.record.base)],
+        [identified.turns.t, identified.turns.x],
     )
-    fitted = found.signal(found.best, found.t)
-    name = ("x", "v", "a")[found.record.order]
+    fitted = identified.signal(identified.best, identified.t)
+    name = ("x", "v", "a")[identified.record.order]
     heads = ["t [s]", column_heading(name, unit), column_heading("fit", unit), column_heading("residual", unit)]
-    write_csv(folder / "fit.csv", heads, [found.t, found.x, fitted, found.x - fitted])
-    draw(found, loss, folder / "figure.svg")
+    write_csv(folder / "fit.csv", heads, [identified.t, identified.x, fitted, identified.x - fitted])
+    draw(identified, loss, folder / "figure.svg")
 
 
-def identified_as_json(found: DecayIdentification, loss: EnergyLoss | None = None) -> dict[str, Any]:
-    """Everything found, for JSON."""
-    problem, record, best = found.problem, found.record, found.best
-    loss = loss or measure_energy_loss(found)
+def identified_as_json(identified: DecayIdentification, loss: EnergyLoss | None = None) -> dict[str, Any]:
+    """Return the identified decay for JSON output."""
+    problem, record, best = identified.problem, identified.record, identified.best
+    loss = loss or measure_energy_loss(identified)
     return {
         "record": record.name,
         "quantity": record.quantity,
         "unit": record.unit,
-        "sentence": found.sentence,
-        "remarks": list(found.remarks),
-        "noise": found.extrema.noise,
-        "residual": found.rms,
-        "turning points": len(found.extrema.t),
+        "sentence": identified.sentence,
+        "remarks": list(identified.remarks),
+        "noise": identified.turns.noise,
+        "residual": identified.rms,
+        "turning points": len(identified.turns.t),
         "used": {
-            "from": float(found.t[0]),
-            "until": float(found.t[-1]),
-            "samples": len(found.t),
+            "from": float(identified.t[0]),
+            "until": float(identified.t[-1]),
+            "samples": len(identified.t),
             "of": len(record.t),
             "time_unit": "s",
         },
@@ -147,23 +146,23 @@ def identified_as_json(found: DecayIdentification, loss: EnergyLoss | None = Non
             "amplitude": float(best.p[AMPLITUDE]) * problem.scale,
             "unit": record.base,
         },
-        "fit": [asdict(each) for each in found.estimates],
-        "turning_points": [asdict(each) for each in found.extrema_estimates],
-        "published": [asdict(each) for each in found.two_peak_estimates],
-        "why_empty": {name: why for name, why in found.unavailable.items() if why},
+        "fit": [asdict(estimate) for estimate in identified.estimates],
+        "turning_points": [asdict(estimate) for estimate in identified.extrema_estimates],
+        "published": [asdict(estimate) for estimate in identified.published],
+        "why_empty": {name: reason for name, reason in identified.why.items() if reason},
         "laws": [
             {
                 "terms": list(law.terms),
                 "bic": law.bic,
-                "residual": float(np.sqrt(law.sum_of_squares / len(found.t))) * problem.scale,
+                "residual": float(np.sqrt(law.sum_of_squares / len(identified.t))) * problem.scale,
             }
-            for law in found.laws
+            for law in identified.laws
         ],
         "loss": {
             "unit": record.base,
             "amplitude": loss.amplitude.tolist(),
             "share_of_energy": loss.fraction.tolist(),
-            "laws": {"+".join(law.terms): loss.curves[law.terms][1].tolist() for law in found.laws},
-            "laws_amplitude": {"+".join(law.terms): loss.curves[law.terms][0].tolist() for law in found.laws},
+            "laws": {"+".join(law.terms): loss.curves[law.terms][1].tolist() for law in identified.laws},
+            "laws_amplitude": {"+".join(law.terms): loss.curves[law.terms][0].tolist() for law in identified.laws},
         },
     }

@@ -1,5 +1,5 @@
-"""The built FMUs in tools that others wrote: each tool in a process of its own, its answers beside fmpy's.
+"""Checks of the built FMUs in other tools, each in a separate process; results are compared with those of fmpy.
 
-A request names instances, values, connections and changes in mid-run (request.py); a player (by_*.py) carries it out
-in one tool; checks.py says what is asked, table.py runs it all.
+A request (request.py) defines instances, values, connections and changes during the run.  An adapter (*_adapter.py)
+executes it in one tool, checks.py defines the checks, and table.py runs them.
 """

@@ -1,6 +1,6 @@
-"""Requests of one FMU carried out by a C program (running/host.c), for which Python is a library at most.
+"""Executes requests for one FMU in a C program (running/host.c).
 
-No player of its own stands between: it would compile the program for each FMU.
+It runs in the process of the harness, so that the program is compiled only once per FMU.
 """
 
 import json
@@ -16,75 +16,77 @@ from .request import END, ImporterReply, ImporterRequest
 
 
 def run_requests(text: str, timeout: float) -> subprocess.CompletedProcess[str]:
-    """The C program, ended, which has carried out requests, as if it were a player; Hangs after `timeout` s."""
+    """Run requests in the C program; return the process with replies like those of an adapter."""
     requests = [ImporterRequest(**json.loads(line)) for line in text.splitlines()]
     library = load_library(Path(requests[0].fmu))
     calls = [
-        call for each in requests for call in [*(reset_cycle_calls(each) * each.reset_cycles or runs(each)), "0 end"]
+        call
+        for request in requests
+        for call in [*(reset_cycle_calls(request) * request.reset_cycles or runs(request)), "0 end"]
     ]
-    asked = "".join(f"{call}\n" for call in [*calls, "0 unload"])
+    commands = "".join(f"{call}\n" for call in [*calls, "0 unload"])
     try:
-        return answered(requests, run_subprocess(library.command, asked, library.environment, timeout))
-    except SubprocessTimeoutError as late:
-        answered(requests, late.process)
+        return with_replies(requests, run_subprocess(library.command, commands, library.environment, timeout))
+    except SubprocessTimeoutError as timeout:
+        with_replies(requests, timeout.process)
         raise
 
 
-def answered(
-    requests: list[ImporterRequest], done: subprocess.CompletedProcess[str]
+def with_replies(
+    requests: list[ImporterRequest], process: subprocess.CompletedProcess[str]
 ) -> subprocess.CompletedProcess[str]:
-    """The process with its answers in the words of a player."""
-    replies = map(reply, requests, done.stdout.split(END)[:-1])
-    done.stdout = "\n".join(json.dumps(asdict(each)) for each in replies)
-    return done
+    """Replace the output of the process by replies in JSON."""
+    replies = map(reply, requests, process.stdout.split(END)[:-1])
+    process.stdout = "\n".join(json.dumps(asdict(reply_object)) for reply_object in replies)
+    return process
 
 
 def reply(request: ImporterRequest, text: str) -> ImporterReply:
-    """What it printed."""
-    rows, statuses = told(text.splitlines(), len(request.instances))
+    """Parse the output of one request."""
+    rows, statuses = parse_output(text.splitlines(), len(request.instances))
     size = len(rows) if request.reset_cycles else request.steps + 1
     return ImporterReply(version(), rows[:size], rows[size:], sum(statuses[: request.steps]))
 
 
 def runs(request: ImporterRequest) -> list[str]:
-    """The calls of all runs of a request that has no lives."""
-    every = range(len(request.instances))
+    """Return the calls of all runs of a request without reset cycles."""
+    all_instances = range(len(request.instances))
     calls = [f"{i} new {name}" for i, name in enumerate(request.instances)]
     calls += run(request, request.values, request.midrun_changes)
     if request.rerun:
-        calls += [f"{i} reset" for i in every] + run(request, {}, {})
-    return calls + [f"{i} free" for i in every]
+        calls += [f"{i} reset" for i in all_instances] + run(request, {}, {})
+    return calls + [f"{i} free" for i in all_instances]
 
 
 def run(request: ImporterRequest, values: dict[str, float], midrun_changes: dict[str, float]) -> list[str]:
-    """The calls of one run."""
-    references, every = request.references, range(len(request.instances))
+    """Return the calls of one run."""
+    references, all_instances = request.references, range(len(request.instances))
     read = "getr " + " ".join(str(references[name]) for name in request.outputs)
     calls = [f"0 setr {references[name]} {value!r}" for name, value in values.items()]
-    calls += [f"{i} begin" for i in every] + [f"{i} {read}" for i in every]
+    calls += [f"{i} begin" for i in all_instances] + [f"{i} {read}" for i in all_instances]
     for step in range(request.steps):
         if request.connection:
             source, sink = (references[name] for name in request.connection)
             calls.append(f"0 pass {source} 1 {sink}")
         if step == request.steps // 2:
             calls += [f"0 setr {references[name]} {value!r}" for name, value in midrun_changes.items()]
-        calls += [f"{i} step {request.step * step!r} {request.step!r}" for i in every]
-        calls += [f"{i} {read}" for i in every]
+        calls += [f"{i} step {request.step * step!r} {request.step!r}" for i in all_instances]
+        calls += [f"{i} {read}" for i in all_instances]
     return calls
 
 
 def reset_cycle_calls(request: ImporterRequest) -> list[str]:
-    """The calls of one life: run, save on the way, restore and run on, reset and run."""
+    """Return the calls of one cycle: run, save the state halfway, restore and continue, reset and run."""
     times = [request.step * i for i in range(request.steps)]
     steps = [f"0 step {t!r} {request.step!r}" for t in times]
-    early, late = steps[: len(steps) // 2], steps[len(steps) // 2 :]
+    first_half, second_half = steps[: len(steps) // 2], steps[len(steps) // 2 :]
     read = ["0 getr " + " ".join(str(request.references[name]) for name in request.outputs)]
-    once = [*early, "0 save", *late, *read, "0 restore", *late, *read]
-    return ["0 new a", "0 begin", *once, "0 reset", "0 begin", *steps, *read, "0 free"]
+    calls = [*first_half, "0 save", *second_half, *read, "0 restore", *second_half, *read]
+    return ["0 new a", "0 begin", *calls, "0 reset", "0 begin", *steps, *read, "0 free"]
 
 
-def told(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
-    """The rows of values of so many instances, and for each step whether all accepted it."""
+def parse_output(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
+    """Parse the rows of values of `count` instances, and for each step whether all instances accepted it."""
     words = [line.split() for line in lines]
     values = [[float(word) for word in rest] for kind, *rest in words if kind == "values"]
     statuses = [rest == ["0"] for kind, *rest in words if kind == "status"]
@@ -94,6 +96,6 @@ def told(lines: list[str], count: int) -> tuple[list[list[float]], list[bool]]:
 
 @cache
 def version() -> str:
-    """The version that the compiler tells of itself."""
-    told = subprocess.run([find_compiler(), "--version"], capture_output=True, text=True, check=True)
-    return (re.findall(r"\d+(?:\.\d+)+", told.stdout.splitlines()[0]) or ["of unknown version"])[-1]
+    """Return the version of the compiler."""
+    parse_output = subprocess.run([find_compiler(), "--version"], capture_output=True, text=True, check=True)
+    return (re.findall(r"\d+(?:\.\d+)+", parse_output.stdout.splitlines()[0]) or ["unknown version"])[-1]

@@ -1,7 +1,7 @@
-"""What every importer is asked of every FMU, and when the answer is right.
+"""The checks of every FMU in every importer.
 
-Numbers agree when they differ by less than AGREE of the largest value of their variable: an importer counts time in
-its own way, and a change in mid-run that comes an instant later makes other internal steps, within the tolerance.
+Values agree if they differ by less than TOLERANCE, relative to the largest value of the variable: importers compute
+time differently, and a slightly later change during the run causes other internal steps.
 """
 
 import json
@@ -21,20 +21,36 @@ from . import c_adapter
 from .request import END, ImporterReply, ImporterRequest
 
 TOLERANCE = 1e-6
-TIMEOUT = 300  # s, for a process
+TIMEOUT = 300  # s per process
 RESET_CYCLES = 100
-POINTS = 200  # communication steps of a run
-DIVERGED = "the solution diverges"
+POINTS = 200  # communication steps
+DIVERGENCE_MESSAGE = "the motion leaves the range of numbers"
 EXCHANGE = "fmi2EnterEventMode"
-NEGATIVE, TINY = {"m": -1.0}, {"m": 1e-300}  # masses: one is refused, with the other a motion diverges
-FACTOR = 1.1  # a tunable is changed by this factor
+NEGATIVE, TINY = {"m": -1.0}, {"m": 1e-300}  # masses: the first is rejected, with the second a run diverges
+FACTOR = 1.1  # by which tunable parameters change
 
 
 @dataclass(frozen=True)
 class Importer:
-    """A tool: its player, the packages it needs; whether it shows the log, heeds the status of a step, ends its own
-    process, with the FMU's sentence, when initialisation answers an error, and asks for the functions of model exchange
-    whatever it runs."""
+    """A simulation tool.
+
+    Attributes
+    ----------
+    name
+        Name of the tool.
+    adapter
+        Module of the adapter.
+    packages
+        Required packages.
+    shows_log
+        Whether the tool passes on log messages.
+    checks_status
+        Whether the tool checks the status of a step.
+    exits_on_error
+        Whether the tool exits if initialisation fails.
+    needs_model_exchange
+        Whether the tool requires the functions of model exchange in every FMU.
+    """
 
     name: str
     adapter: str
@@ -55,30 +71,30 @@ IMPORTERS = (
 )
 
 
-NOT_RUN = {  # why some are not driven
-    "OMSimulator": "its pip package fetches its programs from elsewhere when it is installed",
-    "PyFMI": "conda has it; what pip has of it is of 2018, and wants libraries that pip has not",
-    "fmusim, FMU Compliance Checker, libfmi4c": "neither pip nor Debian has them",
+NOT_RUN = {  # tools without adapter, with reasons
+    "OMSimulator": "its pip package downloads its programs from another site during installation",
+    "PyFMI": "only available from conda; the pip package is from 2018 and needs libraries that pip does not provide",
+    "fmusim, FMU Compliance Checker, libfmi4c": "not available from pip or Debian",
 }
 
 
 @dataclass(frozen=True)
 class AdapterResult:
-    """An answer, and what the process said on standard error meanwhile."""
+    """Reply to a request, and the messages on standard error."""
 
     reply: ImporterReply
     stderr: str
 
 
 class CheckFailedError(Exception):
-    """A check that failed, in a few words."""
+    """A check failed."""
 
 
-RESULTS: dict[tuple[str, str], AdapterResult | CheckFailedError] = {}  # of each player to each request, in JSON
+RESULTS: dict[tuple[str, str], AdapterResult | CheckFailedError] = {}  # cache by adapter and request in JSON
 
 
 def unavailable_reason(importer: Importer, fmu: Path | None = None) -> str:
-    """Why an importer cannot be asked here, of an FMU if one is named, or nothing."""
+    """Return the reason why an importer cannot run, or cannot run this FMU; empty if it can."""
     for package in importer.packages:
         try:
             version(package)
@@ -86,23 +102,23 @@ def unavailable_reason(importer: Importer, fmu: Path | None = None) -> str:
             return f"{package} is not installed: pip install -e '.[importers]'"
     if importer.adapter == "c_adapter":
         if COMPILER is None:
-            return "there is no C compiler here"
+            return "no C compiler found"
         if not PYTHON_LIBRARY.is_file():
-            return "this Python has no shared library that a C program could load"
+            return "this Python has no shared library for a C program"
     if importer.needs_model_exchange and fmu and not has_function(fmu, EXCHANGE):
-        return f"it opens only FMUs whose library has all functions of FMI, and {fmu.name} has none of model exchange"
+        return f"the tool requires the functions of model exchange, which {fmu.name} does not have"
     return ""
 
 
 def has_function(fmu: Path, function: str) -> bool:
-    """Whether the library of an FMU for this machine names a function."""
+    """Return whether the library of an FMU contains the name of a function."""
     with ZipFile(fmu) as archive:
         names = [name for name in archive.namelist() if name.startswith("binaries/linux64/") and name.endswith(".so")]
         return any(function.encode() in archive.read(name) for name in names)
 
 
 def run_request(importer: Importer, request: ImporterRequest) -> AdapterResult:
-    """The answer of an importer, from another process than this; Wrong if that crashes or hangs."""
+    """Run a request in an importer; CheckFailedError if its process crashes or times out."""
     prepare(importer, [request])
     answer = RESULTS[importer.adapter, json.dumps(asdict(request))]
     if isinstance(answer, CheckFailedError):
@@ -111,7 +127,7 @@ def run_request(importer: Importer, request: ImporterRequest) -> AdapterResult:
 
 
 def prepare(importer: Importer, requests: list[ImporterRequest]) -> None:
-    """Ask an importer what it was not asked yet: a process all, and where it crashes or hangs, another one the rest."""
+    """Run all new requests of an importer in one process; if it crashes, continue in another process."""
     texts = [json.dumps(asdict(request)) for request in requests]
     texts = [text for text in dict.fromkeys(texts) if (importer.adapter, text) not in RESULTS]
     while texts:
@@ -121,78 +137,82 @@ def prepare(importer: Importer, requests: list[ImporterRequest]) -> None:
 
 
 def run_adapter(adapter: str, texts: list[str]) -> list[AdapterResult | CheckFailedError]:
-    """The answers to as many of these requests as a process carries out, and of the next one how it crashed or hung."""
-    text, hung = "\n".join(texts), ""
+    """Run requests in a process; return the results, the last of which is an error if the process crashed."""
+    text, timeout_message = "\n".join(texts), ""
     try:
         in_c = adapter == "c_adapter"
-        done = (
+        process = (
             c_adapter.run_requests(text, TIMEOUT)
             if in_c
             else run_module(f"{__package__}.{adapter}", text, timeout=TIMEOUT)
         )
-    except SubprocessTimeoutError as late:
-        done, hung = late.process, f"hangs for {TIMEOUT} s"
-    *said, rest = done.stderr.split(END)
-    replies = [ImporterReply(**json.loads(line)) for line in done.stdout.splitlines()]
-    found: list[AdapterResult | CheckFailedError] = [AdapterResult(*each) for each in zip(replies, said, strict=False)]
-    if done.returncode or rest or len(found) < len(texts):
-        last = rest.strip().splitlines()[-1:] or ["nothing said"]
-        found[len(texts) - 1 :] = [CheckFailedError(hung or f"exit status {done.returncode}: {last[0]}")]
-    return found
+    except SubprocessTimeoutError as timeout:
+        process, timeout_message = timeout.process, f"no answer after {TIMEOUT} s"
+    *messages, rest = process.stderr.split(END)
+    replies = [ImporterReply(**json.loads(line)) for line in process.stdout.splitlines()]
+    results: list[AdapterResult | CheckFailedError] = [
+        AdapterResult(*pair) for pair in zip(replies, messages, strict=False)
+    ]
+    if process.returncode or rest or len(results) < len(texts):
+        last = rest.strip().splitlines()[-1:] or ["no message"]
+        results[len(texts) - 1 :] = [
+            CheckFailedError(timeout_message or f"exit status {process.returncode}: {last[0]}")
+        ]
+    return results
 
 
 @dataclass(frozen=True)
 class FmuUnderTest:
-    """An FMU and what the checks need to know of it."""
+    """An FMU with the data for the checks."""
 
     fmu: Path
-    base_request: ImporterRequest  # the default experiment, its first two outputs and acceleration read
-    connection: list[str]  # an output, and the input, which is of the same unit
-    midrun_changes: dict[str, float]  # a tunable and its new value in mid-run
+    base_request: ImporterRequest  # default experiment with the first two outputs
+    connection: list[str]  # an output and an input of the same unit
+    midrun_changes: dict[str, float]  # tunable parameters with new values during the run
 
 
 class UnsuitableFmuError(HarnessError):
-    """An FMU that the checks cannot be made with."""
+    """The FMU does not have the variables that the checks need."""
 
 
 def describe_fmu(fmu: Path) -> FmuUnderTest:
-    """Read the description of an FMU of this project."""
+    """Read the description of an FMU and return the data for the checks."""
     if not fmu.is_file():
-        raise HarnessError(f"there is no {fmu}: build the FMUs with `python build_fmus.py`, or name another folder")
-    found = read_description(fmu)
-    if found.fmiVersion != "2.0":
-        raise HarnessError(f"{fmu} is of FMI {found.fmiVersion}; the importers are asked with FMUs of FMI 2.0")
-    reals = {v.name: v for v in found.modelVariables if v.type == "Real"}
+        raise HarnessError(f"{fmu} does not exist: build the FMUs with `python build_fmus.py`, or give another folder")
+    fmu_description = read_description(fmu)
+    if fmu_description.fmiVersion != "2.0":
+        raise HarnessError(f"{fmu} is an FMU for FMI {fmu_description.fmiVersion}; the checks require FMI 2.0")
+    reals = {v.name: v for v in fmu_description.modelVariables if v.type == "Real"}
     outputs = [name for name, v in reals.items() if v.causality == "output"]
-    entry = next((name for name, v in reals.items() if v.causality == "input"), "")
-    source = next((name for name in outputs if entry and reals[name].unit == reals[entry].unit), "")
-    if not source or "m" not in reals:
-        raise UnsuitableFmuError("the checks want a mass m, an input, and an output of its unit")
+    input_name = next((name for name, v in reals.items() if v.causality == "input"), "")
+    output_name = next((name for name in outputs if input_name and reals[name].unit == reals[input_name].unit), "")
+    if not output_name or "m" not in reals:
+        raise UnsuitableFmuError("the checks require a mass m, an input, and an output of the same unit")
     midrun_changes = {name: FACTOR * float(v.start) for name, v in reals.items() if name in ("k", "r")}
     base_request = ImporterRequest(
         fmu=str(fmu.resolve()),
         references={name: v.valueReference for name, v in reals.items()},
-        step=float(found.defaultExperiment.stopTime) / POINTS,
+        step=float(fmu_description.defaultExperiment.stopTime) / POINTS,
         steps=POINTS,
         outputs=outputs[:2],
     )
-    return FmuUnderTest(fmu, base_request, [source, entry], midrun_changes)
+    return FmuUnderTest(fmu, base_request, [output_name, input_name], midrun_changes)
 
 
 def check_agreement(importer: Importer, request: ImporterRequest) -> str:
-    """The largest difference from fmpy, as a share of the largest value of the variable."""
-    mine = run_request(importer, request)
-    if mine.stderr:
-        raise CheckFailedError(f"it says: {mine.stderr.splitlines()[0]}")
-    if not all(isfinite(value) for row in mine.reply.rows for value in row):
-        raise CheckFailedError("it answers what is not a number")
+    """Compare a run with fmpy; return the largest difference relative to the largest value of the variable."""
+    result = run_request(importer, request)
+    if result.stderr:
+        raise CheckFailedError(f"it prints: {result.stderr.splitlines()[0]}")
+    if not all(isfinite(value) for row in result.reply.rows for value in row):
+        raise CheckFailedError("values are not finite")
     expected = run_request(IMPORTERS[0], request).reply.rows
-    worst = largest_difference(mine.reply.rows, expected)
+    worst = largest_difference(result.reply.rows, expected)
     return f"{worst:.0e}" if importer is not IMPORTERS[0] else "runs"
 
 
 def largest_difference(rows: list[list[float]], expected: list[list[float]]) -> float:
-    """The same as a number, from the first step on: libcosim shows nothing before it; Wrong if too large."""
+    """Return the largest relative difference from the first step on, because libcosim records nothing before it."""
     if len(rows) != len(expected):
         raise CheckFailedError(f"{len(rows)} points instead of {len(expected)}")
     worst = 0.0
@@ -205,70 +225,80 @@ def largest_difference(rows: list[list[float]], expected: list[list[float]]) -> 
 
 
 def check_failure(importer: Importer, request: ImporterRequest) -> str:
-    """A run that fails: said once on standard error and in the log, no number afterwards, all well after a reset."""
+    """Check a failing run: one message on standard error and in the log, NaN afterwards, success after a reset."""
     sentence = expected_message(request)
     try:
         run_instances = run_request(importer, request)
     except CheckFailedError as wrong:
         if importer.exits_on_error and request.values and sentence in str(wrong):
-            return "told, ends"
+            return "message, exits"
         raise
-    kind = request.instances[0]
+    instance = request.instances[0]
     lines = [line for line in run_instances.stderr.splitlines() if sentence in line]
-    names = f"({kind}): ", f"{Path(request.fmu).name}): ", f"({kind}.0.fmu): "  # the last one in a container
-    own = [line for line in lines if any(name in line for name in names)]
-    if len(own) != 1:
-        raise CheckFailedError(f"{len(own)} lines on standard error instead of one")
+    names = (
+        f"({instance}): ",
+        f"{Path(request.fmu).name}): ",
+        f"({instance}.0.fmu): ",
+    )  # the last one inside a container
+    own_lines = [line for line in lines if any(name in line for name in names)]
+    if len(own_lines) != 1:
+        raise CheckFailedError(f"{len(own_lines)} lines on standard error instead of one")
     if importer.shows_log and len(lines) != 2:
-        raise CheckFailedError("the log says nothing")
+        raise CheckFailedError("no message in the log")
     rows, accepted = run_instances.reply.rows, run_instances.reply.accepted
     if importer.checks_status and accepted == request.steps:
-        raise CheckFailedError("every step is accepted")
+        raise CheckFailedError("every step was accepted")
     if not (all(isnan(value) for value in rows[-1]) or (importer.checks_status and rows[-1] == rows[accepted])):
-        raise CheckFailedError(f"answers {rows[-1][0]!r} after it failed")
-    fresh = run_request(
+        raise CheckFailedError(f"returns {rows[-1][0]!r} after the failure")
+    expected = run_request(
         IMPORTERS[0], replace(request, values={}, midrun_changes={}, instances=["a"], rerun=False)
     ).reply.rows
-    largest_difference(run_instances.reply.rerun, fresh)
-    return "told"
+    largest_difference(run_instances.reply.rerun, expected)
+    return "message"
 
 
 def expected_message(request: ImporterRequest) -> str:
-    """What is to be said of its values: of several, that the motion diverges."""
+    """Return the expected message: the rejected value, or divergence if several values are set."""
     (name, value), *more = [*request.values.items(), *request.midrun_changes.items()]
-    return DIVERGED if more else f"{name} = {value!r}"
+    return DIVERGENCE_MESSAGE if more else f"{name} = {value!r}"
 
 
 def failing_request(subject: FmuUnderTest, **changes: Any) -> ImporterRequest:
-    """A request that fails, and then one that does not."""
+    """Return a request that fails first and succeeds after a reset."""
     return replace(subject.base_request, steps=10, rerun=True, **changes)
 
 
 def check_reset_cycles(importer: Importer, request: ImporterRequest) -> str:
-    """Runs, saves, runs on, restores, runs on, resets, runs and frees, in one process; then unloads the library."""
+    """Check reset cycles in one process: run, save, continue, restore, continue, reset, run and free."""
     if importer.adapter != "c_adapter":
         return "-"
     rows = run_request(importer, request).reply.rows
     if len(rows) != 3 * RESET_CYCLES or any(row != rows[0] for row in rows):
-        raise CheckFailedError("the lives differ")
+        raise CheckFailedError("the cycles differ")
     largest_difference([[], rows[0]], [[], run_request(IMPORTERS[0], replace(request, reset_cycles=0)).reply.rows[-1]])
-    return "alike"
+    return "identical"
 
 
-Judge = Callable[[Importer, ImporterRequest], str]  # returns what the table shows, or raises Wrong
-CHECKS: dict[str, tuple[Judge, Callable[[FmuUnderTest], ImporterRequest]]] = {
-    "default run": (check_agreement, lambda its: its.base_request),
-    "tunable changed": (check_agreement, lambda its: replace(its.base_request, midrun_changes=its.midrun_changes)),
+CheckFunction = Callable[[Importer, ImporterRequest], str]  # returns the table cell, or raises CheckFailedError
+CHECKS: dict[str, tuple[CheckFunction, Callable[[FmuUnderTest], ImporterRequest]]] = {
+    "default run": (check_agreement, lambda subject: subject.base_request),
+    "tunable changed": (
+        check_agreement,
+        lambda subject: replace(subject.base_request, midrun_changes=subject.midrun_changes),
+    ),
     "two connected": (
         check_agreement,
-        lambda its: replace(its.base_request, instances=["a", "b"], connection=its.connection),
+        lambda subject: replace(subject.base_request, instances=["a", "b"], connection=subject.connection),
     ),
-    "100 lives": (check_reset_cycles, lambda its: replace(its.base_request, steps=10, reset_cycles=RESET_CYCLES)),
-    "bad parameter": (check_failure, lambda its: failing_request(its, values=NEGATIVE)),
-    "bad input": (check_failure, lambda its: failing_request(its, midrun_changes={its.connection[1]: nan})),
+    "100 resets": (
+        check_reset_cycles,
+        lambda subject: replace(subject.base_request, steps=10, reset_cycles=RESET_CYCLES),
+    ),
+    "bad parameter": (check_failure, lambda subject: failing_request(subject, values=NEGATIVE)),
+    "bad input": (check_failure, lambda subject: failing_request(subject, midrun_changes={subject.connection[1]: nan})),
     "diverging run": (
         check_failure,
-        lambda its: failing_request(its, midrun_changes={**TINY, its.connection[1]: 1e308}),
+        lambda subject: failing_request(subject, midrun_changes={**TINY, subject.connection[1]: 1e308}),
     ),
-    "% in a name": (check_failure, lambda its: failing_request(its, instances=["100%s%n"], values=NEGATIVE)),
+    "% in a name": (check_failure, lambda subject: failing_request(subject, instances=["100%s%n"], values=NEGATIVE)),
 }

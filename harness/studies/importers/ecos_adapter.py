@@ -1,4 +1,4 @@
-"""A request carried out by Ecos (package ecospy, which needs the library of the package tbb in the process first)."""
+"""Executes requests in Ecos (package ecospy; the library of the package tbb must be loaded first)."""
 
 import ctypes
 import sys
@@ -29,14 +29,14 @@ def run_request(request: ImporterRequest) -> ImporterReply:
             if request.rerun:
                 simulation.reset()
                 rerun = run(simulation, request, None, {})
-            # Ecos does not look at the status of a step, so it accepts all.
+            # Ecos ignores the status of a step
             return ImporterReply(version("ecospy"), rows, rerun, request.steps)
 
 
 def run(
     simulation: EcosSimulation, request: ImporterRequest, values: str | None, midrun_changes: dict[str, float]
 ) -> list[list[float]]:
-    """The rows of one run."""
+    """Return the rows of one run."""
 
     def row() -> list[float]:
         return [

@@ -1,4 +1,4 @@
-"""A request carried out by fmpy, call by call."""
+"""Executes requests with the FMI functions of fmpy."""
 
 import ctypes
 import sys
@@ -16,23 +16,23 @@ from ...running.unpacking import unpack_once
 from .request import ImporterReply, ImporterRequest, serve
 
 
-def run_request(request: ImporterRequest, logged: tuple[str, ...] = ("",)) -> ImporterReply:
-    """The answer; of the log what begins so."""
-    found = read_description(Path(request.fmu))
-    callbacks = logging(logged)
-    about = {
-        "guid": found.guid,
-        "modelIdentifier": found.coSimulation.modelIdentifier,
+def run_request(request: ImporterRequest, prefixes: tuple[str, ...] = ("",)) -> ImporterReply:
+    """Execute a request; print log messages that start with one of `logged`."""
+    fmu_description = read_description(Path(request.fmu))
+    callbacks = logging(prefixes)
+    arguments = {
+        "guid": fmu_description.guid,
+        "modelIdentifier": fmu_description.coSimulation.modelIdentifier,
         "unzipDirectory": str(unpack_once(Path(request.fmu))),
     }
-    instances = [fmi2.FMU2Slave(instanceName=name, **about) for name in request.instances]
+    instances = [fmi2.FMU2Slave(instanceName=name, **arguments) for name in request.instances]
     for instance in instances:
         instance.instantiate(callbacks=callbacks, loggingOn=True)
     return run_instances(request, instances, fmpy.__version__)
 
 
 def run_instances(request: ImporterRequest, instances: list[Any], version: str) -> ImporterReply:
-    """The answer of instances, which are freed; `version` of the tool."""
+    """Execute a request with instances, and free them; `version` is that of the tool."""
     rows, accepted = run(request, instances, request.values, request.midrun_changes)
     rerun: list[list[float]] = []
     if request.rerun:
@@ -47,15 +47,15 @@ def run_instances(request: ImporterRequest, instances: list[Any], version: str) 
 def run(
     request: ImporterRequest, instances: list[Any], values: dict[str, float], midrun_changes: dict[str, float]
 ) -> tuple[list[list[float]], int]:
-    """The rows of one run, and how many steps were accepted."""
+    """Return the rows of one run and the number of accepted steps."""
     references = request.references
-    wanted = [references[name] for name in request.outputs]
+    output_references = [references[name] for name in request.outputs]
 
     def write(instance: Any, new: dict[str, float]) -> None:
         instance.setReal([references[name] for name in new], list(new.values()))
 
     def row() -> list[float]:
-        return [value for instance in instances for value in instance.getReal(wanted)]
+        return [value for instance in instances for value in instance.getReal(output_references)]
 
     def transfer() -> None:
         if request.connection:
@@ -66,7 +66,7 @@ def run(
     for instance in instances:
         instance.setupExperiment(startTime=0.0)
         instance.enterInitializationMode()
-        with suppress(FMICallException):  # as with the steps below
+        with suppress(FMICallException):  # ignored, as for the steps below
             instance.exitInitializationMode()
     rows, accepted = [row()], 0
     for i in range(request.steps):
@@ -78,20 +78,20 @@ def run(
                 instance.doStep(request.step * i, request.step)
             accepted += 1
         except FMICallException:
-            pass  # the tool tells it; what counts is what the FMU answers from now on
+            pass  # the tool logs it; the check reads the values from here on
         rows.append(row())
     return rows, accepted
 
 
-def logging(logged: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:
-    """Callbacks that print what begins so of the log."""
+def logging(prefixes: tuple[str, ...]) -> fmi2.fmi2CallbackFunctions:
+    """Return callbacks that print log messages that start with one of `logged`."""
 
-    def hear(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
-        if text.decode().startswith(logged):
+    def print_message(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
+        if text.decode().startswith(prefixes):
             print(f"log: {text.decode()}", file=sys.stderr, flush=True)
 
     callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(hear)
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(print_message)
     callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
     callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
     addLoggerProxy(ctypes.byref(callbacks))

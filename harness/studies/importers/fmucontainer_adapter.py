@@ -1,6 +1,7 @@
-"""A request carried out by the C runtime of FMUContainer (package fmu-manipulation-toolbox): the instances are embedded
-in one FMU, which fmpy calls; what is set and read goes through its own inputs and outputs.  Of its
-log what the embedded FMUs say is shown; of itself it tells much, also when all goes well.
+"""Executes requests in the C runtime of FMUContainer (package fmu-manipulation-toolbox).
+
+The instances are embedded in a container FMU, which fmpy runs; values pass through inputs and outputs of the container.
+Only log messages of the embedded FMUs are printed, because the container itself is verbose.
 """
 
 import json
@@ -26,37 +27,41 @@ from .request import ImporterReply, ImporterRequest, serve
 def run_request(request: ImporterRequest) -> ImporterReply:
     path, files = Path(request.fmu), tuple(f"{i}.fmu" for i in range(len(request.instances)))
     reals = [variable for variable in read_description(path).modelVariables if variable.type == "Real"]
-    settable = [each.name for each in reals if each.causality == "input" or each.variability == "tunable"]
-    entries = dict.fromkeys([*settable, *request.values, *request.midrun_changes])  # for most requests the same
-    told: dict[str, Any] = {
+    settable = [
+        variable.name for variable in reals if variable.causality == "input" or variable.variability == "tunable"
+    ]
+    inputs = dict.fromkeys(
+        [*settable, *request.values, *request.midrun_changes]
+    )  # equal for most requests, so that the container is cached
+    container: dict[str, Any] = {
         "name": "container.fmu",
         "fmu": files,
         "step_size": request.step,
-        "input": [[name, files[0], name] for name in entries],
+        "input": [[name, files[0], name] for name in inputs],
         "output": [[file, name, f"{name}_{i}"] for i, file in enumerate(files) for name in request.outputs],
         "link": [[files[0], request.connection[0], files[1], request.connection[1]]] if request.connection else [],
     }
-    fmu = built(path, files, json.dumps(told))
-    inside = replace(
+    fmu = build_container(path, files, json.dumps(container))
+    inner_request = replace(
         request,
         fmu=str(fmu),
         references={variable.name: variable.valueReference for variable in read_description(fmu).modelVariables},
-        outputs=[name for _, _, name in told["output"]],
+        outputs=[name for _, _, name in container["output"]],
         instances=request.instances[:1],
         connection=[],
     )
     return replace(
-        fmpy_adapter.run_request(inside, ("0.fmu: ", "1.fmu: ")), version=version("fmu-manipulation-toolbox")
+        fmpy_adapter.run_request(inner_request, ("0.fmu: ", "1.fmu: ")), version=version("fmu-manipulation-toolbox")
     )
 
 
 @cached_by_mtime
-def built(fmu: Path, files: tuple[str, ...], told: str) -> Path:
-    """The container as it is told, of copies of an FMU."""
+def build_container(fmu: Path, files: tuple[str, ...], container: str) -> Path:
+    """Build a container of copies of an FMU from its description in JSON."""
     folder = PROCESS_RESOURCES.enter_context(temporary_directory("container-"))
     for file in files:
         copy(fmu, folder / file)
-    (folder / "container.json").write_text(told, encoding="utf-8")
+    (folder / "container.json").write_text(container, encoding="utf-8")
     options = ["-no-auto-input", "-no-auto-output", "-no-auto-link", "-fmu-directory", str(folder)]
     sys.argv[1:] = ["-container", "container.json", *options]
     with redirect_stdout(StringIO()):

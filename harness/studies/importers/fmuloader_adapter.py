@@ -1,4 +1,4 @@
-"""A request carried out by fmuloader, call by call, in the order of fmpy."""
+"""Executes requests with fmuloader, with the same calls as fmpy."""
 
 import re
 import sys
@@ -18,22 +18,22 @@ from .request import ImporterReply, ImporterRequest, serve
 
 
 class Instance:
-    """An instance of fmuloader's under the names that fmpy gives its calls."""
+    """An instance of fmuloader with the method names of fmpy."""
 
-    def __init__(self, folder: Path, found: Any, name: str) -> None:
-        identifier = found.coSimulation.modelIdentifier
+    def __init__(self, folder: Path, fmu_description: Any, name: str) -> None:
+        identifier = fmu_description.coSimulation.modelIdentifier
         self.slave = Fmi2Slave(folder, model_identifier=identifier)
         self.slave.instantiate(
-            name, Fmi2Type.CO_SIMULATION, guid=found.guid, logging_on=True, log_message_callback=hear
+            name, Fmi2Type.CO_SIMULATION, guid=fmu_description.guid, logging_on=True, log_message_callback=print_message
         )
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        return partial(self.call, snake(name))
+        return partial(self.call, snake_case(name))
 
     def call(self, name: str, *arguments: Any, **named: Any) -> Any:
-        """What a call returns; above a warning, which for fmuloader is no error yet, an exception."""
+        """Call a function; raise FMICallException for a status above warning, also for discard."""
         try:
-            answer = getattr(self.slave, name)(*arguments, **{snake(key): value for key, value in named.items()})
+            answer = getattr(self.slave, name)(*arguments, **{snake_case(key): value for key, value in named.items()})
         except Fmi2Error as error:
             raise FMICallException(error.func_name, int(error.status)) from None
         if answer is Fmi2Status.DISCARD:
@@ -41,19 +41,19 @@ class Instance:
         return answer
 
 
-def snake(name: str) -> str:
-    """What fmuloader calls something: do_step for doStep."""
+def snake_case(name: str) -> str:
+    """Convert a name to snake case: doStep to do_step."""
     return re.sub("[A-Z]", lambda capital: f"_{capital[0].lower()}", name)
 
 
-def hear(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
-    """Print the log."""
+def print_message(environment: Any, name: bytes, status: int, category: bytes, text: bytes) -> None:
+    """Print a log message."""
     print(f"log: {text.decode()}", file=sys.stderr, flush=True)
 
 
 def run_request(request: ImporterRequest) -> ImporterReply:
-    found = read_description(Path(request.fmu))
-    instances = [Instance(unpack_once(Path(request.fmu)), found, name) for name in request.instances]
+    fmu_description = read_description(Path(request.fmu))
+    instances = [Instance(unpack_once(Path(request.fmu)), fmu_description, name) for name in request.instances]
     return run_instances(request, instances, version("fmuloader"))
 
 

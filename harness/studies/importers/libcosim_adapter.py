@@ -1,4 +1,4 @@
-"""A request carried out by libcosim (package libcosimpy).  It has no reset: a second run is a second execution."""
+"""Executes requests in libcosim (package libcosimpy), which has no reset: a rerun is a new execution."""
 
 from importlib.metadata import version
 
@@ -10,7 +10,7 @@ from libcosimpy.CosimSlave import CosimLocalSlave
 
 from .request import ImporterReply, ImporterRequest, serve
 
-NANO = 1e9  # libcosim counts time in whole ns
+NANO = 1e9  # libcosim counts time in ns
 
 
 def run_request(request: ImporterRequest) -> ImporterReply:
@@ -23,29 +23,29 @@ def run_request(request: ImporterRequest) -> ImporterReply:
 def run(
     request: ImporterRequest, values: dict[str, float], midrun_changes: dict[str, float]
 ) -> tuple[list[list[float]], int]:
-    """The rows of one run, the last one repeated where libcosim refuses to go on, and how many steps it took."""
+    """Return the rows of one run, the last one repeated after a rejected step, and the number of accepted steps."""
     references = request.references
     execution = CosimExecution.from_step_size(round(request.step * NANO))
     slaves = [CosimLocalSlave(request.fmu, name) for name in request.instances]
-    places = [execution.add_local_slave(slave) for slave in slaves]
+    indices = [execution.add_local_slave(slave) for slave in slaves]
     observer, manipulator = CosimObserver.create_last_value(), CosimManipulator.create_override()
     execution.add_observer(observer)
     execution.add_manipulator(manipulator)
     for name, value in values.items():
-        execution.real_initial_value(places[0], references[name], value)
+        execution.real_initial_value(indices[0], references[name], value)
     if request.connection:
         source, sink = (references[name] for name in request.connection)
-        execution.connect_real_variables(places[0], source, places[1], sink)
-    wanted = [references[name] for name in request.outputs]
+        execution.connect_real_variables(indices[0], source, indices[1], sink)
+    output_references = [references[name] for name in request.outputs]
 
     def row() -> list[float]:
-        return [value for place in places for value in observer.last_real_values(place, wanted)]
+        return [value for index in indices for value in observer.last_real_values(index, output_references)]
 
     rows, accepted = [row()], 0
     for i in range(request.steps):
         if i == request.steps // 2 and midrun_changes:
             names, new = list(midrun_changes), list(midrun_changes.values())
-            manipulator.slave_real_values(places[0], [references[name] for name in names], new)
+            manipulator.slave_real_values(indices[0], [references[name] for name in names], new)
         accepted += execution.step(1)
         rows.append(row())
     return rows, accepted

@@ -1,6 +1,6 @@
-"""What a player is asked, and how it answers: JSON over standard input and output, one request after another.
+"""Protocol of the adapters: requests and replies as JSON lines on standard input and output.
 
-A player prints the FMU's log to standard error, if the tool hands it on, and what is returned here to standard output.
+An adapter prints log messages of the FMU to standard error if the tool passes them on.
 """
 
 import json
@@ -9,30 +9,30 @@ import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 
-END = "\0"  # on standard error, of what is said while a request is carried out
+END = "\0"  # separates the messages of requests on standard error
 
 
 @dataclass(frozen=True)
 class ImporterRequest:
-    """Equal communication steps of `step` s from t = 0 on, with instances of one FMU; Reals are written and read."""
+    """A run of instances of one FMU with equal communication steps of `step` s, starting at t = 0."""
 
     fmu: str
-    references: dict[str, int]  # of the variables named below
+    references: dict[str, int]  # value references of the variables below
     step: float
     steps: int
     outputs: list[str]
     instances: list[str] = field(default_factory=lambda: ["a"])
-    values: dict[str, float] = field(default_factory=dict)  # of the first instance, before the run
-    midrun_changes: dict[str, float] = field(default_factory=dict)  # of the first instance, after half of the steps
-    connection: list[str] = field(default_factory=list)  # an output of the first instance, an input of the second
-    rerun: bool = False  # afterwards run once more, from a reset, with the start values
-    reset_cycles: int = 0  # the C program only: so many lives of one instance instead, three last rows of each
+    values: dict[str, float] = field(default_factory=dict)  # set in the first instance before the run
+    midrun_changes: dict[str, float] = field(default_factory=dict)  # set in the first instance after half of the steps
+    connection: list[str] = field(default_factory=list)  # output of the first instance, input of the second
+    rerun: bool = False  # reset and run again with start values
+    reset_cycles: int = 0  # C program only: number of reset cycles to run instead; three last rows of each
 
 
 @dataclass(frozen=True)
 class ImporterReply:
-    """Rows of values, one a point in time, instance after instance; those of the run after a reset; how many steps the
-    tool accepted.  Version of the tool."""
+    """Version of the tool, rows of values (one per communication point), rows of the rerun, and number of accepted
+    steps."""
 
     version: str
     rows: list[list[float]]
@@ -41,7 +41,7 @@ class ImporterReply:
 
 
 def serve(run_request: Callable[[ImporterRequest], ImporterReply]) -> None:
-    """Answer the requests on standard input, a line each; what a tool prints goes to standard error."""
+    """Execute the requests on standard input; redirect output of the tool to standard error."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     for line in sys.stdin:

@@ -1,4 +1,4 @@
-"""The importer table: importers by checks by FMUs."""
+"""Runs the checks of all importers, and formats the table."""
 
 from collections.abc import Callable
 from contextlib import closing
@@ -19,9 +19,9 @@ from .checks import (
     IMPORTERS,
     NOT_RUN,
     CheckFailedError,
+    CheckFunction,
     FmuUnderTest,
     Importer,
-    Judge,
     UnsuitableFmuError,
     describe_fmu,
     prepare,
@@ -36,7 +36,7 @@ FOLDER, FILES = "importers", ("importers.csv",)
 
 @dataclass(frozen=True)
 class CheckResult:
-    """One check of one importer: what each FMU gave, and what went wrong; `reason` where it was not asked."""
+    """One check of one importer: a cell per FMU, failures, or the `reason` why it was skipped."""
 
     importer: str
     check: str
@@ -46,43 +46,43 @@ class CheckResult:
     fmus: tuple[str, ...] = ()
 
 
-def run_importer_checks(fmus: Path, out: Path, report: Callable[[str, float], None]) -> list[CheckResult]:
-    """Ask about the FMUs in a folder, and write the rows to out/importers/importers.csv."""
-    with replace_folder(out / FOLDER, FILES, describe_sources(str(fmus))) as folder:
-        found = run_checks(fmus, report)
-        save(found, folder / FILES[0])
-        files = [fmus / f"{name}.fmu" for name in fmu_names(found)]
+def run_importer_checks(find_fmus: Path, out: Path, report: Callable[[str, float], None]) -> list[CheckResult]:
+    """Check the FMUs in a folder, and write the results to out/importers/importers.csv."""
+    with replace_folder(out / FOLDER, FILES, describe_sources(str(find_fmus))) as folder:
+        results = run_checks(find_fmus, report)
+        save(results, folder / FILES[0])
+        files = [find_fmus / f"{name}.fmu" for name in fmu_names(results)]
         write_provenance(
             folder,
             files,
             prefix_parameters({file.stem: declared_parameters(file) for file in files}),
-            source=describe_sources(str(fmus)),
+            source=describe_sources(str(find_fmus)),
         )
-    return found
+    return results
 
 
 def run_checks(folder: Path, report: Callable[[str, float], None]) -> list[CheckResult]:
-    """Ask every importer everything about the FMUs in a folder; `report` is told the importer and the share done."""
+    """Run all checks of all importers for the FMUs in a folder."""
     subjects: list[FmuUnderTest] = []
-    found: list[CheckResult] = []
-    for fmu in fmus(folder):
+    results: list[CheckResult] = []
+    for fmu in find_fmus(folder):
         try:
             subjects.append(describe_fmu(fmu))
         except UnsuitableFmuError as unfit:
-            found.append(CheckResult(fmu.name, "", reason=str(unfit)))
+            results.append(CheckResult(fmu.name, "", reason=str(unfit)))
     if not subjects:
-        raise HarnessError(f"no FMU in {folder} is asked about: {found[0].reason}; name another folder")
+        raise HarnessError(f"no FMU in {folder} can be checked: {results[0].reason}; give another folder")
     names = tuple(subject.fmu.stem for subject in subjects)
     reasons = [unavailable_reason(importer, subjects[0].fmu) for importer in IMPORTERS]
-    present = [importer for importer, reason in zip(IMPORTERS, reasons, strict=True) if not reason]
-    # fmpy first, whose answers the others are set beside
-    with closing(map_in_threads(WORKERS, partial(ask, subjects), present)) as asked:
+    available = [importer for importer, reason in zip(IMPORTERS, reasons, strict=True) if not reason]
+    # fmpy first: it is the reference
+    with closing(map_in_threads(WORKERS, partial(run_all_requests, subjects), available)) as progress_iterator:
         for importer, reason in zip(IMPORTERS, reasons, strict=True):
             if reason:
-                found.append(CheckResult(importer.name, "", reason=reason))
+                results.append(CheckResult(importer.name, "", reason=reason))
                 continue
             report(importer.name, 0.0)
-            next(asked)
+            next(progress_iterator)
             columns = [judge_fmu(importer, subject) for subject in subjects]
             report(importer.name, 1.0)
             name = name_with_version(importer, subjects[0].base_request)
@@ -90,73 +90,77 @@ def run_checks(folder: Path, report: Callable[[str, float], None]) -> list[Check
                 failed = tuple(
                     f"{m}: {check_cell}" for m, check_cell in zip(names, cells, strict=True) if "FAILED" in check_cell
                 )
-                found.append(CheckResult(name, check, tuple(cells), failed, fmus=names))
-    return found + [CheckResult(name, "", reason=reason) for name, reason in NOT_RUN.items()]
+                results.append(CheckResult(name, check, tuple(cells), failed, fmus=names))
+    return results + [CheckResult(name, "", reason=reason) for name, reason in NOT_RUN.items()]
 
 
 def name_with_version(importer: Importer, request: ImporterRequest) -> str:
-    """Its name, and its version if it lives to tell it."""
+    """Return the name of the importer with its version, if known."""
     try:
         return f"{importer.name} {run_request(importer, request).reply.version}"
     except CheckFailedError:
         return importer.name
 
 
-def fmus(folder: Path) -> list[Path]:
-    """The FMUs of a folder, by name."""
-    found = sorted(folder.glob("*.fmu"))
-    if not found:
-        raise HarnessError(f"there is no FMU in {folder}: build them with `python build_fmus.py`, or name another one")
-    return found
+def find_fmus(folder: Path) -> list[Path]:
+    """Return the FMUs of a folder, sorted by name."""
+    files = sorted(folder.glob("*.fmu"))
+    if not files:
+        raise HarnessError(
+            f"there is no FMU in {folder}: build them with `python build_fmus.py`, or give another folder"
+        )
+    return files
 
 
-def ask(subjects: list[FmuUnderTest], importer: Importer) -> None:
-    """Ask an importer all that is judged: one process about all FMUs, in C one about each."""
-    asked = [[request(subject) for _, request in CHECKS.values()] for subject in subjects]
-    if importer.adapter != "c_adapter":  # one life, of which fmpy's is what those in C are set beside
-        asked = [[replace(request, reset_cycles=0) for requests in asked for request in requests]]
-    for requests in asked:
+def run_all_requests(subjects: list[FmuUnderTest], importer: Importer) -> None:
+    """Run all requests of an importer: one process for all FMUs, or one per FMU in C."""
+    requests_by_fmu = [[request(subject) for _, request in CHECKS.values()] for subject in subjects]
+    if importer.adapter != "c_adapter":  # without reset cycles; fmpy's run is the reference for C
+        requests_by_fmu = [[replace(request, reset_cycles=0) for requests in requests_by_fmu for request in requests]]
+    for requests in requests_by_fmu:
         prepare(importer, requests)
 
 
 def judge_fmu(importer: Importer, subject: FmuUnderTest) -> list[str]:
-    """What every check gives."""
+    """Return the cell of every check."""
     return [check_cell(judge, importer, request(subject)) for judge, request in CHECKS.values()]
 
 
-def check_cell(judge: Judge, importer: Importer, request: ImporterRequest) -> str:
-    """What one gives."""
+def check_cell(judge: CheckFunction, importer: Importer, request: ImporterRequest) -> str:
+    """Return the cell of one check."""
     try:
         return judge(importer, request)
     except CheckFailedError as wrong:
         return f"FAILED: {wrong}"
 
 
-def importer_table(found: list[CheckResult]) -> Table:
-    """The rows for reading."""
-    shown = Table("importer", "check", *fmu_names(found), box=None)
+def importer_table(results: list[CheckResult]) -> Table:
+    """Return the table of results."""
+    result_table = Table("importer", "check", *fmu_names(results), box=None)
     last = ""
-    for row in found:
+    for row in results:
         if row.check:
-            shown.add_row(row.importer if row.importer != last else "", row.check, *row.cells)
+            result_table.add_row(row.importer if row.importer != last else "", row.check, *row.cells)
             last = row.importer
-    return shown
+    return result_table
 
 
-def legend_lines(found: list[CheckResult]) -> list[str]:
-    """What the words in the table mean, and which tools were not asked."""
-    words = "numbers: largest difference from fmpy; told: in one sentence, then NaN; reset recovers, or the tool ends"
-    return [words, *(f"{row.importer} was not asked: {row.reason}" for row in found if row.reason)]
+def legend_lines(results: list[CheckResult]) -> list[str]:
+    """Return the legend of the table, and the skipped tools."""
+    legend = (
+        "number: largest difference from fmpy; message: one error message, then NaN, reset recovers (or the tool exits)"
+    )
+    return [legend, *(f"{row.importer} was skipped: {row.reason}" for row in results if row.reason)]
 
 
-def fmu_names(found: list[CheckResult]) -> tuple[str, ...]:
-    """The names of the FMUs."""
-    return next((row.fmus for row in found if row.fmus), ())
+def fmu_names(results: list[CheckResult]) -> tuple[str, ...]:
+    """Return the names of the FMUs."""
+    return next((row.fmus for row in results if row.fmus), ())
 
 
-def save(found: list[CheckResult], path: Path) -> None:
-    """Write the rows as CSV."""
-    names = fmu_names(found)
-    nothing = ("",) * len(names)
-    rows = ((row.importer, row.check or f"not asked: {row.reason}", *(row.cells or nothing)) for row in found)
+def save(results: list[CheckResult], path: Path) -> None:
+    """Write the results as CSV."""
+    names = fmu_names(results)
+    empty_cells = ("",) * len(names)
+    rows = ((row.importer, row.check or f"skipped: {row.reason}", *(row.cells or empty_cells)) for row in results)
     write_csv_rows(path, ["importer", "check", *names], rows)

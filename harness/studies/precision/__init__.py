@@ -1,1 +1,1 @@
-"""What accuracy costs: work-precision, model error, external anchors."""
+"""Work-precision studies, errors of friction laws, and problems from the literature."""

@@ -1,4 +1,4 @@
-"""Work-precision figures: run time and right-hand sides over the error, for every solver of a model."""
+"""Work-precision figures: run time and right-hand side evaluations over the error, for every solver."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,56 +20,58 @@ TOOLS: dict[str, dict[str, Any]] = {
     "scipy": {"linestyle": "--", "marker": "s", "markersize": 4, "fillstyle": "none"},
     "cvode": {"linestyle": "--", "marker": "^", "markersize": 5, "fillstyle": "none"},
 }
-COSTS = {"seconds": "run time [s]", "evaluations": "right-hand sides and Jacobians"}
+COSTS = {"seconds": "run time [s]", "evaluations": "right-hand side and Jacobian evaluations"}
 CHATTERING: dict[str, Any] = {"linestyle": "-", "marker": "x", "markersize": 4, "linewidth": 0.7}
-FILL = {FMU: "full"}  # of the star that stands for a closed form
+FILL = {FMU: "full"}  # of the star marker for a closed form
 LEGEND = (
-    "FMU: its own code in this process; fmpy: the FMU through fmpy\n"
-    "FMI 3.0 through fmpy: co-simulation (CS) with the FMU's defaults, model exchange (ME) by fmpy's CVode"
+    "FMU: code of the FMU in this process; fmpy: FMU through fmpy\n"
+    "FMI 3.0 through fmpy: co-simulation (CS) with default settings, model exchange (ME) with fmpy's CVode"
 )
-FLOOR = 2.0**-53  # errors below what a double can tell are drawn there
+FLOOR = 2.0**-53  # smaller errors are drawn at this value
 
 
 def draw(study: Study, laws: Sequence[LawDeviation], path: Path) -> None:
-    """Save the figure of a study: run time and right-hand sides over the error, a row for each law.
+    """Save the figure of a study, with one row per law.
 
-    Laws that chatter are drawn in the row of true stick and slip, by their error beside that.
+    Laws that chatter are drawn in the first row, with their error against true stick and slip.
     """
     cases = [case for case in study.cases if not case.is_chattering]
     shortcuts = [case for case in study.cases if case.is_chattering]
     with open_figure(path, 2 * WIDTH + 1.5, 0.8 + 3.6 * len(cases)) as figure:
-        figure.suptitle(f"{study.model}: what accuracy costs\n{LEGEND}", fontsize=11)
+        figure.suptitle(f"{study.model}: work-precision\n{LEGEND}", fontsize=11)
         panels = figure.subplots(len(cases), 2, squeeze=False, sharex=True, sharey="col")
         for case, row in zip(cases, panels, strict=True):
-            drawn = [case, *(shortcuts if case is cases[0] else [])]
+            row_cases = [case, *(shortcuts if case is cases[0] else [])]
             for axes, (cost, name) in zip(row, COSTS.items(), strict=True):
-                for each in drawn:
-                    curves(axes, study, each, cost)
+                for row_case in row_cases:
+                    plot_curves(axes, study, row_case, cost)
                 for law in laws:
-                    if law.largest and law.case in [each.name for each in drawn]:
-                        axes.axvline(law.largest, color=GREY, linestyle="-.", label="error of the law itself")
+                    if law.largest and law.case in [row_case.name for row_case in row_cases]:
+                        axes.axvline(law.largest, color=GREY, linestyle="-.", label="error of the law")
                 axes.set_title(case.law)
                 axes.set_ylabel(name)
                 axes.tick_params(labelbottom=True)
         for axes in panels[-1]:
-            axes.set_xlabel("largest error, relative to the largest of the motion")
+            axes.set_xlabel("largest error, relative to the largest value")
         lines = {line.get_label(): line for axes in panels.flat for line in axes.lines}
         figure.legend(lines.values(), lines.keys(), loc="outside right upper")
 
 
-def curves(axes: Axes, study: Study, case: ReferenceCase, cost: str) -> None:
-    """Every solver of a case, log-log; a failed run is a gap."""
+def plot_curves(axes: Axes, study: Study, case: ReferenceCase, cost: str) -> None:
+    """Plot every solver of a case, log-log; failed runs are gaps."""
     for tool, method in study.solvers(case):
-        same = tool in (FMPY, CS) and (cost != "seconds" or case.is_chattering)  # the same right-hand sides
-        if same or not study.curve(case, tool, method):
+        is_duplicate = tool in (FMPY, CS) and (
+            cost != "seconds" or case.is_chattering
+        )  # the same number of evaluations
+        if is_duplicate or not study.curve(case, tool, method):
             continue
-        mine = [p for p in study.points if (p.case, p.tool, p.method) == (case.name, tool, method)]
+        points = [p for p in study.points if (p.case, p.tool, p.method) == (case.name, tool, method)]
         errors = [
-            max(p.beside_dry if case.is_chattering and p.beside_dry is not None else p.largest, FLOOR) for p in mine
+            max(p.beside_dry if case.is_chattering and p.beside_dry is not None else p.largest, FLOOR) for p in points
         ]
         style = CHATTERING if case.is_chattering else TOOLS[tool]
         text = f"{method}, law '{case.law}'" if case.is_chattering else f"{tool}: {method}"
         star = {"markersize": 9, "marker": "*", "fillstyle": FILL.get(tool, "none")}
         shape = {**style, **(star if method == "exact" and tool != CS else {})}
-        costs = [np.nan if p.failure else getattr(p, cost) for p in mine]
+        costs = [np.nan if p.failure else getattr(p, cost) for p in points]
         axes.loglog(errors, costs, color=METHOD_COLOURS.get(method, GREY), label=text, **shape)

@@ -1,9 +1,9 @@
-"""Work-precision: what accuracy costs, in run time and in right-hand sides, for every method, law and peer.
+"""Work-precision studies: run time and right-hand side evaluations over the error, for every method, law and peer.
 
-As in the SciML benchmarks: the relative and the absolute tolerance are swept together, the time is the best of
-several runs after a warm-up, and a run that failed is a gap.  Every solver answers at the same common points.
-Errors are relative to the largest of the motion (see reference.py).  Integration error is that against the true
-solution of the run's own law; `beside_dry` is the whole error, that of the law included.
+As in the SciML benchmarks, relative and absolute tolerance are varied together, the run time is the best of several
+runs after a warm-up, and a failed run is a gap.  All solvers are evaluated at the same times.  Errors are relative to
+the largest value of the motion.  The integration error refers to the exact solution for the friction law of the run;
+`beside_dry` is the total error against dry friction, which includes the error of the law.
 """
 
 from collections.abc import Callable, Iterator
@@ -30,17 +30,28 @@ from ...running.solution import Solution
 from ...running.timing import time_call
 from ...scenes.fmu_files import find_fmu
 
-MAX_REPEATS = 20  # timed runs of one point
+MAX_REPEATS = 20  # maximum number of timed runs per point
 
-FMU, FMPY = "FMU", "fmpy"  # the FMU's own code in this process; the FMU through fmpy
-CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # the FMI 3.0 FMU through fmpy, in co-simulation and in model exchange
+FMU, FMPY = "FMU", "fmpy"  # code of the FMU in this process; FMU through fmpy
+CS, ME = "FMI 3.0 CS", "FMI 3.0 ME"  # FMI 3.0 FMU through fmpy: co-simulation, model exchange
 FMI3_INTERFACES = {CS: fmi3.CO_SIMULATION, ME: fmi3.MODEL_EXCHANGE}
 
 
 @dataclass(frozen=True)
 class SweepSettings:
-    """How far a sweep goes: `timeout` in s is for one run, and where one takes longer tighter ones are not tried;
-    `budget` in s is for the timed runs of one point; solvers are told apart by run times that differ `clear` times."""
+    """Extent of a study.
+
+    Attributes
+    ----------
+    tolerances
+        Relative tolerances, from loose to tight.
+    timeout
+        Time limit of a run in s; after a slower one, tighter tolerances are skipped.
+    budget
+        Time in s for the repeated runs of one point.
+    min_ratio
+        Ratio of run times from which solvers are distinguished.
+    """
 
     tolerances: tuple[float, ...]
     timeout: float
@@ -54,9 +65,25 @@ QUICK = SweepSettings((1e-3, 1e-6, 1e-9), 0.1, 0.005, min_ratio=1.5)
 
 @dataclass(frozen=True)
 class Point:
-    """One solver at one tolerance (rtol NaN for a closed form; either NaN for the FMU's own choice): run time in s,
-    right-hand sides and Jacobians, errors as in reference.Errors, the largest error beside dry friction; or the
-    failure, and no numbers."""
+    """One solver at one tolerance.
+
+    Attributes
+    ----------
+    case, tool, method
+        Case and solver.
+    rtol, atol
+        Tolerances; NaN for a closed form or for those of the FMU.
+    seconds
+        Run time in s.
+    evaluations
+        Number of right-hand side and Jacobian evaluations.
+    final, rms, largest, events
+        Errors as in reference.Errors.
+    beside_dry
+        Largest error against dry friction.
+    failure
+        Error message of a failed run.
+    """
 
     case: str
     tool: str
@@ -75,9 +102,21 @@ class Point:
 
 @dataclass(frozen=True)
 class SolverJob:
-    """How one solver is asked: `run(rtol, extent)` gives its answer and the run time in s, None if there is nothing
-    to ask.  `absolute` is atol as a share of rtol, NaN for the FMU's own choice; to fail is an error where `must` is
-    set, else a gap.  Where it is not `swept` it is asked once, with rtol 0."""
+    """Runs of one solver.
+
+    Attributes
+    ----------
+    tool, method
+        Solver.
+    absolute
+        Ratio of atol to rtol; NaN for that of the FMU.
+    run
+        Function of rtol and settings; returns the solution and the run time in s, or None to skip.
+    must_succeed
+        Whether a failed run is an error; otherwise it is a gap.
+    is_swept
+        Whether the tolerance varies; otherwise there is one run with rtol 0.
+    """
 
     tool: str
     method: str
@@ -89,61 +128,57 @@ class SolverJob:
 
 @dataclass(frozen=True)
 class Study:
-    """All points of one model, its cases in order."""
+    """All points of one model."""
 
     model: str
     cases: tuple[ReferenceCase, ...]
     points: tuple[Point, ...]
 
     def curve(self, case: ReferenceCase, tool: str, method: str) -> list[Point]:
-        """The points of one solver that did not fail, in the order of the sweep."""
-        mine = (case.name, tool, method)
-        return [p for p in self.points if (p.case, p.tool, p.method) == mine and not p.failure]
+        """Return the successful points of one solver, in the order of tolerances."""
+        key = (case.name, tool, method)
+        return [p for p in self.points if (p.case, p.tool, p.method) == key and not p.failure]
 
     def solvers(self, case: ReferenceCase) -> list[tuple[str, str]]:
-        """Tool and method of every curve of a case, in order."""
+        """Return tool and method of every solver of a case."""
         return list(dict.fromkeys((point.tool, point.method) for point in self.points if point.case == case.name))
 
     def exchange_errors(self) -> dict[float, dict[str, float]]:
-        """By relative tolerance, the largest error of every case in model exchange, NaN where that failed; nothing
-        where the FMI 3.0 FMU is not built."""
-        found: dict[float, dict[str, float]] = {}
+        """Return the largest error of every case in model exchange by rtol; NaN for failed runs, empty without FMU."""
+        errors_by_rtol: dict[float, dict[str, float]] = {}
         for point in self.points:
             if point.tool == ME and not isnan(point.rtol):
-                found.setdefault(point.rtol, {})[point.case] = point.largest
-        return found
+                errors_by_rtol.setdefault(point.rtol, {})[point.case] = point.largest
+        return errors_by_rtol
 
 
-def study_model(model: str, extent: SweepSettings, report: Callable[[float], None]) -> Study:
-    """Sweep every case of a model, of ours by its name or of anybody by the path of its file; told how far it is as a
-    share."""
+def study_model(model: str, settings: SweepSettings, report: Callable[[float], None]) -> Study:
+    """Run the study of a model, given by name or by the path of its file; `report` receives the fraction done."""
     file = find_fmu(model)
-    carried = load_model_class(file)
-    cases = tuple(case for case in CASES if case.model == model) or (default_case(model, file, carried),)
-    work = [(case, job) for case in cases for job in solver_jobs(case, carried, file)]
+    model_class = load_model_class(file)
+    cases = tuple(case for case in CASES if case.model == model) or (default_case(model, file, model_class),)
+    tasks = [(case, job) for case in cases for job in solver_jobs(case, model_class, file)]
     points: list[Point] = []
-    for done, (case, job) in enumerate(work):
-        points += sweep_tolerances(case, job, extent)
-        report((done + 1) / len(work))
+    for index, (case, job) in enumerate(tasks):
+        points += sweep_tolerances(case, job, settings)
+        report((index + 1) / len(tasks))
     return Study(file.stem, cases, tuple(points))
 
 
-def default_case(model: str, file: Path, carried: Any) -> ReferenceCase:
-    """The default run of a model that nobody has written a second time: its certified result lies beside the file, or
-    two methods agree about it."""
-    beside = file.with_suffix(".csv").is_file()
-    truth = load_reference(file.stem, file.parent) if beside else certify_default_run(carried, file)
-    law, outputs = "default run", tuple(carried.states)
+def default_case(model: str, file: Path, model_class: Any) -> ReferenceCase:
+    """Return the default run of a user model, with its certified result or the solution on which two methods agree."""
+    has_reference = file.with_suffix(".csv").is_file()
+    truth = load_reference(file.stem, file.parent) if has_reference else certify_default_run(model_class, file)
+    law, outputs = "default run", tuple(model_class.states)
     return ReferenceCase(file.stem, model, law, truth, UnspecifiedProblem(float(truth.times[-1])), outputs=outputs)
 
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """The ways to ask about a case: the model that its FMU carries, that FMU in a file, its sibling, and peers.  Each
-    takes rtol and an extent, and gives the answer with the run time in s."""
+    """Runs a case in different ways; each takes rtol and settings, and returns the solution and the run time in s."""
 
     case: ReferenceCase
-    carried: Any
+    model_class: Any
     file: Path
 
     @property
@@ -151,58 +186,60 @@ class CaseRunner:
         return self.case.reference.times
 
     def run_inside(
-        self, method: str, taken: dict[float, float], rtol: float, extent: SweepSettings
+        self, method: str, run_times: dict[float, float], rtol: float, settings: SweepSettings
     ) -> tuple[Solution, float]:
-        """The FMU's own code, in this process."""
-        run, times = EmbeddedModel.create(self.carried, self.case.values, method, rtol), self.times.tolist()
-        answer = run.solve(times, extent.timeout)
-        taken[rtol] = best_time(partial(run.compute_states, times), extent.budget)
-        return answer, taken[rtol]
+        """Run the code of the FMU in this process."""
+        run, times = EmbeddedModel.create(self.model_class, self.case.values, method, rtol), self.times.tolist()
+        answer = run.solve(times, settings.timeout)
+        run_times[rtol] = best_time(partial(run.compute_states, times), settings.budget)
+        return answer, run_times[rtol]
 
     def run_through_fmpy(
-        self, method: str, taken: dict[float, float], rtol: float, extent: SweepSettings
+        self, method: str, run_times: dict[float, float], rtol: float, settings: SweepSettings
     ) -> tuple[Solution, float] | None:
-        """The FMU through fmpy, states recorded; only where it did not fail without fmpy, then it must not."""
-        if rtol not in taken:
+        """Run the FMU through fmpy, if the run in this process succeeded."""
+        if rtol not in run_times:
             return None
         outputs, tolerance = self.case.outputs, {"solver.rtol": rtol} if rtol else {}
         values: dict[str, float | str] = {**self.case.values, **tolerance, "solver.method": method}
-        grid, repeat = float(self.times[1]), repeats(taken[rtol], extent.budget)
+        grid, repeat = float(self.times[1]), repeats(run_times[rtol], settings.budget)
         run = simulate(RunSpec(self.file, outputs, values, grid=grid, follow=False, repeat=repeat))
-        assert run.statistics  # ours tell it
+        assert run.statistics  # FMUs of this project report it
         columns = np.column_stack([run.columns[name] for name in outputs])
         return Solution(columns, None, run.statistics.evaluations), run.statistics.seconds
 
-    def run_fmi3(self, tool: str, rtol: float, extent: SweepSettings) -> tuple[Solution, float]:
-        """The FMI 3.0 FMU through fmpy, states recorded, and in model exchange every change of mode; the run time is
-        that of fmpy's simulate_fmu on a live instance.  In co-simulation the FMU never hears of the tolerance."""
-        outputs, stop, step = self.case.outputs, float(self.times[-1]), float(self.times[1])
-        marks = tuple(self.carried.contacts) if tool == ME and self.case.reference.modes else ()
-        with fmi3.open_fmi3_instance(fmi3.fmi3_path(self.file), FMI3_INTERFACES[tool]) as fmu:
-            run = partial(fmu.simulate, self.case.values, outputs + marks, stop, step, rtol or None)
-            found = run(extent.timeout)
-            seconds = best_time(run, extent.budget)
-        events = found.find_changes(*marks) if marks else None
-        return Solution(found.sample_at(self.times, outputs), events, found.evaluations), seconds
+    def run_fmi3(self, tool: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:
+        """Run the FMI 3.0 FMU with fmpy's simulate_fmu on an open instance.
 
-    def run_peer(self, peer: str, method: str, rtol: float, extent: SweepSettings) -> tuple[Solution, float]:
-        """Somebody else's solver."""
+        In model exchange, changes of mode are recorded.  In co-simulation the tolerance is not passed on.
+        """
+        outputs, stop, step = self.case.outputs, float(self.times[-1]), float(self.times[1])
+        mode_names = tuple(self.model_class.contacts) if tool == ME and self.case.reference.modes else ()
+        with fmi3.open_fmi3_instance(fmi3.fmi3_path(self.file), FMI3_INTERFACES[tool]) as fmu:
+            run = partial(fmu.simulate, self.case.values, outputs + mode_names, stop, step, rtol or None)
+            recording = run(settings.timeout)
+            seconds = best_time(run, settings.budget)
+        events = recording.find_changes(*mode_names) if mode_names else None
+        return Solution(recording.sample_at(self.times, outputs), events, recording.evaluations), seconds
+
+    def run_peer(self, peer: str, method: str, rtol: float, settings: SweepSettings) -> tuple[Solution, float]:
+        """Run a peer solver."""
         problem = self.case.problem
         ask = partial(peer_solvers.solve, peer, method, problem, self.times, rtol, problem.atol_factor * rtol)
-        return ask(peer_solvers.limit_run_time(extent.timeout)), best_time(ask, extent.budget)
+        return ask(peer_solvers.limit_run_time(settings.timeout)), best_time(ask, settings.budget)
 
 
-def solver_jobs(case: ReferenceCase, carried: Any, file: Path) -> Iterator[SolverJob]:
-    """Every solver that is asked about a case."""
-    ask, absolute = CaseRunner(case, carried, file), case.problem.atol_factor
-    for method in method_numbers(carried):
+def solver_jobs(case: ReferenceCase, model_class: Any, file: Path) -> Iterator[SolverJob]:
+    """Yield the runs of every solver for a case."""
+    ask, absolute = CaseRunner(case, model_class, file), case.problem.atol_factor
+    for method in method_numbers(model_class):
         if not (method == "exact" and case.is_chattering):
-            taken: dict[float, float] = {}  # run time in s by rtol, from the first of the two for the second
+            run_times: dict[float, float] = {}  # run times in s by rtol, passed from the first job to the second
             is_swept = method != "exact"
-            yield SolverJob(FMU, method, nan, partial(ask.run_inside, method, taken), is_swept=is_swept)
-            yield SolverJob(FMPY, method, nan, partial(ask.run_through_fmpy, method, taken), True, is_swept)
+            yield SolverJob(FMU, method, nan, partial(ask.run_inside, method, run_times), is_swept=is_swept)
+            yield SolverJob(FMPY, method, nan, partial(ask.run_through_fmpy, method, run_times), True, is_swept)
     if not case.is_chattering:
-        usual = {number: name for name, number in method_numbers(carried).items()}[carried().solver.method]
+        usual = {number: name for name, number in method_numbers(model_class).items()}[model_class().solver.method]
         for tool, method, is_swept in ((CS, usual, False), (ME, "fmpy's CVode", fmi3.fmi3_path(file).is_file())):
             yield SolverJob(tool, method, nan, partial(ask.run_fmi3, tool), is_swept=is_swept)
         absent = (
@@ -216,39 +253,42 @@ def solver_jobs(case: ReferenceCase, carried: Any, file: Path) -> Iterator[Solve
                 yield SolverJob(peer, method, absolute, partial(ask.run_peer, peer, method))
 
 
-def sweep_tolerances(case: ReferenceCase, job: SolverJob, extent: SweepSettings) -> Iterator[Point]:
-    """One solver over all tolerances, from loose to tight."""
-    truth, dry = case.reference, load_reference(case.dry_friction_reference) if case.dry_friction_reference else None
-    given_up = ""
-    for rtol in extent.tolerances if job.is_swept else (nan,):
+def sweep_tolerances(case: ReferenceCase, job: SolverJob, settings: SweepSettings) -> Iterator[Point]:
+    """Run one solver for all tolerances, from loose to tight."""
+    reference, dry = (
+        case.reference,
+        load_reference(case.dry_friction_reference) if case.dry_friction_reference else None,
+    )
+    skip_reason = ""
+    for rtol in settings.tolerances if job.is_swept else (nan,):
         point = partial(Point, case.name, job.tool, job.method, rtol, job.absolute * rtol)
-        if given_up:
-            yield point(failure=f"not tried: {given_up}")
+        if skip_reason:
+            yield point(failure=f"skipped: {skip_reason}")
             continue
-        begun = perf_counter()
+        start = perf_counter()
         try:
-            found = job.run(0.0 if isnan(rtol) else rtol, extent)
+            result = job.run(0.0 if isnan(rtol) else rtol, settings)
         except HarnessError as error:
             if job.must_succeed:
                 raise
-            if perf_counter() - begun > 0.5 * extent.timeout:
-                given_up = f"at rtol {rtol:g} it was only {error}"
+            if perf_counter() - start > 0.5 * settings.timeout:
+                skip_reason = f"at rtol {rtol:g} the run stopped {error}"
             yield point(failure=str(error))
             continue
-        if not found:
+        if not result:
             continue
-        answer, seconds = found
-        beside_dry = compute_errors(answer, dry).largest if dry else None
-        yield point(seconds, answer.evaluations, **vars(compute_errors(answer, truth)), beside_dry=beside_dry)
+        solution, seconds = result
+        beside_dry = compute_errors(solution, dry).largest if dry else None
+        yield point(seconds, solution.evaluations, **vars(compute_errors(solution, reference)), beside_dry=beside_dry)
 
 
 def best_time(call: Callable[[], object], budget: float) -> float:
-    """The time of the fastest of several calls, in s."""
-    found = [time_call(call)]
-    found += [time_call(call) for _ in range(repeats(found[0], budget) - 1)]
-    return min(found)
+    """Return the time in s of the fastest of several calls."""
+    times = [time_call(call)]
+    times += [time_call(call) for _ in range(repeats(times[0], budget) - 1)]
+    return min(times)
 
 
 def repeats(once: float, budget: float) -> int:
-    """How often to run what takes `once` s within the budget in s."""
+    """Return how often a call of `once` s is repeated within a budget in s."""
     return 1 if once > 4 * budget else max(2, min(MAX_REPEATS, int(budget / once)))

@@ -1,4 +1,4 @@
-"""The work-precision job: studies of the models asked for, the laws beside dry friction, the anchors, the results."""
+"""Runs work-precision studies, law deviations and literature problems, and writes the results."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
@@ -20,8 +20,8 @@ from .advice import recommend
 from .study import QUICK, Point, Study, SweepSettings, study_model
 
 FOLDER = "precision"
-QUICK_RUN = "a quick run"  # which takes no other's place
-UNITS = {  # of the columns that have one; SI stands for m and m/s, or rad and rad/s
+QUICK_RUN = "a quick run"  # does not replace a full run
+UNITS = {  # of columns; SI means m and m/s, or rad and rad/s
     **dict.fromkeys(("rtol", "final", "rms", "largest", "beside_dry", "asymmetry"), "1"),
     **dict.fromkeys(("seconds", "events", "period"), "s"),
     **dict.fromkeys(("atol", "error"), "SI"),
@@ -33,7 +33,7 @@ FILE_SUFFIXES = (".csv", ".json", ".svg", ".png", ".txt", "-exchange.csv", "-law
 
 @dataclass(frozen=True)
 class PrecisionSurvey:
-    """All that was found; what to use, in a sentence for each study; and what is missing, a sentence each."""
+    """All results, with one recommendation per study, and messages on missing results."""
 
     studies: tuple[Study, ...]
     deviations: tuple[law_deviations.LawDeviation, ...]
@@ -45,80 +45,94 @@ class PrecisionSurvey:
 def run_survey(
     models: Sequence[str], extent: SweepSettings, out: Path, report: Callable[[str, float], None]
 ) -> PrecisionSurvey:
-    """Study the models and write results to out/precision; what is there on other models stays."""
+    """Study the models and write the results to out/precision; results of other models are kept."""
     files = list(map(find_fmu, models))
     for file in files:
         check_built(file)
         if extent == QUICK:
             check_same_source(out / FOLDER, QUICK_RUN, f"{file.stem}.json")
-    kept = [path.name for path in (out / FOLDER).glob("*") if path.name.endswith(FILE_SUFFIXES)]
-    with replace_folder(out / FOLDER, ["anchors.csv", *kept]) as folder:
+    existing = [path.name for path in (out / FOLDER).glob("*") if path.name.endswith(FILE_SUFFIXES)]
+    with replace_folder(out / FOLDER, ["anchors.csv", *existing]) as folder:
         if (out / FOLDER).exists():
-            stale = ignore_patterns(*(f"{file.stem}[.-]*" for file in files))
-            copytree(out / FOLDER, folder, ignore=stale, dirs_exist_ok=True)
-        found = run_studies(models, extent, report)
-        write_results(found, files, folder, QUICK_RUN if extent == QUICK else "")
-    return found
+            replaced_files = ignore_patterns(*(f"{file.stem}[.-]*" for file in files))
+            copytree(out / FOLDER, folder, ignore=replaced_files, dirs_exist_ok=True)
+        survey_result = run_studies(models, extent, report)
+        write_results(survey_result, files, folder, QUICK_RUN if extent == QUICK else "")
+    return survey_result
 
 
 def run_studies(models: Iterable[str], extent: SweepSettings, report: Callable[[str, float], None]) -> PrecisionSurvey:
-    """Run everything."""
+    """Run all studies."""
     studies = tuple(study_model(model, extent, partial(report, model)) for model in models)
-    carried = {model: load_model_class(find_fmu(model)) for model in models}
-    told = [
-        law_deviations.compare_with_dry_friction(case, carried[case.model])
+    classes = {model: load_model_class(find_fmu(model)) for model in models}
+    deviations = [
+        law_deviations.compare_with_dry_friction(case, classes[case.model])
         for case in CASES
         if case.dry_friction_reference and case.model in models
     ]
     report("anchors", 0.0)
-    rows = tuple(literature_problems.solve_all()) if told or any(case.model in models for case in CASES) else ()
-    said = tuple(
-        recommend(each, [law for law in told if law.model == each.model], extent.min_ratio) for each in studies
+    literature = (
+        tuple(literature_problems.solve_all()) if deviations or any(case.model in models for case in CASES) else ()
     )
-    absent = (f"{peer} is left out: pip install {package}" for peer, package in missing_packages().items())
+    advice = tuple(
+        recommend(item, [law for law in deviations if law.model == item.model], extent.min_ratio) for item in studies
+    )
+    missing_peers = (f"{peer} was skipped: pip install {package}" for peer, package in missing_packages().items())
     return PrecisionSurvey(
-        studies, tuple(told), rows, said, (*map(count_failures, studies), *failure_reasons(studies), *absent)
+        studies,
+        tuple(deviations),
+        literature,
+        advice,
+        (*map(count_failures, studies), *failure_reasons(studies), *missing_peers),
     )
 
 
-def count_failures(found: Study) -> str:
-    """How many runs failed."""
-    failed = sum(bool(point.failure) for point in found.points)
-    return f"{found.model}: {failed} of {len(found.points)} runs are gaps; {found.model}.csv has the reasons"
+def count_failures(study: Study) -> str:
+    """Return a sentence on the number of failed runs."""
+    failed = sum(bool(point.failure) for point in study.points)
+    return f"{study.model}: {failed} of {len(study.points)} runs failed; see {study.model}.csv"
 
 
-def failure_reasons(found: Iterable[Study]) -> Iterable[str]:
-    """Why what is asked once has no answer."""
-    return dict.fromkeys(p.failure for study in found for p in study.points if p.failure and isnan(p.rtol))
+def failure_reasons(studies: Iterable[Study]) -> Iterable[str]:
+    """Return the error messages of failed runs without tolerance."""
+    return dict.fromkeys(p.failure for study in studies for p in study.points if p.failure and isnan(p.rtol))
 
 
-def write_results(found: PrecisionSurvey, files: Sequence[Path], folder: Path, source: str) -> None:
-    """Tables and figures of what was found about the FMUs in these files, and whether they come from a quick run."""
+def write_results(results: PrecisionSurvey, files: Sequence[Path], folder: Path, source: str) -> None:
+    """Write tables, figures and provenance for the FMUs in `files`."""
     from .figure import draw
 
-    for each, file, sentence in zip(found.studies, files, found.advice, strict=True):
-        values = {case.name: case.values for case in each.cases}
-        write_provenance(folder, [file], declared_parameters(file), values, f"{each.model}.json", source)
-        (folder / f"{each.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
-        save(folder / f"{each.model}.csv", heads(Point), map(astuple, each.points))
-        exchange_errors = each.exchange_errors()
+    for study, file, sentence in zip(results.studies, files, results.advice, strict=True):
+        values = {case.name: case.values for case in study.cases}
+        write_provenance(folder, [file], declared_parameters(file), values, f"{study.model}.json", source)
+        (folder / f"{study.model}.txt").write_text(f"{sentence}\n", encoding="utf-8")
+        write_table(folder / f"{study.model}.csv", csv_headings(Point), map(astuple, study.points))
+        exchange_errors = study.exchange_errors()
         if exchange_errors:
             cases = next(iter(exchange_errors.values()))
             rows = [[rtol, *errors.values()] for rtol, errors in exchange_errors.items()]
-            save(folder / f"{each.model}-exchange.csv", [EXCHANGE_HEADING, *(f"{case} [1]" for case in cases)], rows)
-        mine = [law for law in found.deviations if law.model == each.model]
-        draw(each, mine, folder / f"{each.model}.svg")
-        if mine:
-            save(folder / f"{each.model}-laws.csv", heads(law_deviations.LawDeviation), map(astuple, mine))
-    if found.literature:
-        save(folder / "anchors.csv", heads(literature_problems.LiteratureRun), map(astuple, found.literature))
+            write_table(
+                folder / f"{study.model}-exchange.csv", [EXCHANGE_HEADING, *(f"{case} [1]" for case in cases)], rows
+            )
+        model_deviations = [law for law in results.deviations if law.model == study.model]
+        draw(study, model_deviations, folder / f"{study.model}.svg")
+        if model_deviations:
+            write_table(
+                folder / f"{study.model}-laws.csv",
+                csv_headings(law_deviations.LawDeviation),
+                map(astuple, model_deviations),
+            )
+    if results.literature:
+        write_table(
+            folder / "anchors.csv", csv_headings(literature_problems.LiteratureRun), map(astuple, results.literature)
+        )
 
 
-def heads(kind: type) -> list[str]:
-    """The names of a record's fields, with the units that they are declared with."""
+def csv_headings(kind: type) -> list[str]:
+    """Return the field names of a dataclass with their units."""
     return [column_heading(field.name, UNITS.get(field.name, "")) for field in fields(kind)]
 
 
-def save(path: Path, heads: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """A CSV file; None and NaN are left empty."""
-    write_csv_rows(path, heads, ([None if value != value else value for value in row] for row in rows))
+def write_table(path: Path, csv_headings: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a CSV file; None and NaN are empty cells."""
+    write_csv_rows(path, csv_headings, ([None if value != value else value for value in row] for row in rows))

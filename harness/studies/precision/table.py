@@ -1,4 +1,4 @@
-"""Tables of the work-precision studies, the laws and the anchors."""
+"""Tables of work-precision studies, law deviations and literature problems."""
 
 from collections.abc import Iterable
 from math import isnan
@@ -14,8 +14,8 @@ from .study import Study
 
 
 def work_precision_table(study: Study) -> Table:
-    """Run time in ms, and calls of right-hand side and Jacobian, that every solver needs for an error."""
-    table = empty_table(f"{study.model}: ms and calls of the right-hand side that a largest error needs", "solver")
+    """Return the table of run time in ms and evaluations that every solver needs for a given error."""
+    table = empty_table(f"{study.model}: run time and right-hand side calls for a given largest error", "solver")
     for target in TARGETS:
         table.add_column(f"{format_power(target)}: ms", justify="right")
         table.add_column("calls", justify="right")
@@ -32,25 +32,25 @@ def work_precision_table(study: Study) -> Table:
 
 
 def exchange_table(studies: Iterable[Study]) -> Table:
-    """The largest error in model exchange at every relative tolerance."""
-    table = empty_table("FMI 3.0 model exchange by fmpy's CVode: largest error at each rtol", "rtol")
-    found: dict[float, dict[str, float]] = {}
+    """Return the table of largest errors in model exchange by relative tolerance."""
+    table = empty_table("FMI 3.0 model exchange with fmpy's CVode: largest error by rtol", "rtol")
+    errors_by_rtol: dict[float, dict[str, float]] = {}
     for study in studies:
         for rtol, errors in study.exchange_errors().items():
-            found.setdefault(rtol, {}).update(errors)
-    for case in next(iter(found.values()), {}):
+            errors_by_rtol.setdefault(rtol, {}).update(errors)
+    for case in next(iter(errors_by_rtol.values()), {}):
         table.add_column(case.replace("-", "\n"), justify="right")
-    for rtol, errors in found.items():
+    for rtol, errors in errors_by_rtol.items():
         table.add_row(format_power(rtol), *("-" if isnan(error) else format_power(error) for error in errors.values()))
     return table
 
 
-def deviation_table(found: Iterable[LawDeviation]) -> Table:
-    """The error of each law, integrated without error."""
-    table = empty_table("model error: each law beside true stick and slip", "law")
+def deviation_table(deviations: Iterable[LawDeviation]) -> Table:
+    """Return the table of law deviations."""
+    table = empty_table("model error of each law against true stick and slip", "law")
     for name in ("final", "rms", "largest", "creep [m/s]", "period [s]", "a+/a-"):
         table.add_column(name, justify="right")
-    for law in found:
+    for law in deviations:
         errors = ((law.final, ".2g"), (law.rms, ".2g"), (law.largest, ".2g"))
         figures = (*errors, (law.creep, ".2g"), (law.period, ".4f"), (law.asymmetry, ".3f"))
         table.add_row(law.case, *("" if value is None else f"{value:{how}}" for value, how in figures))
@@ -58,8 +58,8 @@ def deviation_table(found: Iterable[LawDeviation]) -> Table:
 
 
 def literature_table(rows: Iterable[LiteratureRun]) -> Table:
-    """The problems of other people."""
-    table = empty_table("external anchors: calls of the right-hand side, and error at the end", "solver")
+    """Return the table of literature problems."""
+    table = empty_table("problems from the literature: right-hand side calls and final error", "solver")
     table.add_column("method")
     for name in ("rtol", "calls", "error [SI]"):
         table.add_column(name, justify="right")
@@ -75,7 +75,7 @@ def literature_table(rows: Iterable[LiteratureRun]) -> Table:
 
 
 def empty_table(title: str, first: str) -> Table:
-    """An empty table with its first column, wide enough for the title."""
+    """Return an empty table with its first column, as wide as the title."""
     table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     table.min_width = len(title)
     table.add_column(first, no_wrap=True)

@@ -1,1 +1,1 @@
-"""One scene, or one FMU, run; and the main job, every published scene."""
+"""Runs of one scene, of one FMU, and of all published scenes."""

@@ -1,6 +1,6 @@
-"""One scene from file to results, the main job, which is every published one, and an FMU of any origin by its path.
+"""Runs of one scene, of all published scenes, and of an FMU given by its path.
 
-What a scene does not name is not imported: analyses and plots load here, when they are asked for.
+Analyses and plots are imported only when a scene requests them.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -55,7 +55,13 @@ ANALYSES = {"decay": decay, "slip": slip, "steps": steps}
 
 
 def run_scene(scene: Scene, out: Path, report: Callable[[float], None]) -> SceneOutcome:
-    """Run, analyse and write results to out/<scene>; HarnessError leaves older results as they are."""
+    """Run and analyse a scene, and write the results to out/<scene>.
+
+    Raises
+    ------
+    HarnessError
+        If the run or an analysis fails; previous results are kept.
+    """
     try:
         with replace_folder(out / scene.name, FILES, scene.source) as folder:
             return run_and_write(scene, folder, report)
@@ -64,7 +70,7 @@ def run_scene(scene: Scene, out: Path, report: Callable[[float], None]) -> Scene
 
 
 def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -> SceneOutcome:
-    """Run and analyse a scene, and write its results into an empty folder."""
+    """Run and analyse a scene, and write the results to an empty folder."""
     check_built(scene.file)
     run = runner.run(spec_from_scene(scene), report)
     check_steps(scene, run)
@@ -78,8 +84,8 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
     run.write_tables(folder)
     stop = scene.stop if run.failure else float(run.time[-1])
     follow = scene.follow if run.spec.grid is None else run.spec.follow
-    as_run = replace(scene, start=float(run.time[0]), stop=stop, grid=run.spec.grid, follow=follow)
-    write_provenance(folder, [scene.file], run.effective_parameters, as_run, source=scene.source)
+    scene_as_run = replace(scene, start=float(run.time[0]), stop=stop, grid=run.spec.grid, follow=follow)
+    write_provenance(folder, [scene.file], run.effective_parameters, scene_as_run, source=scene.source)
     if results:
         write_quantities(quantities, scene.published, folder / "quantities.csv")
     if scene.plots:
@@ -90,15 +96,15 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
 
 
 def check_steps(scene: Scene, run: Trajectory) -> None:
-    """The FMU shows its solver's steps, where they are asked for."""
+    """Check that the FMU exposes its solver steps if the scene needs them."""
     if run.steps is None and "steps" in (*scene.analyses, *scene.plots):
         raise SceneError(
-            f"'steps' in analyses or plots: {scene.file.name} does not show the steps of its solver: leave it out"
+            f"'steps' in analyses or plots: {scene.file.name} does not expose its solver steps; remove 'steps'"
         )
 
 
 def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
-    """Every published figure has a measured one beside it, in a unit that fits."""
+    """Check that every published value has a measured quantity with a compatible unit."""
     measured = {quantity.name: quantity for quantity in quantities}
     for name, value in scene.published.items():
         if name == "source":
@@ -111,12 +117,12 @@ def check_published(scene: Scene, quantities: tuple[Quantity, ...]) -> None:
             except KeyError:
                 unit = measured[name].unit
                 raise SceneError(
-                    f"published {name} in '{value[1]}' does not fit the measured '{unit}': give it in that"
+                    f"published {name} in '{value[1]}' is incompatible with the measured unit '{unit}'"
                 ) from None
 
 
 def published_scene_names() -> list[str]:
-    """The names of the shipped scenes that have figures to stand beside; HarnessError if an FMU is not built."""
+    """Return the names of the shipped scenes with published values; HarnessError if an FMU is not built."""
     scenes = [scene for scene in map(load_scene, shipped_scenes()) if scene.published]
     for scene in scenes:
         check_built(scene.file)
@@ -124,25 +130,25 @@ def published_scene_names() -> list[str]:
 
 
 def run_scenes(names: Iterable[str], out: Path, report: Callable[[str, float], None]) -> Iterator[SceneOutcome]:
-    """The outcome of each scene; one that fails does not lose the others."""
+    """Yield the outcome of each scene; a failed scene does not stop the others."""
     for name in names:
         check_interrupt()
         try:
             yield run_scene(load_scene(name), out, partial(report, name))
         except HarnessError as error:
-            check_interrupt()  # an FMU in Python may have swallowed the interrupt that made it fail
+            check_interrupt()  # a Python FMU may have swallowed an interrupt
             yield SceneOutcome(name, None, None, (), str(error))
 
 
 def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tuple[Signals, Path]:
-    """Run an FMU of any origin, and write its outputs to out/<name of the file>."""
+    """Run one FMU and write its outputs to out/<name of the FMU>."""
     from .figure import draw
 
     folder, source = out / wanted.model, describe_sources(str(wanted.fmu))
-    with replace_folder(folder, FILES, source) as fresh:
-        done = runner.run(wanted, report)
-        found = signals_from_trajectory(done)
-        write_signals(fresh / FILES[0], found.time, found.columns, found.units)
-        draw(wanted.fmu.name, default_plots(tuple(found.columns)), done, {}, fresh / "figure.svg")
-        write_provenance(fresh, [wanted.fmu], found.parameters, wanted, source=source)
-    return found, folder
+    with replace_folder(folder, FILES, source) as new_folder:
+        trajectory = runner.run(wanted, report)
+        signals = signals_from_trajectory(trajectory)
+        write_signals(new_folder / FILES[0], signals.time, signals.columns, signals.units)
+        draw(wanted.fmu.name, default_plots(tuple(signals.columns)), trajectory, {}, new_folder / "figure.svg")
+        write_provenance(new_folder, [wanted.fmu], signals.parameters, wanted, source=source)
+    return signals, folder

@@ -1,1 +1,1 @@
-"""Stiff and extreme scenes, each with the ending it must have."""
+"""Stiff and extreme cases, each with its expected outcome."""

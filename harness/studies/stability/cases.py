@@ -1,4 +1,4 @@
-"""The stiff and extreme scenes of stability.toml, one case for each method that meets them."""
+"""Stiff and extreme cases: one for each scene of stability.toml and each method."""
 
 import tomllib
 from collections.abc import Iterator
@@ -13,14 +13,14 @@ from ...running.fmu_session import FmuInfo, InitialValues
 FILE = Path(__file__).with_name("stability.toml")
 RTOL = 1e-6
 POINTS = 200
-LOOSE = 3e-2  # error at RTOL of any model, which may carry it on from one slip to the next
-DRIVING = ("F_ext", "T_ext", "v_driver")  # what puts energy into one of ours
-OWN = ("start", "stop", "rtol", "calls")  # what `each` may vary besides a value
+LOOSE = 3e-2  # allowed error at RTOL for user models, where errors may accumulate from slip to slip
+DRIVING = ("F_ext", "T_ext", "v_driver")  # variables that supply energy to the shipped models
+OWN = ("start", "stop", "rtol", "calls")  # keys that `each` may vary besides values
 
 
 @dataclass(frozen=True)
 class StabilityCase:
-    """One scene with one method: `finish` is the largest error allowed, `refuse` the words to be refused with."""
+    """One scene with one method: `max_error` is the allowed error, `expected_message` part of the expected message."""
 
     title: str
     model: str
@@ -34,14 +34,14 @@ class StabilityCase:
     expected_message: str | None = None
     inject_nonfinite: bool = False
     events: str = "all"  # which methods must find every event: all, exact or none
-    region: float | None = None  # where the scene stands on the axis of the region figure
-    may_be_refused: bool = False  # a sentence will do, whatever it says
-    is_driven: bool = False  # energy may come in
-    order: int = 0  # in the table
+    region: float | None = None  # position on the axis of the stability figure
+    may_be_refused: bool = False  # any error message is accepted
+    is_driven: bool = False  # energy may increase
+    order: int = 0  # position in the table
 
     @property
     def name(self) -> str:
-        """That of the model, which may be a file."""
+        """Return the name of the model, also if the model is a file."""
         return Path(self.model).stem
 
     @property
@@ -54,59 +54,61 @@ class StabilityCase:
 
 
 def load_scenes(file: Path = FILE) -> tuple[list[dict[str, Any]], dict[str, float]]:
-    """Every scene with one model and one value, and the largest errors allowed where a scene says nothing."""
+    """Load the scenes, expanded to one model and one value each, and the default error bounds."""
     table = tomllib.loads(file.read_text(encoding="utf-8"))
     return [one for scene in table["scene"] for one in expand_scene(scene)], table["finish"]
 
 
-def usual(model: str, card: FmuInfo, settled: bool) -> list[dict[str, Any]]:
-    """Scenes for a model of somebody's: every number a tenth of what it is, and ten times; tolerances; few steps; what
-    is no number.  `settled`: whether its events can be told."""
-    of_all = {"model": model, "either": True, "driven": True, "events": "all" if settled else "none"}
-    numbers = {
+def generic_scenes(model: str, card: FmuInfo, settled: bool) -> list[dict[str, Any]]:
+    """Return scenes for a user model: parameters scaled by 0.1 and 10, tolerances, few communication steps, and values
+    that are not finite.  `settled`: whether its events are comparable."""
+    common = {"model": model, "either": True, "driven": True, "events": "all" if settled else "none"}
+    parameters = {
         n: x for n, x in card.start_values.items() if x and n not in card.enumerations and not n.startswith("solver.")
     }
-    found: list[dict[str, Any]] = [{"title": "as it comes"}, {"title": "one communication step", "points": 1}]
-    found += [{"title": f"rtol = {rtol:g}", "rtol": rtol, "finish": {}} for rtol in (1e-3, 1e-9)]
-    found += [
+    generated: list[dict[str, Any]] = [{"title": "as it comes"}, {"title": "one communication step", "points": 1}]
+    generated += [{"title": f"rtol = {rtol:g}", "rtol": rtol, "finish": {}} for rtol in (1e-3, 1e-9)]
+    generated += [
         {"title": f"{name} = {share * value:g}", "values": {name: share * value}}
-        for name, value in numbers.items()
+        for name, value in parameters.items()
         for share in (0.1, 10.0)
     ]
-    poison = {
+    injections = {
         "title": "NaN, inf, -inf in every Real, before and in mid-run",
         "inject_nonfinite": True,
         "methods": ["default"],
     }
-    within = {"exact": 1e-6, "other": LOOSE}
-    return [{**of_all, "pattern": one["title"], "finish": within, **one} for one in [*found, poison]]
+    bounds = {"exact": 1e-6, "other": LOOSE}
+    return [{**common, "pattern": scene["title"], "finish": bounds, **scene} for scene in [*generated, injections]]
 
 
 def expand_scene(scene: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """A scene for each of its models and for each value that it varies."""
+    """Yield a scene for each of its models and varied values."""
     for model in scene.get("models", [scene.get("model")]):
         if "each" not in scene:
             yield {**scene, "model": model, "pattern": scene["title"]}
             continue
         ((name, values),) = scene["each"].items()
         for value in values:
-            new = {name: value} if name in OWN else {"values": {**scene.get("values", {}), name: value}}
-            shown = value if name != "calls" else ", then ".join(f"{h!r} s from {t!r} s" for t, h in value)
-            told = {"title": scene["title"].format(shown), "pattern": scene["title"], "varied": value}
-            yield {**scene, **new, "model": model, **told}
+            varied_keys = {name: value} if name in OWN else {"values": {**scene.get("values", {}), name: value}}
+            label = value if name != "calls" else ", then ".join(f"{h!r} s from {t!r} s" for t, h in value)
+            labels = {"title": scene["title"].format(label), "pattern": scene["title"], "varied": value}
+            yield {**scene, **varied_keys, "model": model, **labels}
 
 
-def cases(scene: dict[str, Any], card: FmuInfo, finish: dict[str, float]) -> list[StabilityCase]:
-    """The cases of one scene: the methods that it names, of those that its FMU offers."""
+def scene_cases(scene: dict[str, Any], card: FmuInfo, finish: dict[str, float]) -> list[StabilityCase]:
+    """Return the cases of one scene, for its methods among those of the FMU."""
     methods = scene.get("methods", card.methods)
     methods = [card.default_method if method == "default" else method for method in methods]
     return [
-        case(scene, card, method, largest_error(scene, method, finish)) for method in methods if method in card.methods
+        make_case(scene, card, method, allowed_error(scene, method, finish))
+        for method in methods
+        if method in card.methods
     ]
 
 
-def largest_error(scene: dict[str, Any], method: str, finish: dict[str, float]) -> float:
-    """What a scene allows a method: its own figure, else that of its tolerance."""
+def allowed_error(scene: dict[str, Any], method: str, finish: dict[str, float]) -> float:
+    """Return the allowed error of a method: that of the scene, or the default for its tolerance."""
     own = scene.get("finish", {})
     if not isinstance(own, dict):
         return own
@@ -115,8 +117,8 @@ def largest_error(scene: dict[str, Any], method: str, finish: dict[str, float]) 
     return own.get("other", max(finish["tolerances"] * scene.get("rtol", RTOL), finish["least"]))
 
 
-def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> StabilityCase:
-    """A scene with a method."""
+def make_case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> StabilityCase:
+    """Return the case of a scene and a method."""
     chosen = {"solver.rtol": scene.get("rtol", RTOL), **scene.get("values", {}), "solver.method": method}
     values = card.resolve_labels({**card.start_values, **chosen})
     start, stop = scene.get("start", 0.0), scene.get("stop", card.stop)
@@ -147,10 +149,10 @@ def case(scene: dict[str, Any], card: FmuInfo, method: str, finish: float) -> St
 def value_spans(
     start: float, stop: float, values: dict[str, float], changes: dict[float, dict[str, float]]
 ) -> list[ParameterSpan]:
-    """From one change to the next, and the values that hold there; those of the solver are none of the truth's."""
+    """Return the time spans between changes with their values; solver settings are removed for the reference."""
     physical = {name: value for name, value in values.items() if not name.startswith("solver.")}
-    found, begin = [], start
+    result, begin = [], start
     for t in sorted(changes):
-        found.append((begin, t, physical))
+        result.append((begin, t, physical))
         physical, begin = {**physical, **changes[t]}, t
-    return [*found, (begin, stop, physical)]
+    return [*result, (begin, stop, physical)]

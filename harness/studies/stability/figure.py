@@ -1,4 +1,4 @@
-"""The figure of stability: internal steps over the stiffness, for every method."""
+"""Stability figure: internal steps over stiffness for every method."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -8,15 +8,20 @@ from .outcomes import StabilityRegion
 
 
 def draw(regions: Iterable[StabilityRegion], path: Path) -> None:
-    """Save the steps of each method; a line of slope -1 is bounded by stability."""
+    """Save the figure; a slope of -1 means that steps are bounded by stability."""
     with open_figure(path, 1.3 * WIDTH, 2 * HEIGHT) as figure:
         axes = figure.subplots()
-        for each in regions:
-            text = f"{each.method}: {each.slope:+.2f}"
+        for region in regions:
+            text = f"{region.method}: {region.slope:+.2f}"
             axes.loglog(
-                each.stiffness, each.steps, color=METHOD_COLOURS[each.method], marker="o", markersize=4, label=text
+                region.stiffness,
+                region.steps,
+                color=METHOD_COLOURS[region.method],
+                marker="o",
+                markersize=4,
+                label=text,
             )
-        axes.set_title("pacejka, 16 s at rtol 1e-6: steps over the speed at the peak of the friction curve")
+        axes.set_title("pacejka, 16 s at rtol 1e-6: internal steps over x_m, the speed of maximum friction")
         axes.set_xlabel("x_m [m/s]")
         axes.set_ylabel("internal steps")
         axes.invert_xaxis()  # stiffer to the right

@@ -1,4 +1,4 @@
-"""How the cases end, and where a method's steps are bounded by stability."""
+"""Outcomes of cases, and step counts that are bounded by stability."""
 
 import math
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
 
 @dataclass(frozen=True)
 class CaseOutcome:
-    """How a case ended: `ended` is finished, refused or wrong; `text` is the FMU's sentence, or what is wrong.
+    """Outcome of a case: `ended` is finished, refused or wrong; `text` is the message of the FMU or the reason.
 
-    `error` and `rise` (of energy that nobody put in) are shares of the largest values; NaN where there is none.
+    `error` and `energy_rise` (without external work) are relative to the largest values; NaN if undefined.
     """
 
     case: StabilityCase
@@ -29,14 +29,14 @@ class CaseOutcome:
     def expected(self) -> str:
         case = self.case
         if case.inject_nonfinite:
-            return "refused, each by name"
+            return "refused, naming each variable"
         if case.expected_message:
             return f"refused: {case.expected_message}"
         return f"finished within {case.max_error:g}{', or refused' * case.may_be_refused}"
 
     @property
     def passed(self) -> bool:
-        """Whether it ended as it should."""
+        """Return whether the case ended as expected."""
         if self.case.may_be_refused and self.ended != WRONG:
             return True
         return self.ended == (REFUSED if self.case.inject_nonfinite or self.case.expected_message else FINISHED)
@@ -44,9 +44,9 @@ class CaseOutcome:
 
 @dataclass(frozen=True)
 class StabilityRegion:
-    """Where a method's steps are bounded by stability: `steps` (n,) against `stiff` (n,), and the slope, log by log.
+    """Number of `steps` (n,) of a method over x_m in m/s (`stiffness`, (n,)), with the slope in log-log scale.
 
-    The slope is that of the two stiffest scenes: -1 is an explicit method at its limit, 0 one that has none.
+    The slope is that of the two stiffest scenes: -1 for an explicit method at its stability limit, 0 without limit.
     """
 
     method: str

@@ -1,7 +1,7 @@
-"""A function in another process, with a time limit: a hang or a crash there is a sentence here.
+"""Runs a function in another process with a time limit; a timeout or crash raises HarnessError.
 
-To begin a process, and in it the code of an FMU, takes longer than most runs do; so one that has answered is asked
-again.  If it dies then, a new one is asked the same: what is told of a call is of that call alone.
+Starting a process and loading an FMU takes longer than most runs, so processes are reused.  If a reused process dies,
+the call is repeated in a new one, so that a failure always belongs to the call itself.
 """
 
 import atexit
@@ -16,36 +16,36 @@ from ...process.subprocess_runner import POLL_INTERVAL
 from ...process.temporary_directory import temporary_directory
 from ...process.worker_pool import Worker, WorkerDiedError, process_context
 
-# imported once, where processes are forked from
+# imported once in the server from which processes are forked
 PRELOAD = [f"{__package__}.study", "harness.references.piecewise_linear", "scipy.integrate"]
 
 CONTEXT: Any = process_context(PRELOAD)
 
 
 class TimedWorker(Worker):
-    """A process with a folder of its own."""
+    """A worker process with its own folder."""
 
     def __init__(self) -> None:
         self.held = ExitStack()
         super().__init__(CONTEXT, self.held.enter_context(temporary_directory("bounded-")))
 
     def run(self, limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
-        """As `bounded`; only who answers is asked again."""
-        late = monotonic() + limit
+        """Run function(*arguments) within `limit` s; the worker is reused only after a result."""
+        deadline = monotonic() + limit
         try:
             self.send_task(function, *arguments)
             while not self.has_result(POLL_INTERVAL):
-                if monotonic() > late:
+                if monotonic() > deadline:
                     raise HarnessError(f"no answer after {limit:g} s")
                 check_interrupt()
-            found = self.receive_result()
+            result = self.receive_result()
         except BaseException:
             self.kill()
             raise
         IDLE.append(self)
-        if isinstance(found, BaseException):
-            raise found
-        return found
+        if isinstance(result, BaseException):
+            raise result
+        return result
 
     def kill(self) -> None:
         super().kill()
@@ -57,16 +57,21 @@ IDLE: list[TimedWorker] = []
 
 @atexit.register
 def end_idle_workers() -> None:
-    """End those that wait."""
+    """End the idle workers."""
     while IDLE:
         IDLE.pop().kill()
 
 
 def run_with_timeout(limit: float, function: Callable[..., Any], *arguments: Any) -> Any:
-    """function(*arguments) within `limit` s; HarnessError if it hangs, crashes or raises one itself.
+    """Run function(*arguments) in another process within `limit` s.
 
-    The function must be known to pickle by name; any other exception of its comes through.
+    The function must be picklable.  Its exceptions are raised here.
+
+    Raises
+    ------
+    HarnessError
+        If the call times out or the process crashes.
     """
-    with suppress(IndexError, WorkerDiedError):  # where none waits, or what was asked of it before has killed it
+    with suppress(IndexError, WorkerDiedError):  # no idle worker, or it was killed by its previous call
         return IDLE.pop().run(limit, function, *arguments)
     return TimedWorker().run(limit, function, *arguments)

@@ -1,7 +1,7 @@
-"""Stiff and extreme scenes: each ends within its error, or is refused with its sentence; never a hang.
+"""Runs stiff and extreme cases: each must finish within its error bound or be rejected with a message, never hang.
 
-The scenes and what is expected of them stand in stability.toml, the answers come by a second route (truth.py), and
-every run has a time limit, in a process that may crash (bounded.py).
+Scenes and expected outcomes are in stability.toml, references are independent of the FMUs, and every run has a time
+limit in a separate process.
 """
 
 import math
@@ -38,105 +38,109 @@ from ...running.fmu_session import (
     run_steps,
 )
 from ...scenes.fmu_files import check_built, find_fmu
-from .cases import StabilityCase, cases, load_scenes, usual
+from .cases import StabilityCase, generic_scenes, load_scenes, scene_cases
 from .outcomes import FINISHED, REFUSED, WRONG, CaseOutcome, StabilityRegion
 from .run_with_timeout import run_with_timeout
 
 WORKERS = 2
-LIMIT = 120.0  # s, for one run and for one answer to compare with
+LIMIT = 120.0  # s; time limit of a run and of a reference
 FOLDER, FILES = "stability", ("stability.csv", "region.svg")
 
 
 def run_stability(
-    out: Path, report: Callable[[str, float], None], chosen: list[list[StabilityCase]], source: str = ""
+    out: Path, report: Callable[[str, float], None], groups: list[list[StabilityCase]], source: str = ""
 ) -> tuple[list[CaseOutcome], list[StabilityRegion]]:
-    """Run the chosen groups of cases and write results to out/stability; `source`: of whom, if not of all."""
+    """Run groups of cases and write the results to out/stability; `source` names the models if not all are run."""
     from .figure import draw
 
     with replace_folder(out / FOLDER, FILES, source) as folder:
-        rows = table(report, chosen)
-        found = stability_regions(rows)
-        save(rows, folder / "stability.csv")
-        if found:
-            draw(found, folder / "region.svg")
-        fmus = {row.case.name: find_fmu(row.case.model) for row in rows}
+        outcomes = run_cases(report, groups)
+        regions = stability_regions(outcomes)
+        write_table(outcomes, folder / "stability.csv")
+        if regions:
+            draw(regions, folder / "region.svg")
+        fmus = {row.case.name: find_fmu(row.case.model) for row in outcomes}
         values = prefix_parameters({name: declared_parameters(fmu) for name, fmu in fmus.items()})
         write_provenance(folder, fmus.values(), values, source=source)
-    return rows, found
+    return outcomes, regions
 
 
-def table(report: Callable[[str, float], None], chosen: list[list[StabilityCase]]) -> list[CaseOutcome]:
-    """The rows of the chosen cases; `report` hears of each as it comes."""
+def run_cases(report: Callable[[str, float], None], chosen: list[list[StabilityCase]]) -> list[CaseOutcome]:
+    """Run groups of cases in parallel; `report` receives the label of each finished case."""
 
     def rows(group: list[StabilityCase]) -> list[CaseOutcome]:
-        found = []
+        outcomes = []
         for row in run_group(group):
-            found.append(row)
+            outcomes.append(row)
             report(row.case.label, 1.0)
-        return found
+        return outcomes
 
-    found = [row for found in map_in_threads(WORKERS, rows, chosen) for row in found]
-    return sorted(found, key=lambda row: row.case.order)
+    outcomes = [row for outcomes in map_in_threads(WORKERS, rows, chosen) for row in outcomes]
+    return sorted(outcomes, key=lambda row: row.case.order)
 
 
 def grouped_cases(
-    wanted: Callable[[dict[str, Any]], bool] = lambda scene: True, models: Sequence[str] = ()
+    is_selected: Callable[[dict[str, Any]], bool] = lambda scene: True, models: Sequence[str] = ()
 ) -> list[list[StabilityCase]]:
-    """The cases of all wanted scenes, of some models only if they are named; those that share one true answer stand
-    together.  A model without scenes of its own meets the usual ones."""
+    """Return the cases of selected scenes and models, grouped by common reference.
+
+    Models without their own scenes get the generic ones.
+    """
     require_reference_packages()
     for model in models:
         check_built(find_fmu(model))
-    found, finish = load_scenes()
-    found = [scene for scene in found if wanted(scene) and (not models or scene["model"] in models)]
+    selected_scenes, bounds = load_scenes()
+    selected_scenes = [
+        scene for scene in selected_scenes if is_selected(scene) and (not models or scene["model"] in models)
+    ]
     cards: dict[str, FmuInfo] = {}
-    for model in dict.fromkeys((*models, *(scene["model"] for scene in found))):
+    for model in dict.fromkeys((*models, *(scene["model"] for scene in selected_scenes))):
         cards[model] = run_with_timeout(LIMIT, read_info, model)
-        if model not in [scene["model"] for scene in found]:
-            settled = len(run_with_timeout(LIMIT, modes, model)) < 2
-            found += usual(model, cards[model], settled)
+        if model not in [scene["model"] for scene in selected_scenes]:
+            has_comparable_events = len(run_with_timeout(LIMIT, mode_names, model)) < 2
+            selected_scenes += generic_scenes(model, cards[model], has_comparable_events)
     groups: dict[str, list[StabilityCase]] = {}
-    for place, scene in enumerate(found):
-        for case in cases(scene, cards[scene["model"]], finish):
-            shared = repr((case.model, case.spans, case.grid))
-            groups.setdefault(shared, []).append(replace(case, order=place))
+    for order, scene in enumerate(selected_scenes):
+        for case in scene_cases(scene, cards[scene["model"]], bounds):
+            key = repr((case.model, case.spans, case.grid))
+            groups.setdefault(key, []).append(replace(case, order=order))
     return list(groups.values())
 
 
-def modes(model: str) -> list[str]:
-    """The names of the modes of a model; HarnessError where nothing moves as a body does."""
+def mode_names(model: str) -> list[str]:
+    """Return the modes of a model; HarnessError if it has no position with a speed."""
     carried: Any = load_model_class(find_fmu(model))
     if not {*carried.states} & {*carried.states.values()}:
-        raise HarnessError(f"{model}: no state is the rate of another, and the scenes are about positions and speeds")
+        raise HarnessError(f"{model}: no state is the rate of another one; the cases need a position and a speed")
     return list(carried.contacts)
 
 
 def run_group(group: Iterable[StabilityCase]) -> Iterator[CaseOutcome]:
-    """The rows of cases that share one true answer."""
-    answer: ReferenceTrajectory | None = None
-    doubt = ""
+    """Run cases with a common reference."""
+    reference: ReferenceTrajectory | None = None
+    reference_error = ""
     for case in group:
         try:
             if case.inject_nonfinite:
                 yield judge_injections(case, run_with_timeout(LIMIT, inject_nonfinite, case.setting))
                 continue
-            if case.expected_message is None and answer is None and not doubt:
-                answering = compute_reference if case.model in MODELS else compute_by_two_methods
+            if case.expected_message is None and reference is None and not reference_error:
+                solve_reference = truth if case.model in MODELS else compute_by_two_methods
                 try:
-                    answer = run_with_timeout(LIMIT, answering, case.model, case.spans, case.grid)
+                    reference = run_with_timeout(LIMIT, solve_reference, case.model, case.spans, case.grid)
                 except HarnessError as error:
                     if not case.may_be_refused:
                         raise
-                    doubt = str(error)  # of values that the run may refuse
-            times = answer.times.tolist() if answer else case.grid.times(())
+                    reference_error = str(error)  # the run may reject such values
+            times = reference.times.tolist() if reference else case.grid.times(())
             calls = case.calls or [(t, ahead - t) for t, ahead in pairwise(times)]
-            ending = run_with_timeout(LIMIT, run_steps, case.setting, calls, case.changes)
-            if isinstance(ending, RefusedRun):
-                yield judge_refusal(case, ending)
-            elif answer is None or case.expected_message is not None:
-                yield CaseOutcome(case, WRONG, doubt or "it was taken", motion=ending)
+            outcome = run_with_timeout(LIMIT, run_steps, case.setting, calls, case.changes)
+            if isinstance(outcome, RefusedRun):
+                yield judge_refusal(case, outcome)
+            elif reference is None or case.expected_message is not None:
+                yield CaseOutcome(case, WRONG, reference_error or "it was accepted", motion=outcome)
             else:
-                yield judge_solution(case, ending, answer)
+                yield judge_solution(case, outcome, reference)
         except HarnessError as error:
             yield CaseOutcome(case, WRONG, str(error))
 
@@ -144,65 +148,65 @@ def run_group(group: Iterable[StabilityCase]) -> Iterator[CaseOutcome]:
 def judge_injections(case: StabilityCase, ending: RefusalSummary) -> CaseOutcome:
     if ending.failures:
         return CaseOutcome(case, WRONG, f"{len(ending.failures)} of {ending.n_tried}: {'; '.join(ending.failures)}")
-    return CaseOutcome(case, REFUSED, f"{ending.n_tried} of {ending.n_tried}, each by name")
+    return CaseOutcome(case, REFUSED, f"{ending.n_tried} of {ending.n_tried}, each variable named")
 
 
 def judge_refusal(case: StabilityCase, ending: RefusedRun) -> CaseOutcome:
-    """A refusal says the words that the scene expects, and leaves no number to be taken for a result."""
+    """Check that a rejection has the expected message, and that values read as NaN."""
     if not ending.message:
-        return CaseOutcome(case, WRONG, "it was refused without a sentence")
+        return CaseOutcome(case, WRONG, "refused without a message")
     if not ending.all_nan:
-        return CaseOutcome(case, WRONG, f"refused, but numbers can still be read: {ending.message}")
+        return CaseOutcome(case, WRONG, f"refused, but values can still be read: {ending.message}")
     if not case.may_be_refused and (case.expected_message is None or case.expected_message not in ending.message):
         return CaseOutcome(case, WRONG, f"refused: {ending.message}")
     return CaseOutcome(case, REFUSED, ending.message)
 
 
-def judge_solution(case: StabilityCase, motion: CompletedRun, answer: ReferenceTrajectory) -> CaseOutcome:
-    """A motion has the right events, is as near to the answer as the scene expects, and makes no energy."""
+def judge_solution(case: StabilityCase, motion: CompletedRun, reference: ReferenceTrajectory) -> CaseOutcome:
+    """Check events, error and energy of a finished run."""
     assert case.max_error is not None
-    error = answer.error(motion.x, motion.v)
-    rise = math.nan
-    free, energy = not case.is_driven and motion.energy is not None, motion.energy
-    if free and energy is not None:
-        rise = float((energy - np.minimum.accumulate(energy)).max() / (energy.max() or 1.0))
-    wrong = []
+    error = reference.error(motion.x, motion.v)
+    energy_rise = math.nan
+    conserves, energy = not case.is_driven and motion.energy is not None, motion.energy
+    if conserves and energy is not None:
+        energy_rise = float((energy - np.minimum.accumulate(energy)).max() / (energy.max() or 1.0))
+    reasons = []
     if case.events == "all" or case.events == case.method:
-        if motion.counts.events != len(answer.events):
-            wrong.append(f"{motion.counts.events} events, not {len(answer.events)}")
-        elif answer.events:
-            late = abs(motion.t_last - answer.events[-1][0])
-            error = max_or_nan(error, late / (case.grid.stop - case.grid.start))
+        if motion.counts.events != len(reference.events):
+            reasons.append(f"{motion.counts.events} events, not {len(reference.events)}")
+        elif reference.events:
+            delay = abs(motion.t_last - reference.events[-1][0])
+            error = max_or_nan(error, delay / (case.grid.stop - case.grid.start))
     if not error <= case.max_error:
-        wrong.append(f"error {error:.2g}, more than {case.max_error:g}")
-    if free and not rise <= case.max_error:
-        wrong.append(f"energy rises by {rise:.2g}")
-    return CaseOutcome(case, WRONG if wrong else FINISHED, "; ".join(wrong), error, rise, motion)
+        reasons.append(f"error {error:.2g}, more than {case.max_error:g}")
+    if conserves and not energy_rise <= case.max_error:
+        reasons.append(f"energy rises by {energy_rise:.2g}")
+    return CaseOutcome(case, WRONG if reasons else FINISHED, "; ".join(reasons), error, energy_rise, motion)
 
 
 def stability_regions(rows: Iterable[CaseOutcome]) -> list[StabilityRegion]:
-    """Steps against stiffness, for each method of the scenes that vary it."""
-    found: dict[str, list[tuple[float, int]]] = {}
+    """Return steps over stiffness for each method, from the scenes that vary it."""
+    points_by_method: dict[str, list[tuple[float, int]]] = {}
     for row in rows:
         if row.case.region is not None and row.motion is not None:
-            found.setdefault(row.case.method, []).append((row.case.region, row.motion.counts.steps))
+            points_by_method.setdefault(row.case.method, []).append((row.case.region, row.motion.counts.steps))
     regions = []
-    for method, points in found.items():
+    for method, points in points_by_method.items():
         stiff, steps = np.array(sorted(points, reverse=True), float).T
         slope = np.diff(np.log(steps[-2:])) / np.diff(np.log(stiff[-2:])) if len(steps) > 1 else [math.nan]
         regions.append(StabilityRegion(method, stiff, steps, float(slope[0])))
     return regions
 
 
-def save(rows: list[CaseOutcome], path: Path) -> None:
-    """Write stability.csv: one line for each row."""
-    told = ["model", "scene", "method", "expected", "ended", "error [1]", "energy rise [1]"]
-    heads = [*told, "events", "steps", "rejected", "evaluations", "run time [s]", "sentence"]
-    write_csv_rows(path, heads, map(line, rows))
+def write_table(rows: list[CaseOutcome], path: Path) -> None:
+    """Write stability.csv with one line per case."""
+    heads = ["model", "scene", "method", "expected", "ended", "error [1]", "energy rise [1]"]
+    heads += ["events", "steps", "rejected", "evaluations", "run time [s]", "sentence"]
+    write_csv_rows(path, heads, map(table_line, rows))
 
 
-def line(row: CaseOutcome) -> list[Any]:
-    """What that file says of a row."""
+def table_line(row: CaseOutcome) -> list[Any]:
+    """Return the cells of one case in stability.csv."""
     case, motion = row.case, row.motion
     counts = (*astuple(motion.counts), motion.seconds) if motion else ("", "", "", "", math.nan)
     return [case.name, case.title, case.method, row.expected, row.ended, row.error, row.energy_rise, *counts, row.text]

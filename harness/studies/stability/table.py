@@ -1,4 +1,4 @@
-"""The tables of the stiff and extreme scenes: those that end, and those that are refused."""
+"""Tables of the stiff and extreme cases: finished runs and rejected runs."""
 
 from collections.abc import Iterable
 from itertools import groupby
@@ -11,31 +11,31 @@ from .outcomes import REFUSED, CaseOutcome, StabilityRegion
 
 
 def error_table(rows: Iterable[CaseOutcome]) -> Table:
-    """Largest error and, below it, internal steps of every run that should end."""
-    table = scenes("largest error, as a share of the largest value, and below it internal steps")
+    """Return the table of largest error and internal steps of all runs that should finish."""
+    table = empty_table("largest relative error, and internal steps below")
     rows = [row for row in rows if row.case.max_error is not None]
-    number = {row.case.method: row.case.setting.values["solver.method"] for row in rows}
-    methods = sorted(number, key=lambda method: number[method])
+    method_numbers = {row.case.method: row.case.setting.values["solver.method"] for row in rows}
+    methods = sorted(method_numbers, key=lambda method: method_numbers[method])
     for method in methods:
         table.add_column(method, justify="right", no_wrap=True)
     for model, of_model in groupby(sorted(rows, key=lambda row: row.case.name), lambda row: row.case.name):
         table.add_section()
         table.add_row(Text(model, style="bold"))
         for title, group in groupby(of_model, lambda row: row.case.title):
-            cells = {row.case.method: cell(row) for row in group}
+            cells = {row.case.method: format_cell(row) for row in group}
             table.add_row(f"  {title}", *(cells.get(method, Text("")) for method in methods))
     return table
 
 
-def scenes(title: str) -> Table:
-    """A table that begins with the scene, and breaks its lines rather than cut them off."""
+def empty_table(title: str) -> Table:
+    """Return an empty table with a column for the scene."""
     table = Table(title=title, box=SIMPLE_HEAD, show_edge=False, title_justify="left", expand=True)
     table.add_column("scene", ratio=1)
     return table
 
 
-def cell(row: CaseOutcome) -> Text:
-    """The end of one run."""
+def format_cell(row: CaseOutcome) -> Text:
+    """Format the outcome of one run."""
     if row.passed and row.ended == REFUSED:
         return Text("refused")
     if not row.passed or row.motion is None:
@@ -44,31 +44,31 @@ def cell(row: CaseOutcome) -> Text:
 
 
 def refusal_table(rows: Iterable[CaseOutcome]) -> Table:
-    """The sentence of every run that should be refused; where the models say the same, that of one."""
-    table = scenes("refused, each with its sentence")
+    """Return the table of messages of all runs that should be rejected, one per scene."""
+    table = empty_table("refused with a message")
     table.add_column("models")
-    table.add_column("sentence", ratio=3)
-    found: dict[str, list[CaseOutcome]] = {}
+    table.add_column("message", ratio=3)
+    groups: dict[str, list[CaseOutcome]] = {}
     for row in rows:
         if row.case.max_error is None:
-            found.setdefault(row.case.title, []).append(row)
-    for title, group in found.items():
+            groups.setdefault(row.case.title, []).append(row)
+    for title, group in groups.items():
         models = ", ".join(dict.fromkeys(row.case.name for row in group))
-        wrong = [row for row in group if not row.passed]
-        table.add_row(title, models, Text((wrong or group)[0].text, style="red" if wrong else ""))
+        failed = [row for row in group if not row.passed]
+        table.add_row(title, models, Text((failed or group)[0].text, style="red" if failed else ""))
     return table
 
 
-def summary(rows: list[CaseOutcome], found: Iterable[StabilityRegion]) -> str:
-    """How many ended as they should, what energy did, and where stability bounds the steps."""
-    well = sum(row.passed for row in rows)
-    lines = [f"{well} of {len(rows)} ended as they should."]
+def summary(rows: list[CaseOutcome], regions: Iterable[StabilityRegion]) -> str:
+    """Return a summary of outcomes, energy, and steps bounded by stability."""
+    n_passed = sum(row.passed for row in rows)
+    lines = [f"{n_passed} of {len(rows)} ended as expected."]
     exact = [row.energy_rise for row in rows if row.case.method == "exact" and row.energy_rise >= 0.0]
     others = [row.energy_rise / row.case.rtol for row in rows if row.case.method != "exact" and row.energy_rise >= 0.0]
     if exact and others:
-        words = f"by {max(exact):.1g} of the largest with exact, by {max(others):.2g} rtol with the other methods"
-        lines.append(f"Energy that nobody puts in rises {words}, at most.")
-    for region in found:
+        values = f"at most {max(exact):.1g} of its largest value with exact, {max(others):.2g} rtol with other methods"
+        lines.append(f"Spurious increase of energy: {values}.")
+    for region in regions:
         bound = "bounded by stability" if region.slope < -0.5 else "not bounded by stability"
         growth = f"steps grow as x_m^{region.slope:+.2f} at x_m = {region.stiffness[-1]:g} m/s"
         lines.append(f"{region.method}: {growth}, {bound}.")

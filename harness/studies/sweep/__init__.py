@@ -1,1 +1,1 @@
-"""Many runs over parameters."""
+"""Parameter sweeps."""

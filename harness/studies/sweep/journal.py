@@ -1,6 +1,6 @@
-"""The finished runs of one sweep in a file, block by block, each a line with its checksum: what a kill leaves is kept.
+"""Journal of a sweep: a file with one line and checksum per finished block, so that an interrupted sweep can resume.
 
-Only where the blocks lie is held in memory.
+Only the positions of the blocks are held in memory.
 """
 
 import json
@@ -19,8 +19,7 @@ from ...errors import HarnessError
 
 @dataclass(frozen=True)
 class Block:
-    """Runs from number `first` on: their `values` (runs, columns), NaN where a run failed, and the `sentences` that
-    say why, by the place in the block."""
+    """Runs from number `first` on: `values` (runs, columns), NaN for failed runs, and error `messages` by index."""
 
     first: int
     values: np.ndarray
@@ -28,7 +27,7 @@ class Block:
 
     @property
     def last(self) -> int:
-        """The number behind that of its last run."""
+        """Return the number after that of the last run."""
         return self.first + len(self.values)
 
     def to_line(self) -> bytes:
@@ -37,61 +36,61 @@ class Block:
         return f"{crc32(text.encode()):08x} {text}\n".encode()
 
 
-def block(line: bytes, columns: int) -> Block | None:
-    """The block of a line, None if it holds none."""
+def parse_block(line: bytes, columns: int) -> Block | None:
+    """Parse a line; None if it is damaged."""
     checksum, _, text = line.rstrip(b"\n").partition(b" ")
     if checksum != f"{crc32(text):08x}".encode():
         return None
     try:
         first, count, values, messages = json.loads(text)
         table = np.frombuffer(b64decode(values), "<f8").reshape(count, columns)
-    except (ValueError, TypeError):  # of a journal that somebody else wrote
+    except (ValueError, TypeError):  # a valid checksum, but another content
         return None
     return Block(first, table, {int(place): sentence for place, sentence in messages.items()})
 
 
 class Journal:
-    """The journal at a path, of rows of so many `columns`.
+    """Journal file of a sweep with `runs` runs of `columns` values.
 
-    `damaged` counts the lines that are none, but for the last: a kill cut it off.
+    `damaged` counts damaged lines, except an incomplete last line.
     """
 
     def __init__(self, path: Path, runs: int, columns: int) -> None:
         self.path, self.runs, self.columns = path, runs, columns
-        self.places: list[tuple[int, int, int]] = []  # of each block in order: its first and last number, where it is
+        self.places: list[tuple[int, int, int]] = []  # sorted: first run, end, and file position of each block
         self.damaged = self.end = 0
         with self.os_errors_reported():
             self.read()
 
     @contextmanager
     def os_errors_reported(self) -> Iterator[None]:
-        """What the file system refuses becomes one sentence."""
+        """Convert OSError to HarnessError."""
         try:
             yield
         except OSError as error:
-            raise HarnessError(f"the journal {self.path} cannot be used: {error.strerror}") from None
+            raise HarnessError(f"cannot use the journal {self.path}: {error.strerror}") from None
 
     def read(self) -> None:
-        """Find the blocks that are there."""
+        """Read the positions of the blocks."""
         if not self.path.exists():
             return
         with self.path.open("rb") as file:
             for line in file:
                 if not line.endswith(b"\n"):
                     break
-                found = block(line, self.columns)
-                if found and self.fits(found):
-                    insort(self.places, (found.first, found.last, self.end))
+                block = parse_block(line, self.columns)
+                if block and self.fits(block):
+                    insort(self.places, (block.first, block.last, self.end))
                 else:
                     self.damaged += 1
                 self.end += len(line)
 
-    def fits(self, found: Block) -> bool:
-        """Whether a block holds runs of this sweep that no other one holds."""
-        at = bisect(self.places, (found.first,))
-        low = self.places[at - 1][1] if at else 0
-        high = self.places[at][0] if at < len(self.places) else self.runs
-        return low <= found.first < found.last <= high
+    def fits(self, block: Block) -> bool:
+        """Return whether the runs of a block are in range and not in another block."""
+        index = bisect(self.places, (block.first,))
+        low = self.places[index - 1][1] if index else 0
+        high = self.places[index][0] if index < len(self.places) else self.runs
+        return low <= block.first < block.last <= high
 
     @property
     def n_done(self) -> int:
@@ -99,13 +98,13 @@ class Journal:
 
     @property
     def missing_spans(self) -> list[tuple[int, int]]:
-        """The spans of runs, first and last, that no block holds."""
+        """Return the ranges of runs (first, end) that are not finished."""
         edges = [0, *(edge for first, last, _ in self.places for edge in (first, last)), self.runs]
         return [(first, last) for first, last in zip(edges[::2], edges[1::2], strict=True) if first < last]
 
     @contextmanager
     def open(self) -> Iterator[None]:
-        """Keep the file open for writing, without the line that was cut off."""
+        """Open the file for writing, without an incomplete last line."""
         with self.os_errors_reported():
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self.file = self.path.open("ab")
@@ -114,7 +113,7 @@ class Journal:
                 self.file.truncate(self.end)
             yield
         finally:
-            with suppress(OSError):  # of a full disk, which was told
+            with suppress(OSError):  # a full disk was reported already
                 self.file.close()
 
     def add(self, new: Block) -> None:
@@ -126,15 +125,17 @@ class Journal:
         self.end += len(line)
 
     def blocks(self) -> Iterator[Block]:
-        """All blocks, in the order of their runs."""
+        """Yield all blocks in the order of their runs."""
         with self.os_errors_reported(), self.path.open("rb") as file:
-            for *_, at in self.places:
-                file.seek(at)
-                found = block(file.readline(), self.columns)
-                if not found:
-                    raise HarnessError(f"the journal {self.path} was changed meanwhile; the same command does the rest")
-                yield found
+            for *_, position in self.places:
+                file.seek(position)
+                block = parse_block(file.readline(), self.columns)
+                if not block:
+                    raise HarnessError(
+                        f"the journal {self.path} was changed by another process; repeat the command to resume"
+                    )
+                yield block
 
     def delete(self) -> None:
-        """Remove the file."""
+        """Delete the file."""
         self.path.unlink(missing_ok=True)

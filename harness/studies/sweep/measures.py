@@ -1,6 +1,6 @@
-"""What a sweep may measure in each run: some at its end, some along its path.
+"""Measures of a sweep: at the end of a run, or along its trajectory.
 
-A measure that a run does not have (the period of a single slip, the rest of what still moves) is NaN.
+A measure that is not defined for a run is NaN, such as the period of a single slip.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -17,12 +17,12 @@ from ...running.trajectory import Trajectory
 from ...running.variable_values import variable_unit
 from ...scenes.roles import find_roles
 
-N_STEPS = 400  # communication steps along a path; the ends of the solver's own steps come on top
+N_STEPS = 400  # communication steps along a trajectory, besides the internal steps
 
 
 @dataclass(frozen=True)
 class MeasureColumn:
-    """One measured number of each run: its name, unit and sentence."""
+    """One measured number per run: name, unit and description."""
 
     name: str
     unit: str
@@ -31,8 +31,23 @@ class MeasureColumn:
 
 @dataclass(frozen=True)
 class TrajectoryMeasure:
-    """A measure along the path.  It needs the variables named, a law with modes if it is of `modes`, and no driver if
-    it is of a `decay`; `like`: the role of the output whose unit it has."""
+    """A measure along the trajectory.
+
+    Attributes
+    ----------
+    needs
+        Required variables.
+    unit, text
+        Unit and description.
+    measure
+        Computes the measure.
+    modes
+        Whether the friction law must have modes.
+    decay
+        Whether the model must not have a driver.
+    like
+        Role of the output that has the same unit.
+    """
 
     needs: tuple[str, ...]
     unit: str
@@ -43,8 +58,8 @@ class TrajectoryMeasure:
     like: str = ""
 
 
-def starts(run: Trajectory) -> np.ndarray:
-    """Times in s at which slips begin."""
+def slip_starts(run: Trajectory) -> np.ndarray:
+    """Return the times in s at which slips begin."""
     if run.events is not None:
         return slips_from_modes(run.events.t, run.events.mode)[0]
     driver = run.get_parameter("v_driver", "the measure 'slips'")
@@ -56,7 +71,7 @@ def starts(run: Trajectory) -> np.ndarray:
 
 
 def period(run: Trajectory) -> float:
-    times = starts(run)
+    times = slip_starts(run)
     return float(np.mean(np.diff(times))) if len(times) > 1 else np.nan
 
 
@@ -82,30 +97,36 @@ def unsteady(run: Trajectory) -> float:
     return float(np.ptp(late) / 2 / abs(driver)) if driver else np.nan
 
 
-def decayed(run: Trajectory, law: Callable[[float, float, float], float]) -> float:
-    """A figure from the first and the last turning point of a free decay about zero."""
-    _, places = find_extrema_from_velocity(run.time, run.column_of_role("position"), run.column_of_role("velocity"))
-    sizes = places * np.where(np.arange(len(places)) % 2, -1.0, 1.0) * np.sign(places[:1])
-    places = sizes[sizes > 0]  # the last one may come to rest on its own side
+def evaluate_decay(run: Trajectory, law: Callable[[float, float, float], float]) -> float:
+    """Evaluate `law` for the first and last turning point of a free decay about zero."""
+    _, extrema_values = find_extrema_from_velocity(
+        run.time, run.column_of_role("position"), run.column_of_role("velocity")
+    )
+    sizes = extrema_values * np.where(np.arange(len(extrema_values)) % 2, -1.0, 1.0) * np.sign(extrema_values[:1])
+    extrema_values = sizes[sizes > 0]  # the last one may stop on the same side
     try:
-        return law(float(places[0]), float(places[-1]), (len(places) - 1) / 2) if len(places) > 1 else np.nan
+        return (
+            law(float(extrema_values[0]), float(extrema_values[-1]), (len(extrema_values) - 1) / 2)
+            if len(extrema_values) > 1
+            else np.nan
+        )
     except HarnessError:
         return np.nan
 
 
-zeta = partial(decayed, law=damping_ratio)
-f_over_k = partial(decayed, law=partial(friction_from_envelope, stiffness=1.0))
+zeta = partial(evaluate_decay, law=damping_ratio)
+f_over_k = partial(evaluate_decay, law=partial(friction_from_envelope, stiffness=1.0))
 
-FINAL_MEASURES = {  # and the variable that tells it
+FINAL_MEASURES = {  # with the variable of the FMU
     "events": (MeasureColumn("events", "", "changes of mode"), "events.count"),
     "steps": (MeasureColumn("steps", "", "steps of the solver"), "solver.steps"),
-    "evaluations": (MeasureColumn("evaluations", "", "right-hand sides"), "solver.evaluations"),
+    "evaluations": (MeasureColumn("evaluations", "", "right-hand side evaluations"), "solver.evaluations"),
 }
 DRIVER = "v_driver"
-SWING = "swing of the speed in the later half, over that of the driver"
+SWING = "half the range of speed in the second half of the run, over driver speed"
 ENVELOPE = "friction over stiffness by linear envelope"
 TRAJECTORY_MEASURES = {
-    "slips": TrajectoryMeasure((DRIVER,), "", "slips", lambda run: float(len(starts(run)))),
+    "slips": TrajectoryMeasure((DRIVER,), "", "slips", lambda run: float(len(slip_starts(run)))),
     "period": TrajectoryMeasure((DRIVER,), "s", "slip period", period),
     "unsteady": TrajectoryMeasure((DRIVER,), "1", SWING, unsteady),
     "peak_speed": TrajectoryMeasure((), "", "peak speed", peak_speed, like="velocity"),
@@ -116,7 +137,7 @@ TRAJECTORY_MEASURES = {
 }
 OUTPUT_MEASURES: dict[
     str, tuple[Callable[[np.ndarray], Any], str]
-] = {  # of every output that is recorded: its measure, and in words
+] = {  # of every recorded output: function and description
     "final": (lambda column: column[-1], "at the end"),
     "smallest": (np.min, "smallest at the points of the run"),
     "largest": (np.max, "largest at the points of the run"),
@@ -125,42 +146,44 @@ DEFAULT_MEASURES = ("final", "events")
 
 
 def available_measures(variables: Collection[str], ours: bool, values: Mapping[str, object]) -> list[str]:
-    """The measures that an FMU with these variables gives, with these values set; one that is not ours shows neither
-    its steps nor its modes."""
-    found = [*OUTPUT_MEASURES, "run_time"]
+    """Return the measures available for an FMU with these variables and values.
+
+    `ours` is false for external FMUs, which expose neither internal steps nor modes.
+    """
+    names = [*OUTPUT_MEASURES, "run_time"]
     if not ours:
-        return found
-    found += [name for name, (_, variable) in FINAL_MEASURES.items() if variable in variables]
+        return names
+    names += [name for name, (_, variable) in FINAL_MEASURES.items() if variable in variables]
     if {"position", "velocity"} <= set(find_roles(variables)):
         for name, path in TRAJECTORY_MEASURES.items():
-            lawful = not path.modes or values.get("friction", "hybrid") in ("hybrid", 1)
-            if lawful and set(path.needs) <= set(variables) and not (path.decay and DRIVER in variables):
-                found.append(name)
-    return found
+            has_law = not path.modes or values.get("friction", "hybrid") in ("hybrid", 1)
+            if has_law and set(path.needs) <= set(variables) and not (path.decay and DRIVER in variables):
+                names.append(name)
+    return names
 
 
-def columns(
+def measure_columns(
     measures: Iterable[str], variables: Mapping[str, Any], recorded: Iterable[str]
 ) -> tuple[MeasureColumn, ...]:
-    """The columns of measures that are offered, of an FMU with these variables, of which some are recorded."""
-    found: list[MeasureColumn] = []
+    """Return the columns of measures, for an FMU with these variables and recorded outputs."""
+    columns: list[MeasureColumn] = []
     for measure in measures:
         if measure in OUTPUT_MEASURES:
             for name in recorded:
-                variable = variables.get(name) or variables[name.partition("[")[0]]  # of an element of an array
+                variable = variables.get(name) or variables[name.partition("[")[0]]  # an array element
                 text = f"{variable.description or name} {OUTPUT_MEASURES[measure][1]}"
-                found.append(MeasureColumn(f"{measure}_{name}", variable_unit(variable), text))
+                columns.append(MeasureColumn(f"{measure}_{name}", variable_unit(variable), text))
         elif measure == "run_time":
-            found.append(MeasureColumn("run_time", "s", "run time"))
+            columns.append(MeasureColumn("run_time", "s", "run time"))
         elif measure in FINAL_MEASURES:
-            found.append(FINAL_MEASURES[measure][0])
+            columns.append(FINAL_MEASURES[measure][0])
         else:
             path = TRAJECTORY_MEASURES[measure]
             like = find_roles(variables).get(path.like) if not path.unit else None
-            found.append(MeasureColumn(measure, variable_unit(variables[like]) if like else path.unit, path.text))
-    return tuple(found)
+            columns.append(MeasureColumn(measure, variable_unit(variables[like]) if like else path.unit, path.text))
+    return tuple(columns)
 
 
 def measure_outputs(measure: str, outputs: Mapping[str, np.ndarray]) -> list[float]:
-    """A measure of every output."""
+    """Evaluate a measure for every output."""
     return [float(OUTPUT_MEASURES[measure][0](column)) for column in outputs.values()]

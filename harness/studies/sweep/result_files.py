@@ -1,13 +1,14 @@
-"""A sweep from what is asked to its files: one labelled file that xarray opens, the same as a table for pandas, and the
-figure.  The files are written block by block; sweep.nc holds
+"""Runs a sweep and writes its files: sweep.nc for xarray, sweep.csv with the same content, and the figure.
 
-    <parameter>     the values varied: a dimension of its own on a grid, over `run` in a sample; units, long_name, scale
-    <measure>       one number of each run, NaN where it failed or has none; units, long_name
-    error           why a run failed; empty if it did not
-    title, model    what was swept, and the FMU, whose digest is fmu_sha256
-    parameters      the values of all parameters that were not varied, as JSON, in the units of the FMU
-    stop_time       at which every run ended, in s
-    sample          the grid, or the kind of sample and its seed
+The files are written block by block.  Contents of sweep.nc:
+
+    <parameter>     values of a varied parameter: a dimension on a grid, over `run` in a sample; units, long_name, scale
+    <measure>       one number per run, NaN if the run failed or has no such value; units, long_name
+    error           error message of a failed run, otherwise empty
+    title, model    title and FMU; fmu_sha256 is its digest
+    parameters      JSON with the values of all other parameters, in the units of the FMU
+    stop_time       stop time of every run in s
+    sample          grid, or kind of sample and seed
 """
 
 import csv
@@ -35,7 +36,7 @@ from .journal import Block, Journal
 from .measures import MeasureColumn
 from .runner import SweepSpec, open_runner, run_spec_of
 from .sampling import SweepPoints, parse_axis
-from .study import Sweep, perform
+from .study import Sweep, run_pending
 
 FOLDER = "sweep"
 FILES = ("sweep.nc", "sweep.csv", "figure.svg")
@@ -45,7 +46,7 @@ NUMBER = re.compile(r"-?\b\d+\.?\d*(e[-+]?\d+)?")
 
 @dataclass(frozen=True)
 class SweepRequest:
-    """What the user asks for; `vary` and `values` as texts like m=1:2:11 and k=100, `options` of a Specification."""
+    """User request: `vary` and `values` are strings such as m=1:2:11 and k=100; `options` belong to a Specification."""
 
     model: str
     vary: tuple[str, ...]
@@ -59,7 +60,7 @@ class SweepRequest:
 
 @dataclass(frozen=True)
 class FailureGroup:
-    """Runs that failed alike, but for the numbers in the `sentence` of the first of them."""
+    """Number of runs with the same error message up to numbers; `sentence` and `where` are those of the first run."""
 
     runs: int
     sentence: str
@@ -68,8 +69,23 @@ class FailureGroup:
 
 @dataclass(frozen=True)
 class SweepResult:
-    """The finished sweep: its runs, where its files are, how many runs were done before, how many lines about them
-    were damaged, how the others failed, the most frequent first, and the seconds that the new ones took."""
+    """A finished sweep.
+
+    Attributes
+    ----------
+    runs
+        Number of runs.
+    folder
+        Folder of the results.
+    n_resumed
+        Number of runs taken from the journal of an interrupted sweep.
+    damaged
+        Number of damaged lines in that journal.
+    failures
+        Failed runs by kind, most frequent first.
+    seconds
+        Run time of the new runs in s.
+    """
 
     runs: int
     folder: Path
@@ -80,13 +96,26 @@ class SweepResult:
 
     @property
     def failed(self) -> int:
-        return sum(each.runs for each in self.failures)
+        return sum(failure.runs for failure in self.failures)
 
 
 @dataclass(frozen=True)
 class SweepDescription:
-    """What an FMU says of a sweep: unit and sentence of what is varied, the columns, value and unit of the parameters
-    that are not, the stop time in s, and the known boundaries."""
+    """Data of the FMU for a sweep.
+
+    Attributes
+    ----------
+    varied
+        Unit and description of each varied parameter.
+    columns
+        Measured columns.
+    constants
+        Value and unit of the other parameters.
+    stop
+        Stop time in s.
+    boundaries
+        Known boundaries in the parameter space.
+    """
 
     varied: dict[str, tuple[str, str]]
     columns: tuple[MeasureColumn, ...]
@@ -96,53 +125,53 @@ class SweepDescription:
 
 
 def run_sweep(
-    asked: SweepRequest, out: Path, scheduler: str | None, workers: int | None, report: Callable[[float], None]
+    request: SweepRequest, out: Path, scheduler: str | None, workers: int, report: Callable[[float], None]
 ) -> SweepResult:
-    """Run the sweep and write its files to out/sweep/<name>; HarnessError in one sentence."""
-    check_built(file := find_fmu(asked.model))
-    axes = tuple(parse_axis(text, asked.random is not None) for text in asked.vary)
-    names = tuple(each.name for each in axes)
+    """Run the sweep and write its files to out/sweep/<name>."""
+    check_built(file := find_fmu(request.model))
+    axes = tuple(parse_axis(text, request.random is not None) for text in request.vary)
+    names = tuple(item.name for item in axes)
     if len(set(names)) < len(names):
         raise SceneError("--vary names a parameter twice")
-    points = SweepPoints(axes, asked.random, asked.seed)
-    values, options = map(parse_assignment, asked.values), sorted(asked.options.items())
-    runs = SweepSpec(file.stem, names, tuple(values), asked.measures, tuple(options))
+    points = SweepPoints(axes, request.random, request.seed)
+    values, options = map(parse_assignment, request.values), sorted(request.options.items())
+    runs = SweepSpec(file.stem, names, tuple(values), request.measures, tuple(options))
     about = describe(runs, points, file)
     sweep = Sweep(runs, points, file.read_bytes(), len(about.columns))
-    kept = sweep.journal(out / FOLDER)
-    before = kept.n_done
-    folder = out / FOLDER / (asked.name or "-".join((runs.model, *names, sweep.key[:8])))
+    journal = sweep.journal(out / FOLDER)
+    n_resumed = journal.n_done
+    folder = out / FOLDER / (request.name or "-".join((runs.model, *names, sweep.key[:8])))
     source = describe_sources(str(file))
-    with replace_folder(folder, FILES, source) as fresh:  # from before the runs on: what is in the way is told at once
-        seconds = perform(sweep, kept, scheduler, workers, report)
-        failures = save(sweep, kept, about, fresh)
-        write_provenance(fresh, [file], about.constants, asked, source=source)
-    kept.delete()
-    return SweepResult(len(points), folder, before, kept.damaged, failures, seconds)
+    with replace_folder(folder, FILES, source) as new_folder:  # before the runs, so that conflicts are reported at once
+        seconds = run_pending(sweep, journal, scheduler, workers, report)
+        failures = write_files(sweep, journal, about, new_folder)
+        write_provenance(new_folder, [file], about.constants, request, source=source)
+    journal.delete()
+    return SweepResult(len(points), folder, n_resumed, journal.damaged, failures, seconds)
 
 
 def describe(runs: SweepSpec, points: SweepPoints, file: Path) -> SweepDescription:
-    """What the FMU says of the sweep; SceneError where it cannot be done.
+    """Return the data of the FMU for a sweep; SceneError if the sweep is invalid.
 
-    Some first runs show what is wrong with it before workers are started.
+    Up to three test runs detect problems before workers are started.
     """
-    said = read_description(file, run_spec_of(runs, file).lenient)
-    variables = {variable.name: variable for variable in said.modelVariables}
+    fmu_description = read_description(file, run_spec_of(runs, file).lenient)
+    variables = {variable.name: variable for variable in fmu_description.modelVariables}
     settable = [name for name, variable in variables.items() if is_settable(variable)]
     check_names("parameter to vary", runs.varied, settable)
-    for each in points.axes:
-        if each.name in dict(runs.values):
-            raise SceneError(f"{each.name} is both varied and set: leave one out")
-        if variables[each.name].type not in REAL_TYPES and any(value % 1 for value in each.values):
-            raise SceneError(f"{each.name} is a choice: vary it over whole numbers, as in {each.name}=1,2")
+    for axis in points.axes:
+        if axis.name in dict(runs.values):
+            raise SceneError(f"{axis.name} is both varied and set; remove one of them")
+        if variables[axis.name].type not in REAL_TYPES and any(value % 1 for value in axis.values):
+            raise SceneError(f"{axis.name} is an enumeration; vary it over integers, as in {axis.name}=1,2")
     with open_runner(runs, file) as runner:
         for number in (len(points) - 1, len(points) // 2, 0):
-            (spot,) = points.coordinates(number, number + 1).tolist()
-            measured = runner.run(spot)
+            (point,) = points.coordinates(number, number + 1).tolist()
+            measured = runner.run(point)
             if not isinstance(measured, str):
                 break
         else:
-            raise HarnessError(f"none of three runs of the sweep comes to its end: {measured}")
+            raise HarnessError(f"three test runs of the sweep failed: {measured}")
         constants = {name: value for name, value in runner.constants().items() if name not in runs.varied}
         varied = {name: (variable_unit(variables[name]), variables[name].description or name) for name in runs.varied}
         numbers = {name: value for name, (value, _) in constants.items() if isinstance(value, float)}
@@ -152,28 +181,29 @@ def describe(runs: SweepSpec, points: SweepPoints, file: Path) -> SweepDescripti
 
 
 def is_settable(variable: Any) -> bool:
-    """Whether a variable takes a number before a run."""
+    """Return whether a numeric start value of the variable can be set."""
     return variable.causality in ("parameter", "input") and variable.type not in NOT_NUMBERS and not variable.dimensions
 
 
-def save(sweep: Sweep, kept: Journal, about: SweepDescription, folder: Path) -> tuple[FailureGroup, ...]:
-    """Write the netCDF file, the table and the figure; returns how runs failed."""
+def write_files(sweep: Sweep, journal: Journal, about: SweepDescription, folder: Path) -> tuple[FailureGroup, ...]:
+    """Write the netCDF file, the table and the figure; return the failures."""
     from .figure import draw
 
-    failures, longest = counted(sweep, kept)
+    failures, longest = group_failures(sweep, journal)
     grid, names, length = sweep.points.random is None, sweep.runs.varied, len(sweep.points)
     dimensions = names if grid else ("run",)
-    sizes = {each.name: len(each.values) for each in sweep.points.axes} if grid else {"run": length}
-    letters = f"string{longest}"
+    sizes = {item.name: len(item.values) for item in sweep.points.axes} if grid else {"run": length}
+    text_dimension = f"string{longest}"
     variables = [
-        NetCDFVariable(name, (name,) if grid else ("run",), said) for name, said in labels(sweep, about).items()
+        NetCDFVariable(name, (name,) if grid else ("run",), attributes_of)
+        for name, attributes_of in axis_attributes(sweep, about).items()
     ]
-    where: dict[str, str] = {} if grid else {"coordinates": " ".join(names)}
+    coordinates: dict[str, str] = {} if grid else {"coordinates": " ".join(names)}
     for column in about.columns:
-        said = {"units": column.unit or "1", "long_name": column.text}
-        variables.append(NetCDFVariable(column.name, dimensions, said | where))
-    said = {"long_name": "why a run failed; empty if it did not", "_Encoding": "utf-8"}
-    variables.append(NetCDFVariable("error", (*dimensions, letters), said | where, longest))
+        attributes_of = {"units": column.unit or "1", "long_name": column.text}
+        variables.append(NetCDFVariable(column.name, dimensions, attributes_of | coordinates))
+    attributes_of = {"long_name": "error message of a failed run, otherwise empty", "_Encoding": "utf-8"}
+    variables.append(NetCDFVariable("error", (*dimensions, text_dimension), attributes_of | coordinates, longest))
     attributes: dict[str, str | float] = {
         "title": f"{sweep.runs.model} over {', '.join(names)}",
         "model": sweep.runs.model,
@@ -186,56 +216,56 @@ def save(sweep: Sweep, kept: Journal, about: SweepDescription, folder: Path) -> 
         (folder / "sweep.nc").open("wb") as file,
         (folder / "sweep.csv").open("w", encoding="utf-8", newline="") as text,
     ):
-        data = NetCDFWriter(file, sizes | {letters: longest}, variables, attributes)
+        data = NetCDFWriter(file, sizes | {text_dimension: longest}, variables, attributes)
         table = csv.writer(text, lineterminator="\n")
-        heads = [(each.name, str(each.attributes.get("units", "1"))) for each in variables]
+        heads = [(item.name, str(item.attributes.get("units", "1"))) for item in variables]
         table.writerow([column_heading(name, "" if size == "1" else size) for name, size in heads])
-        for each in sweep.points.axes if grid else ():
-            data.write_values(each.name, 0, np.array(each.values))
-        for block in kept.blocks():
-            spots = sweep.points.coordinates(block.first, block.last)
-            for name, column in zip(names, () if grid else spots.T, strict=not grid):
+        for item in sweep.points.axes if grid else ():
+            data.write_values(item.name, 0, np.array(item.values))
+        for block in journal.blocks():
+            points = sweep.points.coordinates(block.first, block.last)
+            for name, column in zip(names, () if grid else points.T, strict=not grid):
                 data.write_values(name, block.first, column)
             for column, values in zip(about.columns, block.values.T, strict=True):
                 data.write_values(column.name, block.first, values)
             data.write_values("error", block.first, np.array([sentence.encode() for sentence in messages(block)]))
-            table.writerows(rows(spots, block))
-    draw(folder / "sweep.nc", folder / "figure.svg", about.boundaries, sum(each.runs for each in failures))
+            table.writerows(csv_rows(points, block))
+    draw(folder / "sweep.nc", folder / "figure.svg", about.boundaries, sum(item.runs for item in failures))
     return failures
 
 
-def labels(sweep: Sweep, about: SweepDescription) -> dict[str, dict[str, str]]:
-    """The attributes of what is varied."""
-    found = {}
-    for each in sweep.points.axes:
-        size, text = about.varied[each.name]
-        found[each.name] = {"units": size or "1", "long_name": text, "scale": "log" if each.log else "linear"}
-    return found
+def axis_attributes(sweep: Sweep, about: SweepDescription) -> dict[str, dict[str, str]]:
+    """Return the netCDF attributes of the varied parameters."""
+    attributes = {}
+    for axis in sweep.points.axes:
+        size, text = about.varied[axis.name]
+        attributes[axis.name] = {"units": size or "1", "long_name": text, "scale": "log" if axis.log else "linear"}
+    return attributes
 
 
 def messages(block: Block) -> list[str]:
-    """Why each run of a block failed."""
+    """Return the error message of each run of a block, empty for successful runs."""
     return [block.messages.get(i, "") for i in range(len(block.values))]
 
 
-def rows(spots: np.ndarray, block: Block) -> Any:
-    """The rows of a block in the table; what there is not is empty."""
-    values = np.column_stack([spots, block.values]).astype(object)
+def csv_rows(points: np.ndarray, block: Block) -> Any:
+    """Return the CSV rows of a block; missing values are empty."""
+    values = np.column_stack([points, block.values]).astype(object)
     values[values != values] = None
     return ([*row, sentence] for row, sentence in zip(values, messages(block), strict=True))
 
 
-def counted(sweep: Sweep, kept: Journal) -> tuple[tuple[FailureGroup, ...], int]:
-    """How runs failed, the most frequent first, and the bytes of the longest sentence, one at least."""
+def group_failures(sweep: Sweep, journal: Journal) -> tuple[tuple[FailureGroup, ...], int]:
+    """Return the failures, most frequent first, and the length in bytes of the longest message (at least 1)."""
     runs: Counter[str] = Counter()
-    first: dict[str, FailureGroup] = {}
+    examples: dict[str, FailureGroup] = {}
     longest = 1
-    for block in kept.blocks():
-        for place, sentence in block.messages.items():
-            kind = NUMBER.sub("#", sentence)
-            runs[kind] += 1
+    for block in journal.blocks():
+        for offset, sentence in block.messages.items():
+            pattern = NUMBER.sub("#", sentence)
+            runs[pattern] += 1
             longest = max(longest, len(sentence.encode()))
-            if kind not in first:
-                (spot,) = sweep.points.coordinates(block.first + place, block.first + place + 1)
-                first[kind] = FailureGroup(0, sentence, dict(zip(sweep.runs.varied, spot.tolist(), strict=True)))
-    return tuple(replace(first[kind], runs=count) for kind, count in runs.most_common()), longest
+            if pattern not in examples:
+                (point,) = sweep.points.coordinates(block.first + offset, block.first + offset + 1)
+                examples[pattern] = FailureGroup(0, sentence, dict(zip(sweep.runs.varied, point.tolist(), strict=True)))
+    return tuple(replace(examples[pattern], runs=count) for pattern, count in runs.most_common()), longest

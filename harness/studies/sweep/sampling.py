@@ -1,4 +1,4 @@
-"""The points of a sweep: every combination on a grid, or a Latin hypercube between the bounds."""
+"""Points of a sweep: a full grid, or a Latin hypercube."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +14,7 @@ VARY_HELP = "as in m=1:2:11, k=10:1000:31:log, mu=0.1,0.2,0.4 or, with --random,
 
 @dataclass(frozen=True)
 class SweepAxis:
-    """A parameter and its `values` on the axis, or, for a random sample, its two bounds; `log`: evenly in ratio."""
+    """A parameter with its `values`, or with its two bounds for a random sample; `log`: logarithmic spacing."""
 
     name: str
     values: tuple[float, ...]
@@ -22,47 +22,47 @@ class SweepAxis:
 
 
 def parse_axis(text: str, random: bool) -> SweepAxis:
-    """The axis that a text names; SceneError if it does not name one."""
+    """Parse the argument of --vary; SceneError if it is invalid."""
     name, _, span = text.partition("=")
     name = name.strip()
-    wrong = SceneError(f"--vary {text[:MAX_VALUE_LENGTH]} is not understood; write it {VARY_HELP}")
+    invalid = SceneError(f"--vary {text[:MAX_VALUE_LENGTH]} is invalid; write it {VARY_HELP}")
     words = span.split(":")
-    ratio = words[-1] == "log"
-    words = words[: len(words) - ratio]
+    is_log = words[-1] == "log"
+    words = words[: len(words) - is_log]
     try:
         if "," in span:
             values = tuple(map(float, span.split(",")))
         elif len(words) == 2 and random:
             values = (float(words[0]), float(words[1]))
         elif len(words) == 3 and not random:
-            values = evenly_spaced(float(words[0]), float(words[1]), int(words[2]), ratio)
+            values = evenly_spaced(float(words[0]), float(words[1]), int(words[2]), is_log)
         else:
-            raise wrong
+            raise invalid
     except (ValueError, OverflowError):
-        raise wrong from None
+        raise invalid from None
     if not name or not all(map(isfinite, values)) or (random and ("," in span or not values[0] < values[1])):
-        raise wrong
-    if ratio and not min(values) > 0:
+        raise invalid
+    if is_log and not min(values) > 0:
         raise SceneError(f"--vary {text}: a logarithmic axis needs bounds above 0")
     if len(set(values)) < len(values):
-        raise SceneError(f"--vary {text} names a value twice")
-    return SweepAxis(name, values, ratio)
+        raise SceneError(f"--vary {text}: a value occurs twice")
+    return SweepAxis(name, values, is_log)
 
 
 def evenly_spaced(low: float, high: float, count: int, ratio: bool) -> tuple[float, ...]:
-    """`count` values from low to high, both included."""
+    """Return `count` values from low to high, both included."""
     if not 1 <= count <= MAX_RUNS:
         raise ValueError
     if ratio and low > 0 and high > 0:
         return tuple(np.geomspace(low, high, count).tolist())
-    with np.errstate(all="ignore"):  # what is not finite then is refused
+    with np.errstate(all="ignore"):  # the caller rejects values that are not finite
         return tuple(np.linspace(low, high, count).tolist())
 
 
 @dataclass(frozen=True)
 class SweepPoints:
-    """The points of a sweep: the grid of its axes with the last one fastest, made where it is asked for, or `random`
-    points of a Latin hypercube, which are all held.
+    """The points of a sweep: a grid, computed on demand with the last axis fastest, or `random` points of a Latin
+    hypercube, held in memory.
 
     M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979).
     """
@@ -73,24 +73,24 @@ class SweepPoints:
 
     def __post_init__(self) -> None:
         if len(self) > MAX_RUNS:
-            raise SceneError(f"{len(self)} runs are more than {MAX_RUNS}; take fewer values")
+            raise SceneError(f"{len(self)} runs exceed the maximum of {MAX_RUNS}; reduce the number of values")
 
     def __len__(self) -> int:
-        return prod(len(each.values) for each in self.axes) if self.random is None else self.random
+        return prod(len(axis.values) for axis in self.axes) if self.random is None else self.random
 
     def coordinates(self, first: int, last: int) -> np.ndarray:
-        """Those from number `first` to before `last`, (last - first, axes)."""
+        """Return the points from number `first` to before `last`, (last - first, axes)."""
         if self.random is not None:
             return self.sample[first:last]
-        places = np.unravel_index(np.arange(first, last), [len(each.values) for each in self.axes])
-        return np.column_stack([np.array(each.values)[at] for each, at in zip(self.axes, places, strict=True)])
+        indices = np.unravel_index(np.arange(first, last), [len(axis.values) for axis in self.axes])
+        return np.column_stack([np.array(axis.values)[index] for axis, index in zip(self.axes, indices, strict=True)])
 
     @cached_property
     def sample(self) -> np.ndarray:
         from scipy.stats import qmc
 
-        spots: np.ndarray = qmc.LatinHypercube(len(self.axes), rng=self.seed).random(self.random)
-        for each, column in zip(self.axes, spots.T, strict=True):
-            low, high = map(log, each.values) if each.log else each.values
-            column[:] = np.exp(low + column * (high - low)) if each.log else low + column * (high - low)
-        return spots
+        points: np.ndarray = qmc.LatinHypercube(len(self.axes), rng=self.seed).random(self.random)
+        for axis, column in zip(self.axes, points.T, strict=True):
+            low, high = map(log, axis.values) if axis.log else axis.values
+            column[:] = np.exp(low + column * (high - low)) if axis.log else low + column * (high - low)
+        return points

@@ -1,8 +1,8 @@
-"""What happens over many parameters: one FMU, many points, many workers, and a journal that survives a kill.
+"""Runs a sweep: one FMU, many points, many workers, and a journal that survives a kill.
 
-Every block of runs that is finished is written to the journal beside the results, so the same command after an
-interruption does only what is left.  The rows do not depend on who ran them, nor in which order, and no more of them
-is held in memory than a worker has under way.  A run during which its worker dies is found by halves, and told.
+Every finished block of runs is written to the journal, so that the same command resumes an interrupted sweep.  Results
+do not depend on the worker or the order of execution, and only the blocks in progress are held in memory.  A run that
+kills its worker is located by bisection and reported.
 """
 
 import json
@@ -29,17 +29,17 @@ from .sampling import SweepPoints
 from .worker import BlockResult, run_block, unload
 
 MAX_BLOCK_SIZE = 10_000  # runs
-BLOCK_TIME = 0.5  # s that a block is to take
-SHARES = 4  # blocks that each worker is to have at least, so that none waits for the last one
+BLOCK_TIME = 0.5  # target run time of a block in s
+SHARES = 4  # minimum number of blocks per worker, to balance the load
 MAX_DEATHS = 200
 WORKER_DIED = "the process died in this run"
 
-Span = tuple[int, int]  # numbers of runs: the first, and the one behind the last
+Span = tuple[int, int]  # range of runs: first, and one after the last
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The `runs` at `points`; a row has so many `columns`."""
+    """A sweep: `runs` at `points` with the FMU as bytes; each run has `columns` values."""
 
     runs: SweepSpec
     points: SweepPoints
@@ -48,40 +48,40 @@ class Sweep:
 
     @cached_property
     def digest(self) -> str:
-        """SHA-256 of the FMU, in hexadecimal."""
+        """Return the SHA-256 of the FMU in hexadecimal."""
         return sha256(self.fmu).hexdigest()
 
     @cached_property
     def key(self) -> str:
-        """What tells this sweep from any other."""
-        whole = [asdict(self.runs), asdict(self.points), self.digest]
-        return sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()[:16]
+        """Return a key that identifies the sweep."""
+        identity = [asdict(self.runs), asdict(self.points), self.digest]
+        return sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:16]
 
     def journal(self, folder: Path) -> Journal:
         return Journal(folder / f".{self.key}.journal", len(self.points), self.columns)
 
 
-def perform(
-    sweep: Sweep, kept: Journal, scheduler: str | None, workers: int | None, report: Callable[[float], None]
+def run_pending(
+    sweep: Sweep, journal: Journal, scheduler: str | None, workers: int, report: Callable[[float], None]
 ) -> float:
-    """Do the runs that are left, into the journal; returns what that took, in s, the start of the workers included."""
-    begun = perf_counter()
-    left = kept.missing_spans
-    if not left:
+    """Do the remaining runs and write them to the journal; return the elapsed time in s."""
+    start = perf_counter()
+    pending = journal.missing_spans
+    if not pending:
         return 0.0
     try:
-        with open_workers(scheduler, workers, sum(last - first for first, last in left)) as hands, kept.open():
-            for block in Dispatcher(sweep, hands, left).completed_blocks():
-                kept.add(block)
-                report(kept.n_done / len(sweep.points))
-    except BaseException as error:  # what an interrupt makes fail may say anything
+        with open_workers(scheduler, workers, sum(last - first for first, last in pending)) as pool, journal.open():
+            for block in Dispatcher(sweep, pool, pending).completed_blocks():
+                journal.add(block)
+                report(journal.n_done / len(sweep.points))
+    except BaseException as error:  # an interrupt may cause any exception
         if not (RECEIVED_SIGNALS or isinstance(error, KeyboardInterrupt)):
             raise
-        if not kept.n_done:
-            kept.delete()
-        state = f"{kept.n_done} of {len(sweep.points)} runs are kept"
-        raise CommandInterruptedError(f"interrupted: {state}; the same command does the rest") from None
-    return perf_counter() - begun
+        if not journal.n_done:
+            journal.delete()
+        state = f"{journal.n_done} of {len(sweep.points)} runs are finished"
+        raise CommandInterruptedError(f"interrupted: {state}; repeat the command to resume") from None
+    return perf_counter() - start
 
 
 class InProcess:
@@ -105,13 +105,11 @@ class InProcess:
 
 
 @contextmanager
-def open_workers(
-    scheduler: str | None, workers: int | None, runs: int
-) -> Iterator[WorkerPool | DaskCluster | InProcess]:
-    """Those who do the runs: processes of this machine, or the cluster of a scheduler."""
+def open_workers(scheduler: str | None, workers: int, runs: int) -> Iterator[WorkerPool | DaskCluster]:
+    """Open the workers: processes on this machine, or the cluster of a scheduler."""
     if scheduler is not None:
-        with connect_cluster(scheduler, unload) as found:
-            yield found
+        with connect_cluster(scheduler, unload) as connection:
+            yield connection
         return
     if workers is None:
         try:
@@ -120,84 +118,88 @@ def open_workers(
             unload()
         return
     with temporary_directory("sweep-") as folder:
-        hands = WorkerPool(min(workers, runs), folder, [BlockResult.__module__])
+        pool = WorkerPool(min(workers, runs), folder, [BlockResult.__module__])
         try:
-            yield hands
+            yield pool
         finally:
-            hands.kill()
+            pool.kill()
 
 
 class Dispatcher:
-    """The runs of a sweep on their way through the workers, in blocks that grow until each takes half a second."""
+    """Distributes the runs of a sweep to workers, in blocks that grow until each takes half a second."""
 
-    def __init__(self, sweep: Sweep, hands: WorkerPool | DaskCluster | InProcess, left: list[Span]) -> None:
-        self.sweep, self.hands, self.left = sweep, hands, left[::-1]
+    def __init__(self, sweep: Sweep, workers: WorkerPool | DaskCluster, pending: list[Span]) -> None:
+        self.sweep, self.workers, self.pending = sweep, workers, pending[::-1]
         self.size = 1
-        self.busy: dict[Future[BlockResult | None], Span] = {}
-        self.suspects: list[Span] = []  # blocks during which a worker died
-        self.alone = False  # whether one of these is tried, with nothing beside it
+        self.running: dict[Future[BlockResult | None], Span] = {}
+        self.suspects: list[Span] = []  # blocks in which a worker died
+        self.is_isolated = False  # whether a suspect runs, with no other block
         self.deaths = 0
 
     def completed_blocks(self) -> Iterator[Block]:
-        """The blocks as workers finish them."""
-        while self.left or self.suspects or self.busy:
+        """Yield blocks as workers finish them."""
+        while self.pending or self.suspects or self.running:
             check_interrupt()
             self.dispatch()
-            for future in self.hands.wait_for_any(self.busy):
-                yield from self.handle_result(future, self.busy.pop(future))
+            for future in self.workers.wait_for_any(self.running):
+                yield from self.handle_result(future, self.running.pop(future))
 
     def dispatch(self) -> None:
-        """Give the workers what they can do, and one block more each."""
-        while not self.alone and len(self.busy) < 2 * max(1, self.hands.size):
-            if self.suspects and not self.busy:
-                self.alone = True
+        """Keep every worker busy, with one block in reserve."""
+        while not self.is_isolated and len(self.running) < 2 * max(1, self.workers.size):
+            if self.suspects and not self.running:
+                self.is_isolated = True
                 self.submit_block(self.suspects.pop())
-            elif self.left and not self.suspects:
-                self.submit_block(self.next())
+            elif self.pending and not self.suspects:
+                self.submit_block(self.next_span())
             else:
                 return
 
-    def next(self) -> Span:
-        """The next block of those that are left."""
-        first, last = self.left.pop()
-        share = sum(last - first for first, last in [*self.left, (first, last)]) // (SHARES * max(1, self.hands.size))
+    def next_span(self) -> Span:
+        """Return the next block of the remaining runs."""
+        first, last = self.pending.pop()
+        share = sum(last - first for first, last in [*self.pending, (first, last)]) // (
+            SHARES * max(1, self.workers.size)
+        )
         end = min(last, first + max(1, min(self.size, share)))
         if end < last:
-            self.left.append((end, last))
+            self.pending.append((end, last))
         return first, end
 
     def submit_block(self, span: Span, fmu: bytes = b"") -> None:
         sweep = self.sweep
-        self.busy[self.hands.submit(run_block, sweep.points.coordinates(*span), sweep.runs, sweep.digest, fmu)] = span
+        self.running[self.workers.submit(run_block, sweep.points.coordinates(*span), sweep.runs, sweep.digest, fmu)] = (
+            span
+        )
 
     def handle_result(self, future: "Future[BlockResult | None]", span: Span) -> Iterator[Block]:
-        """What has become of a block."""
+        """Handle a finished block, or the death of its worker."""
         first, last = span
         try:
-            found = future.result()
-        except self.hands.death_errors:
-            if self.alone and last - first == 1:
+            result = future.result()
+        except self.workers.death_errors:
+            if self.is_isolated and last - first == 1:
                 self.requeue([])
                 yield Block(first, np.full((1, self.sweep.columns), np.nan), {0: WORKER_DIED})
             else:
                 middle = (first + last) // 2
-                self.requeue([(first, middle), (middle, last)] if self.alone else [span])
+                self.requeue([(first, middle), (middle, last)] if self.is_isolated else [span])
         except HarnessError:
             raise
-        except Exception as error:  # whatever kept a worker from working: no harness there, no memory
+        except Exception as error:  # such as a missing package or lack of memory
             raise HarnessError(f"a worker failed: {type(error).__name__}: {error}") from None
         else:
-            if found is None:
+            if result is None:
                 self.submit_block(span, self.sweep.fmu)
                 return
-            self.alone = False
-            taken = max(found.seconds, 1e-9)
-            self.size = max(1, min(MAX_BLOCK_SIZE, 10 * self.size, round((last - first) / taken * BLOCK_TIME)))
-            yield Block(first, found.values, found.messages)
+            self.is_isolated = False
+            elapsed = max(result.seconds, 1e-9)
+            self.size = max(1, min(MAX_BLOCK_SIZE, 10 * self.size, round((last - first) / elapsed * BLOCK_TIME)))
+            yield Block(first, result.values, result.messages)
 
     def requeue(self, spans: list[Span]) -> None:
-        """A worker has died: what it had under way is to be done again."""
-        self.alone, self.deaths = False, self.deaths + 1
+        """Put the blocks of a dead worker back into the queue."""
+        self.is_isolated, self.deaths = False, self.deaths + 1
         if self.deaths > MAX_DEATHS:
-            raise HarnessError(f"workers died {self.deaths} times; the same command goes on where this one ends")
+            raise HarnessError(f"workers died {self.deaths} times; repeat the command to resume")
         self.suspects += spans

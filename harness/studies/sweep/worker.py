@@ -1,4 +1,4 @@
-"""What a worker does: run a block of points with the instance that it keeps."""
+"""Worker of a sweep: runs blocks of points with a loaded FMU instance."""
 
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -10,15 +10,24 @@ import numpy as np
 from ...process.temporary_directory import temporary_directory
 from .runner import Runner, SweepSpec, open_runner
 
-BUSY = Lock()  # an FMU of pythonfmu is one thread's at a time
-LOADED: dict[tuple[SweepSpec, str], Runner] = {}  # the instance of the present sweep
-HELD = ExitStack()  # what frees it
+BUSY = Lock()  # a pythonfmu FMU must be used by one thread at a time
+LOADED: dict[tuple[SweepSpec, str], Runner] = {}  # the runner of the current sweep
+RESOURCES = ExitStack()  # its resources
 
 
 @dataclass(frozen=True)
 class BlockResult:
-    """The measures of a block, (runs, columns), NaN where a run failed; the sentences of these, by their place; and
-    what the runs took, in s."""
+    """Results of a block.
+
+    Attributes
+    ----------
+    values : (runs, columns)
+        Measures; NaN for failed runs.
+    messages
+        Error messages by index in the block.
+    seconds
+        Run time in s.
+    """
 
     values: np.ndarray
     messages: dict[int, str]
@@ -26,14 +35,14 @@ class BlockResult:
 
 
 def run_block(points: np.ndarray, runs: SweepSpec, digest: str, fmu: bytes) -> BlockResult | None:
-    """The work on a block, with the FMU of that digest; None if it is neither held nor given."""
+    """Run a block with the FMU of a digest; return None if the FMU is neither loaded nor passed."""
     with BUSY:
         runner = LOADED.get((runs, digest))
         if not runner:
             if not fmu:
                 return None
             runner = load(runs, digest, fmu)
-        begun = perf_counter()
+        start = perf_counter()
         values, messages = np.full((len(points), len(runner.columns)), np.nan), {}
         for i, point in enumerate(points.tolist()):
             measured = runner.run(point)
@@ -41,21 +50,21 @@ def run_block(points: np.ndarray, runs: SweepSpec, digest: str, fmu: bytes) -> B
                 messages[i] = measured
             else:
                 values[i] = measured
-        return BlockResult(values, messages, perf_counter() - begun)
+        return BlockResult(values, messages, perf_counter() - start)
 
 
 def load(runs: SweepSpec, digest: str, fmu: bytes) -> Runner:
-    """The runner of another sweep; the one before is freed."""
+    """Load the runner of another sweep and free the previous one."""
     free()
-    file = HELD.enter_context(temporary_directory("sweep-")) / f"{runs.model}.fmu"
+    file = RESOURCES.enter_context(temporary_directory("sweep-")) / f"{runs.model}.fmu"
     file.write_bytes(fmu)
-    LOADED[runs, digest] = found = HELD.enter_context(open_runner(runs, file))
-    return found
+    LOADED[runs, digest] = runner = RESOURCES.enter_context(open_runner(runs, file))
+    return runner
 
 
 def free() -> None:
     LOADED.clear()
-    HELD.close()
+    RESOURCES.close()
 
 
 def unload() -> None:
