@@ -52,6 +52,11 @@ FMUS = (
 @click.option(
     "--out", type=click.Path(path_type=Path), help="Output folder; by default fmus, or the folder of FILE.py."
 )
+@click.option(
+    "--release",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Write one zip file with the FMUs of every kind, the live page, references, licences and checksums.",
+)
 @click.version_option(__version__, prog_name="friction-fmus", message="%(prog)s %(version)s")
 def main(
     models: tuple[str, ...],
@@ -71,6 +76,11 @@ def main(
     gc.disable()  # objects of a build live until its end; collecting garbage takes a tenth of the build time
     if web and (compiled or platforms or fmi == "3"):
         raise CommandLineError("--web writes a page, not FMUs: remove --native, --platform and --fmi 3.")
+    if release is not None:
+        if models or compiled or web or methods or laws or platforms or out or fmi == "3":
+            raise CommandLineError("--release builds everything: remove the other options and models.")
+        print_summary(release_archive(release))
+        return
     compiled, kind = compiled or fmi == "3", "native/fmi3" if fmi == "3" else "native" if compiled else ""
     try:
         sources = {model: find_model(model) for model in models or model_names()}
@@ -104,7 +114,7 @@ def main(
         print_summary(path, weight)
 
 
-def show_progress(what: str) -> AbstractContextManager[object]:
+def show_progress(what: str) -> AbstractContextManager[Any]:
     """Show a status message at the terminal while the block runs."""
     from rich.console import Console
 

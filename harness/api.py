@@ -518,7 +518,7 @@ def record_from(source: Any, x: Any, columns: Any) -> "Record":
     """Return the record in a DataFrame, a trajectory or two arrays."""
     import numpy as np
 
-    from .records.columns import record_of
+    from .records.columns import parse_record
     from .records.table_files import Table
     from .running.trajectory import Trajectory
 
@@ -547,7 +547,7 @@ def record_from(source: Any, x: Any, columns: Any) -> "Record":
         if column.ndim != 1 or len(column) != len(next(iter(table.values()))):
             raise SceneError(f"{each} has the shape {column.shape}: times and samples must be equally long rows")
         cells.append(column.astype(float) if column.dtype.kind in "fiub" else [str(cell) for cell in column])
-    return record_of(Table(name, tuple(heads.values()), tuple(cells)), columns, name)
+    return parse_record(Table(name, tuple(heads.values()), tuple(cells)), columns, name)
 
 
 def stored_run(folder: Path) -> "Trajectory":

@@ -59,3 +59,18 @@ def check_names(category: str, names: Iterable[str], allowed: Collection[str]) -
     for name in names:
         if name not in allowed:
             raise SceneError(unknown_name_message(category, name, allowed))
+
+
+def optional(package: str, purpose: str, extra: str) -> Any:
+    """Import an optional package.
+
+    Raises
+    ------
+    HarnessError
+        If the package is not installed; the message names the extra that installs it.
+    """
+    try:
+        return import_module(package)
+    except ModuleNotFoundError:
+        install = f"python -m pip install 'friction-fmus[{extra}]'"
+        raise HarnessError(f"{purpose} needs {package}, which is not installed: {install}") from None

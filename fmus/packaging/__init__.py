@@ -1,7 +1,8 @@
 """Build-time package: turns a declared model into an FMU file."""
 
 # The only definition of the version; pyproject.toml and every model description read it.
-__version__ = "0.1.0"
+__version__ = "0.2.0"
+__date__ = "2026-11-22"  # of this version; FMUs that are built without SOURCE_DATE_EPOCH carry it
 
 
 class BuildError(Exception):

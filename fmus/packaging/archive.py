@@ -82,8 +82,10 @@ def build(
 
 
 def build_date() -> datetime:
-    """Return the build date: SOURCE_DATE_EPOCH (https://reproducible-builds.org), or a constant."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
+    """Return the build date: SOURCE_DATE_EPOCH (https://reproducible-builds.org), or the date of this version."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH")
+    if epoch is None:
+        return datetime.fromisoformat(__date__).replace(tzinfo=UTC)
     latest = int(LATEST.timestamp())
     if not (epoch.isascii() and epoch.isdigit() and int(epoch) <= latest):
         raise BuildError(f"SOURCE_DATE_EPOCH must be a whole number of seconds from 0 to {latest}, got {epoch!r}.")

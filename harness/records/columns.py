@@ -103,7 +103,11 @@ def read_record(source: str, columns: ColumnOptions, name: str) -> Record:
     SceneError
         If the file contains no record.
     """
-    table = load_table(source, columns.names)
+    return parse_record(load_table(source, columns.names), columns, name)
+
+
+def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
+    """Return the record in a table; raise SceneError if it contains none."""
     if len(table.column_headings) < 2:
         raise SceneError(f"{table.name} has only one column that is not empty; time and position are required")
     if not any(table.column_headings):

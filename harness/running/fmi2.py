@@ -279,10 +279,16 @@ def record_run(plan: RunPlan, fmu: Any, report: ProgressCallback, repeat_index: 
                 point += 1
             if start + point * grid < stop - tolerance:
                 target = start + point * grid
-        if follow and reals[next_at] <= target + tolerance:
+        if signals:
+            target = min(target, signals.next_jump(t))
+        # an input that was set at an event restarts the solver there, up to a rounding before it
+        passed = signals is not None and reals[next_at] <= t + tolerance
+        if follow and reals[next_at] <= target + tolerance and not passed:
             target, ends = min(reals[next_at], stop), True
         if not target > t:
             raise HarnessError(f"{plan.spec.fmu.name}: solver.t_next = {target!r} s is not after t = {t!r} s")
+        if signals:
+            signals.apply(0.5 * (t + target))
         status = do_step(component, t, target - t, 1)
         if status > WARNING:
             raise FMICallException("fmi2DoStep", status)

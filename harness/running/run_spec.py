@@ -32,6 +32,8 @@ class RunSpec:
         Outputs to record.
     values : mapping
         Values to set by variable name; enumerations by label or number.
+    inputs : mapping
+        Table of input signals: the column "time" in s and one column for each input.
     start, stop : float or None
         Start and stop in s; None for those of the FMU.
     grid : float or None
@@ -87,6 +89,7 @@ def spec_from_scene(scene: Scene) -> RunSpec:
             raise SceneError(f"{name} is set twice, in [values] and by its key: remove one")
     equal_steps = DEFAULT_EQUAL_STEPS if scene.follow is None else 0
     derived: dict[str, Any] = {
+        "inputs": {},
         "fmu": scene.file,
         "values": by_key | scene.values,
         "equal_steps": equal_steps,

@@ -226,7 +226,7 @@ class Trajectory:
             )
         return value
 
-    def save(self, directory: Path) -> None:
+    def write_tables(self, directory: Path) -> None:
         """Write trajectory.csv, and steps.csv and events.csv if there are steps and events."""
         write_signals(directory / "trajectory.csv", self.time, self.columns, self.units)
         if self.steps:

@@ -243,6 +243,6 @@ def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
 @pytest.mark.parametrize("name", MODELS)
 def test_hot_objects_have_fewer_attributes_than_the_inline_limit_of_cpython(name, fmus):
     """Thirty of them, and a step takes a tenth longer (3.11)."""
-    march = load_model_class(fmus / f"{name}.fmu")().solver
+    solver = load_model_class(fmus / f"{name}.fmu")().solver
     sizes = {type(each).__name__: len(vars(each)) for each in (solver, solver.step, solver.step.interpolant)}
     assert max(sizes.values()) < 30, sizes

@@ -13,7 +13,12 @@ from .refinement_run import StepRefusedError, TerminatedError, TimeGrid
 
 
 def cosimulate(
-    fmu: Any, version: str, span: TimeGrid, record: Callable[[float], None], report_progress: Callable[..., Any]
+    fmu: Any,
+    version: str,
+    span: TimeGrid,
+    record: Callable[[float], None],
+    report_progress: Callable[..., Any],
+    signals: InputSignals | None = None,
 ) -> None:
     """Step from start to stop and record rows.
 
@@ -30,10 +35,14 @@ def cosimulate(
     is_even = abs(start + count * h - stop) < 1e-6 * h  # otherwise the last step is shorter
     count += start + count * h < stop and not is_even
     t = start
+    if signals:
+        signals.apply(t, after_event=True)
     record(t)
     for i in range(1, count + 1):
         target = stop if i == count else start + i * h
         report_progress(span.progress(t))
+        if signals:
+            signals.apply(0.5 * (t + target))
         try:
             step(fmu, t, h if is_even else target - t)  # an FMU with a fixed step may compare the step exactly
         except TerminatedError as error:
@@ -41,6 +50,8 @@ def cosimulate(
                 record(error.t)
             raise
         t = target
+        if signals:
+            signals.apply(t, after_event=True)
         record(t)
 
 

@@ -115,11 +115,12 @@ class ExternalFmu:
         initialize(fmu, description, request.values, request.start, request.stop, tolerance)
         record = RowRecorder(fmu, description.fmiVersion, self.variables, path, self.strings).record
         times, report_progress = TimeGrid(request.start, request.stop, h), self.watchdog.report_progress
+        signals = self.input_signals(fmu)
         try:
             if request.exchange:
-                integrate(fmu, description, times, tolerance, record, report_progress)
+                integrate(fmu, description, times, tolerance, record, report_progress, signals)
             else:
-                cosimulate(fmu, description.fmiVersion, times, record, report_progress)
+                cosimulate(fmu, description.fmiVersion, times, record, report_progress, signals)
         except (TerminatedError, StepRefusedError):
             # after any other failure the next call may crash; the exit frees the instance
             fmu.freeInstance()

@@ -56,6 +56,7 @@ def integrate(
     rtol: float,
     record: Callable[[float], None],
     report_progress: Callable[..., Any],
+    signals: InputSignals | None = None,
 ) -> None:
     """Integrate and record rows at equidistant points, and before and after each event.
 
@@ -66,6 +67,8 @@ def integrate(
     """
     start, stop, h = span.start, span.stop, span.h
     is_fmi2 = description.fmiVersion == "2.0"
+    if signals:
+        signals.apply(start, after_event=True)
     update = fmu.newDiscreteStates if is_fmi2 else fmu.updateDiscreteStates
     next_event = update_discrete_states(update, start)
     fmu.enterContinuousTimeMode()
@@ -79,7 +82,7 @@ def integrate(
         get_z=fmu.getEventIndicators,
         get_nominals=fmu.getNominalsOfContinuousStates,
         set_time=fmu.setTime,
-        input=Input(fmu, description, None),
+        input=signals or Input(fmu, description, None),
         startTime=start,
         maxStep=(stop - start) / 50,
         relativeTolerance=rtol,
@@ -90,10 +93,13 @@ def integrate(
     record(t)
     while t < stop:
         target = stop if point >= count else start + point * h
-        goal = min(target, next_event)
+        jump = signals.next_jump(t) if signals else inf
+        goal = min(target, next_event, jump)
         event, _, reached = solver.step(t, goal)
         previous, t = t, goal if abs(reached - goal) <= tolerance else reached
         fmu.setTime(t)
+        if signals:
+            signals.apply(t)
         report_progress(span.progress(t))
         stepped = terminated = False
         if description.modelExchange.needsCompletedIntegratorStep:
@@ -101,8 +107,10 @@ def integrate(
         record(t)
         if terminated:
             raise TerminatedError(t, "it returned terminateSimulation from a completed step")
-        if event or stepped or t >= next_event:
+        if event or stepped or t >= min(next_event, jump):
             fmu.enterEventMode()
+            if signals:
+                signals.apply(t, after_event=True)
             next_event = update_discrete_states(update, t)
             fmu.enterContinuousTimeMode()
             solver.reset(t)

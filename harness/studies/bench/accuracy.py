@@ -68,7 +68,7 @@ def exact_run_error(model: str, read_info: FmuInfo) -> Benchmark:
 
 def default_run_error(model: str, read_info: FmuInfo, name: str, value: float | str, target: float) -> Benchmark:
     """Measure the error with the default method and tolerance of the model."""
-    baseline = Baseline("scipy Radau at 1e-11" if equations_of(model).stiff else "scipy DOP853 at 1e-13")
+    baseline = Baseline("scipy Radau at 1e-11" if equations_of(model).is_stiff else "scipy DOP853 at 1e-13")
     return Benchmark(
         f"{model}, default, {name} {value}", max_error(model, read_info, {name: value}), "1", target, (baseline,)
     )

@@ -21,14 +21,16 @@ FILE_SUFFIXES = (".csv", ".txt", ".mat", ".xlsx", ".ods", ".npz")
 RUN_SUFFIXES = (".fmu", ".py", ".toml")  # sources that are run
 
 
-def load_both(sources: tuple[str, str], options: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
-    """Load the trajectories of two folders, files, FMUs or scenes.
+def load_both(sources: Sequence[str | Signals], options: RunSpec, report: ProgressCallback) -> tuple[Signals, Signals]:
+    """Load the trajectories of two folders, files, FMUs or scenes; keep what is loaded already.
 
     FMUs and scenes are run with the communication step of the other side, if it has one, and to the same stop time;
-    other options are in `how`.
+    other options are in `options`.
     """
-    recordings = [read_recorded(source) for source in sources]
-    runs = [None if item else run_spec_for(source, options) for item, source in zip(recordings, sources, strict=True)]
+    recordings = [source if isinstance(source, Signals) else read_recorded(source) for source in sources]
+    runs = [
+        None if item else run_spec_for(str(source), options) for item, source in zip(recordings, sources, strict=True)
+    ]
     grids = [grid_spacing(item.time) for item in recordings if item] + [item.grid for item in runs if item]
     grid = next(filter(None, grids), None)
     ends = [resolve_stop(item, read_description(item.fmu, item.lenient)) for item in runs if item]

@@ -47,7 +47,7 @@ def plot_signal(axes: Axes, identified: DecayIdentification) -> None:
     axes.plot(fine[[0, -1]], rest, color=GREY, linestyle="--", linewidth=0.8, label="rest")
     if not record.order:
         style: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
-        axes.plot(identified.turns.t, identified.turns.x / size, "o", label="turning points", **style)
+        axes.plot(identified.extrema.t, identified.extrema.x / size, "o", label="turning points", **style)
     axes.set_title(f"{record.name}: {identified.best.description}")
     axes.set_ylabel(axis_label(("x", "v", "a")[record.order], unit))
     axes.legend(loc="upper right", ncols=3)

@@ -112,7 +112,7 @@ def write_results(identified: DecayIdentification, folder: Path) -> None:
     write_csv(
         folder / "turning-points.csv",
         ["t [s]", column_heading("x", identified.record.base)],
-        [identified.turns.t, identified.turns.x],
+        [identified.extrema.t, identified.extrema.x],
     )
     fitted = identified.signal(identified.best, identified.t)
     name = ("x", "v", "a")[identified.record.order]
@@ -131,9 +131,9 @@ def identified_as_json(identified: DecayIdentification, loss: EnergyLoss | None 
         "unit": record.unit,
         "sentence": identified.sentence,
         "remarks": list(identified.remarks),
-        "noise": identified.turns.noise,
+        "noise": identified.extrema.noise,
         "residual": identified.rms,
-        "turning points": len(identified.turns.t),
+        "turning points": len(identified.extrema.t),
         "used": {
             "from": float(identified.t[0]),
             "until": float(identified.t[-1]),
@@ -148,8 +148,8 @@ def identified_as_json(identified: DecayIdentification, loss: EnergyLoss | None 
         },
         "fit": [asdict(estimate) for estimate in identified.estimates],
         "turning_points": [asdict(estimate) for estimate in identified.extrema_estimates],
-        "published": [asdict(estimate) for estimate in identified.published],
-        "why_empty": {name: reason for name, reason in identified.why.items() if reason},
+        "published": [asdict(estimate) for estimate in identified.two_peak_estimates],
+        "why_empty": {name: reason for name, reason in identified.unavailable.items() if reason},
         "laws": [
             {
                 "terms": list(law.terms),

@@ -18,7 +18,7 @@ def decay_table(identified: DecayIdentification) -> Table:
         result.add_column(head, justify="right")
     result.add_column("", no_wrap=True)
     by_turns_table = {estimate.name: estimate for estimate in identified.extrema_estimates}
-    by_peaks = {estimate.name: estimate for estimate in identified.published}
+    by_peaks = {estimate.name: estimate for estimate in identified.two_peak_estimates}
     for estimate in identified.estimates:
         cells = [
             format_estimate(source[estimate.name]) if estimate.name in source else ""
@@ -37,8 +37,8 @@ def format_estimate(estimate: Estimate) -> str:
 def summary_lines(identified: DecayIdentification) -> list[str]:
     """Return the sentences below the table."""
     lines = [identified.sentence]
-    lines += [f"No {name}: {reason}." for name, reason in identified.why.items() if reason]
-    if identified.published and len(identified.best.terms) > 1:
+    lines += [f"No {name}: {reason}." for name, reason in identified.unavailable.items() if reason]
+    if identified.two_peak_estimates and len(identified.best.terms) > 1:
         lines.append(
             "The two-peak values attribute the whole loss to one mechanism; with combined mechanisms each is too large."
         )
@@ -46,7 +46,7 @@ def summary_lines(identified: DecayIdentification) -> list[str]:
     n_excluded = len(record.t) - len(used)
     if n_excluded:
         lines.append(
-            f"Fitted to {record.quantity} from t = {record.format_time(used[0])} to {record.format_time(used[-1])} s; {n_excluded} of "
-            f"{len(record.t)} samples are excluded (before release, after the last reliable cycle, or outliers)."
+            f"Fitted to {record.quantity} from t = {record.format_time(used[0])} to {record.format_time(used[-1])} s; "
+            f"{n_excluded} of {len(record.t)} samples are excluded (before release, after the last reliable cycle, or outliers)."
         )
     return [*lines, *identified.remarks]

@@ -125,7 +125,7 @@ def run_group(group: Iterable[StabilityCase]) -> Iterator[CaseOutcome]:
                 yield judge_injections(case, run_with_timeout(LIMIT, inject_nonfinite, case.setting))
                 continue
             if case.expected_message is None and reference is None and not reference_error:
-                solve_reference = truth if case.model in MODELS else compute_by_two_methods
+                solve_reference = compute_reference if case.model in MODELS else compute_by_two_methods
                 try:
                     reference = run_with_timeout(LIMIT, solve_reference, case.model, case.spans, case.grid)
                 except HarnessError as error:

@@ -125,7 +125,7 @@ class SweepDescription:
 
 
 def run_sweep(
-    request: SweepRequest, out: Path, scheduler: str | None, workers: int, report: Callable[[float], None]
+    request: SweepRequest, out: Path, scheduler: str | None, workers: int | None, report: Callable[[float], None]
 ) -> SweepResult:
     """Run the sweep and write its files to out/sweep/<name>."""
     check_built(file := find_fmu(request.model))

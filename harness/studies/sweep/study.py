@@ -62,7 +62,7 @@ class Sweep:
 
 
 def run_pending(
-    sweep: Sweep, journal: Journal, scheduler: str | None, workers: int, report: Callable[[float], None]
+    sweep: Sweep, journal: Journal, scheduler: str | None, workers: int | None, report: Callable[[float], None]
 ) -> float:
     """Do the remaining runs and write them to the journal; return the elapsed time in s."""
     start = perf_counter()
@@ -105,7 +105,9 @@ class InProcess:
 
 
 @contextmanager
-def open_workers(scheduler: str | None, workers: int, runs: int) -> Iterator[WorkerPool | DaskCluster]:
+def open_workers(
+    scheduler: str | None, workers: int | None, runs: int
+) -> Iterator[WorkerPool | DaskCluster | InProcess]:
     """Open the workers: processes on this machine, or the cluster of a scheduler."""
     if scheduler is not None:
         with connect_cluster(scheduler, unload) as connection:
@@ -128,7 +130,7 @@ def open_workers(scheduler: str | None, workers: int, runs: int) -> Iterator[Wor
 class Dispatcher:
     """Distributes the runs of a sweep to workers, in blocks that grow until each takes half a second."""
 
-    def __init__(self, sweep: Sweep, workers: WorkerPool | DaskCluster, pending: list[Span]) -> None:
+    def __init__(self, sweep: Sweep, workers: WorkerPool | DaskCluster | InProcess, pending: list[Span]) -> None:
         self.sweep, self.workers, self.pending = sweep, workers, pending[::-1]
         self.size = 1
         self.running: dict[Future[BlockResult | None], Span] = {}
