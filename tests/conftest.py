@@ -1,4 +1,4 @@
-"""Fixtures: the FMUs built once, and a process that runs them."""
+"""Fixtures: the FMUs, built once per test run, and a process that runs them."""
 
 import atexit
 import gc
@@ -7,9 +7,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 if "PYTEST_XDIST_WORKER" in os.environ:
-    # The last of all, being the first to be told: to take down a worker that has told its results takes seconds.
+    # Registered first, so called last: skip the teardown of a finished worker process, which takes seconds.
     atexit.register(os._exit, 0)
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as a command has it: before what follows loads numpy
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as in a command; must be set before numpy is imported
 
 import build_cache
 import fork_server
@@ -20,7 +20,7 @@ from worker_client import Worker, worker_fixtures
 
 
 def pytest_configure(config):
-    """Open the room of what is built, or enter the one that the first process of this run has opened."""
+    """Create the folder shared by all test processes, or use the one created by the main process."""
     if hasattr(config, "workerinput"):
         build_cache.shared_folder = Path(config.workerinput["shared_folder"])
     else:
@@ -31,19 +31,19 @@ def pytest_configure(config):
 
 
 def pytest_collection_finish():
-    """What is there now stays to the end; to look through it again and again for what is not in use takes seconds."""
+    """Exclude all existing objects from garbage collection; scanning them repeatedly takes seconds."""
     gc.collect()
     gc.freeze()
 
 
 def pytest_unconfigure():
-    """Nor is what is there in the end to be looked through five times for what raises when it goes; once is enough."""
+    """Exclude all objects again, because the interpreter would scan them five times at exit."""
     pytest_collection_finish()
 
 
 @pytest.hookimpl(optionalhook=True)  # of pytest-xdist
 def pytest_configure_node(node):
-    """Tell another process of this run where the room is."""
+    """Pass the shared folder to a worker process."""
     node.workerinput["shared_folder"] = str(build_cache.shared_folder)
 
 
@@ -55,13 +55,13 @@ def fmus():
 
 @pytest.fixture(params=["python", "native"])
 def backend_fmus(request, fmus):
-    """The folder of the FMUs of a kind."""
+    """The folder of the FMUs of one backend."""
     return fmus if request.param == "python" else native_fmus.build_native_fmus()
 
 
 @pytest.fixture(scope="module")
 def user_folder(fmus, tmp_path_factory):
-    """A folder with the built FMUs in it, as a user's would be."""
+    """A folder that contains the built FMUs, like that of a user."""
     folder = tmp_path_factory.mktemp("place")
     (folder / "fmus").symlink_to(fmus)
     return folder
@@ -72,7 +72,7 @@ _workers, worker, fresh_worker = worker_fixtures(Worker, "session")
 
 @pytest.fixture(scope="session")
 def browser():
-    """A browser, of the size of a screen."""
+    """A browser with the size of a screen."""
     if CHROMIUM is None:
         pytest.skip("there is no chromium here")
     browser = Browser()

@@ -1,4 +1,4 @@
-"""The intervals of what cannot be negative, and of few samples."""
+"""Confidence intervals of nonnegative quantities, and of few samples."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from harness.analyses.decay.nonnegative_intervals import nonnegative_interval
 
 
 def test_nonnegative_intervals_cover_95_percent():
-    """By the shares of a normal distribution, of each mean and of each thing measured."""
+    """Checked with the probabilities of a normal distribution, for each mean and each measured value."""
     step = 0.04
     z = np.arange(-4.0, 9.0, step)
     low, high = np.array([nonnegative_interval(np.array([each]), np.eye(1)) for each in z]).T
@@ -31,7 +31,7 @@ def test_nonnegative_intervals_cover_95_percent():
     ],
 )
 def test_joint_nonnegative_intervals_cover_95_percent(means, rho):
-    """Of 200 draws; more only where both are zero, and there the interval is the shorter for it."""
+    """Of 200 draws; more only where both are zero, where the interval is shorter for it."""
     correlation = np.array([[1.0, rho], [rho, 1.0]])
     z = np.random.default_rng(1).multivariate_normal(means, correlation, 200)
     low, high = np.array([nonnegative_interval(each, correlation) for each in z]).T
@@ -43,7 +43,7 @@ def test_joint_nonnegative_intervals_cover_95_percent(means, rho):
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, -0.98])
 def test_an_interval_is_continuous_in_the_correlation(rho):
-    """On which the signs of its axes may hang, and of equal ones the axes themselves."""
+    """The correlation may decide the signs of the axes, and the axes themselves if they are equal."""
     correlation = np.array([[1.0, rho, 0.0], [rho, 1.0, 0.0], [0.0, 0.0, 1.0]])
     intervals = []
     for last in np.random.default_rng(1).uniform(-4e-16, 4e-16, (8, 3, 3)):

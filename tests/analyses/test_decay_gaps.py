@@ -1,4 +1,5 @@
-"""A record with a pause: both sides are used, the swings that nobody saw are counted, too few before it are told."""
+"""Records with a pause: both sides are used, unseen half cycles are counted, and too few before the pause are
+reported."""
 
 import json
 from math import pi, sqrt
@@ -14,12 +15,12 @@ from harness.analyses.decay.identification import fit_decay
 from harness.errors import HarnessError
 from harness.records.record import Record
 
-HALF, RATE = 0.25, 0.3  # s, of a half cycle; 1/s, of the decay
+HALF, RATE = 0.25, 0.3  # s, a half cycle; 1/s, the decay rate
 OMEGA = sqrt((pi / HALF) ** 2 + RATE**2)
 
 
 def paused(begin, share, noise=0.0):
-    """The record of a decay without the samples of a `share` of a half cycle from `begin` in s on."""
+    """Return the record of a decay without the samples from `begin` (s) on for `share` of a half cycle."""
     t = 0.004 * np.arange(1000)
     t = t[(t <= begin) | (t >= begin + share * HALF)]
     x = 0.1 * np.exp(-RATE * t) * np.cos(pi * t / HALF)
@@ -34,7 +35,8 @@ SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
     [(s, b, (0.0, 1e-4)[(i + j) % 2]) for i, s in enumerate(SHARES) for j, b in enumerate(BEGINS)],
 )
 def test_a_pause_of_any_length_does_not_bias_the_fit(begin, share, noise):
-    """Without the laws with drag, which take most of a fit and come after a pause; below are some with them."""
+    """Without the laws with drag, which take most of the time of a fit and follow the pause handling; some tests
+    below include them."""
     found = {
         each.name: each for each in fit_decay(paused(begin, share, noise), KnownParameters(), drag=False).estimates
     }
@@ -69,7 +71,7 @@ def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
 
 @pytest.mark.parametrize("kept", [0, 3, 11])
 def test_a_window_with_too_few_samples_is_reported(kept):
-    """Whatever has taken the others away."""
+    """Whatever removed the other samples."""
     record = paused(2.03, 0.95)
     problem, _ = prepare_problem(record, find_extrema(record, False), False, False)
     with pytest.raises(HarnessError, match=f"has only {kept} samples in a row that follow .* and 12 are needed"):

@@ -1,4 +1,4 @@
-"""The motion that is fitted: that of an integrator, smooth in what is looked for."""
+"""The motion model of the fit agrees with an integrator and is smooth in its parameters."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ def test_the_model_agrees_with_an_integrator_restarted_at_every_turning_point(ze
 @pytest.mark.parametrize("sine", [False, True])
 @pytest.mark.parametrize("order", range(3), ids=QUANTITIES)
 def test_the_jacobian_agrees_with_finite_differences(order, sine):
-    """Between samples that lie in the same half swing; at a reversal an acceleration jumps."""
+    """Between samples in the same half swing; the acceleration jumps at a reversal."""
     model, p = SignalModel(1.0, order, sine, 1.0, 1e-9), np.array([0.05, 1.0, 0.01, 0.02, 5.0, 0.01, 0.02, 0.05])
     unknowns, t = unknown_indices(TERMS, True), np.linspace(0.0, 4.0, 500)
     _, jacobian = model(p, unknowns, t)
@@ -62,7 +62,7 @@ def test_the_jacobian_agrees_with_finite_differences(order, sine):
 
 @pytest.mark.parametrize(("sine", "r"), [(False, 0.51), (True, 0.49)])
 def test_a_body_held_by_friction_does_not_move(sine, r):
-    """Of a pendulum neither from an angle of less than arcsin r, which is more than r."""
+    """Nor does a pendulum from an angle below arcsin r, which is larger than r."""
     model, p = SignalModel(1.0, 0, sine, 0.0, 1e-9), np.array([0, 0.5, 0, 0, 1.0, 0.0, r, 0])
     assert set(model(p, unknown_indices(TERMS, False), np.linspace(-1.0, 10.0, 20))[0]) == {0.5}
 
@@ -70,7 +70,7 @@ def test_a_body_held_by_friction_does_not_move(sine, r):
 @pytest.mark.parametrize("sine", [False, True])
 @pytest.mark.parametrize("b", [0.0026, 0.0051, 0.0116])
 def test_the_model_is_continuous_in_drag(b, sine):
-    """A stretch that begins just before a turning point once lost half a cycle."""
+    """A segment that begins just before a turning point once lost half a cycle."""
     t, model = np.linspace(0, 60, 3000), SignalModel(1.0, 0, sine, 0.0, 1e-9)
     near = [
         model(np.array([0, 1.0, 0, 0, 1.0, 0.01, 0.001, b + h]), unknown_indices(TERMS, False), t)[0] for h in (0, 1e-7)

@@ -1,4 +1,4 @@
-"""The decay analysis on signals whose answer is known."""
+"""The decay analysis on signals with known parameters."""
 
 from math import cos, exp, pi, sin, sqrt
 
@@ -15,7 +15,7 @@ from harness.errors import HarnessError
 
 
 def damped(zeta, n=4001):
-    """Samples of t, x, v of exp(-zeta t) cos(...), from rest at 1, over six cycles of undamped period 2 pi."""
+    """Return samples t, x, v of exp(-zeta t) cos(...), from rest at 1, over six cycles of undamped period 2 pi."""
     t = np.linspace(0.0, 12 * pi, n)
     w = sqrt(1 - zeta * zeta)
     x = np.exp(-zeta * t) * (np.cos(w * t) + zeta / w * np.sin(w * t))
@@ -23,7 +23,8 @@ def damped(zeta, n=4001):
 
 
 def rubbed(loss, n=4001):
-    """Samples of an oscillation of period 2 pi that starts at 1 and loses `loss` in each half cycle until it rests."""
+    """Return samples of an oscillation of period 2 pi that starts at 1 and loses `loss` per half cycle until it
+    rests."""
     rows = []
     for t in np.linspace(0.0, 12 * pi, n):
         half = int(t / pi)
@@ -46,7 +47,8 @@ def test_the_damping_ratio_of_an_exact_signal_is_recovered(zeta, cycles):
 
 @pytest.mark.parametrize("n", [100, 200, 400])
 def test_interpolated_turning_points_converge_with_order_four(n):
-    """Twice the samples, a sixteenth of the error; here bounded by the error of a cubic, h^4/384 x''''."""
+    """Halving the sampling interval divides the error by sixteen; it is bounded by the error of a cubic, h^4/384
+    x''''."""
     t, x, v = damped(0.0, n)
     h = t[1]
     _, positions = find_extrema_from_velocity(t, x, v)

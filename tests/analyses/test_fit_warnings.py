@@ -1,4 +1,4 @@
-"""What is in doubt is told, and what is no answer is refused, with what would mend it."""
+"""Doubtful fits are reported and impossible ones refused, each with a remedy."""
 
 import contextlib
 
@@ -35,7 +35,7 @@ def test_correlated_noise_is_reported_and_widens_the_intervals():
 
 @pytest.mark.parametrize(("r", "alike"), [(2e-3, True), (1.999e-3, True), (2.13e-3, False), (1.8e-3, False)])
 def test_a_loss_in_phase_with_the_sensor_resolution_is_reported(r, alike):
-    """Of 1 mm, at which a half swing takes 2 r."""
+    """Of 1 mm, where a half swing loses 2 r."""
     side = 1.0 if r > 1.9995e-3 else -1.0
     found = fit_decay(
         decay_record(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), KnownParameters(), drag=False
@@ -110,7 +110,7 @@ def test_a_pendulum_is_identified_from_its_angle():
 
 @pytest.mark.parametrize("seed", [3, 11, 29, 30])
 def test_any_record_ends_in_a_fit_or_one_sentence(seed):
-    """A walk at random, on which fits may try anything."""
+    """A random walk, on which fits may try anything."""
     walk = np.random.default_rng(seed).standard_normal(60).cumsum()
     with contextlib.suppress(HarnessError):
         assert fit_decay(Record("walk", np.linspace(0, 1, 60), walk), KnownParameters())

@@ -1,6 +1,6 @@
-"""What is no free motion is left out of the fit, and said: before it, after it, and stray samples within.
+"""Samples outside the free motion are excluded from the fit and reported: before it, after it, and outliers within.
 
-Some are fitted without the laws with drag, which take most of a fit.
+Some fits omit the laws with drag, which take most of the time.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from harness.records.record import QUANTITIES, Record
 
 
 def test_stick_before_and_rest_after_the_motion_are_excluded():
-    """The mass rests where static friction holds it, off what sliding friction alone would allow."""
+    """The mass rests where static friction holds it, farther out than sliding friction alone would allow."""
     record = decay_record(0.01, 0.005)
     held = np.concatenate(
         [np.full(100, record.x[record.x.argmin()]), record.x[record.x.argmin() :], np.full(300, 0.03)]
@@ -44,7 +44,7 @@ def test_a_motion_stopped_from_outside_is_cut_and_reported():
 
 @pytest.mark.parametrize("drag", [True, False])
 def test_repeated_samples_before_and_after_the_motion_are_excluded(drag):
-    """They are longer than the motion, and stop it in mid-swing."""
+    """They are longer than the motion and interrupt it in mid-swing."""
     record = decay_record(0.01, 0.001, turn=0.0, noise=1e-4)
     x = np.concatenate([np.full(900, record.x[0]), record.x, np.full(1200, record.x[-1])])
     found = fit_decay(Record("padded", 0.004 * np.arange(len(x)), x), KnownParameters(), drag)
@@ -76,7 +76,7 @@ def test_outliers_are_excluded_and_counted():
     ids=["marks", "spikes", "dropouts"],
 )
 def test_runs_of_invalid_samples_are_excluded_and_counted(value, run, drag):
-    """What a rangefinder gives without an echo, alone and in runs: turning points that are none."""
+    """A rangefinder without an echo returns single invalid samples and runs of them, with spurious turning points."""
     record = decay_record(0.02, 0.003, rest=0.2, noise=1e-4)
     at = np.random.default_rng(3).choice(np.arange(10, 900, 9), 20 // run, replace=False)
     record.x[(at[:, None] + np.arange(run)).ravel()] = value

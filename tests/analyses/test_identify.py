@@ -1,4 +1,4 @@
-"""Identification from decays whose answer is known: exact on clean signals, right in its choice on noisy ones."""
+"""Identification from decays with known parameters: exact on clean signals, correct law on noisy ones."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from harness.analyses.decay.law import LAWS, TERMS
 from harness.records.record import Record
 
 
-@pytest.mark.parametrize(  # every law of a mass and of a pendulum, of which the quantities take turns
+@pytest.mark.parametrize(  # every law of a mass and of a pendulum, with the quantities in turn
     ("law", "sine", "order"),
     [(law, False, 0) for law in LAWS]
     + [(law, True, i % 3) for i, law in enumerate(LAWS)]
@@ -38,7 +38,7 @@ def test_the_fit_does_not_depend_on_start_or_sampling(turn):
 
 @pytest.mark.parametrize("origin", [2.0**4, 2.0**8, -(2.0**9), 2.0**10, 2.0**12])
 def test_late_clocks_and_offset_origins_cost_no_accuracy(origin):
-    """As of seconds since 1970, binary fractions so that the times themselves are exact."""
+    """As seconds since 1970; binary fractions keep the times themselves exact."""
     times = np.arange(1000) / 256
     x = decay_record(0.02, 0.003, t=times).x
     found = fit_decay(Record("late", times + 2.0**30, x + origin), KnownParameters(), drag=False)

@@ -1,4 +1,4 @@
-"""The intervals of an identified decay are of 95 %, of the errors that are really made."""
+"""The intervals of an identified decay cover 95 % of the actual errors."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ RECORDS = 40
 
 
 def test_intervals_cover_95_percent_and_standard_errors_match_the_scatter():
-    """Values that may be zero are left out, for their intervals end there and make those beside them shorter."""
+    """Parameters that may be zero are excluded, because their intervals end there and shorten those of the others."""
     widths, misses = [], []
     for seed in range(RECORDS):
         record, truth, _ = random_record(seed, ("zeta", "r"), False, False, 600)

@@ -1,4 +1,4 @@
-"""Of a record of each law, of any amplitude, rate and noise: what is told is so, within its intervals."""
+"""Random records of each law, amplitude, rate and noise: the estimates are right within their intervals."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,14 @@ from harness.analyses.decay.law import LAWS
     ids=["mass", "quantised", "pendulum", "velocity", "acceleration"],
 )
 def of_each_law(request):
-    """A record of 200 samples or more for each law, of any amplitude, rate and noise: its truth, and what is found."""
+    """A record of at least 200 samples for each law, of random amplitude, rate and noise: true parameters and fit."""
     sine, quantised, order = request.param
     records = [random_record(100 + i, law, sine, quantised, 200, order) for i, law in enumerate(LAWS)]
     return [(truth, fit_decay(record, KnownParameters(pendulum=sine))) for record, truth, _ in records]
 
 
 def test_no_estimate_is_far_off_without_a_remark(of_each_law):
-    """tests/support/interval_coverage.py has many more."""
+    """tests/support/interval_coverage.py checks many more."""
     for truth, found in of_each_law:
         each = {one.name: one for one in found.estimates}
         off = {name: abs(each[name].value - value) / each[name].error for name, value in truth.items()}
@@ -31,7 +31,7 @@ def test_no_estimate_is_far_off_without_a_remark(of_each_law):
 
 
 def test_intervals_cover_the_true_value_at_their_level(of_each_law):
-    """Of 35 intervals at 95 %, fewer than 28 would hold the truth once in a thousand times
+    """Fewer than 28 of 35 intervals at 95 % would cover the true value once in a thousand times
     (tests/support/interval_coverage.py counts a thousand records of every law)."""
     held = []
     for truth, found in of_each_law:

@@ -1,4 +1,4 @@
-"""The analyses of step sizes and of slips, on arrays whose answer is known."""
+"""The analyses of step sizes and of slips, on arrays with known results."""
 
 import numpy as np
 import pytest
@@ -30,9 +30,9 @@ def test_a_motion_without_reversal_has_no_step_collapse():
     ("mode", "starts", "durations"),
     [
         ([0, 1, 0, 1, 0], [1, 3], [1, 1]),
-        ([0, 1, 0, 1], [1, 3], [1]),  # the last slip is cut short
-        ([1, 0, 1, 0], [2], [1]),  # a slip that was under way is no slip that started
-        ([0, 1, -1, 0, -1], [1, 4], [2]),  # a reversal goes on slipping
+        ([0, 1, 0, 1], [1, 3], [1]),  # the last slip is cut off
+        ([1, 0, 1, 0], [2], [1]),  # a slip already in progress did not start here
+        ([0, 1, -1, 0, -1], [1, 4], [2]),  # a reversal continues the slip
         ([0], [], []),
     ],
 )
@@ -49,4 +49,4 @@ def test_the_vertex_of_a_parabola_is_interpolated_between_uneven_samples():
     t = np.array([0.0, 1.0, 1.5, 3.0])
     y = 7 - 2 * (t - 1.3) ** 2
     assert peak_value(t, y, np.full(4, True)) == pytest.approx(7.0, abs=1e-12)
-    assert peak_value(t, y, np.array([True, True, False, False])) == y[1]  # not across the edge of what counts
+    assert peak_value(t, y, np.array([True, True, False, False])) == y[1]  # not across the edge of the selection

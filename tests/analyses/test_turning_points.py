@@ -1,4 +1,4 @@
-"""What turning points alone say, all of them and two."""
+"""Estimates from turning points alone, from all of them and from two."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""No text makes a command end in a traceback: every input ends well, or in one sentence with a status of its own."""
+"""No input ends a command in a traceback: it succeeds, or fails with one sentence and a specific exit status."""
 
 import io
 import os
@@ -27,7 +27,7 @@ SCENE = {"title": '"a title"', "model": '"smd"', "outputs": '["x", "v"]', "stop"
 TIMES = ("start", "stop", "follow", "h_max")
 PLOTS = '["position", "phase", "steps"]'
 HUGE = "9" * 400
-VALUES = (  # as TOML writes them
+VALUES = (  # as written in TOML
     *("0", "-1", "1e308", "-1e308", "1e-300", "5e-324", "inf", "nan", HUGE, "9" * 5000, "true", "1979-05-27", "{}"),
     *('""', '"x"', '"$x_{$"', '"\\u0000"', '"\\uFFFF\\U0001F600"', '"%s%n"', '"../../x"', '"' + "t" * 200_000 + '"'),
     *("[]", "[1]", '["x", "x"]', '["x", "$_{"]', "[[1]]", "[" * 3000 + "]" * 3000, '[1, "s"]', '["gives"]', "["),
@@ -39,11 +39,11 @@ VALUES = (  # as TOML writes them
         f"{{k = {HUGE}}}",
     ),
 )
-FILES = (  # whole scenes
+FILES = (  # complete scenes
     *(b"\xef\xbb\xbf", b"\xff\xfe", b"\0", b"title", b"[[[[", b"=" * 10_000, b'title = """', b"[values", b"a.b.c = 1"),
     *(b"[values]\n" * 2, b"\xc3\x28 = 1", b"title = 'a'\rmodel = 'smd'", b"{" * 100_000, b"#" * 2_000_000),
 )
-TABLES = (  # of CSV
+TABLES = (  # CSV tables
     *(
         "",
         ",",
@@ -98,7 +98,7 @@ SPANS = (
 
 
 def ended(*arguments):
-    """The status of a command in this process, and what it said; any exception but these is what must not be."""
+    """Return exit status and output of a command run in this process; any unexpected exception fails the test."""
     said, answered = io.StringIO(), io.StringIO()
     with redirect_stderr(said), redirect_stdout(answered):
         try:
@@ -112,14 +112,14 @@ def ended(*arguments):
 
 @pytest.fixture
 def workspace(user_folder, tmp_path):
-    """A folder with the built FMUs, which is the present one."""
+    """The current folder, with the built FMUs."""
     (tmp_path / "fmus").symlink_to(user_folder / "fmus")
     with chdir(tmp_path):
         yield tmp_path
 
 
 def written(scene):
-    """A scene as its file holds it."""
+    """Return a scene as TOML text."""
     return "".join(f"{name} = {told}\n" for name, told in scene.items())
 
 
@@ -133,7 +133,9 @@ def check(status, said, shown):
 
 @pytest.mark.parametrize("key", [*field_names(SceneKeys), "nosuch"])
 def test_any_scene_content_runs_or_is_refused(workspace, key):
-    usual = SCENE if key in TIMES else SCENE | {"grid": "0.01"}  # else there are 4096 points, which tell no more
+    usual = (
+        SCENE if key in TIMES else SCENE | {"grid": "0.01"}
+    )  # without a grid there would be 4096 points, which test nothing more
     for value in VALUES:
         text = written(usual | {key: value})
         (workspace / "mine.toml").write_text(text, encoding="utf-8")
@@ -153,7 +155,7 @@ def test_any_file_content_is_a_scene_or_is_refused(workspace):
         for command in ("run", "couple"):
             try:
                 status, said = ended(command, user_folder)
-            except OSError as error:  # which main tells in a sentence
+            except OSError as error:  # which main reports in one sentence
                 status, said = 1, str(error)
             check(status, said, user_folder[:100])
             assert status, user_folder[:100]
@@ -222,7 +224,7 @@ def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, wo
 
 
 def test_randomly_mutated_scenes_run_or_are_refused(workspace):
-    """The shipped ones, changed at a few places each; the same ones every time."""
+    """The shipped scenes with a few characters changed; the same ones every time."""
     dice = random.Random(10)
     for file in sorted((ROOT / "harness/scenes/coupled").glob("*.toml")):
         for _ in range(60):
@@ -231,9 +233,7 @@ def test_randomly_mutated_scenes_run_or_are_refused(workspace):
                 text[dice.randrange(len(text))] = dice.choice('"[]{}=.,#\\\n0-e$\0\u00e9 ')
             (workspace / "mine.toml").write_text("".join(text), encoding="utf-8")
             with pytest.MonkeyPatch.context() as patch:
-                patch.setattr(
-                    "harness.studies.coupled.study.element_fmus", refuse
-                )  # what comes after reading takes long
+                patch.setattr("harness.studies.coupled.study.element_fmus", refuse)  # later stages take long
                 check(*ended("couple", "mine.toml", "--quiet"), "".join(text))
     base = written(SCENE) + "grid = 0.01\n[values]\nm = 1.5\n"
     for _ in range(150):
@@ -265,7 +265,7 @@ RESULTS = {
 
 
 def test_the_report_survives_any_content_of_a_result(tmp_path):
-    """The first content of each file, then the second of each, and so on; in the end each is a folder."""
+    """The first content of each file, then the second of each, and so on; finally each is a folder."""
     good = tmp_path / "coulomb/quantities.csv"
     good.parent.mkdir(parents=True)
     good.write_text(",measured\nright hand,42.5\n")
@@ -284,7 +284,7 @@ def test_the_report_survives_any_content_of_a_result(tmp_path):
         if contents and contents[0] == UNREADABLE:
             told = re.findall(f"{re.escape(str(tmp_path))}/([^ ]+) cannot be shown", page)
             assert all(file.startswith((*told,)) for file in RESULTS), told
-            assert told.count("smd") == 2  # its figures and its steps
+            assert told.count("smd") == 2  # its quantities and its steps
 
 
 def python(folder, *arguments, shell=None, **environment):
@@ -321,7 +321,7 @@ def test_a_closed_standard_input_is_empty(user_folder, tmp_path):
 
 
 def test_a_record_is_read_from_a_named_pipe(tmp_path):
-    """As a shell makes of `decay <(zcat swing.gz)`."""
+    """As a shell does for `decay <(zcat swing.gz)`."""
     os.mkfifo(tmp_path / "63")
     writer = threading.Thread(target=(tmp_path / "63").write_text, args=("t [s],x [m]\n0.5,1\n1.5,2\n",))
     writer.start()

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end every command at once: status, one line, nothing left behind, nothing begun anew."""
+"""Ctrl-C and SIGTERM end every command at once: exit status, one line, nothing left behind, no new work."""
 
 import logging
 import os
@@ -25,7 +25,7 @@ from harness.process.subprocess_runner import SubprocessTimeoutError, run_subpro
 from harness.process.worker_pool import WorkerDiedError, WorkerPool
 
 SLOW = 'title = "t"\nmodel = "pacejka"\noutputs = ["x", "v"]\ngrid = 5e-6\n[values]\nx_m = 0.001\n'
-COMMANDS = {  # and a file or folder that is there once it is under way
+COMMANDS = {  # and a file or folder that exists once it has started
     "main": ([], "out/.*"),
     "run": (["run", "slow.toml"], "temporary/fmu-*"),
     "precision": (["precision", "pacejka"], "out/.precision-*"),
@@ -46,7 +46,7 @@ def logging_goes_on():
     ("command", "number"), [*product(COMMANDS, [signal.SIGINT]), ("run", signal.SIGTERM), ("sweep", signal.SIGTERM)]
 )
 def test_a_signal_ends_a_command_and_leaves_nothing_behind(user_folder, tmp_path, command, number):
-    """To the whole group, as a terminal sends it."""
+    """To the whole process group, as a terminal sends it."""
     (tmp_path / "temporary").mkdir()
     (tmp_path / "fmus").symlink_to(user_folder / "fmus")
     (tmp_path / "slow.toml").write_text(SLOW)
@@ -72,9 +72,9 @@ def test_a_signal_ends_a_command_and_leaves_nothing_behind(user_folder, tmp_path
     assert list((tmp_path / "temporary").iterdir()) == []
     left = [path.name for path in (tmp_path / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
     if command == "sweep":
-        assert [name for name in left if not name.endswith(".journal")] == []  # what it has done is kept
+        assert [name for name in left if not name.endswith(".journal")] == []  # completed work is kept
     elif command == "main":
-        assert [name for name in left if name.startswith(".")] == []  # scenes that were finished are whole
+        assert [name for name in left if name.startswith(".")] == []  # completed scenes are intact
         assert len(list((tmp_path / "out").glob("*"))) < 8
     else:
         assert left == []
@@ -107,11 +107,11 @@ def test_an_interrupt_swallowed_by_a_callee_still_ends_the_command(monkeypatch):
 
     def swallowed():
         with interruptible():
-            with suppress(KeyboardInterrupt):  # as an FMU in Python may
+            with suppress(KeyboardInterrupt):  # as a Python FMU may do
                 signal.raise_signal(signal.SIGINT)
             raise RuntimeError("a step failed, for what it is worth")
 
-    usual = signal.default_int_handler, signal.SIG_DFL  # a shell lets what it starts in the background ignore Ctrl-C
+    usual = signal.default_int_handler, signal.SIG_DFL  # a shell lets background processes ignore Ctrl-C
     before = [signal.signal(number, handler) for number, handler in zip(interrupt.SIGNALS, usual, strict=True)]
     try:
         with pytest.raises(CommandInterruptedError, match="interrupted") as told:
@@ -143,12 +143,12 @@ def test_a_signal_during_a_protected_section_is_deferred_to_its_end(monkeypatch)
 
 
 def test_a_signal_during_a_wait_leaves_no_lock_held(monkeypatch):
-    """At whatever line of the waiting it comes, of ours or of the library's: else what is awaited could never end."""
+    """Wherever it arrives in the waiting code or in the library; otherwise the awaited event could never end."""
     monkeypatch.setattr(harness.process.interruptible_wait, "POLL_INTERVAL", 1e-4)
     before, trace = signal.signal(signal.SIGINT, interrupt.handle_signal), sys.gettrace()
 
     def interrupted(line):
-        """Whether the waiting has so many lines; it is interrupted at the last."""
+        """Return whether the wait has this many lines; it is interrupted at the last one."""
         monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [])
         pending, lines = Future(), iter(range(line))
 
@@ -160,7 +160,7 @@ def test_a_signal_during_a_wait_leaves_no_lock_held(monkeypatch):
         with suppress(KeyboardInterrupt):
             sys.settrace(look)
             wait_for_any([pending])
-            sys.settrace(trace)  # before suppress, which is Python, too, goes on
+            sys.settrace(trace)  # before suppress, which is also Python code, continues
         sys.settrace(trace)
         other = threading.Thread(target=pending.cancel, daemon=True)
         other.start()
@@ -187,7 +187,7 @@ def test_a_program_that_times_out_ends_with_all_its_children(tmp_path):
     assert late.value.process.stdout == "so far\n"
     state = Path("/proc", (tmp_path / "pid").read_text().strip(), "stat")
     for _ in range(100):
-        if not state.exists() or state.read_text().split()[2] == "Z":  # nobody asks for its status
+        if not state.exists() or state.read_text().split()[2] == "Z":  # nobody waits for its status
             return
         time.sleep(0.05)
     raise AssertionError("what it started lives on")
@@ -214,7 +214,7 @@ def test_a_worker_killed_while_it_receives_data_is_replaced(tmp_path):
     crew = WorkerPool(1, tmp_path, [])
     try:
         pid = result(crew, os.getpid)
-        os.kill(pid, signal.SIGSTOP)  # it reads no more
+        os.kill(pid, signal.SIGSTOP)  # it stops reading
         threading.Timer(0.2, os.kill, [pid, signal.SIGKILL]).start()
         with pytest.raises(WorkerDiedError, match="exit code -9"):
             result(crew, len, bytes(10_000_000))

@@ -1,4 +1,4 @@
-"""The harness on the built FMUs, through its command line, in processes of their own."""
+"""The harness on the built FMUs, through its command line, in child processes."""
 
 import csv
 import json
@@ -22,18 +22,18 @@ BASE = 'title = "a title"\nmodel = "stickslip"\noutputs = ["x", "v"]\n'
 ENVIRONMENT = {"PYTHONPATH": str(ROOT), "PATH": "", "COLUMNS": "100"}
 TIME = r'"name": "run_time",\s+"value": [^,]+'
 NUMBER = r"-?\b\d+\.?\d*(?:e[-+]\d+)?"
-harness = partial(commands.harness, base=ENVIRONMENT, blank=commands.UNPLOTTED)  # what is published is drawn
+harness = partial(commands.harness, base=ENVIRONMENT, blank=commands.UNPLOTTED)  # published cases are drawn elsewhere
 
 
 def python(folder, *arguments):
-    """The finished process of Python with these arguments, which finds the harness but is run in `folder`."""
+    """Run Python with these arguments in `folder`, with the harness on its path; return the finished process."""
     command = [sys.executable, *map(str, arguments)]
     return subprocess.run(command, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, timeout=300)
 
 
 @pytest.fixture
 def scene(user_folder, tmp_path):
-    """scene(text, option, ...): the finished process, and the folder of results."""
+    """Return scene(text, option, ...): the finished process, and the folder of results."""
 
     def run(text, *options, **environment):
         (tmp_path / "mine.toml").write_text(text)
@@ -44,7 +44,7 @@ def scene(user_folder, tmp_path):
 
 
 def table(path):
-    """Header and columns of a CSV file."""
+    """Return header and columns of a CSV file."""
     with path.open() as file:
         head, *rows = csv.reader(file)
     return head, np.array(rows, float).T
@@ -161,7 +161,7 @@ END = 'plots = []\n[decay]\ngives = "zeta"\n'
     [
         (SLIP, "grid = 0.2\n", "peak_speed", 0.41736),
         (SLIP, "grid = 0.2\nfollow = true\n", "peak_speed", 0.41736),
-        (SLIP, "follow = true\n", "peak_acceleration", 2.9546),  # a closed form steps from event to event
+        (SLIP, "follow = true\n", "peak_acceleration", 2.9546),  # the closed form steps from event to event
         (SLIP + 'method = "ode23"\nlaw = "threshold"\n', "grid = 0.15\n", "peak_speed", 0.41736),
         (SWING, "grid = 0.3\n", "zeta", 0.0796),
         (SWING, "grid = 0.04\n", "zeta", 0.0796),
@@ -284,7 +284,7 @@ PAIR = (
 )
 def test_a_forked_process_behaves_like_a_fresh_one(fmus, tmp_path, arguments):
     def done(fresh):
-        shutil.rmtree(tmp_path / "results", ignore_errors=True)  # else the second says that it is the same again
+        shutil.rmtree(tmp_path / "results", ignore_errors=True)  # otherwise the second run reports that nothing changed
         return harness(tmp_path, *arguments, fresh=fresh)
 
     (tmp_path / "fmus").symlink_to(fmus)
@@ -297,7 +297,7 @@ def test_a_forked_process_behaves_like_a_fresh_one(fmus, tmp_path, arguments):
     told = [re.sub(TIME, "", done.stdout) for done in (forked, fresh)]
     assert re.sub(NUMBER, "", told[0]) == re.sub(NUMBER, "", told[1])
     one, other = (list(map(float, re.findall(NUMBER, text))) for text in told)
-    assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy hang on where an array lies
+    assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array
 
 
 @pytest.mark.parametrize("arguments", [["runn"], ["run"], ["run", "nosuch"], ["--nosuch"]])
@@ -321,7 +321,7 @@ def test_list_shows_every_scene(user_folder):
 
 
 def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
-    """Scenes that name more and more, one after the other in one process."""
+    """Scenes that use more and more modules, one after the other in one process."""
     optional = ["harness.analyses.slip", "harness.analyses.decay", "harness.analyses.steps", "matplotlib"]
     extras = ("plots = []", "plots = []\nanalyses = ['slip']", "plots = ['position']")
     code = (

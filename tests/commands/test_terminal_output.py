@@ -1,4 +1,4 @@
-"""What stands on the screen: it fits, keeps its brackets, and says of a quantity what every file and the page say."""
+"""Terminal output: it fits the width, keeps brackets, and formats quantities like the files and the page."""
 
 import csv
 import html
@@ -43,7 +43,7 @@ def workspace(fmus, tmp_path):
 
 
 def fits(said, *headings):
-    """Whether lines are short enough, nothing is cut, and the headings are there."""
+    """Assert that lines are short enough, nothing is truncated, and the headings are present."""
     lines = said.splitlines()
     assert max(map(len, lines)) <= WIDTH, max(lines, key=len)
     assert "\u2026" not in said
@@ -72,7 +72,7 @@ POINTS = [
     for case in CASES
     for tool in (FMU, ME)
 ]
-TABLES = {  # whose commands take long, filled with long words
+TABLES = {  # of slow commands, filled with long words
     "precision": (
         [table.work_precision_table(Study(m, tuple(c for c in CASES if c.model == m), tuple(POINTS))) for m in MODELS],
         "1e-3:",
@@ -166,7 +166,7 @@ def test_a_command_without_its_fmus_explains_how_to_build_them(tmp_path, monkeyp
 
 @pytest.mark.parametrize("arguments", [("run", "--fmu"), ("sweep", "--vary", "k=1,2", "--workers", "1")])
 def test_an_fmu_failure_of_either_backend_is_reported_once(backend_fmus, tmp_path, arguments):
-    """A native one tells it to the process's standard error, too, past Python."""
+    """A native FMU also prints it to the standard error of the process, bypassing Python."""
     done = harness(tmp_path, *arguments, backend_fmus / "smd.fmu", "--set", "m=1e-300", "--set", "F_ext=1e308")
     assert done.returncode == 1
     assert re.fullmatch(r"Error: .*the solution diverges after t = 0.0 s.*\n", done.stderr)
@@ -225,14 +225,14 @@ def test_the_json_list_is_accepted_by_the_commands(workspace):
 
 
 def page_of(workspace):
-    """The report, whose cells say nothing of their look."""
+    """The report, without the markup of its cells."""
     text = html.unescape((workspace / "results/report.html").read_text(encoding="utf-8"))
     return re.sub("<td[^>]*>", "<td>", text)
 
 
 @pytest.mark.parametrize("scene", ["stickslip-threshold", "pendulum", "smd"])
 def test_a_quantity_is_formatted_alike_in_terminal_file_and_page(workspace, scene):
-    """Every one that is measured: the same digits and the same unit."""
+    """Every measured quantity has the same digits and the same unit."""
     said = harness(workspace, "run", scene, **PLAIN).stdout
     assert harness(workspace, "report").returncode == 0
     page = page_of(workspace)

@@ -1,4 +1,4 @@
-"""Declared equations: what follows from them, by routes that share nothing with how they are written out."""
+"""Code generated from declared equations, checked by direct evaluation of the equations."""
 
 import ast
 import math
@@ -22,7 +22,7 @@ DIGITS = 50
 
 
 class Evaluated:
-    """The declared equations of a model, evaluated as they stand, term by term, in floats or in many digits."""
+    """The declared equations of a model, evaluated directly, term by term, in floats or in many digits."""
 
     def __init__(self, analysis, values, functions):
         self.analysis, self.values, self.functions = analysis, values, functions
@@ -49,7 +49,7 @@ class Evaluated:
 
 
 def situations(analysis, model, count):
-    """Values for all parameters, choices and inputs, set in the model too, and a time, states and a mode."""
+    """Yield values for all parameters, choices and inputs (also set in the model), and a time, states and a mode."""
     draw = random.Random(analysis.name)
     for _ in range(count):
         values = {}
@@ -70,7 +70,7 @@ def situations(analysis, model, count):
 
 
 def driven(analysis, model, t):
-    """Where a driver is."""
+    """Return the position of the driver."""
     return {d.name: model.x_base + getattr(model, d.constant_rate.name) * (t - model.t_base) for d in analysis.drivers}
 
 
@@ -80,7 +80,7 @@ def same_bits(a, b):
 
 @EVERY_SOURCE
 def test_generated_code_has_the_bits_of_the_declared_equations(source):
-    """Rates and outputs while sliding and while stuck; the load as rates that it makes zero."""
+    """Rates and outputs while sliding and while stuck, and the load for which the rates vanish."""
     analysis, model = find_model(source).analysis, find_model(source).model()
     modes = [m.name for m in analysis.modes]
     tried = 0
@@ -108,7 +108,7 @@ def test_generated_code_has_the_bits_of_the_declared_equations(source):
 
 @EVERY_SOURCE
 def test_jacobians_agree_with_differences_in_fifty_digits(source):
-    """By time and by each state, sliding either way: of the equations as they stand."""
+    """By time and by each state, sliding either way, from direct evaluation of the equations."""
     analysis, model, found = find_model(source).analysis, find_model(source).model(), []
     for values, t, at, mode in situations(analysis, model, 40):
         known = values | at | driven(analysis, model, t) | {m.name: mode for m in analysis.modes}
@@ -121,7 +121,7 @@ def test_jacobians_agree_with_differences_in_fifty_digits(source):
 
 @pytest.mark.parametrize("source", LARGER_MODELS, ids=lambda source: source.stem)
 def test_any_number_of_states_and_contacts_is_derived(source):
-    """Rates and Jacobian in every mode, of three states and of two contacts; what is stuck to the ground does not
+    """Rates and Jacobian in every mode, for three states and for two contacts; bodies stuck to the ground do not
     move."""
     analysis = find_model(source).analysis
     model = find_model(source).model()
@@ -143,7 +143,7 @@ def test_any_number_of_states_and_contacts_is_derived(source):
 
 
 def slopes(analysis, known):
-    """The derivatives of each law by time and by each state, as differences in many digits."""
+    """Return the derivatives of each law by time and by each state, as differences in many digits."""
     by_time = {d.name: known[d.constant_rate.name] for d in analysis.drivers}
     ways = [by_time, *({s.name: 1} for s in analysis.states)]
     with mpmath.workdps(DIGITS):
@@ -162,9 +162,10 @@ def slopes(analysis, known):
 
 @mpmath.workdps(DIGITS)
 def settled(analysis, law, known):
-    """The law in many digits, with the force of each contact: that of a slide, or the one that keeps its slip.
+    """Return the law in many digits, with the force of each contact: sliding friction, or the force that keeps its
+    slip.
 
-    Slips are linear in the speeds, and their rates in the forces, so that differences say how they hang together.
+    Slips are linear in the speeds, and their rates in the forces, so that differences give the coefficients.
     """
     modes = {m.name for m in analysis.modes}
     values = {name: value if name in modes else mpmath.mpf(value) for name, value in known.items()}
@@ -193,7 +194,7 @@ def settled(analysis, law, known):
 
 @EVERY_SOURCE
 def test_a_model_uses_only_the_public_api(source):
-    """So that a file from anywhere is like ours."""
+    """So that user models can do the same."""
     tree = ast.parse(find_model(source).source)
     for node in ast.walk(tree):
         assert not isinstance(node, ast.Import)
@@ -203,7 +204,7 @@ def test_a_model_uses_only_the_public_api(source):
 
 
 def test_the_public_api_is_complete():
-    """Every variable that can be declared, every function that has a derivative, and nothing that is not said."""
+    """Every variable that can be declared, every function that has a derivative, and no other names."""
     kinds = {cls.__name__ for cls in Variable.__subclasses__()} | {Model.__name__, Rule.__name__}
     assert set(fmus.__all__) == kinds | {*FUNCTIONS, "choose", "pi", "HYBRID", "SIGN", "THRESHOLD"}
     assert len(fmus.__all__) == len(set(fmus.__all__))
@@ -215,11 +216,11 @@ def test_the_public_api_is_complete():
 
 @EVERY_SOURCE
 def test_generated_source_is_deterministic(source):
-    """Builds are compared by their bytes; reading a file anew changes nothing."""
+    """Builds are compared by their bytes; reading a file again changes nothing."""
     first = find_model(source)
     again = type(first)(first.path, first.source)
     analysis = again.analysis
-    for slope in ({e: 1.0} for e in analysis.states):  # whoever asks before changes nothing
+    for slope in ({e: 1.0} for e in analysis.states):  # earlier queries change nothing
         analysis.derivative_while_sliding(analysis.rate_outputs[analysis.dynamic_states[0]], slope)
     assert analysis.overflow_indicators
     assert again.generated_source == first.generated_source
@@ -236,7 +237,7 @@ def test_a_changed_file_is_read_again(tmp_path):
 
 
 def test_subclassed_variable_types_behave_like_their_base(tmp_path):
-    """They are of that kind."""
+    """They are instances of it."""
     path = tmp_path / "mine.py"
     text = (
         (ROOT / "fmus" / "smd.py").read_text().replace("class Smd", "class Mass(Parameter):\n    pass\n\n\nclass Smd")
@@ -247,7 +248,7 @@ def test_subclassed_variable_types_behave_like_their_base(tmp_path):
 
 @pytest.mark.parametrize("moved", ["x", "driver"])
 def test_a_discontinuous_law_has_no_closed_form_even_with_linear_slopes(tmp_path, moved):
-    """Neither a motion nor a load at rest is known from its slopes, where a condition moves."""
+    """Where a condition moves, slopes determine neither the motion nor the load at rest."""
     text = f'''"""A model."""
 from fmus import Contact, Mode, Model, Output, Parameter, State, choose
 
@@ -276,7 +277,7 @@ class Jump(Model):
 
 
 def test_the_test_models_have_choices_and_contacts():
-    """The models of these tests have what they are to try."""
+    """The models used here cover them."""
     kinds = {type(e) for source in SOURCES for e in find_model(source).analysis.declared}
     assert {Choice, Contact} <= kinds
     functions = {name for source in SOURCES for name in FUNCTIONS if f"{name}(" in find_model(source).generated_source}

@@ -1,4 +1,4 @@
-"""Models of more states or contacts, from files as users write them: right by physics written a second time."""
+"""Models with more states or contacts, from user files, against independent formulations."""
 
 import commands
 import numpy as np
@@ -15,25 +15,25 @@ STOP, DOP853 = 8.0, 4
 
 
 def built(name, kind):
-    """The FMU of one of the files, in a folder outside the project."""
+    """Return the FMU of one of the files, in a folder outside the project."""
     (file,) = (file for file in LARGER_MODELS if file.stem == name)
     return build_user_model(file, *(["--native", "--platform", "linux64"] if kind else [])) / kind / f"{name}.fmu"
 
 
 def lugre(t, y):
-    """The bristles by hand."""
+    """The LuGre equations, written independently."""
     x, v, z = y
     u = v - 1e4 * abs(v) * z / (73.56 + (110.34 - 73.56) * np.exp(-((v / 0.01) ** 2)))
     return [v, (742.5 * (0.034 * t - x) - (1e4 * z + 300.0 * u + 0.4 * v)) / 12.5, u]
 
 
 def bristled(stop):
-    """Its position, speed and bristles at the end, by a method that ours have nothing of."""
+    """Return final position, speed and bristle deflection, by a method that the project does not use."""
     return solve_ivp(lugre, (0.0, stop), (0.0, 0.0, 0.0), "LSODA", rtol=1e-12, atol=1e-14).y[:, -1]
 
 
 def test_three_states_agree_with_an_independent_formulation(worker):
-    """LuGre: position, speed and bristles, within 1e-9 of their sizes."""
+    """LuGre: position, speed and bristle deflection, within 1e-9 of their size."""
     fmu = worker.instantiate(built("lugre", "")).begin({"solver.rtol": 1e-11}, stop=STOP)
     (found,) = fmu.run([0.0, STOP], ["x", "v", "z"])[-1:]
     fmu.free()
@@ -41,7 +41,7 @@ def test_three_states_agree_with_an_independent_formulation(worker):
 
 
 def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
-    """LuGre, by its own name for every column."""
+    """LuGre, with its own column names."""
     folder = built("lugre", "").parent
     for file in ("lugre.py", "lugre.fmu"):
         (tmp_path / file).write_bytes((folder / file).read_bytes())
@@ -58,8 +58,8 @@ def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
 
 
 def run(fmu, physics, changes):
-    """Time and modes of the events, and the last state, in steps to every internal one, with values changed on the
-    way."""
+    """Return time and modes of the events and the final state, stepping to every internal step, with changes of
+    values."""
     t, events = 0.0, []
 
     def look():
@@ -88,8 +88,8 @@ RUNS = [(name, ()) for name in CONTACT_REFERENCES] + [
     ("name", "changes"), RUNS, ids=lambda one: one if isinstance(one, str) else f"changed{len(one)}"
 )
 def test_contacts_stick_and_slip_as_in_an_independent_formulation(worker, name, changes):
-    """On a belt, in a clutch, each on its own body or both on one: every event, and the state at the end; also where
-    a belt is set to another speed, and a clutch opened, on the way."""
+    """On a belt, in a clutch, on separate bodies or shared ones: every event and the final state; also with a change
+    of the belt speed and an opening of the clutch."""
     physics = CONTACT_REFERENCES[name]()
     true, end = reference_events(name, changes)
     fmu = worker.instantiate(built(name, ""))
@@ -103,7 +103,7 @@ def test_contacts_stick_and_slip_as_in_an_independent_formulation(worker, name, 
 
 @pytest.mark.parametrize("name", [path.stem for path in LARGER_MODELS])
 def test_python_and_native_agree_bit_for_bit(worker, name):
-    """Outputs and counts at every internal step, by every method."""
+    """Outputs and counters at every internal step, by every method."""
     variables = {v.name: v for v in read_model_description(built(name, "")).modelVariables}
     wanted = [v.name for v in variables.values() if v.causality == "output"]
     wanted += ["solver.steps", "solver.evaluations", "events.count"][: 3 if name in CONTACT_REFERENCES else 2]

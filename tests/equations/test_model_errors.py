@@ -28,7 +28,7 @@ RATE = '    a = Output("m/s2", "acceleration", (F - k * x) / m, rate_of=v)\n'
 DRY = '    mode = Mode()\n    R = Contact("N", "friction", mode=mode, slip=v, slide=f)\n'
 STUCK = '    a = Output("m/s2", "acceleration", (F - k * x - R) / m, rate_of=v)\n'
 
-# What follows the head, the line that is told (the head has 15), and the sentence.
+# The text after the head (15 lines), the reported line, and the message.
 WRONG = {
     "no rate": ("", 15, "v has no derivative: declare an Output or a State with rate_of=v"),
     "two rates": (RATE + RATE.replace("a =", "b ="), 17, "b and a both declare rate_of=v"),
@@ -285,7 +285,7 @@ def test_a_mistake_is_reported_in_one_sentence_with_its_line(wrong, tmp_path):
 
 
 def test_any_docstring_text_survives_unchanged(tmp_path):
-    """What LaTeX, quotes and places for text look like in a docstring; a byte order mark before it all."""
+    """LaTeX, quotes and format placeholders in a docstring; a byte order mark before the file."""
     words = r"""A \nu \x \N{k} {imports} spring of "three" \"\"\" quotes"""
     path = tmp_path / "mine.py"
     text = (HEAD + RATE).replace('    """A mass on a spring.', f"    r'''{words}")

@@ -1,4 +1,4 @@
-"""A model in a file anywhere, as a user writes it: built by its path, in every kind, and right."""
+"""User models in any folder: built by path, with every backend, and correct."""
 
 import subprocess
 import sys
@@ -28,13 +28,13 @@ KINDS = {
 
 
 def command(*arguments, cwd):
-    """The build command, in a folder of the user's."""
+    """The build command, in a user's folder."""
     return commands.build(*arguments, folder=cwd)
 
 
 def built(path, kind):
-    """The FMU, beside a copy of the file in a folder outside the project; of FMI 3.0, whose numerics are those of the
-    native FMU, with its usual method."""
+    """Return the FMU, beside a copy of the file outside the project; for FMI 3.0, whose numerics are those of the
+    native FMU, with the default method only."""
     usual = ["--method", find_model(path).analysis.method] if kind == "native/fmi3" else []
     return build_user_model(path, *KINDS[kind], *usual) / kind / f"{path.stem}.fmu"
 
@@ -56,7 +56,7 @@ def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(path, kind):
 
 @EVERY_FILE
 def test_python_and_native_agree_bit_for_bit(path, worker):
-    """Outputs and counts, up to the stop time of its default run."""
+    """Outputs and counters, up to the stop time of the default run."""
     described = read_model_description(built(path, ""))
     wanted = [v.name for v in described.modelVariables if v.causality == "output" or v.name == "solver.steps"]
     stop = float(described.defaultExperiment.stopTime)
@@ -96,7 +96,7 @@ def test_its_motion_agrees_with_an_independent_formulation(law, start):
 
 
 def rotor_brake(stop):
-    """Turns of the brake from stick to slip and back: times and angles, by scipy with events."""
+    """Return times and angles of the changes between stick and slip of the brake, by scipy with events."""
     J, k, c, T_s, T_d, omega_s, turn = 0.02, 3.0, 0.01, 0.5, 0.3, 0.5, 0.4
     t, phi, found = 0.0, 0.0, []
 
@@ -121,7 +121,7 @@ def rotor_brake(stop):
 
 
 def test_its_friction_sticks_and_slips_when_the_equations_require(worker):
-    """The events of the brake, and a rest that is one."""
+    """The events of the brake, and a rest."""
     path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
     stop = model_class(path).stop_time
     for kind in ("", "native"):
@@ -155,7 +155,7 @@ def test_methods_laws_and_folders_are_selected_for_a_file_as_for_a_name(tmp_path
 
 @pytest.fixture
 def oil(tmp_path):
-    """A folder with the file of a model in it, under the name of one of ours."""
+    """A folder with a model file that is named like a built-in model."""
     path = next(path for path in EXAMPLE_MODELS if path.stem == "viscous_pendulum")
     (tmp_path / "pendulum.py").write_text(path.read_text())
     return tmp_path
@@ -165,7 +165,7 @@ TABLE = "# series and DOP853, relative difference 1e-13\nt [s],phi [rad],omega [
 
 
 def test_files_of_the_same_stem_are_packed_and_no_others(oil):
-    """Icon and certified result; neither is needed, whatever the name."""
+    """Icon and certified result; neither is required, whatever the name."""
     assert command("pendulum.py", cwd=oil).returncode == 0
     with ZipFile(oil / "pendulum.fmu") as archive:
         assert not [name for name in archive.namelist() if name == "model.png" or "fmi-ls-ref" in name]
@@ -182,7 +182,7 @@ def test_files_of_the_same_stem_are_packed_and_no_others(oil):
 
 
 def test_a_model_file_may_be_named_like_a_python_module(oil):
-    """As math.py, fmus.py: none of them is taken for the module, where the commands are run by their names."""
+    """For example math.py or fmus.py: the commands do not import them instead of the module."""
     folder = oil / "Modelle für später"
     folder.mkdir()
     for name in ("math.py", "fmus.py", "random.py"):
@@ -193,7 +193,7 @@ def test_a_model_file_may_be_named_like_a_python_module(oil):
 
 
 def harness(*arguments, cwd):
-    """A command of the harness, in a folder of the user's; at its figures nobody looks."""
+    """A harness command in a user's folder, without figures."""
     return commands.harness(cwd, *arguments, blank=True)
 
 
@@ -236,7 +236,7 @@ class Duffing(Model):
 
 
 def test_a_run_on_which_two_methods_disagree_is_not_certified(oil):
-    """An oscillator that forgets where it started."""
+    """An oscillator whose result depends on rounding at the start."""
     (oil / "duffing.py").write_text(DUFFING)
     assert command("duffing.py", cwd=oil).returncode == 0
     run = harness("references", "duffing.py", cwd=oil)
@@ -307,7 +307,7 @@ class Puck(Model):
 
 @pytest.fixture
 def puck(tmp_path):
-    """The file with it."""
+    """A model file with one state."""
     (tmp_path / "puck.py").write_text(PUCK)
     return tmp_path / "puck.py"
 

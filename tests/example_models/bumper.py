@@ -1,4 +1,4 @@
-"""A cart against a bumper, with about every function that there is."""
+"""A cart against a bumper, which uses almost every available function."""
 
 from fmus import (
     Choice,
@@ -21,11 +21,11 @@ from fmus import (
 
 
 class Bumper(Model):
-    """Cart that a rope pulls to and fro, against a bumper that hardens.
+    """Cart pulled to and fro by a rope, against a bumper with progressive stiffness.
 
         m a = F - F_drag - F_bumper
 
-    The bumper pushes beyond its gap only; the drag is a smooth sign, or grows as the root of the speed.
+    The bumper acts only beyond its gap; the drag is a smooth sign function, or grows as the root of the speed.
     """
 
     m = Parameter(2.0, "kg", "mass", above=0.0)

@@ -4,7 +4,7 @@ from fmus import HYBRID, THRESHOLD, Contact, Fixed, Input, Mode, Model, Output, 
 
 
 class RotorBrake(Model):
-    """Rotor on a torsion spring whose far end turns, in a brake that grips the less the faster it slips.
+    """Rotor on a torsion spring whose far end turns, with a brake whose friction falls with the slip speed.
 
     J alpha = T + k (turn - phi) - c omega - T_brake
     sliding:   T_brake = (T_d + (T_s - T_d) exp(-(omega/omega_s)^2)) sign(omega)

@@ -4,7 +4,7 @@ from fmus import Model, Output, Parameter, State, sin
 
 
 class ViscousPendulum(Model):
-    """Pendulum whose pin is damped; nobody pushes it.
+    """Pendulum with a damped pin and no input.
 
     m l^2 alpha = - m g l sin(phi) - d omega
     """

@@ -20,7 +20,7 @@ class Sense(Enum):
 
 
 class Arrays(Fmi3Slave):
-    """FMI 3.0: a point on a circle, and the matrix that turns it; arrays, an enumeration and a text."""
+    """FMI 3.0: a point on a circle, and its rotation matrix; arrays, an enumeration and a string."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

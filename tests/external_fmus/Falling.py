@@ -3,7 +3,7 @@ from pythonfmu.enums import Fmi2Status
 
 
 class Falling(Fmi2Slave):
-    """A stone, which ends the simulation when it reaches the ground: at t = (2 height / g)^1/2."""
+    """A stone that terminates the simulation when it reaches the ground, at t = (2 height / g)^1/2."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

@@ -5,7 +5,7 @@ from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variabili
 
 
 class Faulty(Fmi2Slave):
-    """x = k t, until half a second: then what `kind` says (0 nothing)."""
+    """x = k t, for half a second; then the fault given by `kind` (0: none)."""
 
     KINDS = ("nothing", "hangs", "crashes", "raises", "prints", "is lost", "fails")
 

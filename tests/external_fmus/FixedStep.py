@@ -2,7 +2,7 @@ from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variabili
 
 
 class FixedStep(Fmi2Slave):
-    """x' = -k x by Euler's rule, in steps of 0.1 s whatever the communication step: 41 % off after 10 s."""
+    """x' = -k x by Euler's method, in steps of 0.1 s for any communication step: 41 % off after 10 s."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

@@ -13,7 +13,7 @@ from pythonfmu3 import (
 
 
 class Fmi3Midpoint(Fmi3Slave):
-    """FMI 3.0: the oscillator of Midpoint, with units; it ends the simulation at the time `limit`."""
+    """FMI 3.0: the oscillator of Midpoint, with units; it terminates the simulation at the time `limit`."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

@@ -2,7 +2,7 @@ from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variabili
 
 
 class Midpoint(Fmi2Slave):
-    """An undamped oscillator by the midpoint rule, one step for each communication step; no units."""
+    """An undamped oscillator by the midpoint rule, one step per communication step; no units."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

@@ -10,7 +10,7 @@ from pythonfmu3 import (
 
 
 class ModelExchangeOnly(Fmi3SlaveBase, ModelExchange):
-    """FMI 3.0, model exchange alone: the oscillator of Midpoint, whose solver is the tool's."""
+    """FMI 3.0, model exchange only: the oscillator of Midpoint, solved by the importer."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

@@ -4,7 +4,7 @@ from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2
 
 
 class NonConforming(Fmi2Slave):
-    """It breaks the standard, as many do: what is no Real may not be continuous, which is what saying nothing says."""
+    """Violates the standard, as many FMUs do: variables other than Real may not be continuous, which is the default."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

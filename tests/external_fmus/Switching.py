@@ -4,7 +4,8 @@ from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2
 
 
 class Switching(Fmi2Slave):
-    """A room with a heater, which is asked every half second: it goes on below 20 degrees and off above 22."""
+    """A room with a thermostat that acts every half second: the heater switches on below 20 degrees and off above
+    22."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

@@ -1,4 +1,4 @@
-"""The FMI 3.0 FMUs in a host written in C, without Python: fmi3_host.c, by the system's compiler."""
+"""The FMI 3.0 FMUs in a host without Python: fmi3_host.c, compiled by the system's compiler."""
 
 import fmi3_fixtures
 import pytest
@@ -11,7 +11,7 @@ fmus, worker, _workers = fmi3_fixtures.FIXTURES
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_hundred_life_cycles_in_a_host_without_python(worker, fmus, name):
-    """Its last values are those that fmpy gets, to the last bit."""
+    """The final values agree with those of fmpy bit for bit."""
     program, library = [host_program(source=FMI3_HOST_SOURCE)], f"x86_64-linux/{name}.so"
     (solving, solved), said = run_life_cycles(program, fmus / f"{name}.fmu", library, LIVES, STEPS)
     stop, (x, v, *_) = model_class(name).stop_time, outputs(name)

@@ -1,4 +1,4 @@
-"""What the FMI 2.0 FMUs promise for co-simulation, the FMI 3.0 FMUs keep: the same claims, word for word."""
+"""FMI 3.0 co-simulation: the tests of the FMI 2.0 FMUs, repeated with the FMI 3.0 FMUs."""
 
 import fmi3_fixtures
 import numpy as np
@@ -45,7 +45,7 @@ def test_the_default_experiment_in_fmpy_reaches_the_reference(worker, fmus, name
 
 @pytest.mark.parametrize("name", MODELS)
 def test_time_and_indicators_are_readable_in_co_simulation(launch, name):
-    """The indicators of model exchange tell in co-simulation too how far the next event is."""
+    """The event indicators of model exchange give the distance to the next event in co-simulation too."""
     fmu, stop, dry = launch(name), model_class(name).stop_time, "mode" in outputs(name)
     names = ["time", *(["mode", outputs(name)[1], "events.to_rest", "events.to_break_away"] if dry else [])]
     times = [stop * i / 200 for i in range(201)]
@@ -53,6 +53,6 @@ def test_time_and_indicators_are_readable_in_co_simulation(launch, name):
         assert row[0] == t
         if dry:
             mode, v, to_rest, to_break_away = row[1:]
-            assert to_rest == (mode * v + 1e-300 if mode else 1.0)  # never zero once an event is handled
+            assert to_rest == (mode * v + 1e-300 if mode else 1.0)  # never zero after event handling
             assert to_break_away > 0.0
             assert mode == 0 or to_break_away == 1.0

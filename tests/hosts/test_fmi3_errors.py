@@ -1,4 +1,4 @@
-"""Failure in co-simulation by FMI 3.0: status 3 (error), and one sentence."""
+"""Errors in FMI 3.0 co-simulation: status 3 (error) and one sentence."""
 
 from math import inf, isfinite, nan
 
@@ -45,7 +45,7 @@ def test_an_impossible_step_is_refused(launch, name, step):
 
 @pytest.mark.parametrize("kind", ["Float64", "Float32", "Int32", "Int64", "UInt64", "Boolean", "String"])
 def test_a_wrong_call_fails_without_ending_the_run(launch, kind):
-    """Each is answered by Error and one sentence, and changes nothing; in the sled 0 is the mass."""
+    """Each call returns Error with one sentence and changes nothing. In the sled, reference 0 is the mass."""
     times, names = [0.0, 0.1, 0.2], outputs("stickslip")
     expected, fmu = launch("stickslip").run(times, names), launch("stickslip")
     rows = [fmu.get(*names)]
@@ -62,11 +62,11 @@ def test_a_wrong_call_fails_without_ending_the_run(launch, kind):
     assert_identical(rows, expected, names)
 
 
-# ---- as fmpy tells it
+# ---- as reported by fmpy
 
 
 def failures(name):
-    """Ways to fail: options for fmpy.simulate_fmu, and what the sentence names."""
+    """Return invalid runs: options for fmpy.simulate_fmu, and words of the message."""
     force, _ = push(name)
     rows = [(0.0, 0.0), (0.5, 0.0), (0.5, nan), (1.0, nan)]
     yield "ExitInitializationMode", {"start_values": {"m": -1.0}}, ("m = -1.0", declared(name)["m"].allowed)

@@ -1,4 +1,4 @@
-"""The FMI 3.0 FMUs in a tool that others wrote; the other tools of test_importers.py do not know FMI 3.0."""
+"""The FMI 3.0 FMUs in Ecos; the other tools of test_importers.py do not support FMI 3.0."""
 
 from dataclasses import replace
 
@@ -14,7 +14,8 @@ ECOS = next(importer for importer in IMPORTERS if importer.name == "Ecos")
 @pytest.mark.skipif(bool(unavailable_reason(ECOS)), reason=unavailable_reason(ECOS))
 @pytest.mark.parametrize("name", MODELS)
 def test_ecos_runs_fmi3_co_simulation_like_fmi2(name, fmus):
-    """The same value references, the same grid; only the stop time, which never arrives, may move an internal step."""
+    """Value references and grid are the same; only the stop time, which Ecos does not pass on, may shift an internal
+    step."""
     older = describe_fmu(fmus / f"{name}.fmu").base_request
     newer = replace(older, fmu=str(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu"))
     prepare(ECOS, [older, newer])

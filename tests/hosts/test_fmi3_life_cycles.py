@@ -1,5 +1,7 @@
-"""Many lives of FMI 3.0 FMUs, for co-simulation and for model exchange, in turn, at once, in threads and processes,
-beside those of FMI 2.0; each host is a separate process (fmi3_life_cycles.py) that must exit cleanly."""
+"""Many life cycles of FMI 3.0 FMUs, in both interfaces: successive, concurrent, in threads and processes, with FMI 2.0.
+
+Each host is a separate process (fmi3_life_cycles.py) that must exit cleanly and print nothing.
+"""
 
 from functools import partial
 
@@ -18,7 +20,7 @@ fresh_worker = fmi3_fixtures.fresh_worker
 
 @pytest.fixture(scope="module")
 def each():
-    """Every FMI 3.0 FMU twice: it is taken for co-simulation, then for model exchange."""
+    """Every FMI 3.0 FMU twice: the first is used for co-simulation, the second for model exchange."""
     return [str(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu") for name in MODELS for _ in range(2)]
 
 
@@ -29,7 +31,7 @@ def older(fmus):
 
 
 def test_successive_life_cycles_leave_little_memory(each, record_property):
-    """Fifteen for each of ten, each with a reset: seen is 0.2 kB a life, and nothing in sys.path."""
+    """Fifteen life cycles of each of ten, each with a reset; the measured growth is 0.2 kB per life cycle."""
     told = run_script("run_in_turn", each, 150)
     early, late = told["memory"]
     record_property("kB a life", (late - early) / 135)
@@ -39,12 +41,12 @@ def test_successive_life_cycles_leave_little_memory(each, record_property):
 
 
 def test_instances_of_both_interfaces_and_both_versions_coexist(each, older):
-    """All alive at once and stepped in turns: every instance of an FMU gives the same run."""
+    """All instances exist at once and are stepped in turn; every instance of an FMU gives the same run."""
     assert run_script("run_interleaved", each + older, 1)["runs"] == 1
 
 
 def test_an_fmu_unpacked_for_every_run_is_released(each, record_property):
-    """As fmpy's simulate_fmu does: memory and libraries of earlier runs are given back."""
+    """Memory and libraries of earlier runs are released, as with simulate_fmu of fmpy."""
     told = run_script("unpack_for_every_run", each[0], 30)
     early, late = told["memory"]
     record_property("kB a run", (late - early) / 27)
@@ -60,7 +62,7 @@ def test_threads_do_not_interfere(each, older):
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_child_processes_continue_instances_and_create_new_ones(method):
-    """In co-simulation the sled, in model exchange the pendulum."""
+    """Co-simulation of the sled, model exchange of the pendulum."""
     paths = [fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu" for name in ("stickslip", "pendulum")]
     told = run_script("run_in_processes", paths, method)
     assert (told["same"], {*told["codes"]}) == (True, {0})
@@ -73,7 +75,7 @@ def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(each):
 
 
 def test_a_folder_may_have_any_name(each, tmp_path):
-    """But one with %20, which the native layer takes for a space."""
+    """Except one with %20, which the native layer takes for a space."""
     expected = run_script("run_in_folder", each[0], None)
     for folder in ("with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200):
         (tmp_path / folder).parent.mkdir(exist_ok=True)
@@ -81,18 +83,18 @@ def test_a_folder_may_have_any_name(each, tmp_path):
 
 
 def test_a_process_may_end_with_live_instances(fresh_worker):
-    """The fixture asks for a good end; so that is not luck, of all FMUs at once."""
+    """The fixture requires a clean exit. All FMUs are loaded, so that this is not luck."""
     for name in MODELS:
         for make in (fresh_worker.instantiate, fresh_worker.exchange, fresh_worker.instantiate):
             make(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu").begin().get(outputs(name)[0])
 
 
-# ---- the two versions of FMI in one process
+# ---- both versions of FMI in one process
 
 
 @pytest.fixture(scope="module")
 def process():
-    """A process that must end well."""
+    """A process that must exit cleanly."""
     worker = fmi3_fixtures.Worker()
     yield worker
     assert worker.close() == 0
@@ -100,7 +102,7 @@ def process():
 
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_co_simulation_agrees_with_fmi2_bit_for_bit(process, fmus, case):
-    """On the same grid, with a change of input in mid-run, where neither knows a stop time."""
+    """On the same grid, with a change of the input during the run and without a stop time."""
     name, values, stop = case
     names, times = outputs(name) + counts(name), [stop * i / 100 for i in range(101)]
     force = next(v for v, d in declared(name).items() if d.causality == "input")

@@ -1,4 +1,5 @@
-"""An interrupt is the host's: it ends the step, and reaches the host when the call is over; in a clean process."""
+"""An interrupt belongs to the host: it ends the step and reaches the host when the call returns. Runs in a clean
+process."""
 
 import json
 import subprocess
@@ -19,7 +20,7 @@ def fmu(fmus):
 
 @pytest.mark.parametrize("handler", HANDLERS)
 def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
-    """As the very exception that the handler of the host has raised, once, and no later than the call is over."""
+    """The host gets the exception that its signal handler raised, once, and no later than at the end of the call."""
     answer, said = run_script_with_stderr("interrupted_host.py", "interrupt_long_step", fmu, handler)
     arguments = {"KeyboardInterrupt": [], "SystemExit": [143], "Stop": ["enough", 3]}
     assert answer["reached"] == [handler, arguments[handler]]
@@ -32,7 +33,7 @@ def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
 
 
 def test_an_interrupt_during_any_call_reaches_the_host(fmu):
-    """Also where it is handled as a function of the FMU is entered, before its first line."""
+    """Also if the signal is handled when a function of the FMU is entered, before its first line."""
     answer, said = run_script_with_stderr("interrupted_host.py", "interrupt_short_steps", fmu, 150)
     assert answer == [["KeyboardInterrupt"], 150]
     assert all("was interrupted" in line for line in said.splitlines())

@@ -1,4 +1,4 @@
-"""The built FMUs in tools that others wrote: what `python -m harness importers` prints, row by row.
+"""The built FMUs in other tools: the table of `python -m harness importers`, row by row.
 
 Tools that are not installed are skipped with the reason; they are in the extra `importers`.
 """
@@ -21,14 +21,14 @@ from harness.studies.importers import checks, table
 from harness.studies.importers.checks import CHECKS, IMPORTERS, NOT_RUN, CheckFailedError
 from harness.studies.importers.request import END, ImporterReply, ImporterRequest
 
-# What is a model's own is the same, to the last bit, in both kinds (native/test_agreement.py), and what is a kind's own
-# in all models: each model is asked about in one kind, the driven sled in both.
+# Both backends of a model agree bit for bit (native/test_python_native_agreement.py), and the code specific to a
+# backend is the same for all models: each model is checked with one backend, the sled with both.
 ASKED = {"python": sorted({*MODELS[::2], "stickslip"}), "native": sorted({*MODELS[1::2], "stickslip"})}
 
 
 @pytest.fixture(scope="module", params=ASKED)
 def asked(request, fmus, tmp_path_factory):
-    """The models of a kind that are asked about, and every row of their table, which is made once a run."""
+    """Return the models to check with a backend, and all rows of their table, computed once per test run."""
     names, source = ASKED[request.param], fmus if request.param == "python" else native_fmus.build_native_fmus()
 
     def make(out):
@@ -61,7 +61,7 @@ def test_the_table_lists_every_model_and_names_missing_tools(asked):
 
 
 def test_an_fmu_unsuitable_for_the_checks_is_skipped_with_a_reason(tmp_path, monkeypatch):
-    """A brake has no mass m; the others are asked about, if there are any."""
+    """The brake has no mass m; the other models are still checked."""
     monkeypatch.setattr(table, "IMPORTERS", ())
     path = next(path for path in EXAMPLE_MODELS if path.stem == "rotor_brake")
     (tmp_path / "rotor_brake.fmu").symlink_to(build_user_model(path) / "rotor_brake.fmu")
@@ -74,13 +74,13 @@ def test_an_fmu_unsuitable_for_the_checks_is_skipped_with_a_reason(tmp_path, mon
 
 
 def test_a_crash_or_timeout_affects_only_its_own_check(monkeypatch):
-    """Whatever follows is asked in another process; a process that ends badly takes the last of its answers with it."""
+    """The checks that follow run in another process; a process that ends badly loses its last answer."""
     asked = []
 
     def process(module, text, timeout):
         asked.append([json.loads(line)["instances"][0] for line in text.splitlines()])
         answered = [*takewhile(lambda name: name not in ("crash", "hang"), asked[-1])]
-        last = asked[-1][: len(answered) + 1][-1]  # that it was about
+        last = asked[-1][: len(answered) + 1][-1]  # the check in which it ended
         ends = {"crash": -11, "hang": -9, "leak": -6}.get(last, 0)
         replies = "\n".join(json.dumps(asdict(ImporterReply(name, [], [], 0))) for name in answered)
         said = "".join(f"{name} speaks{END}" for name in answered) + "a reason\n" * bool(ends)

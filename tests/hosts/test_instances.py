@@ -1,8 +1,6 @@
-"""Hundreds of instances: in turn, at once, in threads and processes, in hosts that hold what could be mistaken for
-them.
+"""Hundreds of instances: successive, concurrent, in threads and processes, and in hosts with conflicting modules.
 
-Both kinds of FMU; every host is a process of its own (life_cycles.py), which must end well.  Memory is measured where
-glibc tells it, on Linux.
+Both backends; every host is a separate process (life_cycles.py) that must exit cleanly. Memory is measured with glibc.
 """
 
 from functools import partial
@@ -14,18 +12,18 @@ from build_cache import ROOT
 from models import MODELS
 
 KINDS = ("python", "native")
-SOME = ("pacejka", "stickslip")  # smooth, and with a mode: processes know no more
+SOME = ("pacejka", "stickslip")  # one smooth, one with a mode: enough for processes
 
 
 @pytest.fixture(scope="module", params=KINDS)
 def folder(request, fmus):
-    """The FMUs of one kind."""
+    """The FMUs of one backend."""
     return fmus if request.param == "python" else native_fmus.build_native_fmus()
 
 
 @pytest.fixture
 def paths(folder):
-    """All FMUs of one kind."""
+    """All FMUs of one backend."""
     return [str(folder / f"{name}.fmu") for name in MODELS]
 
 
@@ -33,7 +31,7 @@ run_script = partial(worker_client.run_script, "life_cycles.py")
 
 
 def test_hundreds_of_life_cycles_leave_little_memory(paths, record_property):
-    """Seen: 2 kB a life in Python; nothing in sys.path."""
+    """Measured: 2 kB per life cycle in Python, and no additions to sys.path."""
     told = run_script("run_in_turn", paths, 150)
     early, late = told["memory"]
     record_property("kB a life", (late - early) / 135)
@@ -46,11 +44,11 @@ def test_hundreds_of_instances_coexist(paths, record_property):
     told = run_script("run_interleaved", paths, 40)
     record_property("kB an instance", told["each"])
     assert told["runs"] == 1
-    assert told["each"] < 90.0  # of which fmpy takes 45
+    assert told["each"] < 90.0  # of which fmpy uses 45
 
 
 def test_an_fmu_unpacked_for_every_run_is_released(paths, record_property):
-    """As fmpy's simulate_fmu does: memory and libraries of earlier runs are given back."""
+    """Memory and libraries of earlier runs are released, as with simulate_fmu of fmpy."""
     told = run_script("unpack_for_every_run", paths[-1], 30)
     early, late = told["memory"]
     record_property("kB a run", (late - early) / 27)
@@ -76,6 +74,6 @@ def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(paths):
 
 
 def test_a_folder_name_may_contain_spaces(paths, tmp_path):
-    """As the layer finds it, which is that of all models."""
+    """The native layer, which locates the folder, is the same for all models."""
     path = paths[-1]
     assert run_script("run_in_folder", path, str(tmp_path / "with  two")) == run_script("run_in_folder", path, None)

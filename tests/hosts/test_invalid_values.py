@@ -1,4 +1,4 @@
-"""Whatever cannot be used is refused in one sentence, and answers NaN; the process lives on and reset recovers."""
+"""An invalid value is refused with one sentence and outputs read NaN; the process survives and a reset recovers."""
 
 import itertools
 from math import inf, isfinite, isnan, nan, nextafter
@@ -14,7 +14,7 @@ REALS = {name: [v for v in outputs(name) if declared(name)[v].type == "Real"] fo
 
 
 def bad_values(declaration):
-    """Values just outside the range, far outside it, and no numbers at all."""
+    """Return values just outside the range, far outside it, and nonfinite ones."""
     yield from (nan, inf, -inf)
     if isfinite(declaration.low):
         yield from (nextafter(declaration.low, -inf), declaration.low - 1e9)
@@ -24,7 +24,7 @@ def bad_values(declaration):
 
 
 def refuses(fmu, name, t, h, *words):
-    """The step from t fails, all outputs read NaN, and one sentence says `words`: in the log and on standard error."""
+    """The step from t fails, all outputs read NaN, and one message with `words` is in the log and on standard error."""
     with pytest.raises(FmiError) as refusal:
         fmu.step(t, h)
     assert (refusal.value.function, refusal.value.status) == REFUSED
@@ -149,7 +149,7 @@ def test_an_impossible_step_is_refused(launch, name, step):
     refuses(fmu, name, *step, "step", *(repr(part) for part in step), "1.0 s", "4.0 s")
 
 
-ARITHMETICS = {  # of hosts: what they take for the time of the n-th step, and for its size
+ARITHMETICS = {  # how hosts compute time and size of the n-th step
     "products": lambda start, h: lambda n: (start + n * h, h),
     "quotients": lambda start, h: lambda n: (start + n / (1.0 / h), h),
     "differences": lambda start, h: lambda n: (start + n * h, start + (n + 1) * h - (start + n * h)),
@@ -161,7 +161,7 @@ ARITHMETICS = {  # of hosts: what they take for the time of the n-th step, and f
 @pytest.mark.parametrize("start", [-2.0, -0.3, 0.0, 1.0, 1e6])
 @pytest.mark.parametrize("arithmetic", ARITHMETICS.values(), ids=ARITHMETICS)
 def test_step_times_within_rounding_are_accepted_wherever_zero_lies(launch, arithmetic, start):
-    """Near t = 0 times carry the rounding of the start; sizes down to 1e-10 s, around the start, 0 and 1e-5."""
+    """Near t = 0 times carry the rounding of the start; steps down to 1e-10 s, around the start, 0 and 1e-5."""
     for h in (0.1, 1e-3, 7e-6, 1e-10):
         if h < 1e-12 * abs(start):
             continue
@@ -196,7 +196,7 @@ def test_a_step_that_begins_elsewhere_is_refused_even_at_zero(launch, late):
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1.0, 2.0, nan, inf])
 def test_an_invalid_tolerance_is_ignored(worker, backend_fmus, tolerance):
-    """As the solver shows, whose error would be as large as the motion."""
+    """Otherwise the error of the solver would be as large as the motion."""
     names, times = ["x", "solver.steps"], [0.0, 1.0, 2.0]
 
     def run(given):
@@ -262,11 +262,12 @@ def test_a_calculated_value_cannot_be_set(launch):
 
 WRONG_TYPES = ("Integer", "Boolean", "String")  # for a Real
 EVERY_TYPE = ("Real", *WRONG_TYPES)
-FIRST = {"Boolean": True, "String": "1"}  # a value of a type; 1 of the others
+FIRST = {"Boolean": True, "String": "1"}  # a value of each type; 1 for the others
 
 
 def wrong_calls(types, wrong):
-    """Type and reference: no variable at all, or one that is not of the type; in the sled 0 is the mass."""
+    """Return type and reference of missing variables and of variables of another type. In the sled, reference 0 is
+    the mass."""
     assert next(iter(declared("stickslip"))) == "m"
     return [(kind, reference) for kind in types for reference in (10**6, 2**31, 2**32 - 1)] + [(k, 0) for k in wrong]
 
@@ -277,7 +278,7 @@ def wrong(request):
 
 
 def test_a_wrong_read_fails_without_ending_the_instance(launch, wrong):
-    """It answers nothing that could be taken for a value, says so once a call, and all else reads and runs on."""
+    """It returns no plausible value and reports one error per call; all other reads and the run continue."""
     kind, reference = wrong
     times, names = [0.0, 0.1, 0.2, 0.3], list(declared("stickslip"))
     expected, fmu = launch("stickslip").run(times, names), launch("stickslip")

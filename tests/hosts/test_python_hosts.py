@@ -1,4 +1,4 @@
-"""What a host may do with the FMUs: load several, in several versions, often, and with any Python from 3.9 on."""
+"""Python hosts may load several FMUs, in several versions, repeatedly, with any Python from 3.9 on."""
 
 import json
 import re
@@ -22,7 +22,7 @@ PYTHONS = ["3.9", "3.10", "3.11", "3.12", "3.13"]
 
 
 def test_the_running_code_is_the_code_in_the_fmu(fresh_worker, fmus):
-    """Not the sources, and not the pythonfmu of the host."""
+    """Neither the sources nor the pythonfmu of the host are used."""
     before = set(fresh_worker.modules())
     for name in MODELS:
         path = fmus / f"{name}.fmu"
@@ -38,7 +38,7 @@ def test_the_running_code_is_the_code_in_the_fmu(fresh_worker, fmus):
 
 
 def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, tmp_path):
-    """The sled edited, rebuilt and run beside the one it was made from."""
+    """The sled is edited, rebuilt and run beside the original."""
     source = (ROOT / "fmus" / "stickslip.py").read_text()
     edited, number = re.subn(r"(\n    k = Parameter\()[^,]+", r"\g<1>900.0", source)
     assert number == 1
@@ -58,7 +58,7 @@ def test_two_versions_of_an_fmu_run_their_own_code_in_one_process(worker, fmus, 
 
 
 def test_concurrent_instances_do_not_interfere(launch, worker):
-    """All models, laws and methods at once, stepped in turns."""
+    """All models, laws and methods at once, stepped in turn."""
     times = [0.02 * i for i in range(50)]
     alone = [launch(name, values, stop=stop).run(times, outputs(name)) for name, values, stop in CASES]
     fleet = [(launch(name, values, stop=stop), outputs(name)) for name, values, stop in CASES]
@@ -90,13 +90,13 @@ def test_twenty_life_cycles_in_one_process_end_alike_and_cleanly(fresh_worker, f
 
 
 def interpreter(version):
-    """An interpreter of this version, or None."""
+    """Return an interpreter of this version, or None."""
     installed = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
     return str(installed[-1]) if installed else shutil.which(f"python{version}")
 
 
 def request(resources, name, values, stop):
-    """What run_embedded.py is asked to run."""
+    """Return the input of run_embedded.py."""
     references = {v: i for i, v in enumerate(declared(name))}
     real = {v: declared(name)[v].type == "Real" for v in references}
     return {
@@ -110,7 +110,7 @@ def request(resources, name, values, stop):
 
 @pytest.fixture(scope="module")
 def requests(fmus, tmp_path_factory):
-    """One run of every case on the unpacked FMUs: what is asked, the names of what is read, and the rows here."""
+    """One run of every case on the unpacked FMUs: the request, the output names, and the rows from this Python."""
     resources, worker, found = tmp_path_factory.mktemp("resources"), Worker(), []
     for name in MODELS:
         with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
@@ -127,7 +127,7 @@ def requests(fmus, tmp_path_factory):
 
 @pytest.mark.parametrize("version", [PYTHONS[0], PYTHONS[-1]])
 def test_the_embedded_code_behaves_alike_on_the_oldest_and_newest_python(requests, version):
-    """And, as all of these tests show, on one between."""
+    """The other tests use a version in between."""
     python = interpreter(version)
     if python is None:
         pytest.skip(f"there is no Python {version} here")

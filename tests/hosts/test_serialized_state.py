@@ -1,7 +1,7 @@
-"""The bytes of a saved state are trusted no further than they can be checked: refused, or taken to the last bit.
+"""The bytes of a saved state are validated: refused, or restored to the last bit.
 
-Most claims are made of the classes that travel inside the FMUs, which take a thousand forgeries a second; those that
-could do harm are made of built FMUs in a clean process.
+Most tests use the classes packed in the FMUs, which check a thousand forgeries per second. Dangerous ones use built
+FMUs in a clean process.
 """
 
 import json
@@ -25,7 +25,7 @@ REFUSAL = (
 
 
 def running(name):
-    """The class of slaves of a model, and one of them in mid-run."""
+    """Return the slave class of a model, and an instance during a run."""
     made = runtime(name, "slave").make_slave_class(model_class(name))
     one = made(instance_name="saved")
     one.exit_initialization_mode()
@@ -34,24 +34,24 @@ def running(name):
 
 
 def own(made, one):
-    """The bytes of its state."""
+    """Return the bytes of its state."""
     return made._fmu_state_to_bytes(one._get_fmu_state())
 
 
 def sealed(text):
-    """With a checksum that is right."""
+    """Return the bytes with a valid checksum."""
     return b"%08x" % crc32(text) + text
 
 
 def forged(content, change):
-    """The bytes after a change of what they hold, with a checksum that is right."""
+    """Return the bytes after a change of their content, with a valid checksum."""
     state = json.loads(content[8:])
     change(state)
     return sealed(json.dumps(state).encode())
 
 
 def taken(made, content):
-    """Whether the bytes are taken for a state."""
+    """Return whether the bytes are accepted as a state."""
     try:
         made._fmu_state_from_bytes(content)
     except sibling_module(made.Model, "runtime.saved_state").InvalidStateError:
@@ -60,7 +60,7 @@ def taken(made, content):
 
 
 def leaves(state, path=()):
-    """The path of every member that holds no others."""
+    """Yield the path of every scalar member."""
     for name, value in state.items():
         if isinstance(value, dict) and value:
             yield from leaves(value, (*path, name))
@@ -69,14 +69,14 @@ def leaves(state, path=()):
 
 
 def alike(one, other):
-    """Whether two values differ as one state does from the next."""
+    """Return whether two values are valid alternatives: the same type, or the same shape."""
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other)
     return type(one) is type(other) and one != 10**30
 
 
 def at(state, path):
-    """What owns the member at the end of a path, and the name of that."""
+    """Return the owner of the member at the end of a path, and its name."""
     for name in path[:-1]:
         state = state[name]
     return state, path[-1]
@@ -86,7 +86,7 @@ def at(state, path):
 def test_own_bytes_are_accepted_and_reproduced(name):
     made, one = running(name)
     heir = made(instance_name="heir")
-    for spoil in ([], ["set"], ["set", "step"]):  # healthy, with a value that cannot be used, failed
+    for spoil in ([], ["set"], ["set", "step"]):  # healthy, with an invalid value, failed
         if spoil == ["set"]:
             one.set_invalid("m", "m = nan kg is refused: a sentence with a · and brackets [{")
         if "step" in spoil:
@@ -113,8 +113,8 @@ def test_flipped_truncated_or_extended_bytes_are_refused(name, capsys):
 
 @EVERY_MODEL
 def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys):
-    """Each is exchanged for something that it is not, and the first of each type and length, which are read alike, for
-    all of it."""
+    """Each member is replaced by something invalid. Members of the same type and length are read alike, so the first
+    of each gets all replacements."""
     made, one = running(name)
     content, draw = own(made, one), random.Random(name)
     assert taken(made, forged(content, lambda state: None))
@@ -225,14 +225,14 @@ FORGERIES = {
 
 @pytest.fixture
 def fmu(fmus):
-    """A process of its own, which must end well, and the path of an FMU for it."""
+    """A process that must exit cleanly, and the path of an FMU."""
     worker = Worker()
     yield worker, fmus / "stickslip.fmu"
     assert worker.close() == 0
 
 
 def test_forged_bytes_change_neither_instance_nor_neighbour_nor_process(fmu):
-    """In the built FMU, one after the other: an error status, a sentence, and all go on as they were."""
+    """In the built FMU, one after the other: an error status and a message, and all instances continue unchanged."""
     worker, path = fmu
     times, names = [0.1 * i for i in range(len(FORGERIES) + 1)], outputs("stickslip")
     expected = worker.instantiate(path).begin().run(times, names)

@@ -1,4 +1,4 @@
-"""The linear system of rodas, eliminated without exchange: solved, or refused; alike on arrays and in scalars."""
+"""The linear system of rodas, solved by elimination without pivoting, or refused; alike on arrays and in scalars."""
 
 from math import fabs, nan
 
@@ -17,7 +17,7 @@ BODIES = {
 
 
 def in_scalars(spec, g, h, J, r):
-    """What the written-out lines make of a system."""
+    """Return the result of the lowered code for a system."""
     names, rates = list(spec.states), list(spec.states.values())
     known = {"g": g, "h": h, "nan": nan, "fabs": fabs} | {
         f"r_{name}": value for name, value in zip(names, r, strict=True)
@@ -38,8 +38,8 @@ def on_arrays(spec, g, h, J, r):
 
 @pytest.mark.parametrize("bodies", BODIES)
 def test_a_system_is_solved_or_refused_but_never_half_solved(bodies):
-    """Also where a pivot nearly vanishes, as in a motion that grows as fast as the step is long; what is left of the
-    equations is small beside their terms."""
+    """Also if a pivot nearly vanishes, as for a motion that grows within one step; the residual is small relative to
+    the terms."""
     spec, draw, refused = ModelLayout(BODIES[bodies], {}), np.random.default_rng(4), 0
     n, g = len(spec.states), 0.25
     M = np.eye(n)
@@ -47,7 +47,7 @@ def test_a_system_is_solved_or_refused_but_never_half_solved(bodies):
         h = 10.0 ** draw.uniform(-4.0, 1.0)
         J = draw.normal(0.0, 1.0, (n, n)) * 10.0 ** draw.uniform(-3.0, 5.0, (n, 1))
         first = spec.dynamic_states[0]
-        if turn % 3:  # the first pivot is nothing but rounding, or little more
+        if turn % 3:  # the first pivot is rounding error, or little more
             moved = [i for i in range(n) if i not in spec.dynamic_states]
             J[first, first] = 1.0 / (g * h) * (1.0 - 10.0 ** draw.uniform(-17.0, -3.0))
             J[first, moved] = 0.0

@@ -1,4 +1,4 @@
-"""The numerics written out: the same bits as the sources on arrays, what is gone, and what is refused."""
+"""The lowered numerics: the same bits as the vector sources on arrays, removed code, and unsupported constructs."""
 
 import ast
 import re
@@ -51,7 +51,7 @@ def test_emitted_code_has_no_vectors_names_its_source_and_keeps_the_line_length(
 
 
 def test_unreachable_code_is_removed():
-    """A smooth model has no modes, one without closed forms none of theirs, and an offer no more than it says."""
+    """A smooth model has no modes, one without closed form no closed-form code, and a selection nothing else."""
     smooth, dry = (
         "\n".join(text for path, text in lowered_files(name).items() if path.split("/")[-1] in NUMERICS)
         for name in ("pacejka", "coulomb")

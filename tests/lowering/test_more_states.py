@@ -1,4 +1,5 @@
-"""Three states, and two contacts on bodies of their own: numerics of more than our five need, by independent routes."""
+"""Three states, and two contacts on separate bodies: features that the five models do not use, against independent
+solutions."""
 
 from functools import cache
 from math import exp, fabs
@@ -31,7 +32,7 @@ def test_arrays_and_scalars_give_the_same_bits_at_every_step(name, method):
 
 
 def run(name, method):
-    """A run of the written-out model: the state at the stop, and time and modes of every event."""
+    """Run the lowered model; return the state at the stop, and time and modes of every event."""
     one, stop = lowered_model(FILES[name])(), STOPS[name]
     prepared_model(
         one, {"solver.method": method, "solver.rtol": RTOL[method], "solver.atol": 1e-3 * RTOL[method]}, stop
@@ -47,7 +48,7 @@ def run(name, method):
 
 @cache
 def bristles():
-    """Where they are at the end, by a method that ours have nothing of."""
+    """Return the final state by a method that the project does not use."""
 
     def rates(t, y):
         x, v, z = y

@@ -1,4 +1,4 @@
-"""Whatever an author calls the variables of a model, its numbers are the same."""
+"""The results do not depend on the names of the variables of a model."""
 
 import pytest
 from internal_steps import prepared_model, start
@@ -28,7 +28,7 @@ class Mine(Model):
     RATE = Output("m/s2", "acceleration", (k * (driver - POSITION) - F) / m, rate_of=SPEED)
 '''
 SLED = BELT.replace(" - 0.5 * u", "")
-# Of position, speed, rate and mode: local names, attributes, constants, stages of each other, what the C has.
+# For position, speed, rate and mode: local names, attributes, constants, stages of each other, names in the C code.
 NAMES = {
     SLED: [("y", "v", "e", "modes"), ("x", "x1", "x0", "x_1")],
     BELT: [("h", "size", "end", "i"), ("OVERFLOW_LIMIT", "d_x", "to", "tie_tolerance")],
@@ -37,7 +37,7 @@ CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
 
 
 def numbers(path, model, names):
-    """Ends of steps, and what these names are there, by two methods."""
+    """Return ends of steps, and the values of these names there, by two methods."""
     found, rules = [], sibling_module(lowered_model(path), "runtime.call_sequence")
     for method in DOP853, RODAS:
         prepared_model(model, {"solver.method": method, "solver.rtol": 1e-6}, 2.0)
@@ -85,7 +85,7 @@ def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_pat
 
 
 def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
-    """Two blocks, whose modes are called like entries of their matrix."""
+    """Two blocks whose modes are named like entries of their matrix."""
     (blocks,) = (path for path in LARGER_MODELS if path.stem == "blocks")
     path, rates = tmp_path / "blocks.py", []
     for names in ("mode1", "mode2"), ("A_F1_F2", "A_F2_F1"):

@@ -1,4 +1,4 @@
-"""Several contacts in the hands of an importer's solver: the events that the equations have, by the numerics alone."""
+"""Several contacts integrated by an importer's solver agree with the events of the equations."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ FILES = {path.stem: path for path in LARGER_MODELS}
 
 
 def integrated(name, stop):
-    """Time and modes of each event, and the last state, by scipy with the indicators for events."""
+    """Return time and modes of each event and the final state, from scipy with the indicators as event functions."""
     cls = lowered_model(FILES[name])
     model, exchange, run = (
         model_exchange_instance(cls),
@@ -57,7 +57,7 @@ def integrated(name, stop):
         if found.status != 1:
             return events, y
         assert len(events) < 99
-        beyond = 1e-12 * (1.0 + t)  # where an importer's solver ends a step: the root lies behind it
+        beyond = 1e-12 * (1.0 + t)  # an importer's solver stops just beyond the root
         t, y = t + beyond, y + beyond * np.array(rates(t, y))
         at(t, y)
         before = [getattr(solver, mode) for mode in model.contacts]
@@ -71,7 +71,7 @@ def integrated(name, stop):
 
 @pytest.mark.parametrize("name", CONTACT_REFERENCES)
 def test_modes_follow_at_the_events_located_by_an_importer(name):
-    """Nothing changes the second time that it is asked for."""
+    """A second update changes nothing."""
     true, end = integrate_events(CONTACT_REFERENCES[name]())
     events, found = integrated(name, CONTACT_REFERENCES[name].stop)
     assert [modes for _, *modes in events] == [modes for _, *modes in true]
@@ -80,7 +80,7 @@ def test_modes_follow_at_the_events_located_by_an_importer(name):
 
 
 def test_states_are_nan_where_no_modes_are_consistent(tmp_path):
-    """A sled whose sliding friction is above the static one, when the driver has pulled far enough."""
+    """A sled whose sliding friction exceeds the static friction once the driver has pulled far enough."""
     cls = lowered_model(write_growing_friction_model(tmp_path))
     model, exchange, run = (
         model_exchange_instance(cls),

@@ -18,7 +18,7 @@ POINTS, H = 12, 1e-4
 
 
 class Three(FMU3Model):
-    """Under the names of FMI 2.0."""
+    """FMI 3.0 instances with the method names of FMI 2.0."""
 
     newDiscreteStates, getReal, setReal = FMU3Model.updateDiscreteStates, FMU3Model.getFloat64, FMU3Model.setFloat64
 
@@ -41,7 +41,7 @@ KINDS = {2: (build_native_fmus, FMU2Model), 3: (fmi3_fixtures.build_fmi3_fmus, T
 
 @pytest.fixture(params=product(MODELS, KINDS), ids=lambda pair: f"{pair[0]}-FMI {pair[1]}.0")
 def model(request, tmp_path):
-    """An instance for model exchange, before it begins, and its description."""
+    """A model-exchange instance before initialisation, and its description."""
     name, version = request.param
     folder, kind = KINDS[version]
     path = folder() / f"{name}.fmu"
@@ -53,7 +53,7 @@ def model(request, tmp_path):
 
 
 def choices(name, description):
-    """Every law and load, by their references; the method has no say, but must go with the law."""
+    """Return every combination of law and load, by reference; the method is unused but must match the law."""
     there = {variable.name: variable for variable in description.modelVariables}
     names = [one for one in ("friction", "pin_load") if one in there]
     items = [[int(item.value) for item in there[one].declaredType.items] for one in names]
@@ -70,7 +70,7 @@ def settle(fmu):
 
 
 def test_directional_derivatives_agree_with_central_differences(model):
-    """Under every law, away from where a force has a kink; differences of fourth order are right to 1e-8."""
+    """Under every law, away from kinks of the force; differences of fourth order are accurate to 1e-8."""
     name, fmu, description = model
     states = [unknown.variable.derivative for unknown in description.derivatives]
     inputs = [v for v in description.modelVariables if v.causality == "input"]
@@ -100,7 +100,7 @@ def test_directional_derivatives_agree_with_central_differences(model):
                 and fmu.getReal([states[1].valueReference])[0] == 0.0
                 and 1 not in list(chosen.values())[:1]
             ):
-                continue  # a law that looks at the speed has a kink there
+                continue  # a law that depends on the sign of the speed has a kink there
             told = []
             for known in knowns:
                 at(point)

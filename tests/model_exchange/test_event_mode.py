@@ -1,4 +1,5 @@
-"""FMI 3.0 co-simulation with event mode, early return and a look inside: a master sees stick and slip in time."""
+"""FMI 3.0 co-simulation with event mode, early return and intermediate update: the master sees stick and slip in
+time."""
 
 from contextlib import contextmanager
 from math import inf
@@ -18,7 +19,7 @@ BREAKAWAY_TIME = 0.9 * 12.5 * 9.81 / (742.5 * 0.034)  # of the sled
 
 @pytest.fixture(scope="module")
 def unpacked(tmp_path_factory):
-    """unpacked(name): the folder of an FMU, and its description."""
+    """Return unpacked(name), which gives the folder of an FMU and its description."""
     room, found = tmp_path_factory.mktemp("unpacked"), {}
 
     def unpacked(name):
@@ -33,7 +34,7 @@ def unpacked(tmp_path_factory):
 
 @contextmanager
 def master(unpacked, name, values=None, **options):
-    """An initialised instance, and functions that read and write its variables by name."""
+    """Return an initialised instance, and functions that read and write its variables by name."""
     folder, description = unpacked(name)
     there = {variable.name: variable for variable in description.modelVariables}
     fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=folder, modelIdentifier=name)
@@ -58,7 +59,7 @@ def master(unpacked, name, values=None, **options):
 
 
 def handle(fmu):
-    """An event, from step mode back to it."""
+    """Handle an event, from step mode back to step mode."""
     fmu.enterEventMode()
     again, terminate, *_ = fmu.updateDiscreteStates()
     assert (again, terminate) == (False, False)
@@ -66,7 +67,7 @@ def handle(fmu):
 
 
 def through(fmu, stop, h, at_event):
-    """Steps of h; `at_event(t, handled)` is called where one returned for an event.  The time of every return."""
+    """Take steps of h and call `at_event(t, handled)` at every event; return the times of all returns."""
     t, times = 0.0, []
     while t < stop:
         ahead = min(h * (int(t / h + 1e-9) + 1), stop)
@@ -84,7 +85,7 @@ def through(fmu, stop, h, at_event):
 @pytest.mark.parametrize("method", ["default", "ode45"])
 @pytest.mark.parametrize("name", COUNTED)
 def test_a_master_with_long_steps_sees_every_event_at_its_time(unpacked, name, method):
-    """The mode is that before the event until event mode is entered, and the other one from then on."""
+    """The old mode is valid until event mode is entered, and the new one from then on."""
     true, seen = load_reference(name).events, []
     stop = model_class(name).stop_time
     values = {} if method == "default" else {"solver.method": 3, "solver.rtol": 1e-10}
@@ -122,7 +123,7 @@ def test_the_sled_breaks_away_at_the_closed_form_time(unpacked):
 @pytest.mark.parametrize("options", [{}, {"eventModeUsed": True}, {"earlyReturnAllowed": True}], ids=str)
 @pytest.mark.parametrize("name", MODELS)
 def test_the_motion_does_not_depend_on_the_steps_of_the_master(unpacked, name, options):
-    """To the last bit: events are handled inside, at the end of a step, or where it returned."""
+    """To the last bit, whether events are handled inside a step, at its end, or after an early return."""
     stop, rows = model_class(name).stop_time, []
     for chosen in ({}, options):
         with master(unpacked, name, **chosen) as (fmu, read, _):
@@ -172,7 +173,7 @@ def test_intermediate_update_shows_every_internal_step_and_can_stop_anywhere(unp
 
 
 def test_a_value_set_at_an_event_acts_from_then_on(unpacked):
-    """A push as the sled breaks away: as if it had been set between two steps at the same time."""
+    """A push at breakaway acts as if it were set between two steps at the same time."""
     rows = []
     for event_mode in (True, False):
         with master(unpacked, "stickslip", eventModeUsed=event_mode, earlyReturnAllowed=True) as (fmu, read, write):
@@ -194,7 +195,7 @@ def test_a_value_set_at_an_event_acts_from_then_on(unpacked):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_an_input_set_during_intermediate_update_acts_from_then_on(unpacked, name):
-    """As if it had been set between two steps at the same time; of what is no input, nothing can be set there."""
+    """It acts as if it were set between two steps at the same time. Only inputs can be set there."""
     (force, size), stop = push(name), 0.5 * model_class(name).stop_time
     places = [next(v.valueReference for v in unpacked(name)[1].modelVariables if v.name == one) for one in (force, "m")]
     rows, turned = [], []

@@ -1,4 +1,4 @@
-"""Model exchange call by call: what happens at an event, and what does not happen without one."""
+"""Model exchange call by call: the effects of events, and that nothing happens without an event."""
 
 from math import isfinite
 
@@ -28,15 +28,15 @@ def test_the_sled_breaks_away_slides_and_sticks_again(launch):
     after = BREAKAWAY_TIME * (1.0 + 1e-12)
     fmu.set_point(after, [0.0, 0.0, DRIVER * after])
     assert fmu.indicators()[1] < 0.0
-    assert fmu.rates() == [0.0, 0.0, DRIVER]  # the mode is the old one until the event is handled
+    assert fmu.rates() == [0.0, 0.0, DRIVER]  # the old mode is valid until the event is handled
     fmu.enter_event_mode()
-    assert fmu.update_discrete_states() == ["states"]  # another motion: the solver must begin anew
-    assert fmu.update_discrete_states() == []  # a slide just begun is not taken for one that ends
+    assert fmu.update_discrete_states() == ["states"]  # the right-hand side changes, so the solver must restart
+    assert fmu.update_discrete_states() == []  # a slip that just began does not end
     fmu.enter_continuous_time()
     assert fmu.get("mode", "events.count", "events.t_last") == [1, 1, after]
     assert fmu.rates() == pytest.approx([0.0, (HOLD - SLIDE) / M, DRIVER])
     to_rest, to_break_away = fmu.indicators()
-    assert 0.0 < to_rest < 1e-200  # zero would be a root that stays
+    assert 0.0 < to_rest < 1e-200  # zero would be a root that remains
     assert to_break_away == 1.0
 
     fmu.set_point(4.6, [0.05, 0.2, DRIVER * 4.6])
@@ -54,7 +54,7 @@ def test_the_sled_breaks_away_slides_and_sticks_again(launch):
 
 @pytest.mark.parametrize("values", [{}, {"mu_d": 0.9}, {"mu_d": 0.0}, {"g": 0.0}], ids=str)
 def test_no_indicator_is_zero_after_event_handling(launch, values):
-    """A solver would take it for a root that stays (CVODE: root found at and very near t)."""
+    """A solver would take it for a root that remains (CVODE: root found at and very near t)."""
     fmu = launch("stickslip", values)
     fmu.update_discrete_states()
     fmu.enter_continuous_time()
@@ -67,8 +67,8 @@ def test_no_indicator_is_zero_after_event_handling(launch, values):
 
 @pytest.mark.parametrize("ulps", [*range(-9, 10), 300])
 def test_an_event_is_due_once_its_indicator_is_not_positive(launch, ulps):
-    """So a solver that stops at the root or a little beyond never stops for nothing.  An event that comes a few units
-    in the last place before acts as well: the load is about to exceed the limit."""
+    """A solver that stops at the root or slightly beyond never stops in vain. An event a few units in the last place
+    too early also acts, because the load is about to exceed the limit."""
     values = {"m": 1.0, "g": 1.0, "mu_s": 0.5, "mu_d": 0.25, "k": 1.0, "v_driver": 1.0}
     fmu = launch("stickslip", values)
     fmu.update_discrete_states()
@@ -77,12 +77,12 @@ def test_an_event_is_due_once_its_indicator_is_not_positive(launch, ulps):
     fmu.set_point(here, [0.0, 0.0, here])
     to_break_away = fmu.indicators()[1]
     assert to_break_away > 0.0 or ulps > 0
-    assert to_break_away <= 0.0 or ulps < 300  # beyond what is held for the rounding of its terms
+    assert to_break_away <= 0.0 or ulps < 300  # beyond the limit by more than the rounding of its terms
     assert handle_event_at(fmu, here, [0.0, 0.0, here]) == ["states"]
     assert fmu.get("mode") == 1
     fmu.enter_continuous_time()
     assert handle_event_at(fmu, 1.0, [0.75, 1e-300, 1.0]) == []
-    assert fmu.get("mode") == 1  # it only just moves, but it does
+    assert fmu.get("mode") == 1  # it barely moves, but it does
     fmu.enter_continuous_time()
     assert handle_event_at(fmu, 1.0, [0.9, 0.0, 1.0]) == ["states"]
     assert fmu.get("mode", "events.count") == [0, 2]
@@ -90,7 +90,7 @@ def test_an_event_is_due_once_its_indicator_is_not_positive(launch, ulps):
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_a_mass_that_friction_cannot_hold_reverses_without_a_stop(launch, direction):
-    """The mass with Coulomb friction, far out: from one slide to the other in one event."""
+    """The mass with Coulomb friction, at large displacement: one event from sliding one way to sliding the other."""
     fmu = launch("coulomb", {"x0": 0.1 * direction})
     fmu.update_discrete_states()
     fmu.enter_continuous_time()
@@ -120,7 +120,7 @@ def test_a_change_in_event_mode_can_set_a_stuck_sled_free(launch, variable, valu
 
 
 def test_a_change_in_continuous_time_takes_effect_at_the_event(launch):
-    """An input that goes on growing between two evaluations: the motion stays smooth, the indicator tells."""
+    """An input keeps growing between two evaluations: the motion stays smooth, and the indicator changes."""
     fmu = launch("stickslip")
     fmu.update_discrete_states()
     fmu.enter_continuous_time()
@@ -151,7 +151,7 @@ def test_a_changed_driver_speed_causes_no_jump(launch):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_value_set_since_the_last_event_restarts_the_solver(launch, name):
-    """Some importers begin anew only where a state is said to have jumped, and set an input just before the event."""
+    """Some importers restart only if a state has jumped, and set an input just before the event."""
     fmu = launch(name)
     assert fmu.update_discrete_states() == []
     fmu.enter_continuous_time()

@@ -1,4 +1,4 @@
-"""Model exchange call by call: what a solver only tries is no failure, what was set and cannot be used is."""
+"""Model exchange call by call: invalid trial states of a solver are no failure, invalid settings are."""
 
 from math import inf, isnan, nan
 
@@ -36,7 +36,7 @@ def test_a_wild_trial_state_is_no_failure(launch_moving, name, wild):
 @EVERY_MODEL
 @pytest.mark.parametrize("wild", [nan, inf, 1e300])
 def test_an_event_at_an_invalid_state_ends_the_run(launch_moving, name, wild):
-    """The importer has come there for good; a saved state brings it back."""
+    """The importer stays at the invalid state; a saved state recovers."""
     fmu, t, states = launch_moving(name)
     fmu.set_point(t, states)
     expected = fmu.rates()
@@ -51,7 +51,7 @@ def test_an_event_at_an_invalid_state_ends_the_run(launch_moving, name, wild):
 
 
 def bad_settings(name):
-    """Values that cannot be used once the run goes on, and what the sentence names."""
+    """Return values that are invalid once the run continues, and words of the message."""
     force, _ = push(name)
     x = outputs(name)[0]
     yield {force: nan}, f"{force} = nan"
@@ -85,7 +85,7 @@ def test_an_invalid_value_ends_the_run_and_reset_recovers(launch_moving, name, v
             ask()
     reals = [v for v in outputs(name) if declared(name)[v].type == "Real"]
     assert all(isnan(value) for value in fmu.get(*reals))
-    assert single_error(fmu) == ""  # once is enough
+    assert single_error(fmu) == ""  # reported only once
     fmu.reset()
     fmu.begin()
     assert fmu.update_discrete_states() == []
@@ -120,6 +120,6 @@ def test_an_invalid_value_may_be_corrected_before_it_is_used(launch_moving, name
     fmu.enter_event_mode()
     fmu.set({force: nan})
     fmu.set({force: 0.0})
-    assert fmu.update_discrete_states() == ["states"]  # what was set, and taken back
+    assert fmu.update_discrete_states() == ["states"]  # a value was set and set back
     assert fmu.rates() == before
     assert single_error(fmu) == ""

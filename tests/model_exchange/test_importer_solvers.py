@@ -1,13 +1,13 @@
-"""Model exchange: the FMUs under solvers of importers, fmpy's CVode and Euler and scipy's, against certified answers.
+"""Model exchange with importer solvers (CVode and Euler of fmpy, scipy) against certified references.
 
-How far a solver may be off follows from its tolerance.  SUNDIALS keeps the error of one step, in root mean square over
-two or three states, within rtol of each state, so no state errs by more than sqrt(3) < 2 times that.  An oscillator
-carries errors on without letting them grow, and no step takes less than one evaluation of the derivatives.  So
+The error bound follows from the tolerance. SUNDIALS keeps the root mean square error of a step, over two or three
+states, within rtol of each state, so that no state is off by more than sqrt(3) < 2 times that. An oscillator propagates
+errors without growth, and each step takes at least one evaluation of the derivatives. Hence
 
-    error, relative to the largest of its column  <=  2 N rtol,    N the number of evaluations.
+    error, relative to the largest value of its column  <=  2 N rtol,    N the number of evaluations.
 
-On the sled an error of position moves the next break-away, by that error over the speed of the driver, and all that
-follows comes later: the speed is off by the acceleration times the delay, which GROWTH stands for.
+On the sled an error of position delays the next breakaway by that error over the speed of the driver, and all that
+follows: the error of the speed is the acceleration times the delay, which GROWTH accounts for.
 """
 
 from itertools import pairwise
@@ -32,13 +32,13 @@ fmus, worker, _workers = fmi3_fixtures.FIXTURES
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
 CERTIFIED = [name for name in MODELS if (ROOT / "fmus" / f"{name}.csv").is_file()]
 TRUTHS = {name: load_reference(name) for name in CERTIFIED}
-PEAK, FASTEST, DRIVER = 2.9546, 0.41736, 0.034  # acceleration, speed, speed of the driver: of the slipping sled, SI
+PEAK, FASTEST, DRIVER = 2.9546, 0.41736, 0.034  # acceleration, speed, driver speed of the slipping sled, SI
 GROWTH = dict.fromkeys(CERTIFIED, 1.0) | dict.fromkeys(("stickslip", "pacejka"), PEAK / DRIVER * 0.544 / FASTEST)
 EVENTS = ("events.count", "events.t_last")
 
 
 def exchange(worker, path, name, **options):
-    """A run of the default experiment by fmpy: its columns, and how often the derivatives were evaluated."""
+    """Simulate the default experiment with fmpy; return its columns and the number of derivative evaluations."""
     stop = model_class(name).stop_time
     options = {
         "output_interval": stop / (POINTS - 1),
@@ -54,7 +54,7 @@ def motion(name, columns):
 
 
 def events(columns):
-    """Time and new mode of every event, each seen at the recorded points that follow it."""
+    """Return time and new mode of every event, which shows in the next recorded points."""
     rows = zip(*(columns[v] for v in (*EVENTS, "mode")), strict=True)
     return sorted({(t, mode) for count, t, mode in rows if count})
 
@@ -68,7 +68,7 @@ def bound(name, evaluations, rtol):
 
 @pytest.fixture(scope="module", params=CERTIFIED)
 def runs(request, fmus, _workers):
-    """The name of a model and its default experiment by CVode, (tolerance, columns, evaluations) each."""
+    """The name of a model, and its default experiment by CVode as (tolerance, columns, evaluations)."""
     path = fmus / f"{request.param}.fmu"
     runs = [(rtol, *exchange(_workers[-1], path, request.param, relative_tolerance=rtol)) for rtol in TOLERANCES]
     return request.param, runs
@@ -82,7 +82,7 @@ def test_the_error_under_cvode_is_within_its_tolerance_bound(runs):
 
 
 def test_the_error_under_cvode_falls_with_its_tolerance(runs):
-    """Order q makes it fall with the power q/(q + 1): at the least, q = 1, a thousandfold for the millionfold."""
+    """With order q it falls with the power q/(q + 1): at least (q = 1) by a factor of 1e3 for a factor of 1e6."""
     name, table = runs
     errors = [relative_errors(motion(name, columns), TRUTHS[name].motion).max() for _, columns, _ in table]
     assert errors == sorted(errors, reverse=True)
@@ -90,8 +90,8 @@ def test_the_error_under_cvode_falls_with_its_tolerance(runs):
 
 
 def test_events_under_cvode_are_in_order_and_on_time(runs):
-    """A delay is the error of position over the speed of approach.  The mass with Coulomb friction comes to rest
-    0.2 ms after the end: a loose run may see that."""
+    """A delay is the error of position over the speed of approach. The mass with Coulomb friction comes to rest 0.2
+    ms after the end: a run with a loose tolerance may include that."""
     name, table = runs
     for rtol, columns, evaluations in table:
         if "mode" not in columns:
@@ -116,7 +116,8 @@ def test_a_stuck_mass_does_not_move_under_cvode(runs):
 
 
 def test_every_output_agrees_with_co_simulation(runs, worker, fmus):
-    """Forces and accelerations err as position and speed do, times the rates of the motion: some ten in SI units."""
+    """Errors of forces and accelerations are those of position and speed times the rates of the motion, about ten in
+    SI units."""
     name, table = runs
     rtol, columns, evaluations = table[-1]
     interval = model_class(name).stop_time / (POINTS - 1)
@@ -131,7 +132,7 @@ def test_every_output_agrees_with_co_simulation(runs, worker, fmus):
 
 @pytest.mark.parametrize("name", CERTIFIED)
 def test_a_second_solver_agrees(worker, fmus, name):
-    """scipy's DOP853, or Radau where it is stiff, which takes no less than one evaluation a step either."""
+    """scipy's DOP853, or Radau on stiff models, which also takes at least one evaluation per step."""
     truth, fmu = TRUTHS[name], worker.exchange(fmus / f"{name}.fmu").begin()
     fmu.update_discrete_states()
     fmu.enter_continuous_time()
@@ -145,7 +146,7 @@ def test_a_second_solver_agrees(worker, fmus, name):
 
 @pytest.mark.parametrize("name", CERTIFIED)
 def test_a_later_start_time_only_shifts_the_motion(runs_at, name):
-    """The start time is told to nobody, and nobody needs it: the driver's position is a state."""
+    """The FMU does not use the start time, because the position of the driver is a state."""
     (early, n), (late_, m) = runs_at(name, 0.0), runs_at(name, 5.0)
     assert late_["time"][0] == 5.0
     assert relative_errors(motion(name, late_), motion(name, early)).max() <= bound(name, n + m, 1e-8)
@@ -158,7 +159,7 @@ def test_a_later_start_time_only_shifts_the_motion(runs_at, name):
 
 @pytest.fixture
 def runs_at(worker, fmus):
-    """runs_at(name, start): the default experiment, moved in time."""
+    """Return runs_at(name, start): the default experiment, shifted in time."""
 
     def run(name, start):
         times = {"start_time": start, "stop_time": start + model_class(name).stop_time}
@@ -185,7 +186,7 @@ def test_euler_steps_agree_with_an_explicit_computation(worker, fmus):
 
 
 def test_the_error_under_euler_halves_with_the_step(worker, fmus):
-    """The events of the mass with Coulomb friction are seen at the end of a step, which costs no order."""
+    """Events of the mass with Coulomb friction are noticed at the end of a step, which does not reduce the order."""
     truth, errors = ClosedFormMotion([(0.0, independent_solution.coulomb())], 0.1, 0.0, 1.0), []
     for h in (4e-4, 2e-4, 1e-4):
         columns, _ = exchange(worker, fmus / "coulomb.fmu", "coulomb", stop_time=1.0, **euler(h))
@@ -204,7 +205,7 @@ def test_the_sled_sticks_and_slips_under_euler(worker, fmus):
 
 
 def test_a_force_ramp_acts_like_a_faster_driver(worker, fmus):
-    """F_ext + k (x_driver - x) grows with rate R + k v_driver either way."""
+    """F_ext + k (x_driver - x) grows at the rate R + k v_driver either way."""
     k, faster = 742.5, 0.016
     fmu = worker.exchange(fmus / "stickslip.fmu").begin()
     fmu.update_discrete_states()
@@ -246,7 +247,8 @@ def test_a_tunable_changed_in_event_mode_acts_from_then_on(worker, fmus, change)
 
 
 def test_a_force_step_acts_from_then_on(worker, fmus):
-    """In stick and in slip; constant between, for fmpy's CVode does not see an input change within a step."""
+    """In stick and in slip. The force is constant in between, because CVode of fmpy does not sample inputs within a
+    step."""
     pushes = {2.0: 90.0, 2.1: -50.0, 9.0: 0.0}
     times = [0.0, *pushes, 16.0]
     forces = [0.0, *pushes.values()]
@@ -260,13 +262,13 @@ def test_a_force_step_acts_from_then_on(worker, fmus):
     assert columns["events.count"][-1] == len(truth.events)
 
 
-# ---- the other laws; solver.method stays at exact, which goes with none of them but has no say here
+# ---- the other laws; solver.method stays at exact, which does not support them but is not used here
 
 
 @pytest.mark.parametrize("case", [case for case in CASES if case.values], ids=lambda case: case.name)
 def test_every_other_law_agrees_with_its_reference(worker, fmus, case):
-    """Reversals under the sign law are no events: the solver finds its way across the jump by small steps.  Nothing
-    sticks before the end, so its answer is that of the hybrid law."""
+    """Reversals under the sign law are no events: the solver crosses the jump with small steps. Nothing sticks
+    before the end, so the result is that of the hybrid law."""
     columns, evaluations = exchange(
         worker, fmus / f"{case.model}.fmu", case.model, start_values=case.values, relative_tolerance=1e-7
     )
@@ -278,7 +280,7 @@ def test_every_other_law_agrees_with_its_reference(worker, fmus, case):
 
 
 def test_the_fmu_survives_a_solver_that_gives_up_on_the_sign_law(worker, fmus):
-    """At rest friction should hold: the solver chatters until it has taken all the steps it may."""
+    """At rest, friction should hold: the solver chatters until it reaches its step limit."""
     with pytest.raises(FmpyError, match="mxstep steps taken"):
         exchange(worker, fmus / "pendulum.fmu", "pendulum", start_values={"friction": SIGN})
     (line,) = worker.read_stderr().splitlines()
@@ -287,7 +289,7 @@ def test_the_fmu_survives_a_solver_that_gives_up_on_the_sign_law(worker, fmus):
 
 
 TIES = [
-    ("stickslip", {"mu_d": 0.0}, 32.0),  # the slip ends at the other limit
+    ("stickslip", {"mu_d": 0.0}, 32.0),  # the slip ends at the opposite limit
     ("stickslip", {"mu_s": 0.6}, 16.0),  # the speed touches zero, here and below
     ("stickslip", {"mu_s": 0.0, "mu_d": 0.0}, 16.0),
     ("stickslip", {"g": 0.0}, 16.0),
@@ -308,7 +310,7 @@ def test_ties_under_cvode_are_decided_by_physics(worker, fmus, name, values, sto
     assert columns["x"][-1] == pytest.approx(float(truth.at(stop)[0]), rel=2000.0 * rtol)
 
 
-# ---- failure, as fmpy tells it
+# ---- errors as reported by fmpy
 
 
 def test_an_invalid_parameter_ends_the_run_before_it_begins(worker, fmus):
@@ -336,7 +338,7 @@ def test_a_successful_run_logs_nothing(worker, fmus):
 
 
 def test_the_natural_frequency_is_that_of_the_spring():
-    """The figures of the sled above, from its parameters."""
+    """The values for the sled above, from its parameters."""
     omega, slack = sqrt(742.5 / 12.5), 0.3 * 12.5 * 9.81 / 742.5
     amplitude = sqrt(slack**2 + (DRIVER / omega) ** 2)
     assert isclose(omega**2 * amplitude, PEAK, rel_tol=1e-4)

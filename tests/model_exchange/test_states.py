@@ -1,4 +1,5 @@
-"""Model exchange call by call: states, rates and indicators, in every state, saved and restored, and after a reset."""
+"""Model exchange call by call: states, rates and indicators in every phase, after restoring a state, and after a
+reset."""
 
 from math import isnan
 
@@ -23,11 +24,11 @@ def test_the_states_are_position_speed_and_the_driver(launch, name):
         declared(name)[f"{v}0"].start,
         *([0.0] * (name in DRIVEN)),
     ]
-    assert fmu.nominals() == [1e-3] * fmu.sizes()[0]  # as solver.atol has it: in SI units
+    assert fmu.nominals() == [1e-3] * fmu.sizes()[0]  # as solver.atol, in SI units
 
 
 def test_the_nominal_speed_is_small_where_creep_matters(launch):
-    """An absolute tolerance of rtol times that must resolve the speed of the peak of the friction curve."""
+    """rtol times the nominal speed as absolute tolerance must resolve the speed at the peak of the friction curve."""
     for x_m in (0.1, 0.01, 1e-4, 1e-6):
         fmu = launch("pacejka", {"x_m": x_m})
         x, v, driver = fmu.nominals()
@@ -58,7 +59,7 @@ def test_it_starts_like_co_simulation(launch, worker, fmus, case):
 
 @EVERY_MODEL
 def test_every_variable_can_be_read_in_every_phase(worker, fmus, name):
-    """Some importers read all there is before initialisation has ended; nobody is told of a value before it is used."""
+    """Some importers read all variables during initialisation; no value is reported before it is valid."""
     fmu = worker.exchange(fmus / f"{name}.fmu")
 
     def ask():
@@ -86,7 +87,7 @@ def test_every_variable_can_be_read_in_every_phase(worker, fmus, name):
 
 @EVERY_MODEL
 def test_rates_outputs_and_indicators_depend_only_on_the_set_states(launch_moving, name):
-    """In any order, bit for bit: nothing remembers where the solver has been."""
+    """In any order, bit for bit: the FMU does not remember earlier solver states."""
     fmu, t, states = launch_moving(name)
     x, v, a = outputs(name)[:3]
     seen = {}
@@ -130,7 +131,7 @@ def test_the_solver_of_the_fmu_is_not_involved(launch_moving, name):
     fmu.set_point(t, states)
     fmu.rates()
     assert fmu.get("solver.steps", "solver.rejected", "solver.evaluations") == [0, 0, 0]
-    assert fmu.get("solver.t_next") == t + model_class(name).stop_time  # no step of its own: a default run ahead
+    assert fmu.get("solver.t_next") == t + model_class(name).stop_time  # no step of its own: the end of a default run
 
 
 def test_indicator_and_driver_variables_agree_with_their_functions(launch_moving):
@@ -145,7 +146,7 @@ def test_indicator_and_driver_variables_agree_with_their_functions(launch_moving
 
 @EVERY_MODEL
 def test_a_restored_state_is_bitwise_identical(launch_moving, launch, name):
-    """In this instance and, serialised, in another, in event mode and out of it."""
+    """In this instance and, serialised, in another; in event mode and outside of it."""
     fmu, t, states = launch_moving(name)
     names = [*outputs(name), *counts(name), "time", "solver.t_next"]
     force, size = push(name)

@@ -1,4 +1,4 @@
-"""What a contact holds, or slides with, may move: it is let go in time, and what can neither hold nor slip is told."""
+"""Static and sliding friction may vary: breakaway is on time, and inconsistent friction is reported."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ class Slider(Model):
 
 @pytest.mark.parametrize("method", [ODE45, DOP853, RODAS])
 def test_a_constant_load_breaks_away_when_the_static_limit_drops_to_it(method):
-    """A sled under a force, lifted by its driver: when mu_s (m g - lift u t) is the force."""
+    """A sled under a force, lifted by its driver: breaks away when mu_s (m g - lift u t) equals the force."""
     model = prepared_model(lowered_model(FILES["lift"])(), {"solver.method": method, "k": 0.0, "F_ext": 60.0}, 16.0)
     start(model, model.initial_state(0.0), 16.0)
     step = model.solver.step
@@ -44,7 +44,7 @@ def test_a_constant_load_breaks_away_when_the_static_limit_drops_to_it(method):
 
 
 def led(source, values):
-    """A model that an importer's solver leads, its exchange, and its run."""
+    """Return a model under an importer's solver, its model-exchange interface, and its run."""
     cls = lowered_model(source)
     model, exchange, run = (
         model_exchange_instance(cls),
@@ -58,12 +58,12 @@ def led(source, values):
 
 
 STUCK = [one for one in (*MODELS, *FILES.values()) if any(d.role == "contact" for d in declared(one).values())]
-STUCK = [one for one in STUCK if one not in (FILES["belt"], FILES["clutch"])]  # which slide at the start
+STUCK = [one for one in STUCK if one not in (FILES["belt"], FILES["clutch"])]  # which slip at the start
 
 
 @pytest.mark.parametrize("source", STUCK, ids=lambda source: getattr(source, "stem", source))
 def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
-    """Whatever an input brings, to the last bit: an importer would never hear of it again."""
+    """For any input, to the last bit: an importer would never notice it otherwise."""
     rest = {name: 0.0 for name, d in declared(source).items() if name in ("x0", "theta0")}
     model, exchange, _ = led(source, rest)
     entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
@@ -72,7 +72,7 @@ def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
     start_states, start_modes = ([getattr(solver, n) for n in names] for names in (model.states, model.contacts))
 
     def push(force):
-        """The indicators before and after the event, with modes as at the start."""
+        """Return the indicators before and after the event, with the modes of the start."""
         for names, numbers in (model.states, start_states), (model.contacts, start_modes):
             for name, number in zip(names, numbers, strict=True):
                 setattr(solver, name, number)
@@ -102,7 +102,7 @@ def slider(tmp_path):
 
 
 def test_sliding_friction_above_static_friction_is_reported_and_stops_the_run(slider):
-    """In co-simulation by any method, in model exchange by states that are no numbers."""
+    """In co-simulation by any method an error; in model exchange the states are NaN."""
     methods = [value for _, value, _ in declared(slider)["solver.method"].items]
     for method in methods:
         model = prepared_model(lowered_model(slider)(), {"solver.method": method, "press": 5.0, "F_ext": 4.5}, 1.0)

@@ -1,4 +1,4 @@
-"""What FMI and physics ask of each FMU beyond what fmpy validates, by walking over all its variables."""
+"""Requirements of FMI and physics that fmpy does not validate, checked for all variables of each FMU."""
 
 import re
 from contextlib import suppress
@@ -34,7 +34,7 @@ FOLDERS = ("binaries", "documentation", "extra", "resources", "sources")  # FMI 
 
 @pytest.fixture(scope="module", params=["python", "native"])
 def fmus(request, fmus):
-    """The folder of the FMUs of one kind."""
+    """The folder of the FMUs of one backend."""
     return fmus if request.param == "python" else native_fmus.build_native_fmus()
 
 
@@ -121,7 +121,7 @@ def test_the_structure_lists_every_output_and_derivative_once_and_in_order(descr
 
 @pytest.fixture
 def physics(monkeypatch):
-    """A model whose values carry their declared dimension, a time, and a motion forward."""
+    """A model whose values carry their declared dimension, a time, and a forward motion."""
 
     def equip(name, values):
         model = model_class(name)()
@@ -143,7 +143,7 @@ def physics(monkeypatch):
 
 
 def has(quantity, expected):
-    """A value is of the dimension of another; zero is of every dimension."""
+    """Assert that a value has the dimension of another; zero matches every dimension."""
     return quantity == 0.0 if not isinstance(quantity, Quantity) else quantity.powers == expected.powers
 
 
@@ -152,7 +152,8 @@ PHYSICS = [(name, values) for name in BODIES for values in combinations(name) if
 
 @pytest.mark.parametrize(("name", "values"), PHYSICS, ids=[label((*case, 0)) for case in PHYSICS])
 def test_the_equations_agree_with_the_declared_units(physics, name, values):
-    """Position, speed and acceleration, loads, derivatives and outputs, in every mode: the very code that runs."""
+    """Position, speed and acceleration, loads, derivatives and outputs, in every mode, with the code that runs in
+    the FMU."""
     model, t, x, v = physics(name, values)
     for mode in (-1, 0, 1):
         modes = [mode] if model.has_dry_friction else []
@@ -172,7 +173,7 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
             assert has(model.breakaway_acceleration(t, x, v, 1), a)
         with suppress(
             *[DimensionError] * ("energy" not in outputs(name))
-        ):  # without one it adds up all that may overflow
+        ):  # without it, it sums up all that may overflow
             model.compute_outputs(t, x, v, *modes)
         for output in outputs(name):
             if declared(name)[output].type == "Real":
@@ -210,7 +211,7 @@ def test_the_methods_preserve_dimensions(physics, name):
 
 @pytest.mark.parametrize("name", BODIES)
 def test_a_wrong_unit_would_be_detected(physics, name):
-    """Each parameter of the motion, given in another unit than its own."""
+    """Each parameter of the motion is given another unit."""
     for variable, d in tunable(name).items():
         model, t, x, v = physics(name, {})
         setattr(model, variable, Quantity.of(1.0, d.unit) * Quantity(1.0, 1, 2, 3))
@@ -230,19 +231,20 @@ def test_a_wrong_unit_would_be_detected(physics, name):
 
 
 def numbers(fmu, name):
-    """Every variable, read."""
+    """Read every variable."""
     return dict(zip(declared(name), fmu.get(*declared(name)), strict=True))
 
 
 def infinite(values):
-    """The variables that do not read as a finite number."""
+    """Return the variables that do not read as a finite number."""
     return [v for v, x in values.items() if not isfinite(x)]
 
 
 @pytest.mark.parametrize("stop", [None, 7.0])
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_a_healthy_run_has_only_finite_values(launch, case, stop):
-    """Importers drop rows with others.  A step without an end is told as one of a default run, or up to the stop."""
+    """Importers drop other rows. Without a limit, the reported step is that of a default run, or up to the stop
+    time."""
     name, values, _ = case
     fmu, t = launch(name, {**values, "solver.rtol": 1e-3}, start=-1.0, stop=stop), -1.0
     for h in (1e-9, 0.1, 0.3, 2.5):
@@ -273,7 +275,7 @@ def test_every_variable_is_readable_in_every_phase(worker, fmus, name):
     assert repr(numbers(fmu, name)) == repr(running)
     fmu.reset()
     assert set(numbers(fmu, name)) == set(declared(name))
-    with suppress(FmiError):  # of the native kind, here already
+    with suppress(FmiError):  # native FMUs fail here already
         fmu.begin({next(iter(tunable(name))): float("nan")})
     with pytest.raises(FmiError):
         fmu.step(0.0, 0.1)
@@ -285,7 +287,7 @@ def test_every_variable_is_readable_in_every_phase(worker, fmus, name):
 
 @EVERY_MODEL
 def test_start_values_are_read_back_bit_for_bit(worker, fmus, description, name):
-    """Before the run, after it was initialised, and after a reset."""
+    """Before the run, after initialisation, and after a reset."""
     starts = {}
     for scalar in description(name).findall("ModelVariables/ScalarVariable"):
         start, number = scalar[0].get("start"), float if scalar[0].tag == "Real" else int
@@ -299,7 +301,7 @@ def test_start_values_are_read_back_bit_for_bit(worker, fmus, description, name)
 
 
 def another(declaration):
-    """An allowed value that is not the start value."""
+    """Return a valid value other than the start value."""
     if declaration.items:
         return next((value for _, value, _ in declaration.items if value != declaration.start), declaration.start)
     return next(
@@ -311,7 +313,7 @@ def another(declaration):
 
 @EVERY_MODEL
 def test_every_settable_variable_can_be_set_individually(launch, name):
-    """It reads back, before the run and where it is tunable in mid-run, and the run goes on."""
+    """It reads back, before the run and, if tunable, during the run, and the run continues."""
     for variable, d in declared(name).items():
         if d.causality not in ("parameter", "input") or len(d.items) == 1:
             continue
@@ -338,8 +340,8 @@ def test_every_settable_variable_can_be_set_individually(launch, name):
 
 @EVERY_MODEL
 def test_outputs_depend_on_the_input_as_declared(launch, description, name):
-    """The declared ones follow at once, in some state; the others keep every bit, in every state.  Where FMUs are for
-    model exchange, too, they follow from states as well."""
+    """The declared ones respond directly in some state; the others keep every bit in every state. FMUs with model
+    exchange also declare dependencies on states."""
     root = description(name)
     scalars = root.findall("ModelVariables/ScalarVariable")
     names = [scalar.get("name") for scalar in scalars]
@@ -372,7 +374,7 @@ def test_outputs_depend_on_the_input_as_declared(launch, description, name):
 
 @EVERY_MODEL
 def test_every_choice_has_a_description_and_a_position(name):
-    """Items count from 1, or from where the method has its number everywhere."""
+    """Items count from 1, or from the number of the method."""
     for d in declared(name).values():
         if isinstance(d, Choice):
             values = [value for _, value, _ in d.items]

@@ -1,4 +1,4 @@
-"""The names, units, bounds and defaults that users rely on, typed a second time."""
+"""The names, units, bounds and defaults that users rely on, written out independently."""
 
 from math import radians
 
@@ -62,7 +62,7 @@ def starts(name, wanted):
 
 
 def test_there_are_five_models():
-    """A sixth has a contract of its own."""
+    """A new model gets its own contract."""
     assert {*TUNABLE} <= {*MODELS}
 
 

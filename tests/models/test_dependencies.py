@@ -1,6 +1,6 @@
-"""What the model descriptions say of the start: which outputs follow from which parameters and inputs.
+"""Initial dependencies in the model descriptions: which outputs depend on which parameters and inputs.
 
-The build reads it in the equations; here built FMUs are tried.
+The build derives them from the equations; this test measures them on the built FMUs.
 """
 
 import random
@@ -18,18 +18,18 @@ from fmus.runtime.variable_declarations import variables
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
 SITUATIONS = 300
-LADDER = (1e-7, 1e-3, 1.0)  # of what starts at zero, in its unit or in what overcomes friction
-LOADS = (-1.1, -1.0, -0.9, 0.9, 1.0, 1.1)  # of a body at rest, in holding limits
+LADDER = (1e-7, 1e-3, 1.0)  # for start values of zero, in their unit or relative to what overcomes friction
+LOADS = (-1.1, -1.0, -0.9, 0.9, 1.0, 1.1)  # of a body at rest, relative to the static limit
 
 
 def structure(fmu):
-    """The element ModelStructure of an FMU."""
+    """Return the element ModelStructure of an FMU."""
     with ZipFile(fmu) as archive:
         return ElementTree.fromstring(archive.read("modelDescription.xml")).find("ModelStructure")
 
 
 def followed(unknowns, names):
-    """For each of the unknowns the names that it follows from; FMI 2.0 counts variables from 1."""
+    """Return for each unknown the names that it depends on; FMI 2.0 counts variables from 1."""
     found = {}
     for unknown in unknowns:
         known = {names[int(i) - 1] for i in unknown.get("dependencies").split()}
@@ -39,14 +39,14 @@ def followed(unknowns, names):
 
 @pytest.fixture
 def at_the_start(fmus):
-    """What the description of a model says."""
+    """Return the initial dependencies in the description of a model."""
     return lambda name: followed(
         structure(fmus / f"{name}.fmu").findall("InitialUnknowns/Unknown"), list(declared(name))
     )
 
 
 def some(name, variable, draw):
-    """An allowed value."""
+    """Return a valid value."""
     d = declared(name)[variable]
     if d.items:
         return draw.choice(d.items)[1]
@@ -58,7 +58,7 @@ def some(name, variable, draw):
 
 
 def situation(name, known, draw):
-    """A value for each of the known; half of them of a body at rest that is about to break away, or just has."""
+    """Return a value for each known; half of the situations are bodies at rest close to breakaway."""
     values = {v: some(name, v, draw) for v in known}
     model, (x, v, *_), (entry, _) = model_class(name)(), outputs(name), push(name)
     if model.rests_when_stuck and f"{v}0" in values and draw.random() < 0.5:
@@ -73,7 +73,7 @@ def situation(name, known, draw):
 
 @EVERY_MODEL
 def test_initial_dependencies_are_exactly_as_declared(worker, fmus, at_the_start, name):
-    """Each known changed on its own: only those follow that are said to, and each of them does in some situation."""
+    """Each known is changed alone: only the declared unknowns respond, and each of them does in some situation."""
     draw, told = random.Random(name), at_the_start(name)
     known = [v for v, d in declared(name).items() if d.causality in ("parameter", "input")]
     seen = {v: set() for v in told}
@@ -82,7 +82,7 @@ def test_initial_dependencies_are_exactly_as_declared(worker, fmus, at_the_start
         values = situation(name, known, draw)
         before, *rows = fmu.vary_each(values, {v: some(name, v, draw) for v in known}, list(told))
         for v, after in zip(known, rows, strict=True):
-            if all(map(isfinite, before + after)):  # else values do not go together
+            if all(map(isfinite, before + after)):  # otherwise the values are inconsistent
                 for output, old, new in zip(told, before, after, strict=True):
                     seen[output] |= {v} if old != new else set()
     fmu.free()
@@ -91,7 +91,7 @@ def test_initial_dependencies_are_exactly_as_declared(worker, fmus, at_the_start
 
 @EVERY_MODEL
 def test_initial_feedthrough_implies_permanent_feedthrough(fmus, at_the_start, name):
-    """Two FMUs that are coupled by such outputs close no algebraic loop, then or ever."""
+    """Two FMUs coupled by such outputs never form an algebraic loop."""
     entry = push(name)[0]
     always = followed(structure(fmus / f"{name}.fmu").findall("Outputs/Unknown"), list(declared(name)))
     assert [v for v, known in at_the_start(name).items() if entry in known] == [v for v in always if always[v]]
@@ -99,7 +99,7 @@ def test_initial_feedthrough_implies_permanent_feedthrough(fmus, at_the_start, n
 
 @EVERY_MODEL
 def test_fmi3_declares_the_same_and_the_driver_depends_on_its_speed(at_the_start, name):
-    """The declared variables have the same places, which FMI 3.0 counts from 0."""
+    """The declared variables have the same positions, which FMI 3.0 counts from 0."""
     names, told = list(declared(name)), {}
     for unknown in structure(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu").findall("InitialUnknown"):
         told[int(unknown.get("valueReference"))] = {names[int(i)] for i in unknown.get("dependencies").split()}
@@ -110,7 +110,7 @@ def test_fmi3_declares_the_same_and_the_driver_depends_on_its_speed(at_the_start
 
 
 def test_rare_dependencies_are_declared_too(tmp_path):
-    """A stop beyond the start; a logarithm behind a condition that does not hold there."""
+    """A stop beyond the start; a logarithm behind a condition that is false there."""
     text = (ROOT / "tests" / "example_models" / "bumper.py").read_text(encoding="utf-8")
     more = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
     (tmp_path / "bumper.py").write_text(text + more, encoding="utf-8")

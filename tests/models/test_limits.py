@@ -1,4 +1,4 @@
-"""What a run may do when nobody limits it: the largest step, and the largest numbers."""
+"""Default limits of a run: the largest step, and the largest values."""
 
 from math import isnan
 
@@ -6,17 +6,17 @@ import pytest
 from models import BODIES, CASES, EXACT, MODELS, declared, label, model_class, outputs, push
 from worker_client import FmiError
 
-REACTION = 2  # of a pendulum whose squared load overflows long before: many steps, then another sentence
+REACTION = 2  # of a pendulum whose squared load overflows much earlier: many steps, then another message
 FORCES = ("k", "c", "f", "g", "mu")
 
 
 def adrift(name):
-    """Values without any force: a motion that every method would follow in one step."""
+    """Return values without any force: every method would cover the motion in one step."""
     return dict.fromkeys(set(FORCES) & declared(name).keys(), 0.0)
 
 
 def is_free(name):
-    """Whether nothing else acts on its body, which starts as it is told."""
+    """Return whether no other force acts on its body, which starts as set."""
     model = model_class(name)()
     for variable, value in adrift(name).items():
         setattr(model, variable, value)
@@ -40,7 +40,7 @@ def test_most_models_can_be_force_free():
 @pytest.mark.parametrize("known", [True, False], ids=["stop known", "stop unknown"])
 @pytest.mark.parametrize("case", SMOOTH, ids=label)
 def test_the_largest_step_is_a_tenth_of_the_run(launch, case, known):
-    """Of the default run where the stop time is unknown; the last one may be stretched by a tenth, to end there."""
+    """Of the default run if the stop time is unknown; the last step may be a tenth longer, to end there."""
     name, values, _ = case
     v0 = f"{outputs(name)[1]}0"
     for start, run in ((0.0, 3.0), (-50.0, 200.0), (7.3, 0.01)):

@@ -1,4 +1,4 @@
-"""Native FMUs in a host written in C: no Python in the process, many instances, threads, sanitizers, every refusal."""
+"""Native FMUs in a host written in C: no Python in the process, many instances, threads, sanitizers, all errors."""
 
 import re
 from collections import Counter
@@ -25,17 +25,17 @@ def stickslip():
 
 
 def reals(name):
-    """References of the Real outputs of a model."""
+    """Return the references of the Real outputs of a model."""
     return [value_references(name)[v] for v in outputs(name) if declared(name)[v].type == "Real"]
 
 
 def numbers(line):
-    """The numbers behind the status in an answer."""
+    """Return the numbers after the status in an answer."""
     return [float.fromhex(word) if word != "nan" else float("nan") for word in line.split()[1:]]
 
 
 def life(i, name):
-    """A short life of instance i: a run, a look ahead, a push; every instance has its own values."""
+    """Return a short script for instance i: a run, a look ahead, a push; every instance has its own values."""
     ref = value_references(name)
     force, size = push(name)
     stop, wanted = model_class(name).stop_time, " ".join(map(str, reals(name)))
@@ -68,7 +68,7 @@ def test_two_hundred_instances_do_not_interfere(fmu):
     together = [line for step in zip(*(life(i, name) for i in range(CROWD)), strict=True) for line in step]
     mixed, _ = run_host_script(fmu, together + [f"{i} free" for i in range(CROWD)])
     steps = len(mixed) // CROWD
-    assert len(set(alone)) > CROWD  # they are not all the same
+    assert len(set(alone)) > CROWD  # the instances differ
     assert [mixed[k * CROWD + i] for i in range(CROWD) for k in range(steps)] == alone
 
 
@@ -77,11 +77,11 @@ def test_instances_coexist_in_threads(fmu):
     assert run_host_script(fmu, script, threads=16)[0] == run_host_script(fmu, script)[0]
 
 
-# ---- refusals
+# ---- errors
 
 
 def failures(name):
-    """Every way to go wrong, in one script; and the way out by reset or by a saved state."""
+    """Return a script that provokes every error, and recovers by reset or from a saved state."""
     ref = value_references(name)
     stop, some, count = model_class(name).stop_time, reals(name)[0], len(ref)
     ints = [ref[v] for v, d in declared(name).items() if d.type == "Enumeration"]
@@ -160,12 +160,12 @@ def test_the_sanitizers_report_nothing(fmu):
 
 @pytest.mark.parametrize("name", ["pacejka", "stickslip"])
 def test_the_thread_sanitizer_reports_nothing(name):
-    """With a contact and without; what threads could share is in the layer, which is the same for all."""
+    """With and without a contact. Threads could only share data of the FMI layer, which is the same for all models."""
     played(build_native_fmus() / f"{name}.fmu", "thread", 1)
 
 
 def played(fmu, sanitizers, crowd):
-    """Every failure, and the lives of a crowd, in threads."""
+    """Run every error, and the life cycles of many instances, in threads."""
     script = failures(fmu.stem) + [line for i in range(1, crowd) for line in life(i, fmu.stem)]
     script += [f"{i} free" for i in range(1, crowd)]
     answers, noise = run_host_script(fmu, script, threads=8, sanitizers=sanitizers)
@@ -179,7 +179,7 @@ def test_every_failure_is_one_sentence_in_the_log_and_on_standard_error(fmu):
     printed = re.findall(rf"^{fmu.stem.capitalize()} \((?:0|x)\): (.*)", noise, re.MULTILINE)
     assert len(heard) > 50
     unheard = list((Counter(printed) - Counter(heard)).elements())
-    assert len(unheard) == 2, unheard  # an instance had no logger; a failure fell into a category that was not wanted
+    assert len(unheard) == 2, unheard  # one instance has no logger; one error has a disabled category
     assert set(heard) <= set(printed)
     assert all(
         line.startswith(("heard 0 3 logStatusError ", "heard x 3 logStatusError "))

@@ -1,8 +1,7 @@
-"""What one kind refuses the others refuse, with the same sentence, whatever is asked for in an order that FMI allows.
+"""All backends refuse the same calls with the same message, for any sequence of calls that FMI allows.
 
-The same calls, as hypothesis finds them, in the Python FMU for FMI 2.0 and in another kind beside it.  After each call
-all that can be seen is compared with ==: whether it was refused, what was said in the log and on standard error, and
-the value of every variable.
+hypothesis generates calls for the Python FMU (FMI 2.0) and for another backend. After each call, everything visible is
+compared with ==: whether the call was refused, the log, standard error, and the value of every variable.
 """
 
 import json
@@ -37,13 +36,13 @@ RUNS = st.sampled_from([None, None, 0.4, 1.0, 0.0, -1.0, nan, inf])
 SIZES = st.sampled_from([0.1, 0.1, 0.05, 0.3, 1e-3, 1e-9, 1e-17, 0.0, -0.0, -0.1, nan, inf])
 OFF = st.sampled_from([0.0] * 6 + [4e-16, -4e-16, 3e-15, -3e-15, 1e-14, 1e-11, -1e-11, 1e-8, 1e-6, -1e-3, nan, inf])
 NEW, INITIALISING, RUNNING = range(3)
-BOTH = range(2)  # places of the kinds
+BOTH = range(2)  # indices of the backends
 
 
 class Calls(RuleBasedStateMachine):
-    """Two instances of each of two kinds, led alike."""
+    """Two instances of each of two backends, called alike."""
 
-    folders = workers = None  # of the kinds
+    folders = workers = None  # of the backends
 
     @initialize(name=st.sampled_from(MODELS))
     def instantiate(self, name):
@@ -55,13 +54,13 @@ class Calls(RuleBasedStateMachine):
         ]
         self.saved = []
         self.anew()
-        self.seen = sorted(v for v in self.declared if v != "solver.t_next")  # which looks ahead
+        self.seen = sorted(v for v in self.declared if v != "solver.t_next")  # which computes the next step
 
     def anew(self):
         self.phase, self.t, self.stop = NEW, 0.0, inf
 
     def both(self, function, *arguments, of=None):
-        """The same call of both, or of what each of them has in `of`; what they answer, which must be the same."""
+        """Make the same call in both backends, or with their own entries of `of`; return the results."""
         answers = []
         for place, instance in enumerate(self.pairs[0]):
             own = [of[place]] if of else []
@@ -77,14 +76,14 @@ class Calls(RuleBasedStateMachine):
         return answers
 
     def look(self, place):
-        """What can be seen of one kind: its values; what was said before and while they were read in the log, where the
-        newest instance hears all; and on standard error."""
+        """Return what is visible of one backend: values, standard error, and the log before and during reading (fmpy
+        passes all messages to the newest instance)."""
         numbers = [pair[place].number for pair in self.pairs]
         log = [[number, "messages", []] for number in numbers]
         asked = [*log, [numbers[0], "get", [self.seen]], *log]
         *before, values, one, other = self.workers[place].call(None, "batch", asked)
         said = [[text.replace("%%", "%") for lines in heard for *_, text in lines] for heard in (before, [one, other])]
-        return json.dumps(values), said, self.workers[place].read_stderr()  # where NaN is NaN
+        return json.dumps(values), said, self.workers[place].read_stderr()  # where NaN equals NaN
 
     # ---- from instantiation to the end
 
@@ -92,7 +91,7 @@ class Calls(RuleBasedStateMachine):
     @rule(start=TIMES, run=RUNS, tolerance=st.sampled_from([None, 1e-4, 0.0, 1.0, -1.0, nan]))
     def setup(self, start, run, tolerance):
         self.t, self.stop = start, inf if run is None else start + run
-        for pair in self.pairs[0]:  # in FMI 3.0 it arrives with what follows
+        for pair in self.pairs[0]:  # in FMI 3.0 it is passed with the next call
             pair.setup(start, None if run is None else self.stop, tolerance)
         self.enter()
 
@@ -123,7 +122,7 @@ class Calls(RuleBasedStateMachine):
     @precondition(lambda self: self.phase == RUNNING)
     @rule(h=SIZES, begin=OFF, end=OFF)
     def step(self, h, begin, end):
-        """Off by a share of the time, or of 1 s."""
+        """Off by a fraction of the time, or of 1 s."""
         scale = max(1.0, abs(self.t))
         at, size = self.t + begin * scale, h + end * scale if h else h
         python, _ = self.both("step", at, size)
@@ -133,13 +132,13 @@ class Calls(RuleBasedStateMachine):
     @precondition(lambda self: self.phase == RUNNING and self.stop < inf)
     @rule(share=st.sampled_from([0.0, 1e-12, 5e-7, 2e-6, 1e-3]))
     def last(self, share):
-        """To the stop time, or a share of the step beyond it."""
+        """To the stop time, or a fraction of the step beyond it."""
         self.step((self.stop - self.t) * (1.0 + share), 0.0, 0.0)
 
     @precondition(lambda self: self.phase == RUNNING)
     @rule(off=OFF)
     def leap(self, off):
-        """To where the internal step ends, or beside it."""
+        """To the end of the internal step, or near it."""
         (ahead, _) = self.both("get", "solver.t_next")
         self.step(ahead - self.t, 0.0, off)
 
@@ -153,7 +152,7 @@ class Calls(RuleBasedStateMachine):
 
     def set(self, name, value):
         if name in ("friction", "solver.method") and value not in (EXACT, HYBRID, 99):
-            value = self.declared[name].start  # others may take steps without number
+            value = self.declared[name].start  # others may take arbitrarily many steps
         self.both("set", {name: value})
 
     @precondition(lambda self: self.phase == RUNNING)
@@ -179,7 +178,7 @@ class Calls(RuleBasedStateMachine):
 
     @rule()
     def move(self):
-        """Life goes on in the other instances."""
+        """Continue in the other instances."""
         states = self.both("serialize", of=self.both("save"))
         self.pairs.reverse()
         self.both("restore", of=self.both("deserialize", of=states))

@@ -1,4 +1,4 @@
-"""Native FMUs: inputs that change by themselves, up to polynomials of order 8, and the rates of outputs."""
+"""Native FMUs: input derivatives up to order 8, and output derivatives."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -27,7 +27,7 @@ DAMPING = {  # stiffness, damping
     "no spring": (0.0, 3.0),
     "no spring nor damper": (0.0, 0.0),
 }
-PIECES = ((0.0, 0.3, 2.0), (1.0, 2.3, -3.0), (2.5, -2.2, 1.7))  # from a time on a force, and its rate
+PIECES = ((0.0, 0.3, 2.0), (1.0, 2.3, -3.0), (2.5, -2.2, 1.7))  # start time, force, and its rate
 HARD = ((0.0, 0.0, 80.0), (2.0, 160.0, -120.0), (5.0, -200.0, 60.0))  # enough to drag the sled
 BENT = ((0.0, 0.3, 2.1, -9.0, 12.5), (1.0, 2.3, -3.0, 8.0), (2.5, -2.2, 1.7, 0.0, 30.0, -400.0))  # and its derivatives
 DRAGGED = ((0.0, 0.0, 20.0, 60.0, -30.0), (3.0, 60.0, -400.0, 250.0), (6.0, -150.0, 0.0, 0.0, 90.0))
@@ -36,7 +36,7 @@ POUND, INCH = 0.45359237, 0.0254
 
 _workers, worker, fresh_worker = worker_client.worker_fixtures(
     fmi3_fixtures.Worker, "module"
-)  # which runs those of FMI 2.0, too
+)  # which also runs FMI 2.0 FMUs
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def fmus():
 
 
 def pushed(fmu, pieces, times, names):
-    """A row of the values of names at each of the times; the input changes in pieces."""
+    """Return a row of values at each of the times; the input changes in pieces."""
     rows, left = [], list(pieces)
     for t, end in pairwise([0.0, *times]):
         if left and left[0][0] == t:
@@ -88,7 +88,7 @@ def test_a_ramp_breaks_the_sled_away_on_time_with_and_without_its_driver(launch,
 
 @pytest.mark.parametrize("damping", DAMPING)
 def test_a_polynomial_force_is_exact_through_stick_and_slip_for_every_damping(launch, damping):
-    """What is not set anew goes on: orders 3 and 4 of the second piece are those of the first."""
+    """Derivatives that are not set again continue: orders 3 and 4 of the second piece are those of the first."""
     k, c = DAMPING[damping]
     for name, friction in ("smd", 0.0), ("coulomb", 0.5):
         fmu = launch(name, {"k": k, "c": c, "v0": 0.2}, stop=None)
@@ -102,14 +102,14 @@ def test_a_polynomial_force_breaks_the_sled_away_on_time(launch, v_driver, k):
     assert agree(fmu, Body(m=12.5, k=k, hold=HELD, slide=SLID, u=v_driver), DRAGGED, 10.0) >= 3
 
 
-# ---- the methods with steps
+# ---- methods with steps
 
-STEPPING = {"ode23": 1e-8, "ode45": 1e-9, "dop853": 1e-10, "rodas": 1e-8}  # and the tolerances to ask for
+STEPPING = {"ode23": 1e-8, "ode45": 1e-9, "dop853": 1e-10, "rodas": 1e-8}  # and their tolerances
 NUMBERS = {"exact": EXACT, "ode23": ODE23, "ode45": ODE45, "dop853": DOP853, "rodas": RODAS}
 
 
 def drag(t, y):
-    """The sled on the curve of the magic formula, pushed with 50 N/s at first."""
+    """The sled on the magic formula, pushed with 50 N/s at first."""
     x, v = y
     C = 2.0 - 2.0 * asin(0.6 / 0.9) / pi
     peak = 2.0 / C
@@ -160,12 +160,12 @@ LIMITS = {
     "coulomb": ({"x0": 0.0}, 0.5),
     "stickslip": ({"v_driver": 0.0}, HELD),
     "pendulum": ({"theta0": 0.0}, 0.1 * 0.25 * INCH * 0.46 * POUND * 386.0 * INCH),
-}  # at rest without a load, and what is held
+}  # at rest without a load, and the static limit
 
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_a_load_peaking_just_below_the_limit_sticks_and_breaks_away_at_the_opposite_limit(launch, name):
-    """Of what is held it is 3 t - 4 t^3, but for 1e-9: 1 at most at 0.5 s, and -1 at 1 s."""
+    """The load is 3 t - 4 t^3 of the limit, but for 1e-9: at most 1 at 0.5 s, and -1 at 1 s."""
     values, limit = LIMITS[name]
     fmu = launch(name, values, stop=None)
     for order, value in (3, -24.0), (1, 3.0):
@@ -189,7 +189,7 @@ def test_a_load_equal_to_the_limit_follows_its_first_nonzero_derivative(launch, 
 
 @pytest.mark.parametrize("name", LIMITS)
 def test_derivatives_growing_with_their_order_cost_no_extra_steps(launch, name):
-    """Those of a load that swings at 50 Hz, below what is held and above it, told every millisecond."""
+    """A load oscillates at 50 Hz, below and above the limit, with derivatives set every millisecond."""
     values, limit = LIMITS[name]
     for size in 0.9 * limit, 2.0 * limit:
         fmu = launch(name, values, stop=None)
@@ -202,13 +202,13 @@ def test_derivatives_growing_with_their_order_cost_no_extra_steps(launch, name):
         assert (fmu.get("events.count") > 0) == (size > limit)
 
 
-ORDERS = {"ode23": 3, "ode45": 5, "dop853": 8, "rodas": 4, "exact": 6}  # of the last any
+ORDERS = {"ode23": 3, "ode45": 5, "dop853": 8, "rodas": 4, "exact": 6}  # the last one is arbitrary
 
 
 @pytest.mark.parametrize("method", ORDERS)
 def test_a_method_keeps_its_order_when_input_derivatives_are_set(launch, method):
-    """Without them it has order 1, with a rate order 2: one internal step for each communication step, at a loose
-    tolerance, under the force sin(3 t) N; the truth is that of steps of the exact method with all derivatives."""
+    """Without input derivatives the order is 1, with the first derivative 2: one internal step per communication
+    step, at a loose tolerance, under the force sin(3 t) N. The reference uses the exact method with all derivatives."""
 
     def left_at(number, order, many):
         h = 1.0 / many
@@ -227,12 +227,12 @@ def test_a_method_keeps_its_order_when_input_derivatives_are_set(launch, method)
         assert log2(coarse / fine) == pytest.approx(order, abs=0.25)
 
 
-# ---- an input that changes is as any other
+# ---- a changing input is like any other
 
 
 @pytest.fixture(params=MODELS)
 def ramped(request, launch):
-    """An instance whose input ramps, the names of its input and outputs, and how fast."""
+    """An instance with a ramped input, the names of its input and outputs, and the rate."""
     name = request.param
     force, size = push(name)
     fmu = launch(name, stop=None)
@@ -245,7 +245,7 @@ def test_an_input_reads_as_set_and_its_rate_lasts_until_the_next_setting(ramped)
     _, fmu, force, _names, size = ramped
     fmu.step(0.0, 0.5)
     assert fmu.get(force) == 0.5 * size
-    fmu.set({force: 0.25 * size})  # what it once was
+    fmu.set({force: 0.25 * size})  # an earlier value
     assert fmu.get(force) == 0.25 * size
     fmu.step(0.5, 1.0)
     assert fmu.get(force) == 0.75 * size
@@ -305,7 +305,7 @@ def test_a_ramp_may_begin_before_the_run(worker, fmus):
     assert rows[0][0] == 180.0
 
 
-# ---- the rates of outputs
+# ---- output derivatives
 
 BUILT = {"FMI 2.0": native_fmus.build_native_fmus, "FMI 3.0": fmi3_fixtures.build_fmi3_fmus}
 
@@ -313,7 +313,7 @@ BUILT = {"FMI 2.0": native_fmus.build_native_fmus, "FMI 3.0": fmi3_fixtures.buil
 @pytest.mark.parametrize("version", BUILT)
 @pytest.mark.parametrize("name", MODELS)
 def test_output_derivatives_agree_with_differences(worker, name, version):
-    """Central ones of fourth order, in stick and slip; the input ramps where it may."""
+    """Central differences of fourth order, in stick and slip; the input ramps where allowed."""
     h, (force, size), names = 1e-3, push(name), [one for one in outputs(name) if one != "mode"]
     fmu = worker.instantiate(BUILT[version]() / f"{name}.fmu").begin({"solver.rtol": 1e-12})
     if version == "FMI 2.0":
@@ -325,7 +325,7 @@ def test_output_derivatives_agree_with_differences(worker, name, version):
         rates = fmu.output_rates(names)
         _, d, (*e, t_last) = fmu.run(times[2:], [*names, "events.t_last"])
         t = times[-1]
-        if not middle - 3 * h < t_last:  # else an event lies between
+        if not middle - 3 * h < t_last:  # otherwise an event lies in between
             right = [(w - 8.0 * x + 8.0 * y - z) / (12.0 * h) for w, x, y, z in zip(a, b, d, e, strict=False)]
             found.append((here, rates, right))
     assert len(found) >= 3
@@ -335,7 +335,7 @@ def test_output_derivatives_agree_with_differences(worker, name, version):
     fmu.free()
 
 
-# ---- what is told, and what is refused
+# ---- description and errors
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -371,8 +371,8 @@ def test_invalid_input_derivatives_are_refused_and_change_nothing(launch):
 
 
 def test_a_model_declares_which_inputs_may_ramp(tmp_path):
-    """None that has a range, or on which hangs what a contact holds, for its release would have no closed form; a
-    method with steps takes any course of a stiffness."""
+    """No input with a range, and none on which the static limit depends, because breakaway would have no closed
+    form. Methods with steps accept any time dependence of a stiffness."""
     text = """
 from fmus import Contact, Input, Mode, Model, Output, Parameter, State
 

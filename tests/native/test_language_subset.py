@@ -1,4 +1,4 @@
-"""Every construct of the subset does in C what it does in CPython, bit for bit."""
+"""Every construct of the subset behaves in C as in CPython, bit for bit."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Native FMUs in the file: what they hold, that it is the same everywhere, and that other tools can compile it."""
+"""Contents of native FMUs: complete, reproducible, and compilable by other tools."""
 
 import os
 import subprocess
@@ -36,7 +36,7 @@ SYSTEM = {
 
 @pytest.fixture(scope="module")
 def smd():
-    """smd, with one method, for every platform, and what was printed."""
+    """smd, with one method, for every platform, and the output of the build."""
     out = build_for_all_platforms()
     return out / "smd.fmu", out.with_suffix(".txt").read_text()
 
@@ -48,7 +48,7 @@ def test_fmpy_reports_no_problems(name):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_the_description_is_that_of_the_python_fmu_except_sources_guid_and_model_exchange(fmus, name):
-    """States and derivatives, what follows from states, and the variables behind those declared."""
+    """Differences: states and derivatives, dependencies on states, and the variables after the declared ones."""
     roots = [
         ET.fromstring(entries(folder / f"{name}.fmu")["modelDescription.xml"]) for folder in (fmus, build_native_fmus())
     ]
@@ -125,7 +125,7 @@ def test_methods_and_laws_can_be_selected_as_for_the_python_fmu(tmp_path):
 
 @pytest.fixture(scope="module")
 def lief():
-    """The package that reads libraries, which takes half a second to load."""
+    """The package that parses libraries; importing it takes half a second."""
     return import_module("lief")
 
 
@@ -150,7 +150,7 @@ def test_every_binary_exports_only_fmi_and_needs_only_the_system(binary):
         exported = {function.name.lstrip("_") for function in library.exported_functions}
         assert exported - {"mh_dylib_header", "dso_handle"} == functions()
         imported = {function.name.lstrip("_") for function in library.imported_functions}
-        assert {"sin", "cos", "exp"} <= imported  # the system's, as Python has them, and not the compiler's
+        assert {"sin", "cos", "exp"} <= imported  # from the system, like Python, and not from the compiler
 
 
 def functions():
@@ -174,7 +174,7 @@ def test_macos_libraries_cover_both_processors_and_are_validly_signed(smd, lief)
         for _, _, place, size, _ in (unpack_from(">IIIII", content, 8 + 20 * i) for i in range(count))
     )
     assert [unpack_from("<I", library, 4)[0] for library in (intel, arm)] == [0x01000007, 0x0100000C]
-    parsed = lief.MachO.parse(arm)  # which owns what is taken from it
+    parsed = lief.MachO.parse(arm)  # which owns the objects taken from it
     check_signature(arm, parsed.at(0).code_signature.data_offset)
 
 
@@ -202,7 +202,7 @@ def test_without_a_platform_the_usual_three_are_built():
 
 @pytest.mark.parametrize("place", ["linux64", "x86_64-linux"])
 def test_fmpy_and_cmake_compile_the_sources_to_the_same_results(tmp_path, place):
-    """Of both versions of FMI, whose layers are the same for every model; of one a model without a contact."""
+    """Of both versions of FMI, whose layers are the same for every model; one model has no contact."""
     pytest.importorskip("cmake", reason="fmpy compiles with CMake: pip install cmake")
     fmu = (
         build_native_fmus() / "stickslip.fmu" if place == "linux64" else fmi3_fixtures.build_fmi3_fmus() / "pacejka.fmu"
@@ -213,7 +213,7 @@ def test_fmpy_and_cmake_compile_the_sources_to_the_same_results(tmp_path, place)
 
 @pytest.mark.parametrize("name", MODELS)
 def test_any_compiler_builds_the_sources_to_the_same_results(tmp_path, name):
-    """By the system's, which is told nothing but what a library is."""
+    """The system's compiler, with no options except for a shared library."""
 
     def make(folder):
         command = [compiler(), "-shared", "-fPIC", "fmi2.c", "-o", f"../binaries/linux64/{name}.so", "-lm"]
@@ -223,7 +223,7 @@ def test_any_compiler_builds_the_sources_to_the_same_results(tmp_path, name):
 
 
 def same(fmu, place, folder, make):
-    """The FMU, unpacked into the folder, does the same with its library and with one that is made of its sources."""
+    """The unpacked FMU gives the same results with its library and with one compiled from its sources."""
     compiler()
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(folder)
@@ -234,7 +234,7 @@ def same(fmu, place, folder, make):
 
 
 def simulations(folder):
-    """Runs in co-simulation and in model exchange."""
+    """Return runs in co-simulation and in model exchange."""
     return [simulate_fmu(str(folder), fmi_type=way).tobytes() for way in ("CoSimulation", "ModelExchange")]
 
 
@@ -262,7 +262,7 @@ def test_a_mistake_is_reported_in_one_sentence():
 
 
 def test_a_missing_compiler_error_says_what_to_install(tmp_path, monkeypatch):
-    """In an error that the command tells as it tells that of a platform."""
+    """As an error that the command prints like that of an unknown platform."""
     monkeypatch.setitem(sys.modules, "ziglang", None)
     with pytest.raises(BuildError, match=r"pip install -e '\.\[native\]'"):
         native.build("smd", tmp_path)

@@ -1,6 +1,6 @@
-"""The binaries for other machines, where an emulator is at hand: Wine for Windows, qemu for Linux on ARM.
+"""The binaries for other platforms, where an emulator is available: Wine for Windows, qemu for Linux on ARM.
 
-On Debian: apt-get install wine64 wine qemu-user libc6-arm64-cross.  Only libm's last place may differ.
+On Debian: apt-get install wine64 wine qemu-user libc6-arm64-cross.  Only the last digits of libm may differ.
 """
 
 import os
@@ -32,11 +32,13 @@ from fmus.packaging.native.compiler import PLATFORMS, compile_binaries, find_com
 from fmus.packaging.native.sources import MAIN_SOURCE
 
 ROWS = 50
-ARM = "/usr/aarch64-linux-gnu"  # where Debian puts the C library
+ARM = "/usr/aarch64-linux-gnu"  # where Debian installs the C library
 PLACES = ("usr/lib*/wine", "usr/lib/*/wine", "opt/wine*/lib*/wine")
-WINE = [path for place in PLACES for path in Path("/").glob(f"{place}/x86_64-windows")]  # and others Wine's libraries
-MACHINES = {"win64": ["wine"], "aarch64-linux": ["qemu-aarch64", "-L", ARM]}  # and what runs their programs
-PROGRAM = {  # the source that a program needs beside those of a library, and options; none of the compiler's libraries
+WINE = [
+    path for place in PLACES for path in Path("/").glob(f"{place}/x86_64-windows")
+]  # and others the libraries of Wine
+MACHINES = {"win64": ["wine"], "aarch64-linux": ["qemu-aarch64", "-L", ARM]}  # and the command that runs their programs
+PROGRAM = {  # additional source of a program, and options; no libraries of the compiler
     "win64": (
         [HOST_SOURCE.with_name("windows_runtime.c")],
         [
@@ -47,11 +49,14 @@ PROGRAM = {  # the source that a program needs beside those of a library, and op
     ),
     "aarch64-linux": ([], ["-rtlib=none"]),
 }
-CLOSE = dict.fromkeys(MODELS, 1e-11) | {"pacejka": 1e-9}  # of an output's largest value; break-aways amplify
+CLOSE = dict.fromkeys(MODELS, 1e-11) | {
+    "pacejka": 1e-9
+}  # relative to the largest value of an output; breakaways amplify
 
 
 def is_steady(case):
-    """Whether a last bit stays one: not with a law that chatters, nor with an explicit method on the stiff curve."""
+    """Return whether last digits stay small: not with a law that chatters, nor with an explicit method on a stiff
+    model."""
     name, values, _ = case
     return values.get("friction", HYBRID) == HYBRID and (name != "pacejka" or values["solver.method"] == RODAS)
 
@@ -61,7 +66,7 @@ STEADY = [case for case in CASES if is_steady(case)]
 
 @pytest.fixture(scope="module", params=MACHINES)
 def machine(request):
-    """A platform, the command that starts a host there, by its source, and the environment for it."""
+    """A platform, a function that returns the command to start a host there, and its environment."""
     emulator, *words = MACHINES[request.param]
     if not shutil.which(emulator) or not (os.path.isdir(ARM) if words else WINE):
         pytest.skip(f"{emulator} is not here: apt-get install wine64 wine qemu-user libc6-arm64-cross")
@@ -82,8 +87,8 @@ def machine(request):
 
 
 def windows():
-    """The environment of a Windows that is Wine's libraries in a folder: to set up all that belongs to one takes longer
-    than all that is asked of it here."""
+    """The environment of a Windows that consists of Wine's libraries in a folder; a complete prefix takes too long
+    to set up."""
 
     def make(folder):
         system = {"system32": WINE[0], "syswow64": WINE[0].with_name("i386-windows")}
@@ -97,7 +102,7 @@ def windows():
 
 
 def library(fmu, version, platform):
-    """The library for a platform, as the build command makes it of the sources that are in the FMU for any."""
+    """Return the library for a platform, built from the sources in the FMU."""
 
     def make(folder):
         sources = {path.name: path.read_text() for path in (unpack_cached(fmu) / "sources").iterdir()}
@@ -110,7 +115,7 @@ def library(fmu, version, platform):
 
 
 def run_host_script_there(machine, name, script):
-    """As play, there."""
+    """Run a script in the host on another platform."""
     platform, program, environment = machine
     fmu = build_native_fmus() / f"{name}.fmu"
     done = subprocess.run(
@@ -126,7 +131,7 @@ def run_host_script_there(machine, name, script):
 
 
 def runs(name):
-    """A script with every case of a model, each in an instance of its own, and how many rows each tells."""
+    """Return a script with every case of a model, each in its own instance, and the number of rows of each."""
     ref, script = value_references(name), []
     reals = " ".join(str(ref[v]) for v in outputs(name) if declared(name)[v].type == "Real")
     for i, (_, values, stop) in enumerate(case for case in STEADY if case[0] == name):
@@ -137,7 +142,8 @@ def runs(name):
 
 
 def exchange(name):
-    """A script by Euler's steps in model exchange, with an event at each; a sled begins far behind its driver."""
+    """Return a script with Euler steps in model exchange and an event at each step; a sled starts far behind its
+    driver."""
     ref, driven = value_references(name), "x_driver" in declared(name)
     states, behind = len(model_class(name).states) + driven, [(ref["x0"], -0.2)] if driven else []
     reals = " ".join(str(ref[v]) for v in outputs(name) if declared(name)[v].type == "Real")
@@ -146,7 +152,7 @@ def exchange(name):
 
 
 def tables(answers):
-    """The rows of every case, column by column."""
+    """Return the rows of every case, column by column."""
     rows = [[float.fromhex(word) for word in line.split()[1:]] for line in answers if line.count(" ") > 2]
     return [list(zip(*rows[k : k + ROWS], strict=True)) for k in range(0, len(rows), ROWS)]
 
@@ -165,7 +171,7 @@ def test_results_agree_with_linux_on_x86(machine, name):
 
 
 def apart(table, other):
-    """The largest difference of two tables, as a share of the largest value of each column."""
+    """Return the largest difference of two tables, relative to the largest value of each column."""
     sizes = [max(map(abs, column)) or 1.0 for column in table]
     differences = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in zip(table, other, strict=True)]
     return max(difference / size for difference, size in zip(differences, sizes, strict=True))
@@ -183,8 +189,8 @@ def test_model_exchange_agrees_with_linux_on_x86(machine, name):
 
 
 def test_fmi3_agrees_with_linux_on_x86(machine):
-    """Both ways to simulate the sled, its states saved, and a refusal; the numerics are those of FMI 2.0, and one
-    method is enough."""
+    """Both interfaces for the sled, saved states, and an error. The numerics are those of FMI 2.0, so one method is
+    enough."""
     platform, program, environment = machine
     sled = fmi3_fixtures.build_reduced_fmu("stickslip")
     ends, said = run_life_cycles(

@@ -1,9 +1,8 @@
-"""The gate: the Python FMU and the native FMU of a model answer the same to every call, bit for bit.
+"""The Python FMU and the native FMU of a model respond identically to every call, bit for bit.
 
-Both go through the same random lives: parameters, tolerances and grids; inputs and tunables that change in mid-run;
-looks ahead; states saved, restored and carried over to another instance as bytes; values and steps that must be
-refused; runs that break down.  Whatever an importer can see is compared with ==: values, counts, statuses, log
-messages, standard error.
+Both get the same random calls: parameters, tolerances and grids; inputs and tunables that change during a run; looks
+ahead; states saved, restored and transferred to another instance as bytes; invalid values and steps; runs that fail.
+Everything visible to an importer is compared with ==: values, counters, statuses, log messages, standard error.
 """
 
 import json
@@ -16,8 +15,8 @@ from models import HYBRID, MODELS, declared, label, model_class, pairwise_cases,
 from native_fmus import build_native_fmus
 from worker_client import FmiError, Worker
 
-LIVES, EVENTS = 2, 30  # of every model, law and method; in a life
-BREAKDOWNS = 3  # of every model, law and method
+LIVES, EVENTS = 2, 30  # for each model, law and method; per life cycle
+BREAKDOWNS = 3  # for each model, law and method
 CASES = [(name, values, 0.0) for name in MODELS for values in pairwise_cases(name)]
 
 
@@ -36,7 +35,7 @@ def pair():
 
 
 class LifeCycle:
-    """What one FMU answers to a list of events."""
+    """The responses of one FMU to a list of events."""
 
     def __init__(self, worker, path, names):
         self.worker, self.names = worker, names
@@ -51,15 +50,15 @@ class LifeCycle:
         return answers
 
     def answer(self, what, *arguments):
-        """What comes back, is logged, printed, and read afterwards."""
+        """Return the result of a call, the log, standard error, and the values afterwards."""
         try:
             value = getattr(self, what)(*arguments)
         except FmiError as refusal:
-            value = refusal.function  # the layer of a Python FMU knows Discard only
-        # fmpy's logger calls back the newest instance, whichever speaks
+            value = refusal.function  # the layer of a Python FMU can only return Discard
+        # fmpy passes all messages to the newest instance
         asked = [[instance.number, "messages", []] for instance in self.instances]
         seen = self.worker.call(None, "batch", [*asked, [self.instances[0].number, "get", [self.names]]])
-        return json.dumps([value, seen, self.worker.read_stderr()])  # where NaN is NaN, and no digit is lost
+        return json.dumps([value, seen, self.worker.read_stderr()])  # where NaN equals NaN, and no digit is lost
 
     def begin(self, values, start, stop, tolerance):
         fmu = self.instances[0]
@@ -68,7 +67,7 @@ class LifeCycle:
         seen = fmu.get(*self.names)
         fmu.setup(start, stop, tolerance)
         seen += fmu.get(*self.names)
-        with suppress(FmiError):  # which a Python FMU cannot; what is wrong is logged by both
+        with suppress(FmiError):  # which a Python FMU cannot raise; both log what is wrong
             fmu.init()
         return seen
 
@@ -77,7 +76,7 @@ class LifeCycle:
         self.instances[0].step(t, h)
 
     def leap(self):
-        """To the end of the internal step."""
+        """Step to the end of the internal step."""
         ahead = self.instances[0].get("solver.t_next")
         if self.t < ahead < inf or ahead != ahead:
             self.step(ahead - self.t if ahead == ahead else 1e-6)
@@ -100,7 +99,7 @@ class LifeCycle:
         self.instances[0].restore(state)
 
     def move(self):
-        """Life goes on in the other instance."""
+        """Continue in the other instance."""
         fmu, other = self.instances
         other.restore(other.deserialize(fmu.serialize(fmu.save())))
         self.instances.reverse()
@@ -114,18 +113,18 @@ ODD = (0.0, -1.0, 1e-300, 5e-324, 1e300, -1.7e308, nan, inf, -inf)
 
 
 def likely(draw, start):
-    """A value for a parameter that starts at `start`."""
+    """Return a value for a parameter that starts at `start`."""
     return (start or 1.0) * 10.0 ** draw.uniform(-0.7, 0.7)
 
 
 def start_values(name):
-    """The start values of what takes a number in a run."""
+    """Return the start values of the numeric variables."""
     numbers = {v: d.start for v, d in parameters(name).items() if not v.startswith("solver.")}
     return numbers | {v: 0.05 for v in numbers if v in ("x0", "v0", "theta0", "omega0")}
 
 
 def beginnings(draw, name, choices, stop):
-    """The first event of a life, and of that after a reset."""
+    """Return the first events of a life cycle, or those after a reset."""
     values = choices | {v: likely(draw, s) for v, s in start_values(name).items() if draw.random() < 0.4 and v != "x_m"}
     is_chattering = choices.get("friction", HYBRID) != HYBRID
     values["solver.rtol"] = draw.choice([1e-2, 1e-3] if is_chattering else [0.0, 1e-3, 1e-5, 1e-7])
@@ -137,7 +136,7 @@ def beginnings(draw, name, choices, stop):
 
 
 def mistakes(draw, name, stop):
-    """Something that cannot be used; a step that tells it; and a way out, if that is wanted."""
+    """Return an invalid setting, a step that reports it, and possibly a recovery."""
     declarations = declared(name)
     odd = {v: draw.choice(ODD) for v in draw.sample(list(tunable(name)), 2)}
     fixed = draw.choice([v for v, d in declarations.items() if d.variability == "fixed"])
@@ -156,7 +155,7 @@ def mistakes(draw, name, stop):
 
 
 def scenario(draw, name, choices):
-    """The events of one life."""
+    """Return the events of one life cycle."""
     stop = model_class(name).stop_time * (0.3 if choices.get("friction", HYBRID) == HYBRID else 0.02)
     tunables = [v for v in tunable(name) if v != "x_m"]  # a stiff curve is too slow for most methods
     starts = start_values(name)
@@ -177,7 +176,7 @@ def scenario(draw, name, choices):
 
 
 def breakdown(draw, name, choices):
-    """A life with values far out, an internal step at a time."""
+    """Return a life cycle with extreme values, one internal step at a time."""
 
     def far(start):
         return draw.choice(
@@ -192,8 +191,8 @@ def breakdown(draw, name, choices):
 
 
 def agree(folders, pair, name, events):
-    """Live the events in a Python FMU and in a native one."""
-    names = [v for v in declared(name) if v != "solver.t_next"]  # which looks ahead: an event of its own
+    """Apply the events to a Python FMU and to a native one, and compare."""
+    names = [v for v in declared(name) if v != "solver.t_next"]  # which computes the next step: an event of its own
     lives = [
         LifeCycle(worker, folder / f"{name}.fmu", names).live(events)
         for worker, folder in zip(pair, folders, strict=True)

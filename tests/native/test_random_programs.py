@@ -1,4 +1,4 @@
-"""Random programs of the subset do in C what they do in CPython, bit for bit."""
+"""Random programs of the subset behave in C as in CPython, bit for bit."""
 
 import importlib.util
 import random
@@ -7,14 +7,14 @@ from compiled_methods import PAIRS, CompiledMethods, assert_same_as_python
 
 
 class Draw:
-    """Random source in the subset, whose loops end; without copysign, which would tell the sign of a NaN."""
+    """Generator of random source code with bounded loops; without copysign, which would reveal the sign of a NaN."""
 
     def __init__(self, seed):
         self.draw = random.Random(seed)
         self.loops = 0
 
     def number(self, depth):
-        """A float."""
+        """Return a float expression."""
         if depth == 0:
             return self.draw.choice(["x", "y", "z", "self.a", "self.b", "self.left.total", "self.row[1]"])
         a, b = self.number(depth - 1), self.number(self.draw.randrange(depth))

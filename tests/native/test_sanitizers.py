@@ -1,5 +1,7 @@
-"""The sources of the native FMUs under the address and undefined-behaviour sanitizers, in the hands of an importer that
-does whatever it must not; tests/support/fmi2_stress.c and, for FMI 3.0, fmi3_stress.c say what it does."""
+"""The sources of the native FMUs under the address and undefined-behaviour sanitizers, with calls that FMI forbids.
+
+See tests/support/fmi2_stress.c and, for FMI 3.0, fmi3_stress.c.
+"""
 
 import os
 import subprocess
@@ -19,7 +21,8 @@ SENTENCE = (
 
 
 def program(source, fmu, sanitizers=SANITIZERS):
-    """What runs a program over the sources in an FMU: it must end well, and tells what went to its outputs."""
+    """Return a function that runs a program with the sources of an FMU, requires a clean exit, and returns its
+    output."""
     out = compile_sanitized(source, fmu, sanitizers=sanitizers)
 
     def run(*words, **options):
@@ -56,7 +59,7 @@ def test_random_calls_end_in_a_status_and_leave_other_instances_alone(abuse):
 
 
 def test_every_fmi3_function_in_every_state_follows_the_standard_without_leaks(walk):
-    """With null pointers and wrong lengths, in every kind of instance; the address sanitizer looks for what is left."""
+    """With null pointers and wrong lengths, in every kind of instance; the address sanitizer detects leaks."""
     told, _ = walk("states", 1)
     assert int(told) > 2_500
 
@@ -76,7 +79,7 @@ NAMES = [
 
 
 def test_any_name_is_logged_as_utf8_and_never_as_a_format(abuse):
-    """Each name twice: of an instance, and of one that is refused."""
+    """Each name is used twice: for an instance, and for a failed instantiation."""
     told, noise = abuse("names", env=SANITIZER_ENVIRONMENT | {"ALOUD": "1"})
     assert [line.split(b"|")[0] for line in told.splitlines()] == [name for name in NAMES for _ in range(2)]
     assert all(b"(" + name + b"): fmi2" in noise for name in NAMES)
@@ -87,7 +90,7 @@ def test_any_name_is_logged_as_utf8_and_never_as_a_format(abuse):
 @pytest.mark.skipif(sys.platform != "linux", reason="/dev/full is Linux's")
 @pytest.mark.parametrize("lost", ["closed", "full", "unread", "by the host", "not writable"])
 def test_an_error_survives_the_loss_of_standard_error(abuse, lost):
-    """The signal of a pipe that nobody reads would end a host that does not ignore it, as this one."""
+    """The signal of a pipe without reader would end a host that does not ignore it, such as this one."""
     if lost == "closed":
         abuse("failures", preexec_fn=lambda: os.close(2), stderr=None)
     elif lost == "full":

@@ -1,4 +1,4 @@
-"""What is outside the subset is refused, with its line and what to write instead; no model is outside."""
+"""Unsupported constructs are refused with their line and an alternative; all models are in the subset."""
 
 import math
 import re

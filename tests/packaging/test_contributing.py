@@ -1,4 +1,4 @@
-"""CONTRIBUTING.md to the letter: its files written, its changes made, its commands typed, in a copy of the project."""
+"""CONTRIBUTING.md is executed literally in a copy of the project: its files, its changes, its commands."""
 
 import os
 import re
@@ -19,7 +19,7 @@ PARTS = ("fmus", "harness", "tests", "build_fmus.py", "pyproject.toml", "README.
 
 @pytest.fixture
 def project(tmp_path):
-    """The copy, with what Python has compiled of it, and one of the models: its last command builds all there are."""
+    """The copy, with compiled Python files and one of the models; the last command of the page builds all of them."""
     for part in PARTS:
         if (ROOT / part).is_dir():
             shutil.copytree(ROOT / part, tmp_path / part, ignore=shutil.ignore_patterns("*.fmu"))
@@ -31,7 +31,7 @@ def project(tmp_path):
 
 
 def typed(line, folder):
-    """A command in the folder must end well."""
+    """Run a command in the folder; it must succeed."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = os.environ | {"PATH": path, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
     done = subprocess.run(line, shell=True, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
@@ -39,7 +39,7 @@ def typed(line, folder):
 
 
 def changed(text, change):
-    """The text after a change, each part of which is found once."""
+    """Return the text after a change, each part of which must occur once."""
     assert "".join(before + after for before, after in CHANGE.findall(change)) == change
     for before, after in CHANGE.findall(change):
         old, new = (re.sub(r"^[-+]", "", part, flags=re.M).rstrip("\n") for part in (before, after))

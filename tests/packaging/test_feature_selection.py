@@ -1,4 +1,4 @@
-"""FMUs built with --method, --law and --platform: they offer just those, carry just their code, and run alike."""
+"""FMUs built with --method, --law and --platform offer only these, carry only their code, and run alike."""
 
 from zipfile import ZipFile
 
@@ -15,7 +15,7 @@ LABELS = {"solver.method": "--method", "friction": "--law"}
 
 
 def chosen(name, values):
-    """The labels of the choices of a case, by the option that asks for them."""
+    """Return the choice labels of a case, by command-line option."""
     found = {}
     for variable, option in LABELS.items():
         for item in declared(name)[variable].items if variable in values else ():
@@ -26,7 +26,7 @@ def chosen(name, values):
 
 @pytest.fixture(scope="module")
 def lean(tmp_path_factory):
-    """lean(case): the FMU that offers the method and the law of a case and nothing else, for Linux."""
+    """Return lean(case): the FMU with only the method and the law of a case, for Linux."""
 
     def build(case):
         options = chosen(*case[:2])
@@ -45,7 +45,9 @@ def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, c
     path = lean(case)
     options = chosen(name, values)
     description = read_model_description(path, validate_model_structure=True)
-    assert {variable.name for variable in description.modelVariables} <= {*declared(name)}  # whose letters are allowed
+    assert {variable.name for variable in description.modelVariables} <= {
+        *declared(name)
+    }  # whose characters are allowed
     for variable in description.modelVariables:
         if variable.name in LABELS:
             assert [item.name for item in variable.declaredType.items] == [options[LABELS[variable.name]]]

@@ -1,4 +1,4 @@
-"""What a built FMI 3.0 FMU carries, what it says about itself, and that both are true and the same everywhere."""
+"""Contents and description of FMI 3.0 FMUs: correct and reproducible."""
 
 import json
 from html.parser import HTMLParser
@@ -34,7 +34,7 @@ DRY = {name for name in model_names() if find_model(name).model.has_dry_friction
 DRIVEN = {name for name in model_names() if find_model(name).model.has_driver}
 TYPES = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Enumeration"}
 STRUCTURE = ("Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator")
-# Nothing is without effect, and friction often holds.
+# Every parameter has an effect, and friction often holds.
 PARAMETERS = {"coulomb": {"c": 0.7, "k": 1.0}, "pendulum": {"r": 0.5}}
 
 
@@ -45,7 +45,8 @@ def fmu():
 
 @pytest.fixture(scope="module")
 def look(fmu, tmp_path_factory):
-    """look(function, name, ...): what is seen where the FMU is all there is to see; one process looks for all tests."""
+    """Return look(function, name, ...), which inspects the FMU alone in a clean process; one process serves all
+    tests."""
     asked = [("variables", name) for name in model_names()]
     asked += [("factors", name, PARAMETERS.get(name, {})) for name in model_names()] + [
         ("nominals", "pacejka", "x_m", 1e-5)
@@ -56,13 +57,13 @@ def look(fmu, tmp_path_factory):
 
 
 def beside(name):
-    """The names of what follows the declared variables."""
+    """Return the names of the variables after the declared ones."""
     indicators = ["events.to_rest", "events.to_break_away"] if name in DRY else []
     return [*indicators, *(["der(x_driver)"] if name in DRIVEN else []), "time"]
 
 
 def structure(root, kind):
-    """Reference, dependencies and their kinds of every unknown of a kind."""
+    """Return reference, dependencies and their kinds of every unknown of a kind."""
     found = root.findall(f"ModelStructure/{kind}")
     return [
         (int(u.get("valueReference")), [int(r) for r in u.get("dependencies", "").split()], u.get("dependenciesKind"))
@@ -99,7 +100,7 @@ def test_declared_variables_keep_their_references_and_attributes(fmu, fmus, name
 
 
 def test_an_alias_is_a_second_name_of_a_settable_variable(fmu, tmp_path):
-    """It is in the XML, importers set it, and what a run tells of its parameters holds under both names."""
+    """It is in the XML, importers can set it, and the provenance of a run lists both names."""
     sled = fmu("stickslip")
     (one,) = [each for each in read_model_description(sled).modelVariables if each.name == "mu_k"]
     assert one.alias.name == "mu_d"
@@ -177,7 +178,7 @@ def test_a_finer_creep_lowers_the_nominal_speed_and_the_event_reports_it(look):
 
 @EVERY_MODEL
 def test_declared_dependencies_are_true(fmu, look, name):
-    """A nudge shows in nothing that is not said to follow; all that rates and indicators follow from shows, too."""
+    """A small change affects only declared dependents, and all declared dependents of rates and indicators respond."""
     root = described(fmu(name))
     told = {kind: structure(root, kind) for kind in ("Output", "ContinuousStateDerivative", "EventIndicator")}
     seen = look("factors", name, PARAMETERS.get(name, {}))
@@ -228,7 +229,9 @@ def test_the_files_are_those_of_fmi3(fmu, name):
     assert content["documentation/licenses/license.txt"].decode() == (ROOT / "LICENSE").read_text(encoding="utf-8")
     certified = {"fmi-ls-manifest.xml", f"{name}_out.csv"}
     headers = [file for files in (OWN_HEADERS, FMI_HEADERS["3"], ("fmi3.c", "guid.h", "model.h")) for file in files]
-    assert all(b"2-Clause BSD License" in content[f"sources/{file}"] for file in FMI_HEADERS["3"])  # it travels
+    assert all(
+        b"2-Clause BSD License" in content[f"sources/{file}"] for file in FMI_HEADERS["3"]
+    )  # the licence is packed
     assert set(content) == {
         "documentation/boundaries.toml",
         "documentation/index.html",

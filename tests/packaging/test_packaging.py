@@ -1,4 +1,4 @@
-"""What a built FMU carries, what it says about itself, and that both are the same wherever it is built."""
+"""Contents and description of built FMUs, which do not depend on where they are built."""
 
 import ast
 import json
@@ -28,7 +28,7 @@ from fmus.runtime.variable_declarations import Fixed, Output, Parameter, Variabl
 
 EVERY_MODEL = pytest.mark.parametrize("name", model_names())
 
-# Runs built FMUs in a process that never saw their sources, and cannot see pythonfmu.
+# Runs built FMUs in a process that has neither the sources nor pythonfmu.
 PROBE = """
 import json, os, shutil, sys
 sys.modules["pythonfmu"] = None
@@ -55,7 +55,7 @@ print(json.dumps(told))
 
 
 def probe(*fmus, folder):
-    """What instances of the FMUs, made one after another in one clean process, tell about themselves."""
+    """Return the self-description of FMU instances that are created one after another in one clean process."""
     call = [sys.executable, "-c", PROBE, *map(str, fmus)]
     run = subprocess.run(call, capture_output=True, text=True, cwd=folder, timeout=120)
     assert run.returncode == 0, run.stderr
@@ -63,25 +63,25 @@ def probe(*fmus, folder):
 
 
 def entries(fmu):
-    """Content of every file in an FMU."""
+    """Return the content of every file in an FMU."""
     with ZipFile(fmu) as archive:
         return {path: archive.read(path) for path in archive.namelist()}
 
 
 def described(fmu):
-    """The root of the model description."""
+    """Return the root of the model description."""
     return ElementTree.fromstring(entries(fmu)["modelDescription.xml"])
 
 
 def modules_of(fmu):
-    """Paths of the sources that travel, without the package name."""
+    """Return the paths of the packed sources, without the package name."""
     found = [PurePosixPath(path).parts for path in entries(fmu) if path.endswith(".py")]
     return {"/".join(parts[2:]) for parts in found if len(parts) > 2}
 
 
 @pytest.fixture(scope="module")
 def building(fmus):
-    """All FMUs, built once by the command, and what it printed."""
+    """All FMUs, built once by the command, and its output."""
     return fmus, fmus.with_suffix(".txt").read_text()
 
 
@@ -176,7 +176,7 @@ def test_capabilities_and_experiment_match_the_contract(fmu, name):
 
 @pytest.fixture(scope="module")
 def probed(fmu, tmp_path_factory):
-    """What each of them tells."""
+    """The self-description of each of them."""
     return dict(
         zip(model_names(), probe(*map(fmu, model_names()), folder=tmp_path_factory.mktemp("probed")), strict=True)
     )
@@ -187,7 +187,7 @@ def test_an_instance_starts_with_the_values_of_the_xml_and_imports_every_packed_
     told = probed[name]
     scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
     assert told["starts"] == {s.get("name"): s[0].get("start") for s in scalars if s[0].get("start") is not None}
-    # Two routes to the same list: the files that are reached by reading imports, the modules that Python loads.
+    # The list is obtained twice: from the imports in the sources, and from the modules that Python loads.
     assert set(told["inside"]) == {path for path in entries(fmu(name)) if path.endswith(".py")}
     assert not [module for module in told["modules"] if module.startswith(("fmus", "pythonfmu."))]
 
@@ -350,7 +350,7 @@ def test_imports_are_followed_through_packages_for_any_line_ends(tmp_path):
 
 
 class Sketch(VariableOwner):
-    """A model for the description alone.
+    """A model that only has a description.
 
     x' = -x
     """
@@ -360,7 +360,7 @@ class Sketch(VariableOwner):
 
 
 def sketch(**declared):
-    """The description of a model with these variables."""
+    """Return the description of a model with these variables."""
     made = type("Sketch", (Sketch,), {"__doc__": Sketch.__doc__} | declared)
     for name, meaning in declared.items():
         meaning.__set_name__(made, name)

@@ -1,4 +1,4 @@
-"""What an FMU tells people: its page, its icon, its certified result."""
+"""The documentation in an FMU: its page, its icon, its certified result."""
 
 import csv
 import re
@@ -20,7 +20,7 @@ from fmus.packaging.svg_chart import tick_values
 from tests.packaging.test_packaging import entries
 
 EVERY_MODEL = pytest.mark.parametrize("name", MODELS)
-WITH = {  # an ending -> the models that have such a file beside them
+WITH = {  # an ending -> the models that have such a file
     ending: [name for name in MODELS if (ROOT / "fmus" / f"{name}.{ending}").is_file()] for ending in ("png", "csv")
 }
 PAGE, ICON, EXTRA = "documentation/index.html", "model.png", "extra/org.fmi-standard.fmi-ls-ref/"
@@ -30,7 +30,7 @@ NAMESPACE = "{http://fmi-standard.org/fmi-ls-manifest}"
 
 @pytest.fixture
 def content(fmus):
-    """content(name): the files of an FMU."""
+    """Return content(name): the files of an FMU."""
     return lambda name: entries(fmus / f"{name}.fmu")
 
 
@@ -43,7 +43,7 @@ def test_a_native_fmu_has_the_same_page_and_states_how_to_run_it(content, name):
     assert told == {path: native.get(path) for path in told}
 
 
-TOLD = {  # by what a model description says it, where an attribute is not false: how its name begins in both versions
+TOLD = {  # names as they begin in the model descriptions of both versions; attributes that are not false
     "FMI": (".", "fmiVersion"),
     "co-simulation; state saved and serialised": ("CoSimulation", "canSerializeFMU"),
     "model exchange: indicators, time events, nominals": ("ModelExchange", "modelIdentifier"),
@@ -62,7 +62,7 @@ TOLD = {  # by what a model description says it, where an attribute is not false
 
 
 def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_readme(content):
-    """Of a model in closed form, which can all of it."""
+    """For a model with a closed form, which has all capabilities."""
     kinds = [
         content("stickslip"),
         *(
@@ -90,7 +90,7 @@ def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_r
 
 
 class Reader(HTMLParser):
-    """The words of a page, its headings, what it refers to, and the elements still open."""
+    """Collect the text of a page, its headings, its links, and the open elements."""
 
     def __init__(self, text):
         super().__init__()
@@ -169,7 +169,7 @@ def test_the_manifest_names_the_certified_result_and_its_origin(content, name):
 
 @pytest.mark.parametrize("name", WITH["csv"])
 def test_the_fmu_reproduces_its_certified_result(content, launch, name):
-    """Position and speed of the default run: the share of the largest that the contract allows."""
+    """Position and speed of the default run, relative to the largest value, within the contract."""
     text = content(name)[f"{EXTRA}{name}_out.csv"].decode()
     heads, *rows = csv.reader(StringIO(text))
     assert heads == ["time", *outputs(name)[:2]]

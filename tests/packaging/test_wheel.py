@@ -1,4 +1,4 @@
-"""The wheel, installed in an environment of its own and used in an empty folder: it has all it needs, and stays."""
+"""The wheel, installed in a separate environment and used in an empty folder, is complete and stays unchanged."""
 
 import os
 import shutil
@@ -16,11 +16,11 @@ from native_fmus import build_for_all_platforms
 from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS
 from tests.packaging.test_packaging import entries
 
-LIBRARIES = Path(numpy.__file__).parents[1]  # the dependencies, which are not installed a second time
+LIBRARIES = Path(numpy.__file__).parents[1]  # the dependencies, which are not installed again
 
 
 def call(*command, cwd, **environment):
-    """What a command prints; it must end well."""
+    """Run a command, which must succeed, and return its output."""
     others = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     environment = others | {key: str(value) for key, value in environment.items()}
     done = subprocess.run([*map(str, command)], cwd=cwd, env=environment, capture_output=True, text=True, timeout=300)
@@ -30,7 +30,7 @@ def call(*command, cwd, **environment):
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """Built from a copy, for setuptools leaves things behind, as pip asks for it; no network is asked."""
+    """Built like pip does, from a copy, because setuptools leaves files behind; without network access."""
     source = tmp_path_factory.mktemp("source")
     for part in ("fmus", "harness"):
         shutil.copytree(ROOT / part, source / part, ignore=shutil.ignore_patterns("__pycache__"))
@@ -43,7 +43,7 @@ def wheel(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def installed(wheel, tmp_path_factory):
-    """A Python that has the wheel, and its site-packages, which nobody may write."""
+    """A Python with the wheel, and its site-packages, which are read-only."""
     folder = tmp_path_factory.mktemp("environment")
     call(sys.executable, "-m", "venv", "--without-pip", folder, cwd=folder)
     pip = (sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index", "--ignore-installed")
@@ -60,16 +60,15 @@ def installed(wheel, tmp_path_factory):
 
 @pytest.fixture
 def run(installed, tmp_path):
-    """run(words, ...): what `python -m words` prints in an empty folder with this environment, which must leave the
-    installation as it was."""
+    """Return run(words, ...): the output of `python -m words` in an empty folder; the installation must not change."""
     python, place = installed
     before = content(place)
     yield lambda words, **environment: call(python, "-m", *words.split(), cwd=tmp_path, **environment)
-    assert content(place) == before  # root may write what is read-only
+    assert content(place) == before  # root may write read-only files
 
 
 def content(place):
-    """The digest of every file."""
+    """Return the digest of every file."""
     return {path: sha256(path.read_bytes()).digest() for path in place.rglob("*") if path.is_file()}
 
 
@@ -88,7 +87,7 @@ def test_the_licence_is_in_the_wheel(wheel):
 
 
 def test_it_builds_the_same_bytes_as_the_sources_and_runs_them_in_an_empty_folder(run, fmus, tmp_path):
-    """From files of another place and time; a model without a contact and one with one."""
+    """From files with another location and time; one model without a contact and one with a contact."""
     printed = run("build_fmus pacejka stickslip", PYTHONHASHSEED="7", TZ="Pacific/Auckland")
     assert [line.split()[0] for line in printed.splitlines()] == ["pacejka.fmu", "stickslip.fmu"]
     made = {path.relative_to(tmp_path).as_posix(): path.read_bytes() for path in tmp_path.rglob("*.fmu")}
@@ -99,8 +98,8 @@ def test_it_builds_the_same_bytes_as_the_sources_and_runs_them_in_an_empty_folde
 
 
 def test_native_builds_differ_from_those_of_the_sources_only_in_the_date(run, tmp_path):
-    """For the usual platforms.  The date reaches the description and the zip only; what the compiler brings, as the
-    stubs of the C libraries, is not made anew, which takes long."""
+    """For the default platforms. The date only affects the description and the zip. The compiler's own files, such
+    as the stubs of the C libraries, are not rebuilt, which would take long."""
     there = entries(build_for_all_platforms() / "smd.fmu")
     run("build_fmus --native smd --method exact", ZIG_LOCAL_CACHE_DIR=tmp_path / "own", SOURCE_DATE_EPOCH="1700000000")
     again = entries(tmp_path / "fmus" / "native" / "smd.fmu")

@@ -1,4 +1,4 @@
-"""Records as instruments, spreadsheets and phones write them: each is read for what it is, or told what it lacks."""
+"""Records from instruments, spreadsheets and phones: each is read correctly, or its problem is reported."""
 
 import contextlib
 import gzip
@@ -27,7 +27,7 @@ X = motion()
 
 
 def rows(*columns, mark=",", comma=False, form="{:.9g}"):
-    """Lines of numbers, with decimal commas if asked."""
+    """Return lines of numbers, optionally with decimal commas."""
     lines = [
         mark.join(cell if isinstance(cell, str) else form.format(cell) for cell in row)
         for row in zip(*columns, strict=True)
@@ -36,7 +36,7 @@ def rows(*columns, mark=",", comma=False, form="{:.9g}"):
 
 
 def phone():
-    """phyphox: three accelerations and their length, quoted headings, six digits after the point."""
+    """phyphox: three accelerations and their magnitude, quoted headings, six decimals."""
     a = motion(2)
     noise = 0.02 * np.random.default_rng(1).standard_normal((2, len(T)))
     head = ",".join(
@@ -74,7 +74,7 @@ def instrument():
 
 
 def logger():
-    """Times rounded to 10 ms where a sample is taken each 12.5 ms; some come twice."""
+    """Times rounded to 10 ms with samples every 12.5 ms; some are repeated."""
     t = 0.0125 * np.arange(480)
     return "t [s],x [mm]\n" + rows(np.round(t, 2), 1e3 * motion(t=t))
 
@@ -156,7 +156,7 @@ def mat5(arrays):
 
 
 def mat73(**arrays):
-    """As MATLAB writes it: HDF5 after a block of 512 bytes of its own."""
+    """As written by MATLAB: HDF5 after a user block of 512 bytes."""
     h5py = pytest.importorskip("h5py", reason="extra records")
     file = io.BytesIO()
     with h5py.File(file, "w", userblock_size=512) as data:
@@ -182,11 +182,13 @@ FOUND = {}
 
 
 def found_in(record, pendulum):
-    """What a record says; of those that are the same to eight digits only the first is fitted."""
+    """Return the fit of a record; of records equal to eight digits only the first is fitted."""
     numbers = [np.round(each, 8).tobytes() for each in (record.t, record.x)]
     key = (*numbers, record.unit, record.base, record.order, record.notes, pendulum)
     if key not in FOUND:
-        FOUND[key] = fit_decay(record, KnownParameters(pendulum=pendulum), drag=False)  # whose laws take most of a fit
+        FOUND[key] = fit_decay(
+            record, KnownParameters(pendulum=pendulum), drag=False
+        )  # the laws with drag take most of a fit
     return FOUND[key]
 
 
@@ -203,24 +205,24 @@ def test_a_common_file_format_gives_the_expected_parameters(tmp_path, name):
     assert SAID.get(name, "") in " ".join(found.remarks)
 
 
-MM = 1e3 * X + 500  # off rest, so that no number begins with 0
+MM = 1e3 * X + 500  # offset, so that no number begins with 0
 CLOCKS = [np.datetime64("2026-11-21T23:59:58.500") + np.timedelta64(round(1000 * t), "ms") for t in T]
 
 DAY = CLOCKS[0].item().date()
 
 
 def each(line, mark="\n"):
-    """The lines of a file, from a time in s, a position in mm, and a stamp."""
+    """Return the lines of a file, from a time in s, a position in mm, and a time stamp."""
     return mark.join(line(t, x, stamp.item()) for t, x, stamp in zip(T, MM, CLOCKS, strict=True))
 
 
 def scope(i, t, x):
-    """What a Tektronix TDS writes: the settings stand beside the first rows."""
+    """A line from a Tektronix TDS: the first rows contain the settings."""
     beside = ["Record Length,6.0e+02", "Sample Interval,1.0e-02", "", "Source,CH1"]
     return f"{beside[i] if i < 4 and beside[i] else ','},,{t:016.12f},{x:10.5f},"
 
 
-WRITTEN = {  # and what is asked of it; in each stands the same motion
+WRITTEN = {  # and the options of its reader; all hold the same motion
     "names with units": (lambda: "time_ms,x_mm\n" + each(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f}"), {}),
     "a clock named after its unit": (lambda: "millis x(mm)\n" + each(lambda t, x, s: f"{1e3 * t:.0f} {x:.6f}"), {}),
     "units of Pasco": (
@@ -349,7 +351,7 @@ def test_a_damaged_file_is_refused_in_one_sentence(tmp_path, name, share):
 
 
 def test_no_file_content_ends_in_a_traceback(tmp_path):
-    """Files as above with bytes changed, cut out and put in: an answer or a sentence, whatever comes."""
+    """The files above with bytes changed, removed and inserted: a fit or one sentence."""
     rng = np.random.default_rng(5)
     texts = [FILES[name]() for name in ("commas.csv", "instrument.csv", "stamps.csv", "utf16.txt", "phone.csv")]
     path = tmp_path / "record.csv"
@@ -365,7 +367,7 @@ def test_no_file_content_ends_in_a_traceback(tmp_path):
 
 
 def test_an_archive_error_lists_its_contents(tmp_path):
-    """As phyphox exports."""
+    """As exported by phyphox."""
     with ZipFile(tmp_path / "swing.zip", "w") as archive:
         archive.writestr("Raw Data.csv", FILES["phone.csv"]())
         archive.writestr("meta/device.csv", "property,value")

@@ -1,4 +1,4 @@
-"""The evidence itself: it solves the equations, and it reproduces every figure that physics states."""
+"""The independent solution solves its equations and reproduces the values that physics predicts."""
 
 import itertools
 from math import degrees
@@ -77,8 +77,8 @@ def test_the_pendulum_swings_and_rests_as_its_equations_state():
         assert swing.events[-1][1] == 0
         assert abs(pendulum.load(rest)) <= pendulum.mu * pendulum.r * pendulum.m * pendulum.g
         fifth = degrees(swing.at(swing.events[9][0])[0])
-        assert fifth == pytest.approx(2.337, abs=0.12)  # the other program's, a coarse one
-    # the energy lost is the torque times the way; 5 turning points give it in closed form
+        assert fifth == pytest.approx(2.337, abs=0.12)  # from another program, with coarse steps
+    # the lost energy is the torque times the angle; 5 turning points give it in closed form
     swing = independent_pendulum.PendulumMotion(
         [(0.0, independent_pendulum.Pendulum())], independent_pendulum.THETA0, 0.0, 5.0
     )

@@ -1,4 +1,4 @@
-"""The references: certified by closed forms and solutions that were typed a second time, and reached by the FMUs."""
+"""The references: certified by closed forms and independent solutions, and reproduced by the FMUs."""
 
 from itertools import pairwise
 
@@ -44,7 +44,8 @@ class Glide:
 
 
 def held_below(eps, stop):
-    """The sled of the threshold law in pieces (time, mode, position, piece), which meet at times found by bisection."""
+    """Return the sled of the threshold law in segments (time, mode, position, segment), joined at times found by
+    bisection."""
     sled = independent_solution.stickslip()
     t, x, v, pieces = mpf(0), mpf(0), mpf(0), []
 
@@ -68,7 +69,7 @@ def held_below(eps, stop):
         go(0, Glide(v), lambda t, x, v: pull(t, x) >= sled.hold, "0.1")
         if t > stop:
             return pieces
-        if not pieces[1:]:  # later it is as fast as eps already
+        if not pieces[1:]:  # later segments start at the speed eps
             go(0, LinearSegment(sled, pull(t, x) - sled.hold, v), lambda t, x, v: v >= eps, "1e-5")
         go(1, LinearSegment(sled, pull(t, x) - sled.slide, v), lambda t, x, v: v <= eps, "1e-3")
 

@@ -1,4 +1,4 @@
-"""The report on results of real runs: complete, self-contained, and fit for a phone."""
+"""The report on results of real runs: complete, self-contained, and usable on a phone."""
 
 import re
 import shutil
@@ -14,7 +14,7 @@ EMPTY = {"meta", "link", "img", "br"}
 
 @pytest.fixture(scope="module")
 def made(fmus, tmp_path_factory):
-    """A folder with results of some kinds, and the finished report on them."""
+    """A folder with results of several kinds, and the report on them."""
     folder = tmp_path_factory.mktemp("report")
     (folder / "fmus").symlink_to(fmus)
     for scene in ("coulomb", "coulomb-sign"):
@@ -33,7 +33,7 @@ def page(made):
 
 
 class Tags(HTMLParser):
-    """Every tag with its attributes; the elements must nest."""
+    """Collect every tag with its attributes; the elements must nest."""
 
     def __init__(self, text):
         super().__init__()
@@ -87,7 +87,7 @@ def test_every_link_leads_to_an_existing_anchor_or_file(made, page):
 
 
 def test_text_from_results_is_escaped(made):
-    """A name with mark-up in it stays a name."""
+    """A name with markup is shown literally."""
     folder = made[0] / "results/decay/coulomb"
     kept = (folder / "decay.json").read_text()
     (folder / "decay.json").write_text(kept.replace('"record": "coulomb"', '"record": "<b>bold"'))
@@ -117,7 +117,7 @@ def test_a_browser_shows_it_without_errors_or_horizontal_scrolling(made, browser
 
 
 def test_it_begins_with_a_plot_of_the_computed_motion(made, page):
-    """The first drawing of the page is the position over time: it has as many turning points."""
+    """The first drawing of the page is the position over time, with the same number of turning points."""
     first = re.search(r'<svg viewBox="0 0 (\d+) (\d+)".*?<polyline points="([^"]+)"', page, re.S)
     points = [tuple(map(float, pair.split(","))) for pair in first[3].split()]
     assert page.index("<svg") < page.index("What to use when</h2>")
@@ -128,7 +128,7 @@ def test_it_begins_with_a_plot_of_the_computed_motion(made, page):
 
 
 def test_figures_follow_the_colour_scheme_and_keep_text_as_text(made, browser):
-    """The ground, an axis and a text of the file itself, on a light screen and on a dark one."""
+    """Background, axis and text of the file itself, on a light screen and on a dark one."""
     look = "[...document.querySelectorAll('#patch_1 path, text')].slice(0, 2).map(e => getComputedStyle(e).fill)"
     seen = []
     for dark in (False, True):

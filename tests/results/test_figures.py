@@ -1,4 +1,4 @@
-"""Figures: drawings in a file that anybody can read, however much is drawn."""
+"""Figures: valid SVG files of limited size."""
 
 from xml.etree.ElementTree import fromstring
 
@@ -8,7 +8,7 @@ from harness.results.style import open_figure
 
 
 def drawn(path, **style):
-    """The text of a figure of 200 000 points, in a path under a name that no XML may hold."""
+    """Return the text of a figure of 200 000 points, in a path whose name contains characters that XML forbids."""
     t = np.linspace(0.0, 1.0, 200_000)
     with open_figure(path, 5.0, 3.0) as figure:
         axes = figure.subplots()
@@ -23,14 +23,14 @@ def test_any_name_gives_valid_xml_with_readable_text(tmp_path):
 
 
 def test_very_many_points_make_a_file_of_hundreds_of_kilobytes_at_most(tmp_path):
-    """As a line and as marks; the same drawing is the same file."""
+    """As a line and as markers; the same drawing gives the same file."""
     line, marks = drawn(tmp_path / "a.svg"), drawn(tmp_path / "b.svg", marker=".", linestyle="")
     assert max(len(line), len(marks)) < 400_000
     assert drawn(tmp_path / "c.svg") == line
 
 
 def test_a_name_longer_than_its_panel_is_wrapped(tmp_path):
-    """As of a model in Modelica: without a blank, and told from the next by its end alone."""
+    """As in Modelica: a name without blanks that differs from others only at its end."""
     name = "mechanics.axis1.bearing.friction.plate[12].frame_a.angular_acceleration_of_the_inner_ring.relative.x[{}]"
     with open_figure(tmp_path / "a.svg", 5.0, 6.0) as figure:
         heading = figure.suptitle(f"{name}\nshort")

@@ -1,4 +1,4 @@
-"""Result folders are replaced whole or not at all."""
+"""Result folders are replaced completely or not at all."""
 
 import json
 import subprocess
@@ -21,7 +21,7 @@ def contents(folder):
 
 @pytest.fixture
 def older(tmp_path):
-    """A folder with an older result, the only thing in its parent."""
+    """A folder with an older result, the only entry of its parent."""
     folder = tmp_path / "case"
     folder.mkdir()
     (folder / "a.csv").write_text("old")
@@ -74,7 +74,7 @@ def test_a_file_in_the_way_is_reported(tmp_path):
 
 @pytest.fixture(params=["one step", "two steps"])
 def steps(request, monkeypatch):
-    """A system that exchanges two folders in one step, and one that does not."""
+    """A system that exchanges two folders atomically, and one that does not."""
     if request.param == "two steps":
         monkeypatch.setattr(folders, "exchange_folders", lambda one, two: False)
     return request.param
@@ -149,7 +149,7 @@ print(json.dumps(seen))
 
 @pytest.mark.parametrize("steps", ["one", "two"])
 def test_a_kill_at_any_moment_keeps_the_previous_or_the_new_result(older, steps):
-    """Before and after every call of the system, from the end of the writing on; the next run clears what was left."""
+    """Before and after every system call from the end of the writing on; the next run removes leftovers."""
     command = [sys.executable, "-c", KILLED, str(older), steps]
     seen = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True, timeout=120).stdout)
     assert len(seen) > 10

@@ -1,4 +1,4 @@
-"""Every result says what it was made from: files by their digest, values with their units, versions, the scene."""
+"""Every result records its provenance: file digests, values with units, versions, the scene."""
 
 import csv
 import json
@@ -24,7 +24,7 @@ COMMANDS = {  # that take seconds, and the folders of their results
     "decay": (("decay", "coulomb", "--no-drag", "--until", "2"), "decay/coulomb"),
     "sweep": (("sweep", "coulomb", "--vary", "f=0.25,0.5", "--workers", "1", "--name", "f"), "sweep/f"),
 }
-DRAWN = "decay/coulomb"  # the others are not, for the same drawing is the same file (test_figures.py)
+DRAWN = "decay/coulomb"  # the others are not drawn; test_figures.py checks that the same drawing gives the same file
 harness = partial(commands.harness, blank=UNPLOTTED)  # each of these is plotted by a test of its study
 
 
@@ -104,7 +104,7 @@ def test_the_report_shows_the_provenance_of_its_results(swung):
 
 
 def test_the_report_shows_every_run(workspace):
-    """Each FMU and each scene of one's own, by its first and last values where nothing else was asked."""
+    """Each FMU and each user scene, by its first and last values, if nothing else was requested."""
     (workspace / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\nplots = ["position"]\n')
     for arguments in (("--fmu", "fmus/pacejka.fmu"), ("mine.toml",)):
         assert harness(workspace, "run", *arguments).returncode == 0
@@ -128,7 +128,8 @@ def test_a_damaged_provenance_file_is_reported_in_the_page(workspace, swung):
 
 
 def files(folder):
-    """What a result holds, but for its account, which has a date, and its figures, which have a run time."""
+    """Return the files of a result, except the provenance (which has a date) and the quantities (which have a run
+    time)."""
     return {
         path.name: path.read_bytes()
         for path in folder.iterdir()

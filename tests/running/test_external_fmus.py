@@ -1,4 +1,4 @@
-"""FMUs that are not ours: each is run, or refused in one sentence; nothing hangs, nothing is lost."""
+"""External FMUs are run, or refused in one sentence; nothing hangs, nothing is lost."""
 
 import csv
 import json
@@ -26,14 +26,14 @@ from harness.scenes.assignments import NumberWithText
 
 @pytest.fixture(scope="module")
 def external_fmu_folder():
-    """The folder of FMUs that are not ours."""
+    """The folder of the external FMUs."""
     return external_fmus.build_external_fmus()
 
 
 @pytest.fixture
 def run(external_fmu_folder, tmp_path):
-    """run(name, ...): the finished `run --fmu`, and the rows of its result by the names of the columns; each FMU is
-    plotted once in this file."""
+    """Return run(name, ...): the finished `run --fmu`, and the result by column; each FMU is plotted once in this
+    file."""
 
     def run(name, *arguments, blank=commands.UNPLOTTED):
         fmu = name if name.endswith(".fmu") else external_fmu_folder / f"{name}.fmu"
@@ -46,7 +46,7 @@ def run(external_fmu_folder, tmp_path):
 
 
 def table(file):
-    """The columns of a result by their headings, if there is one: numbers, or texts."""
+    """Return the columns of a result by heading, if there is one: numbers, or strings."""
     if not file.is_file():
         return None
     with file.open(encoding="utf-8", newline="") as lines:
@@ -81,7 +81,7 @@ def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, 
 
 
 def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
-    """FMI 2.0: after bounce n the ball rises with e^n of the speed of its first fall."""
+    """FMI 2.0: after bounce n the ball rises with e^n times the speed of its first fall."""
     e, g = 0.8, 9.81
     done, rows = run("Bouncing", "--set", f"e={e}", blank=True)
     fine(done)
@@ -154,7 +154,7 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
     (tmp_path / "mine.toml").write_text(
         SCENE.format(fmu=external_fmu_folder / f"{name}.fmu", outputs=outputs, more=more)
     )
-    plain = name != "Arrays"  # whose texts and elements are drawn
+    plain = name != "Arrays"  # whose strings and elements are drawn
     done = commands.harness(tmp_path, "run", "mine.toml", blank=plain, COLUMNS="120")
     fine(done)
     rows = table(tmp_path / "results/mine/trajectory.csv")
@@ -337,7 +337,7 @@ def test_a_changed_file_is_read_again(external_fmu_folder, tmp_path):
     external_fmus.edited_copy(
         external_fmu_folder / "Midpoint.fmu", fmu, described(lambda text: text.replace('name="x"', 'name="y"'))
     )
-    os.utime(fmu, ns=(0, 1))  # however coarse the clock of the files is
+    os.utime(fmu, ns=(0, 1))  # for file systems with coarse time stamps
     assert "y" in [variable.name for variable in read_description(fmu).modelVariables]
 
 
@@ -365,7 +365,7 @@ def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, external_fmu_folde
 @pytest.mark.parametrize("values", [(1.0, 2.0), (1e308, -1e308)])
 @pytest.mark.parametrize("exchange", [False, True])
 def test_results_that_never_agree_are_kept_with_their_difference(exchange, values):
-    """A made-up FMU whose output is another in every second pass."""
+    """A synthetic FMU with a different output in every second run."""
     passes = []
 
     def run(h, tolerance):

@@ -1,4 +1,4 @@
-"""What an FMU of anyone answers that cannot be is refused in a sentence, and no number comes of it."""
+"""Impossible results of an FMU are refused in one sentence, and never used."""
 
 import re
 from types import SimpleNamespace
@@ -18,7 +18,7 @@ NAN, HUGE = float("nan"), 1e300
 
 
 def stepped(answer):
-    """The times that are sampled of an FMU whose fmi3DoStep answers so, and what was raised."""
+    """Return the sample times of an FMU whose fmi3DoStep returns `answer`, and the exception."""
     times = []
     with pytest.raises((TerminatedError, HarnessError)) as caught:
         cosimulate(SimpleNamespace(doStep=answer), "3.0", TimeGrid(0.0, 1.0, 0.25), times.append, lambda share: None)

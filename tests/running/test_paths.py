@@ -1,4 +1,4 @@
-"""The harness runs wherever it is: no letter of a path, and nothing that an FMU lacks, makes it crash."""
+"""The harness works in any folder: neither special characters in a path nor missing files in an FMU make it crash."""
 
 import re
 import tempfile
@@ -19,7 +19,7 @@ ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
 
 @pytest.fixture
 def odd(tmp_path, fmus):
-    """A user's folder with every letter that has a meaning somewhere in its path, the built FMUs in it."""
+    """A user's folder with the built FMUs, whose path contains every special character."""
     folder = tmp_path / ODD
     folder.mkdir()
     (folder / "fmus").symlink_to(fmus)
@@ -83,7 +83,7 @@ def test_a_plain_path_is_one_whose_uri_escapes_only_blanks(path, expected):
 
 
 def without(fmu, copy, left_out):
-    """A copy of an FMU without some of its files."""
+    """Return a copy of an FMU without some of its files."""
     with ZipFile(fmu) as whole, ZipFile(copy, "w") as part:
         for name in whole.namelist():
             if not left_out(name):

@@ -1,4 +1,4 @@
-"""Which of several contacts hold: random loads, on the sources as they stand on arrays."""
+"""Which of several contacts stick: random loads, on the vector sources with numpy arrays."""
 
 from itertools import permutations, product
 
@@ -12,7 +12,7 @@ from fmus.runtime.rounding import ROUNDOFF_MARGIN
 
 
 class Chain(CoupledFriction):
-    """n contacts at rest: each body on the ground, or each on the one before; slips accelerate with b - A F."""
+    """n contacts at rest: each body on the ground, or each on the previous one; slips accelerate with b - A F."""
 
     def __init__(self, draw, n, jump, shared):
         bodies = np.eye(n) - (np.eye(n, k=-1) if shared else 0.0)
@@ -23,7 +23,7 @@ class Chain(CoupledFriction):
         self.b_rate = np.zeros(n)
 
     def ordered(self, order):
-        """The same problem, declared in another order."""
+        """Return the same problem with another order of contacts."""
         other = object.__new__(Chain)
         other.A, other.n = self.A[np.ix_(order, order)], self.n
         for name in ("b", "slide", "limit", "b_rate"):
@@ -43,13 +43,13 @@ class Chain(CoupledFriction):
         return rate, np.zeros(self.n), *pulls
 
     def answer(self):
-        """The modes, beginning with all contacts stuck, and whether they fit."""
+        """Return the modes, found from all contacts stuck, and whether they are consistent."""
         vectors.contact_indices[:] = range(self.n)
         modes, fits = self.solve_modes(0.0, None, np.zeros(self.n), np.full(self.n, AT_REST), ROUNDOFF_MARGIN)
         return tuple(map(int, modes)), fits
 
     def fits(self, modes):
-        """What is stuck bears no more than it holds, and what slips is not drawn back."""
+        """Return whether no stuck contact exceeds its limit and no slipping contact is pulled back."""
         force, pull = self.solved(modes, self.b, self.slide), self.b - self.A @ self.solved(modes, self.b, self.slide)
         stuck = np.array(modes) == STUCK
         return np.all(np.where(stuck, np.abs(force) <= self.limit * (1 + 1e-12), modes * pull >= -1e-12))
@@ -60,7 +60,7 @@ PROBLEMS = [(n, jump, shared) for n in (1, 2, 3, 4, 6) for jump in (1.0, 1.3, 2.
 
 @pytest.mark.parametrize(("n", "jump", "shared"), PROBLEMS)
 def test_consistent_modes_are_found_for_any_order_of_contacts(n, jump, shared):
-    """If static and sliding friction are the same there is one answer; else what can be held is held."""
+    """If static and sliding friction are equal, the solution is unique; otherwise every contact that can stick does."""
     draw = np.random.default_rng([n, round(10 * jump), shared])
     for _ in range(24 if n < 6 else 8):
         chain = Chain(draw, n, jump, shared)
@@ -75,7 +75,7 @@ def test_consistent_modes_are_found_for_any_order_of_contacts(n, jump, shared):
 
 
 def test_sequential_updates_reach_the_same_modes(monkeypatch):
-    """Where it ends soon: as many rounds as there are."""
+    """In cases that take as many iterations as there are contacts."""
     draw, found = np.random.default_rng(7), 0
     for _ in range(100):
         chain = Chain(draw, 4, 1.0, True)
@@ -89,7 +89,7 @@ def test_sequential_updates_reach_the_same_modes(monkeypatch):
 
 @pytest.mark.parametrize("rate", [-1.0, 0.0, 1.0])
 def test_a_load_at_the_limit_breaks_away_if_it_grows_and_sticks_otherwise(rate):
-    """Two bodies, one upon the other: both contacts are at their limits at once, but for a rounding."""
+    """Two stacked bodies: both contacts are at their limits at once, except for rounding."""
     draw = np.random.default_rng(5)
     for _ in range(200):
         chain = Chain(draw, 2, 1.0, True)

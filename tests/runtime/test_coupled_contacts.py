@@ -1,5 +1,5 @@
-"""Contacts that share bodies: events at one time, in any order of declaration; loads that peak inside a step; what is
-conserved."""
+"""Contacts that share bodies: simultaneous events, order of declaration, loads that peak inside a step, conservation
+laws."""
 
 from math import asin
 
@@ -27,8 +27,7 @@ class Mine(Model):
 
 @pytest.fixture(scope="module")
 def mine(tmp_path_factory):
-    """mine(body): a model whose class goes on with these lines, written out with some methods, or all; of the same
-    lines once."""
+    """Return mine(body): the model whose class has these additional lines, lowered with some or all methods, once."""
     path = tmp_path_factory.mktemp("mine") / "mine.py"
 
     def make(*body, methods=()):
@@ -40,7 +39,7 @@ def mine(tmp_path_factory):
 
 
 def body(name, force, mass):
-    """The lines that declare position and speed of a body, and that of its acceleration."""
+    """Return the declarations of position, speed and acceleration of a body."""
     return [
         f'x{name} = State("m", "position of {name}")',
         f'v{name} = State("m/s", "speed of {name}", rate_of=x{name})',
@@ -58,7 +57,7 @@ DRIVER = 'p = State("m", "driver", rate=u)'
 
 
 def events(model, method, rtol, stop):
-    """Time and modes at the end of each step that an event ends, and all ends of steps with their states and modes."""
+    """Return time and modes at each step that ends with an event, and all step ends with their states and modes."""
     prepared_model(model, {"solver.method": method, "solver.rtol": rtol, "solver.atol": 1e-3 * rtol}, stop)
     start(model, model.initial_state(0.0), stop)
     step, found, rows = model.solver.step, [], []
@@ -91,7 +90,8 @@ def test_two_riders_on_one_carrier_break_away_and_stop_together(mine):
 
 
 def test_the_order_of_declaration_does_not_matter(mine):
-    """Three blocks upon each other, driven from both sides: at first all bear the same, and may hold as much."""
+    """Three stacked blocks, driven from both sides: at first all contacts carry the same load and have the same
+    limit."""
     laws = {"1": "F2 - F1 - k * x1", "2": "F3 - F2", "3": "k * (p - x3) - F3"}
     contacts = {"1": ("v1", 10.0, 14.0), "2": ("v2 - v1", 10.0, 14.0), "3": ("v3 - v2", 8.0, 14.0)}
     models = []
@@ -116,8 +116,8 @@ STEPS = [(DOP853, 1e-3), (DOP853, 1e-6), (DOP853, 1e-9), (ODE45, 1e-4), (ODE23, 
 
 @pytest.mark.parametrize(("method", "rtol"), STEPS)
 def test_a_load_that_peaks_inside_a_step_is_detected(mine, method, rtol):
-    """A free mass shakes a block that friction holds, by up to 10 N: 10 % to 0.01 % more than it holds, or to what the
-    method knows."""
+    """A free mass shakes a block held by friction with up to 10 N: 10 % to 0.01 % above the limit, or as far as the
+    method resolves it."""
     (free, a), (held, b) = body("1", "-k * (x1 - x2)", 1.0), body("2", "k * (x1 - x2) - F2", 5.0)
     hold = 'most = Parameter(9.0, "N", "what is held", above=0.0)'
     free[1] = free[1].replace('"speed of 1"', '"speed of 1", start=1.0')
@@ -138,7 +138,7 @@ GAUSS = np.polynomial.legendre.leggauss(8)
 
 
 def integrated(model, power, stop):
-    """The integral of what `power` makes of each state and the forces there, over all steps of a run."""
+    """Return the integral of `power`, a function of states and forces, over all steps of a run."""
     prepared_model(
         model, {"solver.method": DOP853, "solver.rtol": 1e-12, "solver.atol": 1e-15, "solver.h_max": 0.02}, stop
     )
@@ -157,7 +157,7 @@ def integrated(model, power, stop):
 
 
 def test_a_clutch_conserves_momentum_and_dissipates_the_slip_power():
-    """Over its engagement as well: what the torques bring, and what friction takes."""
+    """Also while it engages: the work of the torques, and the loss by friction."""
 
     def power(t, y, forces):
         a, b = y
@@ -179,7 +179,7 @@ def test_stacked_blocks_balance_work_and_dissipation():
 
 
 def test_a_stuck_contact_keeps_zero_slip():
-    """The slip of a stuck contact is zero to the last bit at the end of every step."""
+    """The slip of a stuck contact is exactly zero at the end of every step."""
     for name in ("belt", "clutch", "sleds", "blocks"):
         model = lowered_model(FILES[name])()
         _, rows = events(model, DOP853, 1e-9, model.stop_time)
@@ -192,7 +192,7 @@ def test_a_stuck_contact_keeps_zero_slip():
 
 
 def test_several_drivers_each_pull_at_their_own_speed(mine):
-    """A mass between two of them; the second starts elsewhere, and its speed is an expression."""
+    """A mass between two drivers; the second starts at another position, and its speed is an expression."""
     another = 'q = State("m", "another", start=0.3, rate=0.5 * u)'
     (one, a) = body("1", "k * (p - x1) + k * (q - x1)", 1.0)
     model = mine(*one, DRIVER, another, a, methods=["dop853"])
@@ -216,8 +216,8 @@ LAWS = {
 
 @pytest.mark.parametrize("law", LAWS)
 def test_laws_without_modes_depend_on_each_slip(mine, law):
-    """The rates, outputs and Jacobian are those of the modes that the slips tell; held by threshold is no more than
-    the limit."""
+    """Rates, outputs and Jacobian are those of the modes given by the slips; the threshold law holds at most the
+    limit."""
     words, told = LAWS[law]
     (one, a), (two, b) = body("1", "F2 - F1 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
     both = [line.replace("hold=", f"{words}, hold=") for line in contact("1", "v1", 9.0, 12.0)]
@@ -251,7 +251,7 @@ def test_laws_without_modes_depend_on_each_slip(mine, law):
 
 @pytest.mark.parametrize("bodies", [1, 2])
 def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(mine, bodies):
-    """As differences of the rates have it, on the limit and below: rodas takes few steps by that."""
+    """It agrees with differences of the rates, on the limit and below, so that rodas takes few steps."""
     (one, a), (two, b) = body("1", "k * (p - x1) - F1" + " + F2" * (bodies - 1), 1.0), body("2", "-F2 - k * x2", 1.0)
     both = contact("1", "v1", "f + w * x1", "1.5 * f + 2.0 * w * x1") + contact("2", "v2 - v1", "f", "2.0 * f")
     declared = ['f = Parameter(6.0, "N", "friction")', 'w = Parameter(40.0, "N/m", "how it grows")', DRIVER, *one]

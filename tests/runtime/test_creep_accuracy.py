@@ -1,4 +1,4 @@
-"""The sharper the friction curve, the slower the creep: the tolerance goes along with it."""
+"""The sharper the friction curve, the slower the creep; the tolerance follows."""
 
 import pytest
 from models import outputs
@@ -8,7 +8,7 @@ STOP = 16.0
 
 @pytest.mark.parametrize("x_m", [1e-3, 1e-4, 1e-5, 1e-6])
 def test_a_sharp_friction_curve_costs_no_digits(launch, x_m):
-    """By default within 1e-6 of the same run at a tight tolerance that leaves the creep its digits."""
+    """By default within 1e-6 of a run at a tight tolerance that resolves the creep."""
     times = [STOP * i / 400 for i in range(401)]
     tight = {"solver.rtol": 1e-10, "solver.atol": 1e-13 * x_m}
     runs = [

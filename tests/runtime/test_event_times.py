@@ -1,4 +1,4 @@
-"""The rounding of one event does not add to that of the others: the last of 300 000 is where the closed form has it."""
+"""Rounding errors of events do not accumulate: the last of 300 000 agrees with the closed form."""
 
 from math import ulp
 
@@ -10,7 +10,7 @@ PLACES = 4  # units in the last place of the time
 
 
 def late(fmu, values, start, stop):
-    """The FMU at the time stop, in a few communication steps."""
+    """Return the FMU at the time stop, after a few communication steps."""
     fmu.begin(values, start=start)
     times = [start + (stop - start) * i / 10 for i in range(10)] + [stop]
     return fmu.run(times, ["events.count", "events.t_last", "x"])[-1]
@@ -21,7 +21,7 @@ def close(t, true):
 
 
 LITTLE, LESS, OTHER = 1e-6, 1e-7, {"m": 0.7, "k": 1233.1}
-SWINGS = [  # every two of friction, values and backend_fmus meet in one
+SWINGS = [  # covers every pair of friction, values and backend
     (LITTLE, {}, "native"),
     (LITTLE, OTHER, "python"),
     (LESS, {}, "python"),
@@ -50,7 +50,7 @@ def test_half_cycles_of_a_mass_with_little_friction_end_on_time(worker, backend_
 SLEDS = {"default": {}, "to the other limit": {"mu_d": 0.0}, "backward": {"mu_s": 0.7, "mu_d": 0.3, "v_driver": -0.5}}
 
 
-RUNS = [  # every two of sled, start and backend_fmus meet in one
+RUNS = [  # covers every pair of sled, start and backend
     ("default", 0.0, "python"),
     ("default", -77.7, "native"),
     ("to the other limit", 0.0, "native"),
@@ -63,7 +63,8 @@ RUNS = [  # every two of sled, start and backend_fmus meet in one
 @pytest.mark.parametrize(("sled", "start", "backend_fmus"), RUNS, indirect=["backend_fmus"])
 def test_slips_of_the_sled_end_on_time(worker, backend_fmus, sled, start):
     """It sticks while the spring is stretched from d - (h - d) to h, and slips through the angle 2 (pi - phi) with
-    tan(phi) = w (h - d)/u, where h and d are the stretches that friction holds, and that it slides at."""
+    tan(phi) = w (h - d)/u, where h and d are the stretches at the static limit and at sliding friction.
+    """
     with workdps(DIGITS):
         number = 100_000
         given = {"m": 12.5, "k": 742.5, "g": 9.81, "mu_s": 0.9, "mu_d": 0.6, "v_driver": 0.034, **SLEDS[sled]}

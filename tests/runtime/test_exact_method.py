@@ -11,11 +11,14 @@ import pytest
 from independent_solution import ClosedFormMotion
 from models import EXACT
 
-PLACES, EVENTS = 1e-13, 1e-14  # relative: to the largest value of the run; to the time of the event or of the start
+PLACES, EVENTS = (
+    1e-13,
+    1e-14,
+)  # relative to the largest value of the run; relative to the time of the event or of the start
 
 
 def compare(launch, name, values, x0=0.0, v0=0.0, start=0.0, run=4.0, points=100):
-    """Run the FMU and the evidence side by side: motion, and changes of mode."""
+    """Compare motion and mode changes of the FMU with the independent solution."""
     stop = start + run
     motion = ClosedFormMotion([(start, getattr(independent_solution, name)(**values))], x0, v0, stop)
     fmu = launch(name, {"solver.method": EXACT, **values, "x0": x0, "v0": v0}, start=start, stop=stop)
@@ -79,7 +82,7 @@ def test_the_sled_agrees_when_pulled_either_way_from_any_start(launch):
 
 
 def test_the_sled_agrees_when_static_and_sliding_friction_are_equal(launch):
-    """It breaks away without a jump and then only touches the speed zero, which is no stop."""
+    """It breaks away without a jump and then only touches zero speed, which is no stop."""
     compare(launch, "stickslip", {"mu_s": 0.6}, run=16.0)
 
 

@@ -1,4 +1,4 @@
-"""The solver runs free: communication points, looks ahead and repeated settings leave no trace in the solution."""
+"""The solver steps freely: communication points, looks ahead and repeated settings do not change the solution."""
 
 import random
 from math import cos, inf, nextafter, sin
@@ -7,19 +7,19 @@ import pytest
 from models import CASES, EXACT, counts, declared, label, outputs, parameters, push, tunable
 from row_comparison import assert_close, assert_identical
 
-CHATTER = 1e-6  # m/s: below it the threshold law calls the mass stuck
+CHATTER = 1e-6  # m/s: at smaller speeds the threshold law treats the mass as stuck
 SLED = [case for case in CASES if "x_driver" in outputs(case[0])]
 
 
 @pytest.fixture(scope="module")
 def found():
-    """What following each case has shown."""
+    """Cache of the results of `following`."""
     return {}
 
 
 @pytest.fixture
 def following(launch, found):
-    """following(case): the ends of all internal steps, with the counts and the sizes of steps there."""
+    """Return following(case): the ends of all internal steps, with counters and step sizes."""
 
     def following(case):
         name, values, stop = case
@@ -144,7 +144,7 @@ def test_a_step_ending_within_rounding_of_an_event_ends_at_it(launch, case):
 
 @pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction", 1) == 1], ids=label)
 def test_a_later_start_time_only_shifts_the_motion(launch, case):
-    """Laws that chatter are left out: there rounding of the time decides."""
+    """Without laws that chatter, where rounding of the time decides."""
     name, values, stop = case
     names = outputs(name)[:2]
     times = [stop * i / 80 for i in range(81)]
@@ -181,7 +181,7 @@ def test_a_run_without_stop_time_continues(launch, case):
 
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_outputs_satisfy_force_and_energy_balance(launch, case):
-    """The forces make the acceleration and the energy is of the state, at every point: also before the first step."""
+    """Forces give the acceleration, and the energy is that of the state, at every point, including the start."""
     name, values, stop = case
     force, size = push(name)
     fmu = launch(name, {**values, force: size / 50}, stop=stop)

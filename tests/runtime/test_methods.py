@@ -1,4 +1,4 @@
-"""The integration methods of the runtime, one step at a time: every claim is checked on every method it is made for."""
+"""The integration methods of the runtime, one step at a time: every claim is checked for every method that makes it."""
 
 from itertools import pairwise
 from math import cos, exp, fabs, isnan, log2, nan, sin, sqrt
@@ -10,16 +10,16 @@ from models import MODELS, ROOT, combinations, model_class, runtime
 
 from fmus.runtime import method_registry
 
-# the order of a method, the order of its interpolant, and a step in the range where halving shows them
+# order of the method, order of its interpolant, and a step size at which halving shows them
 METHODS = {"ode23": (3, 3, 0.05), "ode45": (5, 4, 0.1), "dop853": (8, 7, 0.25), "rodas": (4, 3, 0.05)}
-TWO_STATES = "smd"  # for which the methods are written out here
+TWO_STATES = "smd"  # for which the methods are lowered here
 PEERS = {"ode23": "RK23", "ode45": "RK45", "dop853": "DOP853"}
 
 every_method = pytest.mark.parametrize("name", METHODS)
 
 
 class Motion:
-    """A model whose solution is known: x = sin(w t), forced and with nonlinear spring and damper."""
+    """A model with a known solution: x = sin(w t), forced, with nonlinear spring and damper."""
 
     w = 1.3
 
@@ -36,7 +36,7 @@ class Motion:
 
 
 class Linear:
-    """x'' = rate t^power + spring x + damper v, and a record of where its right-hand side was asked for."""
+    """x'' = rate t^power + spring x + damper v, with a record of the evaluations of its right-hand side."""
 
     def __init__(self, rate=0.0, power=1, spring=0.0, damper=0.0):
         self.rate, self.power, self.spring, self.damper = rate, power, spring, damper
@@ -51,7 +51,7 @@ class Linear:
 
 
 class Solver:
-    """A method with its numbers, and one step of it."""
+    """A method with its coefficients, for a single step."""
 
     def __init__(self, name):
         self.numbers = runtime(TWO_STATES, name)
@@ -60,7 +60,7 @@ class Solver:
         self.inside = None
 
     def step(self, model, t, x, v, h):
-        """New x, v and acceleration, and the rates of the error; the interpolant is ready."""
+        """Take a step; return the new x, v and acceleration, and the error estimates. The interpolant is ready."""
         a = model.rates(t, x, v)
         new = self.method.propose(model, t, x, v, a, h)
         step = runtime(TWO_STATES, "step_control").InternalStep()
@@ -77,7 +77,7 @@ def solver(name):
 
 
 def falls_with(power, error, h):
-    """Whether error(h) falls as that power of h, seen by halving; the term after it may still be felt."""
+    """Return whether error(h) falls with that power of h when h is halved, allowing for the next term."""
     return power - 0.5 < log2(error(h) / error(0.5 * h)) < power + 1.0
 
 
@@ -214,11 +214,11 @@ def test_a_step_its_interpolant_and_its_error_estimate_agree_with_scipy(solver, 
         assert solver.inside.evaluate(t) == pytest.approx(tuple(peer.dense_output()(0.3 + t)), abs=1e-13)
 
 
-# ---- rodas: what a stiff method must have on top
+# ---- rodas: additional properties of a stiff method
 
 
 def speed_after_one(damper, h=1.0):
-    """What is left of a speed of 1 after one step of v' = -damper v."""
+    """Return the speed after one step of v' = -damper v from 1."""
     return fabs(Solver("rodas").step(Linear(damper=-damper), 0.0, 0.0, 1.0, h)[1])
 
 
@@ -249,14 +249,15 @@ def test_rodas_is_accurate_on_a_slow_motion_however_stiff():
 
 
 def test_rodas_is_stiffly_accurate():
-    """The last stage is the new point less the estimated error."""
+    """The last stage is the new point minus the estimated error."""
     model, h = Linear(0.4, 2, -3.0, -50.0), 0.1
     x, v, _, e_x, e_v = Solver("rodas").step(model, 0.0, 0.3, 0.2, h)
     assert model.calls[-2] == pytest.approx((h, x - h * e_x, v - h * e_v), abs=1e-13)
 
 
 def test_rodas_meets_the_conditions_of_order_four_with_an_error_estimate_of_order_three():
-    """In the notation of E. Hairer and G. Wanner, IV.7: alpha and beta from the numbers of the transformed form."""
+    """In the notation of E. Hairer and G. Wanner, IV.7: alpha and beta from the coefficients of the transformed
+    form."""
     numbers = Solver("rodas").numbers
 
     def row(letter, i):

@@ -1,4 +1,4 @@
-"""Where modes meet: a load equal to the limit, a break-away without a jump, a reversal shorter than a step."""
+"""Limits between modes: a load equal to the limit, a breakaway without a jump, a reversal shorter than a step."""
 
 import random
 from math import acos, cos, pi, sin, sqrt
@@ -9,7 +9,7 @@ from worker_client import FmiError
 
 DRY = [case for case in CASES if case[1].get("friction") == HYBRID]
 SLED = [case for case in DRY if case[0] == "stickslip"]
-EVEN = {  # binary fractions, so that load and limit are the same numbers
+EVEN = {  # binary fractions, so that load and limit are equal
     "coulomb": ({"f": 0.5, "k": 64.0}, "F_ext", 0.5),
     "stickslip": ({"mu_s": 0.5, "mu_d": 0.25, "m": 2.0, "g": 8.0, "v_driver": 0.0}, "F_ext", 8.0),
     "pendulum": ({"mu": 0.5, "r": 0.25, "m": 2.0, "g": 8.0, "J_G": 1.0}, "T_ext", 2.0),
@@ -32,7 +32,7 @@ def test_a_constant_load_sticks_at_the_limit_and_slips_beyond_it(launch, case):
 
 @pytest.mark.parametrize("case", SLED, ids=label)
 def test_a_breakaway_without_a_force_jump_is_one_event_in_its_direction(launch, case):
-    """mu_s = mu_d: v = v_driver (1 - cos(omega t)) from the break-away on, which rounding must not turn back."""
+    """mu_s = mu_d: v = v_driver (1 - cos(omega t)) from breakaway on, which rounding must not reverse."""
     name, choices, _ = case
     draw = random.Random(3).uniform
     for _ in range(20):
@@ -52,13 +52,13 @@ def test_a_breakaway_without_a_force_jump_is_one_event_in_its_direction(launch, 
 
 @pytest.mark.parametrize("case", SLED, ids=label)
 def test_a_reversal_shorter_than_a_step_is_located_at_its_start(launch, case):
-    """A slide that swings about the driver's speed by a little more than that dips below zero, and sticks there."""
+    """A slip whose speed oscillates about the driver's by slightly more than it drops below zero, and sticks there."""
     name, choices, _ = case
     m, k, g, mu_d, v_driver = 4.0, 100.0, 10.0, 0.3, 0.1
     omega, draw = sqrt(k / m), random.Random(5)
     for _ in range(20):
         swing = v_driver * (1.0 + 10.0 ** draw.uniform(-4.0, -1.0))
-        phase = draw.uniform(0.0, 0.9 * pi)  # where the run begins: v = v_driver + swing cos(phase + omega t)
+        phase = draw.uniform(0.0, 0.9 * pi)  # start of the run: v = v_driver + swing cos(phase + omega t)
         values = {"m": m, "k": k, "g": g, "mu_s": 0.9, "mu_d": mu_d, "v_driver": v_driver, "solver.rtol": 1e-8}
         x0, v0 = swing / omega * sin(phase) - mu_d * m * g / k, v_driver + swing * cos(phase)
         end = (acos(-v_driver / swing) - phase) / omega
@@ -72,7 +72,7 @@ def test_a_reversal_shorter_than_a_step_is_located_at_its_start(launch, case):
 
 
 def test_a_pin_that_could_stop_the_pendulum_instantly_is_refused(launch):
-    """mu r m a = J_G + m a^2 to the bit, and the next number below."""
+    """mu r m a = J_G + m a^2 to the bit, and the next smaller number."""
     values = {"m": 1.0, "a": 1.0, "J_G": 0.0, "r": 1.0, "pin_load": 2, "theta0": 0.5}
     fmu = launch("pendulum", {**values, "mu": 1.0})
     with pytest.raises(FmiError):

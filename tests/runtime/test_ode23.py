@@ -1,4 +1,4 @@
-"""ode23 in the built FMUs: the published counts and peaks, and its errors against closed form."""
+"""ode23 in the built FMUs: the published step counts and peaks, and its errors against the closed form."""
 
 import itertools
 
@@ -19,13 +19,13 @@ def follow(launch, name, values, stop, names=("x",)):
 
 
 def mean_step(times):
-    """As published: the last difference counts twice."""
+    """Return the mean step as published: the last difference counts twice."""
     steps = [b - a for a, b in itertools.pairwise(times)]
     return (sum(steps) + steps[-1]) / (len(steps) + 1)
 
 
 def highs(rows):
-    """Largest values among their neighbours, of the first column."""
+    """Return the local maxima of the first column."""
     x = [row[0] for row in rows]
     return [b for a, b, c in zip(x, x[1:], x[2:], strict=False) if a < b >= c]
 
@@ -42,7 +42,9 @@ def test_coulomb_with_the_sign_law_takes_422_points(launch):
     times, rows = follow(launch, "coulomb", {"friction": SIGN}, 4.0)
     assert len(times) == pytest.approx(422, abs=2)
     peaks = highs(rows)
-    assert (peaks[0], peaks[3]) == pytest.approx((0.08703, 0.04837), abs=1e-5)  # 0.048379: published cut, not rounded
+    assert (peaks[0], peaks[3]) == pytest.approx(
+        (0.08703, 0.04837), abs=1e-5
+    )  # 0.048379: the published value is truncated, not rounded
 
 
 def test_pacejka_takes_6666_points_and_ten_times_as_many_at_a_tenth_of_x_m(launch):
@@ -55,14 +57,14 @@ def test_pacejka_takes_6666_points_and_ten_times_as_many_at_a_tenth_of_x_m(launc
 
 def test_the_threshold_law_chatters_and_shows_the_published_slips(launch):
     times, rows = follow(launch, "stickslip", {"friction": THRESHOLD}, 16.0, ("v", "a"))
-    assert 5000 < len(times) < 20000  # rounding decides; 10972 published
+    assert 5000 < len(times) < 20000  # depends on rounding; 10972 published
     assert max(v for v, _ in rows) == pytest.approx(0.42, abs=0.005)
     assert max(a for v, a in rows if v > 0.01) == pytest.approx(2.95, abs=0.02)
 
 
 @pytest.mark.parametrize(("name", "values"), [("smd", {}), ("coulomb", {}), ("coulomb", {"c": 2.0}), ("stickslip", {})])
 def test_a_tighter_tolerance_comes_closer_to_the_closed_form(launch, name, values):
-    """Located events keep the method's order: the error falls with the tolerance, and is of its size."""
+    """Event location keeps the order of the method: the error falls with the tolerance and is of its size."""
     stop, x0 = (16.0, 0.0) if name == "stickslip" else (4.0, 0.1)
     motion = ClosedFormMotion([(0.0, getattr(independent_solution, name)(**values))], x0, 0.0, stop)
     times = [stop * i / 40 for i in range(41)]
@@ -81,7 +83,8 @@ def test_a_tighter_tolerance_comes_closer_to_the_closed_form(launch, name, value
 
 
 def test_counters_count_the_work_done(launch):
-    """Three right-hand sides a step, accepted or refused (first same as last); two more to begin, one at each event."""
+    """Three right-hand sides per step, accepted or rejected (first same as last); two more at the start, one at each
+    event."""
     for name, law in (("smd", {}), ("coulomb", {"friction": SIGN}), ("pacejka", {})):
         fmu = launch(name, {**MATLAB, **law}, stop=4.0)
         fmu.run([0.0, 4.0], [])
@@ -94,7 +97,7 @@ def test_the_pendulum_agrees_with_its_independent_solution(launch, load):
     cases = [
         ({}, independent_pendulum.THETA0, 0.0, 1e-7),
         ({"mu": 0.3, "T_ext": 0.03}, -1.0, 2.0, 1e-6),
-        ({"mu": 0.02, "a": 0.05, "g": 9.81}, 3.0, 4.0, 1e-5),  # over the top, almost at rest there
+        ({"mu": 0.02, "a": 0.05, "g": 9.81}, 3.0, 4.0, 1e-5),  # over the top, where it almost stops
     ]
     for values, theta0, omega0, bound in cases:
         swing = independent_pendulum.PendulumMotion(

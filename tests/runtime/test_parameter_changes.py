@@ -1,4 +1,4 @@
-"""Inputs and tunable parameters that change in mid-run, against closed forms restarted there."""
+"""Inputs and tunable parameters that change during a run, against closed forms restarted there."""
 
 import random
 
@@ -33,7 +33,7 @@ SCENES = {
 
 
 def spans(make, values, changes):
-    """(time, parameters) of every span between changes."""
+    """Return (time, parameters) of every span between changes."""
     found = [(0.0, make(**values))]
     for t in sorted(changes):
         values = {**values, **changes[t]}
@@ -42,7 +42,8 @@ def spans(make, values, changes):
 
 
 def against_evidence(launch, name, values, changes, solvers):
-    """Run a scene with each of `solvers`, (settings, bound relative to the largest value)."""
+    """Compare a run with each of `solvers`, (settings, bound relative to the largest value), with the independent
+    solution."""
     x0, stop = (0.0, 16.0) if name == "stickslip" else (0.1, 4.0)
     motion = ClosedFormMotion(spans(getattr(independent_solution, name), values, changes), x0, 0.0, stop)
     times = sorted({stop * i / 80 for i in range(81)} | set(changes))
@@ -68,7 +69,7 @@ def test_a_changed_value_acts_from_its_communication_point_on(launch, scene):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_sled_with_randomly_changing_values_agrees_with_the_closed_form(launch, seed):
-    """14 changes in 16 s: each rounds its time, so the bound is three times that of a free run."""
+    """14 changes in 16 s: each rounds its time, so that the bound is three times that of a free run."""
     draw = random.Random(seed).uniform
     ranges = {"m": (5, 30), "k": (200, 2000), "mu_s": (0.7, 1.1), "mu_d": (0.2, 0.65), "v_driver": (-0.3, 0.3)}
     ranges["F_ext"] = (-60, 60)

@@ -1,16 +1,15 @@
-"""Values set one after the other at one point are values set at once, whatever is read in between."""
+"""Successive settings at one time act like one setting, even if values are read in between."""
 
 import pytest
 from models import CASES, counts, label, outputs, push
 from row_comparison import assert_identical
 
-WHERE = (0.0, 0.13, 0.5, 0.77)  # of the run
+WHERE = (0.0, 0.13, 0.5, 0.77)  # fraction of the run
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_two_settings_at_one_point_act_as_one(launch, case):
-    """The first sets the body in motion, the other way or out of its rest; the second takes that back.  All begin at
-    the state that was saved there."""
+    """The first setting starts the body, or reverses it; the second undoes that. All begin at the state saved there."""
     name, values, stop = case
     names = outputs(name) + counts(name)
     force, size = push(name)

@@ -1,4 +1,4 @@
-"""The runtime from inside: the rules of its numerics, events to the last bit, and what a host must never see."""
+"""The runtime from inside: rules of the numerics, event times to the last bit, and error handling."""
 
 import ast
 import random
@@ -50,7 +50,7 @@ def functions(tree):
 
 
 def inside(function):
-    """Every node of the body, but for the docstring."""
+    """Yield every node of the body except the docstring."""
     body = function.body[1:] if ast.get_docstring(function) else function.body
     return [node for statement in body for node in ast.walk(statement)]
 
@@ -86,7 +86,7 @@ def test_every_while_loop_is_bounded_by_a_counter(name):
 
 
 def slave(name, values=None, stop=4.0):
-    """A slave in this process, past initialisation."""
+    """Return a slave in this process, after initialisation."""
     made = runtime(name, "slave").make_slave_class(model_class(name))(instance_name="inside")
     for reference, (variable, declaration) in enumerate(variables(made.model)):
         if variable in (values or {}):
@@ -99,7 +99,7 @@ def slave(name, values=None, stop=4.0):
 
 
 def read(made, *names):
-    """Values of Reals and Integers by name."""
+    """Return values of Reals and Integers by name."""
     references = {v: i for i, (v, _) in enumerate(variables(made.model))}
     kinds = dict(variables(made.model))
     return [
@@ -108,7 +108,7 @@ def read(made, *names):
 
 
 def shape(thing, path, seen):
-    """Path and type of every number an object holds; it must own all its objects alone."""
+    """Return path and type of every number in an object, which must own all its objects alone."""
     assert id(thing) not in seen, f"{path} is owned twice"
     seen.add(id(thing))
     found = {}
@@ -126,7 +126,7 @@ def shape(thing, path, seen):
 
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_attributes_are_created_in_init_and_keep_their_type(case):
-    """So that a flat copy of the numbers is the whole state."""
+    """So that a flat copy of the numbers is the complete state."""
     name, values, stop = case
     made = slave(name, values, stop)
     born = shape(model_class(name)(), name, set())
@@ -148,7 +148,7 @@ def test_turning_points_are_located_to_the_last_bit(case):
         if event and not waiting:
             before, after = (step.state_at(made.model, s)[1] for s in (nextafter(ahead, 0.0), ahead))
             assert mode * before > 0.0
-            assert mode * after <= 0.0 or values["solver.method"] == 1  # the closed form knows its own last bit
+            assert mode * after <= 0.0 or values["solver.method"] == 1  # the closed form rounds independently
             turns += 1
         assert made.do_step(t, ahead - t)
         if event:
@@ -160,7 +160,7 @@ def test_turning_points_are_located_to_the_last_bit(case):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
-    """One sentence, then NaN."""
+    """One message, then NaN."""
     made = slave(name)
     assert made.do_step(0.0, 0.1)
 
@@ -192,7 +192,7 @@ def test_a_run_whose_initialisation_ends_twice_continues(name):
 
 
 def test_cached_reference_lists_are_bounded():
-    """Where an importer asks for others all the time: what reads them is kept for some."""
+    """If an importer always reads other lists, only some readers are cached."""
     made, draw = slave("stickslip"), random.Random(1)
     reals = [i for i, d in enumerate(declared("stickslip").values()) if d.type == "Real"]
 
@@ -209,7 +209,7 @@ def test_cached_reference_lists_are_bounded():
     ask(500)
     after, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert after - before < 200_000  # as much as those that are kept; 500 would take 650_000
+    assert after - before < 200_000  # the size of the cached ones; 500 would take 650_000
 
 
 def test_an_endless_run_is_stopped_with_a_message(monkeypatch, capfd):
@@ -221,19 +221,21 @@ def test_an_endless_run_is_stopped_with_a_message(monkeypatch, capfd):
 
 
 def test_the_cost_of_many_events_is_bounded(monkeypatch, capfd):
-    """A swing of the pendulum takes as many looks for its events as right-hand sides."""
+    """A swing of the pendulum takes as many event evaluations as right-hand sides."""
     integrator = runtime("pendulum", "integrator")
     monkeypatch.setattr(integrator, "MAX_EVALUATIONS", 20 * integrator.BATCH_STEPS)
     made = slave("pendulum", {"mu": 0.0}, stop=1e7)
     assert made.do_step(0.0, 1e7) is False
     assert "right-hand sides" in capfd.readouterr().err
     step = made.model.solver.step
-    assert step.n_accepted == 1 + 2 * integrator.BATCH_STEPS  # of twelve right-hand sides and some looks each
+    assert (
+        step.n_accepted == 1 + 2 * integrator.BATCH_STEPS
+    )  # with twelve right-hand sides and some event evaluations each
     assert step.interpolant.n_event_evals > 0
 
 
 def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
-    """At the tightest tolerances the sign law asks for steps below the rounding of the time."""
+    """At the tightest tolerances the sign law requires steps below the rounding of the time."""
     made = slave("coulomb", {"friction": SIGN, "solver.method": 2, "solver.rtol": 1e-15})
     assert made.do_step(0.0, 4.0) is False
     assert len(capfd.readouterr().err.splitlines()) == 1
@@ -242,7 +244,7 @@ def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_hot_objects_have_fewer_attributes_than_the_inline_limit_of_cpython(name, fmus):
-    """Thirty of them, and a step takes a tenth longer (3.11)."""
+    """With thirty attributes a step takes 10 % longer (Python 3.11)."""
     solver = load_model_class(fmus / f"{name}.fmu")().solver
     sizes = {type(each).__name__: len(vars(each)) for each in (solver, solver.step, solver.step.interpolant)}
     assert max(sizes.values()) < 30, sizes

@@ -11,7 +11,7 @@ from worker_client import FmiError
 
 
 def wander(fmu, name, t, stop):
-    """Leave the path: other forces, other steps, a look ahead."""
+    """Leave the trajectory: other forces, other steps, a look ahead."""
     force, size = push(name)
     fmu.set({force: size})
     fmu.run([t, t + (stop - t) / 50, t + (stop - t) / 15], [])
@@ -21,8 +21,8 @@ def wander(fmu, name, t, stop):
 
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
-    """At random points and at one of every mode; after a look ahead or not; in this, and in turn in another and in a
-    raw instance."""
+    """At random points and at one of every mode; after a look ahead or not; in this instance, another, and a fresh
+    one."""
     name, values, stop = case
     names = outputs(name) + counts(name) + ["solver.t_next"]
     draw = random.Random(label(case))

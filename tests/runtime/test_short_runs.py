@@ -1,4 +1,4 @@
-"""The closed form of a push from rest, at times so small that what it adds up cancels."""
+"""The closed form of a push from rest, at times so short that its terms cancel."""
 
 import pytest
 from independent_solution import smd as system
@@ -11,7 +11,7 @@ STEADY = 12.0  # rad/s
 @pytest.mark.parametrize("run", [1e-1, 1e-2, 1e-3, 1e-4, 1e-5])
 @pytest.mark.parametrize("zeta", [z for z in DAMPING if z >= 1.0])
 def test_a_push_from_rest_keeps_its_digits_in_any_short_run(launch, zeta, run):
-    """Overdamped: position and speed are within 1e-13 of themselves, not of what they may become."""
+    """Overdamped: position and speed are accurate to 1e-13 of their current values."""
     values = {"k": STEADY**2, "c": 2.0 * STEADY * zeta, "F_ext": 3.0}
     times = [run * i / 10 for i in range(11)]
     rows = launch("smd", {**values, "x0": 0.0, "v0": 0.0}, stop=run).run(times, ["x", "v"])

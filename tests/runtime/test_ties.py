@@ -1,7 +1,7 @@
-"""Ties are decided by physics: friction that just holds, a speed that only touches zero, nothing that could stop.
+"""Ties are decided by physics: friction that just holds, a speed that only touches zero, a motion that nothing stops.
 
-The values are small integers times powers of two, so that a load which should be the limit is just that, in the FMU's
-arithmetic and in the evidence's.
+The values are small integers times powers of two, so that a load that should equal the limit does so exactly, in the
+FMU and in the independent solution.
 """
 
 import random
@@ -18,12 +18,12 @@ from tests.runtime.test_exact_method import EVENTS, PLACES
 
 
 def number(draw, low, high):
-    """One that a few bits hold."""
+    """Return a random number with few significant bits."""
     return draw.choice([1, 3, 5, 7]) * 2.0 ** draw.randint(low, high)
 
 
 def sled(draw):
-    """Values of the sled that meet in at least one tie."""
+    """Return values of the sled with at least one tie."""
     k, weight = 2.0 ** draw.randint(4, 9), 10.0
     mu_s = number(draw, -4, -2)
     mu_d = draw.choice([mu_s, mu_s, 0.0, 0.0, 0.5 * mu_s])
@@ -39,7 +39,7 @@ def sled(draw):
 
 
 def mass(draw):
-    """Values of the mass with Coulomb friction whose last turning point is just the end of what friction holds."""
+    """Return values of the mass with Coulomb friction whose last turning point is exactly at the limit of stiction."""
     k, f = 2.0 ** draw.randint(4, 9), number(draw, -3, 1)
     push = draw.choice([0.0, 2.0, -f])
     rest = (push + draw.choice([-1, 1]) * (2 * draw.randint(0, 9) + 1) * f) / k
@@ -55,12 +55,12 @@ def case(name, seed):
 
 @pytest.fixture
 def pair(worker, fmus):
-    """The process that runs them, with the folder of the FMUs of each kind."""
+    """The process that runs the FMUs, and the folder of each backend."""
     return [(worker, fmus), (worker, build_native_fmus())]
 
 
 def answers(pair, name, values, start, stop, read):
-    """What both kinds say, which must be the same to the bit."""
+    """Return the results of both backends, which must agree bit for bit."""
     found = []
     for worker, folder in pair:
         fmu = worker.instantiate(folder / f"{name}.fmu")
@@ -71,7 +71,7 @@ def answers(pair, name, values, start, stop, read):
 
 
 def events(fmu, start, stop):
-    """Time and new mode of each change."""
+    """Return time and new mode of each change."""
     _, rows = fmu.follow(start, stop, ["events.count", "events.t_last", "mode"])
     seen = [(t, mode) for (before, *_), (after, t, mode) in pairwise(rows) if after > before]
     assert rows[-1][0] == len(seen)
@@ -100,7 +100,7 @@ FRICTIONLESS = ({"g": 0.0}, {"mu_s": 0.0, "mu_d": 0.0}, {"mu_s": 0.6}, {"mu_d": 
 
 
 STARTS = (0.0, -77.7, 1e5)
-TOUCHES = [  # every two of method, values and start meet in one
+TOUCHES = [  # covers every pair of method, values and start
     (method, values, STARTS[(i + j) % 3]) for i, method in enumerate(METHODS) for j, values in enumerate(FRICTIONLESS)
 ]
 
@@ -114,7 +114,8 @@ def test_a_speed_that_only_touches_zero_is_no_rest_and_no_event(pair, method, va
 
 
 def any_sled(draw):
-    """Values without friction or with as much when it slides, a start time, and the end of twenty touches."""
+    """Return values without friction or with equal friction while sliding, a start time, and the end of twenty
+    touches."""
     mu, friction = draw.uniform(0.05, 2.0), draw.choice(("none", "weightless", "equal"))
     values = {"m": 10.0 ** draw.uniform(-2.0, 3.0), "k": 10.0 ** draw.uniform(-1.0, 5.0), "g": draw.uniform(1.0, 30.0)}
     values |= dict.fromkeys(("mu_s", "mu_d"), 0.0 if friction == "none" else mu)
@@ -137,7 +138,7 @@ def test_speeds_that_touch_zero_continue_for_any_values(pair):
 
 
 def test_a_slide_that_touches_zero_sticks_where_static_friction_is_larger(pair):
-    """v = u (1 + 0.6 cos y + 0.8 sin y) with y = w t: whether rounding puts its least value above zero or below."""
+    """v = u (1 + 0.6 cos y + 0.8 sin y) with y = w t, whether rounding puts its minimum above or below zero."""
     draw, touch = random.Random(3), 3.141592653589793 + 0.9272952180016122
     for _ in range(60):
         m, k, u = draw.uniform(0.5, 20.0), draw.uniform(50.0, 900.0), draw.uniform(0.01, 0.5)
@@ -162,7 +163,7 @@ def test_a_slip_ending_at_the_opposite_limit_sticks_as_the_load_decreases(pair, 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_start_beyond_the_limit_slides_at_any_tolerance(pair, method):
-    """What is given has no error; a slide that came there would have."""
+    """A given start value has no error; a slip that arrives there would have one."""
     values = {"x0": 1.001 * 0.9 * 12.5 * 9.81 / 742.5, "solver.method": method, "solver.rtol": 1e-3}
     assert answers(pair, "stickslip", values, 0.0, 1.0, methodcaller("get", "mode")) == -1
 
@@ -181,7 +182,7 @@ def test_a_mass_slowed_only_by_a_damper_never_stops(pair, method, seed):
 
 @pytest.mark.parametrize("values", FRICTIONLESS, ids=str)
 def test_values_set_again_at_a_touch_cause_no_event(pair, values):
-    """The communication points fall beside and upon the touches; each sets an input anew, to another value and back."""
+    """Communication points fall near and on the touches; each sets an input to another value and back."""
     given = {"mu_s": 0.9, "g": 9.81, **values}
     first, period = given["mu_s"] * 12.5 * given["g"] / (742.5 * 0.034), 6.283185307179586 * (12.5 / 742.5) ** 0.5
 

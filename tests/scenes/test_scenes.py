@@ -1,4 +1,4 @@
-"""Scenes: what they may say, and what a wrong one is told."""
+"""Scene files: valid contents, and errors of invalid ones."""
 
 import pytest
 
@@ -12,7 +12,7 @@ GOOD = {"title": '"a title"', "model": '"stickslip"', "outputs": '["x", "v", "a"
 
 
 def write(folder, extra="", **keys):
-    """A scene file; a key given as None is left out."""
+    """Write a scene file; a key with value None is omitted."""
     lines = [f"{key} = {value}" for key, value in (GOOD | keys).items() if value is not None]
     path = folder / "mine.toml"
     path.write_text("\n".join([*lines, extra]))

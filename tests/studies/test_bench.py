@@ -1,4 +1,4 @@
-"""The benchmark: every error is measured against a second route, every time beside somebody else's."""
+"""The benchmark: every error is measured against an independent solution, every time against a peer."""
 
 import csv
 import ctypes
@@ -34,7 +34,7 @@ FAST = Benchmark("a step", 2e-6, "s", 3e-6, (Baseline("theirs", 5e-6), Baseline(
 
 @pytest.fixture
 def all_measures(user_folder, monkeypatch):
-    """What the benchmark measures."""
+    """The measures of the benchmark."""
     monkeypatch.chdir(user_folder)
     monkeypatch.setattr(bench_speed, "RUNS", 20)
     return all_benchmarks()
@@ -42,7 +42,7 @@ def all_measures(user_folder, monkeypatch):
 
 @pytest.fixture
 def both_kinds(fmus, tmp_path, monkeypatch):
-    """A folder with the FMUs in Python and the native ones, where nothing has been measured yet."""
+    """A folder with Python and native FMUs, and an empty cache of measurements."""
     (tmp_path / "fmus").mkdir()
     for file in fmus.glob("*.fmu"):
         (tmp_path / "fmus" / file.name).symlink_to(file)
@@ -58,13 +58,13 @@ def both_kinds(fmus, tmp_path, monkeypatch):
 
 
 def forget():
-    """Nothing has been measured yet."""
+    """Clear the cache of measurements."""
     for measured in (native.time_fmu, native.time_cvode, native.time_through_fmpy):
         measured.cache_clear()
 
 
 def of(all_measures, function):
-    """The measures that a function makes."""
+    """Return the measures of a function."""
     return [measure for measure in all_measures if measure.func is function]
 
 
@@ -137,7 +137,7 @@ def test_the_csv_holds_every_value_and_the_provenance_every_parameter(tmp_path, 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_python_one(both_kinds):
-    for _ in range(3):  # a busy machine may spoil a measurement, hardly three
+    for _ in range(3):  # a loaded machine may spoil one measurement, but hardly three
         forget()
         found = [native.run_in_c("stickslip"), native.step_in_c("stickslip")]
         found += [native.run_through_fmpy("stickslip"), native.step_through_fmpy("stickslip")]
@@ -179,7 +179,7 @@ def test_missing_tools_are_reported_in_their_row_and_fail_nothing(both_kinds, mo
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_run_refused_by_an_fmu_in_c_reports_its_message(both_kinds):
-    library = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
+    library = c_host.build_native_fmus(both_kinds / "native" / "stickslip.fmu")
     with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
         native.time_runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
 
@@ -197,8 +197,8 @@ LATE = [
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 @pytest.mark.parametrize("scene", [*model_exchange.DEFAULT_SCENARIOS, *LED, *LATE], ids=str)
 def test_model_exchange_errors_match_cvode_with_explicit_events(scene, both_kinds):
-    """At most three times as much, also where the input jumps or ramps, and from a late start: the solver errs, not the
-    FMU."""
+    """At most three times as large, also with jumps and ramps of the input and a late start: the error is that of
+    the solver."""
     measure = model_exchange.error_ratio_to_cvode(scene, model_exchange.TOLERANCES if scene.is_default else (1e-8,))
     if "not installed: SUNDIALS" in measure.baselines[0].name:
         pytest.skip(measure.baselines[0].name)
@@ -208,7 +208,7 @@ def test_model_exchange_errors_match_cvode_with_explicit_events(scene, both_kind
 
 @pytest.mark.parametrize("scene", model_exchange.COMPARED_SCENARIOS, ids=str)
 def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene, both_kinds):
-    """Also at ties, where the last bit decides or the physics."""
+    """Also at ties, where the last bit or physics decides."""
     assert model_exchange.difference_from_cosimulation(scene).is_met
 
 
@@ -226,7 +226,7 @@ def test_a_model_exchange_call_is_timed_against_that_of_a_reference_fmu(both_kin
     assert len(measure.baselines) == 9
 
 
-THEIRS = {  # a Reference FMU that has just what the bench puts aside, and asks for it
+THEIRS = {  # a Reference FMU with just the files that the benchmark copies and compiles
     "include/model.h": """
 typedef struct { double h, v, g, e; } ModelInstance;
 typedef int Status;

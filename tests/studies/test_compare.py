@@ -1,4 +1,4 @@
-"""Comparisons of FMUs, ours and others, and of results."""
+"""Comparisons of project FMUs, external FMUs, and results."""
 
 import json
 from itertools import combinations
@@ -19,7 +19,7 @@ from harness.studies.compare.trajectory_files import read_trajectory
 
 @pytest.fixture(scope="module")
 def external_fmu_folder():
-    """The folder of FMUs that are not ours, built with plain pythonfmu."""
+    """The folder of the external FMUs, built with plain pythonfmu."""
     return external_fmus.build_external_fmus()
 
 
@@ -73,7 +73,7 @@ def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, 
 
 @pytest.fixture
 def results(tmp_path):
-    """The folder of results, with those of the published cases in it."""
+    """The results folder, with the published cases."""
     (tmp_path / "results").mkdir()
     for folder in (run_published_cases() / "results").iterdir():
         (tmp_path / "results" / folder.name).symlink_to(folder)
@@ -125,7 +125,7 @@ def test_interpolation_follows_the_rate_or_stays_between_neighbours():
     assert v.relative < 1e-5
     stairs = np.floor(one) + 0.25
     found = compare(path("stairs", one, x=stairs), path("line", two, x=np.zeros(400)))
-    assert found.differences[0].largest == 5.25  # no spline swings beyond the stairs
+    assert found.differences[0].largest == 5.25  # no spline overshoots the steps
 
 
 def test_a_variable_uses_its_own_rate_in_an_fmu_without_units():
@@ -141,12 +141,12 @@ def test_a_variable_uses_its_own_rate_in_an_fmu_without_units():
         )
     )
     assert max(each.relative for each in found.differences[:60]) < 1e-8  # 81 times that of pace 1
-    assert min(each.relative for each in found.differences[60:]) > 1e-8  # of these no rate was recorded
+    assert min(each.relative for each in found.differences[60:]) > 1e-8  # no rates are recorded for these
 
 
 @pytest.mark.parametrize("late", [0.0, 1e-9, 1e-3])
 def test_a_jump_is_compared_as_a_jump(late):
-    """A body is let go at 1 s, which its speed and its position follow; its acceleration jumps."""
+    """A body is released at 1 s: its acceleration jumps, its speed and position follow."""
 
     def motion(name, grid, at):
         t = np.unique(np.append(grid, at))
@@ -236,7 +236,7 @@ def test_events_are_matched_by_kind_and_time(second, sentence, shift):
 
 
 def test_a_distant_event_match_hides_no_difference():
-    """The other one jumps back in between, so that what lies between is no one's jump."""
+    """The other one jumps back in between, so that the values in between belong to no jump."""
     t = np.linspace(0, 3, 301)
     one = Signals("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, np.array([[0, 0], [1, 1.0]]))
     step = (t >= 0.5) & (t < 0.8) | (t >= 2)
@@ -291,7 +291,8 @@ def test_results_of_other_tools_can_be_compared(tmp_path, pair):
 
 
 def modelica(file, rows, turned=True, version="4"):
-    """A result as OpenModelica writes it: a MATLAB file of version 4, turned; one variable is an alias with a sign."""
+    """Write a result like OpenModelica: a MATLAB file of version 4, transposed; one variable is an alias with a
+    sign."""
     names = ["time", "x", "on", "turn[1]", "turn[2]", "minus", "p"]
     letters = {
         "Aclass": ["Atrajectory", "1.1", "", "binTrans" if turned else "binNormal"],
@@ -299,7 +300,7 @@ def modelica(file, rows, turned=True, version="4"):
         "description": ["time [s]", "place [m|mm]", "[:#(type=Boolean)]", "", "", "", ""],
     }
     lines = {key: [text.ljust(20) for text in texts] for key, texts in letters.items()}
-    for key in ("name", "description") if turned else ():  # each is a column of letters
+    for key in ("name", "description") if turned else ():  # each is a column of characters
         lines[key] = ["".join(row) for row in zip(*lines[key], strict=True)]
     info = [[0, 1, 0, -1], *([2, i, 0, -1] for i in range(2, 6)), [2, -2, 0, -1], [1, 2, 0, -1]]
     constants = np.array([[0.0, 2.0], [7.0, 7.0]])
@@ -311,7 +312,7 @@ def modelica(file, rows, turned=True, version="4"):
 @pytest.mark.parametrize("version", ["4", "5"])
 @pytest.mark.parametrize("turned", [True, False])
 def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version):
-    """In both of its layouts, and saved anew by MATLAB."""
+    """In both of its layouts, and saved again by MATLAB."""
     modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4]]), turned, version)
     found = read_trajectory(tmp_path / "modelica.mat")
     assert (found.units["x"], found.units["on"]) == ("m", "")
@@ -393,7 +394,7 @@ def test_an_fmu_that_terminates_is_compared_up_to_its_end(harness, external_fmu_
 @pytest.mark.parametrize("at", [1, 7, 18])
 @pytest.mark.parametrize("shift", [0.0, 0.013])
 def test_a_nonfinite_value_on_either_side_is_an_infinite_difference(lost, where, at, shift):
-    """Also beside a variable that agrees, before and after it, and where times have to be interpolated."""
+    """Also beside a variable that agrees, before and after it, and where times are interpolated."""
     t = np.linspace(0, 1, 20)
     good, bad = np.sin(t), np.where(np.arange(20) == at, lost, np.cos(t))
     left = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}

@@ -1,4 +1,5 @@
-"""Coupled scenes: the archive is valid and opens elsewhere, and the engine's answer tends to the monolithic one."""
+"""Coupled scenes: the archive is valid and opens in other tools, and the engines converge to the single-model
+reference."""
 
 import csv
 import json
@@ -33,7 +34,7 @@ springs = [{ between = ["a", "b"], k = 40.0 }]
 
 @pytest.fixture
 def couple(fmus, tmp_path):
-    """couple(scene, option, ...): the finished process, in a folder with the built FMUs."""
+    """Return couple(scene, option, ...): the finished process, in a folder with the built FMUs."""
     (tmp_path / "fmus").symlink_to(fmus)
 
     def run(scene, *options):
@@ -69,7 +70,7 @@ def test_the_reference_has_the_period_of_stick_slip():
 
 
 def test_two_equal_coupled_masses_agree_with_their_closed_form(couple, tmp_path):
-    """From x and -x both feel the stiffness k + 2 k_spring; the error falls in proportion to the step."""
+    """From x and -x both have the stiffness k + 2 k_spring; the error is proportional to the step."""
     done = couple(PAIR, "--stop", "0.5", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout)["order"] == pytest.approx(1.0, abs=0.1)
@@ -89,7 +90,7 @@ def test_two_equal_coupled_masses_agree_with_their_closed_form(couple, tmp_path)
 
 @pytest.fixture
 def run(fmus):
-    """run(scene): the folder of a shipped scene's results; each is run once."""
+    """Return run(scene): the results folder of a shipped scene, which is run once."""
 
     def run(scene):
         def make(folder):
@@ -113,7 +114,7 @@ def engines(folder):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
-    """The error falls as the step does; Ecos and libcosim do the same, fmpy passes the first forces a step later."""
+    """The error is proportional to the step, also in Ecos and libcosim; fmpy passes the first forces one step later."""
     steps, errors = np.loadtxt(run(scene) / "error.csv", delimiter=",", skiprows=1).T
     assert np.log(errors[0] / errors[-1]) / np.log(steps[0] / steps[-1]) == pytest.approx(1.0, abs=0.25)
     found = engines(run(scene))
@@ -127,7 +128,7 @@ def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
 @pytest.mark.parametrize("scene", SCENES)
 def test_an_archive_avoids_factors_inline_values_and_unusual_names(run, scene):
     (file,) = run(scene).glob("*.ssp")
-    system = read_ssd(str(file)).system  # which checks it against the schema
+    system = read_ssd(str(file)).system  # which validates it against the schema
     names = [system.name, *(element.name for element in system.elements)]
     assert all(re.fullmatch(r"[A-Za-z]\w*", name, re.ASCII) for name in (*names, file.stem))
     with zipfile.ZipFile(file) as archive:
@@ -193,7 +194,7 @@ def test_an_invalid_coupled_scene_is_one_sentence(couple, tmp_path, text, status
 
 
 def test_a_scene_is_checked_before_any_fmu(monkeypatch, tmp_path):
-    """A slip of the pen is told as such where nothing is built."""
+    """A typing error is reported even if no FMU is built."""
     monkeypatch.setattr(study, "start_values", lambda fmu: pytest.fail("an FMU was read"))
     with pytest.raises(SceneError, match="unknown coupled scene 'two-mases'"):
         study.run_coupled("two-mases", tmp_path, None, lambda share: None)

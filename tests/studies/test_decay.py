@@ -1,4 +1,4 @@
-"""The study of a decay: its table, numbers and figure, and the command."""
+"""The decay study: its table, quantities and figure, and the command."""
 
 import csv
 import json
@@ -65,12 +65,12 @@ def test_downsampling_keeps_the_extremes(count):
 
 
 def harness(folder, *arguments, text=""):
-    """The finished process of the harness in `folder`."""
+    """Run the harness in `folder` and return the finished process."""
     return commands.harness(folder, *arguments, text=text, blank=True, COLUMNS="120")
 
 
 def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_path):
-    """fmpy's command line simulates the FMU and writes the file."""
+    """The command line of fmpy simulates the FMU and writes the file."""
     words = ["simulate", fmus / "coulomb.fmu", "--output-file", "run.csv", "--output-interval", "0.005"]
     done = commands.harness(tmp_path, *words, "--start-values", "c", "0.3", "f", "0.4", module="fmpy")
     assert (tmp_path / "run.csv").exists(), done.stderr
@@ -104,7 +104,7 @@ def test_standard_input_is_accepted_as_a_record(tmp_path):
 
 
 def test_a_record_needs_no_fmu_modules_and_one_drawing(tmp_path):
-    """Nothing that runs FMUs is imported; the figure is drawn once."""
+    """No module that runs FMUs is imported; the figure is drawn once."""
     program = """
 import sys
 from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""The external anchors: problems of other people, whose answers are not of our making."""
+"""Problems from the literature with known solutions."""
 
 from functools import cache
 
@@ -26,7 +26,7 @@ def table():
 
 @pytest.fixture
 def rows(user_folder, monkeypatch):
-    """rows(problem, solver): those of the table, which is made where there are FMUs."""
+    """Return rows(problem, solver) of the table, which is computed where FMUs exist."""
     monkeypatch.chdir(user_folder)
     return lambda problem, solver: [row for row in table() if (row.problem, row.solver) == (problem, solver)]
 

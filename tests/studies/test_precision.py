@@ -1,4 +1,4 @@
-"""Work-precision: what is measured, what counts as a gap, what the sentences say."""
+"""Work-precision diagrams: measurements, gaps and advice."""
 
 from functools import partial
 from itertools import cycle
@@ -41,7 +41,7 @@ SMOOTH = [case for case in CASES if not case.is_chattering]
 
 
 def command(user_folder, *arguments):
-    """The finished process of `python -m harness precision` in a folder."""
+    """Run `python -m harness precision` in a folder and return the finished process."""
     return commands.harness(user_folder, "precision", *arguments, base={}, PATH="", COLUMNS="100")
 
 
@@ -59,7 +59,7 @@ def test_every_method_of_the_fmu_approaches_the_reference_of_its_law(fmus, case)
     truth, model = load_reference(case.reference_source), load_model_class(fmus / f"{case.model}.fmu")
     within = (
         0.02 if case.reference_source == "stickslip-threshold" else 2e-3
-    )  # where it comes to rest below eps is left to chance
+    )  # the position of rest below eps is arbitrary
     for method in method_numbers(model):
         if (case.name == "pacejka-0.0001" and method != "rodas") or (case.is_chattering and method == "exact"):
             continue  # seconds of explicit steps; refused
@@ -155,8 +155,7 @@ def test_the_advice_is_derived_from_the_points():
 
 
 def test_no_advice_is_given_without_sufficient_evidence():
-    """Of a quick run, where another solver comes near or before the best method; of a whole one, a peer that is before
-    it is named as one."""
+    """A quick run gives no advice if another solver comes close to the best method; a full run names a better peer."""
     own, slower = point("rodas", 2e-3, 1e-7), point("ode23", 4e-3, 1e-7)
     untold = "stickslip: no recommendation from a quick run; use `python -m harness precision stickslip`."
     for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
@@ -207,7 +206,7 @@ def test_stuck_points_lie_between_a_stop_and_the_next_breakaway():
     ("path", "ending"), [*zip(EXAMPLE_MODELS, cycle((".py", ".fmu")))], ids=lambda one: Path(one).name
 )
 def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
-    """Every way that needs no equations but those of the file; two of its methods agree about what is true."""
+    """Every check that needs only the equations of the file; the reference is where two of its methods agree."""
     name = (build_user_model(path) / path.name).with_suffix(ending)
     found = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), lambda share: None)
     assert found.model == path.stem

@@ -1,4 +1,5 @@
-"""Work-precision of the FMI 3.0 FMUs through fmpy: its own solver in model exchange, and theirs in co-simulation."""
+"""Work-precision of the FMI 3.0 FMUs with fmpy: with the solver of fmpy in model exchange, with their own in
+co-simulation."""
 
 import csv
 import json
@@ -38,7 +39,7 @@ TOLERANCES = (1e-4, 1e-6, 1e-8)
 
 @pytest.fixture(scope="module")
 def both(fmus, tmp_path_factory):
-    """A folder as a user's would be, with the FMUs for FMI 2.0 and 3.0 in it."""
+    """A user's folder, with the FMUs for FMI 2.0 and 3.0."""
     folder = tmp_path_factory.mktemp("both")
     (folder / "fmus").mkdir()
     for file in fmus.glob("*.fmu"):
@@ -50,7 +51,7 @@ def both(fmus, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def points(both):
-    """points(name, tool, tolerances): what the study finds about a case with a tool, but how long it takes."""
+    """Return points(name, tool, tolerances): the results of the study for a case with a tool, without run times."""
 
     @cache
     def points(name, tool, tolerances=TOLERANCES):
@@ -65,8 +66,11 @@ def points(both):
 
 
 def amplification(case):
-    """What an error of position at a break-away may become, relative to the motion: with it comes one in time, of its
-    size over the speed of the driver, and one in speed, that times the largest acceleration."""
+    """Return the amplification of a position error at breakaway, relative to the motion.
+
+    The error also shifts the time, by its size over the speed of the driver, and the speed, by that times the largest
+    acceleration.
+    """
     if case.model not in ("stickslip", "pacejka"):
         return 1.0
     x, v = np.abs(load_reference("stickslip").motion).max(axis=0)
@@ -78,7 +82,7 @@ def test_model_exchange_errors_fall_with_the_tolerance_and_stay_below_the_sum_of
     loose, middle, tight = found = points(case.name, ME)
     assert [point.rtol for point in found] == list(TOLERANCES)
     assert loose.largest > 4 * middle.largest > 16 * tight.largest
-    assert loose.evaluations < middle.evaluations < tight.evaluations  # at least one a step
+    assert loose.evaluations < middle.evaluations < tight.evaluations  # at least one per step
     for point in (middle, tight):
         assert point.largest < amplification(case) * point.evaluations * point.rtol
 
@@ -129,21 +133,23 @@ def test_a_failure_is_one_sentence(both, tmp_path, way, capfd):
     assert refused(sled, timeout=1e-3).endswith(" s after 0.001 s of run time")
     assert refused(missing) == f"not built: {missing} (python build_fmus.py --fmi 3)"
     assert refused(broken) == "broken.fmu cannot be unpacked: File is not a zip file"
-    out, err = capfd.readouterr()  # where the FMU itself says its sentence
+    out, err = capfd.readouterr()  # where the FMU itself prints its message
     assert (out, err.count("\n")) == ("", 1)
     assert err.startswith("Stickslip (stickslip): m = -1.0 kg is refused")
 
 
 def harness(folder, *arguments):
-    """The finished process of a command in a folder; nobody looks at its figures."""
+    """Run a command in a folder, without figures, and return the finished process."""
     return commands.harness(folder, *arguments, base={}, blank=True, PATH="", COLUMNS="100")
 
 
 @pytest.fixture(scope="module")
 def twice(both, fmus, tmp_path_factory):
-    """A study of the smd and the page of all results, where its FMU for FMI 3.0 is built and then where it is not, the
-    second of the file, which leaves peers out, and beside results on another model: what each study said, the second as
-    JSON, the files of the first, the pages, and the folder of the second."""
+    """Two studies of smd with the report: with its FMI 3.0 FMU, and without it.
+
+    The second one is of the model file, leaves out peers, and keeps results of another model. Returns the output of
+    each study (the second as JSON), the files of the first, the pages, and the folder of the second.
+    """
     (out, without), said, pages, files = map(tmp_path_factory.mktemp, ("out", "without")), [], [], {}
     (without / "fmus").symlink_to(fmus)
     for folder, *words in ((both, "precision", "smd"), (without, "--json", "precision", "fmus/smd.fmu")):
@@ -166,7 +172,7 @@ def test_the_command_shows_both_interfaces_and_error_against_tolerance(twice):
         ("smd", CS, ""),
         *(("smd", ME, rtol) for rtol in ("0.001", "1e-06", "1e-09")),
     ]
-    for row in rows:  # on a busy machine the tightest may outlast what --quick waits, and says so
+    for row in rows:  # on a loaded machine the tightest one may exceed the time limit of --quick, and is reported
         assert "run time" in row["failure"] if row["failure"] else float(row["seconds [s]"]) > 0
     heads, *table = csv.reader(files["smd-exchange.csv"].splitlines())
     assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "smd [1]"]
@@ -188,7 +194,7 @@ def test_the_page_shows_error_against_tolerance_or_the_commands_that_produce_it(
     whole, lacking = twice[2]
     assert head in whole
     assert commands not in whole
-    assert head not in lacking  # what was there of another build is gone
+    assert head not in lacking  # files of another build are removed
     assert commands in lacking
 
 

@@ -1,4 +1,4 @@
-"""What the figure of a run shows beside its curves, of every published scene but the one that takes seconds."""
+"""The figure of a run, for every published scene except the one that takes seconds."""
 
 import json
 import os
@@ -73,7 +73,7 @@ def drawn(fmus):
 
 
 def curves(scene):
-    """The panels over time, each with its longest line, the curve."""
+    """Return the panels over time, each with its longest line, the curve."""
     over_time = {title: panel for title, panel in scene["panels"].items() if title[:4] not in ("phas", "step")}
     return {title: max(panel["lines"], key=lambda line: len(line[1])) for title, panel in over_time.items()}
 
@@ -85,7 +85,7 @@ def test_a_curve_is_smooth_despite_large_steps(drawn, name):
 
 
 def test_the_plotted_steps_are_those_of_the_solver(drawn):
-    """The steps are those of the run that was measured, the curve has more points than it."""
+    """The steps are those of the measured run, and the curve has more points."""
     _, t, _ = drawn["smd"]["panels"]["step size of the solver"]["lines"][0]
     assert len(t) + 1 == drawn["smd"]["samples"] < 300 < len(curves(drawn["smd"])["position of the mass"][1])
 
@@ -95,7 +95,7 @@ def test_every_stick_phase_is_shaded_from_its_start(drawn, name):
     for title in curves(drawn[name]):
         stuck = drawn[name]["panels"][title]["stuck"]
         assert stuck == pytest.approx(drawn[name]["sticks"][: len(stuck)])
-        assert len(drawn[name]["sticks"]) - len(stuck) <= (name == "coulomb")  # whose last begins after the end
+        assert len(drawn[name]["sticks"]) - len(stuck) <= (name == "coulomb")  # whose last one begins after the end
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -136,7 +136,7 @@ def test_the_published_mean_step_is_shown_for_comparison(drawn, name):
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "pendulum"])
 def test_the_envelope_of_the_published_loss_passes_through_the_turning_points(drawn, name):
-    """To what the published value differs from ours."""
+    """Within the difference between the published value and ours."""
     lines = next(iter(drawn[name]["panels"].values()))["lines"]
     turning = next(np.abs(y) for text, _, y in lines if text == "turning points")
     upper = next(np.array(y) for text, _, y in lines if text == "published" and len(y) > 1)

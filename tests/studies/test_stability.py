@@ -1,4 +1,4 @@
-"""Stiff and extreme scenes: the answers they are held against, the judgement, and a part of the table itself."""
+"""Stiff and extreme scenes: reference solutions, verdicts, and a part of the table."""
 
 import csv
 import os
@@ -53,11 +53,12 @@ QUICK = (
 
 
 def silent(name, share):
-    """Progress that nobody watches."""
+    """Progress reporting that does nothing."""
 
 
 def each_once():
-    """Whether a scene is of QUICK, or at the soft end of the region, and the first with its model or its value."""
+    """Return whether a scene is in QUICK, or at the soft end of the region, and the first with its model or its
+    value."""
     met = set()
 
     def wanted(scene):
@@ -72,11 +73,11 @@ def each_once():
 
 
 def defaults(name):
-    """The values of a model, SI units."""
+    """Return the values of a model, SI units."""
     return {variable: d.start for variable, d in declared(name).items() if d.causality in ("parameter", "input")}
 
 
-# ---- the answers
+# ---- the reference solutions
 
 
 LINEAR = {
@@ -129,7 +130,7 @@ def test_the_pendulum_agrees_with_the_independent_one(reaction):
 
 
 def test_the_smooth_sled_creates_no_energy():
-    """Radau against the balance of power: d(kinetic energy) is the work of pull and friction."""
+    """Radau against the power balance: the work of pull and friction changes the kinetic energy."""
     values = defaults("pacejka")
     found = compute_reference("pacejka", [(0.0, 8.0, values)], CommunicationGrid(0.0, 8.0, 8000))
     curve, pull = MagicFormula(values), values["k"] * (values["v_driver"] * found.times - found.x)
@@ -138,7 +139,7 @@ def test_the_smooth_sled_creates_no_energy():
     np.testing.assert_allclose(0.5 * values["m"] * found.v**2, work, atol=3e-4)
 
 
-# ---- the bounds
+# ---- the time limits
 
 
 def test_a_hang_is_one_sentence():
@@ -157,7 +158,7 @@ def test_an_exception_is_passed_on():
 
 
 def test_a_worker_process_is_reused_and_replaced_after_a_crash(tmp_path, monkeypatch):
-    """Each call is made where it is asked."""
+    """Each call runs in the process it is sent to."""
     first = run_with_timeout(30.0, os.getpid)
     monkeypatch.chdir(tmp_path)
     assert (run_with_timeout(30.0, os.getpid), run_with_timeout(30.0, os.getcwd)) == (first, str(tmp_path))
@@ -166,7 +167,7 @@ def test_a_worker_process_is_reused_and_replaced_after_a_crash(tmp_path, monkeyp
     assert run_with_timeout(30.0, os.getpid) != first
 
 
-# ---- the judgement
+# ---- the verdicts
 
 
 CASE = StabilityCase(
@@ -178,7 +179,7 @@ GOOD = CompletedRun(np.ones(3), np.zeros(3), np.zeros(3), 0.5, RunCounts(1, 2, 0
 
 @pytest.fixture
 def case():
-    """A case that nothing drives."""
+    """A case without input."""
     return replace(CASE, setting=type("Setting", (), {"values": {}})())
 
 
@@ -264,7 +265,7 @@ def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch
 
 
 def test_a_long_path_of_temporary_files_is_supported(tmp_path):
-    """The socket of a server that processes are forked from has room for 107 bytes."""
+    """The socket path of a fork server is limited to 107 bytes."""
     folder = tmp_path / ("long" * 25)
     folder.mkdir()
     name = "run_with_timeout"
@@ -276,8 +277,8 @@ def test_a_long_path_of_temporary_files_is_supported(tmp_path):
 
 @pytest.mark.parametrize("name", ["rotor_brake", "sleds", "belt"])
 def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
-    """Its values, its tolerances and what is no number, by every method; what binds two values may refuse them, and a
-    belt puts energy in."""
+    """Its values, its tolerances and nonfinite numbers, by every method; a rule between two values may refuse them,
+    and a belt adds energy."""
     (path,) = (path for path in (*EXAMPLE_MODELS, *LARGER_MODELS) if path.stem == name)
     file = build_user_model(path) / f"{name}.fmu"
     few = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")

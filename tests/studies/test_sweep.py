@@ -1,4 +1,4 @@
-"""Sweeps on the built FMUs: the runs they should do, what is measured in them, and what is said of those that fail."""
+"""Sweeps on the built FMUs: the runs, their measures, and the messages of failed runs."""
 
 import json
 from functools import partial
@@ -21,7 +21,7 @@ MAP = ("sweep", "stickslip", "--vary", "mu_d=0.5:0.8:4", "--vary", "v_driver=0.0
 
 @pytest.fixture
 def harness(fmus, tmp_path):
-    """harness(argument, ...): the finished process, in a folder with the built FMUs."""
+    """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
     (tmp_path / "fmus").symlink_to(fmus)
 
     return partial(commands.harness, tmp_path)
@@ -61,7 +61,7 @@ def test_an_invalid_axis_is_refused(text, random):
 
 
 def test_a_reset_instance_gives_the_same_results_as_a_fresh_one(fmus):
-    """Also after a run that failed."""
+    """Also after a failed run."""
     measures = ("final", "events", "slips", "period", "peak_speed", "stuck")
     runs = SweepSpec("stickslip", ("mu_d", "v_driver"), (), measures)
     spots = [[0.6, 0.034], [0.95, 0.034], [0.3, 0.1], [0.6, 0.034]]
@@ -135,7 +135,7 @@ TOLD = {  # why some have no run to show
 
 @pytest.mark.parametrize("name", external_fmus.SWEEP_AXES)
 def test_an_external_fmu_is_swept_or_refused_with_a_reason(harness, tmp_path, name):
-    """Numbers alone are measured: of arrays each element, of texts nothing."""
+    """Only numbers are measured: each element of an array, and no strings."""
     fmu, vary = external_fmus.build_external_fmus() / f"{name}.fmu", external_fmus.SWEEP_AXES[name].replace(":3", ":2")
     done = harness(
         "sweep", fmu, "--vary", vary, "--measure", "final,largest", "--name", "a", "--tolerance", 1e-3, blank=True
@@ -152,7 +152,7 @@ def test_an_external_fmu_is_swept_or_refused_with_a_reason(harness, tmp_path, na
 
 
 def test_crashing_and_failing_runs_of_an_external_fmu_are_reported_individually(harness, tmp_path):
-    """With kind 0 it does well, with 2 it crashes, with 6 it fails."""
+    """With kind 0 it succeeds, with 2 it crashes, with 6 it fails."""
     trouble = external_fmus.build_external_fmus() / "Faulty.fmu"
     done = harness("sweep", trouble, "--vary", "kind=2,6,0", "--name", "a", "--workers", 2, blank=True)
     assert done.returncode == 1
@@ -179,7 +179,7 @@ def test_a_sample_has_a_row_for_each_run(harness, tmp_path):
 
 
 def test_the_magic_formula_slides_steadily_below_the_peak_of_its_curve(harness, tmp_path):
-    """Its slope is positive there, so that it damps; beyond it the sled sticks and slips."""
+    """The slope is positive there and damps; beyond it the sled sticks and slips."""
     arguments = ("--vary", "x_m=0.03,0.06", "--vary", "v_driver=0.02,0.04,0.08", "--measure", "unsteady", "--stop", 40)
     assert harness("sweep", "pacejka", *arguments, "--workers", 2, blank=True).returncode == 0
     steady = open_sweep(sweep_folder(tmp_path / "results", "pacejka-x_m-v_driver"))["unsteady"].to_numpy() < 0.1

@@ -1,4 +1,4 @@
-"""The file of a sweep, the scales of its map, and the boundaries in it."""
+"""The file of a sweep, the scales of its map, and its boundaries."""
 
 import tracemalloc
 from zipfile import ZipFile
@@ -21,7 +21,7 @@ from harness.studies.sweep.study import Sweep
 
 
 def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path):
-    """The parts of a sweep that touch every run, on ten times as many of them."""
+    """The parts of a sweep that handle every run, with ten times as many of them."""
     monkeypatch.setattr(figure, "draw", lambda *arguments: None)
     peaks = []
     for many in (20, 200):
@@ -83,7 +83,7 @@ def test_an_axis_spanning_decades_is_logarithmic(values, spread, kind):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_known_boundaries_are_packed_in_the_fmu_and_depend_on_its_parameters(fmus, name):
-    """At its own values each quantity is a number; what it depends on is declared."""
+    """At its own values each quantity is a number, and its dependencies are declared."""
     values = {
         variable.name: float(variable.start)
         for variable in read_description(fmus / f"{name}.fmu").modelVariables

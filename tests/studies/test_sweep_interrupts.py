@@ -1,4 +1,4 @@
-"""What happens to a sweep while it runs: it is killed, or loses those who do its runs."""
+"""Sweeps that are killed or lose their workers."""
 
 import os
 import signal
@@ -36,7 +36,7 @@ sys.addaudithook(note)
 
 @pytest.fixture
 def harness(fmus, tmp_path):
-    """harness(argument, ...): the finished process, in a folder with the built FMUs."""
+    """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
     (tmp_path / "fmus").symlink_to(fmus)
 
     return partial(commands.harness, tmp_path, blank=True)
@@ -44,7 +44,7 @@ def harness(fmus, tmp_path):
 
 @pytest.fixture
 def whole(fmus):
-    """The files of that sweep, by their name, when nothing happens to it."""
+    """Return the files of an undisturbed sweep, by name."""
 
     def make(folder):
         (folder / "fmus").symlink_to(fmus)
@@ -58,19 +58,21 @@ def files(place):
 
 
 def journal(place):
-    """The journal of a sweep that has begun; None before."""
+    """Return the journal of a sweep that has begun; None before."""
     return next((place / "results/sweep").glob(".*.journal"), None)
 
 
 def blocks(place):
-    """How many blocks of runs are finished."""
+    """Return the number of finished blocks of runs."""
     found = journal(place)
     return found.read_bytes().count(b"\n") if found else 0
 
 
 def begun(place):
-    """The long sweep in a process of its own, once it has finished two blocks of runs; how many processes it consists
-    of is told by their environment, and at what they listen, by a file `bound`."""
+    """Start the long sweep in a child process and wait for two finished blocks of runs.
+
+    Its environment marks its processes, and the file `bound` lists the addresses at which they listen.
+    """
     heard, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), blocks(place)
     (place / "sitecustomize.py").write_text(NOTE)
     process = subprocess.Popen(
@@ -90,18 +92,18 @@ def begun(place):
 
 
 def living(place):
-    """The processes of the sweeps that have begun there."""
+    """Return the processes of the sweeps started there."""
     found, mark = [], f"PYTHONPATH={place}{os.pathsep}".encode()
     for file in Path("/proc").glob("[0-9]*/environ"):
         try:
             found += [file.parent.name] if mark in file.read_bytes() else []
-        except OSError:  # another's, or gone
+        except OSError:  # of another user, or gone
             continue
     return found
 
 
 def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, whole, tmp_path):
-    """A kill reaches the sweep alone, Ctrl-C in a terminal its workers as well; what is written last may be cut off."""
+    """A kill reaches only the sweep, Ctrl-C in a terminal also its workers; the last write may be truncated."""
     process = begun(tmp_path)
     assert len(living(tmp_path)) >= 3 or not Path("/proc/self/environ").exists()
     process.kill()
@@ -128,12 +130,12 @@ def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, whole, tmp_path):
     assert f"100 runs, {kept} of them resumed" in done.stdout
     assert files(tmp_path) == whole
     assert journal(tmp_path) is None
-    bound = tmp_path / "bound"  # workers are reached through pipes; a socket that has a file for an address is no port
+    bound = tmp_path / "bound"  # workers use pipes; a socket whose address is a file is no port
     assert "tuple" not in (bound.read_text() if bound.exists() else "")
 
 
 def test_a_cluster_with_a_killed_worker_finishes(harness, whole, tmp_path):
-    """One works in this process, the other one in a process of its own, until the first blocks are finished."""
+    """One worker is in this process, the other in a separate one, until the first blocks are finished."""
     words = ("--no-dashboard", "--nthreads", "2", "--no-nanny")
     options = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
     with distributed.LocalCluster("127.0.0.1", protocol="tcp://", **options) as cluster:
@@ -163,7 +165,7 @@ def test_a_cluster_with_a_killed_worker_finishes(harness, whole, tmp_path):
 
 
 def test_an_unresponsive_scheduler_is_reported(monkeypatch):
-    """After 10 s, of which a test waits for one."""
+    """After 10 s, shortened to 1 s here."""
     client, address = distributed.Client, "tcp://127.0.0.1:1"
     monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout=timeout / 10))
     with pytest.raises(HarnessError, match=f"no scheduler found at {address}"), study.open_workers(address, 1, 1):
@@ -171,8 +173,8 @@ def test_an_unresponsive_scheduler_is_reported(monkeypatch):
 
 
 def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(monkeypatch):
-    """Whatever block it is in, and whatever else was under way meanwhile."""
-    monkeypatch.setattr(study, "run_block", killed_worker.run_block)
+    """In any block, and with any other work in progress."""
+    monkeypatch.setattr(study, "work", killed_worker.work)
     sweep = Sweep(SweepSpec("deadly", ("a",), (), ()), SweepPoints((parse_axis("a=0:39:40", False),)), b"", 1)
     found = {}
     with study.open_workers(None, 2, 40) as hands:

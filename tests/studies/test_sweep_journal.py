@@ -1,4 +1,4 @@
-"""The journal of a sweep: whose it is, and what of it can be read."""
+"""The journal of a sweep: its identity, and how damaged ones are read."""
 
 from dataclasses import replace
 from functools import partial
@@ -16,7 +16,7 @@ from harness.studies.sweep.study import Sweep
 
 @pytest.fixture
 def harness(fmus, tmp_path):
-    """harness(argument, ...): the finished process, in a folder with the built FMUs."""
+    """Return harness(argument, ...): the finished process, in a folder with the built FMUs."""
     (tmp_path / "fmus").symlink_to(fmus)
 
     return partial(commands.harness, tmp_path)
@@ -37,9 +37,9 @@ GOOD = line(3, [[0.5, np.nan], [1.0, 2.0]], {0: "failed"})
 DAMAGED = (
     *(b"", b"7", b"null", b"[]", b"00000000 []", b"\xff\xfe", b"\0", b"[" * 5000, b"9" * 5000),
     *(GOOD[:-1].replace(b"failed", b"fooled"), GOOD[:-4], GOOD[1:-1]),
-    *(line(9, [[0.5, 1.5]] * 2, {})[:-1], line(-1, [[0.5, 1.5]], {})[:-1]),  # runs that there are not
-    line(2, [[0.5, 1.5]] * 2, {})[:-1],  # one of them a second time
-    line(0, [[0.5]], {})[:-1],  # of another number of columns
+    *(line(9, [[0.5, 1.5]] * 2, {})[:-1], line(-1, [[0.5, 1.5]], {})[:-1]),  # missing runs
+    line(2, [[0.5, 1.5]] * 2, {})[:-1],  # one of them repeated
+    line(0, [[0.5]], {})[:-1],  # with another number of columns
 )
 
 
@@ -56,7 +56,7 @@ def test_a_damaged_journal_line_is_skipped_and_counted(tmp_path, damaged):
     assert [(block.first, block.messages) for block in again.blocks()] == [(0, {}), (3, {0: "failed"}), (7, {})]
     file.write_bytes(GOOD + line(7, [[3.0, 4.0]], {})[:-5])
     kept = Journal(file, 10, 2)
-    assert (kept.n_done, kept.damaged) == (2, 0)  # a kill cut it off
+    assert (kept.n_done, kept.damaged) == (2, 0)  # truncated by a kill
 
 
 def test_a_damaged_journal_is_reported_and_its_runs_are_repeated(harness, tmp_path):

@@ -1,4 +1,4 @@
-"""A model of the sources as they stand, which speak of vectors, on numpy arrays."""
+"""Run the vector form of the numerics on numpy arrays."""
 
 import numpy as np
 
@@ -16,9 +16,10 @@ from fmus.runtime.vectors import (
 
 
 def to_array_model(model):
-    """A model of the sources as they stand, with its vectors on arrays: what the numerics take for a model.
+    """Return the model with all vectors stored as numpy arrays, as the vector form of the numerics expects.
 
-    The classes of all that it owns learn that a number fills a vector, and that what is assigned is copied.
+    The classes of the model and of the objects that it owns are replaced by subclasses: assigning a scalar to a vector
+    attribute fills the vector, and assigning an array copies it.
     """
     states, modes = list(model.states), list(model.contacts)
     rates, slips = list(model.states.values()), list(model.contacts.values())
@@ -54,7 +55,7 @@ def to_array_model(model):
 
 
 def store_vectors_as_arrays(thing):
-    """Make vectors of the attributes of an object, and of the objects that it owns, that are vectors."""
+    """Store the vector attributes of an object, and of all objects that it owns, as arrays."""
     said = {name for one in type(thing).__mro__ for name in vars(one).get("__annotations__", {})}
     over_contacts = {name for name in said if "modes" in name}
 
@@ -66,13 +67,13 @@ def store_vectors_as_arrays(thing):
 
     type(thing).__setattr__ = assign
     for name, value in list(vars(thing).items()):
-        setattr(thing, name, 0.0 if isinstance(value, np.ndarray) else value)  # that of another model
+        setattr(thing, name, 0.0 if isinstance(value, np.ndarray) else value)  # left over from another model
         if hasattr(value, "__dict__"):
             store_vectors_as_arrays(value)
 
 
 def call_with_scalars(cls, name):
-    """A method of a model, called with vectors; what it returns becomes one."""
+    """Wrap a method of the model so that it takes and returns vectors."""
 
     def call(self, t, *vectors):
         found = getattr(cls, name)(self, t, *numbers(vectors))
@@ -95,7 +96,7 @@ def call_with_scalars(cls, name):
 
 
 def call_for_single_contact(cls, name):
-    """What a model says of its only contact, called with vectors and the number of the contact."""
+    """Wrap a method of a model with a single contact so that it takes vectors and a contact index."""
 
     def call(self, t, *vectors):
         *vectors, _ = vectors
@@ -105,12 +106,12 @@ def call_for_single_contact(cls, name):
 
 
 def numbers(vectors):
-    """All the numbers of some vectors, as Python has them."""
+    """Flatten vectors to a list of Python floats."""
     return [one for vector in vectors for one in (vector.tolist() if isinstance(vector, np.ndarray) else [vector])]
 
 
 def array_exact_method(exact):
-    """The closed form, called with vectors."""
+    """Wrap the closed-form method so that it takes and returns vectors."""
     cls = type(exact)
 
     class Exact(cls):

@@ -1,4 +1,4 @@
-"""A headless chromium, spoken to through a pair of pipes (Chrome DevTools Protocol): one browser, a page at a time."""
+"""Control a headless Chromium through a pair of pipes (Chrome DevTools Protocol), one page at a time."""
 
 import fcntl
 import itertools
@@ -14,14 +14,16 @@ FLAGS = (
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-dev-shm-usage"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars"),
 )
-READS, WRITES = 3, 4  # what chromium takes for its pipes
+READS, WRITES = 3, 4  # file descriptors that Chromium uses for its pipes
 
 
 class Browser:
-    """The process; `said` collects what its pages write to the console, `asked` the addresses that they load."""
+    """The browser process. `console` collects console messages, `requested_urls` the addresses that the page loads."""
 
     def __init__(self):
-        self.temporary_folder = TemporaryDirectory(ignore_cleanup_errors=True)  # chromium's last child may still write
+        self.temporary_folder = TemporaryDirectory(
+            ignore_cleanup_errors=True
+        )  # a child of Chromium may still be writing
         ours, theirs = zip(*(self.pipe(i) for i in (1, 0)), strict=True)
 
         def place():
@@ -45,7 +47,8 @@ class Browser:
 
     @staticmethod
     def pipe(ours):
-        """Our end and theirs of a pipe, on numbers that are not in the way; `ours`: 1 to write, 0 to read."""
+        """Create a pipe on high file descriptors and return our end and the browser's; `ours` is 1 to write, 0 to
+        read."""
         ends = os.pipe()
         high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 20) for end in ends]
         for end in ends:
@@ -53,7 +56,7 @@ class Browser:
         return high[ours], high[1 - ours]
 
     def call(self, method, **parameters):
-        """The result of a command; events that come before it are noted."""
+        """Send a command and return its result; record the events that arrive before it."""
         number = next(self.numbers)
         message = {"id": number, "method": method, "params": parameters}
         if self.session:
@@ -87,7 +90,8 @@ class Browser:
         return found
 
     def open(self, address):
-        """Load an address, until it has loaded; the page before is left first, so that it is loaded whatever it was."""
+        """Load an address and wait for the load event. Load an empty page first, so that the same address is loaded
+        again."""
         for each in ("about:blank", address):
             self.loaded, self.console, self.requested_urls = False, [], []
             self.call("Page.navigate", url=each)
@@ -95,7 +99,7 @@ class Browser:
                 self.receive()
 
     def run(self, script):
-        """The value of an expression in the page; a promise is awaited."""
+        """Evaluate an expression in the page, awaiting a promise."""
         how = {"awaitPromise": True, "returnByValue": True, "userGesture": True}
         found = self.call("Runtime.evaluate", expression=script, **how)
         assert "exceptionDetails" not in found, found["exceptionDetails"]
@@ -109,7 +113,7 @@ class Browser:
         self.call("Emulation.setEmulatedMedia", features=features)
 
     def picture(self, whole=False):
-        """What the page looks like, as PNG."""
+        """Take a screenshot, as PNG."""
         return b64decode(self.call("Page.captureScreenshot", captureBeyondViewport=whole)["data"])
 
     def pdf(self):

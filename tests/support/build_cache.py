@@ -1,4 +1,5 @@
-"""What is built for the tests is built once a run: its processes share a room, and the first that asks builds."""
+"""Build each set of FMUs once per test run. All test processes share one folder; the first one that needs a set
+builds it."""
 
 import json
 import subprocess
@@ -8,13 +9,13 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 import commands
-from commands import ROOT, SUPPORT  # noqa: F401 - both are told here as well
+from commands import ROOT, SUPPORT  # noqa: F401 - imported from here by the tests
 
-shared_folder = Path()  # conftest.py tells where
+shared_folder = Path()  # set by conftest.py
 
 
 def build(root, out, *words, timeout=600):
-    """Build FMUs from the sources under `root` in a process of their own; what it printed."""
+    """Run the build command on the sources under `root` in a child process and return its standard output."""
     command = [sys.executable, "build_fmus.py", *words, "--out", str(out)]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=timeout)
     assert done.returncode == 0, done.stderr
@@ -22,8 +23,8 @@ def build(root, out, *words, timeout=600):
 
 
 def build_once(name, *words, timeout=600):
-    """The folder `name` of the room, with the FMUs that the build command makes of these words; beside it, in a file
-    `name`.txt, what it printed."""
+    """Return the folder with the FMUs built with these arguments; the output of the build is in `name`.txt beside
+    it."""
 
     def make(folder):
         (shared_folder / f"{name}.txt").write_text(build(ROOT, folder, *words, timeout=timeout))
@@ -32,7 +33,7 @@ def build_once(name, *words, timeout=600):
 
 
 def build_user_model(path, *words):
-    """The folder of a user's file, outside the project, with what the build command makes beside it of these words."""
+    """Copy a model file to a folder outside the project, build it there, and return the folder."""
 
     def make(folder):
         (folder / path.name).write_text(path.read_text())
@@ -44,7 +45,8 @@ def build_user_model(path, *words):
 
 
 def run_published_cases():
-    """The folder of a user who has run the published cases; in process.json the status, and what the command said."""
+    """Return the folder of a user who ran the published cases; process.json holds the exit status, stdout and
+    stderr."""
 
     def make(folder):
         (folder / "fmus").symlink_to(build_once("fmi2"))
@@ -55,7 +57,7 @@ def run_published_cases():
 
 
 def cached_folder(name, make):
-    """The folder `name` of the room, which whoever asks first makes."""
+    """Return the folder `name`; the first process that asks for it calls `make` to fill it."""
     folder = shared_folder / name
     with (shared_folder / f"{name}.lock").open("w") as lock:
         flock(lock, LOCK_EX)

@@ -1,6 +1,6 @@
-"""A run that is refused while nobody can be told on standard error: python closed_stderr.py run_all '[FMU, WAYS]'.
+"""Run an FMU that reports an error while standard error is unusable: python closed_stderr.py run_all '[FMU, WAYS]'.
 
-Prints for each way what the log says, what is read afterwards, and what the run after a reset gives.
+Prints for each way the log, the values read after the error, and the result of the run after a reset.
 """
 
 import io
@@ -10,14 +10,14 @@ import sys
 import tempfile
 from math import isnan
 
-sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not search the folder of its script
 
 import worker
 from fmpy.fmi1 import FMICallException
 
 
 class Broken:
-    """A file whose methods raise, as told."""
+    """A stream whose methods raise the given exceptions."""
 
     encoding = "utf-8"
 
@@ -47,7 +47,7 @@ STDERR_FAILURES = {
     "ASCII only": lambda: setattr(sys, "stderr", io.TextIOWrapper(io.BytesIO(), "ascii", "strict")),
     "an encoding that is none": lambda: setattr(sys, "stderr", Broken(write=UnicodeError("no"))),
     "deleted": lambda: delattr(sys, "stderr"),
-    # those that a process does not come back from
+    # the following cannot be undone within a process
     "closed": lambda: sys.stderr.close(),
     "descriptor closed": lambda: os.close(2),
     "no reader": no_reader,

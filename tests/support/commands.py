@@ -1,10 +1,9 @@
-"""`python -m harness` and `python build_fmus.py` as their user sees them: exit status and streams of a process of its
-own, in a folder of his.
+"""Run `python -m harness` and `python build_fmus.py` in child processes, as a user does.
 
-The process is forked from one that has loaded both and their libraries, for to load them takes a second, and there are
-hundreds of runs; `fresh` asks for one that begins with nothing.  Both answer alike (commands/test_runs.py).  So is
-forked what a command asks of a module of the project in a process of its own.  Figures, which take most of a run, are
-left `blank` where nobody looks at them; "unplotted", where it is told elsewhere that they can be plotted.
+The child is forked from a server process that has already imported both, because the imports take about a second and
+the tests run hundreds of commands. `fresh` starts a new interpreter instead; commands/test_runs.py checks that both
+give the same result. Modules that a command runs in processes of its own are forked too. Drawing takes most of a run:
+`blank` skips layout and drawing, `blank=UNPLOTTED` skips plotting too.
 """
 
 import atexit
@@ -36,13 +35,13 @@ FORKED_MODULES = (
     "build_fmus",
     "harness.running.",
     "harness.studies.coupled.",
-)  # modules that answer in processes of their own
+)  # modules that commands run in processes of their own
 UNPLOTTED = "unplotted"
 BLANK = '<svg xmlns="http://www.w3.org/2000/svg"><style></style></svg>'
 
 
 def harness(folder, *arguments, base=os.environ, fresh=False, blank=False, text="", module="harness", **environment):
-    """The finished process; it reads `text`, and has the environment `base` with what is named."""
+    """Run a command and return the finished process. It reads `text` from standard input."""
     words, environment = [*map(str, arguments)], {**base, "PYTHONPATH": str(ROOT)} | environment
     if not fresh:
         return _server().run(module, words, str(folder), environment, text, blank)
@@ -52,7 +51,7 @@ def harness(folder, *arguments, base=os.environ, fresh=False, blank=False, text=
 
 
 def build(*arguments, folder=ROOT, **environment):
-    """The finished build."""
+    """Run the build command and return the finished process."""
     return harness(folder, *arguments, module="build_fmus", **environment)
 
 
@@ -64,7 +63,7 @@ def _server():
 
 
 class ForkServer:
-    """The process from which the others are forked."""
+    """The process from which all commands are forked."""
 
     def __init__(self):
         self.temporary_folder = tempfile.TemporaryDirectory()
@@ -101,25 +100,27 @@ class ForkServer:
 
 
 def serve():
-    """Load all that can be; then fork for every line that is read, and answer with the exit status."""
+    """Import everything, then fork for every request and answer with the exit status."""
     crew = import_module("harness.process.worker_pool")
-    crew.process_context = lambda preload: multiprocessing.get_context("fork")  # no server has to load it all once more
-    resource_tracker.ensure_running()  # nor has each command to start one
+    crew.process_context = lambda preload: multiprocessing.get_context(
+        "fork"
+    )  # no fork server has to import everything again
+    resource_tracker.ensure_running()  # commands share this tracker instead of starting their own
     packages = [(import_module(name).__path__, f"{name}.") for name in ("harness", "fmus.packaging")]
     for name in (*(module.name for package in packages for module in walk_packages(*package)), *LAZY_IMPORTS):
-        with suppress(ImportError):  # an extra that is not installed
+        with suppress(ImportError):  # optional package that is not installed
             if not name.endswith("__main__"):
                 import_module(name)
-    import_module("fmus.packaging.lowering").lowered_model("smd")  # reads what every model is written out from
+    import_module("fmus.packaging.lowering").lowered_model("smd")  # caches the sources that every model is lowered from
     from harness.process import subprocess_runner as asking
     from harness.results import provenance, style
 
-    provenance.write_provenance(Path(), ())  # what packages and the system are is looked up once
+    provenance.write_provenance(Path(), ())  # caches package and system versions
     asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": ForkedPopen})
-    with style.open_figure(Path(os.devnull), 1.0, 1.0) as figure:  # what draws is loaded, too, and knows its fonts
+    with style.open_figure(Path(os.devnull), 1.0, 1.0) as figure:  # imports matplotlib and loads its fonts
         figure.subplots().set_title("a title")
     drawing = [each for each in sys.modules.values() if getattr(each, "open_figure", None) is style.open_figure]
-    gc.freeze()  # else whoever is forked copies all that there is, to count who refers to it
+    gc.freeze()  # reference counts would otherwise copy every memory page in each child
     for line in sys.stdin:
         child = os.fork()
         if not child:
@@ -134,7 +135,7 @@ def serve():
 
 
 class SkipPlotting(Exception):
-    """The end of what is done to a figure of no kind."""
+    """Raised by any attribute access of a figure that is not plotted."""
 
     def __getattr__(self, name):
         raise self
@@ -142,19 +143,19 @@ class SkipPlotting(Exception):
 
 @contextmanager
 def stub_sheet(kind, path, width, height, layout=None):
-    """In the place of a sheet: what is plotted is neither laid out nor drawn; without a `kind`, it is not plotted."""
+    """Replace `style.sheet`: plot without layout and drawing, or do not plot at all if `kind` is None."""
     with suppress(SkipPlotting):
         yield kind((width, height)) if kind else SkipPlotting()
     path.write_text(BLANK)
 
 
 class ForkedPopen(subprocess.Popen):
-    """In the place of Popen: a module of ours is run by a fork of whoever asks it, who has loaded it."""
+    """Replace Popen: fork this process to run a module of the project instead of starting an interpreter."""
 
     def __init__(self, command, env, **how):
         def answer():
-            os.closerange(3, 1024)  # until then Popen waits; a system may allow a thousand million of them
-            atexit._clear()  # nor is what the asking process holds tidied up
+            os.closerange(3, 1024)  # Popen waits for its pipe to close; the limit may be a thousand million descriptors
+            atexit._clear()  # skip the exit handlers of the parent
             resource_tracker._resource_tracker._fd = None
             for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
                 signal.signal(number, usual)
@@ -174,7 +175,7 @@ class ForkedPopen(subprocess.Popen):
 
 
 def set_process_state(words, folder, environment, files):
-    """What a process has that was started with these."""
+    """Set up working directory, environment, arguments and streams like those of a new process."""
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
@@ -183,11 +184,11 @@ def set_process_state(words, folder, environment, files):
         opened = os.open(file, os.O_RDWR)
         os.dup2(opened, number)
         os.close(opened)
-    sys.stdin = open(0, closefd=False)  # noqa: SIM115 - what was read ahead is not the command's
+    sys.stdin = open(0, closefd=False)  # noqa: SIM115 - drop what the parent has read ahead
 
 
 def run(module):
-    """As Python does, to the end; but what was loaded is not taken down, which takes longer than most commands."""
+    """Run a module like Python does, but exit without tearing down the imported modules, which takes longer."""
     status = 0
     try:
         runpy.run_module(module, run_name="__main__", alter_sys=True)

@@ -1,4 +1,4 @@
-"""Methods of two floats frozen to C and called beside CPython, with values that find the edges."""
+"""Compile methods of two floats to C and compare them with CPython on edge-case values."""
 
 import copy
 import ctypes
@@ -16,14 +16,14 @@ from fmus.packaging.native.c_types import FLOAT, FloatArray, ScalarTuple, Struct
 from fmus.packaging.native.call_graph import CallGraph
 from fmus.packaging.native.compiler import BIT_EXACT, STRICT
 
-FAULT_EXCEPTIONS = (ArithmeticError, ValueError, IndexError)  # for which C raises the fault flag
+FAULT_EXCEPTIONS = (ArithmeticError, ValueError, IndexError)  # the C code sets the fault flag for these
 VALUES = [0.0, -0.0, 1.0, -1.0, 0.3, -2.5, 7.0, 1e-5, 1e5, 710.0, 5e-324, 1e-300, 1e300, math.inf, -math.inf, math.nan]
 VALUES += [random.Random(1).uniform(-4.0, 4.0) for _ in range(6)]
 PAIRS = [*product(VALUES, VALUES)]
 
 
 def flat_values(thing):
-    """All numbers of an object, in order."""
+    """Yield all numbers of an object, in order."""
     for value in vars(thing).values():
         if hasattr(value, "__dict__"):
             yield from flat_values(value)
@@ -34,7 +34,7 @@ def flat_values(thing):
 
 
 def c_member_paths(layout, cls, prefix):
-    """The same numbers in C."""
+    """Yield the C expressions of the same numbers."""
     for name, kind in layout.fields[cls].items():
         if isinstance(kind, StructPointer):
             yield from c_member_paths(layout, kind.cls, f"{prefix}{name}.")
@@ -45,12 +45,12 @@ def c_member_paths(layout, cls, prefix):
 
 
 def bits(values):
-    """Numbers as bits; any NaN is like any other."""
+    """Return the bit patterns of numbers; all NaNs are equal."""
     return [struct.pack("<d", math.nan if value != value else float(value)) for value in values]
 
 
 class CompiledMethods:
-    """Methods of two floats of an object, in C: each call begins with a fresh object."""
+    """Methods of an object compiled to C; each call starts from a fresh copy of the object."""
 
     def __init__(self, thing, methods, folder, warnings=STRICT):
         call_graph = CallGraph(thing)
@@ -77,14 +77,14 @@ class CompiledMethods:
         self.library, self.size = ctypes.CDLL(str(folder / "frozen.so")), 16 + len(state)
 
     def call(self, name, x, y):
-        """Whether the fault flag was raised, and what was returned and left behind, as long as Python's answer is."""
+        """Return the fault flag, and the returned values followed by the state of the object."""
         out = (ctypes.c_double * self.size)()
         fault = getattr(self.library, name)(ctypes.c_double(x), ctypes.c_double(y), out)
         return bool(fault), list(out)
 
 
 def assert_same_as_python(frozen, thing, name, pairs):
-    """A method in C and in CPython: results, objects afterwards, and exceptions as faults."""
+    """Compare results, final object states and exceptions (faults in C) of a method in C and CPython."""
     for x, y in pairs:
         it = copy.deepcopy(thing)
         try:
@@ -95,6 +95,6 @@ def assert_same_as_python(frozen, thing, name, pairs):
         assert fault == isinstance(result, Exception), f"{name}({x!r}, {y!r}): {result!r}"
         left = list(flat_values(it))
         values = [] if fault else [*result] if isinstance(result, tuple) else [result]
-        if fault:  # nothing is returned, but what was done before stays done
+        if fault:  # a fault returns no value, but earlier side effects remain
             out = out[frozen.widths[name] :]
         assert bits(out[: len(values) + len(left)]) == bits(values + left), f"{name}({x!r}, {y!r})"

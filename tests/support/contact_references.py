@@ -1,4 +1,4 @@
-"""Several contacts by scipy: the physics written a second time, piece by piece, each up to the event that ends it."""
+"""Models with several contacts, formulated independently and integrated by scipy from event to event."""
 
 import json
 from math import exp, fabs
@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 
 class Belt:
-    """Block on a belt.  As in all of these, a call gives rates, slips, friction and what it may hold in these modes."""
+    """Block on a belt. A call returns rates, slip speeds, friction forces and static limits in the given modes."""
 
     stop, states, modes, first, start = 10.0, ("x", "v"), ("mode",), [-1], [0.0, 0.0]
     changes = ((6.0, "v_belt", 0.13), (7.1, "v_belt", -0.05))
@@ -27,7 +27,7 @@ class Belt:
 
 
 class Clutch:
-    """Two inertias, which are one while the clutch holds."""
+    """Two inertias that turn as one while the clutch is engaged."""
 
     stop, states, modes, first, start = 4.0, ("omega1", "omega2"), ("mode",), [1], [50.0, 0.0]
     changes = ((1.7, "T_in", 90.0), (2.2, "T_in", 20.0), (3.3, "F_n", 200.0))
@@ -66,7 +66,7 @@ class Sleds:
 
 
 class Blocks:
-    """A block upon a block: four cases, of which two move as one body."""
+    """A block on a block, with four cases; in two of them both blocks move as one body."""
 
     stop, states, modes, first, start = 8.0, ("x1", "v1", "x2", "v2"), ("mode1", "mode2"), [0, 0], [0.0] * 4
     changes = ()
@@ -93,7 +93,7 @@ class Blocks:
 
 
 class Lift:
-    """A sled that its driver lifts as he pulls."""
+    """A sled that the driver lifts while pulling it."""
 
     stop, states, modes, first, start = 16.0, ("x", "v"), ("mode",), [0], [0.0, 0.0]
     changes = ()
@@ -114,7 +114,7 @@ CONTACT_REFERENCES = {"belt": Belt, "clutch": Clutch, "sleds": Sleds, "blocks": 
 
 
 def reference_events(name, changes=()):
-    """Time and modes of every event, and the state at the stop: of one of these, sought once a run."""
+    """Return time and modes of every event and the final state of a model; computed once per test run."""
 
     def make(folder):
         events, end = integrate_events(CONTACT_REFERENCES[name](), changes)
@@ -124,7 +124,7 @@ def reference_events(name, changes=()):
 
 
 def integrate_events(physics, changes=()):
-    """Time and modes of every event, and the state at the stop; changes: (t, name, value) on the way."""
+    """Return time and modes of every event and the final state. `changes` lists (t, name, value)."""
     t, y, modes, events = 0.0, np.array(physics.start), list(physics.first), []
     for end, name, value in (*changes, (physics.stop, "", 0.0)):
         while True:
@@ -157,7 +157,7 @@ def integrate_events(physics, changes=()):
 
 
 def event_function(physics, modes, i, side):
-    """Falls to zero where contact i stops to slide (side 0), or lets go to a side."""
+    """Return an event function that falls to zero where contact i stops slipping (side 0) or breaks away to a side."""
 
     def left(t, y, modes=tuple(modes)):
         _, slips, forces, most = physics(t, y, modes)
@@ -168,7 +168,7 @@ def event_function(physics, modes, i, side):
 
 
 def apply_breakaways(physics, t, y, modes):
-    """What bears more than it holds slides, one after the other."""
+    """Let contacts whose load exceeds the static limit slip, one after the other."""
     while True:
         _, _, forces, most = physics(t, y, modes)
         over = [i for i, m in enumerate(modes) if m == 0 and fabs(forces[i]) > most[i] * (1.0 + 1e-9)]

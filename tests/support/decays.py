@@ -1,4 +1,4 @@
-"""Simulated decays whose truth is known: `swung` makes a record, `random_record` one of any kind."""
+"""Simulated decays with known parameters: `decay_record` for given ones, `random_record` for random ones."""
 
 import numpy as np
 
@@ -36,27 +36,33 @@ def decay_record(
     drift=0.0,
     seed=6,
 ):
-    """The record of a decay from the amplitude `a`, at rest there until `turn`; with white noise, rounded to `step`."""
+    """Return the record of a decay that starts at rest with amplitude `a` at time `turn`, with white noise, rounded
+    to `step`."""
     model = SignalModel(side, order, sine, 0.0, 1e-7 * a)
     x, _ = model(np.array([turn, a, rest, drift, omega, zeta, r, b]), unknown_indices(TERMS, False), t)
     if order:
-        x[t < turn] = rest  # held
+        x[t < turn] = rest  # held at rest
     x = x + noise * np.random.default_rng(seed).standard_normal(len(t))
     base = "rad" if sine else "m"
     return Record("swung", t, step * np.round(x / step) if step else x, base + ("", "/s", "/s2")[order], order, base)
 
 
 def random_record(seed, law=None, sine=None, quantised=None, samples=None, order=0):
-    """A record and its truth: any law, amplitude, rate, noise; a third of them quantised, half of them pendulums; of
-    the position, or of its derivative of an `order`."""
+    """Return a random record, its true parameters, and whether it is a pendulum.
+
+    Law, amplitude, rate and noise are random; a third of the records are quantised and half are pendulums. The record
+    is the derivative of the position of the given order.
+    """
     rng = np.random.default_rng(seed)
     sine = bool(rng.integers(2)) if sine is None else sine
     law = LAWS[rng.integers(len(LAWS))] if law is None else law
     a = 10 ** (rng.uniform(-0.7, 0.45) if sine else rng.uniform(-3, 0))
     if sine and order == 2:
-        a = min(a, 1.4)  # beyond 90 degrees its acceleration has two peaks a swing
+        a = min(a, 1.4)  # beyond 90 degrees the acceleration has two peaks per swing
     omega = 10 ** rng.uniform(-0.3, 2)
-    lost = dict(zip(law, rng.dirichlet(np.ones(len(law))) * 10 ** rng.uniform(-2, -0.7), strict=True))  # of a, at first
+    lost = dict(
+        zip(law, rng.dirichlet(np.ones(len(law))) * 10 ** rng.uniform(-2, -0.7), strict=True)
+    )  # relative to a, at first
     truth = {
         "zeta": lost.get("zeta", 0.0) / np.pi,
         "r": lost.get("r", 0.0) * (min(a, 1.0) if sine else a) / 2,
@@ -72,7 +78,7 @@ def random_record(seed, law=None, sine=None, quantised=None, samples=None, order
     turn = rng.uniform(-1, 0.3) * np.pi / omega
     rest = rng.normal() * size
     if sine and a > 2:
-        turn = abs(turn)  # nothing is made up beyond what was seen
+        turn = abs(turn)  # the start is not extrapolated
     record = decay_record(
         **truth,
         sine=sine,

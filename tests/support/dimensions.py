@@ -1,6 +1,6 @@
-"""Numbers that know their dimension: physics computed with them shows whether its units are consistent.
+"""Numbers with a physical dimension, to check that equations are consistent with their units.
 
-They pass through the code of the models and methods as floats do; a sum of a force and a length raises.
+The code of models and methods computes with them like with floats; adding a force to a length raises DimensionError.
 """
 
 import math
@@ -10,22 +10,22 @@ from fractions import Fraction
 
 from fmus.packaging.units import unit_of
 
-ANY = (0.0, math.inf)  # zero and infinity are of every dimension
+ANY = (0.0, math.inf)  # zero and infinity match every dimension
 
 
 class DimensionError(AssertionError):
-    """Quantities of different dimensions were added or compared, or a function was given one that has a dimension."""
+    """Quantities of different dimensions were added or compared, or a function got an argument with a dimension."""
 
 
 class Quantity:
-    """A value in SI units, and its exponents of kg, m and s; an angle has none."""
+    """A value in SI units with the exponents of kg, m and s; angles are dimensionless."""
 
     def __init__(self, value, *powers):
         self.value, self.powers = value, powers
 
     @classmethod
     def of(cls, value, symbol):
-        """A value in a declared unit."""
+        """Return a value in a declared unit."""
         unit = unit_of(symbol, symbol)
         return cls(value, unit.kg, unit.m, unit.s)
 
@@ -38,7 +38,7 @@ class Quantity:
         return self.value
 
     def like(self, other, operation):
-        """The value of something of the same dimension."""
+        """Return the value of `other`, which must have the same dimension."""
         if not isinstance(other, Quantity):
             if abs(other) not in ANY and any(self.powers):
                 raise DimensionError(f"{operation.__name__} of {self!r} and the number {other!r}")
@@ -103,7 +103,7 @@ FUNCTIONS = {"sqrt": _sqrt, "fabs": _fabs, "copysign": _copysign, "atan2": _atan
 
 
 def patch_functions(monkeypatch):
-    """Let the models that have been written out, and their runtime, take roots and magnitudes of quantities."""
+    """Make the emitted models and their runtime use math functions that accept quantities."""
     for name, module in list(sys.modules.items()):
         if name.startswith("lowered_"):
             for function, taught in FUNCTIONS.items():

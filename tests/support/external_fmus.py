@@ -1,9 +1,5 @@
-"""Ten FMUs that are not ours, of plain pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C; sources in tests/external_fmus.
-
-built() / "Midpoint.fmu"       built once a run
-VARY["Midpoint"]               what a sweep may vary in it, as --vary takes it
-edited(fmu, copy, {name: new}) a copy with files changed, added, or (None) left out; a function gets the old text
-"""
+"""Ten FMUs that do not come from this project: pythonfmu (FMI 2.0), pythonfmu3 (FMI 3.0) and C. Sources:
+tests/external_fmus."""
 
 import os
 import subprocess
@@ -18,20 +14,20 @@ import build_cache
 SOURCES = Path(__file__).parents[1] / "external_fmus"
 SWEEP_AXES = {
     "Midpoint": "k=30:50:3",  # FMI 2.0: converges as its communication steps become shorter; no units
-    "FixedStep": "k=0.5:1:3",  # has a step of its own
-    "Switching": "loss=0.1:0.2:3",  # Boolean, Integer and String, as outputs and as parameters
-    "Falling": "height=1:4:3",  # ends itself
-    "NonConforming": "k=30:50:3",  # breaks the standard, and would run
-    "Faulty": "k=1:2:3",  # with kind=1 to 6 it hangs, crashes, raises, prints, gives NaN, fails
-    "Fmi3Midpoint": "k=30:50:3",  # FMI 3.0, with units; ends itself at `limit`
-    "Arrays": "omega=1:3:3",  # FMI 3.0: arrays, an enumeration, a text
-    "ModelExchangeOnly": "k=30:50:3",  # FMI 3.0, model exchange alone
-    "Bouncing": "e=0.7:0.9:3",  # FMI 2.0, model exchange alone, in C: events that change states; with units
+    "FixedStep": "k=0.5:1:3",  # has a fixed internal step
+    "Switching": "loss=0.1:0.2:3",  # Boolean, Integer and String outputs and parameters
+    "Falling": "height=1:4:3",  # terminates the simulation
+    "NonConforming": "k=30:50:3",  # violates the standard, but runs
+    "Faulty": "k=1:2:3",  # with kind=1 to 6 it hangs, crashes, raises, prints, returns NaN, fails
+    "Fmi3Midpoint": "k=30:50:3",  # FMI 3.0, with units; terminates at `limit`
+    "Arrays": "omega=1:3:3",  # FMI 3.0: arrays, an enumeration, a string
+    "ModelExchangeOnly": "k=30:50:3",  # FMI 3.0, model exchange only
+    "Bouncing": "e=0.7:0.9:3",  # FMI 2.0, model exchange only, in C: events that change states; with units
 }
 
 
 def build_external_fmus():
-    """The folder of all ten."""
+    """Return the folder of all ten FMUs, built once per test run."""
     folder = build_cache.shared_folder / "foreign"
     with (build_cache.shared_folder / "foreign.lock").open("w") as lock:
         flock(lock, LOCK_EX)
@@ -44,7 +40,7 @@ def build_external_fmus():
 
 
 def edited_copy(fmu, copy, changes):
-    """A copy of an FMU with files changed."""
+    """Write a copy of an FMU with changed, added or (None) removed files; a function is applied to the old text."""
     with ZipFile(fmu) as old, ZipFile(copy, "w", ZIP_DEFLATED) as new:
         content = {name: old.read(name) for name in old.namelist()}
         for name, change in changes.items():
@@ -56,7 +52,7 @@ def edited_copy(fmu, copy, changes):
 
 
 def main(out):
-    """Build them all."""
+    """Build all FMUs."""
     import pythonfmu
     import pythonfmu3
 

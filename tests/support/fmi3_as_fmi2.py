@@ -1,12 +1,12 @@
-"""fmpy's FMI 3.0 instances under the names of its FMI 2.0 slave, so that the same helpers lead both."""
+"""FMI 3.0 instances of fmpy with the method names of its FMI 2.0 slave, so that the same helpers work for both."""
 
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 
 class Names:
-    """The calls of FMI 2.0 whose name or place is another in FMI 3.0."""
+    """FMI 2.0 names for functions that have another name or signature in FMI 3.0."""
 
-    experiment = {}  # noqa: RUF012 - replaced, never changed
+    experiment = {}  # noqa: RUF012 - replaced, never mutated
 
     def setupExperiment(self, **experiment):
         self.experiment = experiment

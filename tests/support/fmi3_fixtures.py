@@ -1,6 +1,6 @@
-"""The FMI 3.0 FMUs, built once, and the processes that run them, as fixtures under the names of those for FMI 2.0.
+"""The FMI 3.0 FMUs and the processes that run them, as fixtures with the names of those for FMI 2.0.
 
-A test module takes them over by assignment: `fmus, worker, _workers = fmi3_fixtures.FIXTURES`; `launch` follows.
+A test module selects them by assignment: `fmus, worker, _workers = fmi3_fixtures.FIXTURES`; `launch` then uses them.
 """
 
 from functools import cache
@@ -18,15 +18,15 @@ class Worker(worker_client.Worker):
     script = "fmi3_worker.py"
 
     def exchange(self, path, name="test"):
-        """An instance for model exchange."""
+        """Create an instance for model exchange."""
         return worker_client.Instance(self, self.call(None, "exchange", str(path), name))
 
     def simulate(self, path, kind, **options):
-        """The columns of a run by fmpy; Failed when it raises."""
+        """Simulate with fmpy and return the columns; raise FmpyError if fmpy raises."""
         return self.simulate_and_count(path, kind, **options)[0]
 
     def simulate_and_count(self, path, kind, **options):
-        """The same, and how often the derivatives were evaluated."""
+        """Simulate with fmpy and return the columns and the number of derivative evaluations."""
         answer = self.call(None, "simulate", str(path), {"fmi_type": kind, **options})
         if "error" in answer:
             raise FmpyError(answer["error"])
@@ -34,12 +34,12 @@ class Worker(worker_client.Worker):
 
 
 class FmpyError(Exception):
-    """fmpy gave up a run."""
+    """fmpy aborted a run."""
 
 
 @cache
 def build_fmi3_fmus():
-    """The folder of the FMI 3.0 FMUs."""
+    """Return the folder of the FMI 3.0 FMUs."""
     require_compiler()
     return build_cache.build_once("fmi3", "--fmi", "3", "--platform", "linux64", timeout=600)
 
@@ -49,7 +49,7 @@ REDUCED = {"stickslip": ("ode23", "hybrid"), "coulomb": ("rodas", "sign")}
 
 @cache
 def build_reduced_fmu(name):
-    """The FMI 3.0 FMU of a model with one method and one law."""
+    """Return the FMI 3.0 FMU of a model with one method and one friction law."""
     require_compiler()
 
     def make(folder):

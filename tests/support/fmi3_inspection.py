@@ -1,4 +1,4 @@
-"""Look into built FMI 3.0 FMUs, in a process that never saw their sources: tests name functions here.
+"""Inspect built FMI 3.0 FMUs in a process that does not import the sources.
 
 python fmi3_inspection.py call_each '[[[FUNCTION, ARGUMENT, ...], ...]]'
 """
@@ -19,7 +19,7 @@ NUDGE = 1e-3
 
 @contextmanager
 def instance(path):
-    """An instance for model exchange, its description and its folder; all of it is gone afterwards."""
+    """Yield a model-exchange instance, its description and its folder, and clean up afterwards."""
     folder = str(extract(path))
     description = read_model_description(folder)
     fmu = FMU3Model(guid=description.guid, unzipDirectory=folder, modelIdentifier=description.modelName)
@@ -40,7 +40,7 @@ def write(fmu, variable, value):
 
 
 def variables(path):
-    """Every variable, under its own name, as it reads before and after it is set."""
+    """Read every variable before and after setting it."""
     with instance(path) as (fmu, description, _):
         starts, after = {}, {}
         declared = [variable for variable in description.modelVariables if variable.alias is None]
@@ -55,10 +55,10 @@ def variables(path):
 
 
 def factors(path, parameters):
-    """How everything that is calculated between events answers to a nudge of a state or an input.
+    """Measure how all continuous calculated variables respond to small changes of each state and input.
 
-    {reference of the unknown: {reference of the known: [factors, one for each point at which it answered]}}; the
-    points are some at rest and some in motion, for every choice of law that the model has.
+    Returns {reference of the unknown: {reference of the known: [factors]}} with one factor for each point at which the
+    unknown responded. The points are at rest and in motion, for every choice of friction law.
     """
     found = {}
     with instance(path) as (fmu, description, _):
@@ -84,7 +84,7 @@ def factors(path, parameters):
                 force = chance.uniform(-0.1, 0.1)
                 put(fmu, push, [*point[: len(states)], force])
                 fmu.enterEventMode()
-                settle(fmu)  # the mode does, and the nudges do not change it
+                settle(fmu)  # sets the mode, which the small changes keep
                 point = (c_double * len(states))()
                 fmu.getContinuousStates(point, len(states))
                 point = [*point, force]
@@ -100,7 +100,7 @@ def factors(path, parameters):
 
 
 def nominals(path, variable, value):
-    """The nominal values of the states before and after an event that sets a variable, and what each event tells."""
+    """Return the event flag and the nominal values before, at and after an event that sets a variable."""
     with instance(path) as (fmu, description, _):
         there = {variable.name: variable for variable in description.modelVariables}
         sizes = (c_double * len(description.derivatives))()
@@ -123,7 +123,7 @@ def settle(fmu):
 
 
 def put(fmu, push, point):
-    """Take states and input to a point."""
+    """Set states and input to a point."""
     *states, force = point
     write(fmu, push, force)
     fmu.setTime(1.0)
@@ -131,13 +131,13 @@ def put(fmu, push, point):
 
 
 def answers(fmu, smooth, push, point):
-    """What the unknowns read there."""
+    """Read the unknowns at a point."""
     put(fmu, push, point)
     return [read(fmu, variable) for variable in smooth]
 
 
 def call_each(requests):
-    """The answers of these functions to these arguments, one after another."""
+    """Call functions of this module one after another and return their results."""
     return [globals()[function](*arguments) for function, *arguments in requests]
 
 

@@ -1,6 +1,6 @@
 """life_cycles.py for FMI 3.0 FMUs: folders are used for co-simulation and model exchange in turn.
 
-Lives of FMI 2.0 FMUs are as ever.  python fmi3_life_cycles.py FUNCTION '[ARGUMENTS]'
+FMI 2.0 FMUs are handled by life_cycles.py.  python fmi3_life_cycles.py FUNCTION '[ARGUMENTS]'
 """
 
 import json
@@ -8,7 +8,7 @@ import os
 import sys
 from ctypes import c_double
 
-sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not search the folder of its script
 
 import life_cycles
 from fmi3_as_fmi2 import Model, Slave
@@ -33,7 +33,7 @@ class CoSimulationLifeCycle(life_cycles.LifeCycle):
 
 
 class ModelExchangeLifeCycle(CoSimulationLifeCycle):
-    """An instance for model exchange; a step is one of Euler's, and an event."""
+    """An instance for model exchange; a step is one Euler step followed by an event."""
 
     interface = Model
 
@@ -59,13 +59,13 @@ class ModelExchangeLifeCycle(CoSimulationLifeCycle):
 
 
 def make_life_cycle(folder, name="life"):
-    """A life of the FMU in a folder."""
+    """Create an instance of the FMU in a folder."""
     if life_cycles.describe(folder).fmiVersion == "2.0":
         return FMI2(folder, name)
     return kinds.setdefault(folder, (CoSimulationLifeCycle, ModelExchangeLifeCycle)[len(kinds) % 2])(folder, name)
 
 
-life_cycles.LifeCycle = make_life_cycle  # also in a spawned child, which reads this file too
+life_cycles.LifeCycle = make_life_cycle  # also in a spawned child, which imports this file too
 
 
 if __name__ == "__main__":

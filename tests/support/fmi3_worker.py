@@ -1,6 +1,6 @@
-"""worker.py for FMI 3.0: instances for co-simulation and for model exchange, and whole runs by fmpy, in one process.
+"""worker.py for FMI 3.0: co-simulation and model-exchange instances, and complete runs by fmpy, in one process.
 
-FMI 2.0 FMUs are welcome beside them.
+FMI 2.0 FMUs may be used in the same process.
 """
 
 import os
@@ -13,22 +13,22 @@ import numpy as np
 from fmpy.fmi3 import FMU3Model
 from scipy.integrate import solve_ivp
 
-sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not search the folder of its script
 
 import worker
 from fmi3_as_fmi2 import Model, Slave
 
-FLAGS = ("again", "terminate", "nominals", "states")  # of fmi3UpdateDiscreteStates, in its order
+FLAGS = ("again", "terminate", "nominals", "states")  # the outputs of fmi3UpdateDiscreteStates, in order
 
 
 class CoSimulation(worker.Instance):
-    """An FMI 3.0 instance that solves by itself."""
+    """An FMI 3.0 co-simulation instance."""
 
     interface = Slave
 
     def __init__(self, fmu, name):
         directory, description = fmu
-        kinds = {"Float64": "Real"}  # as its parent calls it
+        kinds = {"Float64": "Real"}  # as in the base class
         self.variables = {v.name: (v.valueReference, kinds.get(v.type, v.type)) for v in description.modelVariables}
         self.states, self.log = [], []
         self.slave = self.interface(
@@ -44,12 +44,12 @@ class CoSimulation(worker.Instance):
 
 
 class ModelExchange(CoSimulation):
-    """An FMI 3.0 instance that a solver of the importer leads."""
+    """An FMI 3.0 model-exchange instance."""
 
     interface = Model
 
     def sizes(self):
-        """The numbers of continuous states and of event indicators."""
+        """Return the numbers of continuous states and of event indicators."""
         return self.slave.getNumberOfContinuousStates(), self.slave.getNumberOfEventIndicators()
 
     def _vector(self, get, size):
@@ -83,23 +83,24 @@ class ModelExchange(CoSimulation):
         self.slave.enterEventMode()
 
     def update_discrete_states(self):
-        """The flags that are raised."""
+        """Update the discrete states and return the names of the flags that are set."""
         *flags, timed, due = self.slave.updateDiscreteStates()
         self.ahead = due if timed else None
         return [name for name, flag in zip(FLAGS, flags, strict=True) if flag]
 
     def next_event_time(self):
-        """When the next event will be, as the last update told; None where it did not."""
+        """Return the time of the next event from the last update, or None."""
         return self.ahead
 
     def enter_continuous_time(self):
         self.slave.enterContinuousTimeMode()
 
     def solve(self, times, names, method, rtol, ramp):
-        """Rows at the times by scipy, a second importer, and the number of evaluations of the derivatives.
+        """Integrate with scipy as a second importer; return the rows at the times and the number of derivative
+        evaluations.
 
-        The instance is at times[0], in continuous-time mode.  `ramp` is {name: [value at time 0, rate]}: inputs for
-        all time.  An event is taken where an indicator is no more above zero, as SUNDIALS does.
+        The instance is at times[0], in continuous-time mode. `ramp` is {name: [value at time 0, rate]} for inputs. An
+        event is handled where an indicator is no longer positive, as in SUNDIALS.
         """
         read, t, rows, evaluations = self._reader(names), times[0], [], 0
 
@@ -126,7 +127,7 @@ class ModelExchange(CoSimulation):
             run = solve_ivp(rates, (t, times[-1]), self.get_states(), method, **options)
             evaluations += run.nfev
             ahead = run.t[-1]
-            if run.status == 1:  # at the root, give or take the last digits
+            if run.status == 1:  # at the root, up to the last digits
                 near = (ahead + i * np.spacing(ahead) for i in range(1000))
                 ahead = next(t for t in near if min(root(t, run.sol(t)) for root in roots) <= 0.0)
             while len(rows) < len(times) and (times[len(rows)] < ahead or run.status == 0):
@@ -157,7 +158,7 @@ class Worker(worker.Worker):
         return len(self.instances) - 1
 
     def simulate(self, path, options):
-        """What fmpy.simulate_fmu gives: {"columns": ..., "evaluations": of the derivatives} or {"error": text}.
+        """Return {"columns": ..., "evaluations": of the derivatives} of fmpy.simulate_fmu, or {"error": text}.
 
         An `input` is given as [names, rows].
         """

@@ -1,6 +1,7 @@
-"""Hosts of FMUs: processes as `python -I SCRIPT ARGUMENTS` begins them, but forked from one that has loaded what they
-load, for that takes half a second, and there are hundreds.  They end as Python does, so that late damage to memory
-shows."""
+"""Start `python -I SCRIPT ARGUMENTS` by forking a process that has imported fmpy and scipy, which takes half a second.
+
+The processes exit like Python, so that late memory errors show.
+"""
 
 import atexit
 import gc
@@ -19,12 +20,14 @@ from pathlib import Path
 from types import ModuleType
 
 PRELOADED = ("fmpy.fmi2", "fmpy.fmi3", "fmpy.logging", "multiprocessing.queues", "scipy.integrate")
-MAX_REQUEST = 1 << 17  # bytes of what is asked
-temporary_folder = None  # the folder of their temporary files, which somebody else removes: many are ended from outside
+MAX_REQUEST = 1 << 17  # bytes of a request
+temporary_folder = (
+    None  # for the temporary files of the processes; removed by conftest.py, because many of them are killed
+)
 
 
 class ForkedProcess:
-    """What is needed here of a subprocess.Popen; its streams are open files."""
+    """The part of subprocess.Popen that the tests need; the streams are open files."""
 
     def __init__(self, words, stdin, stdout, stderr, cwd=None):
         self.link, theirs = socket_pair()
@@ -35,7 +38,7 @@ class ForkedProcess:
         self.pid, self.returncode = int(self.link.recv(99)), None
 
     def wait(self, timeout=None):
-        """The exit status, or None if the process has not ended within so many s."""
+        """Return the exit status, or None if the process still runs after `timeout` seconds."""
         if self.returncode is None and select.select([self.link], [], [], timeout)[0]:
             self.returncode = int(self.link.recv(99))
             self.link.close()
@@ -50,18 +53,18 @@ class ForkedProcess:
 
 
 def pipe():
-    """Its end to read from and its end to write to."""
+    """Return the reading and the writing end of a pipe."""
     return [os.fdopen(end, mode, buffering=0) for end, mode in zip(os.pipe(), ("rb", "wb"), strict=True)]
 
 
 def socket_pair():
-    """The two ends of a line, on which messages stay apart."""
+    """Return the two ends of a socket that keeps message boundaries."""
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 
 @cache
 def _server():
-    """The line to the process from which the others are forked."""
+    """Start the server process and return the socket to it."""
     mine, theirs = socket_pair()
     with theirs:
         call = [sys.executable, "-I", __file__, str(theirs.fileno())]
@@ -73,11 +76,13 @@ def _server():
 
 
 def serve_forks(line):
-    """Fork twice for every message: returns what was asked in the second process; the first tells who that is, and how
-    it ended."""
+    """Fork twice for every request: the outer child reports the process id and exit status of the inner one.
+
+    Returns the request in the inner child.
+    """
     for name in PRELOADED:
         import_module(name)
-    gc.freeze()  # else whoever is forked copies all that there is, to count who refers to it
+    gc.freeze()  # reference counts would otherwise copy every memory page in each child
     while True:
         asked, (*files,), *_ = socket.recv_fds(line, MAX_REQUEST, 4)
         if not asked:
@@ -94,7 +99,7 @@ def serve_forks(line):
     if pid := os.fork():
         for file in streams:
             os.close(file)
-        with suppress(OSError):  # whoever asked is gone
+        with suppress(OSError):  # the client has exited
             os.write(link, str(pid).encode())
             os.write(link, str(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])).encode())
         os._exit(0)
@@ -106,7 +111,7 @@ def serve_forks(line):
 
 
 def run_as(words, folder, environment):
-    """What a process is that was started so."""
+    """Set up the process and run the script."""
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)

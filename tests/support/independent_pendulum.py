@@ -1,9 +1,9 @@
-"""The pendulum a second time: DOP853 at 1e-13 with short steps, restarted at every change of mode.
+"""Independent solution of the pendulum: DOP853 at 1e-13 with short steps, restarted at every change of mode.
 
     (J_G + m a^2) alpha = T_ext - m g a sin(theta) - mu r N sign(omega)
     N = m g, or the magnitude of (m g cos(theta) + m a omega^2, m g sin(theta) + m a alpha)
 
-It has no closed form; this route shares neither method nor code with the FMU and is good to about 1e-12 rad.
+There is no closed form. This solution shares neither method nor code with the FMU and is accurate to about 1e-12 rad.
 """
 
 from bisect import bisect_right
@@ -25,7 +25,7 @@ THETA0 = radians(10.02)
 
 
 class Pendulum:
-    """The equations for one set of parameters; `reaction` takes the pin load from the motion."""
+    """The equations for one set of parameters; `reaction` computes the pin load from the motion."""
 
     def __init__(self, reaction=False, **values):
         self.reaction = reaction
@@ -36,9 +36,9 @@ class Pendulum:
         return self.T_ext - self.m * self.g * self.a * sin(theta)
 
     def acceleration(self, theta, omega, mode):
-        """Angular acceleration; the pin load that depends on it is iterated to a fixed point."""
+        """Return the angular acceleration; a pin load that depends on it is found by fixed-point iteration."""
         alpha, normal, weight = 0.0, self.m * self.g, self.m * self.g
-        for _ in range(12):  # each round gains two digits with pins as thin as these
+        for _ in range(12):  # each iteration gains two digits for thin pins
             if self.reaction:
                 radial = weight * cos(theta) + self.m * self.a * omega**2
                 normal = hypot(radial, weight * sin(theta) + self.m * self.a * alpha)
@@ -46,13 +46,13 @@ class Pendulum:
         return alpha
 
     def direction(self, theta):
-        """Where it goes from rest: at rest the pin bears the weight."""
+        """Return the direction of motion from rest, where the pin carries the weight."""
         load = self.load(theta)
         return int(copysign(1, load)) if abs(load) > self.mu * self.r * self.m * self.g else 0
 
 
 class PendulumMotion:
-    """The motion over spans of (time, Pendulum) up to `stop`: `at(t)`, `events` of (time, new mode)."""
+    """The motion over spans of (time, Pendulum) up to `stop`; `events` lists (time, new mode)."""
 
     def __init__(self, spans, theta, omega, stop):
         self.starts, self.modes, self.parts, self.events = [], [], [], []
@@ -72,12 +72,12 @@ class PendulumMotion:
                     mode = pendulum.direction(theta)
 
     def at(self, t):
-        """Angle and angular speed at time t."""
+        """Return angle and angular speed at time t."""
         return tuple(self.parts[max(bisect_right(self.starts, t) - 1, 0)](t))
 
 
 def integrate_to_turning_point(pendulum, mode, t, end, theta, omega):
-    """From t to the next turning point or the end: time, angle, angular speed and the dense solution."""
+    """Integrate to the next turning point or the end; return time, angle, angular speed and the dense solution."""
 
     def rates(_, y):
         return y[1], pendulum.acceleration(y[0], y[1], mode)

@@ -1,4 +1,5 @@
-"""The piecewise linear oscillators in closed form, typed by hand in 80-digit arithmetic: what the FMUs are judged by.
+"""Independent closed-form solution of the piecewise linear oscillators in 80-digit arithmetic, the reference for the
+FMUs.
 
 Between two changes of mode or of force, with s the time since the last one and y = x - x(0),
 
@@ -10,7 +11,7 @@ difference of exp(r s) over the nodes a, b, ..., which covers every damping regi
     G = [r2, r1],  I = [r2, r1, 0],  J = [r2, r1, 0, 0]          (G, its integral, and the integral of that)
     y = v G + (N I + R J)/m,    y' = v (exp(r2 s) + r1 G) + (N G + R I)/m
 
-Nothing here is shared with the code under test.  Digits lost by nodes that nearly coincide are paid for in advance.
+Nothing here is shared with the code under test. 80 digits leave a margin for the cancellation of nearly equal nodes.
 """
 
 from bisect import bisect_right
@@ -20,15 +21,14 @@ from itertools import count, takewhile
 from mpmath import atan2, atanh, exp, factorial, findroot, mp, mpf, pi, re, sign, sqrt
 
 mp.dps = 80
-TOUCH_TOLERANCE = (
-    mpf(10) ** -40
-)  # a speed this near to zero only touches it; a load this near to the limit is the limit
-ROUNDING = mpf(10) ** -75  # of a speed; below it a root is found no better, however often it is looked for
+TOUCH_TOLERANCE = mpf(10) ** -40  # a smaller speed only touches zero; a load closer to the limit equals the limit
+ROUNDING = mpf(10) ** -75  # of a speed; roots cannot be located more accurately
 
 
 @dataclass(frozen=True)
 class System:
-    """Forces of one span of time (SI units): `slide` and `hold` are the friction forces, `speed` is the driver's."""
+    """Forces of one span of time (SI units): `slide` and `hold` are the friction forces, `speed` is that of the
+    driver."""
 
     m: float
     k: float
@@ -40,12 +40,12 @@ class System:
     dry: bool = True
 
     def load(self, x, drive):
-        """What the mass would feel without friction and damping."""
+        """Return the force on the mass without friction and damping."""
         return mpf(self.push) + mpf(self.k) * (drive - x)
 
     @property
     def rate(self):
-        """Of the load, while the mass rests."""
+        """Rate of the load while the mass rests."""
         return mpf(self.k) * mpf(self.speed)
 
 
@@ -63,7 +63,7 @@ def stickslip(m=12.5, k=742.5, mu_s=0.9, mu_d=0.6, g=9.81, v_driver=0.034, F_ext
 
 
 class LinearSegment:
-    """One linear piece: displacement and speed, and where the speed first changes sign."""
+    """One linear segment: displacement, speed, and the first sign change of the speed."""
 
     def __init__(self, system, net, v):
         self.m, self.c, self.k = mpf(system.m), mpf(system.c), mpf(system.k)
@@ -72,7 +72,7 @@ class LinearSegment:
         self.nodes = [(-self.c - spread) / (2 * self.m), (-self.c + spread) / (2 * self.m), mpf(0), mpf(0)]
 
     def at(self, s):
-        """Displacement y and speed y' at s."""
+        """Return displacement y and speed y' at s."""
         first = [exp(r * s) for r in self.nodes]
         row, heads = first, []
         for n in range(1, 4):
@@ -87,7 +87,7 @@ class LinearSegment:
         return re(y), re(v)
 
     def flats(self):
-        """The times s > 0, in order, where the acceleration is zero; between two of them the speed is monotonic.
+        """Yield the times s > 0, in order, where the acceleration is zero; the speed is monotonic between them.
 
         a = exp(-d s) (a0 cos(w s) + b/w sin(w s)) with d = c/(2 m), w^2 = k/m - d^2, b = a'(0) + d a0.
         """
@@ -109,9 +109,9 @@ class LinearSegment:
                 yield -a / b
 
     def turning_point(self, mode, horizon, catches):
-        """The first s in (0, horizon] where the speed leaves the sign of `mode`, or None.
+        """Return the first s in (0, horizon] where the speed leaves the sign of `mode`, or None.
 
-        `catches`: static friction is larger, so that a speed which only touches zero stays there.
+        `catches`: static friction is larger, so that a speed that only touches zero sticks.
         """
         low = mpf(0)
         for high in [*takewhile(lambda s: s < horizon, self.flats()), mpf(horizon)]:
@@ -124,7 +124,7 @@ class LinearSegment:
 
 
 class Stuck:
-    """A mass at rest: no displacement, no speed."""
+    """A mass at rest."""
 
     @staticmethod
     def at(s):
@@ -134,8 +134,8 @@ class Stuck:
 class ClosedFormMotion:
     """The motion from the state (x, v) over spans of constant parameters, up to `stop`.
 
-    `spans` is a list of (time, System), the first of them at the start time.  `events` lists (time, new mode) for
-    every change of mode (-1, 0, 1; always 1 without dry friction).
+    `spans` is a list of (time, System), the first of them at the start time.  `events` lists (time, new mode) for every
+    change of mode (-1, 0, 1; always 1 without dry friction).
     """
 
     def __init__(self, spans, x, v, stop):
@@ -145,7 +145,7 @@ class ClosedFormMotion:
             self.span(system, end)
 
     def span(self, system, end):
-        """Append the pieces from the present point to `end`."""
+        """Append the segments from the current point to `end`."""
         load, rate = system.load(self.x, self.drive), system.rate
         mode = (int(sign(self.v)) or direction(load, rate, system.hold)) if system.dry else 1
         net = load - mode * system.slide
@@ -164,7 +164,7 @@ class ClosedFormMotion:
                 return
             self.move(system, piece, s)
             self.v, load = mpf(0), system.load(self.x, self.drive)
-            # at a break-away the load equals the limit by definition: no rounding decides the direction
+            # at a breakaway the load equals the limit by definition, so that rounding does not decide the direction
             mode = int(sign(rate)) if stuck else direction(load, rate, system.hold)
             net = mode * (system.hold - system.slide) if stuck else load - mode * system.slide
 
@@ -180,7 +180,7 @@ class ClosedFormMotion:
         self.t, self.x, self.drive = self.t + s, self.x + y, self.drive + mpf(system.speed) * s
 
     def at(self, t):
-        """Position and speed at time t."""
+        """Return position and speed at time t."""
         i = max(bisect_right(self.starts, t) - 1, 0)
         x, piece = self.parts[i]
         y, v = piece.at(mpf(t) - self.starts[i])
@@ -188,9 +188,9 @@ class ClosedFormMotion:
 
 
 def direction(load, rate, limit):
-    """Where a mass at rest goes: nowhere while friction can hold the load.
+    """Return the direction of motion from rest, or 0 while friction can hold the load.
 
-    Just the limit is held, unless the load is about to exceed it.
+    A load equal to the limit is held, unless it is about to exceed it.
     """
     for way in (-1, 1):
         if way * load > limit + TOUCH_TOLERANCE or (way * rate > 0 and way * load > limit - TOUCH_TOLERANCE):

@@ -1,4 +1,4 @@
-"""Runs inside Python, step by step: of a model as it is written out, and of the sources on numpy arrays."""
+"""Record internal steps in Python: of the emitted scalar code of a model, and of the vector sources on numpy arrays."""
 
 import struct
 
@@ -11,7 +11,7 @@ COUNTS = ("n_accepted", "n_rejected", "n_rhs")
 
 
 def prepared_model(model, values, stop):
-    """A model with its values, at the start of a run."""
+    """Return the model with these values set, prepared for a run."""
     for variable, value in values.items():
         owner = model.solver if "." in variable else model
         setattr(owner, variable.split(".")[-1], value)
@@ -24,18 +24,18 @@ def start(model, y, stop):
 
 
 def bits(numbers):
-    """Of numbers, whatever Python calls them; all that is not a number is alike."""
+    """Return the bit patterns of numbers of any type; all NaNs are equal."""
     return [struct.pack("<d", float(value)) if value == value else b"NaN" for value in numbers]
 
 
 def state_values(step, names):
-    """Numbers of a vector at the end of a step, by the names of their parts: x1 of x, x1_1 of x1."""
+    """Return the components of a vector at the end of a step, by their names: x1 for x, x1_1 for x1."""
     return [getattr(step, name + ("_" if name[-1].isdigit() else "") + "1") for name in names]
 
 
 def scalar_steps(model, values, stop, most):
-    """For each internal step its end, the state, its own rates, the modes, the size to try next, the counts, and the
-    state in its middle."""
+    """Return for each internal step its end, states, rates, modes, next step size, counters, and the state in its
+    middle."""
     prepared_model(model, values, stop)
     start(model, model.initial_state(0.0), stop)
     rates = [rate for rate in model.states.values() if rate not in model.states]
@@ -48,7 +48,7 @@ def scalar_steps(model, values, stop, most):
 
 
 def array_steps(model, values, stop, most):
-    """The same of the sources."""
+    """Return the same for the vector sources."""
     prepared_model(model, values, stop)
     model = to_array_model(model)
     start(model, [model.initial_state(0.0)], stop)

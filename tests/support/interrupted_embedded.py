@@ -1,6 +1,6 @@
-"""The code inside an FMU, interrupted as a function of it is entered, in whatever Python runs this file (3.9 or newer).
+"""Interrupt the code inside an FMU at function entry, in any Python that runs this file (3.9 or newer).
 
-python interrupted_embedded.py RESOURCES: prints for every entry what reaches the caller, and what the FMU says of it.
+python interrupted_embedded.py RESOURCES: prints for every entry point what reaches the caller and what the FMU reports.
 """
 
 import ctypes
@@ -15,7 +15,7 @@ from pathlib import Path
 
 
 class Stop(BaseException):
-    """What a host may have its handler raise."""
+    """An exception that the signal handler of a host may raise."""
 
 
 def stop(*_):
@@ -23,7 +23,8 @@ def stop(*_):
 
 
 def interrupted(slave, name, arguments):
-    """Nothing here is Python from the interrupt to the end of the call, as in the native layer."""
+    """Call a method with an interrupt pending; no Python code runs between the interrupt and the call, as in the
+    native layer."""
     trip, queue = ctypes.pythonapi["PyErr_SetInterrupt"], slave._get_log_queue()
     calls = trip, partial(getattr(slave, name), *arguments), queue.clear
     try:

@@ -1,4 +1,4 @@
-"""A host in Python that is interrupted while its FMU computes: python interrupted_host.py FUNCTION '[ARGUMENTS]'."""
+"""A Python host that is interrupted while its FMU computes: python interrupted_host.py FUNCTION '[ARGUMENTS]'."""
 
 import json
 import os
@@ -7,13 +7,13 @@ import sys
 import tempfile
 from math import isnan
 
-sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not look beside its script
+sys.path.insert(0, os.path.dirname(__file__))  # an isolated Python does not search the folder of its script
 
 import worker
 
 
 class Stop(BaseException):
-    """What a host may have its handler raise."""
+    """An exception that the signal handler of a host may raise."""
 
     def __init__(self, why, when):
         super().__init__(why, when)
@@ -38,7 +38,7 @@ def start_fmu(path):
 
 
 def begin(fmu):
-    fmu.set({"solver.method": 2, "solver.rtol": 1e-9})  # ode23: seconds and seconds of work
+    fmu.set({"solver.method": 2, "solver.rtol": 1e-9})  # ode23: computes for many seconds
     fmu.setup(0.0, None, None)
     fmu.init()
 
@@ -48,11 +48,11 @@ def interrupt(*_):
 
 
 def interrupt_long_step(path, handler):
-    """One step of minutes: what reaches the host, what the log says, what is read, and whether a reset recovers."""
+    """Interrupt one very long step; return the exception, the log, the values, and whether a reset recovers."""
     signal.signal(signal.SIGINT, HANDLERS[handler])
     fmu = start_fmu(path)
     signal.signal(signal.SIGVTALRM, interrupt)
-    signal.setitimer(signal.ITIMER_VIRTUAL, 0.1)  # of the processor's time: the step is under way, however busy it is
+    signal.setitimer(signal.ITIMER_VIRTUAL, 0.1)  # processor time: the step has begun, even on a loaded machine
     try:
         fmu.step(0.0, 1e7)
     except BaseException as error:
@@ -67,7 +67,8 @@ def interrupt_long_step(path, handler):
 
 
 def interrupt_short_steps(path, times):
-    """So often in short steps, most of them at the very entry or exit of a call: what reaches the host."""
+    """Interrupt short steps repeatedly, mostly at entry or exit of a call; return the exceptions that reach the
+    host."""
     fmu, reached = start_fmu(path), []
 
     def ring(*_):

@@ -1,8 +1,8 @@
 """Coverage of the 95 % intervals of identified decays: `python tests/support/interval_coverage.py [RECORDS]`.
 
-RECORDS for each law, of masses and of pendulums, with white noise and with quantised samples, and of velocities and
-accelerations; then the records that are wrong by more than five standard errors without a remark, of which there must
-be none.  A share of n records scatters by sqrt(0.95 0.05/n).  Ctrl-C shows what there is until then.
+RECORDS are simulated for each law, for masses and pendulums, with white noise and quantised samples, and for velocities
+and accelerations. Then the records that are wrong by more than five standard errors without a remark are listed; there
+must be none. The coverage of n records has a standard deviation of sqrt(0.95 0.05/n). Ctrl-C prints the results so far.
 """
 
 import sys
@@ -32,7 +32,7 @@ CASES = POSITIONS + RATES
 
 
 def check_record(number):
-    """Of the record of a number, whose case is its remainder: which intervals hold the truth, and what went wrong."""
+    """Fit the record of this number; return which intervals cover the true values, and a description of any failure."""
     law, sine, quantised, order = CASES[number % len(CASES)]
     record, truth, _ = random_record(number, law, sine, quantised, SAMPLES, order)
     try:
@@ -46,7 +46,7 @@ def check_record(number):
 
 
 def table_lines(rows):
-    """The table of what was judged, in the order of the numbers."""
+    """Yield the table of the checked records, in the order of their numbers."""
     yield f"{'law':12} {'kind':9} {'quantity':13} {'noise':10} {'records':>7} " + " ".join(
         f"{name:>6}" for name in (*NAMES, "all")
     )

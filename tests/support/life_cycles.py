@@ -1,4 +1,4 @@
-"""Many lives of FMUs in one process: a test names a function here and what to give it; the answer is JSON.
+"""Many life cycles of FMUs in one process: a test names a function of this file and its arguments; the result is JSON.
 
 python life_cycles.py FUNCTION '[ARGUMENTS]'
 """
@@ -57,14 +57,16 @@ class LifeCycle:
 
 
 class Heap(ctypes.Structure):
-    """What mallinfo(3) of glibc tells."""
+    """The result of mallinfo(3) of glibc."""
 
     _fields_ = [(name, ctypes.c_int) for name in ("_0", "_1", "_2", "_3", "mapped", "_5", "_6", "used", "_8", "_9")]
 
 
 def memory():
-    """What is in use of the heap of C and of Python's own, whose blocks have some 64 bytes, in kB.  Of the resident
-    memory the same leak would show after ten times as many lives."""
+    """Return the memory in use in the C heap and in the heap of Python, whose blocks average 64 bytes, in kB.
+
+    The resident memory would show the same leak only after ten times as many life cycles.
+    """
     gc.collect()
     tell = ctypes.CDLL(None).mallinfo
     tell.restype = Heap
@@ -72,8 +74,11 @@ def memory():
 
 
 def run_in_turn(paths, number):
-    """Create, run, reset, run, free, one FMU after another: the runs that came of it, the memory after a tenth of the
-    lives and after all, and what sys.path gained."""
+    """Create, run, reset, run and free one FMU after another.
+
+    Returns the number of distinct runs, the memory after a tenth of the life cycles and after all, and additions to
+    sys.path.
+    """
     folders, before, after = [extract(path) for path in paths], list(sys.path), []
     rows = {folder: set() for folder in folders}
     for i in range(number):
@@ -90,7 +95,7 @@ def run_in_turn(paths, number):
 
 
 def run_interleaved(paths, number):
-    """All alive at once, stepped in turns: how many different runs each FMU gave, and the memory a life took."""
+    """Step all instances in turn while all exist; return the number of distinct runs and the memory per instance."""
     folders = [extract(path) for path in paths]
     fleet = [[LifeCycle(folder, str(i)).begin() for i in range(5)] for folder in folders]
     before = memory()
@@ -108,7 +113,8 @@ def run_interleaved(paths, number):
 
 
 def unpack_for_every_run(path, number):
-    """Unpacked, run and removed, as fmpy's simulate_fmu does: memory early and late, libraries and sys.path then."""
+    """Unpack, run and delete repeatedly, as fmpy.simulate_fmu does; return early and late memory, libraries and
+    sys.path."""
     before, after = list(sys.path), []
     for i in range(number):
         folder = extract(path)
@@ -123,10 +129,10 @@ def unpack_for_every_run(path, number):
 
 
 def run_in_threads(paths, threads, turns):
-    """Each thread takes lives of every FMU, one after another: the different runs that came of it."""
+    """Run life cycles of every FMU in several threads; return the number of distinct runs."""
     folders = [extract(path) for path in paths]
     for folder in folders:
-        describe(folder)  # now: the XML parser behind it fails now and then when two threads meet in it
+        describe(folder)  # now, because the XML parser occasionally fails in two threads at once
     rows, errors = {folder: set() for folder in folders}, []
 
     def work():
@@ -148,7 +154,7 @@ def run_in_threads(paths, threads, turns):
 
 
 def continue_instances(given, folders):
-    """What the instances that were given say next, and a whole life of each FMU."""
+    """Return the next step of the given instances, and a complete run of each FMU."""
     return [life.step(TIMES[1], TIMES[2]) for life in given], [LifeCycle(folder).begin().run() for folder in folders]
 
 
@@ -157,7 +163,7 @@ def run_in_child(answers, *given):
 
 
 def run_in_processes(paths, method):
-    """Instances carried into two forked children, or none into a spawned one; the children against the parent."""
+    """Carry instances into two forked children, or none into a spawned one; compare the children with the parent."""
     folders = [extract(path) for path in paths]
     given = [LifeCycle(folder).begin() for folder in folders]
     for life in given:
@@ -177,14 +183,14 @@ def run_in_processes(paths, method):
 
 
 def run_beside_sources(root, paths):
-    """The FMUs in a host that has imported the sources and another pythonfmu: the files their code came from."""
+    """Run the FMUs in a host that has imported the sources and another pythonfmu; return the files of their code."""
     sys.path.insert(0, root)
     import pythonfmu
 
     import fmus.runtime.slave
 
     assert fmus.runtime.slave.Fmi2Slave is pythonfmu.fmi2slave.Fmi2Slave
-    pythonfmu.fmi2slave.Fmi2Slave.do_step = None  # whoever leaned on it would notice
+    pythonfmu.fmi2slave.Fmi2Slave.do_step = None  # any use of it by an FMU would fail
     mine = set(sys.modules)
     rows = run_each(paths)
     new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - mine}
@@ -193,7 +199,7 @@ def run_beside_sources(root, paths):
 
 
 def run_in_folder(path, folder):
-    """A run of the FMU unpacked into this very folder."""
+    """Run the FMU unpacked into this folder."""
     life = LifeCycle(extract(path, folder))
     rows = life.begin().run()
     life.end()
@@ -201,7 +207,7 @@ def run_in_folder(path, folder):
 
 
 def run_each(paths):
-    """A run of each FMU."""
+    """Run each FMU once."""
     return [run_in_folder(path, None) for path in paths]
 
 

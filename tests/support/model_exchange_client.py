@@ -1,4 +1,4 @@
-"""Model exchange by hand: an instance in the place of a solver, where it is, and what it said."""
+"""Fixtures and helpers to call a model-exchange instance step by step, as a solver does."""
 
 import fmi3_fixtures
 import pytest
@@ -14,7 +14,7 @@ ERROR = 3
 
 @pytest.fixture
 def launch(worker, fmus):
-    """launch(name, values): an instance in event mode for the first time; freed when the test ends."""
+    """Return launch(name, values), which creates an instance in its first event mode; freed when the test ends."""
     instances = []
 
     def launch(name, values=None):
@@ -29,7 +29,8 @@ def launch(worker, fmus):
 
 @pytest.fixture
 def launch_moving(launch):
-    """moving(name): an instance in continuous-time mode, sliding where friction is dry; a time and states for it."""
+    """Return launch_moving(name): an instance in continuous-time mode, slipping if friction is dry, and a time and
+    states for it."""
 
     def launch_moving(name):
         fmu = launch(name)
@@ -47,14 +48,14 @@ def launch_moving(launch):
 
 
 def handle_event_at(fmu, t, states):
-    """The flags that an event at this point raises."""
+    """Move to a point, handle an event there, and return its flags."""
     fmu.set_point(t, states)
     fmu.enter_event_mode()
     return fmu.update_discrete_states()
 
 
 def single_error(fmu):
-    """The one sentence that was said, in the log and on standard error, or nothing."""
+    """Return the single error message in the log and on standard error, or "" if there is none."""
     said = [message for message in fmu.messages() if message[0] != 0]
     lines = fmu.worker.read_stderr().splitlines()
     assert len(said) == len(lines) <= 1

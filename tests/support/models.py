@@ -1,4 +1,4 @@
-"""The list that completeness walks: every model file, its declared variables, and every law with every method."""
+"""Lists of all models, their variables, and combinations of laws and methods that tests iterate over."""
 
 from functools import cache
 from itertools import combinations as choose
@@ -16,34 +16,34 @@ BODIES = [
     name for name in MODELS if len(find_model(name).model().states) == 2
 ]  # position and speed are all their states
 EXAMPLE_MODELS = sorted((ROOT / "tests" / "example_models").glob("*.py"))  # as users write them, in files of their own
-LARGER_MODELS = sorted((ROOT / "tests" / "example_models" / "larger").glob("*.py"))  # of more states, or more contacts
+LARGER_MODELS = sorted((ROOT / "tests" / "example_models" / "larger").glob("*.py"))  # with more states or more contacts
 EXACT, ODE23, ODE45, DOP853, RODAS = 1, 2, 3, 4, 5
 HYBRID, SIGN, THRESHOLD = 1, 2, 3
 
 
 def model_class(name):
-    """The class of a model as it travels: written out."""
+    """Return the class of a model as it is packed in the FMU (lowered to scalars)."""
     return lowered_model(name)
 
 
 def runtime(name, part):
-    """A file of the runtime as it is written out for a model."""
+    """Return a runtime module as it is emitted for a model."""
     return sibling_module(lowered_model(name), f"runtime.{part}")
 
 
 @cache
 def declared(name):
-    """Name and declaration of every variable of a model, in the order of the XML."""
+    """Return name and declaration of every variable of a model, in the order of the XML."""
     return dict(variables(find_model(name).model()))
 
 
 def outputs(name):
-    """Names of the outputs; position and speed come first."""
+    """Return the names of the outputs; position and speed come first."""
     return [v for v, d in declared(name).items() if isinstance(d, Output)]
 
 
 def is_pushed(name):
-    """Whether a model has an input and a mass m, and starts where and as fast as it is told."""
+    """Return whether a model has an input, a mass m, and start values of position and speed."""
     x, v, *_ = outputs(name)
     return {"m", f"{x}0", f"{v}0"} <= {*declared(name)} and any(isinstance(d, Input) for d in declared(name).values())
 
@@ -52,23 +52,23 @@ PUSHED = [name for name in MODELS if is_pushed(name)]
 
 
 def parameters(name):
-    """Names and declarations of what takes a number: parameters and inputs, but no choices."""
+    """Return names and declarations of the numeric parameters and inputs (no choices)."""
     kinds = (Parameter, Input)
     return {v: d for v, d in declared(name).items() if isinstance(d, kinds) and not isinstance(d, Choice)}
 
 
 def tunable(name):
-    """Those of them that may change in mid-run."""
+    """Return those that may change during a run."""
     return {v: d for v, d in parameters(name).items() if d.variability != "fixed"}
 
 
 def is_allowed(choices):
-    """Whether a combination of choices makes sense: the closed form needs the hybrid law."""
+    """Return whether a combination of choices is valid: the closed form requires the hybrid law."""
     return not (choices.get("solver.method") == EXACT and choices.get("friction", HYBRID) != HYBRID)
 
 
 def combinations(name):
-    """Every allowed combination of a model's choices, as values to set."""
+    """Return every valid combination of the choices of a model, as values to set."""
     choices = {v: d for v, d in declared(name).items() if isinstance(d, Choice)}
     items = [[value for _, value, _ in declaration.items] for declaration in choices.values()]
     return [
@@ -77,10 +77,10 @@ def combinations(name):
 
 
 def experiment(name, values):
-    """One run that tests share: (model, values, stop time).
+    """Return the run of a model for a combination of choices, as (model, values, stop time).
 
-    Laws that chatter run as published, at rtol 1e-3, and not for long, nor do methods that are not for a stiff model,
-    but beyond its first slip: where friction should hold, they take steps without number.
+    Laws that chatter run as published, at rtol 1e-3, and only for a short time. So do non-stiff methods on a stiff
+    model, which stop after its first slip: where friction should hold, they take arbitrarily many steps.
     """
     stop, method = find_model(name).model.stop_time, values["solver.method"]
     if values.get("friction", HYBRID) == HYBRID:
@@ -90,7 +90,7 @@ def experiment(name, values):
 
 
 def pairwise_cases(name, many=2):
-    """A few combinations in which every so many choices meet: every two, though not every three."""
+    """Return a few combinations that contain every pair (`many` = 2) of choices."""
     groups = [(values, {*choose(values.items(), min(many, len(values)))}) for values in combinations(name)]
     kept, missing = [], set().union(*(each for _, each in groups))
     while missing:
@@ -104,20 +104,20 @@ CASES = [experiment(name, values) for name in MODELS for values in pairwise_case
 
 
 def label(case):
-    """A readable test id: the model and the labels of its choices."""
+    """Return a readable test id: the model and the labels of its choices."""
     name, values, _ = case
     names = [item[0] for v, value in values.items() for item in declared(name)[v].items if item[1] == value]
     return "-".join([name, *names])
 
 
 def counts(name):
-    """Names of the counts and of the time of the last event, where the model has them: a run's whole history."""
+    """Return the names of the counters and of the last event time, as far as the model has them."""
     wanted = ("solver.steps", "solver.rejected", "solver.evaluations", "solver.h", "events.count", "events.t_last")
     return [v for v in declared(name) if v in wanted]
 
 
 def push(name):
-    """The input of a model, and a size that overcomes its friction."""
+    """Return the input of a model and a value that overcomes its friction."""
     entry = next((v for v, d in declared(name).items() if isinstance(d, Input)), None)
     if entry is None:
         pytest.skip(f"{name} has no input")
@@ -125,8 +125,7 @@ def push(name):
 
 
 def write_growing_friction_model(folder):
-    """A file of the two sleds, in which the first one's sliding friction is not known beforehand: it grows with its
-    way."""
+    """Write a variant of the two sleds whose first sliding friction grows with its displacement."""
     (sleds,) = (path for path in LARGER_MODELS if path.stem == "sleds")
     text = sleds.read_text().replace("import Contact", "import fabs, Contact")
     text = text.replace("    x1 =", '    wear = Parameter(1.0, "N/m", "how friction grows")\n    x1 =')

@@ -1,4 +1,4 @@
-"""The C programs of tests/support, each compiled once a run by the system's compiler, and scripts for the host."""
+"""The C programs of tests/support, compiled once per test run, and scripts for the host."""
 
 import os
 import shutil
@@ -19,19 +19,20 @@ HEADERS = Path(fmpy.__file__).parent / "c-code"
 HOST_SOURCE = Path(__file__).with_name("fmi2_host.c")
 FMI3_HOST_SOURCE = HOST_SOURCE.with_name("fmi3_host.c")
 SANITIZERS = "address,undefined,float-cast-overflow"
-# The line of what was undefined, which ends in a trap; of what was freed 32 MB are watched, for new memory takes long.
+# Report the line of undefined behaviour, which ends in a trap. Keep 32 MB of freed memory under watch; more is slow.
 SANITIZER_ENVIRONMENT = os.environ | {"ASAN_OPTIONS": "handle_sigill=1:quarantine_size_mb=32"}
 
 
 def compiler():
-    """The system's C compiler."""
+    """Return the C compiler of the system."""
     found = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     return found or pytest.skip("there is no C compiler on this machine: install gcc")
 
 
 @cache
 def compile_cached(name, *words, sanitizers=""):
-    """The file that the compiler makes of these words; to optimise what is sanitized takes longer than to run it."""
+    """Compile once with these arguments and return the output; sanitized code is not optimised, which would take
+    longer."""
     words = [*words, "-ldl", "-lpthread", "-lm"]
     if sanitizers:
         words = [f"-fsanitize={sanitizers}", "-fsanitize-undefined-trap-on-error", "-O0", *words]
@@ -44,12 +45,12 @@ def compile_cached(name, *words, sanitizers=""):
 
 
 def host_program(sanitizers="", source=HOST_SOURCE):
-    """The host, as a program."""
+    """Return the compiled host program."""
     return compile_cached(source.stem, f"-I{HEADERS}", source, sanitizers=sanitizers)
 
 
 def compile_sanitized(source, fmu, *how, sanitizers=SANITIZERS):
-    """The program `source` of tests/support over the sources in an FMU, which it includes, linked `how` it is told."""
+    """Compile the program `source` of tests/support together with the sources in an FMU, which it includes."""
     name, sources = f"{source} {fmu.stem}", unpack_cached(fmu) / "sources"
     dry = ["-DDRY"] if "mode" in declared(fmu.stem) else []
     words = ["-c", "-fPIC", "-fvisibility=hidden", *dry, f"-I{sources}", HOST_SOURCE.with_name(source)]
@@ -59,7 +60,7 @@ def compile_sanitized(source, fmu, *how, sanitizers=SANITIZERS):
 
 @cache
 def unpack_cached(fmu):
-    """The folder of an extracted FMU."""
+    """Return the folder of an extracted FMU."""
 
     def make(folder):
         with zipfile.ZipFile(fmu) as archive:
@@ -73,8 +74,10 @@ def guid(fmu):
 
 
 def run_life_cycles(program, fmu, library, number, steps, **options):
-    """What fmi3_host.c, started by `program`, tells of lives of an FMI 3.0 FMU: the last position and speed in
-    co-simulation and in model exchange, and the lines that it says."""
+    """Run life cycles of an FMI 3.0 FMU in fmi3_host.c, started by `program`.
+
+    Returns the final position and speed in co-simulation and in model exchange, and the lines of standard error.
+    """
     name, place = fmu.stem, unpack_cached(fmu)
     token = fromstring((place / "modelDescription.xml").read_bytes()).attrib["instantiationToken"]
     read = [value_references(name)[variable] for variable in (*outputs(name)[:2], "m")]
@@ -88,7 +91,8 @@ def run_life_cycles(program, fmu, library, number, steps, **options):
 
 
 def run_host_script(fmu, script, threads=1, sanitizers=""):
-    """What the script answers, line by line, and what went to standard error; under sanitizers of the sources."""
+    """Run a script in the host; return its output lines and standard error. With sanitizers the sources are
+    compiled."""
     library = unpack_cached(fmu) / "binaries" / "linux64" / f"{fmu.stem}.so"
     if sanitizers:
         library = compile_sanitized("fmi2_stress.c", fmu, "-shared", sanitizers=sanitizers)
@@ -102,11 +106,11 @@ def run_host_script(fmu, script, threads=1, sanitizers=""):
 
 @cache
 def value_references(name):
-    """The value reference of every variable of a model."""
+    """Return the value reference of every variable of a model."""
     return {variable: place for place, variable in enumerate(declared(name))}
 
 
 def begin(instance, values=(), stop="nan"):
-    """The script from instantiation to the first step; values are (reference, value)."""
+    """Return the script from instantiation to the first step; values are (reference, value)."""
     sets = [f"{instance} setr {reference} {value!r}" for reference, value in values]
     return [f"{instance} new", *sets, f"{instance} setup nan 0 {stop}", f"{instance} enter", f"{instance} exit"]

@@ -1,4 +1,4 @@
-"""One body under a force that is a polynomial in time, by power series in many digits: friction, spring and damper.
+"""One body with friction, spring and damper under a polynomial force, solved by power series in many digits.
 
 m a = F(t) + k u t - k x - c v - mode slide,   stuck while |F(t) + k u t - k x| <= hold
 """
@@ -14,7 +14,7 @@ TIE = Decimal("1e-25")
 
 
 class Body:
-    """Where it is at time t, under a force in whose course it has been pushed; `events` tells when its mode changed."""
+    """The state at time t; `events` lists the times of mode changes."""
 
     def __init__(self, m=1.0, k=0.0, c=0.0, hold=0.0, slide=0.0, u=0.0, x=0.0, v=0.0):
         self.m, self.k, self.c, self.hold, self.slide, self.u = map(Decimal, (m, k, c, hold, slide, u))
@@ -22,25 +22,25 @@ class Body:
         self.force, self.pushed = [Decimal(0)], Decimal(0)
 
     def push(self, *force):
-        """From here on the force has this value and these derivatives; those of higher orders go on."""
+        """Set the force and its leading derivatives at the current time; higher derivatives continue."""
         self.force, self.pushed = [*map(Decimal, force), *self.course()[len(force) :]], self.t
         before, self.mode = self.mode, self.settled()
         self.events += [self.t] * bool(self.hold and self.t and self.mode != before)
 
     def course(self):
-        """The force and its derivatives."""
+        """Return the current force and its derivatives."""
         s, many = self.t - self.pushed, len(self.force)
         return [value([self.force[j] / factorial(j - n) for j in range(n, many)][::-1], s) for n in range(many)]
 
     def forces(self):
-        """The load and its derivatives, while the body stays where it is."""
+        """Return the load and its derivatives while the body does not move."""
         found = [*self.course(), Decimal(0), Decimal(0)]
         found[0] += self.k * (self.u * self.t - self.x)
         found[1] += self.k * self.u
         return found
 
     def settled(self):
-        """The mode that holds from here on; without dry friction any does."""
+        """Return the mode from the current time on; without dry friction any mode is right."""
         load, *rates = self.forces()
         if self.v or not self.hold:
             return sign(self.v)
@@ -48,7 +48,7 @@ class Body:
         return 0 if abs(load) + (TIE if outward else -TIE) <= self.hold else sign(load)
 
     def series(self):
-        """The coefficients of position and speed, the highest first."""
+        """Return the coefficients of position and speed, highest order first."""
         forces = self.forces()
         forces[0] += self.k * self.x - self.mode * self.slide
         x = [self.x, self.v]
@@ -58,7 +58,7 @@ class Body:
         return x[::-1], [n * one for n, one in enumerate(x)][:0:-1]
 
     def release(self):
-        """How long it stays where it is, and in which direction it goes then."""
+        """Return the time until breakaway and its direction."""
         load, *others = [one / factorial(n) for n, one in enumerate(self.forces())]
         found = [(Decimal("inf"), 0)]
         for side in 1, -1:
@@ -74,7 +74,7 @@ class Body:
         return min(found)
 
     def go(self, t):
-        """Position and speed at time t."""
+        """Return position and speed at time t."""
         t = Decimal(t)
         while self.t < t:
             h = min(STEP, t - self.t)
@@ -105,7 +105,7 @@ def sign(number):
 
 
 def value(series, h):
-    """Of a polynomial, by its coefficients, the highest first."""
+    """Evaluate a polynomial from its coefficients, highest order first."""
     total = Decimal(0)
     for one in series:
         total = total * h + one
@@ -113,7 +113,7 @@ def value(series, h):
 
 
 def sample_motion(body, pieces, times):
-    """Position, speed and time of the last event at each of the times, under a force that changes in pieces."""
+    """Return position, speed and last event time at each of the times, under a force that changes in pieces."""
     rows, left = [], list(pieces)
     with localcontext(prec=DIGITS):
         for t, end in pairwise([0.0, *times]):

@@ -1,13 +1,13 @@
-"""Two tables of values that must agree, row by row; the first difference is told."""
+"""Compare two tables of values row by row; the assertion names the first difference."""
 
 
 def assert_identical(rows, expected, names):
-    """Bit for bit; NaN equals NaN."""
+    """Compare bit for bit; NaN equals NaN."""
     assert_close(rows, expected, names, 0.0)
 
 
 def assert_close(rows, expected, names, rel):
-    """Every Real within `rel` of the largest value of its column; integers exactly, and NaN where NaN is expected."""
+    """Compare Reals to `rel` of the largest value of their column, integers exactly, and NaN only with NaN."""
     assert len(rows) == len(expected)
     for name, column, reference in zip(names, zip(*rows, strict=True), zip(*expected, strict=True), strict=True):
         numbers = [abs(b) for b in reference if b == b]

@@ -1,4 +1,4 @@
-"""Run the code inside FMUs without FMI, in whatever Python runs this file (3.9 or newer, standard library only).
+"""Run the code inside FMUs without FMI, in any Python that runs this file (3.9 or newer, standard library only).
 
 Reads JSON from standard input, a list of {"resources": folder, "reals": {reference: value}, "integers": {...}, "times":
 [...], "outputs": [references of Reals]}; prints the rows of every run as JSON.
@@ -25,7 +25,7 @@ def run(resources, reals, integers, times, outputs):
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
     rows = [slave.get_real(outputs)]
-    for t, ahead in zip(times, times[1:]):  # noqa: B905, RUF007 - Python 3.9 knows neither strict= nor pairwise
+    for t, ahead in zip(times, times[1:]):  # noqa: B905, RUF007 - Python 3.9 has neither strict= nor pairwise
         if not slave.do_step(t, ahead - t):
             sys.exit("do_step failed")
         rows.append(slave.get_real(outputs))

@@ -11,6 +11,6 @@ def open_sweep(folder):
 
 
 def sweep_folder(out, begin):
-    """The one folder of a sweep whose name begins so."""
+    """Return the single sweep folder whose name begins with `begin`."""
     (found,) = (out / "sweep").glob(f"{begin}-????????")
     return found

@@ -1,4 +1,4 @@
-"""The page that runs, built once, in one browser."""
+"""The interactive page, built once and opened in one browser."""
 
 import json
 
@@ -13,7 +13,7 @@ FOLLOWED += "const look = () => app.session.runs === runs ? setTimeout(look, 1) 
 
 
 def build_page(name, *words):
-    """The page of a room of its own."""
+    """Build the page in a folder of its own and return its file."""
     pytest.importorskip("ziglang", reason="the page is compiled by the package ziglang: pip install -e '.[native]'")
 
     def make(folder):
@@ -24,14 +24,16 @@ def build_page(name, *words):
 
 
 class Page:
-    """The page at an address, as a visitor has it."""
+    """The page at an address, as a visitor uses it."""
 
     def __init__(self, browser, file):
         self.browser, self.file = browser, file
 
     def open(self, hash="", anew=False):
-        """Go where a link with this behind the # leads: in the page that is open, by which whatever was set before is
-        gone, or by loading it anew; wait until all runs are done."""
+        """Open the page with this URL fragment and wait until all runs are done.
+
+        An open page follows the link, which resets all settings; `anew` reloads the page instead.
+        """
         there = self.run("globalThis.app && location.href")
         link = f"{self.file.as_uri()}#{hash}"
         if anew or not there or there.split("#")[0] != self.file.as_uri() or there == link:
@@ -44,7 +46,7 @@ class Page:
         return self.browser.run(script)
 
     def when_done(self, script):
-        """The value of an expression after something has been done and every run has ended."""
+        """Evaluate an expression after all runs are done."""
         self.run(READY)
         return self.run(script)
 
@@ -64,7 +66,7 @@ class Page:
         self.run(READY)
 
     def check(self, id, on):
-        """Tick a box, or not."""
+        """Tick or untick a box."""
         click = f"e => {{ if (e.checked !== {json.dumps(on)}) e.click() }}"
         self.run(f"({click})(document.getElementById({json.dumps(id)}))")
 
@@ -73,26 +75,26 @@ class Page:
         self.run(READY)
 
     def seek(self, t):
-        """Put the cursor at a time."""
+        """Move the cursor to a time."""
         self.run(f"app.seek({t!r})")
 
     def middle(self, selector):
-        """Where an element has its middle, in the window."""
+        """Return the centre of an element in window coordinates."""
         box = f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()"
         return self.run(f"(b => [b.x + b.width / 2, b.y + b.height / 2])({box})")
 
     def table(self, caption):
-        """Row heading -> cells of the table with a caption."""
+        """Return row heading -> cells of the table with this caption."""
         rows = "[...t.tBodies[0].rows].map(r => [...r.cells].map(c => c.textContent))"
         find = f"[...document.querySelectorAll('table')].find(t => t.caption.textContent === {json.dumps(caption)})"
         return {head: cells for head, *cells in self.run(f"(t => {rows})({find})")}
 
     def wait(self, condition):
-        """Until an expression is true."""
+        """Wait until an expression is true."""
         look = f"const look = () => {condition} ? done(true) : setTimeout(look, 10);"
         return self.run(f"new Promise(done => {{ {look} look() }})")
 
 
 def number(text):
-    """The number at the beginning of a cell."""
+    """Return the number at the beginning of a cell."""
     return float(text.split()[0].replace("\N{MINUS SIGN}", "-"))

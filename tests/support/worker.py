@@ -1,7 +1,7 @@
-"""The far end of worker_client.py: built FMUs in a process of their own that never sees the sources.
+"""Server side of worker_client.py: runs built FMUs in a process that does not import the sources.
 
-One request a line: [instance or null, function, arguments].  One answer a line: {"value": ...}, or {"refused": [FMI
-function, status]} when an FMI call does not return OK, or {"failed": traceback}.
+One request per line: [instance or null, function, arguments]. One answer per line: {"value": ...}, or {"refused": [FMI
+function, status]} if an FMI call does not return OK, or {"failed": traceback}.
 """
 
 import ctypes
@@ -26,8 +26,9 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 
 
-def signature(thing, told=inspect.signature, known={}, **how):  # noqa: B006 - is kept
-    """What fmpy asks about each method of every new instance, which takes longer than all else that makes one."""
+def signature(thing, told=inspect.signature, known={}, **how):  # noqa: B006 - used as a cache
+    """Cache inspect.signature, which fmpy calls for every method of every instance and which takes most of
+    instantiation."""
     function = getattr(thing, "__func__", None)
     if function is None or how:
         return told(thing, **how)
@@ -38,7 +39,7 @@ inspect.signature = signature
 
 
 class Instance:
-    """One instantiated FMU; the public methods are the requests."""
+    """One FMU instance; its public methods are the requests."""
 
     def __init__(self, fmu, name):
         directory, description = fmu
@@ -59,7 +60,7 @@ class Instance:
         self.log.append([status, (category or b"").decode(), (message or b"").decode()])
 
     def messages(self):
-        """What was logged since the last call: [status, category, text]."""
+        """Return the log since the last call, as [status, category, text]."""
         heard, self.log = self.log, []
         return heard
 
@@ -72,7 +73,7 @@ class Instance:
         return self._reader(names)()
 
     def vary_each(self, values, changes, names):
-        """A row of the values of names with `values` set, and one with each of the changes alone beside them."""
+        """Read the named variables with `values` set, and then with each of the changes alone."""
         self.set(values)
         read = self._reader(names)
         rows = [read()]
@@ -83,7 +84,7 @@ class Instance:
         return rows
 
     def _reader(self, names):
-        """A function that reads the named variables with one call per type."""
+        """Return a function that reads the named variables with one call per type."""
         reals = [i for i, name in enumerate(names) if self.variables[name][1] == "Real"]
         others = [i for i, name in enumerate(names) if self.variables[name][1] != "Real"]
         real_references = [self.variables[names[i]][0] for i in reals]
@@ -100,16 +101,16 @@ class Instance:
         return read
 
     def read(self, kind, references):
-        """Read variables as those of a type of FMI, also of one that they are not."""
+        """Read variables with the function of an FMI type, even if they have another type."""
         values = getattr(self.slave, f"get{kind}")(references)
         return [value.decode() if isinstance(value, bytes) else value for value in values]
 
     def read_one(self, kind, reference):
-        """The same for one."""
+        """Read one variable in this way."""
         return self.read(kind, [reference])[0]
 
     def write_one(self, kind, reference, value):
-        """Write it likewise."""
+        """Write one variable in this way."""
         getattr(self.slave, f"set{kind}")([reference], [value])
 
     def ramp(self, name, rate, order=1):
@@ -136,7 +137,7 @@ class Instance:
         self.slave.doStep(t, h)
 
     def run(self, times, names):
-        """Step from times[0] through all the times: a row of values for each, the first included."""
+        """Step through the times; return a row of values for each of them, including the first."""
         read = self._reader(names)
         rows = [read()]
         for t, ahead in itertools.pairwise(times):
@@ -145,12 +146,12 @@ class Instance:
         return rows
 
     def follow(self, t, stop, names):
-        """Step from t to stop as solver.t_next leads: the times, and a row of values for each."""
+        """Step from t to stop along solver.t_next; return the times and a row of values for each."""
         read, look = self._reader(names), self._reader(["solver.t_next"])
         times, rows = [t], [read()]
         while t < stop:
             ahead = look()[0]
-            ahead = ahead if ahead < stop else stop  # NaN, a run that will fail, leads to the stop
+            ahead = ahead if ahead < stop else stop  # NaN (a run that will fail) leads to the stop time
             if ahead <= t:
                 raise AssertionError(f"solver.t_next is {ahead!r} at {t!r}: it does not lead on")
             self.slave.doStep(t, ahead - t)
@@ -196,14 +197,14 @@ class Worker:
         return len(self.instances) - 1
 
     def unpacked(self, path):
-        """The folder of an FMU and its description."""
+        """Return the folder and the description of an FMU."""
         if path not in self.fmus:
             directory = extract(path, tempfile.mkdtemp(dir=self.temporary_folder))
             self.fmus[path] = directory, read_model_description(path)
         return self.fmus[path]
 
     def modules(self):
-        """The file of every loaded module that has one."""
+        """Return the files of all loaded modules."""
         files = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
         return sorted(file for file in files if file)
 
@@ -211,7 +212,7 @@ class Worker:
         return str(self.fmus[path][0])
 
     def batch(self, requests):
-        """The answers to requests none of which is refused."""
+        """Handle several requests, none of which may fail."""
         return [self.handle(*request) for request in requests]
 
     def handle(self, number, function, arguments):
@@ -221,7 +222,7 @@ class Worker:
 def main():
     temporary_folder = tempfile.mkdtemp()
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # what an FMU prints must not look like an answer
+    os.dup2(2, 1)  # output of an FMU must not be mistaken for an answer
     worker = Worker(temporary_folder)
     for line in sys.stdin:
         try:

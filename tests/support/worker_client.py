@@ -1,4 +1,4 @@
-"""Built FMUs at arm's length: worker.py in a clean process, its crashes and hangs told in one sentence."""
+"""Run built FMUs in a clean process (worker.py); a crash or hang becomes a one-sentence AssertionError."""
 
 import itertools
 import json
@@ -10,18 +10,19 @@ from pathlib import Path
 import pytest
 from fork_server import ForkedProcess, pipe
 
-TIMEOUT = 120.0  # s, for one request
+TIMEOUT = 120.0  # s, per request
 
 
 def run_script(script, function, *arguments, **how):
-    """What a function of a script here answers, in a process that must end well and say nothing."""
+    """Return the result of a function of a support script, run in a process that must exit cleanly and print no
+    errors."""
     answer, said = run_script_with_stderr(script, function, *arguments, **how)
     assert said == ""
     return answer
 
 
 def run_script_with_stderr(script, function, *arguments, folder=None, timeout=300):
-    """The same, and what it says on standard error."""
+    """Return the result and standard error of a function of a support script."""
     words = [Path(__file__).with_name(script), function, json.dumps(arguments, default=str)]
     with open(os.devnull) as nothing, tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err:
         process = ForkedProcess(words, nothing, out, err, folder)
@@ -59,7 +60,7 @@ class Worker:
         return self.process.poll() is None
 
     def call(self, instance, function, *arguments):
-        """The value of one request; Refused when an FMI call fails, AssertionError when anything else does."""
+        """Send a request and return its value; raise FmiError if an FMI call fails, AssertionError otherwise."""
         try:
             self.asking.write(json.dumps([instance, function, arguments]).encode() + b"\n")
             answer = json.loads(self._line(function))
@@ -87,7 +88,7 @@ class Worker:
         return f"the FMU process died in {function} with exit code {self.process.wait(10)}: {self.read_stderr()}"
 
     def read_stderr(self):
-        """What was written to standard error since the last call."""
+        """Return what was written to standard error since the last call."""
         self.stderr_file.seek(self.heard)
         text = self.stderr_file.read()
         self.heard += len(text)
@@ -100,11 +101,11 @@ class Worker:
         return self.call(None, "modules")
 
     def directory(self, path):
-        """Where an FMU that was instantiated was extracted to."""
+        """Return the folder to which an instantiated FMU was extracted."""
         return self.call(None, "directory", str(path))
 
     def close(self):
-        """End the process; the exit code."""
+        """End the process and return its exit code."""
         self.asking.close()
         code = self.process.wait(30)
         self.answers.close()
@@ -113,7 +114,7 @@ class Worker:
 
 
 class Instance:
-    """An instance in the worker; its methods are those of worker.Instance."""
+    """An instance in the worker, with the methods of worker.Instance."""
 
     def __init__(self, worker, number):
         self.worker, self.number, self.freed = worker, number, False
@@ -122,7 +123,7 @@ class Instance:
         return lambda *arguments: self.worker.call(self.number, function, *arguments)
 
     def get(self, *names):
-        """The value of one variable, or the list of several."""
+        """Return the value of one variable, or a list for several."""
         values = self.worker.call(self.number, "get", names)
         return values[0] if len(names) == 1 else values
 
@@ -134,7 +135,7 @@ class Instance:
         return self
 
     def run_with_changes(self, times, names, changes):
-        """As run; at the times in `changes` the values given there are set, after the row was read."""
+        """Like run, but set the values in `changes` at their times, after the row is read."""
         asked = []
         for t, end in itertools.pairwise([times[0], *sorted(changes), times[-1]]):
             asked.append([self.number, "set", [changes.get(t, {})]])
@@ -148,7 +149,7 @@ class Instance:
 
 
 def worker_fixtures(kind, scope):
-    """The fixtures `_workers`, `worker` and `fresh` for processes of a kind, under these names."""
+    """Return the fixtures `_workers`, `worker` and `fresh_worker` for a process class."""
 
     @pytest.fixture(scope=scope)
     def _workers():
@@ -159,7 +160,7 @@ def worker_fixtures(kind, scope):
 
     @pytest.fixture
     def worker(_workers):
-        """The process that runs FMUs; a new one when the last test killed it."""
+        """A process that runs FMUs; replaced if the last test killed it."""
         if not _workers[-1].alive:
             _workers.append(kind())
         _workers[-1].read_stderr()
@@ -167,7 +168,7 @@ def worker_fixtures(kind, scope):
 
     @pytest.fixture
     def fresh_worker():
-        """A process of the test's own, which must end well: late damage to memory shows at the exit."""
+        """A separate process that must exit cleanly, because late memory errors show at the exit."""
         worker = kind()
         yield worker
         assert worker.close() == 0

@@ -1,4 +1,4 @@
-"""The page of the project's models."""
+"""The interactive page of the project's models."""
 
 import pytest
 import web_page

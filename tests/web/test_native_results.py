@@ -1,4 +1,4 @@
-"""The numbers of the page are those of the native FMU, whatever is set and whenever it is changed."""
+"""The page computes the same values as the native FMU for any setting and any time of change."""
 
 import random
 from urllib.parse import urlencode
@@ -7,15 +7,18 @@ import native_fmus
 import pytest
 from models import MODELS, declared, outputs, tunable
 
-EXACT, CLOSED = 1e-12, {"smd", "coulomb", "stickslip"}  # of the largest value, where the motion has a closed form
-STATED = 1e-5  # where another library of mathematics shifts the solver's steps, within its tolerance
+EXACT, CLOSED = (
+    1e-12,
+    {"smd", "coulomb", "stickslip"},
+)  # relative to the largest value, where the motion has a closed form
+STATED = 1e-5  # another math library shifts the steps of the solver, within its tolerance
 ONE = "const main = app.session.runs.main;"
 TIMES = f"{ONE} main.grid.map(row => main.time[row])"
 COLUMNS = f"{ONE} main.reals.map(name => main.grid.map(row => main.columns[name][row]))"
 
 
 def some(name, seed):
-    """Values of all tunable parameters that are not zero, each up to a factor of two off, within the rules."""
+    """Return values of all nonzero tunable parameters, each off by up to a factor of two, within the rules."""
     draw = random.Random(f"{name} {seed}")
     values = {v: d.start * 2 ** draw.uniform(-1, 1) for v, d in tunable(name).items() if d.start}
     if "mu_s" in values:

@@ -1,4 +1,5 @@
-"""The page as a visitor has it: what he does, he sees; nothing is loaded, nothing is said, everything has a name."""
+"""The page as a visitor uses it: actions have visible effects, nothing is loaded or logged, every control has a
+name."""
 
 import json
 import re
@@ -27,7 +28,7 @@ CONTROLS = {"button", "checkbox", "combobox", "radio", "slider", "spinbutton", "
 
 @pytest.fixture(autouse=True)
 def quiet(browser):
-    """No test may leave a word in the console, or ask for anything but the page itself."""
+    """No test may write to the console or request anything but the page itself."""
     browser.console.clear()
     yield
     assert browser.console == []
@@ -47,7 +48,7 @@ def test_five_models_take_less_than_600_kb_and_load_nothing(page):
     page.open(anew=True)
     refused = "fetch('data:text/plain,x').then(() => 'came', () => 'refused')"
     assert page.run(refused) == "refused"
-    assert page.browser.console.pop()  # the policy says so
+    assert page.browser.console.pop()  # reported by the content security policy
     assert len(page.browser.console) <= 1
     page.browser.console.clear()
 
@@ -77,7 +78,7 @@ def test_every_module_imports_existing_names_from_earlier_modules_only():
         exports[name] = set(re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", text, re.M))
 
 
-# ---- what is seen
+# ---- content
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -116,7 +117,7 @@ def test_every_parameter_has_a_slider_and_a_field_with_its_start_value_and_unit(
             assert page.run(f"app.state().values[{variable!r}]") == pytest.approx(10.0 / factor)
 
 
-# ---- what is done
+# ---- interaction
 
 
 def test_a_slider_changes_the_run_and_shows_the_value_used(page):
@@ -148,7 +149,7 @@ def test_the_next_frame_shows_a_changed_parameter(page):
 
 
 def test_a_slow_method_is_previewed_with_a_fast_one(page):
-    """However long a run takes: a slider that is pulled is answered by the last value, to the end of the run."""
+    """For any run time: dragging a slider shows the last value up to the end of the run."""
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001")
     seen = page.run(
         "new Promise(done => { const e = document.querySelector('.field:has(#field-k) [type=range]');"
@@ -160,7 +161,10 @@ def test_a_slow_method_is_previewed_with_a_fast_one(page):
     done, k, quick, reached, own = seen
     assert (done, quick) == (False, {"x_m": 0.001, "k": k})
     assert own < reached <= 16
-    assert page.when_done("app.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [16, 16]
+    assert page.when_done("app.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [
+        16,
+        16,
+    ]
     assert page.run("app.session.runs.main.setting.values.k") == k
 
 
@@ -176,7 +180,7 @@ def test_only_one_model_is_compiled_before_the_first_picture(page):
 
 def test_the_last_of_two_models_chosen_at_once_is_shown(page):
     page.open(".model=coulomb")
-    for first, last in (("pacejka", "smd"), ("smd", "pendulum"), ("stickslip", "smd")):  # known, and not yet compiled
+    for first, last in (("pacejka", "smd"), ("smd", "pendulum"), ("stickslip", "smd")):  # known, but not yet compiled
         page.run(f"for (const name of [{first!r}, {last!r}]) document.querySelector(`input[value=${{name}}]`).click()")
         page.wait(f"app.state().model === {last!r}")
         page.run("new Promise(done => setTimeout(done, 100))")
@@ -283,7 +287,7 @@ def test_dragging_a_moving_body_applies_a_force_until_release(page, name):
 
 
 def test_dragging_with_a_slow_method_never_goes_back_in_time(page):
-    """The next force waits for the run of the last one."""
+    """The next force waits for the previous run."""
     page.browser.size(1280)
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001&.t=8")
     x, y = page.middle("#mechanism .body")
@@ -391,20 +395,18 @@ def test_extreme_numbers_are_reported_or_drawn_and_never_shown_as_nan(page, name
     assert page.run("document.getElementById('alert').hidden")
 
 
-# ---- what was published
+# ---- published cases
 
 
 def test_every_published_case_measures_the_same_as_the_terminal(page):
-    """To a per mille, but where chatter makes the steps hang on rounding; and beside the same figures."""
+    """Within 0.1 %, except where chatter makes the steps depend on rounding; the published values are shown as well."""
     page.open()
     names = page.run("[...app.session.presets.keys()]")
     scenes = {scene.name: scene for scene in map(load_scene, shipped_scenes()) if scene.published}
     assert sorted(names) == sorted(scenes)
     for name, scene in scenes.items():
         page.choose("preset", name)
-        native = (
-            native_fmus.build_native_fmus() / f"{scene.model}.fmu"
-        )  # which runs while the page waits for more to be done
+        native = native_fmus.build_native_fmus() / f"{scene.model}.fmu"  # runs while the page waits for more work
         run = simulate(replace(spec_from_scene(scene), fmu=native, repeat=1))
         page.wait(
             f"app.state().preset === {name!r} && document.querySelector('#tables caption')?.textContent === "
@@ -423,11 +425,11 @@ def test_every_published_case_measures_the_same_as_the_terminal(page):
                 there = quantities[figure]
                 value = there.to_unit(*unit) if unit and unit != [there.unit] else there.value
                 assert float(size) == pytest.approx(value, rel=1e-3), (name, figure)
-    page.choose("preset", "")  # my own: as it is, but no published case any more
+    page.choose("preset", "")  # custom: values unchanged, but no published case any more
     assert page.run("[app.state().preset, app.state().model]") == ["", scene.model]
 
 
-# ---- what is taken away
+# ---- exports
 
 
 def test_the_csv_file_holds_the_run_and_the_picture_is_a_png(page):
@@ -448,7 +450,7 @@ def test_the_csv_file_holds_the_run_and_the_picture_is_a_png(page):
 
 
 def test_a_printout_is_white_and_complete(page):
-    """But the cursor: its canvas would cover the curves beneath it in a PDF file."""
+    """Except the cursor, whose canvas would cover the curves in a PDF file."""
     page.browser.dark()
     page.open(".model=stickslip")
     page.run(
@@ -464,11 +466,11 @@ def test_a_printout_is_white_and_complete(page):
     page.browser.dark(False)
 
 
-# ---- of anybody
+# ---- user models
 
 
 def test_moving_bodies_of_any_model_are_read_from_its_declaration():
-    """Of every model that users might write: what kind each body is, and what acts on it."""
+    """For models that users might write: the kind of each body, and what acts on it."""
     drawn = {path.stem: list_bodies(find_model(path).analysis) for path in (*EXAMPLE_MODELS, *LARGER_MODELS)}
     kinds = {name: [body["kind"] for body in found] for name, found in drawn.items()}
     assert kinds["viscous_pendulum"] == ["pendulum"]
@@ -490,7 +492,7 @@ def test_user_models_run_on_a_page_of_their_own(browser):
         assert page.run("app.session.runs.main.events.length") > 2
         assert page.run("document.querySelectorAll('#mechanism .body').length") == count
         assert page.run("document.getElementById('body').parentElement.hidden") == (count == 1)
-    page.choose("body", 1)  # of its diagrams those of the motion stand first, too
+    page.choose("body", 1)  # the plots of the motion come first here too
     shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
     second = page.run("app.session.models.get('blocks').bodies[1]")
     assert page.when_done(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]

@@ -1,4 +1,4 @@
-"""What the page's C calls of its library is what C, and Python, have under that name."""
+"""The C library functions of the page behave like those of C and Python."""
 
 import json
 import math
@@ -18,7 +18,7 @@ NUMBERS = [0.1, 5e-324, 1.7976931348623157e308, 9007199254740993.0, 1e16, 123456
 
 @pytest.fixture(scope="module")
 def library(browser):
-    """An expression of the library's functions, beside a memory of its own and words to put there and to get."""
+    """Return an evaluator of library functions, with a memory of their own and helpers to write and read strings."""
     text = (HERE / "script" / "libc.js").read_text(encoding="utf-8").replace("export ", "")
     setting = """
         const memory = new WebAssembly.Memory({ initial: 1 }), said = [];
@@ -39,7 +39,7 @@ def library(browser):
 
 
 def value(function, *arguments):
-    """As C has it: Python raises where there is no number, or none that a double holds."""
+    """Return the result as in C, where Python raises for undefined or overflowing results."""
     try:
         return function(*arguments)
     except (ValueError, OverflowError):

@@ -1,14 +1,14 @@
-"""A block upon a block."""
+"""A block on a block."""
 
 from fmus import Contact, Input, Mode, Model, Output, Parameter, State
 
 
 class Blocks(Model):
-    """A block upon a block upon the ground; the driver pulls the upper one, and both contacts push the lower one.
+    """A block on a block on the ground; the driver pulls the upper one, and both contacts act on the lower one.
 
     m1 a1 = F_ext - c x1 + F2 - F1,   m2 a2 = k (x_driver - x2) - F2,   slip1 = v1,   slip2 = v2 - v1
     sliding:   F1 = mu1 (m1 + m2) g sign(slip1),   F2 = mu2 m2 g sign(slip2)
-    stuck:     as both bodies ask, up to `stick` times as much
+    stuck:     the force required by both bodies, up to `stick` times the sliding force
     """
 
     m1 = Parameter(4.0, "kg", "mass of the lower block", above=0.0)

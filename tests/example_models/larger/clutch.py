@@ -9,7 +9,7 @@ class Clutch(Model):
     J_1 alpha1 = T_1 - T_clutch,   T_1 = T_in - c_1 omega1
     J_2 alpha2 = T_clutch - T_2,   T_2 = T_load + c_2 omega2
     sliding:   T_clutch = mu_d r F_n sign(slip),   slip = omega1 - omega2
-    engaged:   slip = 0 while |T_clutch| <= mu_s r F_n,   T_clutch as both inertias ask
+    engaged:   slip = 0 while |T_clutch| <= mu_s r F_n,   T_clutch as required by both inertias
     """
 
     J_1 = Parameter(0.5, "kg.m2", "moment of inertia of the driving side", above=0.0)

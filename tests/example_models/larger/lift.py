@@ -1,10 +1,10 @@
-"""Sled that its driver lifts as he pulls."""
+"""Sled that the driver lifts while pulling."""
 
 from fmus import Contact, Input, Mode, Model, Output, Parameter, State
 
 
 class Lift(Model):
-    """Sled that its driver lifts as he pulls: while it sticks, what the ground holds falls, and the load rises.
+    """Sled that the driver lifts while pulling: while it sticks, the static limit falls and the load rises.
 
     m a = F_ext + k s - F_friction,   N = m g - lift s,   s = x_driver - x
     sliding:   F_friction = mu_d N sign(v)
