@@ -13,7 +13,7 @@ def test_nonnegative_intervals_cover_95_percent():
     """Checked with the probabilities of a normal distribution, for each mean and each measured value."""
     step = 0.04
     z = np.arange(-4.0, 9.0, step)
-    low, high = np.array([nonnegative_interval(np.array([each]), np.eye(1)) for each in z]).T
+    low, high = np.array([nonnegative_interval(np.array([item]), np.eye(1)) for item in z]).T
     for mean in (0.0, 0.3, 1.0, 2.0, 3.0, 5.0):
         share = step * np.sum(norm.pdf(z - mean)[(low <= mean) & (mean <= high)])
         assert share == pytest.approx(0.95, abs=0.004), mean
@@ -34,10 +34,10 @@ def test_joint_nonnegative_intervals_cover_95_percent(means, rho):
     """Of 200 draws; more only where both are zero, where the interval is shorter for it."""
     correlation = np.array([[1.0, rho], [rho, 1.0]])
     z = np.random.default_rng(1).multivariate_normal(means, correlation, 200)
-    low, high = np.array([nonnegative_interval(each, correlation) for each in z]).T
+    low, high = np.array([nonnegative_interval(item, correlation) for item in z]).T
     assert 0.9 < np.mean((low <= means[0]) & (means[0] <= high)) < (1.0 if means == (0.0, 0.0) else 0.985)
     if means == (0.0, 0.0) and rho < 0:
-        alone = np.array([nonnegative_interval(each[:1], np.eye(1)) for each in z])
+        alone = np.array([nonnegative_interval(item[:1], np.eye(1)) for item in z])
         assert np.mean(high) < 0.5 * np.mean(alone[:, 1])
 
 

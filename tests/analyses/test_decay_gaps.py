@@ -37,25 +37,25 @@ SHARES, BEGINS = [0.45, 0.95, 1.3, 3.3], [0.1, 0.3, 1.2, 2.2]
 def test_a_pause_of_any_length_does_not_bias_the_fit(begin, share, noise):
     """Without the laws with drag, which take most of the time of a fit and follow the pause handling; some tests
     below include them."""
-    found = {
-        each.name: each for each in fit_decay(paused(begin, share, noise), KnownParameters(), drag=False).estimates
+    estimates = {
+        item.name: item for item in fit_decay(paused(begin, share, noise), KnownParameters(), drag=False).estimates
     }
     for name, truth in {"omega": OMEGA, "zeta": RATE / OMEGA}.items():
-        assert abs(found[name].value - truth) < 1e-7 * truth + 5 * found[name].error
-    assert found["omega"].error < 1e-3 * OMEGA
+        assert abs(estimates[name].value - truth) < 1e-7 * truth + 5 * estimates[name].error
+    assert estimates["omega"].error < 1e-3 * OMEGA
 
 
 @pytest.mark.parametrize("share", [0.35, 0.55, 0.7])
 def test_a_pause_without_a_turning_point_costs_no_other_samples(share):
-    found = fit_decay(paused(0.55, share), KnownParameters())
-    assert found.t[0] == 0.0
-    assert found.remarks == ()
+    fit = fit_decay(paused(0.55, share), KnownParameters())
+    assert fit.t[0] == 0.0
+    assert fit.remarks == ()
 
 
 def test_half_cycles_before_a_pause_are_skipped_and_reported_if_too_few():
-    found = fit_decay(paused(0.55, 1.3), KnownParameters())
-    assert found.t[0] > 0.55
-    assert "The record before the gap that ends at t = 0.8760 s has too few cycles" in " ".join(found.remarks)
+    fit = fit_decay(paused(0.55, 1.3), KnownParameters())
+    assert fit.t[0] > 0.55
+    assert "The record before the gap that ends at t = 0.8760 s has too few cycles" in " ".join(fit.remarks)
 
 
 def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
@@ -64,15 +64,15 @@ def test_the_command_line_uses_both_sides_of_a_pause(tmp_path):
     (tmp_path / "paused.csv").write_text("\n".join(["time [s],x [m]", *rows]))
     done = harness(tmp_path, "decay", "paused.csv", "--json", blank=True)
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    assert {each["name"]: each["value"] for each in found["fit"]}["omega"] == pytest.approx(OMEGA, rel=1e-8)
-    assert found["used"]["from"] < 2.03 < found["used"]["until"]
+    data = json.loads(done.stdout)
+    assert {item["name"]: item["value"] for item in data["fit"]}["omega"] == pytest.approx(OMEGA, rel=1e-8)
+    assert data["used"]["from"] < 2.03 < data["used"]["until"]
 
 
-@pytest.mark.parametrize("kept", [0, 3, 11])
-def test_a_window_with_too_few_samples_is_reported(kept):
+@pytest.mark.parametrize("n_samples", [0, 3, 11])
+def test_a_window_with_too_few_samples_is_reported(n_samples):
     """Whatever removed the other samples."""
     record = paused(2.03, 0.95)
     problem, _ = prepare_problem(record, find_extrema(record, False), False, False)
-    with pytest.raises(HarnessError, match=f"has only {kept} samples in a row that follow .* and 12 are needed"):
-        problem.subset(slice(kept))
+    with pytest.raises(HarnessError, match=f"has only {n_samples} samples in a row that follow .* and 12 are needed"):
+        problem.subset(slice(n_samples))

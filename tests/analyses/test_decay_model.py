@@ -21,7 +21,7 @@ from harness.records.record import QUANTITIES
 )
 def test_the_model_agrees_with_an_integrator_restarted_at_every_turning_point(zeta, r, b, sine, a):
     times = np.linspace(0.0, 30.0, 1000)
-    expected, begin, place, s = np.full((3, 1000), np.nan), 0.0, a, -1.0
+    expected, begin, position, s = np.full((3, 1000), np.nan), 0.0, a, -1.0
     while np.isnan(expected[0, -1]):
 
         def rates(_, u, s=s):
@@ -33,18 +33,18 @@ def test_the_model_agrees_with_an_integrator_restarted_at_every_turning_point(ze
 
         still.terminal, still.direction = True, -s
         piece = solve_ivp(
-            rates, (begin, 30.001), [place, 0], "DOP853", events=still, dense_output=True, rtol=1e-13, atol=1e-15
+            rates, (begin, 30.001), [position, 0], "DOP853", events=still, dense_output=True, rtol=1e-13, atol=1e-15
         )
         inside = (times >= begin) & (times <= piece.t[-1])
         u = piece.sol(times[inside])
         expected[:, inside] = u[0], u[1], rates(0, u)[1]
-        begin, place, s = piece.t[-1], piece.y[0, -1], -s
-        if abs(np.sin(place) if sine else place) <= r:
-            expected[:, times > begin] = [[place], [0], [0]]
+        begin, position, s = piece.t[-1], piece.y[0, -1], -s
+        if abs(np.sin(position) if sine else position) <= r:
+            expected[:, times > begin] = [[position], [0], [0]]
     for order in range(3):
         model = SignalModel(1.0, order, sine, 0.0, 1e-9 * a)
-        found, _ = model(np.array([0, a, 0, 0, 2.0, zeta, r, b]), unknown_indices(TERMS, False), times / 2)
-        assert found == pytest.approx(expected[order] * 2.0**order, abs=3e-9 * 5**order * a)
+        samples, _ = model(np.array([0, a, 0, 0, 2.0, zeta, r, b]), unknown_indices(TERMS, False), times / 2)
+        assert samples == pytest.approx(expected[order] * 2.0**order, abs=3e-9 * 5**order * a)
 
 
 @pytest.mark.parametrize("sine", [False, True])
@@ -54,8 +54,8 @@ def test_the_jacobian_agrees_with_finite_differences(order, sine):
     model, p = SignalModel(1.0, order, sine, 1.0, 1e-9), np.array([0.05, 1.0, 0.01, 0.02, 5.0, 0.01, 0.02, 0.05])
     unknowns, t = unknown_indices(TERMS, True), np.linspace(0.0, 4.0, 500)
     _, jacobian = model(p, unknowns, t)
-    for column, place in zip(jacobian.T, unknowns, strict=True):
-        up, down = (p + way * 1e-5 * (np.arange(8) == place) for way in (1, -1))
+    for column, parameter in zip(jacobian.T, unknowns, strict=True):
+        up, down = (p + way * 1e-5 * (np.arange(8) == parameter) for way in (1, -1))
         slope = (model(up, unknowns, t)[0] - model(down, unknowns, t)[0]) / 2e-5
         assert np.mean(np.abs(slope - column) < 1e-5 * np.abs(column).max()) > 0.95
 

@@ -15,32 +15,32 @@ from harness.records.record import Record
 def test_drift_is_reported_and_fitted_on_request():
     record = decay_record(0.01, 0.001, drift=0.002, noise=1e-4)
     assert "--drift" in remarks_text(fit_decay(record, KnownParameters()))
-    found = fit_decay(record, KnownParameters(), drift=True)
-    each = {one.name: one for one in found.estimates}
-    assert each["drift"].value == pytest.approx(0.002, rel=2e-2)
-    assert each["zeta"].low < 0.01 < each["zeta"].high
-    assert found.remarks == ()
+    fit = fit_decay(record, KnownParameters(), drift=True)
+    by_name = {one.name: one for one in fit.estimates}
+    assert by_name["drift"].value == pytest.approx(0.002, rel=2e-2)
+    assert by_name["zeta"].low < 0.01 < by_name["zeta"].high
+    assert fit.remarks == ()
 
 
 def test_correlated_noise_is_reported_and_widens_the_intervals():
     record = decay_record(0.01, 0.001, noise=1e-3)
     white = fit_decay(record, KnownParameters(), drag=False)
     noise = np.convolve(np.random.default_rng(3).standard_normal(1019), np.ones(20), "valid") * 2e-4
-    alike = fit_decay(Record("alike", record.t, decay_record(0.01, 0.001).x + noise), KnownParameters(), drag=False)
-    assert "not independent" in remarks_text(alike)
-    zeta = [next(each for each in found.estimates if each.name == "zeta") for found in (white, alike)]
+    repeated = fit_decay(Record("alike", record.t, decay_record(0.01, 0.001).x + noise), KnownParameters(), drag=False)
+    assert "not independent" in remarks_text(repeated)
+    zeta = [next(estimate for estimate in result.estimates if estimate.name == "zeta") for result in (white, repeated)]
     assert zeta[1].low < 0.01 < zeta[1].high
     assert zeta[1].error > zeta[0].error
 
 
-@pytest.mark.parametrize(("r", "alike"), [(2e-3, True), (1.999e-3, True), (2.13e-3, False), (1.8e-3, False)])
-def test_a_loss_in_phase_with_the_sensor_resolution_is_reported(r, alike):
+@pytest.mark.parametrize(("r", "repeated"), [(2e-3, True), (1.999e-3, True), (2.13e-3, False), (1.8e-3, False)])
+def test_a_loss_in_phase_with_the_sensor_resolution_is_reported(r, repeated):
     """Of 1 mm, where a half swing loses 2 r."""
     side = 1.0 if r > 1.9995e-3 else -1.0
-    found = fit_decay(
+    fit = fit_decay(
         decay_record(r=r, rest=0.0203, turn=-0.1, step=1e-3, noise=1e-5, side=side), KnownParameters(), drag=False
     )
-    assert ("rounds all turning points alike" in remarks_text(found)) == alike
+    assert ("rounds all turning points alike" in remarks_text(fit)) == repeated
 
 
 def test_a_second_oscillation_is_reported():

@@ -18,28 +18,28 @@ def test_stick_before_and_rest_after_the_motion_are_excluded():
     held = np.concatenate(
         [np.full(100, record.x[record.x.argmin()]), record.x[record.x.argmin() :], np.full(300, 0.03)]
     )
-    found = fit_decay(Record("held", 0.004 * np.arange(len(held)), held), KnownParameters())
-    assert values(found.estimates)["r"] == pytest.approx(0.005, rel=1e-3)
-    assert "are excluded" in remarks_text(found)
+    fit = fit_decay(Record("held", 0.004 * np.arange(len(held)), held), KnownParameters())
+    assert values(fit.estimates)["r"] == pytest.approx(0.005, rel=1e-3)
+    assert "are excluded" in remarks_text(fit)
 
 
 def test_a_push_before_the_motion_is_excluded_and_reported():
     t = np.linspace(0, 6, 1500)
     x = decay_record(0.01, 0.001, turn=1.06, t=t, noise=1e-5).x
     x[t < 1.2] = 0.02 + 1e-5 * np.random.default_rng(2).standard_normal((t < 1.2).sum())
-    found = fit_decay(Record("pushed", t, x), KnownParameters(), drag=False)
-    assert values(found.estimates)["zeta"] == pytest.approx(0.01, rel=1e-2)
-    assert found.t[0] >= 1.2
-    assert "The motion is free from t = " in remarks_text(found)
+    fit = fit_decay(Record("pushed", t, x), KnownParameters(), drag=False)
+    assert values(fit.estimates)["zeta"] == pytest.approx(0.01, rel=1e-2)
+    assert fit.t[0] >= 1.2
+    assert "The motion is free from t = " in remarks_text(fit)
 
 
 def test_a_motion_stopped_from_outside_is_cut_and_reported():
     t = np.linspace(0, 8, 1500)
     x = decay_record(0.005, 0.0003, turn=0.0, t=t, noise=1e-4).x
     x[t > 6] = 0.02 + 0.3 * (x[t > 6] - 0.02)
-    found = fit_decay(Record("stopped", t, x), KnownParameters())
-    assert values(found.estimates)["zeta"] == pytest.approx(0.005, rel=0.1)
-    assert "follows the law until t = " in remarks_text(found)
+    fit = fit_decay(Record("stopped", t, x), KnownParameters())
+    assert values(fit.estimates)["zeta"] == pytest.approx(0.005, rel=0.1)
+    assert "follows the law until t = " in remarks_text(fit)
 
 
 @pytest.mark.parametrize("drag", [True, False])
@@ -47,27 +47,27 @@ def test_repeated_samples_before_and_after_the_motion_are_excluded(drag):
     """They are longer than the motion and interrupt it in mid-swing."""
     record = decay_record(0.01, 0.001, turn=0.0, noise=1e-4)
     x = np.concatenate([np.full(900, record.x[0]), record.x, np.full(1200, record.x[-1])])
-    found = fit_decay(Record("padded", 0.004 * np.arange(len(x)), x), KnownParameters(), drag)
-    each = {one.name: one for one in found.estimates}
-    assert abs(each["zeta"].value - 0.01) < 4 * each["zeta"].error < 0.002
-    assert abs(each["r"].value - 0.001) < 4 * each["r"].error < 1e-4
+    fit = fit_decay(Record("padded", 0.004 * np.arange(len(x)), x), KnownParameters(), drag)
+    by_name = {one.name: one for one in fit.estimates}
+    assert abs(by_name["zeta"].value - 0.01) < 4 * by_name["zeta"].error < 0.002
+    assert abs(by_name["r"].value - 0.001) < 4 * by_name["r"].error < 1e-4
 
 
 @pytest.mark.parametrize("order", range(3), ids=QUANTITIES)
 def test_one_outlier_has_bounded_influence(order):
     record = decay_record(0.01, 0.001, turn=0.0, noise=1e-5 * OMEGA**order, order=order)
     record.x[0] += 0.3 * OMEGA**order
-    found = fit_decay(record, KnownParameters(), drag=False)
-    assert values(found.estimates)["zeta"] == pytest.approx(0.01, rel=1e-2)
-    assert len(found.t) == len(record.t) - 1
+    fit = fit_decay(record, KnownParameters(), drag=False)
+    assert values(fit.estimates)["zeta"] == pytest.approx(0.01, rel=1e-2)
+    assert len(fit.t) == len(record.t) - 1
 
 
 def test_outliers_are_excluded_and_counted():
     record = decay_record(0.02, 0.003, noise=1e-4)
     record.x[[200, 500]] += (0.05, -0.08)
-    found = fit_decay(record, KnownParameters())
-    assert values(found.estimates)["r"] == pytest.approx(0.003, rel=2e-2)
-    assert "2 of 1000 samples are outliers and are left out." in remarks_text(found)
+    fit = fit_decay(record, KnownParameters())
+    assert values(fit.estimates)["r"] == pytest.approx(0.003, rel=2e-2)
+    assert "2 of 1000 samples are outliers and are left out." in remarks_text(fit)
 
 
 @pytest.mark.parametrize(  # a fit with drag tries longest what no fit can reach
@@ -80,11 +80,11 @@ def test_runs_of_invalid_samples_are_excluded_and_counted(value, run, drag):
     record = decay_record(0.02, 0.003, rest=0.2, noise=1e-4)
     at = np.random.default_rng(3).choice(np.arange(10, 900, 9), 20 // run, replace=False)
     record.x[(at[:, None] + np.arange(run)).ravel()] = value
-    found = fit_decay(record, KnownParameters(), drag)
-    each = values(found.estimates)
-    assert (each["r"], each["zeta"]) == (pytest.approx(0.003, rel=2e-2), pytest.approx(0.02, rel=2e-2))
-    assert 20 <= 1000 - len(found.record.t) <= 30  # a run may take its neighbours with it
-    assert f"{1000 - len(found.record.t)} of 1000 samples are outliers and are left out." in remarks_text(found)
+    fit = fit_decay(record, KnownParameters(), drag)
+    by_name = values(fit.estimates)
+    assert (by_name["r"], by_name["zeta"]) == (pytest.approx(0.003, rel=2e-2), pytest.approx(0.02, rel=2e-2))
+    assert 20 <= 1000 - len(fit.record.t) <= 30  # a run may take its neighbours with it
+    assert f"{1000 - len(fit.record.t)} of 1000 samples are outliers and are left out." in remarks_text(fit)
 
 
 @pytest.mark.parametrize("gap", [(2.0, 2.4), (2.2, 3.7)])
@@ -92,8 +92,8 @@ def test_both_sides_of_a_gap_are_used(gap):
     t = np.linspace(0, 6, 1500)
     keep = (t < gap[0]) | (t > gap[1])
     record = decay_record(0.01, 0.001, t=t, noise=1e-4)
-    found = fit_decay(Record("gap", t[keep], record.x[keep]), KnownParameters(), drag=False)
-    assert values(found.estimates) == pytest.approx(
+    fit = fit_decay(Record("gap", t[keep], record.x[keep]), KnownParameters(), drag=False)
+    assert values(fit.estimates) == pytest.approx(
         {"zeta": 0.01, "r": 0.001, "omega": OMEGA, "rest": 0.02}, rel=2e-2, abs=0.05
     )
-    assert found.t[0] < gap[0] < gap[1] < found.t[-1]
+    assert fit.t[0] < gap[0] < gap[1] < fit.t[-1]

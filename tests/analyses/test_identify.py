@@ -15,25 +15,25 @@ from harness.records.record import Record
     [(law, False, 0) for law in LAWS]
     + [(law, True, i % 3) for i, law in enumerate(LAWS)]
     + [(LAWS[0], False, order) for order in (1, 2)],
-    ids=lambda each: "+".join(each) if isinstance(each, tuple) else None,
+    ids=lambda item: "+".join(item) if isinstance(item, tuple) else None,
 )
 def test_clean_signals_are_identified_to_nine_digits(law, sine, order):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.4}[term] for term in law}
     t = np.linspace(0, 3, 200)
-    found = fit_decay(decay_record(**truth, sine=sine, order=order, turn=0.0, t=t), KnownParameters(pendulum=sine))
-    assert set(found.best.terms) == set(law)
-    assert values(found.estimates) == pytest.approx(
+    fit = fit_decay(decay_record(**truth, sine=sine, order=order, turn=0.0, t=t), KnownParameters(pendulum=sine))
+    assert set(fit.best.terms) == set(law)
+    assert values(fit.estimates) == pytest.approx(
         dict.fromkeys(TERMS, 0.0) | truth | {"omega": OMEGA, "rest": 0.02}, rel=1e-9, abs=1e-12
     )
-    assert found.remarks == ()
+    assert fit.remarks == ()
 
 
 @pytest.mark.parametrize("turn", [-0.01, 0.0, 0.001, 0.12, 0.24])
 def test_the_fit_does_not_depend_on_start_or_sampling(turn):
     times = np.sort(np.random.default_rng(1).uniform(0.0, 3.0, 500))
-    found = fit_decay(decay_record(0.02, 0.003, turn=turn, t=times), KnownParameters(), drag=False)
+    fit = fit_decay(decay_record(0.02, 0.003, turn=turn, t=times), KnownParameters(), drag=False)
     expected = {"zeta": 0.02, "r": 0.003, "omega": OMEGA, "rest": 0.02}
-    assert values(found.estimates) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert values(fit.estimates) == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("origin", [2.0**4, 2.0**8, -(2.0**9), 2.0**10, 2.0**12])
@@ -41,34 +41,34 @@ def test_late_clocks_and_offset_origins_cost_no_accuracy(origin):
     """As seconds since 1970; binary fractions keep the times themselves exact."""
     times = np.arange(1000) / 256
     x = decay_record(0.02, 0.003, t=times).x
-    found = fit_decay(Record("late", times + 2.0**30, x + origin), KnownParameters(), drag=False)
+    fit = fit_decay(Record("late", times + 2.0**30, x + origin), KnownParameters(), drag=False)
     expected = {"zeta": 0.02, "r": 0.003, "omega": OMEGA, "rest": origin + 0.02}
-    assert values(found.estimates) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert values(fit.estimates) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize("truth", [{"zeta": 0.02}, {"r": 0.003}, {"zeta": 0.02, "r": 0.003}])
 def test_noise_does_not_hide_the_law(truth):
-    found = fit_decay(decay_record(**truth, noise=1e-3), KnownParameters())
-    assert set(found.best.terms) == set(truth)
-    assert found.best.description in found.sentence
+    fit = fit_decay(decay_record(**truth, noise=1e-3), KnownParameters())
+    assert set(fit.best.terms) == set(truth)
+    assert fit.best.description in fit.sentence
 
 
 def test_an_undecidable_law_is_reported_with_what_would_decide_it():
-    found = fit_decay(decay_record(0.004, noise=3e-3, t=np.linspace(0, 2, 300)), KnownParameters())
-    assert "cannot be distinguished from" in remarks_text(found)
-    assert "less noise" in remarks_text(found)
+    fit = fit_decay(decay_record(0.004, noise=3e-3, t=np.linspace(0, 2, 300)), KnownParameters())
+    assert "cannot be distinguished from" in remarks_text(fit)
+    assert "less noise" in remarks_text(fit)
 
 
 @pytest.mark.parametrize(("k", "m"), [(157.9, None), (None, 2.0)])
 def test_stiffness_or_mass_convert_the_fit_to_physical_parameters(k, m):
-    found = values(fit_decay(decay_record(0.02, 0.003, 0.4, noise=1e-4), KnownParameters(k, m)).estimates)
-    zeta, r, b, omega = (found[name] for name in (*TERMS, "omega"))
+    fit = values(fit_decay(decay_record(0.02, 0.003, 0.4, noise=1e-4), KnownParameters(k, m)).estimates)
+    zeta, r, b, omega = (fit[name] for name in (*TERMS, "omega"))
     k, m = k or m * omega**2, m or k / omega**2
     expected = {"f": k * r, "c": 2 * zeta * m * omega, "q": b * m}
     assert b > 0
-    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-9)
+    assert {name: fit[name] for name in expected} == pytest.approx(expected, rel=1e-9)
 
 
 def test_no_loss_is_reported_as_no_loss():
-    found = fit_decay(decay_record(noise=1e-3), KnownParameters())
-    assert "No loss stands out" in found.sentence or all(each.value < 3 * each.error for each in found.estimates[1:4])
+    fit = fit_decay(decay_record(noise=1e-3), KnownParameters())
+    assert "No loss stands out" in fit.sentence or all(item.value < 3 * item.error for item in fit.estimates[1:4])

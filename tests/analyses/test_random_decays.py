@@ -24,26 +24,26 @@ def of_each_law(request):
 
 def test_no_estimate_is_far_off_without_a_remark(of_each_law):
     """tests/support/interval_coverage.py checks many more."""
-    for truth, found in of_each_law:
-        each = {one.name: one for one in found.estimates}
-        off = {name: abs(each[name].value - value) / each[name].error for name, value in truth.items()}
-        assert max(off.values()) < FAR or found.remarks
+    for truth, result in of_each_law:
+        by_name = {one.name: one for one in result.estimates}
+        off = {name: abs(by_name[name].value - value) / by_name[name].error for name, value in truth.items()}
+        assert max(off.values()) < FAR or result.remarks
 
 
 def test_intervals_cover_the_true_value_at_their_level(of_each_law):
     """Fewer than 28 of 35 intervals at 95 % would cover the true value once in a thousand times
     (tests/support/interval_coverage.py counts a thousand records of every law)."""
     held = []
-    for truth, found in of_each_law:
-        each = {one.name: one for one in found.estimates}
-        held += [each[name].low <= value <= each[name].high for name, value in truth.items()]
+    for truth, result in of_each_law:
+        by_name = {one.name: one for one in result.estimates}
+        held += [by_name[name].low <= value <= by_name[name].high for name, value in truth.items()]
     assert np.sum(held) >= 28
 
 
 def test_an_extra_term_never_costs_more_than_ln_n(of_each_law):
-    for _, found in of_each_law:
-        bic = {frozenset(law.terms): law.bic for law in found.laws}
+    for _, result in of_each_law:
+        bic = {frozenset(law.terms): law.bic for law in result.laws}
         for less in bic:
             assert all(
-                bic[more] - bic[less] < len(more - less) * np.log(len(found.t)) + 1e-6 for more in bic if less < more
+                bic[more] - bic[less] < len(more - less) * np.log(len(result.t)) + 1e-6 for more in bic if less < more
             )

@@ -37,8 +37,8 @@ def test_a_motion_without_reversal_has_no_step_collapse():
     ],
 )
 def test_slips_last_from_stick_to_stick(mode, starts, durations):
-    found = slips_from_modes(np.arange(float(len(mode))), np.array(mode))
-    assert [list(values) for values in found] == [starts, durations]
+    result = slips_from_modes(np.arange(float(len(mode))), np.array(mode))
+    assert [list(values) for values in result] == [starts, durations]
 
 
 def test_upward_zero_crossings_are_interpolated():

@@ -12,26 +12,26 @@ from harness.analyses.decay.law import TERMS
 
 @pytest.mark.parametrize(("sine", "a"), [(False, 0.1), (True, 0.1), (True, 2.0)])
 def test_turning_points_alone_give_the_same_estimates(sine, a):
-    found = fit_decay(
+    fit = fit_decay(
         decay_record(0.02, 0.003, 0.02, sine, a=a, t=np.linspace(0, 5, 2001)), KnownParameters(pendulum=sine)
     )
     expected = {"zeta": 0.02, "r": 0.003, "b": 0.02, "rest": 0.02}
     tolerance = {"rel": 0.02, "abs": 0.01 if a < 1 else 1e-3}
-    assert values(found.extrema_estimates) == pytest.approx(
-        {name: expected[name] for name in values(found.extrema_estimates)}, **tolerance
+    assert values(fit.extrema_estimates) == pytest.approx(
+        {name: expected[name] for name in values(fit.extrema_estimates)}, **tolerance
     )
-    assert {"zeta", "r"} <= set(values(found.extrema_estimates))
+    assert {"zeta", "r"} <= set(values(fit.extrema_estimates))
 
 
 @pytest.mark.parametrize("a", [0.1, 2.5])
 @pytest.mark.parametrize("term", TERMS)
 def test_two_peaks_of_a_pendulum_identify_a_single_loss(term, a):
     truth = {term: {"zeta": 0.01, "r": 0.003, "b": 0.05}[term]}
-    found = fit_decay(
+    fit = fit_decay(
         decay_record(**truth, sine=True, a=a, t=np.linspace(0, 4, 401), noise=1e-5 * a), KnownParameters(pendulum=True)
     )
-    assert values(found.two_peak_estimates)[term] == pytest.approx(truth[term], rel=5e-3)
-    assert set(found.best.terms) == {term}
+    assert values(fit.two_peak_estimates)[term] == pytest.approx(truth[term], rel=5e-3)
+    assert set(fit.best.terms) == {term}
 
 
 def test_the_published_peaks_give_the_published_values():
@@ -40,9 +40,9 @@ def test_the_published_peaks_give_the_published_values():
 
 
 def test_an_inapplicable_column_states_the_reason():
-    found = fit_decay(decay_record(0.02, 0.003, order=1), KnownParameters(), drag=False)
-    assert found.extrema_estimates == found.two_peak_estimates == ()
-    assert "No turning points: a record of velocity shows no turning points of the position." in remarks_text(found)
+    fit = fit_decay(decay_record(0.02, 0.003, order=1), KnownParameters(), drag=False)
+    assert fit.extrema_estimates == fit.two_peak_estimates == ()
+    assert "No turning points: a record of velocity shows no turning points of the position." in remarks_text(fit)
 
 
 def test_two_peaks_of_a_mixed_law_report_the_assumed_loss():

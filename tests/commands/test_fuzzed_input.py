@@ -97,16 +97,16 @@ SPANS = (
 )
 
 
-def ended(*arguments):
+def run_command(*arguments):
     """Return exit status and output of a command run in this process; any unexpected exception fails the test."""
-    said, answered = io.StringIO(), io.StringIO()
-    with redirect_stderr(said), redirect_stdout(answered):
+    stderr, stdout = io.StringIO(), io.StringIO()
+    with redirect_stderr(stderr), redirect_stdout(stdout):
         try:
             commands.main([*map(str, arguments)], standalone_mode=True)
         except HarnessError as error:
             return error.status, str(error)
         except SystemExit as end:
-            return end.code or 0, said.getvalue()
+            return end.code or 0, stderr.getvalue()
     raise AssertionError("it does not end")
 
 
@@ -118,61 +118,61 @@ def workspace(user_folder, tmp_path):
         yield tmp_path
 
 
-def written(scene):
+def scene_text(scene):
     """Return a scene as TOML text."""
-    return "".join(f"{name} = {told}\n" for name, told in scene.items())
+    return "".join(f"{name} = {text}\n" for name, text in scene.items())
 
 
-def check(status, said, shown):
-    assert status in (0, 1, 2), shown
-    assert len(said) < 3000, shown
-    assert "Traceback" not in said, shown
+def check(status, output, figures):
+    assert status in (0, 1, 2), figures
+    assert len(output) < 3000, figures
+    assert "Traceback" not in output, figures
     if status:
-        assert said.strip(), shown
+        assert output.strip(), figures
 
 
 @pytest.mark.parametrize("key", [*field_names(SceneKeys), "nosuch"])
 def test_any_scene_content_runs_or_is_refused(workspace, key):
-    usual = (
+    default = (
         SCENE if key in TIMES else SCENE | {"grid": "0.01"}
     )  # without a grid there would be 4096 points, which test nothing more
     for value in VALUES:
-        text = written(usual | {key: value})
+        text = scene_text(default | {key: value})
         (workspace / "mine.toml").write_text(text, encoding="utf-8")
-        check(*ended("run", "mine.toml", "--quiet"), text[:300])
+        check(*run_command("run", "mine.toml", "--quiet"), text[:300])
 
 
 def test_any_file_content_is_a_scene_or_is_refused(workspace):
     for content in FILES:
         (workspace / "mine.toml").write_bytes(content)
         for command in ("run", "couple"):
-            status, said = ended(command, "mine.toml")
-            check(status, said, content[:100])
+            status, output = run_command(command, "mine.toml")
+            check(status, output, content[:100])
             assert status == 2, content[:100]
     (workspace / "folder.toml").mkdir()
     (workspace / "null.toml").symlink_to(os.devnull)
-    for user_folder in ("folder.toml", "null.toml", os.devnull, "nosuch.toml", "x" * 1000 + ".toml", "\udcff.toml", ""):
+    for file in ("folder.toml", "null.toml", os.devnull, "nosuch.toml", "x" * 1000 + ".toml", "\udcff.toml", ""):
         for command in ("run", "couple"):
             try:
-                status, said = ended(command, user_folder)
+                status, output = run_command(command, file)
             except OSError as error:  # which main reports in one sentence
-                status, said = 1, str(error)
-            check(status, said, user_folder[:100])
-            assert status, user_folder[:100]
+                status, output = 1, str(error)
+            check(status, output, file[:100])
+            assert status, file[:100]
 
 
 @pytest.mark.parametrize("title", ["$x_{$", "$", "\\$", "a_{b^c", "\u5b57\u0378", "%d {0} {x}"])
 def test_a_title_is_drawn_literally(workspace, title):
-    text = written(SCENE | {"title": f"'{title}'", "plots": '["position"]'})
+    text = scene_text(SCENE | {"title": f"'{title}'", "plots": '["position"]'})
     (workspace / "mine.toml").write_text(text, encoding="utf-8")
-    assert ended("run", "mine.toml", "--quiet") == (0, "")
+    assert run_command("run", "mine.toml", "--quiet") == (0, "")
     assert (workspace / "results/mine/figure.svg").stat().st_size > 1000
 
 
 def test_extreme_numbers_are_drawn_or_refused(workspace):
     for values in ("x0 = 1e308", "x0 = 1e-308", "k = 1e300", "v0 = -1e300", "x0 = 5e-324\nv0 = 1e250", "m = 1e308"):
-        (workspace / "mine.toml").write_text(f"{written(SCENE | {'plots': PLOTS})}[values]\n{values}\n")
-        check(*ended("run", "mine.toml", "--quiet"), values)
+        (workspace / "mine.toml").write_text(f"{scene_text(SCENE | {'plots': PLOTS})}[values]\n{values}\n")
+        check(*run_command("run", "mine.toml", "--quiet"), values)
 
 
 def test_any_table_content_is_compared_or_refused(workspace, monkeypatch):
@@ -183,14 +183,14 @@ def test_any_table_content_is_compared_or_refused(workspace, monkeypatch):
     (workspace / "good.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
     (workspace / "\udcff$_{.csv").write_text("t [s],x [m]\n0,1\n1,2.5\n2,3\n")
     for name in (*names, "\udcff$_{.csv"):
-        check(*ended("compare", name, "good.csv", "--quiet"), (name, Path(name).read_text()[:200]))
+        check(*run_command("compare", name, "good.csv", "--quiet"), (name, Path(name).read_text()[:200]))
     monkeypatch.setattr(
         "harness.studies.compare.figure.open_figure", partial(stub_sheet, Figure)
     )  # the same tables are drawn
     for name in names:
         for pair in (("good.csv", name), (name, name)):
-            check(*ended("compare", *pair, "--quiet"), (pair, Path(name).read_text()[:200]))
-    check(*ended("report", "--quiet"), "the report on all of these")
+            check(*run_command("compare", *pair, "--quiet"), (pair, Path(name).read_text()[:200]))
+    check(*run_command("report", "--quiet"), "the report on all of these")
     assert (workspace / "results/report.html").stat().st_size > 1000
 
 
@@ -198,8 +198,8 @@ def test_any_table_content_is_compared_or_refused(workspace, monkeypatch):
 def test_an_invalid_sweep_is_refused_before_a_worker_starts(workspace, option):
     vary = () if option == "--vary" else ("--vary", "m=1:2:2")
     for text in (*WORDS, *(SPANS if option == "--vary" else ())):
-        status, said = ended("sweep", "smd", *vary, option, text)
-        check(status, said, text[:100])
+        status, output = run_command("sweep", "smd", *vary, option, text)
+        check(status, output, text[:100])
         assert status, text[:100]
     for more in (
         ("--seed", "-1"),
@@ -208,8 +208,8 @@ def test_an_invalid_sweep_is_refused_before_a_worker_starts(workspace, option):
         ("--workers", "9" * 9),
         ("--name", "../x"),
     ):
-        status, said = ended("sweep", "smd", "--vary", "m=1:2", "--random", "2", more)
-        check(status, said, more)
+        status, output = run_command("sweep", "smd", "--vary", "m=1:2", "--random", "2", more)
+        check(status, output, more)
         assert status == 2, more
     assert not list(workspace.glob("results/sweep/*"))
 
@@ -218,9 +218,9 @@ def test_an_invalid_sweep_is_refused_before_a_worker_starts(workspace, option):
 @pytest.mark.parametrize("option", ["--stop", "--tolerance", "--within"])
 def test_numbers_on_the_command_line_are_finite_or_refused(workspace, option, word):
     (workspace / "a.csv").write_text("t [s],x [m]\n0,1\n1,2\n2,3\n")
-    check(*ended("compare", "a.csv", "a.csv", option, word, "--quiet"), word)
+    check(*run_command("compare", "a.csv", "a.csv", option, word, "--quiet"), word)
     if option != "--within":
-        check(*ended("run", "--fmu", "fmus/smd.fmu", option, word, "--quiet"), word)
+        check(*run_command("run", "--fmu", "fmus/smd.fmu", option, word, "--quiet"), word)
 
 
 def test_randomly_mutated_scenes_run_or_are_refused(workspace):
@@ -234,14 +234,14 @@ def test_randomly_mutated_scenes_run_or_are_refused(workspace):
             (workspace / "mine.toml").write_text("".join(text), encoding="utf-8")
             with pytest.MonkeyPatch.context() as patch:
                 patch.setattr("harness.studies.coupled.study.element_fmus", refuse)  # later stages take long
-                check(*ended("couple", "mine.toml", "--quiet"), "".join(text))
-    base = written(SCENE) + "grid = 0.01\n[values]\nm = 1.5\n"
+                check(*run_command("couple", "mine.toml", "--quiet"), "".join(text))
+    base = scene_text(SCENE) + "grid = 0.01\n[values]\nm = 1.5\n"
     for _ in range(150):
         text = list(base)
         for _ in range(dice.randint(1, 4)):
             text[dice.randrange(len(text))] = dice.choice('"[]{}=.,#\\\n0-e$\0\u00e9 ')
         (workspace / "mine.toml").write_text("".join(text), encoding="utf-8")
-        check(*ended("run", "mine.toml", "--quiet"), "".join(text))
+        check(*run_command("run", "mine.toml", "--quiet"), "".join(text))
 
 
 def refuse(*arguments):
@@ -278,13 +278,13 @@ def test_the_report_survives_any_content_of_a_result(tmp_path):
                 (tmp_path / file).mkdir()
             else:
                 (tmp_path / file).write_bytes(content.encode("utf-8", "surrogateescape"))
-        assert ended("report", "--out", tmp_path, "--quiet") == (0, ""), contents
+        assert run_command("report", "--out", tmp_path, "--quiet") == (0, ""), contents
         page = (tmp_path / "report.html").read_text(encoding="utf-8")
         assert "right hand" in page
         if contents and contents[0] == UNREADABLE:
-            told = re.findall(f"{re.escape(str(tmp_path))}/([^ ]+) cannot be shown", page)
-            assert all(file.startswith((*told,)) for file in RESULTS), told
-            assert told.count("smd") == 2  # its quantities and its steps
+            unreadable = re.findall(f"{re.escape(str(tmp_path))}/([^ ]+) cannot be shown", page)
+            assert all(file.startswith((*unreadable,)) for file in RESULTS), unreadable
+            assert unreadable.count("smd") == 2  # its quantities and its steps
 
 
 def python(folder, *arguments, shell=None, **environment):
@@ -299,7 +299,7 @@ FULL = "Error: No space left on device\n"
 
 
 @pytest.mark.parametrize(
-    ("command", "shell", "status", "said"),
+    ("command", "shell", "status", "message"),
     [
         (("list",), "| head -1", 0, ""),
         (("list",), ">&- 2>&-", 0, ""),
@@ -309,10 +309,10 @@ FULL = "Error: No space left on device\n"
         (("run", "mine.toml"), "> /dev/full", 1, FULL),
     ],
 )
-def test_an_unwritable_standard_output_is_no_crash(workspace, command, shell, status, said):
-    (workspace / "mine.toml").write_text(written(SCENE))
+def test_an_unwritable_standard_output_is_no_crash(workspace, command, shell, status, message):
+    (workspace / "mine.toml").write_text(scene_text(SCENE))
     done = python(workspace, *command, shell=shell)
-    assert (done.returncode, done.stderr) == (status, said)
+    assert (done.returncode, done.stderr) == (status, message)
 
 
 def test_a_closed_standard_input_is_empty(user_folder, tmp_path):
@@ -325,7 +325,7 @@ def test_a_record_is_read_from_a_named_pipe(tmp_path):
     os.mkfifo(tmp_path / "63")
     writer = threading.Thread(target=(tmp_path / "63").write_text, args=("t [s],x [m]\n0.5,1\n1.5,2\n",))
     writer.start()
-    assert ended("decay", tmp_path / "63") == (2, "63 has 2 samples in this interval; at least 12 are required")
+    assert run_command("decay", tmp_path / "63") == (2, "63 has 2 samples in this interval; at least 12 are required")
     writer.join()
 
 
@@ -343,7 +343,7 @@ ASCII, C = {"PYTHONIOENCODING": "ascii"}, {"LC_ALL": "C", "PYTHONUTF8": "0", "PY
 def test_an_ascii_standard_output_is_no_crash(workspace, command, coding):
     rows = [f"{0.04 * i},{exp(-0.04 * i) * cos(0.48 * i)}" for i in range(50)]
     (workspace / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
-    (workspace / "mine.toml").write_text(written(SCENE))
+    (workspace / "mine.toml").write_text(scene_text(SCENE))
     done = python(workspace, *command, **coding)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.isascii()

@@ -52,7 +52,7 @@ def test_a_signal_ends_a_command_and_leaves_nothing_behind(user_folder, tmp_path
     (tmp_path / "slow.toml").write_text(SLOW)
     arguments, sign = COMMANDS[command]
     environment = os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(tmp_path / "temporary")}
-    heard = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a test run in the background ignores it
+    reset_sigint = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a test run in the background ignores it
     process = subprocess.Popen(
         [sys.executable, "-m", "harness", *arguments, "--out", "out"],
         cwd=tmp_path,
@@ -61,44 +61,44 @@ def test_a_signal_ends_a_command_and_leaves_nothing_behind(user_folder, tmp_path
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=heard,
+        preexec_fn=reset_sigint,
     )
     while process.poll() is None and not list(tmp_path.glob(sign)):
         time.sleep(0.01)
     os.killpg(process.pid, number)
-    answered, said = process.communicate(timeout=60)
-    assert (process.returncode, answered, said.count("\n")) == (128 + number, "", 1), said
-    assert said.startswith(("Error: interrupted", "Error: terminated"))
+    stdout, stderr = process.communicate(timeout=60)
+    assert (process.returncode, stdout, stderr.count("\n")) == (128 + number, "", 1), stderr
+    assert stderr.startswith(("Error: interrupted", "Error: terminated"))
     assert list((tmp_path / "temporary").iterdir()) == []
-    left = [path.name for path in (tmp_path / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
+    files = [path.name for path in (tmp_path / "out").rglob("*") if path.is_file() or path.name.startswith(".")]
     if command == "sweep":
-        assert [name for name in left if not name.endswith(".journal")] == []  # completed work is kept
+        assert [name for name in files if not name.endswith(".journal")] == []  # completed work is kept
     elif command == "main":
-        assert [name for name in left if name.startswith(".")] == []  # completed scenes are intact
+        assert [name for name in files if name.startswith(".")] == []  # completed scenes are intact
         assert len(list((tmp_path / "out").glob("*"))) < 8
     else:
-        assert left == []
+        assert files == []
 
 
 def test_a_context_is_exited_if_a_signal_arrives_during_entry():
-    left = []
+    events = []
 
     @contextmanager
     def folder():
         try:
             yield
         finally:
-            left.append("folder")
+            events.append("folder")
 
     def entered():
         held = folder()
         held.__enter__()
         raise KeyboardInterrupt
 
-    with pytest.raises(CommandInterruptedError) as told, interruptible():
+    with pytest.raises(CommandInterruptedError) as error, interruptible():
         entered()
-    assert told
-    assert left == ["folder"]
+    assert error
+    assert events == ["folder"]
 
 
 def test_an_interrupt_swallowed_by_a_callee_still_ends_the_command(monkeypatch):
@@ -111,12 +111,12 @@ def test_an_interrupt_swallowed_by_a_callee_still_ends_the_command(monkeypatch):
                 signal.raise_signal(signal.SIGINT)
             raise RuntimeError("a step failed, for what it is worth")
 
-    usual = signal.default_int_handler, signal.SIG_DFL  # a shell lets background processes ignore Ctrl-C
-    before = [signal.signal(number, handler) for number, handler in zip(interrupt.SIGNALS, usual, strict=True)]
+    default = signal.default_int_handler, signal.SIG_DFL  # a shell lets background processes ignore Ctrl-C
+    before = [signal.signal(number, handler) for number, handler in zip(interrupt.SIGNALS, default, strict=True)]
     try:
-        with pytest.raises(CommandInterruptedError, match="interrupted") as told:
+        with pytest.raises(CommandInterruptedError, match="interrupted") as error:
             swallowed()
-        assert told.value.status == 130
+        assert error.value.status == 130
         with pytest.raises(KeyboardInterrupt):
             check_interrupt()
     finally:

@@ -54,8 +54,8 @@ def table(path):
 def main_job():
     """The finished main job and its results."""
     folder = run_published_cases()
-    said = json.loads((folder / "process.json").read_text())
-    return SimpleNamespace(**dict(zip(("returncode", "stdout", "stderr"), said, strict=True))), folder / "results"
+    process = json.loads((folder / "process.json").read_text())
+    return SimpleNamespace(**dict(zip(("returncode", "stdout", "stderr"), process, strict=True))), folder / "results"
 
 
 def test_the_main_job_runs_every_published_case(main_job):
@@ -174,13 +174,13 @@ def test_a_measure_unsupported_by_its_samples_is_refused_and_the_remedy_works(sc
     assert done.returncode == 1
     (step,) = re.findall(r"each .* needs at least 8 samples, .* has \d: set grid to (\S+) s or less\n", done.stderr)
     done, _ = scene(text.replace("\nanalyses", f"\ngrid = {step}\nanalyses"), "--json")
-    found = {each["name"]: each["value"] for each in json.loads(done.stdout)["quantities"]}
-    assert found[name] == pytest.approx(value, rel=1e-3)
+    quantities = {item["name"]: item["value"] for item in json.loads(done.stdout)["quantities"]}
+    assert quantities[name] == pytest.approx(value, rel=1e-3)
 
 
 def test_slips_are_measured_without_the_acceleration(scene):
     done, _ = scene(BASE + "plots = []\nanalyses = ['slip']", "--json")
-    names = [each["name"] for each in json.loads(done.stdout)["quantities"]]
+    names = [item["name"] for item in json.loads(done.stdout)["quantities"]]
     assert "peak_speed" in names
     assert "peak_acceleration" not in names
 
@@ -294,9 +294,9 @@ def test_a_forked_process_behaves_like_a_fresh_one(fmus, tmp_path, arguments):
     (tmp_path / "swing.csv").write_text("\n".join(["t [s],x [m]", *rows]))
     fresh, forked = done(True), done(False)
     assert (forked.returncode, forked.stderr) == (fresh.returncode, fresh.stderr)
-    told = [re.sub(TIME, "", done.stdout) for done in (forked, fresh)]
-    assert re.sub(NUMBER, "", told[0]) == re.sub(NUMBER, "", told[1])
-    one, other = (list(map(float, re.findall(NUMBER, text))) for text in told)
+    outputs = [re.sub(TIME, "", done.stdout) for done in (forked, fresh)]
+    assert re.sub(NUMBER, "", outputs[0]) == re.sub(NUMBER, "", outputs[1])
+    one, other = (list(map(float, re.findall(NUMBER, text))) for text in outputs)
     assert one == pytest.approx(other, rel=1e-6, abs=1e-9)  # sums of numpy depend on the memory alignment of an array
 
 

@@ -42,13 +42,13 @@ def workspace(fmus, tmp_path):
     return tmp_path
 
 
-def fits(said, *headings):
+def assert_fits(output, *headings):
     """Assert that lines are short enough, nothing is truncated, and the headings are present."""
-    lines = said.splitlines()
+    lines = output.splitlines()
     assert max(map(len, lines)) <= WIDTH, max(lines, key=len)
-    assert "\u2026" not in said
+    assert "\u2026" not in output
     for heading in headings:
-        assert heading in said
+        assert heading in output
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def fits(said, *headings):
 def test_command_tables_fit_into_80_columns(workspace, arguments, headings):
     done = harness(workspace, *arguments, **PLAIN)
     assert (done.returncode, done.stderr) == (0, "")
-    fits(done.stdout, *headings)
+    assert_fits(done.stdout, *headings)
 
 
 POINTS = [
@@ -122,11 +122,11 @@ TABLES = {  # of slow commands, filled with long words
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_of_long_commands_fit_into_80_columns(name):
     shown, heading = TABLES[name]
-    for each in shown:
+    for item in shown:
         console = Console(width=WIDTH, markup=False, highlight=False)
-        with console.capture() as said:
-            console.print(each)
-        fits(said.get(), heading)
+        with console.capture() as output:
+            console.print(item)
+        assert_fits(output.get(), heading)
 
 
 @pytest.mark.parametrize("command", ["", *commands.commands])
@@ -134,7 +134,7 @@ def test_help_text_is_not_truncated(tmp_path, command):
     done = harness(tmp_path, *command.split(), "--help", **PLAIN)
     assert (done.returncode, done.stderr) == (0, "")
     prose = [line for line in done.stdout.splitlines() if "-m harness" not in line]  # a command is one line
-    fits("\n".join(prose), "Example")
+    assert_fits("\n".join(prose), "Example")
     assert not [line for line in prose if re.search(r"\w\.\.\.$", line)]
     assert "None" not in done.stdout
 
@@ -142,9 +142,9 @@ def test_help_text_is_not_truncated(tmp_path, command):
 def test_names_with_brackets_are_printed_literally(tmp_path):
     for name, off in (("one", 0.0), ("two", 0.5)):
         (tmp_path / f"{name}.csv").write_text(f"t [s],x[1] [m],[bold] [m]\n0,0,1\n1,{1 + off},2\n2,3,4\n")
-    said = harness(tmp_path, "compare", "one.csv", "two.csv", **PLAIN).stdout
-    assert "\nx[1] " in said
-    assert "\n[bold] " in said
+    output = harness(tmp_path, "compare", "one.csv", "two.csv", **PLAIN).stdout
+    assert "\nx[1] " in output
+    assert "\n[bold] " in output
 
 
 @pytest.mark.parametrize(
@@ -196,32 +196,32 @@ def test_a_missing_optional_package_is_named_before_any_run(workspace, package, 
 
 
 def test_an_fmu_given_as_a_scene_is_run(workspace, tmp_path):
-    told = [
+    outputs = [
         harness(workspace, "run", *way, "fmus/smd.fmu", "--set", "k=50", "--out", tmp_path / str(len(way)))
         for way in ((), ("--fmu",))
     ]
-    assert [done.returncode for done in told] == [0, 0]
-    assert told[0].stdout.splitlines()[:-1] == told[1].stdout.splitlines()[:-1] != []
+    assert [done.returncode for done in outputs] == [0, 0]
+    assert outputs[0].stdout.splitlines()[:-1] == outputs[1].stdout.splitlines()[:-1] != []
 
 
 def test_the_versions_are_printed(tmp_path):
-    own = f"friction-fmus {version('friction-fmus')}"
-    said = harness(tmp_path, "--version").stdout
-    assert said.startswith(f"{own}, fmpy {version('fmpy')}, ")
-    assert processes.build("--version", folder=tmp_path).stdout == f"{own}\n"
+    name_and_version = f"friction-fmus {version('friction-fmus')}"
+    output = harness(tmp_path, "--version").stdout
+    assert output.startswith(f"{name_and_version}, fmpy {version('fmpy')}, ")
+    assert processes.build("--version", folder=tmp_path).stdout == f"{name_and_version}\n"
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_json_list_is_accepted_by_the_commands(workspace):
-    found = json.loads(harness(workspace, "list", "--json").stdout)
-    assert [each["scene"] for each in found if each["command"] == "run"] == [file.stem for file in shipped_scenes()]
-    assert [each["scene"] for each in found if each["command"] == "couple"] == [
+    listing = json.loads(harness(workspace, "list", "--json").stdout)
+    assert [item["scene"] for item in listing if item["command"] == "run"] == [file.stem for file in shipped_scenes()]
+    assert [item["scene"] for item in listing if item["command"] == "couple"] == [
         file.stem for file in coupled.shipped_coupled_scenes()
     ]
-    for each in found:
-        if each["command"] == "run":
-            scene = load_scene(each["scene"])
-            assert (each["title"], each["model"]) == (scene.title, scene.file.stem)
+    for item in listing:
+        if item["command"] == "run":
+            scene = load_scene(item["scene"])
+            assert (item["title"], item["model"]) == (scene.title, scene.file.stem)
 
 
 def page_of(workspace):
@@ -233,34 +233,34 @@ def page_of(workspace):
 @pytest.mark.parametrize("scene", ["stickslip-threshold", "pendulum", "smd"])
 def test_a_quantity_is_formatted_alike_in_terminal_file_and_page(workspace, scene):
     """Every measured quantity has the same digits and the same unit."""
-    said = harness(workspace, "run", scene, **PLAIN).stdout
+    output = harness(workspace, "run", scene, **PLAIN).stdout
     assert harness(workspace, "report").returncode == 0
     page = page_of(workspace)
     with (workspace / f"results/{scene}/quantities.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) > 10
     for row in rows:
-        told = re.search(
-            rf"  {re.escape(row[''])} +{re.escape(row['measured'])}(?= ) *.*{re.escape(row['unit'])}", said
+        cell = re.search(
+            rf"  {re.escape(row[''])} +{re.escape(row['measured'])}(?= ) *.*{re.escape(row['unit'])}", output
         )
-        assert told, row
+        assert cell, row
         cells = f"<td>{row['']}</td><td>{row['measured']}</td>"
         assert cells in page, row
     steps = page.split('<section id="steps">')[1].split("</section>")[0]
-    told = dict(zip(*(re.findall(f"<{tag}[^>]*>([^<]*)</{tag}>", steps) for tag in ("th", "td")), strict=True))
+    cell = dict(zip(*(re.findall(f"<{tag}[^>]*>([^<]*)</{tag}>", steps) for tag in ("th", "td")), strict=True))
     for row in rows:
-        if row[""] in told:
-            assert told[row[""]] == f"{row['measured']} {row['unit']}".strip()
-    assert len(told) == 6
+        if row[""] in cell:
+            assert cell[row[""]] == f"{row['measured']} {row['unit']}".strip()
+    assert len(cell) == 6
 
 
 def test_an_interval_is_formatted_alike_in_terminal_and_page(workspace):
     t = np.linspace(0.0, 10.0, 800)
     x = np.exp(-0.2 * t) * np.cos(12 * t) + 1e-3 * np.random.default_rng(1).standard_normal(800)
     np.savetxt(workspace / "mine.csv", np.column_stack([t, x]), header="t [s],x [m]", delimiter=",", comments="")
-    said = harness(workspace, "decay", "mine.csv", COLUMNS="200", PATH="").stdout
+    output = harness(workspace, "decay", "mine.csv", COLUMNS="200", PATH="").stdout
     assert harness(workspace, "report").returncode == 0
     page = page_of(workspace)
-    told = re.findall(r"\S+ \u00b1 \S+|\S+ \(\S+ to \S+\)|< \S+", said.split("Best")[0])
-    assert len(told) > 4
-    assert all(f"<td>{each}</td>" in page for each in told)
+    cells = re.findall(r"\S+ \u00b1 \S+|\S+ \(\S+ to \S+\)|< \S+", output.split("Best")[0])
+    assert len(cells) > 4
+    assert all(f"<td>{item}</td>" in page for item in cells)

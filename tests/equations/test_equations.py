@@ -69,7 +69,7 @@ def situations(analysis, model, count):
         yield values, t, at, draw.choice((-1, 1))
 
 
-def driven(analysis, model, t):
+def driver_positions(analysis, model, t):
     """Return the position of the driver."""
     return {d.name: model.x_base + getattr(model, d.constant_rate.name) * (t - model.t_base) for d in analysis.drivers}
 
@@ -85,7 +85,7 @@ def test_generated_code_has_the_bits_of_the_declared_equations(source):
     modes = [m.name for m in analysis.modes]
     tried = 0
     for values, t, at, mode in situations(analysis, model, 300):
-        values |= at | driven(analysis, model, t) | dict.fromkeys(modes, mode)
+        values |= at | driver_positions(analysis, model, t) | dict.fromkeys(modes, mode)
         equations = Evaluated(analysis, values, math)
         for c in analysis.contacts:
             values[c.name] = mode * equations.of(c.slide)
@@ -109,14 +109,14 @@ def test_generated_code_has_the_bits_of_the_declared_equations(source):
 @EVERY_SOURCE
 def test_jacobians_agree_with_differences_in_fifty_digits(source):
     """By time and by each state, sliding either way, from direct evaluation of the equations."""
-    analysis, model, found = find_model(source).analysis, find_model(source).model(), []
+    analysis, model, differences = find_model(source).analysis, find_model(source).model(), []
     for values, t, at, mode in situations(analysis, model, 40):
-        known = values | at | driven(analysis, model, t) | {m.name: mode for m in analysis.modes}
-        found += zip(
-            model.jacobian(t, *at.values(), *[mode] * len(analysis.modes)), slopes(analysis, known), strict=True
+        point = values | at | driver_positions(analysis, model, t) | {m.name: mode for m in analysis.modes}
+        differences += zip(
+            model.jacobian(t, *at.values(), *[mode] * len(analysis.modes)), slopes(analysis, point), strict=True
         )
-    size = max(abs(true) for _, true in found)
-    assert all(abs(slope - true) <= 1e-12 * abs(true) + 1e-15 * size for slope, true in found)
+    size = max(abs(true) for _, true in differences)
+    assert all(abs(slope - true) <= 1e-12 * abs(true) + 1e-15 * size for slope, true in differences)
 
 
 @pytest.mark.parametrize("source", LARGER_MODELS, ids=lambda source: source.stem)
@@ -127,33 +127,33 @@ def test_any_number_of_states_and_contacts_is_derived(source):
     model = find_model(source).model()
     for values, t, at, _ in situations(analysis, model, 12):
         for modes in product((-1, 0, 1), repeat=len(analysis.modes)):
-            known = values | at | driven(analysis, model, t)
-            known |= {m.name: mode for m, mode in zip(analysis.modes, modes, strict=True)}
+            situation = values | at | driver_positions(analysis, model, t)
+            situation |= {m.name: mode for m, mode in zip(analysis.modes, modes, strict=True)}
             point = t, *at.values(), *modes
             rates = model.rates(*point)
             for state, got in zip(
                 analysis.dynamic_states, rates if len(analysis.dynamic_states) > 1 else [rates], strict=True
             ):
-                true = settled(analysis, analysis.rate_outputs[state], known)
+                true = converged_law(analysis, analysis.rate_outputs[state], situation)
                 assert abs(got - true) < 1e-12 * (1 + abs(true))
-                stuck = [c for c in analysis.independent_contacts if c.slip is state and known[c.mode.name] == 0]
+                stuck = [c for c in analysis.independent_contacts if c.slip is state and situation[c.mode.name] == 0]
                 assert got == 0.0 or not stuck
-            for got, true in zip(model.jacobian(*point), slopes(analysis, known), strict=True):
+            for got, true in zip(model.jacobian(*point), slopes(analysis, situation), strict=True):
                 assert abs(got - true) < 1e-11 * (1 + abs(true))
 
 
-def slopes(analysis, known):
+def slopes(analysis, values):
     """Return the derivatives of each law by time and by each state, as differences in many digits."""
-    by_time = {d.name: known[d.constant_rate.name] for d in analysis.drivers}
+    by_time = {d.name: values[d.constant_rate.name] for d in analysis.drivers}
     ways = [by_time, *({s.name: 1} for s in analysis.states)]
     with mpmath.workdps(DIGITS):
         h = mpmath.mpf(10) ** -20
 
         def moved(way, step):
-            return known | {name: known[name] + step * mpmath.mpf(speed) for name, speed in way.items()}
+            return values | {name: values[name] + step * mpmath.mpf(speed) for name, speed in way.items()}
 
         pairs = (
-            [settled(analysis, analysis.rate_outputs[s], moved(way, d)) for d in (h, -h)]
+            [converged_law(analysis, analysis.rate_outputs[s], moved(way, d)) for d in (h, -h)]
             for s in analysis.dynamic_states
             for way in ways
         )
@@ -161,14 +161,14 @@ def slopes(analysis, known):
 
 
 @mpmath.workdps(DIGITS)
-def settled(analysis, law, known):
+def converged_law(analysis, law, variables):
     """Return the law in many digits, with the force of each contact: sliding friction, or the force that keeps its
     slip.
 
     Slips are linear in the speeds, and their rates in the forces, so that differences give the coefficients.
     """
     modes = {m.name for m in analysis.modes}
-    values = {name: value if name in modes else mpmath.mpf(value) for name, value in known.items()}
+    values = {name: value if name in modes else mpmath.mpf(value) for name, value in variables.items()}
     equations = Evaluated(analysis, values, mpmath.mp)
     stuck = [c for c in analysis.contacts if values[c.mode.name] == 0]
     for c in analysis.contacts:

@@ -27,7 +27,7 @@ def lugre(t, y):
     return [v, (742.5 * (0.034 * t - x) - (1e4 * z + 300.0 * u + 0.4 * v)) / 12.5, u]
 
 
-def bristled(stop):
+def reference_run(stop):
     """Return final position, speed and bristle deflection, by a method that the project does not use."""
     return solve_ivp(lugre, (0.0, stop), (0.0, 0.0, 0.0), "LSODA", rtol=1e-12, atol=1e-14).y[:, -1]
 
@@ -35,9 +35,9 @@ def bristled(stop):
 def test_three_states_agree_with_an_independent_formulation(worker):
     """LuGre: position, speed and bristle deflection, within 1e-9 of their size."""
     fmu = worker.instantiate(built("lugre", "")).begin({"solver.rtol": 1e-11}, stop=STOP)
-    (found,) = fmu.run([0.0, STOP], ["x", "v", "z"])[-1:]
+    (final,) = fmu.run([0.0, STOP], ["x", "v", "z"])[-1:]
     fmu.free()
-    assert np.abs(found - bristled(STOP)).max() < 1e-9
+    assert np.abs(final - reference_run(STOP)).max() < 1e-9
 
 
 def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
@@ -50,11 +50,11 @@ def test_a_certified_result_has_all_states_and_precision_accepts_it(tmp_path):
     _, heads, *rows = (tmp_path / "lugre.csv").read_text().splitlines()
     assert heads == "t [s],x [m],v [m/s],z [m]"
     table = np.array([row.split(",") for row in rows], float)
-    assert np.abs(table[-1, 1:] - bristled(table[-1, 0])).max() < 1e-9
+    assert np.abs(table[-1, 1:] - reference_run(table[-1, 0])).max() < 1e-9
     done = commands.harness(tmp_path, "precision", "lugre.py", "--quick", blank=True)
     assert (done.returncode, done.stderr) == (0, "")
-    kept = {"lugre.csv", "lugre.json", "lugre.svg", "lugre.txt"}
-    assert {file.name for file in (tmp_path / "results/precision").iterdir()} == kept
+    expected_files = {"lugre.csv", "lugre.json", "lugre.svg", "lugre.txt"}
+    assert {file.name for file in (tmp_path / "results/precision").iterdir()} == expected_files
 
 
 def run(fmu, physics, changes):
@@ -94,30 +94,30 @@ def test_contacts_stick_and_slip_as_in_an_independent_formulation(worker, name, 
     true, end = reference_events(name, changes)
     fmu = worker.instantiate(built(name, ""))
     fmu.begin({"solver.rtol": 1e-12, "solver.method": DOP853}, stop=physics.stop)
-    events, found = run(fmu, physics, changes)
+    events, final = run(fmu, physics, changes)
     fmu.free()
     assert [modes for _, *modes in events] == [modes for _, *modes in true]
     assert np.abs(np.array([t for t, *_ in events]) - [t for t, *_ in true]).max() < 1e-9
-    assert np.abs(np.array(found) - end).max() < 1e-9
+    assert np.abs(np.array(final) - end).max() < 1e-9
 
 
 @pytest.mark.parametrize("name", [path.stem for path in LARGER_MODELS])
 def test_python_and_native_agree_bit_for_bit(worker, name):
     """Outputs and counters at every internal step, by every method."""
     variables = {v.name: v for v in read_model_description(built(name, "")).modelVariables}
-    wanted = [v.name for v in variables.values() if v.causality == "output"]
-    wanted += ["solver.steps", "solver.evaluations", "events.count"][: 3 if name in CONTACT_REFERENCES else 2]
+    names = [v.name for v in variables.values() if v.causality == "output"]
+    names += ["solver.steps", "solver.evaluations", "events.count"][: 3 if name in CONTACT_REFERENCES else 2]
     methods = [int(item.value) for item in variables["solver.method"].declaredType.items]
     assert len(methods) > 3
     for method in methods:
         runs = []
         for kind in ("", "native"):
             fmu = worker.instantiate(built(name, kind)).begin({"solver.rtol": 1e-5, "solver.method": method}, stop=STOP)
-            runs.append(fmu.follow(0.0, STOP, wanted))
+            runs.append(fmu.follow(0.0, STOP, names))
             fmu.free()
         (times, rows), (same, others) = runs
         assert times == same
-        assert_identical(rows, others, wanted)
+        assert_identical(rows, others, names)
 
 
 @pytest.mark.parametrize("kind", ["", "native"])

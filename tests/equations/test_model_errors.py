@@ -279,9 +279,9 @@ def test_a_mistake_is_reported_in_one_sentence_with_its_line(wrong, tmp_path):
     body, line, sentence = WRONG[wrong]
     path = tmp_path / "mine.py"
     path.write_text(HEAD + body)
-    with pytest.raises(BuildError, match=re.escape(f"{path}, line {line}: {sentence}")) as told:
+    with pytest.raises(BuildError, match=re.escape(f"{path}, line {line}: {sentence}")) as error:
         find_model(path).model  # noqa: B018
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(error.value)
 
 
 def test_any_docstring_text_survives_unchanged(tmp_path):

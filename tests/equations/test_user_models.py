@@ -35,8 +35,8 @@ def command(*arguments, cwd):
 def built(path, kind):
     """Return the FMU, beside a copy of the file outside the project; for FMI 3.0, whose numerics are those of the
     native FMU, with the default method only."""
-    usual = ["--method", find_model(path).analysis.method] if kind == "native/fmi3" else []
-    return build_user_model(path, *KINDS[kind], *usual) / kind / f"{path.stem}.fmu"
+    method_option = ["--method", find_model(path).analysis.method] if kind == "native/fmi3" else []
+    return build_user_model(path, *KINDS[kind], *method_option) / kind / f"{path.stem}.fmu"
 
 
 @EVERY_FILE
@@ -46,8 +46,8 @@ def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(path, kind):
     assert validate_fmu(str(fmu)) == []
     assert read_model_description(fmu).modelName == path.stem
     folder, *_ = [*kind.split("/"), ""]
-    left = {file.name for file in fmu.parents[len(kind.split("/")) if kind else 0].iterdir()}
-    assert left == {path.name, folder or f"{path.stem}.fmu"}
+    files = {file.name for file in fmu.parents[len(kind.split("/")) if kind else 0].iterdir()}
+    assert files == {path.name, folder or f"{path.stem}.fmu"}
     with ZipFile(fmu) as archive:
         names = archive.namelist()
         assert "documentation/index.html" in names
@@ -58,15 +58,15 @@ def test_it_is_built_beside_its_file_for_every_backend_and_is_valid(path, kind):
 def test_python_and_native_agree_bit_for_bit(path, worker):
     """Outputs and counters, up to the stop time of the default run."""
     described = read_model_description(built(path, ""))
-    wanted = [v.name for v in described.modelVariables if v.causality == "output" or v.name == "solver.steps"]
+    names = [v.name for v in described.modelVariables if v.causality == "output" or v.name == "solver.steps"]
     stop = float(described.defaultExperiment.stopTime)
     times = [stop * i / 50 for i in range(51)]
     rows = []
     for kind in ("", "native"):
         fmu = worker.instantiate(built(path, kind)).begin({}, stop=stop)
-        rows.append(fmu.run(times, wanted))
+        rows.append(fmu.run(times, names))
         fmu.free()
-    assert_identical(*rows, wanted)
+    assert_identical(*rows, names)
 
 
 def viscous_pendulum(t, y):
@@ -88,17 +88,17 @@ def test_its_motion_agrees_with_an_independent_formulation(law, start):
     path = next(path for path in EXAMPLE_MODELS if path.stem == law.__name__)
     stop = model_class(path).stop_time
     values = {"solver.rtol": 1e-11, "solver.method": 4}
-    found = simulate_fmu(built(path, "native"), stop_time=stop, output_interval=stop / 100, start_values=values)
+    simulation = simulate_fmu(built(path, "native"), stop_time=stop, output_interval=stop / 100, start_values=values)
     x, v = (s.name for s in find_model(path).analysis.states)
-    true = solve_ivp(law, (0.0, stop), start, "DOP853", t_eval=found["time"], rtol=1e-12, atol=1e-13).y
-    assert np.abs(found[x] - true[0]).max() < 1e-9
-    assert np.abs(found[v] - true[1]).max() < 1e-8
+    true = solve_ivp(law, (0.0, stop), start, "DOP853", t_eval=simulation["time"], rtol=1e-12, atol=1e-13).y
+    assert np.abs(simulation[x] - true[0]).max() < 1e-9
+    assert np.abs(simulation[v] - true[1]).max() < 1e-8
 
 
 def rotor_brake(stop):
     """Return times and angles of the changes between stick and slip of the brake, by scipy with events."""
     J, k, c, T_s, T_d, omega_s, turn = 0.02, 3.0, 0.01, 0.5, 0.3, 0.5, 0.4
-    t, phi, found = 0.0, 0.0, []
+    t, phi, changes = 0.0, 0.0, []
 
     def slide(t, y):
         drag = T_d + (T_s - T_d) * np.exp(-((y[1] / omega_s) ** 2))
@@ -111,13 +111,13 @@ def rotor_brake(stop):
     while True:
         t = (T_s / k + phi) / turn
         if t > stop:
-            return found
-        found.append((t, phi))
+            return changes
+        changes.append((t, phi))
         run = solve_ivp(slide, (t, stop), (phi, 0.0), "DOP853", events=rest, rtol=1e-12, atol=1e-13)
         if run.status != 1:
-            return found
+            return changes
         t, (phi, _) = run.t[-1], run.y[:, -1]
-        found.append((t, phi))
+        changes.append((t, phi))
 
 
 def test_its_friction_sticks_and_slips_when_the_equations_require(worker):
@@ -202,8 +202,8 @@ def test_a_result_is_certified_by_two_agreeing_methods_and_packed_by_the_next_bu
         "Error: there is no pendulum.fmu: build it with `python build_fmus.py pendulum.py`\n"
     )
     assert command("pendulum.py", cwd=oil).returncode == 0
-    made = harness("references", "pendulum.py", cwd=oil)
-    assert (made.returncode, made.stderr) == (0, "")
+    process = harness("references", "pendulum.py", cwd=oil)
+    assert (process.returncode, process.stderr) == (0, "")
     how, heads, *rows = (oil / "pendulum.csv").read_text().splitlines()
     assert how.startswith("# dop853 and rodas, relative difference ")
     assert float(how.rsplit(" ", 1)[1]) < 1e-10

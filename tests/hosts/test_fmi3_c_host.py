@@ -13,14 +13,14 @@ fmus, worker, _workers = fmi3_fixtures.FIXTURES
 def test_a_hundred_life_cycles_in_a_host_without_python(worker, fmus, name):
     """The final values agree with those of fmpy bit for bit."""
     program, library = [host_program(source=FMI3_HOST_SOURCE)], f"x86_64-linux/{name}.so"
-    (solving, solved), said = run_life_cycles(program, fmus / f"{name}.fmu", library, LIVES, STEPS)
+    (co_simulation, model_exchange), stderr = run_life_cycles(program, fmus / f"{name}.fmu", library, LIVES, STEPS)
     stop, (x, v, *_) = model_class(name).stop_time, outputs(name)
     h = stop / STEPS
     times = [i * h for i in range(STEPS)]
     fmu = worker.instantiate(fmus / f"{name}.fmu").begin()
     for t in times:
         fmu.step(t, h)
-    assert fmu.get(x, v) == solving
+    assert fmu.get(x, v) == co_simulation
     fmu.free()
     fmu = worker.exchange(fmus / f"{name}.fmu").begin()
     fmu.update_discrete_states()
@@ -31,9 +31,9 @@ def test_a_hundred_life_cycles_in_a_host_without_python(worker, fmus, name):
         fmu.enter_event_mode()
         fmu.update_discrete_states()
         fmu.enter_continuous_time()
-    assert fmu.get(x, v) == solved
+    assert fmu.get(x, v) == model_exchange
     fmu.free()
 
-    assert [line for line in said if not line.startswith("log")] != []
-    assert all("m = -1.0" in line for line in said)
-    assert len(said) == 2  # in the log and on standard error
+    assert [line for line in stderr if not line.startswith("log")] != []
+    assert all("m = -1.0" in line for line in stderr)
+    assert len(stderr) == 2  # in the log and on standard error

@@ -14,7 +14,7 @@ from tests.hosts import test_invalid_values
 fmus, worker, _workers = fmi3_fixtures.FIXTURES
 fresh_worker = fmi3_fixtures.fresh_worker
 ERROR = 3
-REALS, refuses = test_invalid_values.REALS, test_invalid_values.refuses
+REALS, assert_refused = test_invalid_values.REALS, test_invalid_values.assert_refused
 
 
 @pytest.fixture(autouse=True)
@@ -40,7 +40,7 @@ STEPS = {
 def test_an_impossible_step_is_refused(launch, name, step):
     fmu = launch(name)
     fmu.step(0.0, 1.0)
-    refuses(fmu, name, *step, "step", *(repr(part) for part in step), "1.0 s")
+    assert_refused(fmu, name, *step, "step", *(repr(part) for part in step), "1.0 s")
 
 
 @pytest.mark.parametrize("kind", ["Float64", "Float32", "Int32", "Int64", "UInt64", "Boolean", "String"])

@@ -19,7 +19,7 @@ def test_ecos_runs_fmi3_co_simulation_like_fmi2(name, fmus):
     older = describe_fmu(fmus / f"{name}.fmu").base_request
     newer = replace(older, fmu=str(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu"))
     prepare(ECOS, [older, newer])
-    found, expected = run_request(ECOS, newer).reply, run_request(ECOS, older).reply
-    assert len(found.rows) == len(expected.rows) > 100
-    for mine, theirs in zip(found.rows, expected.rows, strict=True):
-        assert mine == pytest.approx(theirs, rel=1e-6, abs=1e-7)
+    actual, expected = run_request(ECOS, newer).reply, run_request(ECOS, older).reply
+    assert len(actual.rows) == len(expected.rows) > 100
+    for row, expected_row in zip(actual.rows, expected.rows, strict=True):
+        assert row == pytest.approx(expected_row, rel=1e-6, abs=1e-7)

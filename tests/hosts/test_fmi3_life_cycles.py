@@ -19,44 +19,44 @@ fresh_worker = fmi3_fixtures.fresh_worker
 
 
 @pytest.fixture(scope="module")
-def each():
+def folders():
     """Every FMI 3.0 FMU twice: the first is used for co-simulation, the second for model exchange."""
     return [str(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu") for name in MODELS for _ in range(2)]
 
 
 @pytest.fixture(scope="module")
-def older(fmus):
+def fmi2_folders(fmus):
     """The FMI 2.0 FMUs."""
     return [str(fmus / f"{name}.fmu") for name in MODELS]
 
 
-def test_successive_life_cycles_leave_little_memory(each, record_property):
+def test_successive_life_cycles_leave_little_memory(folders, record_property):
     """Fifteen life cycles of each of ten, each with a reset; the measured growth is 0.2 kB per life cycle."""
-    told = run_script("run_in_turn", each, 150)
-    early, late = told["memory"]
+    result = run_script("run_in_turn", folders, 150)
+    early, late = result["memory"]
     record_property("kB a life", (late - early) / 135)
-    assert told["runs"] == [1] * len(each)
-    assert told["path"] == []
+    assert result["runs"] == [1] * len(folders)
+    assert result["path"] == []
     assert late - early < 135 * 4.0
 
 
-def test_instances_of_both_interfaces_and_both_versions_coexist(each, older):
+def test_instances_of_both_interfaces_and_both_versions_coexist(folders, fmi2_folders):
     """All instances exist at once and are stepped in turn; every instance of an FMU gives the same run."""
-    assert run_script("run_interleaved", each + older, 1)["runs"] == 1
+    assert run_script("run_interleaved", folders + fmi2_folders, 1)["runs"] == 1
 
 
-def test_an_fmu_unpacked_for_every_run_is_released(each, record_property):
+def test_an_fmu_unpacked_for_every_run_is_released(folders, record_property):
     """Memory and libraries of earlier runs are released, as with simulate_fmu of fmpy."""
-    told = run_script("unpack_for_every_run", each[0], 30)
-    early, late = told["memory"]
+    result = run_script("unpack_for_every_run", folders[0], 30)
+    early, late = result["memory"]
     record_property("kB a run", (late - early) / 27)
-    assert told["libraries"] <= 2
-    assert told["path"] == []
+    assert result["libraries"] <= 2
+    assert result["path"] == []
     assert late - early < 27 * 20.0
 
 
-def test_threads_do_not_interfere(each, older):
-    paths = each + older
+def test_threads_do_not_interfere(folders, fmi2_folders):
+    paths = folders + fmi2_folders
     assert run_script("run_in_threads", paths, 4, 2) == {"runs": [1] * len(paths), "errors": []}
 
 
@@ -64,22 +64,22 @@ def test_threads_do_not_interfere(each, older):
 def test_child_processes_continue_instances_and_create_new_ones(method):
     """Co-simulation of the sled, model exchange of the pendulum."""
     paths = [fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu" for name in ("stickslip", "pendulum")]
-    told = run_script("run_in_processes", paths, method)
-    assert (told["same"], {*told["codes"]}) == (True, {0})
+    result = run_script("run_in_processes", paths, method)
+    assert (result["same"], {*result["codes"]}) == (True, {0})
 
 
-def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(each):
-    told = run_script("run_beside_sources", str(ROOT), each)
-    assert told["foreign"] == []
-    assert told["rows"] == run_script("run_each", each)
+def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(folders):
+    result = run_script("run_beside_sources", str(ROOT), folders)
+    assert result["foreign"] == []
+    assert result["rows"] == run_script("run_each", folders)
 
 
-def test_a_folder_may_have_any_name(each, tmp_path):
+def test_a_folder_may_have_any_name(folders, tmp_path):
     """Except one with %20, which the native layer takes for a space."""
-    expected = run_script("run_in_folder", each[0], None)
+    expected = run_script("run_in_folder", folders[0], None)
     for folder in ("with  two", "Grüße, 世界", "a b/ü", "50% off", "d" * 200):
         (tmp_path / folder).parent.mkdir(exist_ok=True)
-        assert run_script("run_in_folder", each[0], str(tmp_path / folder)) == expected, folder
+        assert run_script("run_in_folder", folders[0], str(tmp_path / folder)) == expected, folder
 
 
 def test_a_process_may_end_with_live_instances(fresh_worker):

@@ -21,22 +21,22 @@ def fmu(fmus):
 @pytest.mark.parametrize("handler", HANDLERS)
 def test_an_interrupt_ends_a_step_and_reaches_the_host(fmu, handler):
     """The host gets the exception that its signal handler raised, once, and no later than at the end of the call."""
-    answer, said = run_script_with_stderr("interrupted_host.py", "interrupt_long_step", fmu, handler)
+    answer, stderr = run_script_with_stderr("interrupted_host.py", "interrupt_long_step", fmu, handler)
     arguments = {"KeyboardInterrupt": [], "SystemExit": [143], "Stop": ["enough", 3]}
     assert answer["reached"] == [handler, arguments[handler]]
     ((status, category, sentence),) = answer["log"]
     assert (status, category) == (3, "logStatusError")
     assert sentence == "the run was interrupted after t = 0.0 s; reset the FMU to run again"
-    assert said == f"Smd (interrupted): {sentence}\n"
+    assert stderr == f"Smd (interrupted): {sentence}\n"
     assert answer["x"]
     assert answer["recovers"]
 
 
 def test_an_interrupt_during_any_call_reaches_the_host(fmu):
     """Also if the signal is handled when a function of the FMU is entered, before its first line."""
-    answer, said = run_script_with_stderr("interrupted_host.py", "interrupt_short_steps", fmu, 150)
+    answer, stderr = run_script_with_stderr("interrupted_host.py", "interrupt_short_steps", fmu, 150)
     assert answer == [["KeyboardInterrupt"], 150]
-    assert all("was interrupted" in line for line in said.splitlines())
+    assert all("was interrupted" in line for line in stderr.splitlines())
 
 
 @pytest.mark.parametrize("version", PYTHONS)

@@ -23,13 +23,13 @@ from harness.studies.importers.request import END, ImporterReply, ImporterReques
 
 # Both backends of a model agree bit for bit (native/test_python_native_agreement.py), and the code specific to a
 # backend is the same for all models: each model is checked with one backend, the sled with both.
-ASKED = {"python": sorted({*MODELS[::2], "stickslip"}), "native": sorted({*MODELS[1::2], "stickslip"})}
+CHECKED = {"python": sorted({*MODELS[::2], "stickslip"}), "native": sorted({*MODELS[1::2], "stickslip"})}
 
 
-@pytest.fixture(scope="module", params=ASKED)
-def asked(request, fmus, tmp_path_factory):
+@pytest.fixture(scope="module", params=CHECKED)
+def checked(request, fmus, tmp_path_factory):
     """Return the models to check with a backend, and all rows of their table, computed once per test run."""
-    names, source = ASKED[request.param], fmus if request.param == "python" else native_fmus.build_native_fmus()
+    names, source = CHECKED[request.param], fmus if request.param == "python" else native_fmus.build_native_fmus()
 
     def make(out):
         folder = tmp_path_factory.mktemp("asked")
@@ -42,19 +42,19 @@ def asked(request, fmus, tmp_path_factory):
 
 @pytest.mark.parametrize("check", CHECKS)
 @pytest.mark.parametrize("importer", IMPORTERS, ids=lambda importer: importer.name)
-def test_the_importer_passes(asked, importer, check):
-    names, rows = asked
-    mine = [row for row in rows if row.importer.startswith(importer.name)]
-    if mine[0].reason:
-        pytest.skip(mine[0].reason)
-    (row,) = [row for row in mine if row.check == check]
+def test_the_importer_passes(checked, importer, check):
+    names, rows = checked
+    importer_rows = [row for row in rows if row.importer.startswith(importer.name)]
+    if importer_rows[0].reason:
+        pytest.skip(importer_rows[0].reason)
+    (row,) = [row for row in importer_rows if row.check == check]
     assert row.failed == ()
     unfit = [row for row in rows if row.importer.endswith(".fmu")]
     assert len(row.cells) + len(unfit) == len(names)
 
 
-def test_the_table_lists_every_model_and_names_missing_tools(asked):
-    names, rows = asked
+def test_the_table_lists_every_model_and_names_missing_tools(checked):
+    names, rows = checked
     unfit = [row.importer.removesuffix(".fmu") for row in rows if row.importer.endswith(".fmu")]
     assert sorted([*table.fmu_names(rows), *unfit]) == names
     assert {row.importer for row in rows if row.reason} >= set(NOT_RUN)
@@ -75,16 +75,16 @@ def test_an_fmu_unsuitable_for_the_checks_is_skipped_with_a_reason(tmp_path, mon
 
 def test_a_crash_or_timeout_affects_only_its_own_check(monkeypatch):
     """The checks that follow run in another process; a process that ends badly loses its last answer."""
-    asked = []
+    batches = []
 
     def process(module, text, timeout):
-        asked.append([json.loads(line)["instances"][0] for line in text.splitlines()])
-        answered = [*takewhile(lambda name: name not in ("crash", "hang"), asked[-1])]
-        last = asked[-1][: len(answered) + 1][-1]  # the check in which it ended
+        batches.append([json.loads(line)["instances"][0] for line in text.splitlines()])
+        finished = [*takewhile(lambda name: name not in ("crash", "hang"), batches[-1])]
+        last = batches[-1][: len(finished) + 1][-1]  # the check in which it ended
         ends = {"crash": -11, "hang": -9, "leak": -6}.get(last, 0)
-        replies = "\n".join(json.dumps(asdict(ImporterReply(name, [], [], 0))) for name in answered)
-        said = "".join(f"{name} speaks{END}" for name in answered) + "a reason\n" * bool(ends)
-        done = CompletedProcess([], ends, replies, said)
+        replies = "\n".join(json.dumps(asdict(ImporterReply(name, [], [], 0))) for name in finished)
+        stderr = "".join(f"{name} speaks{END}" for name in finished) + "a reason\n" * bool(ends)
+        done = CompletedProcess([], ends, replies, stderr)
         if last == "hang":
             raise SubprocessTimeoutError(timeout, done)
         return done
@@ -96,26 +96,26 @@ def test_a_crash_or_timeout_affects_only_its_own_check(monkeypatch):
     requests = [ImporterRequest("a.fmu", {}, 1.0, 1, [], instances=[name]) for name in names]
     checks.prepare(tool, requests[:3])
     checks.prepare(tool, requests)
-    told = {}
+    versions = {}
     for name, request in zip(names, requests, strict=True):
         try:
             played = checks.run_request(tool, request)
-            told[name] = played.reply.version, played.stderr
+            versions[name] = played.reply.version, played.stderr
         except CheckFailedError as wrong:
-            told[name] = str(wrong)
-    assert told == {
+            versions[name] = str(wrong)
+    assert versions == {
         **{name: (name, f"{name} speaks") for name in ("one", "two", "three")},
         **{"crash": "exit status -11: a reason", "hang": "no answer after 300 s", "leak": "exit status -6: a reason"},
     }
-    assert asked == [names[:3], ["two"], names[3:], names[4:]]
+    assert batches == [names[:3], ["two"], names[3:], names[4:]]
     assert [table.name_with_version(tool, request) for request in requests[:2]] == ["Ecos one", "Ecos"]
 
 
 def test_an_excluded_tool_is_listed_with_the_reason():
-    said = table.legend_lines(
+    text = table.legend_lines(
         [table.CheckResult("Ecos", "", reason="it is not installed: pip install -e '.[importers]'")]
     )
-    assert "Ecos was skipped: it is not installed: pip install -e '.[importers]'" in said
+    assert "Ecos was skipped: it is not installed: pip install -e '.[importers]'" in text
 
 
 def test_fmus_of_another_fmi_version_are_refused_in_one_sentence():

@@ -32,28 +32,28 @@ run_script = partial(worker_client.run_script, "life_cycles.py")
 
 def test_hundreds_of_life_cycles_leave_little_memory(paths, record_property):
     """Measured: 2 kB per life cycle in Python, and no additions to sys.path."""
-    told = run_script("run_in_turn", paths, 150)
-    early, late = told["memory"]
+    result = run_script("run_in_turn", paths, 150)
+    early, late = result["memory"]
     record_property("kB a life", (late - early) / 135)
-    assert told["runs"] == [1] * len(paths)
-    assert told["path"] == []
+    assert result["runs"] == [1] * len(paths)
+    assert result["path"] == []
     assert late - early < 135 * 4.0
 
 
 def test_hundreds_of_instances_coexist(paths, record_property):
-    told = run_script("run_interleaved", paths, 40)
-    record_property("kB an instance", told["each"])
-    assert told["runs"] == 1
-    assert told["each"] < 90.0  # of which fmpy uses 45
+    result = run_script("run_interleaved", paths, 40)
+    record_property("kB an instance", result["each"])
+    assert result["runs"] == 1
+    assert result["each"] < 90.0  # of which fmpy uses 45
 
 
 def test_an_fmu_unpacked_for_every_run_is_released(paths, record_property):
     """Memory and libraries of earlier runs are released, as with simulate_fmu of fmpy."""
-    told = run_script("unpack_for_every_run", paths[-1], 30)
-    early, late = told["memory"]
+    result = run_script("unpack_for_every_run", paths[-1], 30)
+    early, late = result["memory"]
     record_property("kB a run", (late - early) / 27)
-    assert told["libraries"] <= 2
-    assert told["path"] == []
+    assert result["libraries"] <= 2
+    assert result["path"] == []
     assert late - early < 27 * 20.0
 
 
@@ -63,14 +63,14 @@ def test_threads_do_not_interfere(paths):
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_child_processes_continue_instances_and_create_new_ones(folder, method):
-    told = run_script("run_in_processes", [folder / f"{name}.fmu" for name in SOME], method)
-    assert (told["same"], {*told["codes"]}) == (True, {0})
+    result = run_script("run_in_processes", [folder / f"{name}.fmu" for name in SOME], method)
+    assert (result["same"], {*result["codes"]}) == (True, {0})
 
 
 def test_a_host_with_the_sources_and_pythonfmu_loaded_changes_nothing(paths):
-    told = run_script("run_beside_sources", str(ROOT), paths)
-    assert told["foreign"] == []
-    assert told["rows"] == run_script("run_each", paths)
+    result = run_script("run_beside_sources", str(ROOT), paths)
+    assert result["foreign"] == []
+    assert result["rows"] == run_script("run_each", paths)
 
 
 def test_a_folder_name_may_contain_spaces(paths, tmp_path):

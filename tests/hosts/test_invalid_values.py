@@ -23,7 +23,7 @@ def bad_values(declaration):
     yield from (bound for bound in (declaration.above, declaration.below) if isfinite(bound))
 
 
-def refuses(fmu, name, t, h, *words):
+def assert_refused(fmu, name, t, h, *words):
     """The step from t fails, all outputs read NaN, and one message with `words` is in the log and on standard error."""
     with pytest.raises(FmiError) as refusal:
         fmu.step(t, h)
@@ -47,7 +47,7 @@ def test_a_value_out_of_range_is_refused_by_name(launch, name, variable):
     for value in bad_values(declaration):
         fmu = launch(name, {variable: value})
         assert all(isnan(v) for v in fmu.get(*REALS[name]))
-        refuses(fmu, name, 0.0, 0.1, variable, repr(value), declaration.allowed)
+        assert_refused(fmu, name, 0.0, 0.1, variable, repr(value), declaration.allowed)
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
@@ -59,7 +59,7 @@ def test_a_value_that_becomes_invalid_during_a_run_stops_it_and_reset_recovers(l
         fmu = launch(name, values, stop=stop)
         fmu.run(times[:11], [])
         fmu.set({variable: value})
-        refuses(fmu, name, times[10], 0.01, variable, repr(value))
+        assert_refused(fmu, name, times[10], 0.01, variable, repr(value))
         with pytest.raises(FmiError):
             fmu.step(times[10], 0.01)
         fmu.reset()
@@ -79,14 +79,14 @@ def test_an_invalid_value_may_be_corrected_before_it_is_used(launch, name):
 
 
 def choices():
-    found = [(name, v) for name in MODELS for v, d in declared(name).items() if isinstance(d, Choice)]
-    return [(name, v, value) for name, v in found for value in (0, 99, -1, 2**31 - 1)]
+    names = [(name, v) for name in MODELS for v, d in declared(name).items() if isinstance(d, Choice)]
+    return [(name, v, value) for name, v in names for value in (0, 99, -1, 2**31 - 1)]
 
 
 @pytest.mark.parametrize(("name", "choice", "value"), choices(), ids=str)
 def test_an_unknown_choice_is_refused_with_the_available_ones(launch, name, choice, value):
     labels = [item[0] for item in declared(name)[choice].items]
-    refuses(launch(name, {choice: value}), name, 0.0, 0.1, choice, repr(value), *labels)
+    assert_refused(launch(name, {choice: value}), name, 0.0, 0.1, choice, repr(value), *labels)
 
 
 RULES = {
@@ -113,7 +113,7 @@ RULES = {
 @pytest.mark.parametrize("rule", RULES.values(), ids=RULES)
 def test_inconsistent_values_are_refused(launch, rule):
     name, values, words = rule
-    refuses(launch(name, values), name, 0.0, 0.1, *words)
+    assert_refused(launch(name, values), name, 0.0, 0.1, *words)
 
 
 def test_friction_may_become_invalid_during_a_run_only_as_a_pair(launch):
@@ -123,7 +123,7 @@ def test_friction_may_become_invalid_during_a_run_only_as_a_pair(launch):
     fmu.set({"mu_d": 0.4})
     fmu.step(1.0, 1.0)
     fmu.set({"mu_d": 0.7})
-    refuses(fmu, "stickslip", 2.0, 0.1, "mu_d", "0.7", "mu_s", "0.5")
+    assert_refused(fmu, "stickslip", 2.0, 0.1, "mu_d", "0.7", "mu_s", "0.5")
 
 
 STEPS = {
@@ -146,7 +146,7 @@ STEPS = {
 def test_an_impossible_step_is_refused(launch, name, step):
     fmu = launch(name, stop=4.0)
     fmu.step(0.0, 1.0)
-    refuses(fmu, name, *step, "step", *(repr(part) for part in step), "1.0 s", "4.0 s")
+    assert_refused(fmu, name, *step, "step", *(repr(part) for part in step), "1.0 s", "4.0 s")
 
 
 ARITHMETICS = {  # how hosts compute time and size of the n-th step
@@ -166,8 +166,8 @@ def test_step_times_within_rounding_are_accepted_wherever_zero_lies(launch, arit
         if h < 1e-12 * abs(start):
             continue
         step = arithmetic(start, h)
-        for place in {start, 0.0, 1e-5} if start <= 0.0 else {start}:
-            first = max(0, round((place - start) / h) - 5)
+        for origin in {start, 0.0, 1e-5} if start <= 0.0 else {start}:
+            first = max(0, round((origin - start) / h) - 5)
             fmu = launch("smd", start=start)
             if first:
                 fmu.step(start, step(first)[0] - start)
@@ -191,7 +191,7 @@ def test_a_million_accumulated_steps_may_end_at_the_stop_time(launch):
 def test_a_step_that_begins_elsewhere_is_refused_even_at_zero(launch, late):
     fmu = launch("smd", start=-2.0)
     fmu.step(-2.0, 2.0)
-    refuses(fmu, "smd", late * 0.01, 0.01, "t = 0.0 s")
+    assert_refused(fmu, "smd", late * 0.01, 0.01, "t = 0.0 s")
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1.0, 2.0, nan, inf])
@@ -199,9 +199,9 @@ def test_an_invalid_tolerance_is_ignored(worker, backend_fmus, tolerance):
     """Otherwise the error of the solver would be as large as the motion."""
     names, times = ["x", "solver.steps"], [0.0, 1.0, 2.0]
 
-    def run(given):
+    def run(value):
         fmu = worker.instantiate(backend_fmus / "smd.fmu")
-        rows = fmu.begin({"solver.method": ODE23}, stop=2.0, tolerance=given).run(times, names)
+        rows = fmu.begin({"solver.method": ODE23}, stop=2.0, tolerance=value).run(times, names)
         fmu.free()
         return rows
 
@@ -210,8 +210,8 @@ def test_an_invalid_tolerance_is_ignored(worker, backend_fmus, tolerance):
 
 
 def test_a_stop_before_the_start_and_a_nonfinite_start_are_refused(launch):
-    refuses(launch("smd", start=2.0, stop=1.0), "smd", 2.0, 0.1, "stop time", "1.0", "2.0")
-    refuses(launch("smd", start=nan), "smd", 0.0, 0.1, "start time", "nan")
+    assert_refused(launch("smd", start=2.0, stop=1.0), "smd", 2.0, 0.1, "stop time", "1.0", "2.0")
+    assert_refused(launch("smd", start=nan), "smd", 0.0, 0.1, "start time", "nan")
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ def test_overflowing_outputs_of_a_finite_motion_are_reported(launch, name):
 def test_a_calculated_value_cannot_be_set(launch):
     fmu = launch("smd")
     fmu.set({"x": 1.0})
-    refuses(fmu, "smd", 0.0, 0.1, "x", "calculated")
+    assert_refused(fmu, "smd", 0.0, 0.1, "x", "calculated")
 
 
 WRONG_TYPES = ("Integer", "Boolean", "String")  # for a Real
@@ -303,7 +303,7 @@ def test_a_wrong_write_is_refused_by_the_next_step(launch, wrong):
     fmu.write_one(kind, reference, FIRST.get(kind, 1))
     assert fmu.get("m") == mass
     assert all(isnan(value) for value in fmu.get(*REALS["stickslip"]))
-    refuses(fmu, "stickslip", 0.1, 0.1, "value reference", "type")
+    assert_refused(fmu, "stickslip", 0.1, 0.1, "value reference", "type")
     fmu.reset()
     fmu.begin().step(0.0, 0.1)
 
@@ -328,4 +328,4 @@ def test_percent_signs_in_an_instance_name_are_harmless(worker, fmus):
 def test_t_next_announces_a_run_that_will_fail(launch):
     fmu = launch("smd", {"x0": 1e300, "k": 1e300, "solver.method": ODE23}, stop=4.0)
     assert isnan(fmu.get("solver.t_next"))
-    refuses(fmu, "smd", 0.0, 4.0)
+    assert_refused(fmu, "smd", 0.0, 4.0)

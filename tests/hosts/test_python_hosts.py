@@ -28,10 +28,10 @@ def test_the_running_code_is_the_code_in_the_fmu(fresh_worker, fmus):
         path = fmus / f"{name}.fmu"
         instance = fresh_worker.instantiate(path).begin()
         instance.step(0.0, 0.1)
-        files, own = set(fresh_worker.modules()), fresh_worker.directory(path)
-        assert len([file for file in files if file.startswith(own)]) >= 4
+        files, own_folder = set(fresh_worker.modules()), fresh_worker.directory(path)
+        assert len([file for file in files if file.startswith(own_folder)]) >= 4
         assert not [file for file in files if file.startswith(str(ROOT / "fmus"))]
-        strangers = [file for file in files - before if not file.startswith(own)]
+        strangers = [file for file in files - before if not file.startswith(own_folder)]
         assert not [file for file in strangers if "pythonfmu" in file or "friction" in file]
         before = files
         instance.free()
@@ -65,11 +65,11 @@ def test_concurrent_instances_do_not_interfere(launch, worker):
     rows = [[fmu.get(*names)] for fmu, names in fleet]
     for t, ahead in pairwise(times):
         turns = [[[fmu.number, "step", [t, ahead - t]], [fmu.number, "get", [names]]] for fmu, names in fleet]
-        told = worker.call(None, "batch", [*chain(*turns)])
-        for mine, row in zip(rows, told[1::2], strict=True):
-            mine.append(row)
-    for (_, names), mine, expected in zip(fleet, rows, alone, strict=True):
-        assert_identical(mine, expected, names)
+        results = worker.call(None, "batch", [*chain(*turns)])
+        for collected, row in zip(rows, results[1::2], strict=True):
+            collected.append(row)
+    for (_, names), collected, expected in zip(fleet, rows, alone, strict=True):
+        assert_identical(collected, expected, names)
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -111,18 +111,18 @@ def request(resources, name, values, stop):
 @pytest.fixture(scope="module")
 def requests(fmus, tmp_path_factory):
     """One run of every case on the unpacked FMUs: the request, the output names, and the rows from this Python."""
-    resources, worker, found = tmp_path_factory.mktemp("resources"), Worker(), []
+    resources, worker, collected = tmp_path_factory.mktemp("resources"), Worker(), []
     for name in MODELS:
         with zipfile.ZipFile(fmus / f"{name}.fmu") as archive:
             archive.extractall(resources / name)
     for case in CASES:
         name, values, stop = case
-        asked, names = request(resources, *case), [v for v in outputs(name) if declared(name)[v].type == "Real"]
+        inputs, names = request(resources, *case), [v for v in outputs(name) if declared(name)[v].type == "Real"]
         fmu = worker.instantiate(fmus / f"{name}.fmu").begin(values, stop=stop)
-        found.append((asked, [f"{label(case)}: {v}" for v in names], fmu.run(asked["times"], names)))
+        collected.append((inputs, [f"{label(case)}: {v}" for v in names], fmu.run(inputs["times"], names)))
         fmu.free()
     assert worker.close() == 0
-    return found
+    return collected
 
 
 @pytest.mark.parametrize("version", [PYTHONS[0], PYTHONS[-1]])
@@ -131,8 +131,8 @@ def test_the_embedded_code_behaves_alike_on_the_oldest_and_newest_python(request
     python = interpreter(version)
     if python is None:
         pytest.skip(f"there is no Python {version} here")
-    command, asked = [python, "-I", SUPPORT / "run_embedded.py"], json.dumps([asked for asked, _, _ in requests])
-    done = subprocess.run(command, input=asked, capture_output=True, text=True, timeout=120)
+    command, inputs = [python, "-I", SUPPORT / "run_embedded.py"], json.dumps([inputs for inputs, _, _ in requests])
+    done = subprocess.run(command, input=inputs, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     for (_, names, expected), rows in zip(requests, json.loads(done.stdout), strict=True):
         assert_close(rows, expected, names, 1e-14)

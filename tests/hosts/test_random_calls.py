@@ -43,7 +43,7 @@ VALUES = {"Boolean": True, "String": "1"}  # a value of each FMI type; 1 for the
 CHATTER = {"friction", "solver.method"}  # choices that may take arbitrarily many steps
 
 
-class Calls(RuleBasedStateMachine):
+class RandomCalls(RuleBasedStateMachine):
     """One instance that is called at random, and a second one that must be unaffected."""
 
     process = folder = types = worker = None  # of the backend
@@ -65,7 +65,7 @@ class Calls(RuleBasedStateMachine):
     def anew(self):
         self.phase, self.failed, self.t, self.sentences, self.changed = NEW, False, 0.0, [], False
 
-    def hear(self):
+    def collect_messages(self):
         """Return the messages since the run was last healthy."""
         for instance in (self.fmu, self.beside):  # fmpy passes all messages to the newest instance
             self.sentences += [text for status, _, text in instance.messages() if status > 1]
@@ -73,13 +73,13 @@ class Calls(RuleBasedStateMachine):
         assert all(sentence for sentence in self.sentences)
         return self.sentences
 
-    def called(self, function, *arguments):
+    def call(self, function, *arguments):
         """Return the result of a call, or FmiError if it fails, which must have been reported."""
         try:
             return getattr(self.fmu, function)(*arguments)
         except worker_client.FmiError:
-            said = self.hear()
-        assert said, f"{function}{arguments} is refused without a sentence"
+            messages = self.collect_messages()
+        assert messages, f"{function}{arguments} is refused without a sentence"
         return worker_client.FmiError
 
     def go(self, allowed, then):
@@ -90,32 +90,32 @@ class Calls(RuleBasedStateMachine):
 
     @rule(start=TIMES, stop=TIMES, tolerance=st.sampled_from([1e-4, 0.0, 1.0, nan]))
     def setup(self, start, stop, tolerance):
-        self.called("setup", start, stop if stop != start else None, tolerance)
+        self.call("setup", start, stop if stop != start else None, tolerance)
         self.t = start
         self.go([NEW], READY)
 
     @rule()
     def init(self):
-        self.called("init")
+        self.call("init")
         self.go([READY], RUNNING)
 
     @precondition(lambda self: self.phase == NEW)
     @rule()
     def begin(self):
-        self.called("begin")
+        self.call("begin")
         self.phase = RUNNING
 
     @rule()
     def terminate(self):
-        self.called("terminate")
+        self.call("terminate")
         self.go([], LOST)
 
     @rule()
     def reset(self):
-        assert self.called("reset") is None
+        assert self.call("reset") is None
         self.anew()
         self.begin()
-        assert self.called("step", 0.0, 0.01) is None
+        assert self.call("step", 0.0, 0.01) is None
         self.t = 0.01
         self.healthy()
 
@@ -123,7 +123,7 @@ class Calls(RuleBasedStateMachine):
 
     @rule(h=SIZES, late=st.sampled_from([0.0, 0.0, 0.0, 1.0, -1e-3, nan]))
     def step(self, h, late):
-        answer = self.called("step", self.t + late, h)
+        answer = self.call("step", self.t + late, h)
         self.changed = False
         if answer is worker_client.FmiError:
             self.failed = self.failed or self.phase == RUNNING
@@ -142,14 +142,14 @@ class Calls(RuleBasedStateMachine):
             self.step(0.1, 0.0)
 
     def healthy(self):
-        told = [v for v in self.declared if v != "solver.t_next"]  # which is NaN if the next step will fail
-        values = dict(zip(told, self.fmu.get(*told), strict=True))
-        assert [v for v in told if self.declared[v].causality in ("output", "local") and not isfinite(values[v])] == []
-        self.hear()
+        names = [v for v in self.declared if v != "solver.t_next"]  # which is NaN if the next step will fail
+        values = dict(zip(names, self.fmu.get(*names), strict=True))
+        assert [v for v in names if self.declared[v].causality in ("output", "local") and not isfinite(values[v])] == []
+        self.collect_messages()
         self.sentences.clear()
 
     def broken(self):
-        assert self.hear()
+        assert self.collect_messages()
         assert all(isnan(value) for value in self.fmu.get(*self.calculated))
 
     # ---- values
@@ -160,13 +160,13 @@ class Calls(RuleBasedStateMachine):
         value = data.draw(REALS if self.declared[name].type == "Real" else INTEGERS)
         if name in CHATTER and value in (1, 2, 3, 5):
             value = self.declared[name].start
-        self.called("set", {name: value})
+        self.call("set", {name: value})
         self.changed = True
 
     @rule(data=st.data())
     def read(self, data):
         names = data.draw(st.lists(st.sampled_from(sorted(self.declared)), min_size=2, max_size=5))
-        values = self.called("get", *names)
+        values = self.call("get", *names)
         if self.failed and not self.changed and values is not worker_client.FmiError:
             calculated = {
                 v for v, d in self.declared.items() if d.causality in ("output", "local") and d.type == "Real"
@@ -177,18 +177,18 @@ class Calls(RuleBasedStateMachine):
     def read_one(self, data, reference):
         """Read a variable with a wrong type, or a missing one: the others stay readable."""
         kind = data.draw(st.sampled_from(self.types))
-        before = None if self.changed or self.phase == LOST else self.called("get", *self.outputs)
-        value = self.called("read_one", kind, reference)
+        before = None if self.changed or self.phase == LOST else self.call("get", *self.outputs)
+        value = self.call("read_one", kind, reference)
         if reference > 30 and value is not worker_client.FmiError:
             assert isnan(value) if kind in ("Real", "Float64") else not value
-            assert self.hear()
+            assert self.collect_messages()
         if before is not None:
-            assert str(self.called("get", *self.outputs)) == str(before)
+            assert str(self.call("get", *self.outputs)) == str(before)
 
     @rule(data=st.data(), reference=STRANGE)
     def write_one(self, data, reference):
         kind = data.draw(st.sampled_from(self.types))
-        self.called("write_one", kind, reference, VALUES.get(kind, 1))
+        self.call("write_one", kind, reference, VALUES.get(kind, 1))
         self.changed = True
 
     # ---- state
@@ -196,7 +196,7 @@ class Calls(RuleBasedStateMachine):
     @precondition(lambda self: len(self.saved) < 4)
     @rule(through_bytes=st.booleans())
     def save(self, through_bytes):
-        state = self.called("save")
+        state = self.call("save")
         if state is not worker_client.FmiError and through_bytes:
             state = self.fmu.deserialize(self.fmu.serialize(state))  # own bytes are always accepted
         if state is not worker_client.FmiError:
@@ -206,22 +206,26 @@ class Calls(RuleBasedStateMachine):
     @rule(data=st.data())
     def restore(self, data):
         state, phase, failed, t, changed = data.draw(st.sampled_from(self.saved))
-        if self.called("restore", state) is None:
+        if self.call("restore", state) is None:
             self.phase, self.failed, self.t, self.changed = phase, failed, t, changed
 
     @rule(data=st.data())
     def foreign_bytes(self, data):
         """Flipped, truncated, extended or arbitrary bytes are refused, and the instance does not change."""
-        state = self.called("save")
+        state = self.call("save")
         if state is worker_client.FmiError:
             return
-        before = self.called("get", *self.outputs)
-        own = bytes.fromhex(self.fmu.serialize(state))
-        place = data.draw(st.integers(0, len(own) - 1))
-        flipped = bytes([*own[:place], own[place] ^ 1 << data.draw(st.integers(0, 7)), *own[place + 1 :]])
-        foreign = data.draw(st.sampled_from([flipped, own[:place], own + own[:place] + b" ", b"[" * place]))
-        assert self.called("deserialize", foreign.hex()) is worker_client.FmiError
-        assert str(self.called("get", *self.outputs)) == str(before)
+        before = self.call("get", *self.outputs)
+        content = bytes.fromhex(self.fmu.serialize(state))
+        position = data.draw(st.integers(0, len(content) - 1))
+        flipped = bytes(
+            [*content[:position], content[position] ^ 1 << data.draw(st.integers(0, 7)), *content[position + 1 :]]
+        )
+        foreign = data.draw(
+            st.sampled_from([flipped, content[:position], content + content[:position] + b" ", b"[" * position])
+        )
+        assert self.call("deserialize", foreign.hex()) is worker_client.FmiError
+        assert str(self.call("get", *self.outputs)) == str(before)
 
     def teardown(self):
         if not self.worker.alive:
@@ -240,6 +244,6 @@ class Calls(RuleBasedStateMachine):
 def test_no_call_sequence_crashes_or_fails_silently(fmus, kind):
     process, built, types = KINDS[kind]
     chosen = {"process": process, "folder": built() if built else fmus, "types": types}
-    machine = type("Machine", (Calls,), chosen)
+    machine = type("Machine", (RandomCalls,), chosen)
     run_state_machine_as_test(machine, settings=SHORT)
     assert machine.worker.close() == 0

@@ -24,58 +24,58 @@ REFUSAL = (
 )
 
 
-def running(name):
+def running_instance(name):
     """Return the slave class of a model, and an instance during a run."""
-    made = runtime(name, "slave").make_slave_class(model_class(name))
-    one = made(instance_name="saved")
+    slave_class = runtime(name, "slave").make_slave_class(model_class(name))
+    one = slave_class(instance_name="saved")
     one.exit_initialization_mode()
     assert one.do_step(0.0, 0.3)
-    return made, one
+    return slave_class, one
 
 
-def own(made, one):
+def own_bytes(slave_class, one):
     """Return the bytes of its state."""
-    return made._fmu_state_to_bytes(one._get_fmu_state())
+    return slave_class._fmu_state_to_bytes(one._get_fmu_state())
 
 
-def sealed(text):
+def with_checksum(text):
     """Return the bytes with a valid checksum."""
     return b"%08x" % crc32(text) + text
 
 
-def forged(content, change):
+def forge_bytes(content, change):
     """Return the bytes after a change of their content, with a valid checksum."""
     state = json.loads(content[8:])
     change(state)
-    return sealed(json.dumps(state).encode())
+    return with_checksum(json.dumps(state).encode())
 
 
-def taken(made, content):
+def is_accepted(slave_class, content):
     """Return whether the bytes are accepted as a state."""
     try:
-        made._fmu_state_from_bytes(content)
-    except sibling_module(made.Model, "runtime.saved_state").InvalidStateError:
+        slave_class._fmu_state_from_bytes(content)
+    except sibling_module(slave_class.Model, "runtime.saved_state").InvalidStateError:
         return False
     return True
 
 
-def leaves(state, path=()):
+def iterate_members(state, path=()):
     """Yield the path of every scalar member."""
     for name, value in state.items():
         if isinstance(value, dict) and value:
-            yield from leaves(value, (*path, name))
+            yield from iterate_members(value, (*path, name))
         else:
             yield (*path, name)
 
 
-def alike(one, other):
+def is_alternative(one, other):
     """Return whether two values are valid alternatives: the same type, or the same shape."""
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other)
     return type(one) is type(other) and one != 10**30
 
 
-def at(state, path):
+def find_member(state, path):
     """Return the owner of the member at the end of a path, and its name."""
     for name in path[:-1]:
         state = state[name]
@@ -84,84 +84,84 @@ def at(state, path):
 
 @EVERY_MODEL
 def test_own_bytes_are_accepted_and_reproduced(name):
-    made, one = running(name)
-    heir = made(instance_name="heir")
+    slave_class, one = running_instance(name)
+    heir = slave_class(instance_name="heir")
     for spoil in ([], ["set"], ["set", "step"]):  # healthy, with an invalid value, failed
         if spoil == ["set"]:
             one.set_invalid("m", "m = nan kg is refused: a sentence with a · and brackets [{")
         if "step" in spoil:
             one.do_step(0.3, 0.1)
             assert one.run.has_failed
-        heir._set_fmu_state(made._fmu_state_from_bytes(own(made, one)))
-        assert own(made, heir) == own(made, one)
+        heir._set_fmu_state(slave_class._fmu_state_from_bytes(own_bytes(slave_class, one)))
+        assert own_bytes(slave_class, heir) == own_bytes(slave_class, one)
 
 
 @EVERY_MODEL
 def test_flipped_truncated_or_extended_bytes_are_refused(name, capsys):
     """Ten thousand times in all."""
-    made, one = running(name)
-    content, draw = own(made, one), random.Random(name)
+    slave_class, one = running_instance(name)
+    content, draw = own_bytes(slave_class, one), random.Random(name)
     for i in range(TIMES):
-        place, bit = draw.randrange(len(content)), 1 << draw.randrange(8)
-        flipped = bytes([*content[:place], content[place] ^ bit, *content[place + 1 :]]) if i % 4 == 0 else b""
-        foreign = [flipped, content[:place], content + draw.randbytes(1 + i % 9), draw.randbytes(place)][i % 4]
-        assert not taken(made, foreign)
-    said = capsys.readouterr().err.splitlines()
-    assert set(said) == {f"{made.__name__}: {REFUSAL}"}
-    assert len(said) == TIMES
+        position, bit = draw.randrange(len(content)), 1 << draw.randrange(8)
+        flipped = bytes([*content[:position], content[position] ^ bit, *content[position + 1 :]]) if i % 4 == 0 else b""
+        foreign = [flipped, content[:position], content + draw.randbytes(1 + i % 9), draw.randbytes(position)][i % 4]
+        assert not is_accepted(slave_class, foreign)
+    stderr = capsys.readouterr().err.splitlines()
+    assert set(stderr) == {f"{slave_class.__name__}: {REFUSAL}"}
+    assert len(stderr) == TIMES
 
 
 @EVERY_MODEL
 def test_every_member_must_be_present_with_its_name_type_and_length(name, capsys):
     """Each member is replaced by something invalid. Members of the same type and length are read alike, so the first
     of each gets all replacements."""
-    made, one = running(name)
-    content, draw = own(made, one), random.Random(name)
-    assert taken(made, forged(content, lambda state: None))
+    slave_class, one = running_instance(name)
+    content, draw = own_bytes(slave_class, one), random.Random(name)
+    assert is_accepted(slave_class, forge_bytes(content, lambda state: None))
     state = json.loads(content[8:])
     others, met = [None, "1", [], {}, [0.0] * 3, True, 1, 1.5, 10**30], set()
-    for path in leaves(state):
-        value = at(state, path)[0][path[-1]]
+    for path in iterate_members(state):
+        value = find_member(state, path)[0][path[-1]]
 
         def drop(state, path=path):
-            thing, last = at(state, path)
+            thing, last = find_member(state, path)
             del thing[last]
 
         def rename(state, path=path):
-            thing, last = at(state, path)
+            thing, last = find_member(state, path)
             thing["__class__"] = thing.pop(last)
 
         def add(state, path=path):
-            at(state, path)[0]["compute_outputs"] = 1.0
+            find_member(state, path)[0]["compute_outputs"] = 1.0
 
         changes, kind = [drop, rename, add], (type(value), type(value) is list and len(value))
-        wrong = [other for other in others if not alike(other, value)]
+        wrong = [other for other in others if not is_alternative(other, value)]
         for other in wrong if kind not in met else [draw.choice(wrong)]:
 
             def replace(state, path=path, other=other):
-                thing, last = at(state, path)
+                thing, last = find_member(state, path)
                 thing[last] = other
 
             changes.append(replace)
         met.add(kind)
         for change in changes:
-            assert not taken(made, forged(content, change)), (path, change)
+            assert not is_accepted(slave_class, forge_bytes(content, change)), (path, change)
 
 
 @EVERY_MODEL
 def test_every_setting_must_be_in_range(name, capsys):
-    made, one = running(name)
-    content = own(made, one)
+    slave_class, one = running_instance(name)
+    content = own_bytes(slave_class, one)
     settable = {v: d for v, d in declared(name).items() if d.causality in ("parameter", "input")}
     for variable, declaration in settable.items():
         for wrong in (nan, declaration.low - 1.0, declaration.high + 1.0) if declaration.type == "Real" else (0, 99):
 
             def change(state, variable=variable, wrong=wrong):
-                thing, last = at(state["model"], variable.split("."))
+                thing, last = find_member(state["model"], variable.split("."))
                 thing[last] = wrong
 
             if not declaration.accepts(wrong):
-                assert not taken(made, forged(content, change)), (variable, wrong)
+                assert not is_accepted(slave_class, forge_bytes(content, change)), (variable, wrong)
 
 
 SENTENCES = {
@@ -203,23 +203,25 @@ SPELLINGS = {
 }
 FORGERIES = {
     **{
-        f"sentence {what}": lambda content, s=s: forged(content, lambda state: state.update(invalid_values=s))
+        f"sentence {what}": lambda content, s=s: forge_bytes(content, lambda state: state.update(invalid_values=s))
         for what, s in SENTENCES.items()
     },
     **{
-        f"setting {what}": lambda content, n=what, v=v: forged(content, lambda state: state.update({n: v}))
+        f"setting {what}": lambda content, n=what, v=v: forge_bytes(content, lambda state: state.update({n: v}))
         for what, v in SETTINGS.items()
     },
     **{
-        f"run with {what}": lambda content, n=what, v=v: forged(content, lambda state: state["run"].update({n: v}))
+        f"run with {what}": lambda content, n=what, v=v: forge_bytes(content, lambda state: state["run"].update({n: v}))
         for what, v in RUN.items()
     },
-    **{what: lambda content, spell=spell: sealed(spell(content[8:])) for what, spell in SPELLINGS.items()},
-    "mass of -5": lambda content: forged(content, lambda state: state["model"].update(m=-5.0)),
-    "a class": lambda content: forged(content, lambda state: state["model"].update(__class__={"rules": ["a"]})),
-    "rules": lambda content: forged(content, lambda state: state["model"].update(rules=["a"], compute_outputs=1.0)),
+    **{what: lambda content, spell=spell: with_checksum(spell(content[8:])) for what, spell in SPELLINGS.items()},
+    "mass of -5": lambda content: forge_bytes(content, lambda state: state["model"].update(m=-5.0)),
+    "a class": lambda content: forge_bytes(content, lambda state: state["model"].update(__class__={"rules": ["a"]})),
+    "rules": lambda content: forge_bytes(
+        content, lambda state: state["model"].update(rules=["a"], compute_outputs=1.0)
+    ),
     "no bytes": lambda content: b"",
-    "a checksum alone": lambda content: sealed(b"")[:8],
+    "a checksum alone": lambda content: with_checksum(b"")[:8],
 }
 
 
@@ -246,11 +248,11 @@ def test_forged_bytes_change_neither_instance_nor_neighbour_nor_process(fmu):
         assert refusal.value.status >= 3, what
         assert worker.read_stderr() == f"Stickslip: {REFUSAL}\n"
         assert REFUSAL in one.messages()[-1][2]
-        for instance, seen in zip((neighbour, one), rows, strict=True):
+        for instance, row in zip((neighbour, one), rows, strict=True):
             instance.step(t, ahead - t)
-            seen.append(instance.get(*names))
-    for seen in rows:
-        assert_identical(seen, expected, names)
+            row.append(instance.get(*names))
+    for row in rows:
+        assert_identical(row, expected, names)
     for instance in (neighbour, one):
         instance.reset()
         assert_identical(instance.begin().run(times[:3], names), expected[:3], names)

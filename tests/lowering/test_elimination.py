@@ -19,12 +19,15 @@ BODIES = {
 def in_scalars(spec, g, h, J, r):
     """Return the result of the lowered code for a system."""
     names, rates = list(spec.states), list(spec.states.values())
-    known = {"g": g, "h": h, "nan": nan, "fabs": fabs} | {
+    namespace = {"g": g, "h": h, "nan": nan, "fabs": fabs} | {
         f"r_{name}": value for name, value in zip(names, r, strict=True)
     }
-    known |= {f"{rates[i]}_{name}": J[i, n] for i in spec.dynamic_states for n, name in enumerate(names)}
-    exec("\n".join([*factorization_lines("s", "g", "h", spec), *solution_lines("k", "s", "r", "g", "h", spec)]), known)
-    return [known[f"k_{name}"] for name in names]
+    namespace |= {f"{rates[i]}_{name}": J[i, n] for i in spec.dynamic_states for n, name in enumerate(names)}
+    exec(
+        "\n".join([*factorization_lines("s", "g", "h", spec), *solution_lines("k", "s", "r", "g", "h", spec)]),
+        namespace,
+    )
+    return [namespace[f"k_{name}"] for name in names]
 
 
 def on_arrays(spec, g, h, J, r):

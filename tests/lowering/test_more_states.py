@@ -61,31 +61,31 @@ def bristles():
 @EVERY_METHOD
 def test_bristles_agree_with_an_independent_solver(method):
     truth = bristles()
-    found, _ = run("lugre", method)
-    assert np.abs(np.array(found) - truth).max() < max(2e3 * RTOL[method] * np.abs(truth).max(), 1e-11)
+    final, _ = run("lugre", method)
+    assert np.abs(np.array(final) - truth).max() < max(2e3 * RTOL[method] * np.abs(truth).max(), 1e-11)
 
 
 @EVERY_METHOD
 @pytest.mark.parametrize("name", CONTACT_REFERENCES)
 def test_contacts_stick_and_slip_as_in_an_independent_solver(name, method):
     events, end = reference_events(name)
-    found, seen = run(name, method)
-    assert [modes for _, *modes in seen] == [modes for _, *modes in events]
-    assert seen
+    final, observed_events = run(name, method)
+    assert [modes for _, *modes in observed_events] == [modes for _, *modes in events]
+    assert observed_events
     room = max(2e3 * RTOL[method], 1e-10)
-    assert [t for t, *_ in seen] == pytest.approx([t for t, *_ in events], abs=room)
-    assert np.abs(np.array(found) - end).max() < room
+    assert [t for t, *_ in observed_events] == pytest.approx([t for t, *_ in events], abs=room)
+    assert np.abs(np.array(final) - end).max() < room
 
 
 def test_a_stuck_sled_keeps_zero_speed_while_the_other_moves():
     one = lowered_model(FILES["sleds"])()
     prepared_model(one, {"solver.method": DOP853, "solver.rtol": 1e-9}, 16.0)
     start(one, one.initial_state(0.0), 16.0)
-    step, seen = one.solver.step, 0
+    step, n_stuck = one.solver.step, 0
     while step.t1 < 16.0:
         assert step.compute_next(one) == 0
         for mode, speed in ("mode1", "v1"), ("mode2", "v2"):
             if getattr(step, f"{mode}_0") == 0:
                 assert bits([getattr(step, f"{speed}_0"), getattr(step, f"{speed}_1")]) == bits([0.0, 0.0])
-                seen += 1
-    assert seen > 10
+                n_stuck += 1
+    assert n_stuck > 10

@@ -38,7 +38,7 @@ CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
 
 def numbers(path, model, names):
     """Return ends of steps, and the values of these names there, by two methods."""
-    found, rules = [], sibling_module(lowered_model(path), "runtime.call_sequence")
+    results, rules = [], sibling_module(lowered_model(path), "runtime.call_sequence")
     for method in DOP853, RODAS:
         prepared_model(model, {"solver.method": method, "solver.rtol": 1e-6}, 2.0)
         start(model, model.initial_state(0.0), 2.0)
@@ -47,19 +47,19 @@ def numbers(path, model, names):
             solver.update_t_next(model)
             assert solver.advance(model, solver.t_next) == 0
             rules.set_outputs(rules.RunState(1e-6), model)
-            found.append((solver.t, *(getattr(model, name) for name in names)))
-    return found
+            results.append((solver.t, *(getattr(model, name) for name in names)))
+    return results
 
 
 @pytest.mark.parametrize("text", NAMES, ids=["sled", "belt"])
 def test_names_used_inside_the_numerics_change_nothing(tmp_path, text):
-    plain, path = ("POSITION", "SPEED", "RATE", "MODE"), tmp_path / "mine.py"
+    default_names, path = ("POSITION", "SPEED", "RATE", "MODE"), tmp_path / "mine.py"
     path.write_text(text)
-    expected = numbers(path, lowered_model(path)(), plain)
+    expected = numbers(path, lowered_model(path)(), default_names)
     assert len(expected) > 20
     for names in NAMES[text]:
         changed = text
-        for old, new in zip(plain, names, strict=True):
+        for old, new in zip(default_names, names, strict=True):
             changed = changed.replace(old, new)
         path.write_text(changed)
         assert numbers(path, lowered_model(path)(), names) == expected, names
@@ -70,7 +70,7 @@ def test_names_used_inside_the_numerics_change_nothing(tmp_path, text):
 
 def test_author_choices_named_like_an_unavailable_method_or_law_are_kept(tmp_path):
     path, labels = tmp_path / "mine.py", [*METHODS, *LAWS]
-    items, cases = (", ".join(each.format(*pair) for pair in zip(labels, "12345678", strict=True)) for each in CHOSEN)
+    items, cases = (", ".join(item.format(*pair) for pair in zip(labels, "12345678", strict=True)) for item in CHOSEN)
     text = SLED.replace("import Contact", "import Choice, Contact").replace("- F)", f"* kind.choose({cases}) - F)")
     path.write_text(text.replace("    m =", f'    kind = Choice("kind", {items})\n    m ='))
     source = find_model(path)

@@ -13,7 +13,7 @@ from fmus.packaging.lowering import lowered_model, sibling_module
 FILES = {path.stem: path for path in LARGER_MODELS}
 
 
-def integrated(name, stop):
+def integrate_with_indicators(name, stop):
     """Return time and modes of each event and the final state, from scipy with the indicators as event functions."""
     cls = lowered_model(FILES[name])
     model, exchange, run = (
@@ -52,9 +52,9 @@ def integrated(name, stop):
     t, y, events = 0.0, states(), []
     indicators = [indicator(i) for i in range(2 * len(model.contacts))]
     while True:
-        found = solve_ivp(rates, (t, stop), y, "DOP853", events=indicators, rtol=1e-11, atol=1e-14, max_step=0.05)
-        t, y = found.t[-1], found.y[:, -1]
-        if found.status != 1:
+        solution = solve_ivp(rates, (t, stop), y, "DOP853", events=indicators, rtol=1e-11, atol=1e-14, max_step=0.05)
+        t, y = solution.t[-1], solution.y[:, -1]
+        if solution.status != 1:
             return events, y
         assert len(events) < 99
         beyond = 1e-12 * (1.0 + t)  # an importer's solver stops just beyond the root
@@ -73,10 +73,10 @@ def integrated(name, stop):
 def test_modes_follow_at_the_events_located_by_an_importer(name):
     """A second update changes nothing."""
     true, end = integrate_events(CONTACT_REFERENCES[name]())
-    events, found = integrated(name, CONTACT_REFERENCES[name].stop)
+    events, final = integrate_with_indicators(name, CONTACT_REFERENCES[name].stop)
     assert [modes for _, *modes in events] == [modes for _, *modes in true]
     assert np.abs(np.array([t for t, *_ in events]) - [t for t, *_ in true]).max() < 1e-7
-    assert np.abs(np.array(found)[: len(end)] - end).max() < 1e-6
+    assert np.abs(np.array(final)[: len(end)] - end).max() < 1e-6
 
 
 def test_states_are_nan_where_no_modes_are_consistent(tmp_path):

@@ -17,7 +17,7 @@ from native_fmus import build_native_fmus
 POINTS, H = 12, 1e-4
 
 
-class Three(FMU3Model):
+class Fmi3Instance(FMU3Model):
     """FMI 3.0 instances with the method names of FMI 2.0."""
 
     newDiscreteStates, getReal, setReal = FMU3Model.updateDiscreteStates, FMU3Model.getFloat64, FMU3Model.setFloat64
@@ -27,7 +27,7 @@ class Three(FMU3Model):
 
 
 def begin(fmu, choices):
-    if isinstance(fmu, Three):
+    if isinstance(fmu, Fmi3Instance):
         fmu.setInt64(list(choices), list(choices.values()))
     else:
         fmu.setInteger(list(choices), list(choices.values()))
@@ -36,7 +36,7 @@ def begin(fmu, choices):
     fmu.exitInitializationMode()
 
 
-KINDS = {2: (build_native_fmus, FMU2Model), 3: (fmi3_fixtures.build_fmi3_fmus, Three)}
+KINDS = {2: (build_native_fmus, FMU2Model), 3: (fmi3_fixtures.build_fmi3_fmus, Fmi3Instance)}
 
 
 @pytest.fixture(params=product(MODELS, KINDS), ids=lambda pair: f"{pair[0]}-FMI {pair[1]}.0")
@@ -54,12 +54,12 @@ def model(request, tmp_path):
 
 def choices(name, description):
     """Return every combination of law and load, by reference; the method is unused but must match the law."""
-    there = {variable.name: variable for variable in description.modelVariables}
-    names = [one for one in ("friction", "pin_load") if one in there]
-    items = [[int(item.value) for item in there[one].declaredType.items] for one in names]
+    by_name = {variable.name: variable for variable in description.modelVariables}
+    names = [one for one in ("friction", "pin_load") if one in by_name]
+    items = [[int(item.value) for item in by_name[one].declaredType.items] for one in names]
     for values in product(*items):
         yield {
-            there[one].valueReference: value
+            by_name[one].valueReference: value
             for one, value in zip((*names, "solver.method"), (*values, RODAS), strict=True)
         }
 
@@ -90,8 +90,8 @@ def test_directional_derivatives_agree_with_central_differences(model):
         settle(fmu)
         for i in range(POINTS):
             speed = (0.3, -0.2, 0.0)[i % 3] if model_class(name).contacts else (0.3, -0.2, 0.05)[i % 3]
-            place = [chance.uniform(-1e-3, 1e-3), speed, chance.uniform(-1e-3, 1e-3)][:size]
-            point = np.array([*place, *(chance.uniform(-1e-3, 1e-3) for _ in inputs)])
+            centre = [chance.uniform(-1e-3, 1e-3), speed, chance.uniform(-1e-3, 1e-3)][:size]
+            point = np.array([*centre, *(chance.uniform(-1e-3, 1e-3) for _ in inputs)])
             at(point)
             fmu.enterEventMode()
             settle(fmu)
@@ -101,11 +101,11 @@ def test_directional_derivatives_agree_with_central_differences(model):
                 and 1 not in list(chosen.values())[:1]
             ):
                 continue  # a law that depends on the sign of the speed has a kink there
-            told = []
+            pairs = []
             for known in knowns:
                 at(point)
-                told.append(fmu.getDirectionalDerivative(unknowns, [known], [1.0]))
-            for number, slopes in enumerate(told):
+                pairs.append(fmu.getDirectionalDerivative(unknowns, [known], [1.0]))
+            for number, slopes in enumerate(pairs):
                 if speed == 0.0 and number == 1:
                     continue  # no body moves while it is stuck
 
@@ -118,20 +118,25 @@ def test_directional_derivatives_agree_with_central_differences(model):
             at(point)
             direction = [chance.uniform(-1.0, 1.0) for _ in knowns]
             along = fmu.getDirectionalDerivative(unknowns, knowns, direction)
-            assert along == pytest.approx(np.array(direction) @ np.array(told), rel=1e-12, abs=1e-12)
-            if isinstance(fmu, Three):
+            assert along == pytest.approx(np.array(direction) @ np.array(pairs), rel=1e-12, abs=1e-12)
+            if isinstance(fmu, Fmi3Instance):
                 seed = [chance.uniform(-1.0, 1.0) for _ in unknowns]
                 adjoint = fmu.adjoint(unknowns, knowns, seed)
-                assert adjoint == pytest.approx(np.array(told) @ np.array(seed), rel=1e-12, abs=1e-12)
+                assert adjoint == pytest.approx(np.array(pairs) @ np.array(seed), rel=1e-12, abs=1e-12)
         fmu.reset()
 
 
 def test_nondifferentiable_variables_are_refused(model, capfd):
     _, fmu, description = model
     begin(fmu, {})
-    there = {variable.name: variable.valueReference for variable in description.modelVariables}
+    references = {variable.name: variable.valueReference for variable in description.modelVariables}
     state = description.derivatives[0].variable.derivative.valueReference
-    for unknown, known in ((state, there["m"]), (there["m"], state), (there["solver.steps"], state), (10**6, state)):
+    for unknown, input_reference in (
+        (state, references["m"]),
+        (references["m"], state),
+        (references["solver.steps"], state),
+        (10**6, state),
+    ):
         with pytest.raises(FMICallException):
-            fmu.getDirectionalDerivative([unknown], [known], [1.0])
+            fmu.getDirectionalDerivative([unknown], [input_reference], [1.0])
         assert "is not that of a state or an input, or of what follows" in capfd.readouterr().err

@@ -20,14 +20,14 @@ BREAKAWAY_TIME = 0.9 * 12.5 * 9.81 / (742.5 * 0.034)  # of the sled
 @pytest.fixture(scope="module")
 def unpacked(tmp_path_factory):
     """Return unpacked(name), which gives the folder of an FMU and its description."""
-    room, found = tmp_path_factory.mktemp("unpacked"), {}
+    temporary_folder, folders = tmp_path_factory.mktemp("unpacked"), {}
 
     def unpacked(name):
-        if name not in found:
+        if name not in folders:
             path = fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu"
-            folder = fmpy.extract(path, room / name)
-            found[name] = str(folder), fmpy.read_model_description(path)
-        return found[name]
+            folder = fmpy.extract(path, temporary_folder / name)
+            folders[name] = str(folder), fmpy.read_model_description(path)
+        return folders[name]
 
     return unpacked
 
@@ -36,17 +36,17 @@ def unpacked(tmp_path_factory):
 def master(unpacked, name, values=None, **options):
     """Return an initialised instance, and functions that read and write its variables by name."""
     folder, description = unpacked(name)
-    there = {variable.name: variable for variable in description.modelVariables}
+    by_name = {variable.name: variable for variable in description.modelVariables}
     fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=folder, modelIdentifier=name)
     fmu.instantiate(**options)
 
     def read(variable):
-        get = fmu.getFloat64 if there[variable].type == "Float64" else fmu.getInt64
-        return get([there[variable].valueReference])[0]
+        get = fmu.getFloat64 if by_name[variable].type == "Float64" else fmu.getInt64
+        return get([by_name[variable].valueReference])[0]
 
     def write(variable, value):
-        (fmu.setFloat64 if there[variable].type == "Float64" else fmu.setInt64)(
-            [there[variable].valueReference], [value]
+        (fmu.setFloat64 if by_name[variable].type == "Float64" else fmu.setInt64)(
+            [by_name[variable].valueReference], [value]
         )
 
     for variable, value in (values or {}).items():
@@ -86,7 +86,7 @@ def through(fmu, stop, h, at_event):
 @pytest.mark.parametrize("name", COUNTED)
 def test_a_master_with_long_steps_sees_every_event_at_its_time(unpacked, name, method):
     """The old mode is valid until event mode is entered, and the new one from then on."""
-    true, seen = load_reference(name).events, []
+    true, changes = load_reference(name).events, []
     stop = model_class(name).stop_time
     values = {} if method == "default" else {"solver.method": 3, "solver.rtol": 1e-10}
     with master(unpacked, name, values, eventModeUsed=True, earlyReturnAllowed=True) as (fmu, read, _):
@@ -96,14 +96,14 @@ def test_a_master_with_long_steps_sees_every_event_at_its_time(unpacked, name, m
         def at_event(t):
             before, counted = read("mode"), read("events.count")
             handle(fmu)
-            seen.append((t, read("mode")))
+            changes.append((t, read("mode")))
             assert read("mode") != before
-            assert read("events.count") == counted + 1 == len(seen)
+            assert read("events.count") == counted + 1 == len(changes)
             assert read("events.t_last") == t == read("time")
 
         through(fmu, stop, 1.0, at_event)
-    assert [mode for _, mode in seen] == [mode for _, mode in true]
-    off = max(abs(t - then) for (t, _), (then, _) in zip(seen, true, strict=True))
+    assert [mode for _, mode in changes] == [mode for _, mode in true]
+    off = max(abs(t - then) for (t, _), (then, _) in zip(changes, true, strict=True))
     assert off < (1e-12 if name == "stickslip" and method == "default" else 1e-6)
 
 
@@ -143,31 +143,31 @@ def test_the_motion_does_not_depend_on_the_steps_of_the_master(unpacked, name, o
 @pytest.mark.parametrize("early", [True, False])
 @pytest.mark.parametrize("name", MODELS)
 def test_intermediate_update_shows_every_internal_step_and_can_stop_anywhere(unpacked, name, early):
-    stop, looks, began, wanted = 0.5 * model_class(name).stop_time, [], 0.0, 0.3 * model_class(name).stop_time
-    place = next(v.valueReference for v in unpacked(name)[1].modelVariables if v.name == outputs(name)[0])
+    stop, looks, began, requested = 0.5 * model_class(name).stop_time, [], 0.0, 0.3 * model_class(name).stop_time
+    reference = next(v.valueReference for v in unpacked(name)[1].modelVariables if v.name == outputs(name)[0])
 
     def look(_, time, setting, getting, finished, may_return, request, when):
-        looks.append((time, fmu.getFloat64([place])[0]))
+        looks.append((time, fmu.getFloat64([reference])[0]))
         assert (setting, getting, may_return) == (True, True, early)
         assert finished == (time > began)
-        request[0], when[0] = True, wanted
+        request[0], when[0] = True, requested
 
     with master(unpacked, name, earlyReturnAllowed=early, intermediateUpdate=look) as (fmu, read, _):
         t = 0.0
-        while t < wanted:  # an event is an early return as well
+        while t < requested:  # an event is an early return as well
             began = t
             _, _, returned, t = fmu.doStep(t, stop - t)
             assert returned == early
-        assert t == (pytest.approx(wanted, abs=1e-12) if early else stop)
+        assert t == (pytest.approx(requested, abs=1e-12) if early else stop)
         assert looks[-1] == (t, read(outputs(name)[0]))
         steps = read("solver.steps")
     with master(unpacked, name) as (fmu, read, _):
         times = [time for time, _ in looks]
         assert times == sorted(times)
         for time, x in looks:
-            here = read("time")
-            if time > here:
-                fmu.doStep(here, time - here)
+            t_inside = read("time")
+            if time > t_inside:
+                fmu.doStep(t_inside, time - t_inside)
             assert read(outputs(name)[0]) == pytest.approx(x, rel=1e-12, abs=1e-14)
     assert len(looks) > (0 if early else steps)
 

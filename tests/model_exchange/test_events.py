@@ -73,12 +73,12 @@ def test_an_event_is_due_once_its_indicator_is_not_positive(launch, ulps):
     fmu = launch("stickslip", values)
     fmu.update_discrete_states()
     fmu.enter_continuous_time()
-    here = 0.5 * (1.0 + ulps * 2.0**-52)
-    fmu.set_point(here, [0.0, 0.0, here])
+    t_limit = 0.5 * (1.0 + ulps * 2.0**-52)
+    fmu.set_point(t_limit, [0.0, 0.0, t_limit])
     to_break_away = fmu.indicators()[1]
     assert to_break_away > 0.0 or ulps > 0
     assert to_break_away <= 0.0 or ulps < 300  # beyond the limit by more than the rounding of its terms
-    assert handle_event_at(fmu, here, [0.0, 0.0, here]) == ["states"]
+    assert handle_event_at(fmu, t_limit, [0.0, 0.0, t_limit]) == ["states"]
     assert fmu.get("mode") == 1
     fmu.enter_continuous_time()
     assert handle_event_at(fmu, 1.0, [0.75, 1e-300, 1.0]) == []
@@ -114,8 +114,8 @@ def test_a_change_in_event_mode_can_set_a_stuck_sled_free(launch, variable, valu
     fmu.set({variable: value})
     assert fmu.update_discrete_states() == ["states"]
     assert fmu.get("mode", "events.count", "events.t_last") == [1, 1, 2.0]
-    given = {"k": K, "mu_d": 0.05, "g": G, "F_ext": 0.0, variable: value}
-    net = given["F_ext"] + given["k"] * DRIVER * 2.0 - given["mu_d"] * M * given["g"]
+    settings = {"k": K, "mu_d": 0.05, "g": G, "F_ext": 0.0, variable: value}
+    net = settings["F_ext"] + settings["k"] * DRIVER * 2.0 - settings["mu_d"] * M * settings["g"]
     assert fmu.rates()[1] == pytest.approx(net / M)
 
 

@@ -97,10 +97,10 @@ def test_events_under_cvode_are_in_order_and_on_time(runs):
         if "mode" not in columns:
             assert "events.count" not in columns or set(columns["events.count"]) == {0}
             continue
-        found, true = events(columns), TRUTHS[name].events
+        actual, true = events(columns), TRUTHS[name].events
         if rtol < 1e-5 or name != "coulomb":
             assert columns["events.count"][-1] == len(true)
-        assert event_time_error(found[: len(true)], true) <= 2.0 * evaluations * rtol * model_class(name).stop_time
+        assert event_time_error(actual[: len(true)], true) <= 2.0 * evaluations * rtol * model_class(name).stop_time
 
 
 def test_a_stuck_mass_does_not_move_under_cvode(runs):
@@ -124,8 +124,8 @@ def test_every_output_agrees_with_co_simulation(runs, worker, fmus):
     solved = worker.simulate(fmus / f"{name}.fmu", "CoSimulation", output_interval=interval)
     for variable in outputs(name):
         if declared(name)[variable].type == "Real":
-            mine, theirs = (np.array(table[variable])[:, None] for table in (columns, solved))
-            assert relative_errors(mine, theirs).max() <= 20.0 * bound(name, evaluations, rtol) + 1e-6, variable
+            actual, expected = (np.array(table[variable])[:, None] for table in (columns, solved))
+            assert relative_errors(actual, expected).max() <= 20.0 * bound(name, evaluations, rtol) + 1e-6, variable
         else:
             assert columns[variable] == solved[variable]
 
@@ -179,8 +179,8 @@ def test_euler_steps_agree_with_an_explicit_computation(worker, fmus):
     h = 1e-3
     columns, _ = exchange(worker, fmus / "smd.fmu", "smd", **euler(1e-3), output=["x", "v"])
     x, v = 0.1, 0.0
-    for seen in zip(columns["x"], columns["v"], strict=True):
-        assert seen == pytest.approx((x, v), abs=1e-12)
+    for point in zip(columns["x"], columns["v"], strict=True):
+        assert point == pytest.approx((x, v), abs=1e-12)
         x, v = x + h * v, v + h * (-157.9 * x - 2.0 * v)
     assert len(columns["x"]) == 4001
 
@@ -301,8 +301,8 @@ TIES = [
 @pytest.mark.parametrize(("name", "values", "stop"), TIES)
 def test_ties_under_cvode_are_decided_by_physics(worker, fmus, name, values, stop, rtol):
     start = {"v0": 1.0} if name == "coulomb" else {}
-    given = {"start_values": {**values, **start}, "stop_time": stop, "output_interval": stop / 20}
-    columns, _ = exchange(worker, fmus / f"{name}.fmu", name, relative_tolerance=rtol, **given)
+    options = {"start_values": {**values, **start}, "stop_time": stop, "output_interval": stop / 20}
+    columns, _ = exchange(worker, fmus / f"{name}.fmu", name, relative_tolerance=rtol, **options)
     truth = ClosedFormMotion(
         [(0.0, getattr(independent_solution, name)(**values))], 0.1 * (name == "coulomb"), start.get("v0", 0.0), stop
     )

@@ -63,9 +63,9 @@ def test_every_variable_can_be_read_in_every_phase(worker, fmus, name):
     fmu = worker.exchange(fmus / f"{name}.fmu")
 
     def ask():
-        told = fmu.sizes(), fmu.get_states(), fmu.rates(), fmu.indicators(), fmu.nominals(), fmu.get(*outputs(name))
+        values = fmu.sizes(), fmu.get_states(), fmu.rates(), fmu.indicators(), fmu.nominals(), fmu.get(*outputs(name))
         assert single_error(fmu) == ""
-        return told
+        return values
 
     expected = ask()
     fmu.set({"m": -1.0})
@@ -90,23 +90,23 @@ def test_rates_outputs_and_indicators_depend_only_on_the_set_states(launch_movin
     """In any order, bit for bit: the FMU does not remember earlier solver states."""
     fmu, t, states = launch_moving(name)
     x, v, a = outputs(name)[:3]
-    seen = {}
+    results = {}
     for scale in (1.0, 0.7, 1.3, 0.7, 1.0):
-        here = [scale * states[0], scale * states[1], *states[2:]]
-        fmu.set_point(scale * t, here)
+        point = [scale * states[0], scale * states[1], *states[2:]]
+        fmu.set_point(scale * t, point)
         rates, values = fmu.rates(), fmu.get("time", x, v, a)
-        assert values[:3] == [scale * t, *here[:2]]
+        assert values[:3] == [scale * t, *point[:2]]
         assert values[3] == pytest.approx(rates[1], rel=1e-13)
-        assert rates[0] == here[1]
+        assert rates[0] == point[1]
         assert rates[2:] == [DRIVER] * (name in DRIVEN)
-        assert fmu.get_states() == here
+        assert fmu.get_states() == point
         if name in DRY:
-            assert fmu.indicators() == [abs(here[1]), 1.0]
-        told = rates, fmu.indicators(), fmu.get(*outputs(name))
-        assert seen.setdefault(scale, told) == told
+            assert fmu.indicators() == [abs(point[1]), 1.0]
+        result = rates, fmu.indicators(), fmu.get(*outputs(name))
+        assert results.setdefault(scale, result) == result
         if name in DRIVEN:
-            assert fmu.get("x_driver") == here[2]
-            assert fmu.get("F_spring") == pytest.approx(K * (here[2] - here[0]), rel=1e-14)
+            assert fmu.get("x_driver") == point[2]
+            assert fmu.get("F_spring") == pytest.approx(K * (point[2] - point[0]), rel=1e-14)
 
 
 @EVERY_MODEL

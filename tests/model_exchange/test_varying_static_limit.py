@@ -43,7 +43,7 @@ def test_a_constant_load_breaks_away_when_the_static_limit_drops_to_it(method):
     assert state_values(step, model.contacts) == [1]
 
 
-def led(source, values):
+def externally_integrated(source, values):
     """Return a model under an importer's solver, its model-exchange interface, and its run."""
     cls = lowered_model(source)
     model, exchange, run = (
@@ -65,7 +65,7 @@ STUCK = [one for one in STUCK if one not in (FILES["belt"], FILES["clutch"])]  #
 def test_no_contact_sticks_while_its_indicator_requires_breakaway(source):
     """For any input, to the last bit: an importer would never notice it otherwise."""
     rest = {name: 0.0 for name, d in declared(source).items() if name in ("x0", "theta0")}
-    model, exchange, _ = led(source, rest)
+    model, exchange, _ = externally_integrated(source, rest)
     entry = next(name for name, d in declared(source).items() if d.causality == "input" and d.unit in ("N", "N.m"))
     many, tried = len(model.contacts), 0
     solver = model.solver
@@ -108,11 +108,11 @@ def test_sliding_friction_above_static_friction_is_reported_and_stops_the_run(sl
         model = prepared_model(lowered_model(slider)(), {"solver.method": method, "press": 5.0, "F_ext": 4.5}, 1.0)
         start(model, model.initial_state(0.0), 1.0)
         assert model.solver.step.compute_next(model) == NO_CONSISTENT_MODES
-    model, exchange, _ = led(slider, {"press": 5.0})
+    model, exchange, _ = externally_integrated(slider, {"press": 5.0})
     model.F_ext = 4.5
     exchange.update_modes(model, model.solver)
     assert np.isnan([model.solver.x, model.solver.v]).all()
-    model, exchange, _ = led(slider, {"press": 3.9})
+    model, exchange, _ = externally_integrated(slider, {"press": 3.9})
     model.F_ext = 4.5
     exchange.update_modes(model, model.solver)
     assert (model.solver.x, model.solver.v, model.solver.mode) == (0.0, 0.0, 1)

@@ -142,7 +142,7 @@ def physics(monkeypatch):
     return equip
 
 
-def has(quantity, expected):
+def assert_dimension(quantity, expected):
     """Assert that a value has the dimension of another; zero matches every dimension."""
     return quantity == 0.0 if not isinstance(quantity, Quantity) else quantity.powers == expected.powers
 
@@ -158,26 +158,26 @@ def test_the_equations_agree_with_the_declared_units(physics, name, values):
     for mode in (-1, 0, 1):
         modes = [mode] if model.has_dry_friction else []
         a = model.rates(t, x, v, *modes)
-        assert has(a, Quantity.of(1.0, declared(name)[outputs(name)[2]].unit))
-        assert has(a, v / t)
-        assert has(v, x / t)
+        assert assert_dimension(a, Quantity.of(1.0, declared(name)[outputs(name)[2]].unit))
+        assert assert_dimension(a, v / t)
+        assert assert_dimension(v, x / t)
         for slope, by in zip(model.jacobian(t, x, v, *modes), (t, x, v), strict=True):
-            assert has(slope, a / by)
+            assert assert_dimension(slope, a / by)
         if model.is_linear:
-            assert has(model.applied_acceleration(t, *modes), a)
+            assert assert_dimension(model.applied_acceleration(t, *modes), a)
         if model.rests_when_stuck:
             load, rate, limit = model.stick_load(t, x, v)
-            assert has(rate, load / t)
-            assert has(limit, load)
-            assert has(model.load_magnitude(t, x, v), load)
-            assert has(model.breakaway_acceleration(t, x, v, 1), a)
+            assert assert_dimension(rate, load / t)
+            assert assert_dimension(limit, load)
+            assert assert_dimension(model.load_magnitude(t, x, v), load)
+            assert assert_dimension(model.breakaway_acceleration(t, x, v, 1), a)
         with suppress(
             *[DimensionError] * ("energy" not in outputs(name))
         ):  # without it, it sums up all that may overflow
             model.compute_outputs(t, x, v, *modes)
         for output in outputs(name):
             if declared(name)[output].type == "Real":
-                assert has(getattr(model, output), Quantity.of(1.0, declared(name)[output].unit)), output
+                assert assert_dimension(getattr(model, output), Quantity.of(1.0, declared(name)[output].unit)), output
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -189,24 +189,30 @@ def test_the_methods_preserve_dimensions(physics, name):
     for file in ("ode23", "ode45", "dop853", "rodas"):
         method = getattr(runtime(name, file), file.capitalize())()
         x1, v1, a1, e_x, e_v = method.propose(model, *modes, t, x, v, a, h)
-        assert [has(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [True] * 5
+        assert [assert_dimension(*pair) for pair in ((x1, x), (v1, v), (a1, a), (e_x, x / h), (e_v, v / h))] == [
+            True
+        ] * 5
         step = runtime(name, "step_control").InternalStep()
         names = [*model.states, list(model.states.values())[-1]]
         for end, values in ("0", (x, v, a)), ("1", (x1, v1, a1)):
-            for known, value in zip(names, values, strict=True):
-                setattr(step, known + end, value)
+            for parameter, value in zip(names, values, strict=True):
+                setattr(step, parameter + end, value)
         step.t0, step.mode0, step.h_full = t, 1, h
         method.build_interpolant(model, step)
-        assert [has(*pair) for pair in zip(step.interpolant.evaluate(0.3 * h), (x, v), strict=True)] == [True] * 2
+        assert [assert_dimension(*pair) for pair in zip(step.interpolant.evaluate(0.3 * h), (x, v), strict=True)] == [
+            True
+        ] * 2
     if model.is_linear:
         exact = runtime(name, "linear_closed_form").LinearClosedForm()
         exact.prepare(*model.linear_coefficients())
         exact.start_segment(x, v, a, model.applied_acceleration(t, *modes), x)
-        assert [has(*pair) for pair in zip(exact.evaluate(h), (x, v), strict=True)] == [True] * 2
+        assert [assert_dimension(*pair) for pair in zip(exact.evaluate(h), (x, v), strict=True)] == [True] * 2
         if model.has_dry_friction:
             exact.start_segment(x, v, -a, model.applied_acceleration(t, *modes), x)
-            assert has(exact.next_standstill(1), t)
-            assert [has(*pair) for pair in zip(exact.state_at_standstill(h), (x, v, x), strict=True)] == [True] * 3
+            assert assert_dimension(exact.next_standstill(1), t)
+            assert [assert_dimension(*pair) for pair in zip(exact.state_at_standstill(h), (x, v, x), strict=True)] == [
+                True
+            ] * 3
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -219,7 +225,7 @@ def test_a_wrong_unit_would_be_detected(physics, name):
         def move(model=model, t=t, x=x, v=v):
             model.prepare()
             a = [model.rates(t, x, v, *modes) for modes in (((1,), (0,)) if model.has_dry_friction else ((),))]
-            assert all(has(value, v / t) for value in a)
+            assert all(assert_dimension(value, v / t) for value in a)
 
         if variable == "eps":
             continue
@@ -248,10 +254,10 @@ def test_a_healthy_run_has_only_finite_values(launch, case, stop):
     name, values, _ = case
     fmu, t = launch(name, {**values, "solver.rtol": 1e-3}, start=-1.0, stop=stop), -1.0
     for h in (1e-9, 0.1, 0.3, 2.5):
-        seen = numbers(fmu, name)
-        assert infinite(seen) == []
-        assert t < seen["solver.t_next"] <= (t + model_class(name).stop_time if stop is None else stop)
-        assert seen["events.t_last"] == -1.0 or seen["events.count"] > 0
+        readings = numbers(fmu, name)
+        assert infinite(readings) == []
+        assert t < readings["solver.t_next"] <= (t + model_class(name).stop_time if stop is None else stop)
+        assert readings["events.t_last"] == -1.0 or readings["events.count"] > 0
         fmu.step(t, h)
         t += h
 
@@ -346,12 +352,12 @@ def test_outputs_depend_on_the_input_as_declared(launch, description, name):
     scalars = root.findall("ModelVariables/ScalarVariable")
     names = [scalar.get("name") for scalar in scalars]
     entry, size = push(name)
-    told = {}
+    declared_dependencies = {}
     for unknown in root.findall("ModelStructure/Outputs/Unknown"):
         known = [scalars[int(i) - 1] for i in unknown.get("dependencies").split()]
         inputs = [scalar.get("name") for scalar in known if scalar.get("causality") == "input"]
         assert inputs in ([], [entry])
-        told[names[int(unknown.get("index")) - 1]] = bool(inputs)
+        declared_dependencies[names[int(unknown.get("index")) - 1]] = bool(inputs)
     followed = set()
     for case in CASES:
         if case[0] != name:
@@ -359,17 +365,19 @@ def test_outputs_depend_on_the_input_as_declared(launch, description, name):
         fmu = launch(name, case[1], stop=case[2])
         for turn in range(6):
             t = turn * case[2] / 8
-            before = fmu.get(*told)
+            before = fmu.get(*declared_dependencies)
             for value in (0.1 * size, -3.0 * size, 3.0 * size):
                 fmu.set({entry: value})
-                after = fmu.get(*told)
-                changed = {v for v, a, b in zip(told, before, after, strict=True) if repr(a) != repr(b)}
-                assert not [v for v in changed if not told[v]], label(case)
+                after = fmu.get(*declared_dependencies)
+                changed = {
+                    v for v, a, b in zip(declared_dependencies, before, after, strict=True) if repr(a) != repr(b)
+                }
+                assert not [v for v in changed if not declared_dependencies[v]], label(case)
                 followed |= changed
             fmu.set({entry: 0.0})
-            assert repr(fmu.get(*told)) == repr(before)
+            assert repr(fmu.get(*declared_dependencies)) == repr(before)
             fmu.step(t, case[2] / 8)
-    assert followed == {v for v, direct in told.items() if direct}
+    assert followed == {v for v, direct in declared_dependencies.items() if direct}
 
 
 @EVERY_MODEL

@@ -57,8 +57,8 @@ UNITS = {
 }
 
 
-def starts(name, wanted):
-    return {v: d.start for v, d in declared(name).items() if wanted(d) and "." not in v and not isinstance(d, Choice)}
+def starts(name, kind):
+    return {v: d.start for v, d in declared(name).items() if kind(d) and "." not in v and not isinstance(d, Choice)}
 
 
 def test_there_are_five_models():
@@ -88,8 +88,8 @@ def test_the_solver_has_its_settings_and_counters(name):
     for label, value, _ in declared(name)["solver.method"].items:
         assert METHODS[label] == value
     counts = [v for v, d in declared(name).items() if isinstance(d, (Local, Count))]
-    wanted = "solver.steps solver.rejected solver.evaluations solver.h solver.t_next events.count events.t_last"
-    assert sorted(counts) == sorted(wanted.split())
+    expected = "solver.steps solver.rejected solver.evaluations solver.h solver.t_next events.count events.t_last"
+    assert sorted(counts) == sorted(expected.split())
 
 
 def test_each_model_offers_its_friction_laws():
@@ -127,8 +127,8 @@ def test_a_declaration_states_its_allowed_range():
         kind = Choice(2, "kind", (("one", 1, "first"), ("two", 2, "second")))
 
     assert vars(Sample()) == {"free": 1.0, "mass": 1.0, "share": 0.5, "kind": 2}
-    told = value_message(OUT_OF_RANGE, "mass", Sample.mass, -2.0)
-    assert told == "mass = -2.0 kg is refused: mass must be above 0.0 kg"
+    message = value_message(OUT_OF_RANGE, "mass", Sample.mass, -2.0)
+    assert message == "mass = -2.0 kg is refused: mass must be above 0.0 kg"
     assert Sample.share.allowed == "at least 0.0 and below 1.0"
     assert Sample.kind.allowed == "one of 1 (one), 2 (two)"
     assert Sample.free.allowed == "a finite number"

@@ -28,19 +28,19 @@ def structure(fmu):
         return ElementTree.fromstring(archive.read("modelDescription.xml")).find("ModelStructure")
 
 
-def followed(unknowns, names):
+def dependencies_by_name(unknowns, names):
     """Return for each unknown the names that it depends on; FMI 2.0 counts variables from 1."""
-    found = {}
+    dependencies = {}
     for unknown in unknowns:
-        known = {names[int(i) - 1] for i in unknown.get("dependencies").split()}
-        found[names[int(unknown.get("index")) - 1]] = known
-    return found
+        names_known = {names[int(i) - 1] for i in unknown.get("dependencies").split()}
+        dependencies[names[int(unknown.get("index")) - 1]] = names_known
+    return dependencies
 
 
 @pytest.fixture
 def at_the_start(fmus):
     """Return the initial dependencies in the description of a model."""
-    return lambda name: followed(
+    return lambda name: dependencies_by_name(
         structure(fmus / f"{name}.fmu").findall("InitialUnknowns/Unknown"), list(declared(name))
     )
 
@@ -57,13 +57,13 @@ def some(name, variable, draw):
     return draw.choice([value for step in steps for value in (step * size, -step * size) if d.accepts(value)])
 
 
-def situation(name, known, draw):
+def situation(name, knowns, draw):
     """Return a value for each known; half of the situations are bodies at rest close to breakaway."""
-    values = {v: some(name, v, draw) for v in known}
+    values = {v: some(name, v, draw) for v in knowns}
     model, (x, v, *_), (entry, _) = model_class(name)(), outputs(name), push(name)
     if model.rests_when_stuck and f"{v}0" in values and draw.random() < 0.5:
         values[f"{v}0"] = 0.0
-        for variable in (each for each in values if "." not in each):
+        for variable in (value for value in values if "." not in value):
             setattr(model, variable, values[variable])
         model.prepare()
         load, _, limit = model.stick_load(0.0, values[f"{x}0"], 0.0)
@@ -74,39 +74,39 @@ def situation(name, known, draw):
 @EVERY_MODEL
 def test_initial_dependencies_are_exactly_as_declared(worker, fmus, at_the_start, name):
     """Each known is changed alone: only the declared unknowns respond, and each of them does in some situation."""
-    draw, told = random.Random(name), at_the_start(name)
-    known = [v for v, d in declared(name).items() if d.causality in ("parameter", "input")]
-    seen = {v: set() for v in told}
+    draw, declared_dependencies = random.Random(name), at_the_start(name)
+    knowns = [v for v, d in declared(name).items() if d.causality in ("parameter", "input")]
+    responses = {v: set() for v in declared_dependencies}
     fmu = worker.instantiate(fmus / f"{name}.fmu")
     for _ in range(SITUATIONS):
-        values = situation(name, known, draw)
-        before, *rows = fmu.vary_each(values, {v: some(name, v, draw) for v in known}, list(told))
-        for v, after in zip(known, rows, strict=True):
+        values = situation(name, knowns, draw)
+        before, *rows = fmu.vary_each(values, {v: some(name, v, draw) for v in knowns}, list(declared_dependencies))
+        for v, after in zip(knowns, rows, strict=True):
             if all(map(isfinite, before + after)):  # otherwise the values are inconsistent
-                for output, old, new in zip(told, before, after, strict=True):
-                    seen[output] |= {v} if old != new else set()
+                for output, old, new in zip(declared_dependencies, before, after, strict=True):
+                    responses[output] |= {v} if old != new else set()
     fmu.free()
-    assert seen == told
+    assert responses == declared_dependencies
 
 
 @EVERY_MODEL
 def test_initial_feedthrough_implies_permanent_feedthrough(fmus, at_the_start, name):
     """Two FMUs coupled by such outputs never form an algebraic loop."""
     entry = push(name)[0]
-    always = followed(structure(fmus / f"{name}.fmu").findall("Outputs/Unknown"), list(declared(name)))
-    assert [v for v, known in at_the_start(name).items() if entry in known] == [v for v in always if always[v]]
+    always = dependencies_by_name(structure(fmus / f"{name}.fmu").findall("Outputs/Unknown"), list(declared(name)))
+    assert [v for v, knowns in at_the_start(name).items() if entry in knowns] == [v for v in always if always[v]]
 
 
 @EVERY_MODEL
 def test_fmi3_declares_the_same_and_the_driver_depends_on_its_speed(at_the_start, name):
     """The declared variables have the same positions, which FMI 3.0 counts from 0."""
-    names, told = list(declared(name)), {}
+    names, dependencies = list(declared(name)), {}
     for unknown in structure(fmi3_fixtures.build_fmi3_fmus() / f"{name}.fmu").findall("InitialUnknown"):
-        told[int(unknown.get("valueReference"))] = {names[int(i)] for i in unknown.get("dependencies").split()}
-    expected = {names.index(v): known for v, known in at_the_start(name).items()}
-    beside = {place: known for place, known in told.items() if place not in expected}
-    assert told == expected | beside
-    assert list(beside.values()) == [{"v_driver"}] * model_class(name).has_driver
+        dependencies[int(unknown.get("valueReference"))] = {names[int(i)] for i in unknown.get("dependencies").split()}
+    expected = {names.index(v): knowns for v, knowns in at_the_start(name).items()}
+    additional = {index: knowns for index, knowns in dependencies.items() if index not in expected}
+    assert dependencies == expected | additional
+    assert list(additional.values()) == [{"v_driver"}] * model_class(name).has_driver
 
 
 def test_rare_dependencies_are_declared_too(tmp_path):
@@ -115,6 +115,6 @@ def test_rare_dependencies_are_declared_too(tmp_path):
     more = '    depth = Output("1", "how far beyond the gap", choose(x > gap, log(x / gap), 0.0))\n'
     (tmp_path / "bumper.py").write_text(text + more, encoding="utf-8")
     model = lowered_model(tmp_path / "bumper.py")
-    told = initial_dependencies(model, variables(model()))
-    assert {"gap", "s"} <= set(told["a"])
-    assert told["depth"] == ["gap"]
+    dependencies = initial_dependencies(model, variables(model()))
+    assert {"gap", "s"} <= set(dependencies["a"])
+    assert dependencies["depth"] == ["gap"]

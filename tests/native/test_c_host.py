@@ -38,28 +38,28 @@ def life(i, name):
     """Return a short script for instance i: a run, a look ahead, a push; every instance has its own values."""
     ref = value_references(name)
     force, size = push(name)
-    stop, wanted = model_class(name).stop_time, " ".join(map(str, reals(name)))
+    stop, names_to_read = model_class(name).stop_time, " ".join(map(str, reals(name)))
     return [
         *begin(i, [(ref["m"], model_class(name).m.start * (1.0 + i / CROWD))], stop),
-        f"{i} run 0 {stop / 4} 5 {wanted}",
+        f"{i} run 0 {stop / 4} 5 {names_to_read}",
         f"{i} getr {ref['solver.t_next']}",
         f"{i} setr {ref[force]} {size!r}",
-        f"{i} run {stop / 4} {stop / 2} 3 {wanted}",
+        f"{i} run {stop / 4} {stop / 2} 3 {names_to_read}",
         f"{i} geti {ref['solver.steps']}",
     ]
 
 
 def test_the_process_has_no_python_and_agrees_with_the_python_fmu(fmu, fmus, worker):
     name = fmu.stem
-    stop, wanted = model_class(name).stop_time, [v for v in outputs(name) if declared(name)[v].type == "Real"]
-    run = f"0 run 0 {stop} 200 {' '.join(str(value_references(name)[v]) for v in wanted)}"
+    stop, names_to_read = model_class(name).stop_time, [v for v in outputs(name) if declared(name)[v].type == "Real"]
+    run = f"0 run 0 {stop} 200 {' '.join(str(value_references(name)[v]) for v in names_to_read)}"
     answers, noise = run_host_script(fmu, [*begin(0, stop=stop), run])
     mapped = re.findall(r"mapped (.*)", noise)
     assert any(path.endswith(f"{name}.so") for path in mapped)
     assert not [path for path in mapped if "python" in path.lower()]
     python = worker.instantiate(fmus / f"{name}.fmu").begin(stop=stop)
     times = [stop * i / 200 for i in range(201)]
-    assert numbers(answers[-1]) == python.run(times, wanted)[-1]
+    assert numbers(answers[-1]) == python.run(times, names_to_read)[-1]
 
 
 def test_two_hundred_instances_do_not_interfere(fmu):
@@ -155,16 +155,16 @@ def failures(name):
 
 
 def test_the_sanitizers_report_nothing(fmu):
-    played(fmu, SANITIZERS, 25)
+    run_failures(fmu, SANITIZERS, 25)
 
 
 @pytest.mark.parametrize("name", ["pacejka", "stickslip"])
 def test_the_thread_sanitizer_reports_nothing(name):
     """With and without a contact. Threads could only share data of the FMI layer, which is the same for all models."""
-    played(build_native_fmus() / f"{name}.fmu", "thread", 1)
+    run_failures(build_native_fmus() / f"{name}.fmu", "thread", 1)
 
 
-def played(fmu, sanitizers, crowd):
+def run_failures(fmu, sanitizers, crowd):
     """Run every error, and the life cycles of many instances, in threads."""
     script = failures(fmu.stem) + [line for i in range(1, crowd) for line in life(i, fmu.stem)]
     script += [f"{i} free" for i in range(1, crowd)]
@@ -175,16 +175,16 @@ def played(fmu, sanitizers, crowd):
 
 def test_every_failure_is_one_sentence_in_the_log_and_on_standard_error(fmu):
     answers, noise = run_host_script(fmu, failures(fmu.stem))
-    heard = [line.split(" ", 4)[4] for line in answers if line.startswith("heard ")]
+    messages = [line.split(" ", 4)[4] for line in answers if line.startswith("log ")]
     printed = re.findall(rf"^{fmu.stem.capitalize()} \((?:0|x)\): (.*)", noise, re.MULTILINE)
-    assert len(heard) > 50
-    unheard = list((Counter(printed) - Counter(heard)).elements())
+    assert len(messages) > 50
+    unheard = list((Counter(printed) - Counter(messages)).elements())
     assert len(unheard) == 2, unheard  # one instance has no logger; one error has a disabled category
-    assert set(heard) <= set(printed)
+    assert set(messages) <= set(printed)
     assert all(
-        line.startswith(("heard 0 3 logStatusError ", "heard x 3 logStatusError "))
+        line.startswith(("log 0 3 logStatusError ", "log x 3 logStatusError "))
         for line in answers
-        if "heard" in line
+        if line.startswith("log ")
     )
 
 
@@ -226,8 +226,8 @@ def test_a_call_out_of_sequence_is_refused_and_changes_nothing(stickslip, phase,
 
 
 def test_unread_values_can_be_read_after_termination(fmu):
-    wanted = " ".join(map(str, reals(fmu.stem)))
-    last = ["0 step 0 0.7", f"0 getr {wanted}"]
+    names_to_read = " ".join(map(str, reals(fmu.stem)))
+    last = ["0 step 0 0.7", f"0 getr {names_to_read}"]
     before, _ = run_host_script(fmu, [*begin(0, stop=4.0), *last])
     after, _ = run_host_script(fmu, [*begin(0, stop=4.0), last[0], "0 terminate", last[1]])
     assert before[-1] == after[-1]

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule, run_state_machine_as_test
 from models import EXACT, HYBRID, MODELS, declared
 
-KINDS = {
+OTHER_BACKENDS = {
     "native": (worker_client.Worker, native_fmus.build_native_fmus),
     "FMI 3.0": (fmi3_fixtures.Worker, fmi3_fixtures.build_fmi3_fmus),
 }
@@ -36,10 +36,10 @@ RUNS = st.sampled_from([None, None, 0.4, 1.0, 0.0, -1.0, nan, inf])
 SIZES = st.sampled_from([0.1, 0.1, 0.05, 0.3, 1e-3, 1e-9, 1e-17, 0.0, -0.0, -0.1, nan, inf])
 OFF = st.sampled_from([0.0] * 6 + [4e-16, -4e-16, 3e-15, -3e-15, 1e-14, 1e-11, -1e-11, 1e-8, 1e-6, -1e-3, nan, inf])
 NEW, INITIALISING, RUNNING = range(3)
-BOTH = range(2)  # indices of the backends
+BACKENDS = range(2)  # indices of the backends
 
 
-class Calls(RuleBasedStateMachine):
+class MatchedCalls(RuleBasedStateMachine):
     """Two instances of each of two backends, called alike."""
 
     folders = workers = None  # of the backends
@@ -62,28 +62,30 @@ class Calls(RuleBasedStateMachine):
     def both(self, function, *arguments, of=None):
         """Make the same call in both backends, or with their own entries of `of`; return the results."""
         answers = []
-        for place, instance in enumerate(self.pairs[0]):
-            own = [of[place]] if of else []
+        for index, instance in enumerate(self.pairs[0]):
+            first_argument = [of[index]] if of else []
             try:
-                answers.append(getattr(instance, function)(*own, *arguments))
+                answers.append(getattr(instance, function)(*first_argument, *arguments))
             except worker_client.FmiError:
                 answers.append(worker_client.FmiError)
-        looks = [self.look(place) for place in BOTH]
+        looks = [self.look(index) for index in BACKENDS]
         assert looks[0] == looks[1], (function, arguments)
         refused = [answer is worker_client.FmiError for answer in answers]
         if function not in ("exit", "read_one"):  # which a Python FMU for FMI 2.0 cannot refuse
             assert refused[0] == refused[1], (function, arguments, looks)
         return answers
 
-    def look(self, place):
+    def look(self, index):
         """Return what is visible of one backend: values, standard error, and the log before and during reading (fmpy
         passes all messages to the newest instance)."""
-        numbers = [pair[place].number for pair in self.pairs]
+        numbers = [pair[index].number for pair in self.pairs]
         log = [[number, "messages", []] for number in numbers]
-        asked = [*log, [numbers[0], "get", [self.seen]], *log]
-        *before, values, one, other = self.workers[place].call(None, "batch", asked)
-        said = [[text.replace("%%", "%") for lines in heard for *_, text in lines] for heard in (before, [one, other])]
-        return json.dumps(values), said, self.workers[place].read_stderr()  # where NaN equals NaN
+        requests = [*log, [numbers[0], "get", [self.seen]], *log]
+        *before, values, one, other = self.workers[index].call(None, "batch", requests)
+        messages = [
+            [text.replace("%%", "%") for lines in heard for *_, text in lines] for heard in (before, [one, other])
+        ]
+        return json.dumps(values), messages, self.workers[index].read_stderr()  # where NaN equals NaN
 
     # ---- from instantiation to the end
 
@@ -190,10 +192,10 @@ class Calls(RuleBasedStateMachine):
                 instance.free()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", OTHER_BACKENDS)
 def test_both_backends_refuse_the_same_calls_with_the_same_message(fmus, kind):
-    process, built = KINDS[kind]
+    process, built = OTHER_BACKENDS[kind]
     workers = [worker_client.Worker(), process()]
     chosen = {"workers": workers, "folders": [fmus, built()]}
-    run_state_machine_as_test(type("Machine", (Calls,), chosen), settings=OFTEN)
+    run_state_machine_as_test(type("Machine", (MatchedCalls,), chosen), settings=OFTEN)
     assert [worker.close() for worker in workers] == [0, 0]

@@ -29,7 +29,11 @@ DAMPING = {  # stiffness, damping
 }
 PIECES = ((0.0, 0.3, 2.0), (1.0, 2.3, -3.0), (2.5, -2.2, 1.7))  # start time, force, and its rate
 HARD = ((0.0, 0.0, 80.0), (2.0, 160.0, -120.0), (5.0, -200.0, 60.0))  # enough to drag the sled
-BENT = ((0.0, 0.3, 2.1, -9.0, 12.5), (1.0, 2.3, -3.0, 8.0), (2.5, -2.2, 1.7, 0.0, 30.0, -400.0))  # and its derivatives
+POLYNOMIAL_PIECES = (
+    (0.0, 0.3, 2.1, -9.0, 12.5),
+    (1.0, 2.3, -3.0, 8.0),
+    (2.5, -2.2, 1.7, 0.0, 30.0, -400.0),
+)  # and its derivatives
 DRAGGED = ((0.0, 0.0, 20.0, 60.0, -30.0), (3.0, 60.0, -400.0, 250.0), (6.0, -150.0, 0.0, 0.0, 90.0))
 HELD, SLID = 0.9 * 12.5 * 9.81, 0.6 * 12.5 * 9.81
 POUND, INCH = 0.45359237, 0.0254
@@ -44,12 +48,12 @@ def fmus():
     return native_fmus.build_native_fmus()
 
 
-def pushed(fmu, pieces, times, names):
+def run_with_inputs(fmu, pieces, times, names):
     """Return a row of values at each of the times; the input changes in pieces."""
-    rows, left = [], list(pieces)
+    rows, remaining = [], list(pieces)
     for t, end in pairwise([0.0, *times]):
-        if left and left[0][0] == t:
-            _, value, *rates = left.pop(0)
+        if remaining and remaining[0][0] == t:
+            _, value, *rates = remaining.pop(0)
             for order in range(len(rates), 0, -1):
                 fmu.ramp("F_ext", rates[order - 1], order)
             fmu.set({"F_ext": value})
@@ -61,7 +65,7 @@ def pushed(fmu, pieces, times, names):
 def agree(fmu, body, pieces, stop):
     times = [stop * n / 20 for n in range(1, 21)]
     names = ("x", "v", "events.t_last")
-    assert_close(pushed(fmu, pieces, times, names), sample_motion(body, pieces, times), names, 1e-12)
+    assert_close(run_with_inputs(fmu, pieces, times, names), sample_motion(body, pieces, times), names, 1e-12)
     assert fmu.get("events.count") == len(body.events)
     return len(body.events)
 
@@ -93,7 +97,7 @@ def test_a_polynomial_force_is_exact_through_stick_and_slip_for_every_damping(la
     for name, friction in ("smd", 0.0), ("coulomb", 0.5):
         fmu = launch(name, {"k": k, "c": c, "v0": 0.2}, stop=None)
         body = Body(k=k, c=c, hold=friction, slide=friction, x=0.1, v=0.2)
-        assert agree(fmu, body, BENT, 5.0) >= 2 * friction
+        assert agree(fmu, body, POLYNOMIAL_PIECES, 5.0) >= 2 * friction
 
 
 @pytest.mark.parametrize(("v_driver", "k"), [(0.034, 742.5), (0.0, 742.5), (0.034, 0.0)])
@@ -148,11 +152,11 @@ def test_every_method_evaluates_a_polynomial_force_at_the_stage_times(launch, na
 @pytest.mark.parametrize("name", ["coulomb", "stickslip"])
 def test_every_method_breaks_away_and_stops_under_a_polynomial_force(launch, name, method):
     values = {"solver.method": NUMBERS[method], "solver.rtol": STEPPING[method]}
-    sled, pieces = name == "stickslip", DRAGGED if name == "stickslip" else BENT
+    sled, pieces = name == "stickslip", DRAGGED if name == "stickslip" else POLYNOMIAL_PIECES
     fmu = launch(name, values, stop=None)
     body = Body(m=12.5, k=742.5, hold=HELD, slide=SLID, u=0.034) if sled else Body(k=157.9, hold=0.5, slide=0.5, x=0.1)
     times, names = [0.25 * n for n in range(1, 25)], ("x", "v", "events.t_last")
-    assert_close(pushed(fmu, pieces, times, names), sample_motion(body, pieces, times), names, 1e-5)
+    assert_close(run_with_inputs(fmu, pieces, times, names), sample_motion(body, pieces, times), names, 1e-5)
     assert fmu.get("events.count") == len(body.events) >= 2
 
 
@@ -231,7 +235,7 @@ def test_a_method_keeps_its_order_when_input_derivatives_are_set(launch, method)
 
 
 @pytest.fixture(params=MODELS)
-def ramped(request, launch):
+def ramped_instance(request, launch):
     """An instance with a ramped input, the names of its input and outputs, and the rate."""
     name = request.param
     force, size = push(name)
@@ -241,8 +245,8 @@ def ramped(request, launch):
     return name, fmu, force, outputs(name), size
 
 
-def test_an_input_reads_as_set_and_its_rate_lasts_until_the_next_setting(ramped):
-    _, fmu, force, _names, size = ramped
+def test_an_input_reads_as_set_and_its_rate_lasts_until_the_next_setting(ramped_instance):
+    _, fmu, force, _names, size = ramped_instance
     fmu.step(0.0, 0.5)
     assert fmu.get(force) == 0.5 * size
     fmu.set({force: 0.25 * size})  # an earlier value
@@ -254,8 +258,8 @@ def test_an_input_reads_as_set_and_its_rate_lasts_until_the_next_setting(ramped)
     assert fmu.get(force) == 0.75 * size
 
 
-def test_results_do_not_depend_on_the_grid_or_on_repeated_settings(launch, ramped):
-    name, fmu, force, names, size = ramped
+def test_results_do_not_depend_on_the_grid_or_on_repeated_settings(launch, ramped_instance):
+    name, fmu, force, names, size = ramped_instance
     other = launch(name, stop=None)
     fmu.ramp(force, -2.0 * size, 3)
     other.ramp(force, -2.0 * size, 3)
@@ -269,8 +273,8 @@ def test_results_do_not_depend_on_the_grid_or_on_repeated_settings(launch, rampe
     assert_identical([fmu.get(force, *names)], [other.get(force, *names)], [force, *names])
 
 
-def test_a_ramp_is_saved_and_continues_bit_for_bit(ramped):
-    _, fmu, force, names, size = ramped
+def test_a_ramp_is_saved_and_continues_bit_for_bit(ramped_instance):
+    _, fmu, force, names, size = ramped_instance
     fmu.ramp(force, 9.0 * size, 4)
     fmu.step(0.0, 0.3)
     state = fmu.save()
@@ -318,18 +322,18 @@ def test_output_derivatives_agree_with_differences(worker, name, version):
     fmu = worker.instantiate(BUILT[version]() / f"{name}.fmu").begin({"solver.rtol": 1e-12})
     if version == "FMI 2.0":
         fmu.ramp(force, 0.1 * size)
-    t, found = 0.0, []
+    t, derivatives = 0.0, []
     for middle in (0.1, 0.4, 0.6, 1.0, 2.0):
         times = [middle + n * h for n in (-2, -1, 0, 1, 2)]
-        a, b, here = fmu.run([t, *times[:3]], names)[1:]
+        a, b, row = fmu.run([t, *times[:3]], names)[1:]
         rates = fmu.output_rates(names)
         _, d, (*e, t_last) = fmu.run(times[2:], [*names, "events.t_last"])
         t = times[-1]
         if not middle - 3 * h < t_last:  # otherwise an event lies in between
             right = [(w - 8.0 * x + 8.0 * y - z) / (12.0 * h) for w, x, y, z in zip(a, b, d, e, strict=False)]
-            found.append((here, rates, right))
-    assert len(found) >= 3
-    for values, rates, right in zip(*(zip(*rows, strict=True) for rows in zip(*found, strict=True)), strict=True):
+            derivatives.append((row, rates, right))
+    assert len(derivatives) >= 3
+    for values, rates, right in zip(*(zip(*rows, strict=True) for rows in zip(*derivatives, strict=True)), strict=True):
         bound = 1e-5 * max(map(abs, right)) + 1e-8 * (10.0 + max(map(abs, values)))
         assert rates == pytest.approx(right, rel=0.0, abs=bound)
     fmu.free()

@@ -137,14 +137,14 @@ class Allowed(Base):
         return done, tries
 
     def guarded(self, x, y):
-        left = 30
-        while left > 0 and 1.0 / x < y:
+        remaining = 30
+        while remaining > 0 and 1.0 / x < y:
             x = x * 0.75
-            left -= 1
-            if left == 7:
+            remaining -= 1
+            if remaining == 7:
                 continue
             self.a += x
-        return x, left
+        return x, remaining
 
     def effects_in_a_test(self, x, y):
         while self.left.take(x) < y:

@@ -88,10 +88,10 @@ def test_the_archive_contents_are_complete(smd):
     assert {name for name in entries(fmu) if name.startswith("binaries/")} == binaries
     sources = {f"sources/{file}" for file in (*OWN_HEADERS, *FMI_HEADERS["2"], "fmi2.c", "model.h", "guid.h")}
     sources.add("sources/buildDescription.xml")
-    found = entries(fmu)
-    told = {path for path in found if path.split("/")[0] in ("documentation", "extra", "model.png")}
-    assert set(found) - told == binaries | sources | {"modelDescription.xml"}
-    assert "documentation/licenses/license.txt" in told
+    files = entries(fmu)
+    documentation = {path for path in files if path.split("/")[0] in ("documentation", "extra", "model.png")}
+    assert set(files) - documentation == binaries | sources | {"modelDescription.xml"}
+    assert "documentation/licenses/license.txt" in documentation
     digest = sha256(fmu.read_bytes()).hexdigest()
     assert printed == f"smd.fmu  {len(fmu.read_bytes()) / 1000:4.0f} kB  {digest[:16]}\n"
 
@@ -112,9 +112,9 @@ def test_methods_and_laws_can_be_selected_as_for_the_python_fmu(tmp_path):
         assert done.returncode == 0, done.stderr
     lean = entries(tmp_path / "native" / "stickslip.fmu")
     text = lean["sources/model.h"].decode()
-    whole = entries(build_native_fmus() / "stickslip.fmu")["sources/model.h"].decode()
+    complete = entries(build_native_fmus() / "stickslip.fmu")["sources/model.h"].decode()
     others = ("Ode23_", "Ode45_", "Dop853_", "Rodas_")
-    assert [name for name in others if name not in whole or name in text] == []
+    assert [name for name in others if name not in complete or name in text] == []
     assert b'name="ode45"' not in lean["modelDescription.xml"]
     results = [simulate_fmu(str(tmp_path / folder / "stickslip.fmu")) for folder in ("python", "native")]
     assert results[0].tobytes() == results[1].tobytes()
@@ -141,9 +141,9 @@ def binary(request, smd, lief):
 def test_every_binary_exports_only_fmi_and_needs_only_the_system(binary):
     platform, _, libraries = binary
     assert len(libraries) == len(PLATFORMS[platform].targets)
-    for place in range(len(libraries)):
-        library = libraries[place] if platform != "darwin64" else libraries.at(place)
-        needed = {getattr(each, "name", each) for each in library.libraries}
+    for index in range(len(libraries)):
+        library = libraries[index] if platform != "darwin64" else libraries.at(index)
+        needed = {getattr(library_name, "name", library_name) for library_name in library.libraries}
         if platform == "win64":
             needed = {name.lower() for name in needed if not name.startswith("api-ms-win-crt-")}
         assert needed == SYSTEM[platform]
@@ -161,8 +161,8 @@ def functions():
 
 def test_no_binary_reveals_where_it_was_built(binary):
     _, content, _ = binary
-    for place in (str(ROOT), os.path.expanduser("~"), "/tmp", "fmi2.c", "ziglang"):
-        assert place.encode() not in content
+    for text in (str(ROOT), os.path.expanduser("~"), "/tmp", "fmi2.c", "ziglang"):
+        assert text.encode() not in content
 
 
 def test_macos_libraries_cover_both_processors_and_are_validly_signed(smd, lief):
@@ -170,23 +170,27 @@ def test_macos_libraries_cover_both_processors_and_are_validly_signed(smd, lief)
     magic, count = unpack_from(">II", content)
     assert (magic, count) == (0xCAFEBABE, 2)
     intel, arm = (
-        content[place : place + size]
-        for _, _, place, size, _ in (unpack_from(">IIIII", content, 8 + 20 * i) for i in range(count))
+        content[offset : offset + size]
+        for _, _, offset, size, _ in (unpack_from(">IIIII", content, 8 + 20 * i) for i in range(count))
     )
     assert [unpack_from("<I", library, 4)[0] for library in (intel, arm)] == [0x01000007, 0x0100000C]
     parsed = lief.MachO.parse(arm)  # which owns the objects taken from it
     check_signature(arm, parsed.at(0).code_signature.data_offset)
 
 
-def check_signature(library, place):
+def check_signature(library, signature_offset):
     """The page hashes of the code directory (Apple, xnu, bsd/sys/codesign.h)."""
-    magic, _, count = unpack_from(">III", library, place)
+    magic, _, count = unpack_from(">III", library, signature_offset)
     assert magic == 0xFADE0CC0
-    blobs = [unpack_from(">II", library, place + 12 + 8 * i)[1] for i in range(count)]
-    directory = next(place + blob for blob in blobs if unpack_from(">I", library, place + blob)[0] == 0xFADE0C02)
+    blobs = [unpack_from(">II", library, signature_offset + 12 + 8 * i)[1] for i in range(count)]
+    directory = next(
+        signature_offset + blob
+        for blob in blobs
+        if unpack_from(">I", library, signature_offset + blob)[0] == 0xFADE0C02
+    )
     hashes, _, _, pages, limit = unpack_from(">IIIII", library, directory + 16)
     size, kind, _, bits = unpack_from(">BBBB", library, directory + 36)
-    assert (size, kind, limit) == (32, 2, place)  # sha256 over everything before the signature
+    assert (size, kind, limit) == (32, 2, signature_offset)  # sha256 over everything before the signature
     for page in range(pages):
         code = library[page << bits : min((page + 1) << bits, limit)]
         start = directory + hashes + size * page
@@ -200,15 +204,19 @@ def test_without_a_platform_the_usual_three_are_built():
     assert DEFAULT_PLATFORMS == ("linux64", "win64", "darwin64")
 
 
-@pytest.mark.parametrize("place", ["linux64", "x86_64-linux"])
-def test_fmpy_and_cmake_compile_the_sources_to_the_same_results(tmp_path, place):
+@pytest.mark.parametrize("platform", ["linux64", "x86_64-linux"])
+def test_fmpy_and_cmake_compile_the_sources_to_the_same_results(tmp_path, platform):
     """Of both versions of FMI, whose layers are the same for every model; one model has no contact."""
     pytest.importorskip("cmake", reason="fmpy compiles with CMake: pip install cmake")
     fmu = (
-        build_native_fmus() / "stickslip.fmu" if place == "linux64" else fmi3_fixtures.build_fmi3_fmus() / "pacejka.fmu"
+        build_native_fmus() / "stickslip.fmu"
+        if platform == "linux64"
+        else fmi3_fixtures.build_fmi3_fmus() / "pacejka.fmu"
     )
     (tmp_path / "cmake").mkdir()
-    same(fmu, place, tmp_path / "unpacked", lambda folder: build_platform_binary(folder, tmp_path / "cmake"))
+    assert_same_results(
+        fmu, platform, tmp_path / "unpacked", lambda folder: build_platform_binary(folder, tmp_path / "cmake")
+    )
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -219,16 +227,16 @@ def test_any_compiler_builds_the_sources_to_the_same_results(tmp_path, name):
         command = [compiler(), "-shared", "-fPIC", "fmi2.c", "-o", f"../binaries/linux64/{name}.so", "-lm"]
         subprocess.run(command, cwd=folder / "sources", check=True)
 
-    same(build_native_fmus() / f"{name}.fmu", "linux64", tmp_path / "unpacked", make)
+    assert_same_results(build_native_fmus() / f"{name}.fmu", "linux64", tmp_path / "unpacked", make)
 
 
-def same(fmu, place, folder, make):
+def assert_same_results(fmu, platform, folder, make):
     """The unpacked FMU gives the same results with its library and with one compiled from its sources."""
     compiler()
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(folder)
     before = simulations(folder)
-    (folder / "binaries" / place / f"{fmu.stem}.so").unlink()
+    (folder / "binaries" / platform / f"{fmu.stem}.so").unlink()
     make(folder)
     assert simulations(folder) == before
 
@@ -243,8 +251,8 @@ def test_the_build_description_names_the_existing_files(smd):
     (configuration,) = read_build_description(fmu)
     assert configuration.modelIdentifier == "smd"
     described = read_model_description(fmu).buildConfigurations[0]
-    for each in (configuration, described):
-        assert [file for files in each.sourceFileSets for file in files.sourceFiles] == ["fmi2.c"]
+    for item in (configuration, described):
+        assert [file for files in item.sourceFileSets for file in files.sourceFiles] == ["fmi2.c"]
 
 
 # ---- mistakes on the command line
@@ -274,10 +282,10 @@ def test_the_c_files_are_part_of_the_package():
 
 
 def test_the_compiler_cache_works_without_a_home_and_stays_clean(monkeypatch):
-    told = {}
+    outputs = {}
 
     def run(command, **options):
-        told.update(options["env"])
+        outputs.update(options["env"])
         return subprocess.CompletedProcess(command, 1, "", "")
 
     for name in ("HOME", "ZIG_LOCAL_CACHE_DIR"):
@@ -285,5 +293,5 @@ def test_the_compiler_cache_works_without_a_home_and_stays_clean(monkeypatch):
     monkeypatch.setattr("fmus.packaging.native.compiler.subprocess.run", run)
     with pytest.raises(BuildError, match=r"a.so does not compile"):
         compile_and_link({}, "a.c", "x86_64-linux-gnu.2.17", "a.so", ())
-    assert Path(told["HOME"]).is_dir()
-    assert not Path(told["ZIG_LOCAL_CACHE_DIR"]).parent.exists()
+    assert Path(outputs["HOME"]).is_dir()
+    assert not Path(outputs["ZIG_LOCAL_CACHE_DIR"]).parent.exists()

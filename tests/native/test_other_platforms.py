@@ -93,12 +93,12 @@ def windows():
     def make(folder):
         system = {"system32": WINE[0], "syswow64": WINE[0].with_name("i386-windows")}
         links = {"dosdevices/c:": "../drive_c", "dosdevices/z:": "/"}
-        for link, place in (links | {f"drive_c/windows/{name}": path for name, path in system.items()}).items():
+        for link, target in (links | {f"drive_c/windows/{name}": path for name, path in system.items()}).items():
             (folder / link).parent.mkdir(parents=True, exist_ok=True)
-            (folder / link).symlink_to(place)
+            (folder / link).symlink_to(target)
 
-    here = str(build_cache.cached_folder("windows", make))
-    return {"WINEDEBUG": "-all", "WINEDLLOVERRIDES": "wineboot.exe=d", "WINEPREFIX": here, "HOME": here}
+    prefix = str(build_cache.cached_folder("windows", make))
+    return {"WINEDEBUG": "-all", "WINEDLLOVERRIDES": "wineboot.exe=d", "WINEPREFIX": prefix, "HOME": prefix}
 
 
 def library(fmu, version, platform):
@@ -160,17 +160,17 @@ def tables(answers):
 @pytest.mark.parametrize("name", MODELS)
 def test_results_agree_with_linux_on_x86(machine, name):
     script = runs(name)
-    here, there = (
+    expected, actual = (
         tables(run_host_script(build_native_fmus() / f"{name}.fmu", script)[0]),
         tables(run_host_script_there(machine, name, script)),
     )
     cases = [case for case in STEADY if case[0] == name]
-    for case, table, other in zip(cases, here, there, strict=True):
-        print(f"{machine[0]} {label(case)}: largest difference {apart(table, other):.1e}")
-        assert apart(table, other) <= CLOSE[name]
+    for case, table, other in zip(cases, expected, actual, strict=True):
+        print(f"{machine[0]} {label(case)}: largest difference {relative_difference(table, other):.1e}")
+        assert relative_difference(table, other) <= CLOSE[name]
 
 
-def apart(table, other):
+def relative_difference(table, other):
     """Return the largest difference of two tables, relative to the largest value of each column."""
     sizes = [max(map(abs, column)) or 1.0 for column in table]
     differences = [max(abs(a - b) for a, b in zip(*pair, strict=True)) for pair in zip(table, other, strict=True)]
@@ -180,12 +180,12 @@ def apart(table, other):
 @pytest.mark.parametrize("name", MODELS)
 def test_model_exchange_agrees_with_linux_on_x86(machine, name):
     script = exchange(name)
-    (here,), (there,) = (
+    (expected,), (actual,) = (
         tables(run_host_script(build_native_fmus() / f"{name}.fmu", script)[0]),
         tables(run_host_script_there(machine, name, script)),
     )
-    assert len(set(here[0])) > 3  # it moves
-    assert apart(here, there) <= CLOSE[name]
+    assert len(set(expected[0])) > 3  # it moves
+    assert relative_difference(expected, actual) <= CLOSE[name]
 
 
 def test_fmi3_agrees_with_linux_on_x86(machine):
@@ -193,14 +193,14 @@ def test_fmi3_agrees_with_linux_on_x86(machine):
     enough."""
     platform, program, environment = machine
     sled = fmi3_fixtures.build_reduced_fmu("stickslip")
-    ends, said = run_life_cycles(
+    ends, stderr = run_life_cycles(
         program(FMI3_HOST_SOURCE), sled, library(sled, "3", platform), 2, 4000, env=environment
     )
     expected, sentences = run_life_cycles(
         [host_program(source=FMI3_HOST_SOURCE)], sled, "x86_64-linux/stickslip.so", 2, 4000
     )
     assert ends == [pytest.approx(row, abs=1e-11) for row in expected]
-    assert said == sentences
+    assert stderr == sentences
 
 
 def test_messages_agree_with_linux_on_x86(machine):
@@ -218,9 +218,9 @@ def test_messages_agree_with_linux_on_x86(machine):
     script = ["0 new"]
     for number in numbers:
         script += [f"0 setr {ref['x']} {number}", "0 setup nan 0 1", "0 enter", "0 exit", "0 step 0 0.5", "0 reset"]
-    here, there = (
+    expected, actual = (
         run_host_script(build_native_fmus() / "stickslip.fmu", script)[0],
         run_host_script_there(machine, "stickslip", script),
     )
-    assert here == there
-    assert any("x = 5.684341886080802e-14 is refused" in line for line in here)
+    assert expected == actual
+    assert any("x = 5.684341886080802e-14 is refused" in line for line in expected)

@@ -15,13 +15,13 @@ from models import HYBRID, MODELS, declared, label, model_class, pairwise_cases,
 from native_fmus import build_native_fmus
 from worker_client import FmiError, Worker
 
-LIVES, EVENTS = 2, 30  # for each model, law and method; per life cycle
+LIFE_CYCLES, EVENTS = 2, 30  # for each model, law and method; per life cycle
 BREAKDOWNS = 3  # for each model, law and method
 CASES = [(name, values, 0.0) for name in MODELS for values in pairwise_cases(name)]
 
 
 @pytest.fixture(scope="module")
-def natives():
+def native_folder():
     return build_native_fmus()
 
 
@@ -56,20 +56,20 @@ class LifeCycle:
         except FmiError as refusal:
             value = refusal.function  # the layer of a Python FMU can only return Discard
         # fmpy passes all messages to the newest instance
-        asked = [[instance.number, "messages", []] for instance in self.instances]
-        seen = self.worker.call(None, "batch", [*asked, [self.instances[0].number, "get", [self.names]]])
-        return json.dumps([value, seen, self.worker.read_stderr()])  # where NaN equals NaN, and no digit is lost
+        requests = [[instance.number, "messages", []] for instance in self.instances]
+        visible = self.worker.call(None, "batch", [*requests, [self.instances[0].number, "get", [self.names]]])
+        return json.dumps([value, visible, self.worker.read_stderr()])  # where NaN equals NaN, and no digit is lost
 
     def begin(self, values, start, stop, tolerance):
         fmu = self.instances[0]
         self.t = start
         fmu.set(values)
-        seen = fmu.get(*self.names)
+        readings = fmu.get(*self.names)
         fmu.setup(start, stop, tolerance)
-        seen += fmu.get(*self.names)
+        readings += fmu.get(*self.names)
         with suppress(FmiError):  # which a Python FMU cannot raise; both log what is wrong
             fmu.init()
-        return seen
+        return readings
 
     def step(self, h):
         t, self.t = self.t, self.t + h
@@ -112,7 +112,7 @@ class LifeCycle:
 ODD = (0.0, -1.0, 1e-300, 5e-324, 1e300, -1.7e308, nan, inf, -inf)
 
 
-def likely(draw, start):
+def random_value(draw, start):
     """Return a value for a parameter that starts at `start`."""
     return (start or 1.0) * 10.0 ** draw.uniform(-0.7, 0.7)
 
@@ -123,9 +123,11 @@ def start_values(name):
     return numbers | {v: 0.05 for v in numbers if v in ("x0", "v0", "theta0", "omega0")}
 
 
-def beginnings(draw, name, choices, stop):
+def random_start(draw, name, choices, stop):
     """Return the first events of a life cycle, or those after a reset."""
-    values = choices | {v: likely(draw, s) for v, s in start_values(name).items() if draw.random() < 0.4 and v != "x_m"}
+    values = choices | {
+        v: random_value(draw, s) for v, s in start_values(name).items() if draw.random() < 0.4 and v != "x_m"
+    }
     is_chattering = choices.get("friction", HYBRID) != HYBRID
     values["solver.rtol"] = draw.choice([1e-2, 1e-3] if is_chattering else [0.0, 1e-3, 1e-5, 1e-7])
     if draw.random() < 0.3:
@@ -135,7 +137,7 @@ def beginnings(draw, name, choices, stop):
     return [("begin", values, start, end, draw.choice([None, 1e-4, 0.0, 2.0])), ("save",)]
 
 
-def mistakes(draw, name, stop):
+def random_mistake(draw, name, stop):
     """Return an invalid setting, a step that reports it, and possibly a recovery."""
     declarations = declared(name)
     odd = {v: draw.choice(ODD) for v in draw.sample(list(tunable(name)), 2)}
@@ -154,33 +156,33 @@ def mistakes(draw, name, stop):
     return [mistake, ("step", 1e-6 * stop), ("leap",), ("restore",)]
 
 
-def scenario(draw, name, choices):
+def random_scenario(draw, name, choices):
     """Return the events of one life cycle."""
     stop = model_class(name).stop_time * (0.3 if choices.get("friction", HYBRID) == HYBRID else 0.02)
     tunables = [v for v in tunable(name) if v != "x_m"]  # a stiff curve is too slow for most methods
     starts = start_values(name)
-    drawn = {
+    events = {
         "step": lambda: [("step", stop * draw.choice([1e-9, 0.003, 0.02, 0.02, 0.1]))],
         "leap": lambda: [("leap",)],
         "look": lambda: [("look",)],
-        "set": lambda: [("set", {v: likely(draw, starts[v]) for v in draw.sample(tunables, 2)})],
+        "set": lambda: [("set", {v: random_value(draw, starts[v]) for v in draw.sample(tunables, 2)})],
         "save": lambda: [("save",)],
         "restore": lambda: [("restore",)],
         "move": lambda: [("move",)],
-        "mistake": lambda: mistakes(draw, name, stop),
-        "reset": lambda: [("reset",), *beginnings(draw, name, choices, stop)],
+        "mistake": lambda: random_mistake(draw, name, stop),
+        "reset": lambda: [("reset",), *random_start(draw, name, choices, stop)],
     }
     weights = {"step": 10, "leap": 5, "look": 2, "set": 3, "save": 1, "restore": 1, "move": 1, "mistake": 1, "reset": 1}
     kinds = draw.choices(list(weights), list(weights.values()), k=EVENTS)
-    return beginnings(draw, name, choices, stop) + [event for kind in kinds for event in drawn[kind]()]
+    return random_start(draw, name, choices, stop) + [event for kind in kinds for event in events[kind]()]
 
 
-def breakdown(draw, name, choices):
+def random_breakdown(draw, name, choices):
     """Return a life cycle with extreme values, one internal step at a time."""
 
     def far(start):
         return draw.choice(
-            [start, start, likely(draw, start), start * 1e9, start * 1e-9, 10.0 ** draw.uniform(-320, 308)]
+            [start, start, random_value(draw, start), start * 1e9, start * 1e-9, 10.0 ** draw.uniform(-320, 308)]
         )
 
     values = choices | {v: far(s) for v, s in start_values(name).items()}
@@ -190,7 +192,7 @@ def breakdown(draw, name, choices):
     return [("begin", values, 0.0, stop, None), *[("leap",)] * 8, ("set", change), *[("leap",)] * 8]
 
 
-def agree(folders, pair, name, events):
+def assert_agree(folders, pair, name, events):
     """Apply the events to a Python FMU and to a native one, and compare."""
     names = [v for v in declared(name) if v != "solver.t_next"]  # which computes the next step: an event of its own
     lives = [
@@ -202,16 +204,16 @@ def agree(folders, pair, name, events):
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_both_backends_respond_identically_to_every_call(fmus, natives, pair, case):
+def test_both_backends_respond_identically_to_every_call(fmus, native_folder, pair, case):
     name, choices, _ = case
-    for number in range(LIVES):
+    for number in range(LIFE_CYCLES):
         draw = random.Random(f"{label(case)} {number}")
-        agree((fmus, natives), pair, name, scenario(draw, name, choices))
+        assert_agree((fmus, native_folder), pair, name, random_scenario(draw, name, choices))
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
-def test_both_backends_fail_at_the_same_point_with_the_same_message(fmus, natives, pair, case):
+def test_both_backends_fail_at_the_same_point_with_the_same_message(fmus, native_folder, pair, case):
     name, choices, _ = case
     for number in range(BREAKDOWNS):
         draw = random.Random(f"{label(case)} {number}")
-        agree((fmus, natives), pair, name, breakdown(draw, name, choices))
+        assert_agree((fmus, native_folder), pair, name, random_breakdown(draw, name, choices))

@@ -49,31 +49,31 @@ class Draw:
         return [" " * indent + line for line in lines]
 
     def statement(self, depth):
-        place = self.draw.choice(["x", "y", "z", "self.a", "self.b", "self.right.total", "self.row[0]"])
-        other = self.draw.choice([p for p in ("x", "y", "z", "self.a", "self.b") if p != place])
+        target = self.draw.choice(["x", "y", "z", "self.a", "self.b", "self.right.total", "self.row[0]"])
+        other = self.draw.choice([p for p in ("x", "y", "z", "self.a", "self.b") if p != target])
         simple = [
-            lambda: f"{place} = {self.number(2)}",
-            lambda: f"{place} {self.draw.choice(['+=', '-=', '*='])} {self.number(1)}",
-            lambda: f"{place}, {other} = {self.number(1)}, {self.number(1)}",
-            lambda: f"{place} = {other} = {self.number(2)}",
-            lambda: f"{place} = self.left.take({self.number(1)})",
-            lambda: f"{place}, {other} = self.arithmetic_pair({self.number(1)}, {self.number(1)})",
+            lambda: f"{target} = {self.number(2)}",
+            lambda: f"{target} {self.draw.choice(['+=', '-=', '*='])} {self.number(1)}",
+            lambda: f"{target}, {other} = {self.number(1)}, {self.number(1)}",
+            lambda: f"{target} = {other} = {self.number(2)}",
+            lambda: f"{target} = self.left.take({self.number(1)})",
+            lambda: f"{target}, {other} = self.arithmetic_pair({self.number(1)}, {self.number(1)})",
             lambda: f"self.on = {self.truth(1)}",
             lambda: f"self.n = {self.integer()}",
         ]
         if depth == 0 or self.draw.random() < 0.6:
             return [self.draw.choice(simple)()]
         self.loops += 1
-        left, inner = f"left{self.loops}", depth - 1
+        counter, inner = f"left{self.loops}", depth - 1
         compound = [
             lambda: [f"if {self.truth(2)}:", *self.block(inner, 4), "else:", *self.block(inner, 4)],
             lambda: [f"if {self.truth(1)}:", *self.block(inner, 4), f"elif {self.truth(1)}:", *self.block(inner, 4)],
             lambda: [f"if {self.truth(1)}:", *self.block(inner, 4), f"    return {self.number(1)}, i"],
             lambda: [f"for i in range({self.draw.randint(1, 3)}):", *self.block(inner, 4, True), "i = 1"],
             lambda: [
-                f"{left} = 3",
-                f"while {left} > 0 and {self.truth(1)}:",
-                f"    {left} -= 1",
+                f"{counter} = 3",
+                f"while {counter} > 0 and {self.truth(1)}:",
+                f"    {counter} -= 1",
                 *self.block(inner, 4, True),
             ],
         ]

@@ -45,27 +45,27 @@ def walk(request):
 
 
 def test_a_corrupted_state_is_refused_and_no_instance_changes(abuse):
-    told, noise = abuse("flips")
-    assert int(told) > STATES / len(MODELS)
-    assert noise.count(SENTENCE.encode()) >= int(told)
+    output, stderr = abuse("flip_bits")
+    assert int(output) > STATES / len(MODELS)
+    assert stderr.count(SENTENCE.encode()) >= int(output)
 
 
 def test_an_impossible_state_is_refused_despite_a_valid_checksum(abuse):
-    abuse("forged")
+    abuse("forge_states")
 
 
 def test_random_calls_end_in_a_status_and_leave_other_instances_alone(abuse):
-    abuse("calls", 1, 20_000)
+    abuse("random_calls", 1, 20_000)
 
 
 def test_every_fmi3_function_in_every_state_follows_the_standard_without_leaks(walk):
     """With null pointers and wrong lengths, in every kind of instance; the address sanitizer detects leaks."""
-    told, _ = walk("states", 1)
-    assert int(told) > 2_500
+    output, _ = walk("states", 1)
+    assert int(output) > 2_500
 
 
 def test_random_fmi3_calls_end_in_a_status_and_leave_other_instances_alone(walk):
-    walk("calls", 1, 20_000)
+    walk("random_calls", 1, 20_000)
 
 
 def test_fmi3_instances_share_nothing_between_threads():
@@ -80,11 +80,11 @@ NAMES = [
 
 def test_any_name_is_logged_as_utf8_and_never_as_a_format(abuse):
     """Each name is used twice: for an instance, and for a failed instantiation."""
-    told, noise = abuse("names", env=SANITIZER_ENVIRONMENT | {"ALOUD": "1"})
-    assert [line.split(b"|")[0] for line in told.splitlines()] == [name for name in NAMES for _ in range(2)]
-    assert all(b"(" + name + b"): fmi2" in noise for name in NAMES)
-    told.decode()
-    noise.decode()
+    output, stderr = abuse("check_names", env=SANITIZER_ENVIRONMENT | {"ALOUD": "1"})
+    assert [line.split(b"|")[0] for line in output.splitlines()] == [name for name in NAMES for _ in range(2)]
+    assert all(b"(" + name + b"): fmi2" in stderr for name in NAMES)
+    output.decode()
+    stderr.decode()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/dev/full is Linux's")
@@ -92,17 +92,17 @@ def test_any_name_is_logged_as_utf8_and_never_as_a_format(abuse):
 def test_an_error_survives_the_loss_of_standard_error(abuse, lost):
     """The signal of a pipe without reader would end a host that does not ignore it, such as this one."""
     if lost == "closed":
-        abuse("failures", preexec_fn=lambda: os.close(2), stderr=None)
+        abuse("check_failures", preexec_fn=lambda: os.close(2), stderr=None)
     elif lost == "full":
         with open("/dev/full", "w") as full:
-            abuse("failures", stderr=full)
+            abuse("check_failures", stderr=full)
     elif lost == "not writable":
         with open(os.devnull) as null:
-            abuse("failures", stderr=null)
+            abuse("check_failures", stderr=null)
     elif lost == "unread":
         reader, writer = os.pipe()
         os.close(reader)
-        abuse("failures", stderr=writer)
+        abuse("check_failures", stderr=writer)
         os.close(writer)
     else:
-        abuse("failures", "closes")
+        abuse("check_failures", "closes")

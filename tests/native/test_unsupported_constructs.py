@@ -349,8 +349,8 @@ FORBIDDEN = [
 def test_an_unsupported_construct_is_refused_with_its_line_and_an_alternative(function):
     with pytest.raises(UnsupportedConstructError) as refusal:
         CallGraph(Allowed()).add_model_entry_point("entry", function, FLOAT, FLOAT)
-    place, sentence = str(refusal.value).split(": ", 1)
-    file, line = place.split(":")
+    location, sentence = str(refusal.value).split(": ", 1)
+    file, line = location.split(":")
     assert file == "test_unsupported_constructs.py"
     assert 0 <= int(line) - function.__code__.co_firstlineno < 8 or function.__name__ in (
         "recursion",

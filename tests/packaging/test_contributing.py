@@ -30,7 +30,7 @@ def project(tmp_path):
     return tmp_path
 
 
-def typed(line, folder):
+def run_line(line, folder):
     """Run a command in the folder; it must succeed."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = os.environ | {"PATH": path, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": ""}
@@ -38,7 +38,7 @@ def typed(line, folder):
     assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
 
 
-def changed(text, change):
+def apply_change(text, change):
     """Return the text after a change, each part of which must occur once."""
     assert "".join(before + after for before, after in CHANGE.findall(change)) == change
     for before, after in CHANGE.findall(change):
@@ -64,12 +64,12 @@ def test_each_example_does_what_the_page_says(project):
         if kind == "sh":
             commands += content.splitlines()
             for line in content.splitlines():
-                typed(line, project)
+                run_line(line, project)
             continue
         assert file.exists() == (kind == "diff"), f"{name} is there already, or not yet"
-        file.write_text(changed(file.read_text(encoding="utf-8"), content) if kind == "diff" else content)
+        file.write_text(apply_change(file.read_text(encoding="utf-8"), content) if kind == "diff" else content)
         files.add(name)
     assert {"build_fmus.py", "harness", "pytest"} <= {word for line in commands for word in line.split()}
-    typed(f"python -m ruff check {' '.join(sorted(files))}", project)
-    typed(f"python -m ruff format --check {' '.join(sorted(files))}", project)
-    typed("lint-imports", project)
+    run_line(f"python -m ruff check {' '.join(sorted(files))}", project)
+    run_line(f"python -m ruff format --check {' '.join(sorted(files))}", project)
+    run_line("lint-imports", project)

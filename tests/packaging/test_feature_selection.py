@@ -14,14 +14,14 @@ from fmus.packaging.lowering import LAWS, METHODS
 LABELS = {"solver.method": "--method", "friction": "--law"}
 
 
-def chosen(name, values):
+def choice_options(name, values):
     """Return the choice labels of a case, by command-line option."""
-    found = {}
+    choices = {}
     for variable, option in LABELS.items():
         for item in declared(name)[variable].items if variable in values else ():
             if item[1] == values[variable]:
-                found[option] = item[0]
-    return found
+                choices[option] = item[0]
+    return choices
 
 
 @pytest.fixture(scope="module")
@@ -29,9 +29,9 @@ def lean(tmp_path_factory):
     """Return lean(case): the FMU with only the method and the law of a case, for Linux."""
 
     def build(case):
-        options = chosen(*case[:2])
-        asked = [[options[word]] if word in options else [] for word in LABELS.values()]
-        return archive.build(case[0], tmp_path_factory.mktemp("lean"), *asked, ["linux64"])
+        options = choice_options(*case[:2])
+        options_of_case = [[options[word]] if word in options else [] for word in LABELS.values()]
+        return archive.build(case[0], tmp_path_factory.mktemp("lean"), *options_of_case, ["linux64"])
 
     return build
 
@@ -43,7 +43,7 @@ EACH = [experiment(name, values) for name in MODELS for values in pairwise_cases
 def test_a_reduced_fmu_carries_one_method_and_runs_alike(lean, launch, worker, case):
     name, values, stop = case
     path = lean(case)
-    options = chosen(name, values)
+    options = choice_options(name, values)
     description = read_model_description(path, validate_model_structure=True)
     assert {variable.name for variable in description.modelVariables} <= {
         *declared(name)
@@ -77,10 +77,10 @@ def test_several_may_be_selected_and_the_first_is_the_default(tmp_path):
 
 
 def test_a_reduced_build_is_reproducible_and_differs_from_the_full_one(lean, tmp_path, fmus):
-    here = lean(next(case for case in EACH if label(case) == "smd-exact"))
+    fmu = lean(next(case for case in EACH if label(case) == "smd-exact"))
     assert command("smd", "--method", "exact", "--platform", "linux64", "--out", tmp_path).returncode == 0
-    assert (tmp_path / "smd.fmu").read_bytes() == here.read_bytes()
-    guids = {read_model_description(path).guid for path in (here, fmus / "smd.fmu")}
+    assert (tmp_path / "smd.fmu").read_bytes() == fmu.read_bytes()
+    guids = {read_model_description(path).guid for path in (fmu, fmus / "smd.fmu")}
     assert len(guids) == 2
 
 

@@ -24,7 +24,7 @@ from fmus.runtime.variable_declarations import variables
 from tests.packaging.test_packaging import (  # noqa: F401
     EVERY_MODEL,
     command,
-    described,
+    description_of,
     entries,
     test_validation_reports_no_problems,
 )
@@ -47,16 +47,16 @@ def fmu():
 def look(fmu, tmp_path_factory):
     """Return look(function, name, ...), which inspects the FMU alone in a clean process; one process serves all
     tests."""
-    asked = [("variables", name) for name in model_names()]
-    asked += [("factors", name, PARAMETERS.get(name, {})) for name in model_names()] + [
+    requests = [("variables", name) for name in model_names()]
+    requests += [("factors", name, PARAMETERS.get(name, {})) for name in model_names()] + [
         ("nominals", "pacejka", "x_m", 1e-5)
     ]
-    calls = [(function, fmu(name), *more) for function, name, *more in asked]
+    calls = [(function, fmu(name), *more) for function, name, *more in requests]
     answers = worker_client.run_script("fmi3_inspection.py", "call_each", calls, folder=tmp_path_factory.mktemp("look"))
-    return lambda *call: answers[asked.index(call)]
+    return lambda *call: answers[requests.index(call)]
 
 
-def beside(name):
+def additional_names(name):
     """Return the names of the variables after the declared ones."""
     indicators = ["events.to_rest", "events.to_break_away"] if name in DRY else []
     return [*indicators, *(["der(x_driver)"] if name in DRIVEN else []), "time"]
@@ -64,16 +64,16 @@ def beside(name):
 
 def structure(root, kind):
     """Return reference, dependencies and their kinds of every unknown of a kind."""
-    found = root.findall(f"ModelStructure/{kind}")
+    unknowns = root.findall(f"ModelStructure/{kind}")
     return [
         (int(u.get("valueReference")), [int(r) for r in u.get("dependencies", "").split()], u.get("dependenciesKind"))
-        for u in found
+        for u in unknowns
     ]
 
 
 @EVERY_MODEL
 def test_one_fmu_offers_model_exchange_and_co_simulation(fmu, name):
-    root = described(fmu(name))
+    root = description_of(fmu(name))
     assert (root.get("fmiVersion"), root.get("modelName")) == ("3.0", name)
     for kind in ("ModelExchange", "CoSimulation"):
         able = root.find(kind).attrib
@@ -88,33 +88,33 @@ def test_one_fmu_offers_model_exchange_and_co_simulation(fmu, name):
 @EVERY_MODEL
 def test_declared_variables_keep_their_references_and_attributes(fmu, fmus, name):
     two = read_model_description(fmus / f"{name}.fmu").modelVariables
-    three = [each for each in read_model_description(fmu(name)).modelVariables if each.alias is None]
+    three = [item for item in read_model_description(fmu(name)).modelVariables if item.alias is None]
     for variable, as_before in zip(three, two, strict=False):
         for key in ("name", "valueReference", "description", "causality", "variability", "initial", "start"):
             assert getattr(variable, key) == getattr(as_before, key)
         for key in ("unit", "displayUnit", "min", "max"):
             assert getattr(variable, key) == getattr(as_before, key)
         assert variable.type == TYPES[as_before.type]
-    assert [variable.name for variable in three[len(two) :]] == beside(name)
+    assert [variable.name for variable in three[len(two) :]] == additional_names(name)
     assert [variable.valueReference for variable in three] == list(range(len(three)))
 
 
 def test_an_alias_is_a_second_name_of_a_settable_variable(fmu, tmp_path):
     """It is in the XML, importers can set it, and the provenance of a run lists both names."""
     sled = fmu("stickslip")
-    (one,) = [each for each in read_model_description(sled).modelVariables if each.name == "mu_k"]
+    (one,) = [item for item in read_model_description(sled).modelVariables if item.name == "mu_k"]
     assert one.alias.name == "mu_d"
     runs = [simulate_fmu(str(sled), start_values=values).tobytes() for values in ({"mu_k": 0.4}, {"mu_d": 0.4}, {})]
     assert runs[0] == runs[1] != runs[2]
     done = commands.harness(tmp_path, "run", "--fmu", sled, "--set", "mu_k=0.4", "--stop", "1", blank=True)
     assert done.returncode == 0, done.stderr
-    told = json.loads((tmp_path / "results" / "stickslip" / "provenance.json").read_text())["parameters"]
-    assert (told["mu_d"]["value"], told["mu_k"]["value"]) == (0.4, 0.4)
+    parameters = json.loads((tmp_path / "results" / "stickslip" / "provenance.json").read_text())["parameters"]
+    assert (parameters["mu_d"]["value"], parameters["mu_k"]["value"]) == (0.4, 0.4)
 
 
 @EVERY_MODEL
 def test_every_real_has_a_unit_and_every_enumeration_its_items(fmu, name):
-    root = described(fmu(name))
+    root = description_of(fmu(name))
     units = {unit.get("name") for unit in root.findall("UnitDefinitions/Unit")}
     assert {element.get("unit") for element in root.iterfind("ModelVariables/Float64")} == units
     types = {kind.get("name"): kind for kind in root.find("TypeDefinitions")}
@@ -140,17 +140,17 @@ def test_derivatives_name_their_states_and_follow_the_order_of_the_states(fmu, n
 
 @EVERY_MODEL
 def test_the_structure_lists_all_unknowns_in_schema_order(fmu, name):
-    root = described(fmu(name))
+    root = description_of(fmu(name))
     kinds = [element.tag for element in root.find("ModelStructure")]
     assert kinds == sorted(kinds, key=STRUCTURE.index)
-    found = [variable.name for variable in read_model_description(fmu(name)).modelVariables]
-    indicators = [found[reference] for reference, _, _ in structure(root, "EventIndicator")]
-    assert indicators == [name for name in beside(name) if name.startswith("events.")]
+    names = [variable.name for variable in read_model_description(fmu(name)).modelVariables]
+    indicators = [names[reference] for reference, _, _ in structure(root, "EventIndicator")]
+    assert indicators == [name for name in additional_names(name) if name.startswith("events.")]
 
 
 @EVERY_MODEL
 def test_only_the_speed_may_jump_and_only_with_dry_friction(fmu, name):
-    jumping = [element.get("name") for element in described(fmu(name)).findall("ModelVariables/*[@reinit='true']")]
+    jumping = [element.get("name") for element in description_of(fmu(name)).findall("ModelVariables/*[@reinit='true']")]
     _, speed, *_ = [
         variable for variable, meaning in variables(find_model(name).model()) if meaning.causality == "output"
     ]
@@ -171,56 +171,58 @@ def test_nominal_values_are_the_error_scales_of_the_own_solver(fmu, name):
 
 
 def test_a_finer_creep_lowers_the_nominal_speed_and_the_event_reports_it(look):
-    usual, fine = [1e-3, 1e-3, 1e-3], [1e-3, 1e-5, 1e-3]
-    told = look("nominals", "pacejka", "x_m", 1e-5)
-    assert told == [[False, usual], [True, fine], [False, fine]]
+    default, fine = [1e-3, 1e-3, 1e-3], [1e-3, 1e-5, 1e-3]
+    nominals = look("nominals", "pacejka", "x_m", 1e-5)
+    assert nominals == [[False, default], [True, fine], [False, fine]]
 
 
 @EVERY_MODEL
 def test_declared_dependencies_are_true(fmu, look, name):
     """A small change affects only declared dependents, and all declared dependents of rates and indicators respond."""
-    root = described(fmu(name))
-    told = {kind: structure(root, kind) for kind in ("Output", "ContinuousStateDerivative", "EventIndicator")}
-    seen = look("factors", name, PARAMETERS.get(name, {}))
-    seen = {int(unknown): {int(known): f for known, f in row.items()} for unknown, row in seen.items()}
-    for reference, knowns, _ in [row for rows in told.values() for row in rows]:
-        assert set(seen.get(reference, {})) <= set(knowns)
-    for reference, knowns, _ in told["ContinuousStateDerivative"] + told["EventIndicator"]:
-        assert set(seen.get(reference, {})) == set(knowns)
+    root = description_of(fmu(name))
+    declared_structure = {
+        kind: structure(root, kind) for kind in ("Output", "ContinuousStateDerivative", "EventIndicator")
+    }
+    responses = look("factors", name, PARAMETERS.get(name, {}))
+    responses = {int(unknown): {int(known): f for known, f in row.items()} for unknown, row in responses.items()}
+    for reference, knowns, _ in [row for rows in declared_structure.values() for row in rows]:
+        assert set(responses.get(reference, {})) <= set(knowns)
+    for reference, knowns, _ in declared_structure["ContinuousStateDerivative"] + declared_structure["EventIndicator"]:
+        assert set(responses.get(reference, {})) == set(knowns)
     (push,) = [int(e.get("valueReference")) for e in root.findall("ModelVariables/*[@causality='input']")]
-    for reference, knowns, _ in told["Output"]:
+    for reference, knowns, _ in declared_structure["Output"]:
         continuous = root.find(f"ModelVariables/*[@valueReference='{reference}']").get("variability") == "continuous"
-        assert (push in seen.get(reference, {})) == (push in knowns and continuous)
+        assert (push in responses.get(reference, {})) == (push in knowns and continuous)
 
 
 @EVERY_MODEL
 def test_constant_factors_are_declared_and_are_constant(fmu, look, name):
-    rates = structure(described(fmu(name)), "ContinuousStateDerivative")
+    rates = structure(description_of(fmu(name)), "ContinuousStateDerivative")
     expected = {"smd": ["constant", "tunable tunable tunable"], "pacejka": ["constant", None, None]}
     assert [kinds for _, _, kinds in rates] == expected.get(name, [None] * len(rates))
-    seen = look("factors", name, {}) if name in expected else {}
+    responses = look("factors", name, {}) if name in expected else {}
     for reference, knowns, kinds in rates:
         for known, kind in zip(knowns, (kinds or "").split(), strict=bool(kinds)):
-            factors = seen[str(reference)][str(known)]
+            factors = responses[str(reference)][str(known)]
             assert factors == pytest.approx([1.0 if kind == "constant" else factors[0]] * len(factors), rel=1e-9)
 
 
 @EVERY_MODEL
 def test_an_instance_starts_with_the_values_of_the_xml_and_accepts_others(fmu, look, name):
-    told = look("variables", name)
-    elements = described(fmu(name)).find("ModelVariables")
+    values = look("variables", name)
+    elements = description_of(fmu(name)).find("ModelVariables")
     starts = {e.get("name"): e.get("start") for e in elements if e.get("start") is not None}
-    assert set(told["starts"]) == {e.get("name") for e in elements}
-    assert starts == {variable: told["starts"][variable] for variable in starts}
+    assert set(values["starts"]) == {e.get("name") for e in elements}
+    assert starts == {variable: values["starts"][variable] for variable in starts}
     settable = {
         variable
         for variable, meaning in variables(find_model(name).model())
         if meaning.causality in ("parameter", "input")
     }
-    assert set(told["after"]) == settable == set(starts)
+    assert set(values["after"]) == settable == set(starts)
     for e in elements:
         if e.tag == "Float64" and e.get("start") is not None:
-            assert float(told["after"][e.get("name")]) == 0.5 * float(e.get("start")) + 0.0625
+            assert float(values["after"][e.get("name")]) == 0.5 * float(e.get("start")) + 0.0625
 
 
 @EVERY_MODEL
@@ -258,22 +260,22 @@ def test_the_terminal_describes_the_body_and_is_valid_and_drawn(fmu, name):
     ]
     x, v = [variable for variable, meaning in variables(find_model(name).model()) if meaning.role == "state"][:2]
     assert members == [(x, "signal"), (v, "signal"), ("T_ext" if name == "pendulum" else "F_ext", "inflow")]
-    (drawn,) = etree.fromstring(content).iter("TerminalGraphicalRepresentation")
-    with Image.open(BytesIO(files[f"terminalsAndIcons/{drawn.get('iconBaseName')}.png"])) as icon:
+    (representation,) = etree.fromstring(content).iter("TerminalGraphicalRepresentation")
+    with Image.open(BytesIO(files[f"terminalsAndIcons/{representation.get('iconBaseName')}.png"])) as icon:
         icon.verify()
 
 
 @EVERY_MODEL
 def test_the_page_shows_the_icon_and_describes_model_exchange(fmu, name):
-    content, found = entries(fmu(name)), []
+    content, icons = entries(fmu(name)), []
 
     class Reader(HTMLParser):
         def handle_starttag(self, tag, attributes):
-            found.extend(value for key, value in attributes if (tag, key) == ("img", "src"))
+            icons.extend(value for key, value in attributes if (tag, key) == ("img", "src"))
 
     text = content["documentation/index.html"].decode()
     Reader().feed(text)
-    assert [source.removeprefix("../") for source in found] == ["terminalsAndIcons/icon.png"]
+    assert [source.removeprefix("../") for source in icons] == ["terminalsAndIcons/icon.png"]
     assert "In model exchange" in text
 
 

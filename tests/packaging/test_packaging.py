@@ -68,30 +68,30 @@ def entries(fmu):
         return {path: archive.read(path) for path in archive.namelist()}
 
 
-def described(fmu):
+def description_of(fmu):
     """Return the root of the model description."""
     return ElementTree.fromstring(entries(fmu)["modelDescription.xml"])
 
 
 def modules_of(fmu):
     """Return the paths of the packed sources, without the package name."""
-    found = [PurePosixPath(path).parts for path in entries(fmu) if path.endswith(".py")]
-    return {"/".join(parts[2:]) for parts in found if len(parts) > 2}
+    paths = [PurePosixPath(path).parts for path in entries(fmu) if path.endswith(".py")]
+    return {"/".join(parts[2:]) for parts in paths if len(parts) > 2}
 
 
 @pytest.fixture(scope="module")
-def building(fmus):
+def build_output(fmus):
     """All FMUs, built once by the command, and its output."""
     return fmus, fmus.with_suffix(".txt").read_text()
 
 
 @pytest.fixture(scope="module")
-def fmu(building):
-    return lambda name: building[0] / f"{name}.fmu"
+def fmu(build_output):
+    return lambda name: build_output[0] / f"{name}.fmu"
 
 
-def test_the_command_prints_name_size_import_time_and_digest_of_every_model(building):
-    out, printed = building
+def test_the_command_prints_name_size_import_time_and_digest_of_every_model(build_output):
+    out, printed = build_output
     for name, line in zip(model_names(), printed.splitlines(), strict=True):
         content = (out / f"{name}.fmu").read_bytes()
         size, digest = f"{len(content) / 1000:.0f}", sha256(content).hexdigest()[:16]
@@ -106,12 +106,12 @@ def test_validation_reports_no_problems(fmu, name):
 
 @EVERY_MODEL
 def test_the_xml_matches_the_declarations(fmu, name):
-    scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
-    for place, (scalar, (variable, meaning)) in enumerate(
+    scalars = description_of(fmu(name)).findall("ModelVariables/ScalarVariable")
+    for index, (scalar, (variable, meaning)) in enumerate(
         zip(scalars, variables(find_model(name).model()), strict=True)
     ):
         value = scalar[0]
-        assert (scalar.get("name"), scalar.get("valueReference"), value.tag) == (variable, str(place), meaning.type)
+        assert (scalar.get("name"), scalar.get("valueReference"), value.tag) == (variable, str(index), meaning.type)
         assert (scalar.get("description"), scalar.get("causality")) == (meaning.text, meaning.causality)
         assert (scalar.get("variability"), scalar.get("initial", "")) == (meaning.variability, meaning.initial)
         assert value.get("unit", "") == meaning.unit
@@ -125,7 +125,7 @@ def test_the_xml_matches_the_declarations(fmu, name):
 
 @EVERY_MODEL
 def test_every_real_has_a_unit_and_every_angle_is_displayed_in_degrees(fmu, name):
-    root = described(fmu(name))
+    root = description_of(fmu(name))
     shown = {unit.get("name"): unit.find("DisplayUnit") for unit in root.findall("UnitDefinitions/Unit")}
     for real in root.iterfind("ModelVariables/ScalarVariable/Real"):
         assert real.get("unit") in shown
@@ -136,7 +136,7 @@ def test_every_real_has_a_unit_and_every_angle_is_displayed_in_degrees(fmu, name
 
 @EVERY_MODEL
 def test_enumerations_list_their_items(fmu, name):
-    root = described(fmu(name))
+    root = description_of(fmu(name))
     types = {kind.get("name"): kind for kind in root.findall("TypeDefinitions/SimpleType")}
     choices = {variable: meaning for variable, meaning in variables(find_model(name).model()) if meaning.items}
     assert "solver.method" in choices
@@ -148,13 +148,13 @@ def test_enumerations_list_their_items(fmu, name):
 
 @EVERY_MODEL
 def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name):
-    root = described(fmu(name))
+    root = description_of(fmu(name))
     meanings = [meaning for _, meaning in variables(find_model(name).model())]
-    (force,) = [place for place, meaning in enumerate(meanings, 1) if meaning.causality == "input"]
+    (force,) = [index for index, meaning in enumerate(meanings, 1) if meaning.causality == "input"]
     outputs = {int(u.get("index")): u.get("dependencies") for u in root.findall("ModelStructure/Outputs/Unknown")}
     assert outputs == {
-        place: str(force) if meaning.direct else ""
-        for place, meaning in enumerate(meanings, 1)
+        index: str(force) if meaning.direct else ""
+        for index, meaning in enumerate(meanings, 1)
         if isinstance(meaning, Output)
     }
     unknowns = root.findall("ModelStructure/InitialUnknowns/Unknown")
@@ -163,7 +163,7 @@ def test_direct_outputs_depend_on_the_input_and_the_others_on_nothing(fmu, name)
 
 @EVERY_MODEL
 def test_capabilities_and_experiment_match_the_contract(fmu, name):
-    root, model = described(fmu(name)), find_model(name).model
+    root, model = description_of(fmu(name)), find_model(name).model
     able = root.find("CoSimulation").attrib
     assert able["modelIdentifier"] == root.get("modelName") == name
     for flag in ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"):
@@ -175,7 +175,7 @@ def test_capabilities_and_experiment_match_the_contract(fmu, name):
 
 
 @pytest.fixture(scope="module")
-def probed(fmu, tmp_path_factory):
+def self_descriptions(fmu, tmp_path_factory):
     """The self-description of each of them."""
     return dict(
         zip(model_names(), probe(*map(fmu, model_names()), folder=tmp_path_factory.mktemp("probed")), strict=True)
@@ -183,13 +183,15 @@ def probed(fmu, tmp_path_factory):
 
 
 @EVERY_MODEL
-def test_an_instance_starts_with_the_values_of_the_xml_and_imports_every_packed_module(fmu, name, probed):
-    told = probed[name]
-    scalars = described(fmu(name)).findall("ModelVariables/ScalarVariable")
-    assert told["starts"] == {s.get("name"): s[0].get("start") for s in scalars if s[0].get("start") is not None}
+def test_an_instance_starts_with_the_values_of_the_xml_and_imports_every_packed_module(fmu, name, self_descriptions):
+    self_description = self_descriptions[name]
+    scalars = description_of(fmu(name)).findall("ModelVariables/ScalarVariable")
+    assert self_description["starts"] == {
+        s.get("name"): s[0].get("start") for s in scalars if s[0].get("start") is not None
+    }
     # The list is obtained twice: from the imports in the sources, and from the modules that Python loads.
-    assert set(told["inside"]) == {path for path in entries(fmu(name)) if path.endswith(".py")}
-    assert not [module for module in told["modules"] if module.startswith(("fmus", "pythonfmu."))]
+    assert set(self_description["inside"]) == {path for path in entries(fmu(name)) if path.endswith(".py")}
+    assert not [module for module in self_description["modules"] if module.startswith(("fmus", "pythonfmu."))]
 
 
 @EVERY_MODEL
@@ -221,9 +223,9 @@ def test_entry_script_and_package_carry_the_digest_of_their_content(fmu, name):
 
 @EVERY_MODEL
 def test_no_file_reveals_where_it_was_built(fmu, name):
-    places = [str(place).encode() for place in (ROOT, fmu(name).parents[1], installed_package("pythonfmu"))]
+    places = [str(location).encode() for location in (ROOT, fmu(name).parents[1], installed_package("pythonfmu"))]
     for path, content in entries(fmu(name)).items():
-        assert not [place for place in places if place in content], path
+        assert not [location for location in places if location in content], path
 
 
 @EVERY_MODEL
@@ -236,12 +238,12 @@ def test_both_licences_are_packed(fmu, name):
 def test_the_source_date_changes_only_the_date(fmu, tmp_path):
     name, moment = model_names()[0], datetime(2024, 2, 29, 12, 30, 14, tzinfo=UTC)
     assert command(name, "--out", tmp_path, SOURCE_DATE_EPOCH=str(int(moment.timestamp()))).returncode == 0
-    dated, plain = tmp_path / f"{name}.fmu", fmu(name)
+    dated, original = tmp_path / f"{name}.fmu", fmu(name)
     with ZipFile(dated) as archive:
         assert {info.date_time for info in archive.infolist()} == {(2024, 2, 29, 12, 30, 14)}
-    stamp = described(plain).get("generationDateAndTime")
-    replaced = entries(plain)["modelDescription.xml"].replace(stamp.encode(), b"2024-02-29T12:30:14Z")
-    assert entries(dated) == entries(plain) | {"modelDescription.xml": replaced}
+    stamp = description_of(original).get("generationDateAndTime")
+    replaced = entries(original)["modelDescription.xml"].replace(stamp.encode(), b"2024-02-29T12:30:14Z")
+    assert entries(dated) == entries(original) | {"modelDescription.xml": replaced}
 
 
 @pytest.mark.parametrize("arguments", [("bogus",), ("smd", "bogus")])
@@ -338,15 +340,15 @@ def test_imports_are_followed_through_packages_for_any_line_ends(tmp_path):
     }
     for path, content in files.items():
         (tmp_path / path).write_bytes(content)
-    found = embedded_files(ODD, {}, tmp_path)
-    assert set(found) == set(files) - {"runtime/idle.py"} | {
+    results = embedded_files(ODD, {}, tmp_path)
+    assert set(results) == set(files) - {"runtime/idle.py"} | {
         "__init__.py",
         "pythonfmu_workarounds.py",
         "pythonfmu/__init__.py",
         "pythonfmu/logmsg.py",
     }
-    assert found["runtime/slave.py"] == "from ..pythonfmu.logmsg import LogMsg\n"
-    assert "\r" not in "".join(found.values())
+    assert results["runtime/slave.py"] == "from ..pythonfmu.logmsg import LogMsg\n"
+    assert "\r" not in "".join(results.values())
 
 
 class Sketch(VariableOwner):
@@ -361,10 +363,10 @@ class Sketch(VariableOwner):
 
 def sketch(**declared):
     """Return the description of a model with these variables."""
-    made = type("Sketch", (Sketch,), {"__doc__": Sketch.__doc__} | declared)
+    model_class = type("Sketch", (Sketch,), {"__doc__": Sketch.__doc__} | declared)
     for name, meaning in declared.items():
-        meaning.__set_name__(made, name)
-    return describe(made, "sketch", "code", datetime(2024, 1, 1, tzinfo=UTC)).decode()
+        meaning.__set_name__(model_class, name)
+    return describe(model_class, "sketch", "code", datetime(2024, 1, 1, tzinfo=UTC)).decode()
 
 
 def test_start_values_survive_the_xml_bit_for_bit():

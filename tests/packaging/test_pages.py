@@ -36,14 +36,14 @@ def content(fmus):
 
 @EVERY_MODEL
 def test_a_native_fmu_has_the_same_page_and_states_how_to_run_it(content, name):
-    told = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
+    files = {path: data for path, data in content(name).items() if path in (PAGE, ICON) or path.startswith(EXTRA)}
     native = entries(native_fmus.build_native_fmus() / f"{name}.fmu")
-    assert len(told) == 1 + (name in WITH["png"]) + 2 * (name in WITH["csv"])
+    assert len(files) == 1 + (name in WITH["png"]) + 2 * (name in WITH["csv"])
     native[PAGE] = native[PAGE].replace(USAGE_NOTE.encode(), b"", 1)
-    assert told == {path: native.get(path) for path in told}
+    assert files == {path: native.get(path) for path in files}
 
 
-TOLD = {  # names as they begin in the model descriptions of both versions; attributes that are not false
+CAPABILITIES = {  # names as they begin in the model descriptions of both versions; attributes that are not false
     "FMI": (".", "fmiVersion"),
     "co-simulation; state saved and serialised": ("CoSimulation", "canSerializeFMU"),
     "model exchange: indicators, time events, nominals": ("ModelExchange", "modelIdentifier"),
@@ -74,19 +74,21 @@ def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_r
         (table,) = re.findall(r"<table class='offered'>.*?</table>", files[PAGE].decode())
         rows = [re.findall(r"<td>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
         text = (ROOT / "README.md").read_text(encoding="utf-8")
-        told = text.split("## FMI 3.0 and model exchange")[1].split("|---|---|---|---|\n")[1].split("\n\n")[0]
+        readme_table = text.split("## FMI 3.0 and model exchange")[1].split("|---|---|---|---|\n")[1].split("\n\n")[0]
         assert rows == [
             [re.sub("`(.*?)`", r"<code>\1</code>", cell.strip()) for cell in line.split("|")[1:-1]]
-            for line in told.splitlines()
+            for line in readme_table.splitlines()
         ]
     for what, *offered in rows:
         if what.startswith("terminal"):
             assert [bool(cell) for cell in offered] == [any("flange" in name for name in files) for files in kinds]
             continue
-        element, start = TOLD[what]
-        found = [ElementTree.fromstring(files["modelDescription.xml"]).find(element) for files in kinds]
-        said = [{k: v for k, v in e.attrib.items() if k.startswith(start)} if e is not None else {} for e in found]
-        assert [bool(cell) for cell in offered] == [set(each.values()) not in (set(), {"false"}) for each in said]
+        element, start = CAPABILITIES[what]
+        elements = [ElementTree.fromstring(files["modelDescription.xml"]).find(element) for files in kinds]
+        attributes = [
+            {k: v for k, v in e.attrib.items() if k.startswith(start)} if e is not None else {} for e in elements
+        ]
+        assert [bool(cell) for cell in offered] == [set(item.values()) not in (set(), {"false"}) for item in attributes]
 
 
 class Reader(HTMLParser):
@@ -176,9 +178,9 @@ def test_the_fmu_reproduces_its_certified_result(content, launch, name):
     table = [[float(word) for word in row] for row in rows]
     times = [row[0] for row in table]
     assert (times[0], times[-1]) == (0.0, model_class(name).stop_time)
-    mine = launch(name, stop=times[-1]).run(times, heads[1:])
+    computed = launch(name, stop=times[-1]).run(times, heads[1:])
     allowed = {"pacejka": 1e-6, "pendulum": 1e-9}.get(name, 1e-13)
-    for column, expected in zip(zip(*mine, strict=True), list(zip(*table, strict=True))[1:], strict=True):
+    for column, expected in zip(zip(*computed, strict=True), list(zip(*table, strict=True))[1:], strict=True):
         largest = max(map(abs, expected))
         assert max(abs(a - b) for a, b in zip(column, expected, strict=True)) <= allowed * largest
 
@@ -196,9 +198,9 @@ def test_names_are_typeset_and_escaped():
 
 @pytest.mark.parametrize(("low", "high"), [(-1.0, 1.0), (0.0, 16.0), (-3e-7, 2e-7), (1e5, 1.2e5)])
 def test_ticks_are_round_few_and_inside(low, high):
-    found = tick_values(low, high)
-    assert 3 <= len(found) <= 7
-    assert all(low <= tick <= high for tick in found)
+    values = tick_values(low, high)
+    assert 3 <= len(values) <= 7
+    assert all(low <= tick <= high for tick in values)
 
 
 @EVERY_MODEL

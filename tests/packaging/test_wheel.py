@@ -48,12 +48,12 @@ def installed(wheel, tmp_path_factory):
     call(sys.executable, "-m", "venv", "--without-pip", folder, cwd=folder)
     pip = (sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index", "--ignore-installed")
     call(*pip, "--prefix", folder, wheel, cwd=folder)
-    (place,) = folder.glob("lib/python*/site-packages")
-    (place / "libraries.pth").write_text(f"{LIBRARIES}\n")
-    folders = [path for path in (place, *place.rglob("*")) if path.is_dir()]
+    (site_packages,) = folder.glob("lib/python*/site-packages")
+    (site_packages / "libraries.pth").write_text(f"{LIBRARIES}\n")
+    folders = [path for path in (site_packages, *site_packages.rglob("*")) if path.is_dir()]
     for path in folders:
         path.chmod(0o555)
-    yield folder / "bin" / "python", place
+    yield folder / "bin" / "python", site_packages
     for path in folders:
         path.chmod(0o755)
 
@@ -61,23 +61,23 @@ def installed(wheel, tmp_path_factory):
 @pytest.fixture
 def run(installed, tmp_path):
     """Return run(words, ...): the output of `python -m words` in an empty folder; the installation must not change."""
-    python, place = installed
-    before = content(place)
+    python, site_packages = installed
+    before = content(site_packages)
     yield lambda words, **environment: call(python, "-m", *words.split(), cwd=tmp_path, **environment)
-    assert content(place) == before  # root may write read-only files
+    assert content(site_packages) == before  # root may write read-only files
 
 
-def content(place):
+def content(folder):
     """Return the digest of every file."""
-    return {path: sha256(path.read_bytes()).digest() for path in place.rglob("*") if path.is_file()}
+    return {path: sha256(path.read_bytes()).digest() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_the_wheel_holds_sources_and_data_and_no_fmu(wheel):
     with ZipFile(wheel) as archive:
-        found = {path for path in archive.namelist() if ".dist-info/" not in path}
+        files = {path for path in archive.namelist() if ".dist-info/" not in path}
     folders = [path for part in ("fmus", "harness") for path in (ROOT / part).rglob("*") if path.is_file()]
-    kept = [path.relative_to(ROOT).as_posix() for path in folders if path.suffix not in (".pyc", ".fmu")]
-    assert found == {"build_fmus.py", *kept}
+    data_files = [path.relative_to(ROOT).as_posix() for path in folders if path.suffix not in (".pyc", ".fmu")]
+    assert files == {"build_fmus.py", *data_files}
 
 
 def test_the_licence_is_in_the_wheel(wheel):
@@ -90,8 +90,8 @@ def test_it_builds_the_same_bytes_as_the_sources_and_runs_them_in_an_empty_folde
     """From files with another location and time; one model without a contact and one with a contact."""
     printed = run("build_fmus pacejka stickslip", PYTHONHASHSEED="7", TZ="Pacific/Auckland")
     assert [line.split()[0] for line in printed.splitlines()] == ["pacejka.fmu", "stickslip.fmu"]
-    made = {path.relative_to(tmp_path).as_posix(): path.read_bytes() for path in tmp_path.rglob("*.fmu")}
-    assert made == {f"fmus/{name}.fmu": (fmus / f"{name}.fmu").read_bytes() for name in ("pacejka", "stickslip")}
+    built_files = {path.relative_to(tmp_path).as_posix(): path.read_bytes() for path in tmp_path.rglob("*.fmu")}
+    assert built_files == {f"fmus/{name}.fmu": (fmus / f"{name}.fmu").read_bytes() for name in ("pacejka", "stickslip")}
     assert "stickslip" in run("harness run stickslip")
     assert {path.name for path in tmp_path.iterdir()} == {"fmus", "results"}
     assert (tmp_path / "results" / "stickslip" / "trajectory.csv").is_file()
@@ -100,11 +100,11 @@ def test_it_builds_the_same_bytes_as_the_sources_and_runs_them_in_an_empty_folde
 def test_native_builds_differ_from_those_of_the_sources_only_in_the_date(run, tmp_path):
     """For the default platforms. The date only affects the description and the zip. The compiler's own files, such
     as the stubs of the C libraries, are not rebuilt, which would take long."""
-    there = entries(build_for_all_platforms() / "smd.fmu")
+    expected = entries(build_for_all_platforms() / "smd.fmu")
     run("build_fmus --native smd --method exact", ZIG_LOCAL_CACHE_DIR=tmp_path / "own", SOURCE_DATE_EPOCH="1700000000")
     again = entries(tmp_path / "fmus" / "native" / "smd.fmu")
     assert {f"binaries/{platform}/smd{PLATFORMS[platform].suffix}" for platform in DEFAULT_PLATFORMS} <= set(again)
     dated = again["modelDescription.xml"]
     undated = dated.replace(b"2023-11-14T22:13:20Z", b"1980-01-01T00:00:00Z")
     assert dated != undated
-    assert again | {"modelDescription.xml": undated} == {name: there[name] for name in again}
+    assert again | {"modelDescription.xml": undated} == {name: expected[name] for name in again}

@@ -126,14 +126,14 @@ FILES = {
     "matlab73.mat": lambda: mat73(t=T[None], x=X[None]),
     "spreadsheet.xlsx": lambda: xlsx([["Laser"], [], ["t [s]", "x [mm]"], *np.stack([T, 1e3 * X], 1).tolist()]),
 }  # fmt: skip
-ASKED = {
+OPTIONS = {
     "no-heading.csv": {"names": "t [s],x [mm]"},
     "encoder.csv": {"per_count": "0.001deg"},
     **{name: {"unit": "m"} for name in ("numpy.npz", "matlab5.mat", "matlab-structure.mat", "matlab73.mat")},
 }
 PENDULUMS = ("stamps.csv", "gyroscope.csv", "encoder.csv")
 QUANTITIES = {"phone.csv": "acceleration", "accelerometer-in-g.csv": "acceleration", "gyroscope.csv": "velocity"}
-SAID = {
+MESSAGES = {
     "logger.csv": "0.0125004 s apart. This step, and any frequency, has a relative uncertainty of about 8e-05",
     "holes.csv": "3 of 600 rows have a missing cell",
     "cut-off.csv": "1 of 601 rows have a missing cell",
@@ -178,31 +178,31 @@ def xlsx(*sheets):
     return file.getvalue()
 
 
-FOUND = {}
+FITS = {}
 
 
-def found_in(record, pendulum):
+def fit_record(record, pendulum):
     """Return the fit of a record; of records equal to eight digits only the first is fitted."""
-    numbers = [np.round(each, 8).tobytes() for each in (record.t, record.x)]
+    numbers = [np.round(array, 8).tobytes() for array in (record.t, record.x)]
     key = (*numbers, record.unit, record.base, record.order, record.notes, pendulum)
-    if key not in FOUND:
-        FOUND[key] = fit_decay(
+    if key not in FITS:
+        FITS[key] = fit_decay(
             record, KnownParameters(pendulum=pendulum), drag=False
         )  # the laws with drag take most of a fit
-    return FOUND[key]
+    return FITS[key]
 
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_common_file_format_gives_the_expected_parameters(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(FILES[name]())
-    record = read_record(str(path), ColumnOptions(**ASKED.get(name, {})), path.stem)
+    record = read_record(str(path), ColumnOptions(**OPTIONS.get(name, {})), path.stem)
     assert record.quantity == QUANTITIES.get(name, "position")
-    found = found_in(record, name in PENDULUMS)
-    values = {each.name: each for each in found.estimates}
+    fit = fit_record(record, name in PENDULUMS)
+    values = {estimate.name: estimate for estimate in fit.estimates}
     for symbol, truth in TRUTH.items():
         assert values[symbol].value == pytest.approx(truth, rel=2e-3)
-    assert SAID.get(name, "") in " ".join(found.remarks)
+    assert MESSAGES.get(name, "") in " ".join(fit.remarks)
 
 
 MM = 1e3 * X + 500  # offset, so that no number begins with 0
@@ -211,37 +211,46 @@ CLOCKS = [np.datetime64("2026-11-21T23:59:58.500") + np.timedelta64(round(1000 *
 DAY = CLOCKS[0].item().date()
 
 
-def each(line, mark="\n"):
+def text_lines(line, mark="\n"):
     """Return the lines of a file, from a time in s, a position in mm, and a time stamp."""
     return mark.join(line(t, x, stamp.item()) for t, x, stamp in zip(T, MM, CLOCKS, strict=True))
 
 
 def scope(i, t, x):
     """A line from a Tektronix TDS: the first rows contain the settings."""
-    beside = ["Record Length,6.0e+02", "Sample Interval,1.0e-02", "", "Source,CH1"]
-    return f"{beside[i] if i < 4 and beside[i] else ','},,{t:016.12f},{x:10.5f},"
+    neighbour = ["Record Length,6.0e+02", "Sample Interval,1.0e-02", "", "Source,CH1"]
+    return f"{neighbour[i] if i < 4 and neighbour[i] else ','},,{t:016.12f},{x:10.5f},"
 
 
-WRITTEN = {  # and the options of its reader; all hold the same motion
-    "names with units": (lambda: "time_ms,x_mm\n" + each(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f}"), {}),
-    "a clock named after its unit": (lambda: "millis x(mm)\n" + each(lambda t, x, s: f"{1e3 * t:.0f} {x:.6f}"), {}),
+NOTATIONS = {  # and the options of its reader; all hold the same motion
+    "names with units": (lambda: "time_ms,x_mm\n" + text_lines(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f}"), {}),
+    "a clock named after its unit": (
+        lambda: "millis x(mm)\n" + text_lines(lambda t, x, s: f"{1e3 * t:.0f} {x:.6f}"),
+        {},
+    ),
     "units of Pasco": (
         lambda: (
             "Time (ms) Run #1,Position (mm) Run #1,Time (s) Run #2,Position (mm) Run #2\n"
-            + each(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f},{2 * t},{3 * x}")
+            + text_lines(lambda t, x, s: f"{1e3 * t:.0f},{x:.6f},{2 * t},{3 * x}")
         ),
         {},
     ),
-    "blanks before units": (lambda: "Time (s)   x [mm]\n" + each(lambda t, x, s: f"{t:9.3f} {x:11.6f}"), {}),
-    "samples": (lambda: "Sample,x [mm]\n" + each(lambda t, x, s: f"{100 * t:.0f},{x:.6f}"), {"time_unit": "0.01s"}),
+    "blanks before units": (lambda: "Time (s)   x [mm]\n" + text_lines(lambda t, x, s: f"{t:9.3f} {x:11.6f}"), {}),
+    "samples": (
+        lambda: "Sample,x [mm]\n" + text_lines(lambda t, x, s: f"{100 * t:.0f},{x:.6f}"),
+        {"time_unit": "0.01s"},
+    ),
     "day, month and year": (
-        lambda: "Zeit;Weg [mm]\n" + each(lambda t, x, s: f"{s:%d.%m.%Y %H:%M:%S,%f};{x:.6f}".replace(".6", ",6")),
+        lambda: "Zeit;Weg [mm]\n" + text_lines(lambda t, x, s: f"{s:%d.%m.%Y %H:%M:%S,%f};{x:.6f}".replace(".6", ",6")),
         {},
     ),
-    "half days": (lambda: "Time,x [mm]\n" + each(lambda t, x, s: f"{s:%m/%d/%Y %I:%M:%S.%f %p},{x:.6f}"), {}),
-    "three colons": (lambda: "Time\tx [mm]\n" + each(lambda t, x, s: f"{s:%H:%M:%S:%f}\t{x:.6f}"), {}),
-    "date and time": (lambda: "Date,Time,x [mm]\n" + each(lambda t, x, s: f"{s:%Y-%m-%d,%H:%M:%S.%f},{x:.6f}"), {}),
-    "empty cells": (lambda: "t [s];x [mm];;;;\n" + each(lambda t, x, s: f"{t};{x:.6f};;;;"), {}),
+    "half days": (lambda: "Time,x [mm]\n" + text_lines(lambda t, x, s: f"{s:%m/%d/%Y %I:%M:%S.%f %p},{x:.6f}"), {}),
+    "three colons": (lambda: "Time\tx [mm]\n" + text_lines(lambda t, x, s: f"{s:%H:%M:%S:%f}\t{x:.6f}"), {}),
+    "date and time": (
+        lambda: "Date,Time,x [mm]\n" + text_lines(lambda t, x, s: f"{s:%Y-%m-%d,%H:%M:%S.%f},{x:.6f}"),
+        {},
+    ),
+    "empty cells": (lambda: "t [s];x [mm];;;;\n" + text_lines(lambda t, x, s: f"{t};{x:.6f};;;;"), {}),
     "settings beside": (
         lambda: "\n".join(scope(i, t, x) for i, (t, x) in enumerate(zip(T, MM, strict=True))),
         {"names": "t [s],x [mm]"},
@@ -249,29 +258,31 @@ WRITTEN = {  # and the options of its reader; all hold the same motion
     "settings above": (
         lambda: (
             "Writer_Version\t2\nReader_Version\t2\n\nSamples\t600\t\nX0\t0,0E+0\t\nX_Value\tx [mm]\tComment\n"
-            + each(lambda t, x, s: f"{t}\t{x:.6f}".replace(".", ","))
+            + text_lines(lambda t, x, s: f"{t}\t{x:.6f}".replace(".", ","))
         ),
         {},
     ),
     "the numbers of Fortran": (
-        lambda: "# t [s] x [mm]\n" + each(lambda t, x, s: f"  {t:.9E}  {x:.9E}".replace("E", "D")),
+        lambda: "# t [s] x [mm]\n" + text_lines(lambda t, x, s: f"  {t:.9E}  {x:.9E}".replace("E", "D")),
         {},
     ),
     "a typesetter's minus": (
-        lambda: "t [s];x [mm]\n" + each(lambda t, x, s: f"{t};{x - 1000:.6f}".replace("-", "\u2212")),
+        lambda: "t [s];x [mm]\n" + text_lines(lambda t, x, s: f"{t};{x - 1000:.6f}".replace("-", "\u2212")),
         {},
     ),
-    "thousands": (lambda: "t [s],x [um]\n" + each(lambda t, x, s: f'{t},"{1e3 * x:,.3f}"'), {}),
-    "whole thousands": (lambda: "t [s],x [nm]\n" + each(lambda t, x, s: f'{t},"{1e6 * x:,.0f}"'), {}),
+    "thousands": (lambda: "t [s],x [um]\n" + text_lines(lambda t, x, s: f'{t},"{1e3 * x:,.3f}"'), {}),
+    "whole thousands": (lambda: "t [s],x [nm]\n" + text_lines(lambda t, x, s: f'{t},"{1e6 * x:,.0f}"'), {}),
     "thousands in Germany": (
-        lambda: "t [s];x [um]\n" + each(lambda t, x, s: f"{t};{1e3 * x:_.3f}".replace(".", ",").replace("_", ".")),
+        lambda: (
+            "t [s];x [um]\n" + text_lines(lambda t, x, s: f"{t};{1e3 * x:_.3f}".replace(".", ",").replace("_", "."))
+        ),
         {},
     ),
     "three decimals and a gap": (
-        lambda: "t [s];x [mm]\n9;NaN\n" + each(lambda t, x, s: f"{t + 10};{x:.3f}".replace(".", ",")),
+        lambda: "t [s];x [mm]\n9;NaN\n" + text_lines(lambda t, x, s: f"{t + 10};{x:.3f}".replace(".", ",")),
         {},
     ),
-    "packed": (lambda: gzip.compress(("t [s],x [mm]\n" + each(lambda t, x, s: f"{t},{x:.6f}")).encode()), {}),
+    "packed": (lambda: gzip.compress(("t [s],x [mm]\n" + text_lines(lambda t, x, s: f"{t},{x:.6f}")).encode()), {}),
     "times of a spreadsheet": (
         lambda: xlsx([["t", "x [mm]"], *([s.item().time(), x] for s, x in zip(CLOCKS, MM, strict=True))]),
         {},
@@ -286,12 +297,12 @@ WRITTEN = {  # and the options of its reader; all hold the same motion
 }
 
 
-@pytest.mark.parametrize("name", WRITTEN)
+@pytest.mark.parametrize("name", NOTATIONS)
 def test_numbers_and_times_are_read_in_any_notation(tmp_path, name):
-    path, (content, asked) = tmp_path / "record", WRITTEN[name]
+    path, (content, options) = tmp_path / "record", NOTATIONS[name]
     written = content()
     path.write_bytes(written.encode() if isinstance(written, str) else written)
-    record = read_record(str(path), ColumnOptions(**asked), "record")
+    record = read_record(str(path), ColumnOptions(**options), "record")
     assert record.t - record.t[0] == pytest.approx(T, abs=1e-6)
     assert record.x - record.x[0] == pytest.approx(X - X[0], abs=1e-6)
 
@@ -359,8 +370,8 @@ def test_no_file_content_ends_in_a_traceback(tmp_path):
         bytes_ = bytearray(data[: rng.integers(200, 4000)])
         at = rng.integers(0, len(bytes_), 8)
         bytes_[at[0] : at[0]] = bytes(rng.integers(0, 256, rng.integers(1, 200), dtype=np.uint8))
-        for place in at[1:]:
-            bytes_[place] = rng.integers(256)
+        for position in at[1:]:
+            bytes_[position] = rng.integers(256)
         path.write_bytes(bytes_)
         with contextlib.suppress(HarnessError):
             read_record(str(path), ColumnOptions(), "record")

@@ -82,9 +82,9 @@ def test_the_threshold_reference_is_the_double_nearest_to_its_segments():
     assert [mode for _, mode in truth.events] == [mode for _, mode in events]
     assert all(abs(t - exact) <= ULP * exact for (t, _), (exact, _) in zip(truth.events, events, strict=True))
     for t, (x, v) in zip(truth.times[::5], truth.motion[::5], strict=True):
-        start, _, place, piece = [each for each in pieces if each[0] <= t][-1]
+        start, _, position, piece = [item for item in pieces if item[0] <= t][-1]
         y, speed = piece.at(mpf(float(t)) - start)
-        assert abs(x - place - y) <= ULP * 0.5
+        assert abs(x - position - y) <= ULP * 0.5
         assert abs(v - speed) <= ULP * 0.5
 
 
@@ -149,9 +149,9 @@ def test_a_jacobian_is_the_slope_of_the_rates(problem):
 def test_errors_are_relative_to_the_largest_value_of_each_column():
     truth = load_reference("smd")
     off = truth.motion + np.array([1e-3 * np.abs(truth.motion[:, 0]).max(), 0.0])
-    found = compute_errors(Solution(off, None, 0), truth)
-    assert [found.final, found.rms, found.largest] == pytest.approx([1e-3] * 3, rel=1e-10)
-    assert found.events is None
+    actual = compute_errors(Solution(off, None, 0), truth)
+    assert [actual.final, actual.rms, actual.largest] == pytest.approx([1e-3] * 3, rel=1e-10)
+    assert actual.events is None
 
 
 def test_event_times_are_compared_only_where_the_modes_agree():

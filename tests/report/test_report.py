@@ -13,7 +13,7 @@ EMPTY = {"meta", "link", "img", "br"}
 
 
 @pytest.fixture(scope="module")
-def made(fmus, tmp_path_factory):
+def report_run(fmus, tmp_path_factory):
     """A folder with results of several kinds, and the report on them."""
     folder = tmp_path_factory.mktemp("report")
     (folder / "fmus").symlink_to(fmus)
@@ -28,8 +28,8 @@ def made(fmus, tmp_path_factory):
 
 
 @pytest.fixture
-def page(made):
-    return (made[0] / "results/report.html").read_text(encoding="utf-8")
+def page(report_run):
+    return (report_run[0] / "results/report.html").read_text(encoding="utf-8")
 
 
 class Tags(HTMLParser):
@@ -53,8 +53,8 @@ class Tags(HTMLParser):
         return [attributes for name, attributes in self.found if name == tag]
 
 
-def test_existing_results_are_shown_and_missing_ones_listed_with_their_command(made, page):
-    done = made[1]
+def test_existing_results_are_shown_and_missing_ones_listed_with_their_command(report_run, page):
+    done = report_run[1]
     assert (done.returncode, done.stderr) == (0, "")
     assert "Missing: smd; run `python -m harness run smd`" in done.stdout
     assert "Missing: stability; run `python -m harness stability`" in done.stdout
@@ -76,25 +76,25 @@ def test_every_picture_has_alternative_text_and_nothing_is_loaded_from_elsewhere
     assert tags.of("script") == []
 
 
-def test_every_link_leads_to_an_existing_anchor_or_file(made, page):
+def test_every_link_leads_to_an_existing_anchor_or_file(report_run, page):
     tags = Tags(page)
     places = {attributes.get("id") for _, attributes in tags.found}
     links = {link["href"] for link in tags.of("a")}
     files = {link for link in links if not link.startswith("#")}
     assert {link[1:] for link in links - files} <= places
     assert {"coulomb/trajectory.csv", "coulomb/events.csv", "coulomb-sign/steps.csv", "coulomb/figure.svg"} <= files
-    assert all((made[0] / "results" / file).is_file() for file in files)
+    assert all((report_run[0] / "results" / file).is_file() for file in files)
 
 
-def test_text_from_results_is_escaped(made):
+def test_text_from_results_is_escaped(report_run):
     """A name with markup is shown literally."""
-    folder = made[0] / "results/decay/coulomb"
-    kept = (folder / "decay.json").read_text()
-    (folder / "decay.json").write_text(kept.replace('"record": "coulomb"', '"record": "<b>bold"'))
-    assert harness(made[0], "report", "--quiet").returncode == 0
-    assert "&lt;b&gt;bold" in (made[0] / "results/report.html").read_text()
-    (folder / "decay.json").write_text(kept)
-    assert harness(made[0], "report", "--quiet").returncode == 0
+    folder = report_run[0] / "results/decay/coulomb"
+    preserved = (folder / "decay.json").read_text()
+    (folder / "decay.json").write_text(preserved.replace('"record": "coulomb"', '"record": "<b>bold"'))
+    assert harness(report_run[0], "report", "--quiet").returncode == 0
+    assert "&lt;b&gt;bold" in (report_run[0] / "results/report.html").read_text()
+    (folder / "decay.json").write_text(preserved)
+    assert harness(report_run[0], "report", "--quiet").returncode == 0
 
 
 def test_without_results_there_is_no_report(tmp_path):
@@ -105,9 +105,9 @@ def test_without_results_there_is_no_report(tmp_path):
 
 
 @pytest.mark.parametrize("dark", [False, True])
-def test_a_browser_shows_it_without_errors_or_horizontal_scrolling(made, browser, dark):
+def test_a_browser_shows_it_without_errors_or_horizontal_scrolling(report_run, browser, dark):
     browser.dark(dark)
-    browser.open((made[0] / "results/report.html").as_uri())
+    browser.open((report_run[0] / "results/report.html").as_uri())
     for width in (360, 1200):
         browser.size(width)
         assert browser.run("document.documentElement.scrollWidth") <= width
@@ -116,32 +116,34 @@ def test_a_browser_shows_it_without_errors_or_horizontal_scrolling(made, browser
     assert browser.pdf().startswith(b"%PDF")
 
 
-def test_it_begins_with_a_plot_of_the_computed_motion(made, page):
+def test_it_begins_with_a_plot_of_the_computed_motion(report_run, page):
     """The first drawing of the page is the position over time, with the same number of turning points."""
     first = re.search(r'<svg viewBox="0 0 (\d+) (\d+)".*?<polyline points="([^"]+)"', page, re.S)
     points = [tuple(map(float, pair.split(","))) for pair in first[3].split()]
     assert page.index("<svg") < page.index("What to use when</h2>")
     assert (points[0][0], points[-1][0]) == (6.0, float(first[1]) - 6.0)
-    drawn = [y for y, _ in groupby(y for _, y in points)]
-    turns = sum((b - a) * (c - b) < 0 for a, b, c in zip(drawn, drawn[1:], drawn[2:], strict=False))
+    turns_of_plot = [y for y, _ in groupby(y for _, y in points)]
+    turns = sum(
+        (b - a) * (c - b) < 0 for a, b, c in zip(turns_of_plot, turns_of_plot[1:], turns_of_plot[2:], strict=False)
+    )
     assert turns == 15  # of the 16 half swings
 
 
-def test_figures_follow_the_colour_scheme_and_keep_text_as_text(made, browser):
+def test_figures_follow_the_colour_scheme_and_keep_text_as_text(report_run, browser):
     """Background, axis and text of the file itself, on a light screen and on a dark one."""
     look = "[...document.querySelectorAll('#patch_1 path, text')].slice(0, 2).map(e => getComputedStyle(e).fill)"
-    seen = []
+    colours = []
     for dark in (False, True):
         browser.dark(dark)
-        browser.open((made[0] / "results/coulomb/figure.svg").as_uri())
-        seen.append(browser.run(look))
+        browser.open((report_run[0] / "results/coulomb/figure.svg").as_uri())
+        colours.append(browser.run(look))
     browser.dark(False)
-    assert seen == [["rgb(255, 255, 255)", "rgb(0, 0, 0)"], ["rgb(29, 33, 37)", "rgb(230, 232, 234)"]]
-    assert "position of the mass" in (made[0] / "results/coulomb/figure.svg").read_text(encoding="utf-8")
+    assert colours == [["rgb(255, 255, 255)", "rgb(0, 0, 0)"], ["rgb(29, 33, 37)", "rgb(230, 232, 234)"]]
+    assert "position of the mass" in (report_run[0] / "results/coulomb/figure.svg").read_text(encoding="utf-8")
 
 
-def test_an_existing_interactive_page_is_included_and_every_picture_links_to_it(tmp_path, made):
-    shutil.copytree(made[0] / "results", tmp_path / "results")
+def test_an_existing_interactive_page_is_included_and_every_picture_links_to_it(tmp_path, report_run):
+    shutil.copytree(report_run[0] / "results", tmp_path / "results")
     (tmp_path / "fmus/web").mkdir(parents=True)
     bench = '<!doctype html><title>it\'s "here" &amp; <b></title><script>"x"</script>'
     (tmp_path / "fmus/web/index.html").write_text(bench)
@@ -151,4 +153,4 @@ def test_an_existing_interactive_page_is_included_and_every_picture_links_to_it(
     assert [frame["srcdoc"] for frame in tags.of("iframe")] == [bench]
     links = [link["href"] for link in tags.of("a")]
     assert {"../fmus/web/index.html", "../fmus/web/index.html#.preset=coulomb"} <= set(links)
-    assert "index.html" not in (made[0] / "results/report.html").read_text(encoding="utf-8")
+    assert "index.html" not in (report_run[0] / "results/report.html").read_text(encoding="utf-8")

@@ -7,7 +7,7 @@ import numpy as np
 from harness.results.style import open_figure
 
 
-def drawn(path, **style):
+def figure_text(path, **style):
     """Return the text of a figure of 200 000 points, in a path whose name contains characters that XML forbids."""
     t = np.linspace(0.0, 1.0, 200_000)
     with open_figure(path, 5.0, 3.0) as figure:
@@ -18,15 +18,15 @@ def drawn(path, **style):
 
 
 def test_any_name_gives_valid_xml_with_readable_text(tmp_path):
-    root = fromstring(drawn(tmp_path / "a.svg"))
-    assert "a<b & \ufffd\ufffd\ufffd\ufffd $x_" in [each.text for each in root.iter("{http://www.w3.org/2000/svg}text")]
+    root = fromstring(figure_text(tmp_path / "a.svg"))
+    assert "a<b & \ufffd\ufffd\ufffd\ufffd $x_" in [item.text for item in root.iter("{http://www.w3.org/2000/svg}text")]
 
 
 def test_very_many_points_make_a_file_of_hundreds_of_kilobytes_at_most(tmp_path):
     """As a line and as markers; the same drawing gives the same file."""
-    line, marks = drawn(tmp_path / "a.svg"), drawn(tmp_path / "b.svg", marker=".", linestyle="")
+    line, marks = figure_text(tmp_path / "a.svg"), figure_text(tmp_path / "b.svg", marker=".", linestyle="")
     assert max(len(line), len(marks)) < 400_000
-    assert drawn(tmp_path / "c.svg") == line
+    assert figure_text(tmp_path / "c.svg") == line
 
 
 def test_a_name_longer_than_its_panel_is_wrapped(tmp_path):
@@ -41,8 +41,8 @@ def test_a_name_longer_than_its_panel_is_wrapped(tmp_path):
     assert heading.get_text().endswith("\nshort")
     assert heading.get_window_extent().width <= figure.bbox.width
     for i, axes in enumerate(panels):
-        label, place = axes.yaxis.label, axes.get_window_extent()
+        label, extent = axes.yaxis.label, axes.get_window_extent()
         assert label.get_text().replace("\n", "") == name.format(i)
-        assert label.get_window_extent().height <= 1.05 * place.height
+        assert label.get_window_extent().height <= 1.05 * extent.height
     assert panels[0].get_title(loc="left").count("\n") == 1
     assert panels[1].get_title(loc="left") == "panel 1"

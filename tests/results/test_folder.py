@@ -151,22 +151,24 @@ print(json.dumps(seen))
 def test_a_kill_at_any_moment_keeps_the_previous_or_the_new_result(older, steps):
     """Before and after every system call from the end of the writing on; the next run removes leftovers."""
     command = [sys.executable, "-c", KILLED, str(older), steps]
-    seen = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True, timeout=120).stdout)
-    assert len(seen) > 10
+    outcomes = json.loads(subprocess.run(command, cwd=ROOT, capture_output=True, check=True, timeout=120).stdout)
+    assert len(outcomes) > 10
     results = [["a.csv"], ["b.csv"]]
-    for at_once, after, beside in seen:
+    for at_once, after, leftovers in outcomes:
         assert at_once in results or (steps == "two" and at_once == [])
         assert after in results
-        assert beside == [older.name]
-    assert seen[0][0] == ["a.csv"]
-    assert seen[-1][0] == ["b.csv"]
-    assert ([] in [at_once for at_once, _, _ in seen]) == (steps == "two")
+        assert leftovers == [older.name]
+    assert outcomes[0][0] == ["a.csv"]
+    assert outcomes[-1][0] == ["b.csv"]
+    assert ([] in [at_once for at_once, _, _ in outcomes]) == (steps == "two")
 
 
 def test_leftovers_of_a_killed_run_are_removed_but_no_other_files(older):
-    beside = [older.with_name(name) for name in (".case-abcdefgh.new", ".case-abcdefgi.old", ".case-sign-abcdefgh.new")]
+    leftovers = [
+        older.with_name(name) for name in (".case-abcdefgh.new", ".case-abcdefgi.old", ".case-sign-abcdefgh.new")
+    ]
     foreign = older.with_name(".case-abcdefgk.new")
-    for folder in (*beside, foreign):
+    for folder in (*leftovers, foreign):
         folder.mkdir()
     (foreign / "notes.txt").write_text("mine")
     with replace_folder(older, OURS) as other:
@@ -174,10 +176,10 @@ def test_leftovers_of_a_killed_run_are_removed_but_no_other_files(older):
         with replace_folder(older, OURS) as fresh:
             (fresh / "a.csv").write_text("of one that is quicker")
         assert contents(other) == {"b.csv": "of a run that goes on"}
-        assert not beside[0].exists()
-        assert not beside[1].exists()
+        assert not leftovers[0].exists()
+        assert not leftovers[1].exists()
     assert contents(older) == {"b.csv": "of a run that goes on"}
-    assert sorted(older.parent.iterdir()) == sorted([older, foreign, beside[2]])
+    assert sorted(older.parent.iterdir()) == sorted([older, foreign, leftovers[2]])
 
 
 @pytest.mark.parametrize("target", ["elsewhere", "nowhere"])

@@ -36,7 +36,7 @@ def workspace(fmus, tmp_path):
 
 
 @pytest.fixture(scope="module", params=COMMANDS)
-def made(request, fmus, tmp_path_factory):
+def example_run(request, fmus, tmp_path_factory):
     """A folder in which one of the commands was run, its arguments, and its result."""
     workspace, (arguments, folder) = tmp_path_factory.mktemp("made"), COMMANDS[request.param]
     (workspace / "fmus").symlink_to(fmus)
@@ -46,59 +46,59 @@ def made(request, fmus, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def swung(user_folder):
+def first_run(user_folder):
     """A folder in which the first scene was run."""
     assert harness(user_folder, "run", "smd").returncode == 0
     return user_folder
 
 
-def told(folder):
+def read_provenance(folder):
     return json.loads((folder / "provenance.json").read_text())
 
 
-def test_a_result_records_the_digests_of_its_files_and_all_versions(made):
-    workspace, arguments, folder = made
-    found = told(folder)
-    assert found["command"] == " ".join(("python -m harness", *arguments))
-    assert {"python", "friction-fmus", "fmpy", "numpy"} <= set(found["versions"])
-    assert found["files"]
-    for file, digest in found["files"].items():
+def test_a_result_records_the_digests_of_its_files_and_all_versions(example_run):
+    workspace, arguments, folder = example_run
+    provenance = read_provenance(folder)
+    assert provenance["command"] == " ".join(("python -m harness", *arguments))
+    assert {"python", "friction-fmus", "fmpy", "numpy"} <= set(provenance["versions"])
+    assert provenance["files"]
+    for file, digest in provenance["files"].items():
         assert digest == sha256((workspace / file).read_bytes()).hexdigest()
 
 
 @pytest.mark.parametrize("model", MODELS)
 def test_every_effective_parameter_is_recorded_with_its_unit(workspace, model):
     assert harness(workspace, "run", "--fmu", f"fmus/{model}.fmu", "--set", "m=1.5", "--stop", "0.5").returncode == 0
-    found = told(workspace / "results" / model)["parameters"]
+    recorded = read_provenance(workspace / "results" / model)["parameters"]
     variables = read_model_description(str(workspace / f"fmus/{model}.fmu")).modelVariables
-    parameters = [each for each in variables if each.causality == "parameter"]
-    assert set(found) == {each.name for each in parameters}
-    for each in parameters:
-        type_unit = each.declaredType.unit if each.declaredType is not None else None
-        assert found[each.name]["unit"] in (each.unit, type_unit, "")
-    assert found["m"] == {"value": 1.5, "unit": "kg"}
+    parameters = [variable for variable in variables if variable.causality == "parameter"]
+    assert set(recorded) == {variable.name for variable in parameters}
+    for variable in parameters:
+        type_unit = variable.declaredType.unit if variable.declaredType is not None else None
+        assert recorded[variable.name]["unit"] in (variable.unit, type_unit, "")
+    assert recorded["m"] == {"value": 1.5, "unit": "kg"}
 
 
 def test_a_comparison_records_the_parameters_of_both_sides(workspace):
     assert harness(workspace, "compare", "fmus/smd.fmu", "smd").returncode == 0
-    found = told(workspace / "results/compare/fmus-smd-scene-smd")["parameters"]
-    assert found["one: c"] == found["two: c"] == {"value": 2.0, "unit": "N.s/m"}
+    parameters = read_provenance(workspace / "results/compare/fmus-smd-scene-smd")["parameters"]
+    assert parameters["one: c"] == parameters["two: c"] == {"value": 2.0, "unit": "N.s/m"}
 
 
 def test_the_scene_is_stored_as_it_was_run(workspace):
     (workspace / "mine.toml").write_text('title = "a title"\nmodel = "smd"\noutputs = ["x"]\n[values]\nc = 3.0\n')
     assert harness(workspace, "run", "mine.toml").returncode == 0
-    scene = told(workspace / "results/mine")["scene"]
+    scene = read_provenance(workspace / "results/mine")["scene"]
     assert (scene["name"], scene["title"], scene["outputs"], scene["values"]) == ("mine", "a title", ["x"], {"c": 3.0})
     with (workspace / "results/mine/trajectory.csv").open() as file:
         times = [float(row[0]) for row in list(csv.reader(file))[1:]]
     assert (scene["start"], scene["stop"]) == (times[0], times[-1])
 
 
-def test_the_report_shows_the_provenance_of_its_results(swung):
-    assert harness(swung, "report").returncode == 0
-    page = (swung / "results/report.html").read_text()
-    digest = sha256((swung / "fmus/smd.fmu").read_bytes()).hexdigest()
+def test_the_report_shows_the_provenance_of_its_results(first_run):
+    assert harness(first_run, "report").returncode == 0
+    page = (first_run / "results/report.html").read_text()
+    digest = sha256((first_run / "fmus/smd.fmu").read_bytes()).hexdigest()
     assert f"smd.fmu (sha256 {digest[:12]})" in page
     assert "k = 157.9 N/m" in page
 
@@ -116,10 +116,10 @@ def test_the_report_shows_every_run(workspace):
     assert "mine: the plots that its scene names" in page
 
 
-def test_a_damaged_provenance_file_is_reported_in_the_page(workspace, swung):
+def test_a_damaged_provenance_file_is_reported_in_the_page(workspace, first_run):
     damaged = ("", "[]", "{}", '{"files": 1}', '{"files": {}, "versions": {}}')
     for model, content in zip(MODELS, damaged, strict=True):
-        shutil.copytree(swung / "results/smd", workspace / "results" / model)
+        shutil.copytree(first_run / "results/smd", workspace / "results" / model)
         (workspace / "results" / model / "provenance.json").write_text(content)
     done = harness(workspace, "report")
     assert (done.returncode, done.stderr) == (0, "")
@@ -137,16 +137,16 @@ def files(folder):
     }
 
 
-def test_a_result_is_reproduced_from_its_folder_bit_for_bit(made):
-    workspace, (command, *_), folder = made
-    before, account = files(folder), told(folder)
+def test_a_result_is_reproduced_from_its_folder_bit_for_bit(example_run):
+    workspace, (command, *_), folder = example_run
+    before, account = files(folder), read_provenance(folder)
     done = commands.harness(
         workspace, "run", folder.relative_to(workspace), blank=not folder.match(DRAWN) and UNPLOTTED
     )
     assert (done.returncode, done.stderr) == (0, "")
     assert files(folder) == before
     for key in ("files", "parameters", "scene", "source"):
-        assert told(folder)[key] == account[key]
+        assert read_provenance(folder)[key] == account[key]
     if command == "run":
         assert "the same, bit for bit" in done.stdout
         assert harness(workspace, "run", folder.relative_to(workspace), "--quiet").returncode == 0  # and again
@@ -189,7 +189,7 @@ def test_a_result_whose_fmu_changed_or_vanished_is_not_reproduced(workspace, fmu
     assert files(workspace / "results/mine") == before
 
 
-def swinging(file):
+def write_decay(file):
     """Write a record of a decay."""
     t = np.linspace(0, 2, 60)
     rows = np.column_stack([t, np.exp(-t) * np.cos(12 * t)])
@@ -212,11 +212,11 @@ ONCE = ("--vary", "c=2,3", "--workers", "1", "--name", "c")
     ],
 )
 def test_a_result_of_another_scene_is_replaced_only_with_overwrite(workspace, fmus, first, second, folder):
-    for user_folder in ("a", "b", "b/a"):
-        (workspace / user_folder).mkdir()
-        (workspace / user_folder / "mine.toml").write_text(MINE)
-        shutil.copy(fmus / "smd.fmu", workspace / user_folder)
-    swinging(workspace / "a/coulomb.csv")
+    for subfolder in ("a", "b", "b/a"):
+        (workspace / subfolder).mkdir()
+        (workspace / subfolder / "mine.toml").write_text(MINE)
+        shutil.copy(fmus / "smd.fmu", workspace / subfolder)
+    write_decay(workspace / "a/coulomb.csv")
     assert harness(workspace, *first).returncode == 0
     before = files(workspace / "results" / folder)
     done = harness(workspace, *second)
@@ -224,9 +224,9 @@ def test_a_result_of_another_scene_is_replaced_only_with_overwrite(workspace, fm
     assert f"results/{folder} holds the result of `python -m harness {' '.join(first)}`" in done.stderr
     assert "choose another --out, or replace it with --overwrite" in done.stderr
     assert files(workspace / "results" / folder) == before
-    source = told(workspace / "results" / folder)["source"]
+    source = read_provenance(workspace / "results" / folder)["source"]
     assert harness(workspace, *second, "--overwrite").returncode == 0
-    now = told(workspace / "results" / folder)
+    now = read_provenance(workspace / "results" / folder)
     assert now["command"] == " ".join(("python -m harness", *second, "--overwrite"))
     assert now["source"] != source
 
@@ -235,8 +235,8 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
     (workspace / "mine.toml").write_text(MINE)
     assert "place" not in harness(workspace, "run", "mine.toml").stdout
     (workspace / "mine.toml").write_text(MINE.replace("3.0", "4.0").replace("1.0", "2.0"))
-    said = harness(workspace, "run", "mine.toml", COLUMNS="200").stdout
-    assert re.search(r"It replaces the result of [-\dT:+]+, which had c = 3.0 N.s/m, .*stop = 1.0", said)
+    output = harness(workspace, "run", "mine.toml", COLUMNS="200").stdout
+    assert re.search(r"It replaces the result of [-\dT:+]+, which had c = 3.0 N.s/m, .*stop = 1.0", output)
 
 
 @pytest.mark.parametrize(
@@ -249,16 +249,16 @@ def test_a_result_with_other_values_is_not_replaced_silently(workspace):
     ],
 )
 def test_a_result_with_other_options_is_not_replaced_silently(workspace, arguments, older, newer, had):
-    swinging(workspace / "swing.csv")
+    write_decay(workspace / "swing.csv")
     assert harness(workspace, *arguments, *older).returncode == 0
     done = harness(workspace, *arguments, *newer, COLUMNS="200")
     assert (done.returncode, done.stderr) == (0, "")
     assert re.search(rf"It replaces the result of [-\dT:+]+, which had {had}\b", done.stdout)
 
 
-def test_a_folder_without_provenance_is_not_run_again(workspace, swung):
+def test_a_folder_without_provenance_is_not_run_again(workspace, first_run):
     account = workspace / "results/smd/provenance.json"
-    shutil.copytree(swung / "results/smd", workspace / "results/smd")
+    shutil.copytree(first_run / "results/smd", workspace / "results/smd")
     for content in ("[]", "{}", '{"command": 1}', "", None):
         if content is None:
             account.unlink()

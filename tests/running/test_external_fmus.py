@@ -57,11 +57,11 @@ def table(file):
     }
 
 
-def fine(done):
+def assert_succeeded(done):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def refused(done, status, *sentences):
+def assert_refused(done, status, *sentences):
     assert done.returncode == status
     assert done.stderr.startswith("Error: ")
     assert done.stderr.count("Error: ") == 1
@@ -73,7 +73,7 @@ def refused(done, status, *sentences):
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
 def test_an_fmu_with_hidden_steps_is_refined_until_two_results_agree(run, name, tolerance):
     done, rows = run(name, "--set", "k=50", "--tolerance", tolerance, blank=tolerance > 1e-4 or commands.UNPLOTTED)
-    fine(done)
+    assert_succeeded(done)
     assert "changes no output by more than" in done.stdout
     time, position, *_ = rows.values()
     assert time[-1] == 1.0
@@ -84,7 +84,7 @@ def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
     """FMI 2.0: after bounce n the ball rises with e^n times the speed of its first fall."""
     e, g = 0.8, 9.81
     done, rows = run("Bouncing", "--set", f"e={e}", blank=True)
-    fine(done)
+    assert_succeeded(done)
     fall = sqrt(2 / g)
     bounces = fall + 2 * fall * np.cumsum([0, *(e**n for n in (1, 2))])
     since = rows["t [s]"][-1] - bounces[-1]
@@ -97,7 +97,7 @@ def test_a_state_that_jumps_at_events_agrees_with_its_closed_form(run):
 
 def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such(run):
     done, rows = run("FixedStep", blank=True)
-    fine(done)
+    assert_succeeded(done)
     assert "fixed internal step of 0.1 s, error unknown" in done.stdout
     assert rows["x"][-1] == pytest.approx(0.9**100)  # 41 % off
     assert abs(0.9**100 / exp(-10) - 1) > 0.4
@@ -105,20 +105,20 @@ def test_an_fmu_with_a_fixed_internal_step_is_reported_as_such(run):
 
 def test_booleans_integers_and_strings_are_recorded_drawn_and_set(run, tmp_path):
     done, rows = run("Switching", "--set", "enabled=true", "--set", "most=3", "--set", "name=007", blank=False)
-    fine(done)
+    assert_succeeded(done)
     assert (tmp_path / "results/Switching/figure.svg").is_file()
     assert {*rows["on"]} == {0, 1}
     assert rows["switched"][-1] == 3
     assert {*rows["says"]} == {"cold", "007 cold", "007 warm"}
     assert "says: from cold to 007 " in done.stdout
     done, rows = run("Switching", "--set", "enabled=FALSE", "--set", "most=3.0")
-    fine(done)
+    assert_succeeded(done)
     assert not rows["on"][-1]
 
 
 def test_arrays_and_enumerations_are_recorded_elementwise_and_set(run):
     done, rows = run("Arrays", "--set", "begin=0,2", "--set", "sense=right", "--set", "omega=1.5")
-    fine(done)
+    assert_succeeded(done)
     turn = [f"turn[{i},{j}]" for i in (1, 2) for j in (1, 2)]
     assert [*rows] == ["t [s]", *turn, "place[1]", "place[2]", "going", "says"]
     assert rows["place[1]"][-1] == pytest.approx(2 * sin(1.5))
@@ -154,9 +154,9 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
     (tmp_path / "mine.toml").write_text(
         SCENE.format(fmu=external_fmu_folder / f"{name}.fmu", outputs=outputs, more=more)
     )
-    plain = name != "Arrays"  # whose strings and elements are drawn
-    done = commands.harness(tmp_path, "run", "mine.toml", blank=plain, COLUMNS="120")
-    fine(done)
+    without_strings = name != "Arrays"  # whose strings and elements are drawn
+    done = commands.harness(tmp_path, "run", "mine.toml", blank=without_strings, COLUMNS="120")
+    assert_succeeded(done)
     rows = table(tmp_path / "results/mine/trajectory.csv")
     turn = [f"turn[{i},{j}]" for i in (1, 2) for j in (1, 2)]
     assert [*rows][1:] == (columns or ["place[2]", "says", *turn])
@@ -172,7 +172,7 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
 
 
 @pytest.mark.parametrize(
-    ("name", "arguments", "end", "told"),
+    ("name", "arguments", "end", "message"),
     [
         (
             "Falling",
@@ -188,15 +188,15 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
         ),
     ],
 )
-def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run, name, arguments, end, told):
+def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run, name, arguments, end, message):
     done, rows = run(name, *arguments, blank=True)
-    refused(done, 1, f"{name}.fmu: it terminated the simulation: ", told, f"until then is in results/{name}")
+    assert_refused(done, 1, f"{name}.fmu: it terminated the simulation: ", message, f"until then is in results/{name}")
     assert rows["t [s]"][-1] == pytest.approx(end, abs=1e-3)
     assert len(rows["t [s]"]) > 60
 
 
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "message"),
     [
         (1, "a call did not return within 1.5 s (--timeout sets the limit), after t = 0.5 s"),
         (2, "its binary crashed (Segmentation fault), after t = 0.5 s"),
@@ -205,9 +205,9 @@ def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run,
         (6, "it terminated the simulation: fmi2DoStep returned Discard with fmi2Terminated at t = 0.5 s"),
     ],
 )
-def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run, kind, told):
+def test_a_hang_crash_exception_or_nan_is_one_sentence_and_keeps_its_samples(run, kind, message):
     done, rows = run("Faulty", "--set", f"kind={kind}", "--timeout", "1.5", blank=True)
-    refused(done, 1, f"Faulty.fmu: {told}")
+    assert_refused(done, 1, f"Faulty.fmu: {message}")
     assert done.stderr.count("\n") == 1
     assert rows["t [s]"][-1] == 0.5
     assert (rows["x"] == rows["t [s]"]).all()
@@ -230,14 +230,14 @@ def test_the_longest_of_the_aborted_refinement_runs_is_kept(tmp_path):
 
 def test_the_output_of_an_fmu_is_reported_and_harmless(run):
     done, rows = run("Faulty", "--set", "kind=4", "--json")
-    fine(done)
+    assert_succeeded(done)
     assert "it printed: I am at 1.0" in json.loads(done.stdout)["note"]
     assert rows["x"][-1] == 1.0
 
 
 def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
     done, rows = run("NonConforming")
-    refused(
+    assert_refused(
         done,
         1,
         "NonConforming.fmu violates the FMI standard in 2 places:",
@@ -247,7 +247,7 @@ def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
     )
     assert rows is None
     done, rows = run("NonConforming", "--lenient")
-    fine(done)
+    assert_succeeded(done)
     assert rows["x"][-1] == pytest.approx(cos(sqrt(40)))
     assert (rows["up"] == (rows["x"] > 0)).all()
 
@@ -270,17 +270,17 @@ def test_violations_of_the_standard_are_listed_and_tolerated_with_lenient(run):
 )
 def test_an_unsupported_request_is_one_sentence(run, name, arguments, status, sentence):
     done, _ = run(name, *arguments)
-    refused(done, status, sentence)
+    assert_refused(done, status, sentence)
 
 
 def test_a_scene_that_requests_invisible_steps_is_refused(external_fmu_folder, tmp_path):
     scene = SCENE.format(fmu=external_fmu_folder / "Midpoint.fmu", outputs=["x", "v"], more="analyses = ['steps']")
     (tmp_path / "mine.toml").write_text(scene)
     done = commands.harness(tmp_path, "run", "mine.toml", COLUMNS="120")
-    refused(done, 2, "Midpoint.fmu does not show the steps of its solver")
+    assert_refused(done, 2, "Midpoint.fmu does not show the steps of its solver")
 
 
-def described(change):
+def edited_description(change):
     return {"modelDescription.xml": change}
 
 
@@ -289,25 +289,33 @@ def described(change):
     [
         (
             "Midpoint",
-            described(lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"')),
+            edited_description(lambda text: text.replace('fmiVersion="2.0"', 'fmiVersion="1.0"')),
             "has FMI version 1.0",
         ),
-        ("Midpoint", described(lambda text: text.replace('"v"', '"x"')), 'The variable name "x" (line'),
-        ("Midpoint", described(lambda text: text.replace(' start="40"', "")), 'Variable "k" (line'),
-        ("Midpoint", described(lambda text: text.replace("<ModelVariables", "<Nonsense")), "cannot be read: "),
-        ("Midpoint", described(lambda text: text.replace('stopTime="1.0"', "")), "has no default stop time; set one"),
+        ("Midpoint", edited_description(lambda text: text.replace('"v"', '"x"')), 'The variable name "x" (line'),
+        ("Midpoint", edited_description(lambda text: text.replace(' start="40"', "")), 'Variable "k" (line'),
+        ("Midpoint", edited_description(lambda text: text.replace("<ModelVariables", "<Nonsense")), "cannot be read: "),
+        (
+            "Midpoint",
+            edited_description(lambda text: text.replace('stopTime="1.0"', "")),
+            "has no default stop time; set one",
+        ),
         *[
             (
                 "Midpoint",
-                described(lambda text, times=times: text.replace('startTime="0.0" stopTime="1.0"', times)),
+                edited_description(lambda text, times=times: text.replace('startTime="0.0" stopTime="1.0"', times)),
                 "there are too few floating-point times",
             )
             for times in ('startTime="0.0" stopTime="INF"', 'startTime="1e17" stopTime="100000000000000016"')
         ],
-        ("Midpoint", described(lambda text: text.replace('index="1"', 'index="77"')), "lacks a required element"),
         (
             "Midpoint",
-            described(lambda text: text.replace('fmiVersion="2.0"', "")),
+            edited_description(lambda text: text.replace('index="1"', 'index="77"')),
+            "lacks a required element",
+        ),
+        (
+            "Midpoint",
+            edited_description(lambda text: text.replace('fmiVersion="2.0"', "")),
             "lacks a required element or the FMI version",
         ),
         ("Midpoint", {"modelDescription.xml": None}, 'cannot be read: "There is no item'),
@@ -328,14 +336,14 @@ def test_a_damaged_file_is_one_sentence(run, external_fmu_folder, tmp_path, name
     external_fmus.edited_copy(external_fmu_folder / f"{name}.fmu", tmp_path / "damaged.fmu", changes)
     done, _ = run("damaged.fmu")
     assert done.returncode in (1, 2)
-    refused(done, done.returncode, "damaged.fmu", sentence)
+    assert_refused(done, done.returncode, "damaged.fmu", sentence)
 
 
 def test_a_changed_file_is_read_again(external_fmu_folder, tmp_path):
     fmu = external_fmus.edited_copy(external_fmu_folder / "Midpoint.fmu", tmp_path / "mine.fmu", {})
     assert "x" in [variable.name for variable in read_description(fmu).modelVariables]
     external_fmus.edited_copy(
-        external_fmu_folder / "Midpoint.fmu", fmu, described(lambda text: text.replace('name="x"', 'name="y"'))
+        external_fmu_folder / "Midpoint.fmu", fmu, edited_description(lambda text: text.replace('name="x"', 'name="y"'))
     )
     os.utime(fmu, ns=(0, 1))  # for file systems with coarse time stamps
     assert "y" in [variable.name for variable in read_description(fmu).modelVariables]
@@ -345,10 +353,10 @@ def test_unicode_names_and_missing_units_are_supported(run, external_fmu_folder,
     external_fmus.edited_copy(
         external_fmu_folder / "Midpoint.fmu",
         tmp_path / "\u03c9.fmu",
-        described(lambda text: text.replace('name="x"', 'name="\u03c6, \u3042"')),
+        edited_description(lambda text: text.replace('name="x"', 'name="\u03c6, \u3042"')),
     )
     done, _ = run("\u03c9.fmu", "--tolerance", "1e-3", blank=True)
-    fine(done)
+    assert_succeeded(done)
     assert "\u03c6, \u3042: from 1 to 0.99" in done.stdout
 
 
@@ -359,7 +367,7 @@ def test_a_file_that_would_fill_the_disk_is_not_unpacked(run, external_fmu_folde
         archive.writestr("resources/huge", b"")
         archive.infolist()[-1].file_size = 2**60
     done, _ = run("huge.fmu")
-    refused(done, 1, "huge.fmu", "do not fit into the temporary directory")
+    assert_refused(done, 1, "huge.fmu", "do not fit into the temporary directory")
 
 
 @pytest.mark.parametrize("values", [(1.0, 2.0), (1e308, -1e308)])
@@ -373,9 +381,9 @@ def test_results_that_never_agree_are_kept_with_their_difference(exchange, value
         passes.append(RefinementRun(len(passes), SampleRows(time, {"x": np.full(65, values[len(passes) % 2])})))
         return passes[-1]
 
-    asked = ExternalRunRequest("", "", exchange, 0.0, 1.0, tolerance=1e-6, timeout=1.0)
+    request = ExternalRunRequest("", "", exchange, 0.0, 1.0, tolerance=1e-6, timeout=1.0)
     answer = refine(
-        asked, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
+        request, SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=None), defaultExperiment=None), run
     )
     assert answer.run_number == len(passes) - 1
     assert "of its largest value, more than the tolerance of 1e-06; raise --tolerance" in answer.failure

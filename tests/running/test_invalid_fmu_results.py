@@ -17,7 +17,7 @@ from harness.running.external.step_refinement import refine
 NAN, HUGE = float("nan"), 1e300
 
 
-def stepped(answer):
+def run_with_step(answer):
     """Return the sample times of an FMU whose fmi3DoStep returns `answer`, and the exception."""
     times = []
     with pytest.raises((TerminatedError, HarnessError)) as caught:
@@ -26,24 +26,24 @@ def stepped(answer):
 
 
 def test_an_unauthorised_early_return_is_refused():
-    times, said = stepped(lambda t, h: (False, False, t > 0.3, t + h / 2))
+    times, output = run_with_step(lambda t, h: (False, False, t > 0.3, t + h / 2))
     assert times == [0.0, 0.25, 0.5]
-    assert said == "fmi3DoStep returned early without permission"
+    assert output == "fmi3DoStep returned early without permission"
 
 
 @pytest.mark.parametrize(
-    ("told", "last"), [(0.6, 0.6), (0.75, 0.75), (0.5, 0.5), (0.1, 0.5), (-1.0, 0.5), (NAN, 0.5), (HUGE, 0.5)]
+    ("last_time", "last"), [(0.6, 0.6), (0.75, 0.75), (0.5, 0.5), (0.1, 0.5), (-1.0, 0.5), (NAN, 0.5), (HUGE, 0.5)]
 )
-def test_a_termination_time_lies_within_the_step(told, last):
-    times, said = stepped(lambda t, h: (False, t == 0.5, t == 0.5, told))
+def test_a_termination_time_lies_within_the_step(last_time, last):
+    times, output = run_with_step(lambda t, h: (False, t == 0.5, t == 0.5, last_time))
     assert (times[-1], times) == (last, sorted(times))
-    assert said == "it terminated the simulation: fmi3DoStep returned terminateSimulation"
+    assert output == "it terminated the simulation: fmi3DoStep returned terminateSimulation"
 
 
-@pytest.mark.parametrize("told", [NAN, 1.9, -HUGE])
-def test_an_event_in_the_past_or_at_infinity_is_refused(told):
-    with pytest.raises(HarnessError, match=re.escape(f"sets its next event to {told:.9g} s, at t = 2 s")):
-        update_discrete_states(lambda: (False, False, False, False, True, told), 2.0)
+@pytest.mark.parametrize("next_time", [NAN, 1.9, -HUGE])
+def test_an_event_in_the_past_or_at_infinity_is_refused(next_time):
+    with pytest.raises(HarnessError, match=re.escape(f"sets its next event to {next_time:.9g} s, at t = 2 s")):
+        update_discrete_states(lambda: (False, False, False, False, True, next_time), 2.0)
 
 
 def test_an_immediate_event_is_handled_at_once_and_not_forever():
@@ -61,8 +61,8 @@ def test_an_impossible_step_size_is_treated_as_undeclared(declared):
         steps.append(h)
         return RefinementRun(len(steps), SampleRows([0.0], {}), "no")
 
-    found = SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=declared), defaultExperiment=None)
-    refine(ExternalRunRequest("", "", False, 0.0, 1.0, tolerance=1e-6, timeout=1.0), found, run)
+    description = SimpleNamespace(coSimulation=SimpleNamespace(fixedInternalStepSize=declared), defaultExperiment=None)
+    refine(ExternalRunRequest("", "", False, 0.0, 1.0, tolerance=1e-6, timeout=1.0), description, run)
     assert min(steps) > 0.0
 
 

@@ -18,7 +18,7 @@ ODD = "a#b'+(,&@[{;=!$^%20 é\u3042`~)"
 
 
 @pytest.fixture
-def odd(tmp_path, fmus):
+def odd_folder(tmp_path, fmus):
     """A user's folder with the built FMUs, whose path contains every special character."""
     folder = tmp_path / ODD
     folder.mkdir()
@@ -36,32 +36,32 @@ def odd(tmp_path, fmus):
         ("couple", "pair.toml", "--stop", "0.1"),
     ],
 )
-def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd, command):
-    temporary = odd / "temporary"
+def test_paths_of_temporary_files_fmus_and_results_may_contain_any_character(odd_folder, command):
+    temporary = odd_folder / "temporary"
     temporary.mkdir()
     scene = (ROOT / "harness/scenes/coupled/two-masses.toml").read_text()
-    (odd / "pair.toml").write_text(re.sub("(?m)^steps = .*$", "steps = [0.01]", scene))
-    done = harness(odd, *command, "--out", odd / "out", "--quiet", blank=UNPLOTTED, TMPDIR=str(temporary))
+    (odd_folder / "pair.toml").write_text(re.sub("(?m)^steps = .*$", "steps = [0.01]", scene))
+    done = harness(odd_folder, *command, "--out", odd_folder / "out", "--quiet", blank=UNPLOTTED, TMPDIR=str(temporary))
     assert (done.returncode, done.stderr) == (0, "")
     assert list(temporary.iterdir()) == []
-    assert any((odd / "out").rglob("*.svg")) or any((odd / "out").rglob("*.csv"))
+    assert any((odd_folder / "out").rglob("*.svg")) or any((odd_folder / "out").rglob("*.csv"))
 
 
-def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd, fmus, monkeypatch):
+def test_without_a_plain_folder_a_python_fmu_is_refused_and_others_run(odd_folder, fmus, monkeypatch):
     monkeypatch.setattr(rooms, "FALLBACK_DIRECTORIES", ())
-    monkeypatch.setattr(tempfile, "tempdir", str(odd))
+    monkeypatch.setattr(tempfile, "tempdir", str(odd_folder))
     refused = pytest.raises(HarnessError, match=r"smd\.fmu is an FMU in Python, which cannot be run from .*TMPDIR")
     with refused, unpacking.unpack(fmus / "smd.fmu"):
         pass
-    compiled = without(fmus / "smd.fmu", odd / "c.fmu", lambda name: name.startswith("binaries/"))
+    compiled = copy_without(fmus / "smd.fmu", odd_folder / "c.fmu", lambda name: name.startswith("binaries/"))
     with unpacking.unpack(compiled) as folder:
-        assert folder.parent == odd
-    assert sorted(file.name for file in odd.iterdir()) == ["c.fmu", "fmus"]
+        assert folder.parent == odd_folder
+    assert sorted(file.name for file in odd_folder.iterdir()) == ["c.fmu", "fmus"]
 
 
 @pytest.mark.parametrize("part", ["resources/", "resources/slavemodule.txt", "_fmu.py"])
 def test_a_python_fmu_without_the_files_of_its_library_is_refused(fmus, tmp_path, part):
-    broken = without(fmus / "smd.fmu", tmp_path / "broken.fmu", lambda name: part in name)
+    broken = copy_without(fmus / "smd.fmu", tmp_path / "broken.fmu", lambda name: part in name)
     done = harness(tmp_path, "run", "--fmu", broken)
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
@@ -82,10 +82,10 @@ def test_a_plain_path_is_one_whose_uri_escapes_only_blanks(path, expected):
     assert has_plain_uri(Path(path)) is expected
 
 
-def without(fmu, copy, left_out):
+def copy_without(fmu, copy, left_out):
     """Return a copy of an FMU without some of its files."""
-    with ZipFile(fmu) as whole, ZipFile(copy, "w") as part:
-        for name in whole.namelist():
+    with ZipFile(fmu) as source, ZipFile(copy, "w") as part:
+        for name in source.namelist():
             if not left_out(name):
-                part.writestr(name, whole.read(name))
+                part.writestr(name, source.read(name))
     return copy

@@ -76,15 +76,15 @@ def test_consistent_modes_are_found_for_any_order_of_contacts(n, jump, shared):
 
 def test_sequential_updates_reach_the_same_modes(monkeypatch):
     """In cases that take as many iterations as there are contacts."""
-    draw, found = np.random.default_rng(7), 0
+    draw, n_cases = np.random.default_rng(7), 0
     for _ in range(100):
         chain = Chain(draw, 4, 1.0, True)
         monkeypatch.setattr(contact_lcp, "MAX_JOINT_ITERATIONS", 60)
         modes = chain.answer()
         monkeypatch.setattr(contact_lcp, "MAX_JOINT_ITERATIONS", 0)
         assert chain.answer() == modes
-        found += modes != ((0, 0, 0, 0), True)
-    assert found > 50
+        n_cases += modes != ((0, 0, 0, 0), True)
+    assert n_cases > 50
 
 
 @pytest.mark.parametrize("rate", [-1.0, 0.0, 1.0])

@@ -26,7 +26,7 @@ class Mine(Model):
 
 
 @pytest.fixture(scope="module")
-def mine(tmp_path_factory):
+def custom_model(tmp_path_factory):
     """Return mine(body): the model whose class has these additional lines, lowered with some or all methods, once."""
     path = tmp_path_factory.mktemp("mine") / "mine.py"
 
@@ -60,36 +60,38 @@ def events(model, method, rtol, stop):
     """Return time and modes at each step that ends with an event, and all step ends with their states and modes."""
     prepared_model(model, {"solver.method": method, "solver.rtol": rtol, "solver.atol": 1e-3 * rtol}, stop)
     start(model, model.initial_state(0.0), stop)
-    step, found, rows = model.solver.step, [], []
+    step, changes, rows = model.solver.step, [], []
     while step.t1 < stop:
         assert step.compute_next(model) == 0
         rows.append((step.t1, state_values(step, model.states), state_values(step, model.contacts)))
         if step.event_at_end:
-            found.append((step.t1, *rows[-1][2]))
-    return found, rows
+            changes.append((step.t1, *rows[-1][2]))
+    return changes, rows
 
 
-def test_simultaneous_equal_events_are_one_event(mine):
+def test_simultaneous_equal_events_are_one_event(custom_model):
     """Two equal sleds on two equal springs, pulled alike, have the same bits."""
     (one, a), (two, b) = body("1", "k * (p - x1) - F1", 12.5), body("2", "k * (p - x2) - F2", 12.5)
     both = contact("1", "v1", 20.0, 30.0) + contact("2", "v2", 20.0, 30.0)
-    found, rows = events(mine(*one, *two, DRIVER, *both, a, b, methods=["dop853"]), DOP853, 1e-10, 8.0)
-    assert len(found) > 5
-    assert all(first == second for _, first, second in found)
+    changes, rows = events(custom_model(*one, *two, DRIVER, *both, a, b, methods=["dop853"]), DOP853, 1e-10, 8.0)
+    assert len(changes) > 5
+    assert all(first == second for _, first, second in changes)
     assert all(x1 == x2 and v1 == v2 for _, (x1, v1, x2, v2), _ in rows)
 
 
-def test_two_riders_on_one_carrier_break_away_and_stop_together(mine):
+def test_two_riders_on_one_carrier_break_away_and_stop_together(custom_model):
     (carrier, a), (one, b) = body("0", "F1 + F2 - 3.0 * k * x0", 3.0), body("1", "k * (p - x1) - F1", 1.3)
     two, c = body("2", "k * (p - x2) - F2", 1.3)
     both = contact("1", "v1 - v0", 7.0, 10.0) + contact("2", "v2 - v0", 7.0, 10.0)
-    found, rows = events(mine(*carrier, *one, *two, DRIVER, *both, a, b, c, methods=["dop853"]), DOP853, 1e-10, 8.0)
-    assert len(found) > 5
-    assert all(first == second for _, first, second in found)
+    changes, rows = events(
+        custom_model(*carrier, *one, *two, DRIVER, *both, a, b, c, methods=["dop853"]), DOP853, 1e-10, 8.0
+    )
+    assert len(changes) > 5
+    assert all(first == second for _, first, second in changes)
     assert max(abs(y[2] - y[4]) for _, y, _ in rows) < 1e-12
 
 
-def test_the_order_of_declaration_does_not_matter(mine):
+def test_the_order_of_declaration_does_not_matter(custom_model):
     """Three stacked blocks, driven from both sides: at first all contacts carry the same load and have the same
     limit."""
     laws = {"1": "F2 - F1 - k * x1", "2": "F3 - F2", "3": "k * (p - x3) - F3"}
@@ -99,13 +101,13 @@ def test_the_order_of_declaration_does_not_matter(mine):
         bodies = [body(name, laws[name], 2.0) for name in order]
         lines = [line for states, _ in bodies for line in states] + [DRIVER]
         lines += [line for name in order for line in contact(name, *contacts[name])] + [law for _, law in bodies]
-        models.append((mine(*lines), order))
+        models.append((custom_model(*lines), order))
     for method in ODE45, DOP853, RODAS:
-        seen = []
+        results = []
         for model, order in models:
-            found, _ = events(model, method, 1e-9, 6.0)
-            seen.append([(t, *(modes[order.index(name)] for name in "123")) for t, *modes in found])
-        first, other = seen
+            changes, _ = events(model, method, 1e-9, 6.0)
+            results.append([(t, *(modes[order.index(name)] for name in "123")) for t, *modes in changes])
+        first, other = results
         assert len(first) > 10
         assert [modes for _, *modes in other] == [modes for _, *modes in first]
         assert np.abs(np.array([t for t, *_ in other]) - [t for t, *_ in first]).max() < 1e-8
@@ -115,29 +117,29 @@ STEPS = [(DOP853, 1e-3), (DOP853, 1e-6), (DOP853, 1e-9), (ODE45, 1e-4), (ODE23, 
 
 
 @pytest.mark.parametrize(("method", "rtol"), STEPS)
-def test_a_load_that_peaks_inside_a_step_is_detected(mine, method, rtol):
+def test_a_load_that_peaks_inside_a_step_is_detected(custom_model, method, rtol):
     """A free mass shakes a block held by friction with up to 10 N: 10 % to 0.01 % above the limit, or as far as the
     method resolves it."""
     (free, a), (held, b) = body("1", "-k * (x1 - x2)", 1.0), body("2", "k * (x1 - x2) - F2", 5.0)
     hold = 'most = Parameter(9.0, "N", "what is held", above=0.0)'
     free[1] = free[1].replace('"speed of 1"', '"speed of 1", start=1.0')
-    model = mine(hold, *free, *held, *contact("2", "v2", "0.9 * most", "most"), a, b)
+    model = custom_model(hold, *free, *held, *contact("2", "v2", "0.9 * most", "most"), a, b)
     model.k = 100.0
     inside = 0
     for i in range(40):
         model.most = 10.0 * (1.0 - max(10.0 ** -(1.0 + 3.0 * i / 40), 3.0 * rtol))
-        found, rows = events(model, method, rtol, 1.0)
-        assert found, model.most
-        assert abs(found[0][0] - asin(model.most / 10.0) / 10.0) < max(30.0 * rtol, 1e-8) ** 0.5
-        before = [t for t, _, _ in rows if t < found[0][0]]
-        inside += model.solver.step.active_method.stages > 0 and (before[-1] if before else 0.0) < found[0][0] - 1e-3
+        result, rows = events(model, method, rtol, 1.0)
+        assert result, model.most
+        assert abs(result[0][0] - asin(model.most / 10.0) / 10.0) < max(30.0 * rtol, 1e-8) ** 0.5
+        before = [t for t, _, _ in rows if t < result[0][0]]
+        inside += model.solver.step.active_method.stages > 0 and (before[-1] if before else 0.0) < result[0][0] - 1e-3
     assert inside > 20
 
 
 GAUSS = np.polynomial.legendre.leggauss(8)
 
 
-def integrated(model, power, stop):
+def integrate_power(model, power, stop):
     """Return the integral of `power`, a function of states and forces, over all steps of a run."""
     prepared_model(
         model, {"solver.method": DOP853, "solver.rtol": 1e-12, "solver.atol": 1e-15, "solver.h_max": 0.02}, stop
@@ -148,8 +150,8 @@ def integrated(model, power, stop):
     while step.t1 < stop:
         assert step.compute_next(model) == 0
         h = step.t1 - step.t0
-        for place, weight in zip(*GAUSS, strict=True):
-            t = step.t0 + 0.5 * h * (1.0 + place)
+        for node, weight in zip(*GAUSS, strict=True):
+            t = step.t0 + 0.5 * h * (1.0 + node)
             y = step.state_at(model, t)
             forces = model.contact_forces(t, *y, *(getattr(step, mode) for mode in modes))[: len(modes)]
             total += 0.5 * h * weight * np.array(power(t, y, forces))
@@ -164,7 +166,7 @@ def test_a_clutch_conserves_momentum_and_dissipates_the_slip_power():
         first, second = 20.0 - 0.05 * a, 5.0 + 0.2 * b
         return first - second, first * a - second * b - forces[0] * (a - b)
 
-    (impulse, work), (a, b) = integrated(lowered_model(FILES["clutch"])(), power, 4.0)
+    (impulse, work), (a, b) = integrate_power(lowered_model(FILES["clutch"])(), power, 4.0)
     assert 0.5 * a + 1.5 * b == pytest.approx(25.0 + impulse, abs=1e-10)
     assert 0.25 * a * a + 0.75 * b * b == pytest.approx(625.0 + work, abs=1e-9)
 
@@ -174,7 +176,7 @@ def test_stacked_blocks_balance_work_and_dissipation():
         _, v1, x2, v2 = y
         return 400.0 * (0.2 * t - x2) * v2 - forces[0] * v1 - forces[1] * (v2 - v1)
 
-    work, (x1, v1, _, v2) = integrated(lowered_model(FILES["blocks"])(), power, 8.0)
+    work, (x1, v1, _, v2) = integrate_power(lowered_model(FILES["blocks"])(), power, 8.0)
     assert 2.0 * v1 * v1 + v2 * v2 + 75.0 * x1 * x1 == pytest.approx(work, abs=1e-9)
 
 
@@ -191,11 +193,11 @@ def test_a_stuck_contact_keeps_zero_slip():
         assert held > 5
 
 
-def test_several_drivers_each_pull_at_their_own_speed(mine):
+def test_several_drivers_each_pull_at_their_own_speed(custom_model):
     """A mass between two drivers; the second starts at another position, and its speed is an expression."""
     another = 'q = State("m", "another", start=0.3, rate=0.5 * u)'
     (one, a) = body("1", "k * (p - x1) + k * (q - x1)", 1.0)
-    model = mine(*one, DRIVER, another, a, methods=["dop853"])
+    model = custom_model(*one, DRIVER, another, a, methods=["dop853"])
     _, rows = events(model, DOP853, 1e-11, 2.0)
     w = 600.0**0.5
     for t, (x, v, q), _ in rows:
@@ -215,20 +217,20 @@ LAWS = {
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_laws_without_modes_depend_on_each_slip(mine, law):
+def test_laws_without_modes_depend_on_each_slip(custom_model, law):
     """Rates, outputs and Jacobian are those of the modes given by the slips; the threshold law holds at most the
     limit."""
-    words, told = LAWS[law]
+    words, expected_modes = LAWS[law]
     (one, a), (two, b) = body("1", "F2 - F1 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
     both = [line.replace("hold=", f"{words}, hold=") for line in contact("1", "v1", 9.0, 12.0)]
     both += [line.replace("hold=", f"{words}, hold=") for line in contact("2", "v2 - v1", 6.0, 8.0)]
-    model, draw, clipped = mine(*one, *two, DRIVER, *both, a, b, methods=["ode23"]), np.random.default_rng(2), 0
+    model, draw, clipped = custom_model(*one, *two, DRIVER, *both, a, b, methods=["ode23"]), np.random.default_rng(2), 0
     assert model.prepare() == 0
     for _ in range(200):
         y = draw.uniform(-0.05, 0.05, 4) * [1.0, draw.choice([0.0, 0.1, 1.0]), 1.0, draw.choice([0.1, 1.0])]
         model.friction = 1
         slips = np.array(model.slip_velocities(0.0, *y))
-        modes = [int(told(slip)) for slip in slips]
+        modes = [int(expected_modes(slip)) for slip in slips]
         forces = np.array(model.contact_forces(0.0, *y, *modes)[:2])
         if law == SIGN:
             forces = np.sign(slips) * [9.0, 6.0]
@@ -250,14 +252,14 @@ def test_laws_without_modes_depend_on_each_slip(mine, law):
 
 
 @pytest.mark.parametrize("bodies", [1, 2])
-def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(mine, bodies):
+def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(custom_model, bodies):
     """It agrees with differences of the rates, on the limit and below, so that rodas takes few steps."""
     (one, a), (two, b) = body("1", "k * (p - x1) - F1" + " + F2" * (bodies - 1), 1.0), body("2", "-F2 - k * x2", 1.0)
     both = contact("1", "v1", "f + w * x1", "1.5 * f + 2.0 * w * x1") + contact("2", "v2 - v1", "f", "2.0 * f")
     declared = ['f = Parameter(6.0, "N", "friction")', 'w = Parameter(40.0, "N/m", "how it grows")', DRIVER, *one]
     lines = [line.replace("hold=", f"{LAWS[THRESHOLD][0]}, hold=") for line in both]
     lines = [*declared, *two, *lines, a, b] if bodies == 2 else [*declared, *lines[:2], a]
-    model, draw, many = mine(*lines, methods=["rodas"]), np.random.default_rng(3), 2 * bodies
+    model, draw, many = custom_model(*lines, methods=["rodas"]), np.random.default_rng(3), 2 * bodies
     assert model.prepare() == 0
     model.friction, limited = THRESHOLD, 0
     for _ in range(200):
@@ -266,7 +268,7 @@ def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(mine, bodies)
         for moved in 1e-7 * np.eye(many):
             ahead, behind = (np.ravel(model.rates(0.1, *(y + way), *[0] * bodies)) for way in (moved, -moved))
             slopes.append((ahead - behind) / 2e-7)
-        found = np.reshape(model.jacobian(0.1, *y, *[0] * bodies), (bodies, many + 1))
-        assert np.abs(found[:, 1:].T - slopes).max() < 1e-5
+        actual = np.reshape(model.jacobian(0.1, *y, *[0] * bodies), (bodies, many + 1))
+        assert np.abs(actual[:, 1:].T - slopes).max() < 1e-5
         limited += bool(abs(slopes[0][0]) < 300.0)
     assert 20 < limited < 180

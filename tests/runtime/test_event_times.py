@@ -9,14 +9,14 @@ DIGITS = 50
 PLACES = 4  # units in the last place of the time
 
 
-def late(fmu, values, start, stop):
+def fmu_at(fmu, values, start, stop):
     """Return the FMU at the time stop, after a few communication steps."""
     fmu.begin(values, start=start)
     times = [start + (stop - start) * i / 10 for i in range(10)] + [stop]
     return fmu.run(times, ["events.count", "events.t_last", "x"])[-1]
 
 
-def close(t, true):
+def assert_close_times(t, true):
     return abs(mpf(t) - true) <= PLACES * ulp(t)
 
 
@@ -38,10 +38,10 @@ def test_half_cycles_of_a_mass_with_little_friction_end_on_time(worker, backend_
         half, loss = pi * sqrt(m / k), 2 * mpf(f) / k
         stop = float((number + mpf("0.25")) * half)
         fmu = worker.instantiate(backend_fmus / "coulomb.fmu")
-        count, t, x = late(fmu, {"f": f, **values}, 0.0, stop)
+        count, t, x = fmu_at(fmu, {"f": f, **values}, 0.0, stop)
         fmu.free()
         assert count == number
-        assert close(t, number * half)
+        assert assert_close_times(t, number * half)
         turned = (-1) ** number * (mpf(0.1) - number * loss)
         rest = sign(turned) * loss / 2
         assert abs(x - (rest + (turned - rest) * cos((mpf(stop) - number * half) * pi / half))) < 1e-9 * 0.1
@@ -67,18 +67,18 @@ def test_slips_of_the_sled_end_on_time(worker, backend_fmus, sled, start):
     """
     with workdps(DIGITS):
         number = 100_000
-        given = {"m": 12.5, "k": 742.5, "g": 9.81, "mu_s": 0.9, "mu_d": 0.6, "v_driver": 0.034, **SLEDS[sled]}
-        m, k, g, mu_s, mu_d, v = (mpf(value) for value in given.values())
+        parameters = {"m": 12.5, "k": 742.5, "g": 9.81, "mu_s": 0.9, "mu_d": 0.6, "v_driver": 0.034, **SLEDS[sled]}
+        m, k, g, mu_s, mu_d, v = (mpf(value) for value in parameters.values())
         h, d, w, u = mu_s * m * g / k, mu_d * m * g / k, sqrt(k / m), abs(v)
         slip, stick = 2 * (pi - atan2(w * (h - d), u)) / w, 2 * (h - d) / u
         first = mpf(start) + h / u
         last = first + (number - 1) * (slip + stick)
         stop = float(last + slip + stick / 2)
         fmu = worker.instantiate(backend_fmus / "stickslip.fmu")
-        count, t, x = late(fmu, SLEDS[sled], start, stop)
+        count, t, x = fmu_at(fmu, SLEDS[sled], start, stop)
         fmu.free()
         assert count == 2 * number
-        assert close(t, last + slip)
+        assert assert_close_times(t, last + slip)
         way = number * (slip + stick) * v
         assert abs(x - way) < 1e-9 * 0.1
-        assert close(x, way)
+        assert assert_close_times(x, way)

@@ -36,10 +36,10 @@ def compare(launch, name, values, x0=0.0, v0=0.0, start=0.0, run=4.0, points=100
 
 def same_events(fmu, events, start, stop):
     times, rows = fmu.follow(start, stop, ["events.count", "events.t_last", "mode"])
-    seen = [(t, mode) for (before, *_), (after, t, mode) in pairwise(rows) if after > before]
+    changes = [(t, mode) for (before, *_), (after, t, mode) in pairwise(rows) if after > before]
     assert rows[-1][0] == len(events)
-    assert [mode for _, mode in seen] == [mode for _, mode in events]
-    for (t, _), (true, _) in zip(seen, events, strict=True):
+    assert [mode for _, mode in changes] == [mode for _, mode in events]
+    for (t, _), (true, _) in zip(changes, events, strict=True):
         assert abs(t - true) <= EVENTS * max(abs(true), abs(start))
         assert t in times
 
@@ -112,8 +112,8 @@ def test_each_coulomb_cycle_loses_4_f_over_k_of_amplitude(launch):
 )
 def test_a_stuck_mass_does_not_move_in_a_million_seconds(launch, name, values):
     fmu = launch(name, values, stop=1e6)
-    place, speed = ("theta", "omega") if name == "pendulum" else ("x", "v")
-    rows = fmu.run([0.0, 1e-3, 1.0, 31557.6, 1e6], [place, speed, "mode", "events.count"])
+    position, speed = ("theta", "omega") if name == "pendulum" else ("x", "v")
+    rows = fmu.run([0.0, 1e-3, 1.0, 31557.6, 1e6], [position, speed, "mode", "events.count"])
     rest = values["theta0" if name == "pendulum" else "x0"]
     assert rows == [[rest, 0.0, 0, 0]] * 5
 

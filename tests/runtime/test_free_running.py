@@ -12,20 +12,20 @@ SLED = [case for case in CASES if "x_driver" in outputs(case[0])]
 
 
 @pytest.fixture(scope="module")
-def found():
+def cache():
     """Cache of the results of `following`."""
     return {}
 
 
 @pytest.fixture
-def following(launch, found):
+def following(launch, cache):
     """Return following(case): the ends of all internal steps, with counters and step sizes."""
 
     def following(case):
         name, values, stop = case
-        if label(case) not in found:
-            found[label(case)] = launch(name, values, stop=stop).follow(0.0, stop, ["solver.steps", "solver.h"])
-        return found[label(case)]
+        if label(case) not in cache:
+            cache[label(case)] = launch(name, values, stop=stop).follow(0.0, stop, ["solver.steps", "solver.h"])
+        return cache[label(case)]
 
     return following
 
@@ -102,12 +102,12 @@ def test_the_effective_step_size_is_finite_and_unaffected_by_lookahead_and_setti
     for share in (0.0, 0.3, 0.7):
         fmu, t = launch(name, values), share * stop
         fmu.run([0.0, t][: 1 + (t > 0.0)], [])
-        told = fmu.get("solver.h")
-        assert 0.0 <= told < inf
-        assert (told > 0.0) == (t > 0.0)
+        step_size = fmu.get("solver.h")
+        assert 0.0 <= step_size < inf
+        assert (step_size > 0.0) == (t > 0.0)
         fmu.set({force: size})
-        found = [fmu.get("solver.h"), fmu.get("solver.t_next", "solver.h")[1], fmu.get("solver.h")]
-        assert found == [told] * 3
+        step_sizes = [fmu.get("solver.h"), fmu.get("solver.t_next", "solver.h")[1], fmu.get("solver.h")]
+        assert step_sizes == [step_size] * 3
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
@@ -187,21 +187,21 @@ def test_outputs_satisfy_force_and_energy_balance(launch, case):
     fmu = launch(name, {**values, force: size / 50}, stop=stop)
     value = dict(zip(parameters(name), fmu.get(*parameters(name)), strict=True))
     for row in fmu.run([stop * i / 200 for i in range(201)], outputs(name)):
-        seen = dict(zip(outputs(name), row, strict=True))
+        readings = dict(zip(outputs(name), row, strict=True))
         if name == "pendulum":
             weight, inertia = value["m"] * value["g"] * value["a"], value["J_G"] + value["m"] * value["a"] ** 2
-            drive = value["T_ext"] - weight * sin(seen["theta"]) - seen["T_friction"]
-            assert inertia * seen["alpha"] == pytest.approx(drive, rel=1e-9, abs=1e-14)
-            energy = inertia * seen["omega"] ** 2 / 2 + weight * (1 - cos(seen["theta"]))
+            drive = value["T_ext"] - weight * sin(readings["theta"]) - readings["T_friction"]
+            assert inertia * readings["alpha"] == pytest.approx(drive, rel=1e-9, abs=1e-14)
+            energy = inertia * readings["omega"] ** 2 / 2 + weight * (1 - cos(readings["theta"]))
         else:
             forces = ("F_spring", "F_damper")
-            drive = value["F_ext"] + sum(seen.get(f, 0.0) for f in forces) - seen.get("F_friction", 0.0)
-            drive -= value.get("c", 0.0) * seen["v"] if "F_damper" not in seen else 0.0
-            stretch = seen.get("x_driver", 0.0) - seen["x"]
-            assert seen["F_spring"] == pytest.approx(value["k"] * stretch, rel=1e-12, abs=1e-12)
-            assert value["m"] * seen["a"] == pytest.approx(drive, rel=1e-9, abs=1e-11)
-            energy = value["m"] * seen["v"] ** 2 / 2 + value["k"] * stretch**2 / 2
-        assert seen["energy"] == pytest.approx(energy, rel=1e-9, abs=1e-14)
-        if "mode" in seen:
+            drive = value["F_ext"] + sum(readings.get(f, 0.0) for f in forces) - readings.get("F_friction", 0.0)
+            drive -= value.get("c", 0.0) * readings["v"] if "F_damper" not in readings else 0.0
+            stretch = readings.get("x_driver", 0.0) - readings["x"]
+            assert readings["F_spring"] == pytest.approx(value["k"] * stretch, rel=1e-12, abs=1e-12)
+            assert value["m"] * readings["a"] == pytest.approx(drive, rel=1e-9, abs=1e-11)
+            energy = value["m"] * readings["v"] ** 2 / 2 + value["k"] * stretch**2 / 2
+        assert readings["energy"] == pytest.approx(energy, rel=1e-9, abs=1e-14)
+        if "mode" in readings:
             _, speed, acceleration = row[:3]
-            assert seen["mode"] * speed > 0 or seen["mode"] * acceleration >= 0 == speed or abs(speed) < CHATTER
+            assert readings["mode"] * speed > 0 or readings["mode"] * acceleration >= 0 == speed or abs(speed) < CHATTER

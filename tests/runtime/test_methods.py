@@ -223,9 +223,9 @@ def speed_after_one(damper, h=1.0):
 
 
 def test_rodas_is_l_stable():
-    left = [speed_after_one(10.0**n) for n in range(2, 15, 2)]
-    assert all(after < before for before, after in pairwise(left))
-    assert left[-1] < 1e-12
+    speeds = [speed_after_one(10.0**n) for n in range(2, 15, 2)]
+    assert all(after < before for before, after in pairwise(speeds))
+    assert speeds[-1] < 1e-12
 
 
 def test_rodas_never_amplifies_an_undamped_oscillator():

@@ -20,11 +20,11 @@ EVEN = {  # binary fractions, so that load and limit are equal
 def test_a_constant_load_sticks_at_the_limit_and_slips_beyond_it(launch, case):
     name, choices, stop = case
     values, force, limit = EVEN[name]
-    place, speed = outputs(name)[:2]
+    position, speed = outputs(name)[:2]
     for sign in (1.0, -1.0):
-        steady = {**choices, **values, f"{place}0": 0.0}
+        steady = {**choices, **values, f"{position}0": 0.0}
         fmu = launch(name, {**steady, force: sign * limit}, stop=stop)
-        rows = fmu.run([0.0, 1e-6, stop / 3, stop], [place, speed, "mode", "events.count"])
+        rows = fmu.run([0.0, 1e-6, stop / 3, stop], [position, speed, "mode", "events.count"])
         assert rows == [[0.0, 0.0, 0, 0]] * 4
         fmu = launch(name, {**steady, force: sign * limit * (1.0 + 1e-9)}, stop=stop)
         assert fmu.run([0.0, 1e-6], ["mode"])[-1] == [sign]

@@ -34,14 +34,14 @@ SCENES = {
 
 def spans(make, values, changes):
     """Return (time, parameters) of every span between changes."""
-    found = [(0.0, make(**values))]
+    result = [(0.0, make(**values))]
     for t in sorted(changes):
         values = {**values, **changes[t]}
-        found.append((t, make(**values)))
-    return found
+        result.append((t, make(**values)))
+    return result
 
 
-def against_evidence(launch, name, values, changes, solvers):
+def assert_agrees_with_reference(launch, name, values, changes, solvers):
     """Compare a run with each of `solvers`, (settings, bound relative to the largest value), with the independent
     solution."""
     x0, stop = (0.0, 16.0) if name == "stickslip" else (0.1, 4.0)
@@ -64,7 +64,7 @@ def against_evidence(launch, name, values, changes, solvers):
 @pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
 def test_a_changed_value_acts_from_its_communication_point_on(launch, scene):
     solvers = [({"solver.method": EXACT}, 1e-13), ({"solver.method": ODE23, "solver.rtol": 1e-8}, 1e-5)]
-    against_evidence(launch, *scene, solvers)
+    assert_agrees_with_reference(launch, *scene, solvers)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -74,7 +74,7 @@ def test_a_sled_with_randomly_changing_values_agrees_with_the_closed_form(launch
     ranges = {"m": (5, 30), "k": (200, 2000), "mu_s": (0.7, 1.1), "mu_d": (0.2, 0.65), "v_driver": (-0.3, 0.3)}
     ranges["F_ext"] = (-60, 60)
     changes = {draw(0.0, 16.0): {name: draw(*ranges[name])} for name in 2 * list(ranges)}
-    against_evidence(launch, "stickslip", {}, changes, [({"solver.method": EXACT}, 3e-13)])
+    assert_agrees_with_reference(launch, "stickslip", {}, changes, [({"solver.method": EXACT}, 3e-13)])
 
 
 @pytest.mark.parametrize("load", [1, 2], ids=["weight", "reaction"])

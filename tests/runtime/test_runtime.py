@@ -87,72 +87,73 @@ def test_every_while_loop_is_bounded_by_a_counter(name):
 
 def slave(name, values=None, stop=4.0):
     """Return a slave in this process, after initialisation."""
-    made = runtime(name, "slave").make_slave_class(model_class(name))(instance_name="inside")
-    for reference, (variable, declaration) in enumerate(variables(made.model)):
+    instance = runtime(name, "slave").make_slave_class(model_class(name))(instance_name="inside")
+    for reference, (variable, declaration) in enumerate(variables(instance.model)):
         if variable in (values or {}):
-            write = made.set_real if declaration.type == "Real" else made.set_integer
+            write = instance.set_real if declaration.type == "Real" else instance.set_integer
             write([reference], [values[variable]])
-    made.setup_experiment(0.0, stop, None)
-    made.enter_initialization_mode()
-    made.exit_initialization_mode()
-    return made
+    instance.setup_experiment(0.0, stop, None)
+    instance.enter_initialization_mode()
+    instance.exit_initialization_mode()
+    return instance
 
 
-def read(made, *names):
+def read(instance, *names):
     """Return values of Reals and Integers by name."""
-    references = {v: i for i, (v, _) in enumerate(variables(made.model))}
-    kinds = dict(variables(made.model))
+    references = {v: i for i, (v, _) in enumerate(variables(instance.model))}
+    kinds = dict(variables(instance.model))
     return [
-        (made.get_real if kinds[name].type == "Real" else made.get_integer)([references[name]])[0] for name in names
+        (instance.get_real if kinds[name].type == "Real" else instance.get_integer)([references[name]])[0]
+        for name in names
     ]
 
 
-def shape(thing, path, seen):
+def number_paths(thing, path, seen):
     """Return path and type of every number in an object, which must own all its objects alone."""
     assert id(thing) not in seen, f"{path} is owned twice"
     seen.add(id(thing))
-    found = {}
+    numbers = {}
     for name, value in vars(thing).items():
-        here = f"{path}.{name}"
+        member_path = f"{path}.{name}"
         if hasattr(value, "__dict__"):
-            found |= shape(value, here, seen)
+            numbers |= number_paths(value, member_path, seen)
         elif isinstance(value, list):
-            found[here] = (len(value), *map(type, value))
+            numbers[member_path] = (len(value), *map(type, value))
         else:
-            assert type(value) in (float, int, bool), f"{here} is {value!r}"
-            found[here] = type(value)
-    return found
+            assert type(value) in (float, int, bool), f"{member_path} is {value!r}"
+            numbers[member_path] = type(value)
+    return numbers
 
 
 @pytest.mark.parametrize("case", CASES, ids=label)
 def test_attributes_are_created_in_init_and_keep_their_type(case):
     """So that a flat copy of the numbers is the complete state."""
     name, values, stop = case
-    made = slave(name, values, stop)
-    born = shape(model_class(name)(), name, set())
+    instance = slave(name, values, stop)
+    born = number_paths(model_class(name)(), name, set())
     for i in range(8):
-        assert made.do_step(i * stop / 8, stop / 8)
-        read(made, *declared(name))
-        assert shape(made.model, name, set()) == born
+        assert instance.do_step(i * stop / 8, stop / 8)
+        read(instance, *declared(name))
+        assert number_paths(instance.model, name, set()) == born
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction") == 1], ids=label)
 def test_turning_points_are_located_to_the_last_bit(case):
     """One float earlier the mass still moves the old way."""
     name, values, stop = case
-    made, turns = slave(name, values, stop), 0
-    step, t = made.model.solver.step, 0.0
+    instance, turns = slave(name, values, stop), 0
+    step, t = instance.model.solver.step, 0.0
     while t < stop:
-        (ahead,) = read(made, "solver.t_next")
+        (ahead,) = read(instance, "solver.t_next")
         mode, waiting, event = step.mode0, step.is_stuck, step.event_at_end
         if event and not waiting:
-            before, after = (step.state_at(made.model, s)[1] for s in (nextafter(ahead, 0.0), ahead))
+            before, after = (step.state_at(instance.model, s)[1] for s in (nextafter(ahead, 0.0), ahead))
             assert mode * before > 0.0
             assert mode * after <= 0.0 or values["solver.method"] == 1  # the closed form rounds independently
             turns += 1
-        assert made.do_step(t, ahead - t)
+        assert instance.do_step(t, ahead - t)
         if event:
-            speed = read(made, outputs(name)[1])
+            speed = read(instance, outputs(name)[1])
             assert speed == [0.0]
         t = ahead
     assert turns >= 3
@@ -161,19 +162,19 @@ def test_turning_points_are_located_to_the_last_bit(case):
 @pytest.mark.parametrize("name", MODELS)
 def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
     """One message, then NaN."""
-    made = slave(name)
-    assert made.do_step(0.0, 0.1)
+    instance = slave(name)
+    assert instance.do_step(0.0, 0.1)
 
     def broken(*_):
         raise RuntimeError("100 % broken")
 
-    monkeypatch.setattr(type(made.model), "compute_outputs", broken)
-    monkeypatch.setattr(type(made.model), "prepare", broken)
-    made.set_real([list(declared(name)).index("m")], [2.0])
-    assert made.do_step(0.1, 0.1) is False
-    assert all(isnan(value) for value in read(made, *[v for v in outputs(name) if v != "mode"]))
-    assert made.do_step(0.1, 0.1) is False
-    (message,) = made.log_queue
+    monkeypatch.setattr(type(instance.model), "compute_outputs", broken)
+    monkeypatch.setattr(type(instance.model), "prepare", broken)
+    instance.set_real([list(declared(name)).index("m")], [2.0])
+    assert instance.do_step(0.1, 0.1) is False
+    assert all(isnan(value) for value in read(instance, *[v for v in outputs(name) if v != "mode"]))
+    assert instance.do_step(0.1, 0.1) is False
+    (message,) = instance.log_queue
     assert "100 %% broken" in message.msg  # the native layer takes it for a printf format
     (line,) = capfd.readouterr().err.splitlines()
     assert "100 % broken" in line
@@ -181,26 +182,26 @@ def test_no_exception_reaches_the_host(name, monkeypatch, capfd):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_run_whose_initialisation_ends_twice_continues(name):
-    once, twice = slave(name), slave(name)
-    for made in once, twice:
-        assert made.do_step(0.0, 0.1)
-    twice.exit_initialization_mode()
-    assert read(twice, *outputs(name)) == read(once, *outputs(name))
-    for made in once, twice:
-        assert made.do_step(0.1, 0.1)
-    assert read(twice, *outputs(name)) == pytest.approx(read(once, *outputs(name)), rel=1e-4)
+    once, finished_twice = slave(name), slave(name)
+    for instance in once, finished_twice:
+        assert instance.do_step(0.0, 0.1)
+    finished_twice.exit_initialization_mode()
+    assert read(finished_twice, *outputs(name)) == read(once, *outputs(name))
+    for instance in once, finished_twice:
+        assert instance.do_step(0.1, 0.1)
+    assert read(finished_twice, *outputs(name)) == pytest.approx(read(once, *outputs(name)), rel=1e-4)
 
 
 def test_cached_reference_lists_are_bounded():
     """If an importer always reads other lists, only some readers are cached."""
-    made, draw = slave("stickslip"), random.Random(1)
+    instance, draw = slave("stickslip"), random.Random(1)
     reals = [i for i, d in enumerate(declared("stickslip").values()) if d.type == "Real"]
 
     def ask(times):
         for _ in range(times):
-            asked = draw.choices(reals, k=8)
-            assert len(made.get_real(asked)) == 8
-        assert len(made.readers) <= runtime("stickslip", "variable_access").MAX_READERS
+            references = draw.choices(reals, k=8)
+            assert len(instance.get_real(references)) == 8
+        assert len(instance.readers) <= runtime("stickslip", "variable_access").MAX_READERS
 
     ask(200)
     tracemalloc.start()
@@ -214,20 +215,20 @@ def test_cached_reference_lists_are_bounded():
 
 def test_an_endless_run_is_stopped_with_a_message(monkeypatch, capfd):
     monkeypatch.setattr(runtime("pacejka", "integrator"), "MAX_BATCHES", 2)
-    made = slave("pacejka", {"solver.method": 2}, stop=16.0)
-    assert made.do_step(0.0, 16.0) is False
+    instance = slave("pacejka", {"solver.method": 2}, stop=16.0)
+    assert instance.do_step(0.0, 16.0) is False
     assert "internal steps" in capfd.readouterr().err
-    assert isnan(read(made, "x")[0])
+    assert isnan(read(instance, "x")[0])
 
 
 def test_the_cost_of_many_events_is_bounded(monkeypatch, capfd):
     """A swing of the pendulum takes as many event evaluations as right-hand sides."""
     integrator = runtime("pendulum", "integrator")
     monkeypatch.setattr(integrator, "MAX_EVALUATIONS", 20 * integrator.BATCH_STEPS)
-    made = slave("pendulum", {"mu": 0.0}, stop=1e7)
-    assert made.do_step(0.0, 1e7) is False
+    instance = slave("pendulum", {"mu": 0.0}, stop=1e7)
+    assert instance.do_step(0.0, 1e7) is False
     assert "right-hand sides" in capfd.readouterr().err
-    step = made.model.solver.step
+    step = instance.model.solver.step
     assert (
         step.n_accepted == 1 + 2 * integrator.BATCH_STEPS
     )  # with twelve right-hand sides and some event evaluations each
@@ -236,15 +237,15 @@ def test_the_cost_of_many_events_is_bounded(monkeypatch, capfd):
 
 def test_a_solver_without_progress_is_stopped_with_a_message(capfd):
     """At the tightest tolerances the sign law requires steps below the rounding of the time."""
-    made = slave("coulomb", {"friction": SIGN, "solver.method": 2, "solver.rtol": 1e-15})
-    assert made.do_step(0.0, 4.0) is False
+    instance = slave("coulomb", {"friction": SIGN, "solver.method": 2, "solver.rtol": 1e-15})
+    assert instance.do_step(0.0, 4.0) is False
     assert len(capfd.readouterr().err.splitlines()) == 1
-    assert isnan(read(made, "x")[0])
+    assert isnan(read(instance, "x")[0])
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_hot_objects_have_fewer_attributes_than_the_inline_limit_of_cpython(name, fmus):
     """With thirty attributes a step takes 10 % longer (Python 3.11)."""
     solver = load_model_class(fmus / f"{name}.fmu")().solver
-    sizes = {type(each).__name__: len(vars(each)) for each in (solver, solver.step, solver.step.interpolant)}
+    sizes = {type(item).__name__: len(vars(item)) for item in (solver, solver.step, solver.step.interpolant)}
     assert max(sizes.values()) < 30, sizes

@@ -61,31 +61,33 @@ def pair(worker, fmus):
 
 def answers(pair, name, values, start, stop, read):
     """Return the results of both backends, which must agree bit for bit."""
-    found = []
+    results = []
     for worker, folder in pair:
         fmu = worker.instantiate(folder / f"{name}.fmu")
-        found.append(read(fmu.begin(values, start=start, stop=stop)))
+        results.append(read(fmu.begin(values, start=start, stop=stop)))
         fmu.free()
-    assert found[0] == found[1]
-    return found[0]
+    assert results[0] == results[1]
+    return results[0]
 
 
 def events(fmu, start, stop):
     """Return time and new mode of each change."""
     _, rows = fmu.follow(start, stop, ["events.count", "events.t_last", "mode"])
-    seen = [(t, mode) for (before, *_), (after, t, mode) in pairwise(rows) if after > before]
-    assert rows[-1][0] == len(seen)
-    return seen
+    changes = [(t, mode) for (before, *_), (after, t, mode) in pairwise(rows) if after > before]
+    assert rows[-1][0] == len(changes)
+    return changes
 
 
 @pytest.mark.parametrize(("name", "seed"), [*product(["coulomb", "stickslip"], range(40))])
 def test_every_tie_ends_as_in_the_closed_form(pair, name, seed):
     values, start, stop = case(name, seed)
-    given = {key: value for key, value in values.items() if key not in ("x0", "v0")}
-    motion = ClosedFormMotion([(start, getattr(independent_solution, name)(**given))], values["x0"], values["v0"], stop)
-    seen = answers(pair, name, values, start, stop, lambda fmu: events(fmu, start, stop))
-    assert [mode for _, mode in seen] == [mode for _, mode in motion.events]
-    for (t, _), (true, _) in zip(seen, motion.events, strict=True):
+    parameters = {key: value for key, value in values.items() if key not in ("x0", "v0")}
+    motion = ClosedFormMotion(
+        [(start, getattr(independent_solution, name)(**parameters))], values["x0"], values["v0"], stop
+    )
+    changes = answers(pair, name, values, start, stop, lambda fmu: events(fmu, start, stop))
+    assert [mode for _, mode in changes] == [mode for _, mode in motion.events]
+    for (t, _), (true, _) in zip(changes, motion.events, strict=True):
         assert abs(t - true) <= EVENTS * max(abs(true), abs(start))
     times = [start + (stop - start) * i / 20 for i in range(21)]
     rows = answers(pair, name, values, start, stop, lambda fmu: fmu.run(times, ["x", "v"]))
@@ -109,11 +111,11 @@ TOUCHES = [  # covers every pair of method, values and start
 def test_a_speed_that_only_touches_zero_is_no_rest_and_no_event(pair, method, values, start):
     stop = start + 30.0
     values = {**values, "solver.method": method, "solver.rtol": 1e-5}
-    seen = answers(pair, "stickslip", values, start, stop, lambda fmu: events(fmu, start, stop))
-    assert [mode for _, mode in seen] == ([] if values.get("g") == 0.0 or values.get("mu_s") == 0.0 else [1])
+    changes = answers(pair, "stickslip", values, start, stop, lambda fmu: events(fmu, start, stop))
+    assert [mode for _, mode in changes] == ([] if values.get("g") == 0.0 or values.get("mu_s") == 0.0 else [1])
 
 
-def any_sled(draw):
+def random_sled(draw):
     """Return values without friction or with equal friction while sliding, a start time, and the end of twenty
     touches."""
     mu, friction = draw.uniform(0.05, 2.0), draw.choice(("none", "weightless", "equal"))
@@ -130,7 +132,7 @@ def any_sled(draw):
 def test_speeds_that_touch_zero_continue_for_any_values(pair):
     draw = random.Random(1)
     for _ in range(150):
-        values, start, stop = any_sled(draw)
+        values, start, stop = random_sled(draw)
         ends = methodcaller("run", [start, stop], ["events.count", "mode"])
         _, (count, mode) = answers(pair, "stickslip", values, start, stop, ends)
         assert count == (1 if values["mu_s"] * values["g"] else 0)
@@ -183,14 +185,17 @@ def test_a_mass_slowed_only_by_a_damper_never_stops(pair, method, seed):
 @pytest.mark.parametrize("values", FRICTIONLESS, ids=str)
 def test_values_set_again_at_a_touch_cause_no_event(pair, values):
     """Communication points fall near and on the touches; each sets an input to another value and back."""
-    given = {"mu_s": 0.9, "g": 9.81, **values}
-    first, period = given["mu_s"] * 12.5 * given["g"] / (742.5 * 0.034), 6.283185307179586 * (12.5 / 742.5) ** 0.5
+    parameters = {"mu_s": 0.9, "g": 9.81, **values}
+    first, period = (
+        parameters["mu_s"] * 12.5 * parameters["g"] / (742.5 * 0.034),
+        6.283185307179586 * (12.5 / 742.5) ** 0.5,
+    )
 
     def read(fmu):
         t, counts = 0.0, []
         for touch in range(1, 9):
-            for beside in (-1e-9, 0.0, 1e-9):
-                end = first + touch * period + beside
+            for shift in (-1e-9, 0.0, 1e-9):
+                end = first + touch * period + shift
                 fmu.step(t, end - t)
                 t = end
                 fmu.set({"F_ext": 1.0})

@@ -47,8 +47,8 @@ def test_a_grid_follows_the_solver_only_on_request(tmp_path):
     ],
 )
 def test_a_scene_without_plots_shows_its_outputs(tmp_path, outputs, plots):
-    found = load_scene(write(tmp_path, outputs=outputs)).plots
-    assert found == plots if isinstance(plots, tuple) else len(found) == plots + 1
+    result = load_scene(write(tmp_path, outputs=outputs)).plots
+    assert result == plots if isinstance(plots, tuple) else len(result) == plots + 1
     assert load_scene(write(tmp_path, outputs=outputs, plots="[]")).plots == ()
 
 

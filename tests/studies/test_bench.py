@@ -41,7 +41,7 @@ def all_measures(user_folder, monkeypatch):
 
 
 @pytest.fixture
-def both_kinds(fmus, tmp_path, monkeypatch):
+def both_backends(fmus, tmp_path, monkeypatch):
     """A folder with Python and native FMUs, and an empty cache of measurements."""
     (tmp_path / "fmus").mkdir()
     for file in fmus.glob("*.fmu"):
@@ -75,9 +75,9 @@ def test_exact_events_and_the_pendulum_meet_their_targets_and_a_stuck_body_stays
         for call in of(all_measures, function)
     ]
     chosen += [call for call in of(all_measures, default_run_error) if call.args[0] == "pendulum"]
-    found = [call() for call in chosen]
-    assert len(found) == 3 + 2 + 2 + 3 + 2
-    assert [measure.name for measure in found if not measure.is_met] == []
+    measures = [call() for call in chosen]
+    assert len(measures) == 3 + 2 + 2 + 3 + 2
+    assert [measure.name for measure in measures if not measure.is_met] == []
 
 
 def test_a_missed_accuracy_target_is_reported(all_measures):
@@ -101,9 +101,9 @@ def test_the_own_code_is_faster_than_python_peers(all_measures):
 def test_a_communication_step_is_timed_against_an_empty_fmu_with_the_same_outputs(all_measures, monkeypatch):
     monkeypatch.setattr(stepping_loops, "REPEATS", 2)
     measure = of(all_measures, time_communication_step)[2]()
-    usual, empty, lean, lean_empty = (beside.value for beside in measure.baselines)
-    assert measure.value == usual / empty
-    assert 0.0 < usual < 10 * empty
+    default, empty, lean, lean_empty = (peer.value for peer in measure.baselines)
+    assert measure.value == default / empty
+    assert 0.0 < default < 10 * empty
     assert 0.0 < lean < 10 * lean_empty
 
 
@@ -119,7 +119,7 @@ def test_a_target_is_met_up_to_its_bound(value, reached):
 
 
 def test_a_peer_is_reported_as_a_ratio_and_a_missing_one_by_name():
-    assert [format_baseline(FAST, beside) for beside in FAST.baselines] == [
+    assert [format_baseline(FAST, peer) for peer in FAST.baselines] == [
         "theirs: 5 µs, 2.5 times",
         "absent is not installed",
     ]
@@ -136,12 +136,12 @@ def test_the_csv_holds_every_value_and_the_provenance_every_parameter(tmp_path, 
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_python_one(both_kinds):
+def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_python_one(both_backends):
     for _ in range(3):  # a loaded machine may spoil one measurement, but hardly three
         forget()
-        found = [native.run_in_c("stickslip"), native.step_in_c("stickslip")]
-        found += [native.run_through_fmpy("stickslip"), native.step_through_fmpy("stickslip")]
-        slower = [measure for measure in found if not 0.0 < measure.value < measure.baselines[0].value]
+        measures = [native.run_in_c("stickslip"), native.step_in_c("stickslip")]
+        measures += [native.run_through_fmpy("stickslip"), native.step_through_fmpy("stickslip")]
+        slower = [measure for measure in measures if not 0.0 < measure.value < measure.baselines[0].value]
         if not slower:
             break
     assert slower == []
@@ -150,7 +150,7 @@ def test_a_native_fmu_is_faster_in_c_and_through_fmpy_than_the_python_one(both_k
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 @pytest.mark.parametrize("case", native.RUN_TIME_TARGETS)
-def test_the_cvode_fmu_improves_with_its_tolerance_and_the_native_one_is_better(case, both_kinds):
+def test_the_cvode_fmu_improves_with_its_tolerance_and_the_native_one_is_better(case, both_backends):
     try:
         errors = [native.largest_error(case, native.time_cvode(case, rtol)) for rtol in (1e-4, 1e-6, 1e-8)]
     except c_host.MissingToolError as error:
@@ -161,30 +161,30 @@ def test_the_cvode_fmu_improves_with_its_tolerance_and_the_native_one_is_better(
     assert len(measure.baselines) == 4
 
 
-def test_missing_tools_are_reported_in_their_row_and_fail_nothing(both_kinds, monkeypatch):
+def test_missing_tools_are_reported_in_their_row_and_fail_nothing(both_backends, monkeypatch):
     monkeypatch.setattr(c_host, "COMPILER", None)
-    shutil.rmtree(both_kinds / "native")
+    shutil.rmtree(both_backends / "native")
     c_host.build_host.cache_clear()
     native.build_cvode_fmu.cache_clear()
-    found = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.compare_with_cvode("smd")]
-    assert [measure.is_met for measure in found] == [False, False, False]
-    assert [measure.baselines[0].name.split(":")[0] for measure in found] == ["not built"] * 3
+    measures = [native.run_through_fmpy("smd"), native.run_in_c("smd"), native.compare_with_cvode("smd")]
+    assert [measure.is_met for measure in measures] == [False, False, False]
+    assert [measure.baselines[0].name.split(":")[0] for measure in measures] == ["not built"] * 3
     with pytest.raises(c_host.MissingToolError, match="not installed: a C compiler"):
         native.time_cvode("smd", 1e-6)
     monkeypatch.setattr(c_host, "COMPILER", "false")  # one that finds no header
     with pytest.raises(c_host.MissingToolError, match="not installed: SUNDIALS"):
         native.time_cvode("smd", 1e-6)
-    assert "not measured" in "".join(str(cell) for cell in benchmark_table(found).columns[3].cells)
+    assert "not measured" in "".join(str(cell) for cell in benchmark_table(measures).columns[3].cells)
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-def test_a_run_refused_by_an_fmu_in_c_reports_its_message(both_kinds):
-    library = c_host.build_native_fmus(both_kinds / "native" / "stickslip.fmu")
+def test_a_run_refused_by_an_fmu_in_c_reports_its_message(both_backends):
+    library = c_host.build_native_fmus(both_backends / "native" / "stickslip.fmu")
     with pytest.raises(HarnessError, match=r"m = -1\.0 kg is refused"):
         native.time_runs(library, {"m": -1.0}, ("x",), 16.0, 10, 1)
 
 
-LED = [
+EXPLICIT_EVENTS = [
     scene
     for scene in model_exchange.DRIVEN_SCENARIOS
     if not scene.reference_case.problem.is_stiff or str(scene) == "pacejka-0.01, ramps"
@@ -195,8 +195,8 @@ LATE = [
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-@pytest.mark.parametrize("scene", [*model_exchange.DEFAULT_SCENARIOS, *LED, *LATE], ids=str)
-def test_model_exchange_errors_match_cvode_with_explicit_events(scene, both_kinds):
+@pytest.mark.parametrize("scene", [*model_exchange.DEFAULT_SCENARIOS, *EXPLICIT_EVENTS, *LATE], ids=str)
+def test_model_exchange_errors_match_cvode_with_explicit_events(scene, both_backends):
     """At most three times as large, also with jumps and ramps of the input and a late start: the error is that of
     the solver."""
     measure = model_exchange.error_ratio_to_cvode(scene, model_exchange.TOLERANCES if scene.is_default else (1e-8,))
@@ -207,16 +207,16 @@ def test_model_exchange_errors_match_cvode_with_explicit_events(scene, both_kind
 
 
 @pytest.mark.parametrize("scene", model_exchange.COMPARED_SCENARIOS, ids=str)
-def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene, both_kinds):
+def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene, both_backends):
     """Also at ties, where the last bit or physics decides."""
     assert model_exchange.difference_from_cosimulation(scene).is_met
 
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
-def test_a_model_exchange_call_is_timed_against_that_of_a_reference_fmu(both_kinds, tmp_path, monkeypatch):
+def test_a_model_exchange_call_is_timed_against_that_of_a_reference_fmu(both_backends, tmp_path, monkeypatch):
     """An FMU of ours stands for theirs, whose sources are not here: that is told."""
     assert model_exchange.call_overhead("smd").baselines[0].name.startswith("not found: Reference-FMUs")
-    sled = c_host.load_library(both_kinds / "native" / "stickslip.fmu")
+    sled = c_host.load_library(both_backends / "native" / "stickslip.fmu")
     monkeypatch.setattr(model_exchange, "build_bouncing_ball", lambda acceleration: sled)
     monkeypatch.setattr(model_exchange, "REPEATS", 10)
     monkeypatch.setattr(model_exchange, "BOUNCING_BALL_SIZES", (3, 2))
@@ -226,7 +226,7 @@ def test_a_model_exchange_call_is_timed_against_that_of_a_reference_fmu(both_kin
     assert len(measure.baselines) == 9
 
 
-THEIRS = {  # a Reference FMU with just the files that the benchmark copies and compiles
+REFERENCE_FMU = {  # a Reference FMU with just the files that the benchmark copies and compiles
     "include/model.h": """
 typedef struct { double h, v, g, e; } ModelInstance;
 typedef int Status;
@@ -260,14 +260,14 @@ __attribute__((visibility("default"))) double ask(double x, double v, double for
 
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_reference_fmu_gets_the_acceleration_of_each_model(tmp_path, monkeypatch):
-    for file, text in THEIRS.items():
+    for file, text in REFERENCE_FMU.items():
         (tmp_path / file).parent.mkdir(exist_ok=True)
         (tmp_path / file).write_text(text + "\n")
     monkeypatch.setattr(model_exchange, "REFERENCE_FMUS", tmp_path)
-    given = {"x": 0.1, "v": 0.3, "force": -2.0, "mass": 4.0}
+    values = {"x": 0.1, "v": 0.3, "force": -2.0, "mass": 4.0}
     for name in model_exchange.MODELS:
         equation = model_exchange.SETTINGS["acceleration"][name]
         ask = ctypes.CDLL(str(model_exchange.build_bouncing_ball(equation).file)).ask
-        ask.restype, ask.argtypes = ctypes.c_double, [ctypes.c_double] * len(given)
-        assert ask(*given.values()) == pytest.approx(eval(equation, {"sin": sin, "atan": atan, **given}), rel=1e-14)
+        ask.restype, ask.argtypes = ctypes.c_double, [ctypes.c_double] * len(values)
+        assert ask(*values.values()) == pytest.approx(eval(equation, {"sin": sin, "atan": atan, **values}), rel=1e-14)
     model_exchange.build_bouncing_ball.cache_clear()

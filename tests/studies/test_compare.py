@@ -47,8 +47,8 @@ def test_a_run_as_json_prints_only_json(harness, external_fmu_folder):
     assert json.loads(done.stdout)["final"]["x"] == pytest.approx(cos(sqrt(40)), abs=2e-3)
     done = harness("run", "coulomb", "--json")
     assert (done.returncode, done.stderr) == (0, "")
-    found = {each["name"]: each["value"] for each in json.loads(done.stdout)["quantities"]}
-    assert found["f"] == pytest.approx(0.5, rel=1e-12)
+    quantities = {item["name"]: item["value"] for item in json.loads(done.stdout)["quantities"]}
+    assert quantities["f"] == pytest.approx(0.5, rel=1e-12)
 
 
 def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, tmp_path):
@@ -57,10 +57,10 @@ def test_two_fmus_differ_as_their_closed_forms_do(harness, external_fmu_folder, 
     arguments = (external_fmu_folder / "Midpoint.fmu", other, "--tolerance", 1e-4)
     done = harness("compare", *arguments, "--json", blank=False)
     assert (done.returncode, done.stderr) == (0, "")
-    found = json.loads(done.stdout)
+    comparison = json.loads(done.stdout)
     times = np.linspace(0, 1, 1001)
     off = np.abs(np.cos(sqrt(40) * times) - np.cos(sqrt(40.4) * times))
-    (x,) = (each for each in found["variables"] if each["name"] == "x")
+    (x,) = (item for item in comparison["variables"] if item["name"] == "x")
     assert x["largest"] == pytest.approx(off.max(), rel=1e-2)
     assert x["rms"] == pytest.approx(np.sqrt(np.mean(off * off)), rel=1e-2)
     folder = tmp_path / "results/compare/Midpoint-Other"
@@ -117,15 +117,15 @@ def path(name, times, events=None, **columns):
 
 def test_interpolation_follows_the_rate_or_stays_between_neighbours():
     one, two = np.linspace(0, 6, 1001), np.linspace(0.0005, 5.9, 400)
-    found = compare(*(path("x and v", t, x=np.sin(t), v=np.cos(t)) for t in (one, two)))
-    assert found.interpolated
-    assert len(found.time) == 400
-    x, v = found.differences
+    comparison = compare(*(path("x and v", t, x=np.sin(t), v=np.cos(t)) for t in (one, two)))
+    assert comparison.interpolated
+    assert len(comparison.time) == 400
+    x, v = comparison.differences
     assert x.relative < 1e-10  # the fourth power of the spacing over 384 times 16
     assert v.relative < 1e-5
     stairs = np.floor(one) + 0.25
-    found = compare(path("stairs", one, x=stairs), path("line", two, x=np.zeros(400)))
-    assert found.differences[0].largest == 5.25  # no spline overshoots the steps
+    comparison = compare(path("stairs", one, x=stairs), path("line", two, x=np.zeros(400)))
+    assert comparison.differences[0].largest == 5.25  # no spline overshoots the steps
 
 
 def test_a_variable_uses_its_own_rate_in_an_fmu_without_units():
@@ -134,14 +134,14 @@ def test_a_variable_uses_its_own_rate_in_an_fmu_without_units():
     motions = [
         np.concatenate([np.sin(pace * t[:, None]), pace * np.cos(pace * t[:, None])], axis=1) for t in (one, two)
     ]
-    found = compare(
+    comparison = compare(
         *(
-            path("many", t, **{f"y{i}": y for i, y in enumerate(each.T)})
-            for t, each in zip((one, two), motions, strict=True)
+            path("many", t, **{f"y{i}": y for i, y in enumerate(item.T)})
+            for t, item in zip((one, two), motions, strict=True)
         )
     )
-    assert max(each.relative for each in found.differences[:60]) < 1e-8  # 81 times that of pace 1
-    assert min(each.relative for each in found.differences[60:]) > 1e-8  # no rates are recorded for these
+    assert max(item.relative for item in comparison.differences[:60]) < 1e-8  # 81 times that of pace 1
+    assert min(item.relative for item in comparison.differences[60:]) > 1e-8  # no rates are recorded for these
 
 
 @pytest.mark.parametrize("late", [0.0, 1e-9, 1e-3])
@@ -155,12 +155,14 @@ def test_a_jump_is_compared_as_a_jump(late):
         units = {"a": "m/s2", "v": "m/s", "x": "m"}
         return Signals(name, t, columns, units, np.array([[0, 0], [at, 1]]))
 
-    found = compare(motion("one", np.linspace(0, 2, 101), 1.0), motion("two", np.linspace(0, 1.99, 57), 1.0 + late))
-    largest = {each.name: each.largest for each in found.differences}
+    comparison = compare(
+        motion("one", np.linspace(0, 2, 101), 1.0), motion("two", np.linspace(0, 1.99, 57), 1.0 + late)
+    )
+    largest = {difference.name: difference.largest for difference in comparison.differences}
     assert largest["a"] == 0.0
     assert largest["v"] <= 2.1 * late + 1e-15
     assert largest["x"] <= 2.1 * late + 1e-15
-    assert found.pairs.shift == pytest.approx(late, rel=1e-6, abs=1e-15)
+    assert comparison.pairs.shift == pytest.approx(late, rel=1e-6, abs=1e-15)
 
 
 def test_a_repeated_time_holds_both_sides_of_a_jump(tmp_path):
@@ -177,9 +179,9 @@ def test_unmatched_variables_and_missing_units_are_reported():
     t = np.arange(20.0)
     one = Signals("one", t, {"x": t, "a": t, "F": t}, {"x": "m", "a": "m/s²", "F": "N"})
     two = Signals("two", t, {"x": t, "a": t, "E": t}, {"x": "", "a": "m/s^2", "E": "J"})
-    found = compare(one, two)
-    assert [each.name for each in found.differences] == ["x", "a"]
-    assert found.left_out == (
+    comparison = compare(one, two)
+    assert [difference.name for difference in comparison.differences] == ["x", "a"]
+    assert comparison.left_out == (
         "x has no unit in two; assumed m",
         "only in one: F",
         "only in two: E",
@@ -189,14 +191,14 @@ def test_unmatched_variables_and_missing_units_are_reported():
 def test_the_first_help_example_shows_no_more_than_the_curves_contain(harness, results):
     done = harness("compare", "results/stickslip", "results/stickslip-threshold", "--json")
     assert (done.returncode, done.stderr) == (0, "")
-    (a,) = (each for each in json.loads(done.stdout)["variables"] if each["name"] == "a")
+    (a,) = (item for item in json.loads(done.stdout)["variables"] if item["name"] == "a")
     assert a["largest"] < 9.0
 
 
 def test_modes_are_not_interpolated():
     one, two = np.arange(30.0), np.arange(30.0) + 0.5
-    found = compare(path("one", one, mode=one // 10), path("two", two, mode=two // 10))
-    assert found.differences[0].largest in (0.0, 1.0)
+    comparison = compare(path("one", one, mode=one // 10), path("two", two, mode=two // 10))
+    assert comparison.differences[0].largest in (0.0, 1.0)
 
 
 def test_results_without_a_common_variable_are_refused():
@@ -245,7 +247,7 @@ def test_a_distant_event_match_hides_no_difference():
 
 
 @pytest.mark.parametrize(
-    ("left", "right", "factor"),
+    ("remaining", "right", "factor"),
     [
         *(("m/s2", other, 1.0) for other in ("m/s^2", "m.s-2", "m s^-2", "m·s⁻²", "m/s²", "m/s/s", "m*s**-2")),
         ("N.m", "Nm", 1.0),
@@ -260,17 +262,19 @@ def test_a_distant_event_match_hides_no_difference():
         ("m/s", "m", None),
     ],
 )
-def test_units_have_one_spelling_and_are_converted_or_refused(left, right, factor):
+def test_units_have_one_spelling_and_are_converted_or_refused(remaining, right, factor):
     t = np.arange(20.0)
-    pair = (Signals(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", left), ("two", right)))
-    found = compare(*pair)
+    pair = (
+        Signals(name, t, {"y": t, "x": t}, {"y": unit, "x": "m"}) for name, unit in (("one", remaining), ("two", right))
+    )
+    comparison = compare(*pair)
     if factor is None:
-        assert found.left_out == (f"y is in {left} in one and in {right} in two; skipped",)
+        assert comparison.left_out == (f"y is in {remaining} in one and in {right} in two; skipped",)
         return
-    (y, _) = found.differences
-    assert y.unit == left
+    (y, _) = comparison.differences
+    assert y.unit == remaining
     assert y.largest == pytest.approx(19 * (1 - factor))
-    assert bool(found.left_out) == (factor != 1.0)
+    assert bool(comparison.left_out) == (factor != 1.0)
 
 
 OTHERS = {
@@ -286,8 +290,13 @@ def test_results_of_other_tools_can_be_compared(tmp_path, pair):
     for name, text in OTHERS.items():
         (tmp_path / name).write_text(text)
     modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4], [2, 3, 1, 5, 6]]))
-    found = compare(*(read_trajectory(tmp_path / name) for name in pair))
-    assert {each.name: each.largest for each in found.differences} == {"x": 0, "on": 0, "turn[1]": 0, "turn[2]": 0}
+    comparison = compare(*(read_trajectory(tmp_path / name) for name in pair))
+    assert {difference.name: difference.largest for difference in comparison.differences} == {
+        "x": 0,
+        "on": 0,
+        "turn[1]": 0,
+        "turn[2]": 0,
+    }
 
 
 def modelica(file, rows, turned=True, version="4"):
@@ -314,19 +323,19 @@ def modelica(file, rows, turned=True, version="4"):
 def test_units_and_signs_of_a_modelica_result_are_read(tmp_path, turned, version):
     """In both of its layouts, and saved again by MATLAB."""
     modelica(tmp_path / "modelica.mat", np.array([[0.0, 1, 1, 1, 2], [1, 2, 0, 3, 4]]), turned, version)
-    found = read_trajectory(tmp_path / "modelica.mat")
-    assert (found.units["x"], found.units["on"]) == ("m", "")
-    assert [*found.columns] == ["x", "on", "turn[1]", "turn[2]", "minus"]
-    assert found.columns["minus"].tolist() == [-1.0, -2.0]
+    trajectory = read_trajectory(tmp_path / "modelica.mat")
+    assert (trajectory.units["x"], trajectory.units["on"]) == ("m", "")
+    assert [*trajectory.columns] == ["x", "on", "turn[1]", "turn[2]", "minus"]
+    assert trajectory.columns["minus"].tolist() == [-1.0, -2.0]
 
 
 def test_strings_are_compared_as_strings(tmp_path):
     (tmp_path / "one.csv").write_text("t [s],says,x\n0,cold,1\n1,cold,1\n2,warm,1\n")
     (tmp_path / "two.csv").write_text("t [s],says,x\n0,cold,1\n1,warm,1\n2,warm,one\n")
-    found = compare(*(read_trajectory(tmp_path / name) for name in ("one.csv", "two.csv")))
-    (says,) = found.differences
+    comparison = compare(*(read_trajectory(tmp_path / name) for name in ("one.csv", "two.csv")))
+    (says,) = comparison.differences
     assert (says.name, says.largest, says.at) == ("says", 1.0, 1.0)
-    assert found.left_out == ("x is a string in two and a number in one; skipped",)
+    assert comparison.left_out == ("x is a string in two and a number in one; skipped",)
 
 
 @pytest.mark.parametrize(
@@ -352,12 +361,12 @@ def test_a_name_longer_than_its_column_is_printed_in_full(tmp_path):
     name = f"mechanics.{'axis.' * 20}position"
     (tmp_path / "one.csv").write_text(f"t [s],{name}\n0,1\n1,4\n")
     (tmp_path / "two.csv").write_text(f"t [s],{name}\n0,1\n1,3\n")
-    said = commands.harness(tmp_path, "compare", "one.csv", "two.csv", COLUMNS="80").stdout
-    assert name in "".join(line.split(" ")[0] for line in said.splitlines())
+    output = commands.harness(tmp_path, "compare", "one.csv", "two.csv", COLUMNS="80").stdout
+    assert name in "".join(line.split(" ")[0] for line in output.splitlines())
 
 
 @pytest.mark.parametrize(
-    ("pair", "told"),
+    ("pair", "message"),
     [
         (("Midpoint", "ModelExchangeOnly"), "fmpy's CVode at rtol"),
         (("Fmi3Midpoint", "NonConforming"), "NonConforming: internal steps"),
@@ -367,11 +376,11 @@ def test_a_name_longer_than_its_column_is_printed_in_full(tmp_path):
         (("Bouncing", "Bouncing"), "bounces"),
     ],
 )
-def test_external_fmus_are_compared(harness, external_fmu_folder, pair, told):
+def test_external_fmus_are_compared(harness, external_fmu_folder, pair, message):
     one, two = (external_fmu_folder / f"{name}.fmu" for name in pair)
     done = harness("compare", one, two, "--tolerance", 1e-4, "--rtol", 2e-4, "--lenient")
     assert (done.returncode, done.stderr) == (0, "")
-    assert told in done.stdout
+    assert message in done.stdout
 
 
 def test_fmus_are_run_to_the_same_stop_time(harness, external_fmu_folder, tmp_path):
@@ -397,12 +406,12 @@ def test_a_nonfinite_value_on_either_side_is_an_infinite_difference(lost, where,
     """Also beside a variable that agrees, before and after it, and where times are interpolated."""
     t = np.linspace(0, 1, 20)
     good, bad = np.sin(t), np.where(np.arange(20) == at, lost, np.cos(t))
-    left = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}
+    remaining = {"a": good, "x": bad if where != "right" else np.cos(t), "z": good}
     right = {"a": good, "x": bad if where != "left" else np.cos(t), "z": good}
-    units = dict.fromkeys(left, "m")
-    found = compare(Signals("one", t, left, units), Signals("two", t + shift, right, units))
-    assert np.isnan(found.worst)
-    assert not found.worst <= 1e300
+    units = dict.fromkeys(remaining, "m")
+    comparison = compare(Signals("one", t, remaining, units), Signals("two", t + shift, right, units))
+    assert np.isnan(comparison.worst)
+    assert not comparison.worst <= 1e300
 
 
 def test_within_fails_on_nan(tmp_path):
@@ -421,13 +430,13 @@ def test_a_difference_is_relative_to_the_larger_side(turned):
     t = np.linspace(0, 1, 20)
     small, large = ({"x": np.full(20, size)} for size in (1.0, 4.0))
     pair = [Signals(name, t, columns, {"x": "m"}) for name, columns in (("small", small), ("large", large))]
-    (found,) = compare(*(reversed(pair) if turned else pair)).differences
-    assert found.relative == 0.75
-    assert found.largest == 3.0
+    (difference,) = compare(*(reversed(pair) if turned else pair)).differences
+    assert difference.relative == 0.75
+    assert difference.largest == 3.0
 
 
 def test_differences_near_overflow_have_a_relative_value():
     t = np.linspace(0, 1, 20)
     one, two = ({"x": np.full(20, value)} for value in (1e308, -1e308))
-    found = compare(Signals("one", t, one, {"x": "m"}), Signals("two", t, two, {"x": "m"}))
-    assert found.worst == 2.0
+    comparison = compare(Signals("one", t, one, {"x": "m"}), Signals("two", t, two, {"x": "m"}))
+    assert comparison.worst == 2.0

@@ -79,8 +79,8 @@ def test_two_equal_coupled_masses_agree_with_their_closed_form(couple, tmp_path)
         *("mine.ssp", "trajectory.csv", "error.csv", "engines.csv", "figure.svg", "provenance.json")
     }
     values = json.loads((folder / "provenance.json").read_text())["parameters"]
-    told = {name: values[name]["value"] for name in ("a.c", "a.x0", "b.x0", "spring_a_b.k")}
-    assert told == {"a.c": 0.0, "a.x0": 0.1, "b.x0": -0.1, "spring_a_b.k": 40.0}
+    values_used = {name: values[name]["value"] for name in ("a.c", "a.x0", "b.x0", "spring_a_b.k")}
+    assert values_used == {"a.c": 0.0, "a.x0": 0.1, "b.x0": -0.1, "spring_a_b.k": 40.0}
     assert values["a.k"] == {"value": 157.9, "unit": "N/m"}
     table = np.loadtxt(folder / "trajectory.csv", delimiter=",", skiprows=1)
     expected = [0.1 * cos(sqrt(157.9 + 80.0) * t) for t in table[:, 0]]
@@ -117,12 +117,12 @@ def test_a_shipped_scene_converges_to_its_reference_in_every_engine(run, scene):
     """The error is proportional to the step, also in Ecos and libcosim; fmpy passes the first forces one step later."""
     steps, errors = np.loadtxt(run(scene) / "error.csv", delimiter=",", skiprows=1).T
     assert np.log(errors[0] / errors[-1]) / np.log(steps[0] / steps[-1]) == pytest.approx(1.0, abs=0.25)
-    found = engines(run(scene))
-    assert [why for _, why in found.values()] == [""] * 4
-    assert found["libcosim"][0] == pytest.approx(found["Ecos"][0], rel=1e-4)
-    assert found["fmpy"][0][-1] < 2 * found["Ecos"][0][-1]
+    engine_errors = engines(run(scene))
+    assert [why for _, why in engine_errors.values()] == [""] * 4
+    assert engine_errors["libcosim"][0] == pytest.approx(engine_errors["Ecos"][0], rel=1e-4)
+    assert engine_errors["fmpy"][0][-1] < 2 * engine_errors["Ecos"][0][-1]
     size = np.abs(np.loadtxt(run(scene) / "trajectory.csv", delimiter=",", skiprows=1)[:, 1:]).max()
-    assert found["Ecos"][0][-1] < 0.05 * size
+    assert engine_errors["Ecos"][0][-1] < 0.05 * size
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -146,9 +146,9 @@ def test_an_external_archive_is_compared_with_its_finest_run(run, user_folder):
         user_folder, "couple", run("driven") / "driven.ssp", "--stop", "0.5", "--out", "theirs", "--json", blank=True
     )
     assert (done.returncode, done.stderr) == (0, "")
-    told = json.loads(done.stdout)
-    assert told["order"] > 0.8
-    assert {name: each["why not"] for name, each in told["engines"].items()} == dict.fromkeys(ENGINES, "")
+    result = json.loads(done.stdout)
+    assert result["order"] > 0.8
+    assert {name: item["why not"] for name, item in result["engines"].items()} == dict.fromkeys(ENGINES, "")
     table = np.loadtxt(user_folder / "theirs/coupled/driven/trajectory.csv", delimiter=",", skiprows=1)
     ours = np.loadtxt(run("driven") / "trajectory.csv", delimiter=",", skiprows=1)
     heads = (user_folder / "theirs/coupled/driven/trajectory.csv").read_text().splitlines()[0].split(",")

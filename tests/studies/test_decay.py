@@ -24,17 +24,17 @@ from harness.studies.decay.table import decay_table
 
 
 def test_the_table_has_a_row_for_every_value():
-    found = fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters(k=157.9))
-    assert decay_table(found).row_count == len(found.estimates) == 8
+    fit = fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters(k=157.9))
+    assert decay_table(fit).row_count == len(fit.estimates) == 8
 
 
 def test_the_quantities_keep_their_names():
-    found = identified_as_json(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
-    assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(found)
-    assert {each["name"] for each in found["fit"]} == {"omega", "zeta", "r", "b", "rest"}
-    assert all({"value", "error", "low", "high", "unit"} <= set(each) for each in found["fit"])
-    assert len(found["laws"]) == 7
-    assert set(found["loss"]["laws"]) == {"+".join(law) for law in LAWS}
+    fit = identified_as_json(fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters()))
+    assert {"fit", "remarks", "laws", "sentence", "turning_points", "published"} <= set(fit)
+    assert {item["name"] for item in fit["fit"]} == {"omega", "zeta", "r", "b", "rest"}
+    assert all({"value", "error", "low", "high", "unit"} <= set(item) for item in fit["fit"])
+    assert len(fit["laws"]) == 7
+    assert set(fit["loss"]["laws"]) == {"+".join(law) for law in LAWS}
 
 
 def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples(tmp_path, monkeypatch):
@@ -43,15 +43,15 @@ def test_a_figure_shows_angles_in_degrees_and_marks_only_excluded_samples(tmp_pa
     monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: figures.append(figure))
     t = np.linspace(0.0, 9.0, 3001)
     record = decay_record(0.02, sine=True, a=1.0, turn=0.0, rest=0.0, t=t, noise=1e-3)
-    found = fit_decay(replace(record, t=record.t + 1.7e9), KnownParameters(pendulum=True))
-    draw(found, measure_energy_loss(found), tmp_path / "figure.svg")
+    fit = fit_decay(replace(record, t=record.t + 1.7e9), KnownParameters(pendulum=True))
+    draw(fit, measure_energy_loss(fit), tmp_path / "figure.svg")
     signal, residuals, shares = figures[0].get_axes()
     assert [axes.get_ylabel() for axes in (signal, residuals)] == ["x [deg]", "record - fit [deg]"]
     assert shares.get_xlabel() == "amplitude [deg]"
     drawn = {line.get_label(): line.get_data() for line in signal.lines}
     assert np.degrees(1.0) == pytest.approx(np.max(drawn["record"][1]), rel=5e-3)
-    assert len(drawn.get("excluded", [[]])[0]) == len(record.t) - len(found.t)
-    assert found.record.format_time(1.7e9 + 0.0125) == "1700000000.0125"
+    assert len(drawn.get("excluded", [[]])[0]) == len(record.t) - len(fit.t)
+    assert fit.record.format_time(1.7e9 + 0.0125) == "1700000000.0125"
 
 
 @pytest.mark.parametrize("count", [3000, 120_000])
@@ -76,9 +76,9 @@ def test_the_csv_of_another_program_gives_the_parameters_of_its_run(fmus, tmp_pa
     assert (tmp_path / "run.csv").exists(), done.stderr
     done = harness(tmp_path, "decay", "run.csv", "--unit", "m", "--k", "157.9", "--json")
     assert (done.returncode, done.stderr) == (0, "")
-    found = {each["name"]: each["value"] for each in json.loads(done.stdout)["fit"]}
-    assert found["f"] == pytest.approx(0.4, rel=1e-9)
-    assert found["c"] == pytest.approx(0.3, rel=1e-9)
+    estimates = {item["name"]: item["value"] for item in json.loads(done.stdout)["fit"]}
+    assert estimates["f"] == pytest.approx(0.4, rel=1e-9)
+    assert estimates["c"] == pytest.approx(0.3, rel=1e-9)
 
 
 def test_a_scene_writes_quantities_turning_points_fit_and_figure(fmus, tmp_path):
@@ -89,8 +89,8 @@ def test_a_scene_writes_quantities_turning_points_fit_and_figure(fmus, tmp_path)
     folder = tmp_path / "results/decay/coulomb"
     files = {"decay.json", "turning-points.csv", "fit.csv", "figure.svg", "provenance.json"}
     assert {file.name for file in folder.iterdir()} == files
-    found = {each["name"]: each for each in json.loads((folder / "decay.json").read_text())["fit"]}
-    assert found["f"]["value"] == pytest.approx(0.5, rel=1e-9)
+    estimates = {item["name"]: item for item in json.loads((folder / "decay.json").read_text())["fit"]}
+    assert estimates["f"]["value"] == pytest.approx(0.5, rel=1e-9)
     with (folder / "fit.csv").open() as file:
         assert next(csv.reader(file)) == ["t [s]", "x [m]", "fit [m]", "residual [m]"]
 

@@ -53,9 +53,9 @@ def test_every_method_of_the_runtime_reaches_the_end_of_the_block(rows, method):
 def test_the_block_sticks_and_slips_in_the_order_of_the_peer():
     run = EmbeddedModel.create(literature_problems.block_model(), {}, "dop853", 1e-11)
     truth = peer_solvers.solve("scipy", "DOP853", BeltBlock(), np.array([0.0, 50.0]), 1e-12, 1e-15).events
-    found = run.find_mode_changes(50.0)
-    assert [mode for _, mode in found] == [mode for _, mode in truth] == [0, -1] * 4
-    assert [t for t, _ in found] == pytest.approx([t for t, _ in truth], abs=1e-8)
+    events = run.find_mode_changes(50.0)
+    assert [mode for _, mode in events] == [mode for _, mode in truth] == [0, -1] * 4
+    assert [t for t, _ in events] == pytest.approx([t for t, _ in truth], abs=1e-8)
 
 
 def test_smoothing_loses_four_digits_at_more_cost_than_event_location(rows):

@@ -49,9 +49,9 @@ def command(user_folder, *arguments):
 def test_exact_is_within_1e_13_of_the_reference_and_1e_14_of_every_event(fmus, name):
     truth = load_reference(name)
     answer = EmbeddedModel.create(load_model_class(fmus / f"{name}.fmu"), {}, "exact", 0.0).solve(truth.times.tolist())
-    found = compute_errors(answer, truth)
-    assert found.largest < 1e-13
-    assert not found.events or found.events < 1e-14 * truth.times[-1]
+    off = compute_errors(answer, truth)
+    assert off.largest < 1e-13
+    assert not off.events or off.events < 1e-14 * truth.times[-1]
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
@@ -76,10 +76,10 @@ def test_every_installed_peer_approaches_the_reference_and_its_events(case):
             if peer in peer_solvers.missing_packages() or (case.problem.is_stiff and method in ("DOP853", "Adams")):
                 continue
             answer = peer_solvers.solve(peer, method, case.problem, truth.times, 1e-7, 1e-10)
-            found = compute_errors(answer, truth)
-            assert found.largest < 1e-3
-            assert (found.events is not None) == case.problem.has_dry_friction
-            assert not found.events or found.events < 1e-4
+            off = compute_errors(answer, truth)
+            assert off.largest < 1e-3
+            assert (off.events is not None) == case.problem.has_dry_friction
+            assert not off.events or off.events < 1e-4
             assert answer.evaluations > 100
 
 
@@ -99,10 +99,10 @@ def test_a_run_is_limited_in_steps_and_in_time():
 
 
 def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped():
-    asked = []
+    rtols = []
 
     def run(rtol, extent):
-        asked.append(rtol)
+        rtols.append(rtol)
         if rtol == 1e-3:
             raise HarnessError("it fell over")
         if rtol == 1e-5:
@@ -123,27 +123,27 @@ def test_a_failed_run_is_a_gap_and_tighter_ones_after_a_slow_run_are_skipped():
     points = list(
         sweep_tolerances(CASE["smd"], SolverJob("tool", "method", 1e-3, run), SweepSettings(tolerances, 0.1, 0.1))
     )
-    assert asked == [1e-2, 1e-3, 1e-4, 1e-5]
-    assert [point.rtol for point in points] == list(tolerances)
-    assert [point.seconds for point in points] == pytest.approx([0.25, nan, 0.25, nan, nan], nan_ok=True)
-    assert [point.largest for point in points] == pytest.approx([0.0, nan, 0.0, nan, nan], nan_ok=True)
+    assert rtols == [1e-2, 1e-3, 1e-4, 1e-5]
+    assert [make_point.rtol for make_point in points] == list(tolerances)
+    assert [make_point.seconds for make_point in points] == pytest.approx([0.25, nan, 0.25, nan, nan], nan_ok=True)
+    assert [make_point.largest for make_point in points] == pytest.approx([0.0, nan, 0.0, nan, nan], nan_ok=True)
     failures = ["", "it fell over", "", "it took too long", "skipped: at rtol 1e-05 the run stopped it took too long"]
-    assert [point.failure for point in points] == failures
+    assert [make_point.failure for make_point in points] == failures
 
 
-def point(method, seconds, largest, tool=FMU, case="stickslip", **more):
+def make_point(method, seconds, largest, tool=FMU, case="stickslip", **more):
     return Point(case, tool, method, 1e-6, 1e-9, seconds=seconds, evaluations=1, largest=largest, **more)
 
 
 def test_the_advice_is_derived_from_the_points():
     points = (
-        point("ode23", 1e-3, 1e-3),
-        point("ode23", 8e-3, 1e-7),
-        point("ode45", 2e-3, 1e-6),
-        point("ode45", 1.5e-3, 1e-5),
-        point("RK45", 2e-2, 1e-7, "scipy"),
-        point("ode23", 4e-3, 1e-9, FMPY),
-        point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
+        make_point("ode23", 1e-3, 1e-3),
+        make_point("ode23", 8e-3, 1e-7),
+        make_point("ode45", 2e-3, 1e-6),
+        make_point("ode45", 1.5e-3, 1e-5),
+        make_point("RK45", 2e-2, 1e-7, "scipy"),
+        make_point("ode23", 4e-3, 1e-9, FMPY),
+        make_point("ode23", 1e-3, 1e-3, case="stickslip-threshold", beside_dry=5e-3),
     )
     study = Study("stickslip", (CASE["stickslip"], CASE["stickslip-threshold"]), points)
     assert advice.recommend(study, []) == (
@@ -156,15 +156,15 @@ def test_the_advice_is_derived_from_the_points():
 
 def test_no_advice_is_given_without_sufficient_evidence():
     """A quick run gives no advice if another solver comes close to the best method; a full run names a better peer."""
-    own, slower = point("rodas", 2e-3, 1e-7), point("ode23", 4e-3, 1e-7)
+    own, slower = make_point("rodas", 2e-3, 1e-7), make_point("ode23", 4e-3, 1e-7)
     untold = "stickslip: no recommendation from a quick run; use `python -m harness precision stickslip`."
     for peer, carried in ((1.7e-3, False), (2.5e-3, False), (4e-3, True)):
-        study = Study("stickslip", (CASE["stickslip"],), (own, slower, point("LSODA", peer, 1e-7, "scipy")))
-        quick, whole = (advice.recommend(study, [], clear) for clear in (QUICK.min_ratio, FULL.min_ratio))
-        assert (quick == whole) == carried
+        study = Study("stickslip", (CASE["stickslip"],), (own, slower, make_point("LSODA", peer, 1e-7, "scipy")))
+        quick, complete = (advice.recommend(study, [], clear) for clear in (QUICK.min_ratio, FULL.min_ratio))
+        assert (quick == complete) == carried
         assert carried or quick == untold
-        assert whole.startswith("stickslip: use rodas: ")
-        assert ("scipy LSODA 0.85, not a method of the FMU" in whole) == (peer < own.seconds)
+        assert complete.startswith("stickslip: use rodas: ")
+        assert ("scipy LSODA 0.85, not a method of the FMU" in complete) == (peer < own.seconds)
     assert advice.recommend(Study("stickslip", (CASE["stickslip"],), ()), [], QUICK.min_ratio) == untold
 
 
@@ -178,15 +178,15 @@ def test_a_quick_run_does_not_replace_a_full_one(user_folder, tmp_path, monkeypa
 
 
 def test_the_laws_creep_and_lose_their_symmetry_as_published(fmus):
-    found = {
+    analyses_by_case = {
         case.name: law_deviations.compare_with_dry_friction(case, load_model_class(fmus / f"{case.model}.fmu"))
         for case in CASES
         if case.dry_friction_reference
     }
-    assert found["coulomb-sign"].largest == 0.0
-    assert found["stickslip-threshold"].creep == pytest.approx(1e-7)  # the threshold itself
-    assert found["stickslip-threshold"].period == pytest.approx(3.345104499330, rel=1e-4)
-    soft, *_, steep = magic = [found[f"pacejka-{x_m}"] for x_m in ("0.01", "0.001", "0.0001")]
+    assert analyses_by_case["coulomb-sign"].largest == 0.0
+    assert analyses_by_case["stickslip-threshold"].creep == pytest.approx(1e-7)  # the threshold itself
+    assert analyses_by_case["stickslip-threshold"].period == pytest.approx(3.345104499330, rel=1e-4)
+    soft, *_, steep = magic = [analyses_by_case[f"pacejka-{x_m}"] for x_m in ("0.01", "0.001", "0.0001")]
     for law, x_m in zip(magic, (0.01, 0.001, 0.0001), strict=True):
         assert 0.3 * x_m < law.creep < 0.4 * x_m
         assert 0.4 < law.asymmetry < 0.9
@@ -208,10 +208,10 @@ def test_stuck_points_lie_between_a_stop_and_the_next_breakaway():
 def test_a_user_model_is_studied_by_its_path_or_that_of_its_fmu(path, ending):
     """Every check that needs only the equations of the file; the reference is where two of its methods agree."""
     name = (build_user_model(path) / path.name).with_suffix(ending)
-    found = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), lambda share: None)
-    assert found.model == path.stem
-    assert {tool for tool, _ in found.solvers(found.cases[0])} == {FMU, FMPY, *FMI3_INTERFACES}
-    best = {p.tool: p.largest for p in found.points if p.method == "dop853"}
+    points = study_model(str(name), SweepSettings((1e-6,), 5.0, 0.0), lambda share: None)
+    assert points.model == path.stem
+    assert {tool for tool, _ in points.solvers(points.cases[0])} == {FMU, FMPY, *FMI3_INTERFACES}
+    best = {p.tool: p.largest for p in points.points if p.method == "dop853"}
     assert best[FMU] == best[FMPY] < 1e-3
 
 

@@ -56,9 +56,11 @@ def points(both):
     @cache
     def points(name, tool, tolerances=TOLERANCES):
         file = both / "fmus" / f"{CASE[name].model}.fmu"
-        asked = [job for job in solver_jobs(CASE[name], load_model_class(file), file) if job.tool == tool]
+        selected = [job for job in solver_jobs(CASE[name], load_model_class(file), file) if job.tool == tool]
         return [
-            point for job in asked for point in sweep_tolerances(CASE[name], job, SweepSettings(tolerances, 5.0, 0.0))
+            point
+            for job in selected
+            for point in sweep_tolerances(CASE[name], job, SweepSettings(tolerances, 5.0, 0.0))
         ]
 
     with patch.object(study, "best_time", lambda run, budget: 0.0):
@@ -79,8 +81,8 @@ def amplification(case):
 
 @pytest.mark.parametrize("case", SMOOTH, ids=lambda case: case.name)
 def test_model_exchange_errors_fall_with_the_tolerance_and_stay_below_the_sum_of_step_errors(points, case):
-    loose, middle, tight = found = points(case.name, ME)
-    assert [point.rtol for point in found] == list(TOLERANCES)
+    loose, middle, tight = all_points = points(case.name, ME)
+    assert [point.rtol for point in all_points] == list(TOLERANCES)
     assert loose.largest > 4 * middle.largest > 16 * tight.largest
     assert loose.evaluations < middle.evaluations < tight.evaluations  # at least one per step
     for point in (middle, tight):
@@ -144,29 +146,29 @@ def harness(folder, *arguments):
 
 
 @pytest.fixture(scope="module")
-def twice(both, fmus, tmp_path_factory):
+def two_studies(both, fmus, tmp_path_factory):
     """Two studies of smd with the report: with its FMI 3.0 FMU, and without it.
 
     The second one is of the model file, leaves out peers, and keeps results of another model. Returns the output of
     each study (the second as JSON), the files of the first, the pages, and the folder of the second.
     """
-    (out, without), said, pages, files = map(tmp_path_factory.mktemp, ("out", "without")), [], [], {}
+    (out, without), outputs, pages, files = map(tmp_path_factory.mktemp, ("out", "without")), [], [], {}
     (without / "fmus").symlink_to(fmus)
     for folder, *words in ((both, "precision", "smd"), (without, "--json", "precision", "fmus/smd.fmu")):
         done = harness(folder, *words, "--quick", "--out", out)  # --json before any command
         assert (done.returncode, done.stderr) == (0, "")
-        said.append(done.stdout)
+        outputs.append(done.stdout)
         files = files or {file.name: file.read_text() for file in (out / "precision").glob("*.csv")}
         assert harness(folder, "report", "--quiet", "--out", out).returncode == 0
         pages.append(unescape((out / "report.html").read_text(encoding="utf-8")))
         (out / "precision/pendulum.txt").write_text("older")
-    return said, files, pages, out / "precision"
+    return outputs, files, pages, out / "precision"
 
 
-def test_the_command_shows_both_interfaces_and_error_against_tolerance(twice):
-    (said, _), files, *_ = twice
-    assert "  FMI 3.0 CS: exact  " in said
-    assert "  FMI 3.0 ME: fmpy's CVode  " in said
+def test_the_command_shows_both_interfaces_and_error_against_tolerance(two_studies):
+    (output, _), files, *_ = two_studies
+    assert "  FMI 3.0 CS: exact  " in output
+    assert "  FMI 3.0 ME: fmpy's CVode  " in output
     rows = [row for row in csv.DictReader(files["smd.csv"].splitlines()) if row["tool"] in (CS, ME)]
     assert [(row["case"], row["tool"], row["rtol [1]"]) for row in rows] == [
         ("smd", CS, ""),
@@ -177,32 +179,32 @@ def test_the_command_shows_both_interfaces_and_error_against_tolerance(twice):
     heads, *table = csv.reader(files["smd-exchange.csv"].splitlines())
     assert heads == ["model exchange by fmpy's CVode: largest error at rtol [1]", "smd [1]"]
     assert table == [[row["rtol [1]"], row["largest [1]"]] for row in rows[1:]]
-    printed = said.partition("FMI 3.0 model exchange with fmpy's CVode: largest error by rtol")[2]
-    told = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
-    assert told == [[advice.format_power(float(number)) if number else "-" for number in row] for row in table]
+    printed = output.partition("FMI 3.0 model exchange with fmpy's CVode: largest error by rtol")[2]
+    table_rows = [line.split() for line in printed.splitlines() if line.startswith("1e-")]
+    assert table_rows == [[advice.format_power(float(number)) if number else "-" for number in row] for row in table]
 
 
-def test_json_holds_all_results(twice):
-    found = json.loads(twice[0][1])
-    assert {point["method"] for point in found["points"]["smd"]} >= {"exact", "dop853", "fmpy's CVode"}
-    assert found["advice"][0].startswith("smd: use exact")
+def test_json_holds_all_results(two_studies):
+    data = json.loads(two_studies[0][1])
+    assert {point["method"] for point in data["points"]["smd"]} >= {"exact", "dop853", "fmpy's CVode"}
+    assert data["advice"][0].startswith("smd: use exact")
 
 
-def test_the_page_shows_error_against_tolerance_or_the_commands_that_produce_it(twice):
+def test_the_page_shows_error_against_tolerance_or_the_commands_that_produce_it(two_studies):
     head = "model exchange by fmpy's CVode: largest error at rtol"
     commands = "python build_fmus.py smd --fmi 3 && python -m harness precision smd"
-    whole, lacking = twice[2]
-    assert head in whole
-    assert commands not in whole
-    assert head not in lacking  # files of another build are removed
-    assert commands in lacking
+    complete, incomplete = two_studies[2]
+    assert head in complete
+    assert commands not in complete
+    assert head not in incomplete  # files of another build are removed
+    assert commands in incomplete
 
 
-def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_models(twice):
-    (said, lacking), files, _, folder = twice
-    assert "smd: use exact: " in said
-    made = {"smd.csv", "smd.json", "smd.svg", "smd.txt", "anchors.csv"}
-    assert {path.name for path in folder.iterdir()} == made | {"pendulum.txt"}
+def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_models(two_studies):
+    (output, incomplete), files, _, folder = two_studies
+    assert "smd: use exact: " in output
+    expected_files = {"smd.csv", "smd.json", "smd.svg", "smd.txt", "anchors.csv"}
+    assert {path.name for path in folder.iterdir()} == expected_files | {"pendulum.txt"}
     assert (folder / "pendulum.txt").read_text() == "older"
     texts = files["smd.csv"], (folder / "smd.csv").read_text()
     rows, later = (list(csv.DictReader(text.splitlines())) for text in texts)
@@ -210,11 +212,11 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     assert {row["tool"] for row in rows} == tools
     unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
     assert [row["failure"] for row in later if row["tool"] in FMI3_INTERFACES] == [unbuilt, unbuilt]
-    assert [told for told in json.loads(lacking)["missing"] if unbuilt in told] == [unbuilt]
+    assert [told for told in json.loads(incomplete)["missing"] if unbuilt in told] == [unbuilt]
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
     assert len(inside) == 1 + 4 * len(QUICK.tolerances)
     assert float(inside[0]["largest [1]"]) < 1e-13
     numbers = ("method", "rtol [1]", "evaluations", "largest [1]")
-    same = [[[row[name] for name in numbers] for row in each if not row["failure"]] for each in (inside, outside)]
+    same = [[[row[name] for name in numbers] for row in item if not row["failure"]] for item in (inside, outside)]
     assert same[0] == same[1]
     assert all(bool(row["failure"]) == (row["seconds [s]"] == "") for row in rows + later)

@@ -55,7 +55,7 @@ print(json.dumps(told))
 
 
 @pytest.fixture(scope="module")
-def drawn(fmus):
+def drawn_figures(fmus):
     def make(folder):
         (folder / "fmus").symlink_to(fmus)
         done = subprocess.run(
@@ -79,34 +79,43 @@ def curves(scene):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_curve_is_smooth_despite_large_steps(drawn, name):
-    for _, t, _ in curves(drawn[name]).values():
+def test_a_curve_is_smooth_despite_large_steps(drawn_figures, name):
+    for _, t, _ in curves(drawn_figures[name]).values():
         assert np.diff(t).max() < 2.01 * (t[-1] - t[0]) / 1000
 
 
-def test_the_plotted_steps_are_those_of_the_solver(drawn):
+def test_the_plotted_steps_are_those_of_the_solver(drawn_figures):
     """The steps are those of the measured run, and the curve has more points."""
-    _, t, _ = drawn["smd"]["panels"]["step size of the solver"]["lines"][0]
-    assert len(t) + 1 == drawn["smd"]["samples"] < 300 < len(curves(drawn["smd"])["position of the mass"][1])
+    _, t, _ = drawn_figures["smd"]["panels"]["step size of the solver"]["lines"][0]
+    assert (
+        len(t) + 1
+        == drawn_figures["smd"]["samples"]
+        < 300
+        < len(curves(drawn_figures["smd"])["position of the mass"][1])
+    )
 
 
 @pytest.mark.parametrize("name", MODAL)
-def test_every_stick_phase_is_shaded_from_its_start(drawn, name):
-    for title in curves(drawn[name]):
-        stuck = drawn[name]["panels"][title]["stuck"]
-        assert stuck == pytest.approx(drawn[name]["sticks"][: len(stuck)])
-        assert len(drawn[name]["sticks"]) - len(stuck) <= (name == "coulomb")  # whose last one begins after the end
+def test_every_stick_phase_is_shaded_from_its_start(drawn_figures, name):
+    for title in curves(drawn_figures[name]):
+        stuck = drawn_figures[name]["panels"][title]["stuck"]
+        assert stuck == pytest.approx(drawn_figures[name]["sticks"][: len(stuck)])
+        assert len(drawn_figures[name]["sticks"]) - len(stuck) <= (
+            name == "coulomb"
+        )  # whose last one begins after the end
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_no_legend_covers_a_title(drawn, name):
-    assert [title for title, panel in drawn[name]["panels"].items() if panel["covered"]] == []
+def test_no_legend_covers_a_title(drawn_figures, name):
+    assert [title for title, panel in drawn_figures[name]["panels"].items() if panel["covered"]] == []
 
 
-def test_angles_are_in_degrees(drawn):
-    angle, speed = (drawn["pendulum"]["panels"][title] for title in ("angle, zero hanging down", "angular speed"))
+def test_angles_are_in_degrees(drawn_figures):
+    angle, speed = (
+        drawn_figures["pendulum"]["panels"][title] for title in ("angle, zero hanging down", "angular speed")
+    )
     assert (angle["axis"], speed["axis"]) == ("theta [deg]", "omega [deg/s]")
-    assert curves(drawn["pendulum"])["angle, zero hanging down"][2][0] == pytest.approx(10.02)
+    assert curves(drawn_figures["pendulum"])["angle, zero hanging down"][2][0] == pytest.approx(10.02)
 
 
 @pytest.mark.parametrize(
@@ -120,24 +129,24 @@ def test_angles_are_in_degrees(drawn):
         ("stickslip-threshold", "speed of the sled", ["peak_speed"]),
     ],
 )
-def test_a_published_figure_is_shown_for_comparison(drawn, name, title, figures):
+def test_a_published_figure_is_shown_for_comparison(drawn_figures, name, title, figures):
     published = [SCENES[name]["published"][figure] for figure in figures]
-    lines = drawn[name]["panels"][title]["lines"]
-    found = [y[0] for text, _, y in lines if text.startswith("published") and len(set(y)) == 1]
-    assert found == pytest.approx([value[0] if isinstance(value, list) else value for value in published])
+    lines = drawn_figures[name]["panels"][title]["lines"]
+    levels = [y[0] for text, _, y in lines if text.startswith("published") and len(set(y)) == 1]
+    assert levels == pytest.approx([value[0] if isinstance(value, list) else value for value in published])
 
 
 @pytest.mark.parametrize("name", ["smd", "stickslip-threshold", "pacejka-0.01"])
-def test_the_published_mean_step_is_shown_for_comparison(drawn, name):
+def test_the_published_mean_step_is_shown_for_comparison(drawn_figures, name):
     value, unit = SCENES[name]["published"]["mean_step"]
-    found = {text: y[0] for text, _, y in drawn[name]["panels"]["step size of the solver"]["lines"]}
-    assert found[f"published {value:.5g} {unit}"] == pytest.approx(1e-3 * value)
+    levels = {text: y[0] for text, _, y in drawn_figures[name]["panels"]["step size of the solver"]["lines"]}
+    assert levels[f"published {value:.5g} {unit}"] == pytest.approx(1e-3 * value)
 
 
 @pytest.mark.parametrize("name", ["smd", "coulomb", "pendulum"])
-def test_the_envelope_of_the_published_loss_passes_through_the_turning_points(drawn, name):
+def test_the_envelope_of_the_published_loss_passes_through_the_turning_points(drawn_figures, name):
     """Within the difference between the published value and ours."""
-    lines = next(iter(drawn[name]["panels"].values()))["lines"]
+    lines = next(iter(drawn_figures[name]["panels"].values()))["lines"]
     turning = next(np.abs(y) for text, _, y in lines if text == "turning points")
     upper = next(np.array(y) for text, _, y in lines if text == "published" and len(y) > 1)
     assert upper == pytest.approx(turning, abs=0.02 * turning[0])

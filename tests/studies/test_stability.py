@@ -52,11 +52,11 @@ QUICK = (
 )
 
 
-def silent(name, share):
+def no_progress(name, share):
     """Progress reporting that does nothing."""
 
 
-def each_once():
+def is_sampled():
     """Return whether a scene is in QUICK, or at the soft end of the region, and the first with its model or its
     value."""
     met = set()
@@ -93,21 +93,21 @@ LINEAR = {
 def test_the_closed_form_agrees_with_the_independent_one(case):
     name, chosen = case
     values, stop = {**defaults(name), **chosen}, 16.0 if name == "stickslip" else 4.0
-    found = compute_reference(name, [(0.0, stop, values)], CommunicationGrid(0.0, stop, 60))
+    solution = compute_reference(name, [(0.0, stop, values)], CommunicationGrid(0.0, stop, 60))
     traits = {k: v for k, v in chosen.items() if k not in ("x0", "v0")}
     motion = independent_solution.ClosedFormMotion(
         [(0.0, getattr(independent_solution, name)(**traits))], values["x0"], values["v0"], stop
     )
-    expected = np.array([[float(value) for value in motion.at(t)] for t in found.times]).T
-    np.testing.assert_allclose([found.x, found.v], expected, rtol=1e-15, atol=1e-18)
-    assert [mode for _, mode in found.events] == [mode for _, mode in motion.events]
-    assert [t for t, _ in found.events] == pytest.approx([float(t) for t, _ in motion.events], rel=1e-15)
+    expected = np.array([[float(value) for value in motion.at(t)] for t in solution.times]).T
+    np.testing.assert_allclose([solution.x, solution.v], expected, rtol=1e-15, atol=1e-18)
+    assert [mode for _, mode in solution.events] == [mode for _, mode in motion.events]
+    assert [t for t, _ in solution.events] == pytest.approx([float(t) for t, _ in motion.events], rel=1e-15)
 
 
 def test_a_change_of_values_starts_a_new_segment():
     values = defaults("stickslip")
     changes = {2.0: {"F_ext": 90.0}, 2.1: {"F_ext": -50.0}}
-    found = compute_reference(
+    solution = compute_reference(
         "stickslip", value_spans(0.0, 16.0, values, changes), CommunicationGrid(0.0, 16.0, 40, (2.0, 2.1))
     )
     parts = [
@@ -115,28 +115,28 @@ def test_a_change_of_values_starts_a_new_segment():
         *((t, independent_solution.stickslip(**change)) for t, change in changes.items()),
     ]
     motion = independent_solution.ClosedFormMotion(parts, 0.0, 0.0, 16.0)
-    assert list(found.x) == pytest.approx([float(motion.at(t)[0]) for t in found.times], rel=1e-15, abs=1e-18)
+    assert list(solution.x) == pytest.approx([float(motion.at(t)[0]) for t in solution.times], rel=1e-15, abs=1e-18)
 
 
 @pytest.mark.parametrize("reaction", [False, True], ids=["weight", "reaction"])
 def test_the_pendulum_agrees_with_the_independent_one(reaction):
     values = {**defaults("pendulum"), "pin_load": 1 + reaction}
-    found = compute_reference("pendulum", [(0.0, 5.0, values)], CommunicationGrid(0.0, 5.0, 60))
+    solution = compute_reference("pendulum", [(0.0, 5.0, values)], CommunicationGrid(0.0, 5.0, 60))
     swing = independent_pendulum.PendulumMotion(
         [(0.0, independent_pendulum.Pendulum(reaction))], values["theta0"], 0.0, 5.0
     )
-    assert list(found.x) == pytest.approx([swing.at(t)[0] for t in found.times], abs=1e-11)
-    assert [mode for _, mode in found.events] == [mode for _, mode in swing.events]
+    assert list(solution.x) == pytest.approx([swing.at(t)[0] for t in solution.times], abs=1e-11)
+    assert [mode for _, mode in solution.events] == [mode for _, mode in swing.events]
 
 
 def test_the_smooth_sled_creates_no_energy():
     """Radau against the power balance: the work of pull and friction changes the kinetic energy."""
     values = defaults("pacejka")
-    found = compute_reference("pacejka", [(0.0, 8.0, values)], CommunicationGrid(0.0, 8.0, 8000))
-    curve, pull = MagicFormula(values), values["k"] * (values["v_driver"] * found.times - found.x)
-    power = [(f - curve.mu(v) * values["m"] * values["g"]) * v for f, v in zip(pull, found.v, strict=True)]
-    work = np.concatenate([[0.0], np.cumsum(np.diff(found.times) * (np.array(power[1:]) + power[:-1]) / 2)])
-    np.testing.assert_allclose(0.5 * values["m"] * found.v**2, work, atol=3e-4)
+    solution = compute_reference("pacejka", [(0.0, 8.0, values)], CommunicationGrid(0.0, 8.0, 8000))
+    curve, pull = MagicFormula(values), values["k"] * (values["v_driver"] * solution.times - solution.x)
+    power = [(f - curve.mu(v) * values["m"] * values["g"]) * v for f, v in zip(pull, solution.v, strict=True)]
+    work = np.concatenate([[0.0], np.cumsum(np.diff(solution.times) * (np.array(power[1:]) + power[:-1]) / 2)])
+    np.testing.assert_allclose(0.5 * values["m"] * solution.v**2, work, atol=3e-4)
 
 
 # ---- the time limits
@@ -188,7 +188,7 @@ def test_a_correct_motion_is_finished(case):
 
 
 @pytest.mark.parametrize(
-    ("changed", "said"),
+    ("changed", "message"),
     [
         ({"x": np.array([1.0, 1.0, 1.01])}, "error 0.01"),
         ({"v": np.array([0.0, nan, 0.0])}, "error nan"),
@@ -198,11 +198,11 @@ def test_a_correct_motion_is_finished(case):
     ],
     ids=["far", "not a number", "energy out of nothing", "late", "one event too many"],
 )
-def test_a_plausible_wrong_motion_is_wrong(case, changed, said):
+def test_a_plausible_wrong_motion_is_wrong(case, changed, message):
     row = judge_solution(case, replace(GOOD, **changed), REST)
     assert row.ended == WRONG
     assert not row.passed
-    assert said in row.text
+    assert message in row.text
 
 
 def test_a_refusal_needs_its_message_and_no_values(case):
@@ -219,19 +219,19 @@ def test_the_slope_is_that_of_the_stiff_end(case):
         CaseOutcome(replace(case, region=x), FINISHED, "", motion=replace(GOOD, counts=RunCounts(0, n, 0, 0)))
         for x, n in ((1e-4, 1000), (1e-3, 100), (1e-2, 50))
     ]
-    (found,) = stability_regions(rows)
-    assert found.slope == pytest.approx(-1.0)
-    assert found.steps.tolist() == [50, 100, 1000]
+    (region,) = stability_regions(rows)
+    assert region.slope == pytest.approx(-1.0)
+    assert region.steps.tolist() == [50, 100, 1000]
 
 
 # ---- the table
 
 
 def test_every_scene_states_its_expected_ending_for_an_existing_model():
-    found, finish = load_scenes()
+    all_scenes, finish = load_scenes()
     assert set(finish) == {"exact", "tolerances", "least"}
-    assert {scene["model"] for scene in found} == set(MODELS)
-    for scene in found:
+    assert {scene["model"] for scene in all_scenes} == set(MODELS)
+    for scene in all_scenes:
         assert not ("refuse" in scene and "finish" in scene), scene["title"]
         assert "{" not in scene["title"], scene["title"]
 
@@ -248,15 +248,15 @@ def test_a_scene_is_expanded_over_models_and_values():
 
 def test_a_part_of_the_table_ends_as_expected(user_folder, tmp_path, monkeypatch):
     monkeypatch.chdir(user_folder)
-    rows, (*_, region) = run_stability(tmp_path, silent, grouped_cases(each_once()))
+    rows, (*_, region) = run_stability(tmp_path, no_progress, grouped_cases(is_sampled()))
     assert [f"{row.case.label}: {row.text}" for row in rows if not row.passed] == []
     assert {row.case.method for row in rows} == {"exact", "ode23", "ode45", "dop853", "rodas"}
     assert {row.case.model for row in rows} == set(MODELS)
     with (tmp_path / "stability" / "stability.csv").open(encoding="utf-8", newline="") as file:
         assert len(list(csv.DictReader(file))) == len(rows) > 100
-    told = load_provenance(tmp_path / "stability")["parameters"]
-    assert told["pendulum: theta0"]["unit"] == "rad"
-    assert {name.partition(":")[0] for name in told} == set(MODELS)
+    parameters = load_provenance(tmp_path / "stability")["parameters"]
+    assert parameters["pendulum: theta0"]["unit"] == "rad"
+    assert {name.partition(":")[0] for name in parameters} == set(MODELS)
     assert region.method == "rodas"
     assert region.stiffness.tolist() == [0.1, 0.03]
     assert error_table(rows).row_count > 20
@@ -270,8 +270,8 @@ def test_a_long_path_of_temporary_files_is_supported(tmp_path):
     folder.mkdir()
     name = "run_with_timeout"
     code = f"from harness.studies.stability.{name} import {name}\nprint({name}(60.0, len, 'three'))"
-    asked = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(folder)}
-    done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, timeout=120)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "TMPDIR": str(folder)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=120)
     assert (done.stdout, done.stderr) == ("5\n", "")
 
 
@@ -283,7 +283,7 @@ def test_a_user_model_passes_the_standard_scenes(tmp_path, name):
     file = build_user_model(path) / f"{name}.fmu"
     few = ("as it comes", "rtol = 1e-09", "NaN", "T_d = 3", "J = 0.002", "m1 = 125")
     chosen = [[case for case in group if case.title.startswith(few)] for group in grouped_cases(models=[str(file)])]
-    rows, _ = run_stability(tmp_path, silent, [group for group in chosen if group])
+    rows, _ = run_stability(tmp_path, no_progress, [group for group in chosen if group])
     assert {row.case.name for row in rows} == {name}
     assert {row.case.title for row in rows} >= {"as it comes", "rtol = 1e-09"}
     assert [f"{row.case.label}: {row.text}" for row in rows if not row.passed] == []
@@ -311,8 +311,8 @@ def test_a_model_without_position_and_speed_is_refused_by_stability_but_not_by_p
     assert commands.build("relax.py", folder=tmp_path).returncode == 0
     done = commands.harness(tmp_path, "stability", "relax.py")
     assert (done.returncode, done.stdout) == (1, "")
-    said = "no state is the rate of another one; the cases need a position and a speed"
-    assert done.stderr == f"Error: relax.py: {said}\n"
+    output = "no state is the rate of another one; the cases need a position and a speed"
+    assert done.stderr == f"Error: relax.py: {output}\n"
     done = commands.harness(tmp_path, "precision", "relax.py", "--quick", blank=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "results/precision/relax.csv").is_file()

@@ -127,7 +127,7 @@ def test_failed_runs_are_reported_on_screen_in_files_and_in_the_exit_status(harn
     assert pandas.read_csv(tmp_path / "results/sweep/mine/sweep.csv")["final_x [m]"].isna().sum() == 6
 
 
-TOLD = {  # why some have no run to show
+REASONS = {  # why some have no run to show
     "Falling": "it terminated the simulation: fmi2DoStep returned Discard",
     "NonConforming": "violates the FMI standard in 2 places",
 }
@@ -140,8 +140,8 @@ def test_an_external_fmu_is_swept_or_refused_with_a_reason(harness, tmp_path, na
     done = harness(
         "sweep", fmu, "--vary", vary, "--measure", "final,largest", "--name", "a", "--tolerance", 1e-3, blank=True
     )
-    if name in TOLD:
-        assert (done.returncode, TOLD[name] in done.stderr) == (1, True)
+    if name in REASONS:
+        assert (done.returncode, REASONS[name] in done.stderr) == (1, True)
         return
     assert (done.returncode, done.stderr) == (0, "")
     data = open_sweep(tmp_path / "results/sweep/a").drop_vars("error")
@@ -165,8 +165,8 @@ def test_crashing_and_failing_runs_of_an_external_fmu_are_reported_individually(
 def test_sweeps_of_different_ranges_have_separate_folders(harness, tmp_path):
     for vary in ("m=1:2:2", "m=1:3:2"):
         assert harness("sweep", "smd", "--vary", vary, "--workers", 1, blank=True).returncode == 0
-    found = [open_sweep(folder)["m"].to_numpy().tolist() for folder in (tmp_path / "results/sweep").iterdir()]
-    assert sorted(found) == [[1.0, 2.0], [1.0, 3.0]]
+    values = [open_sweep(folder)["m"].to_numpy().tolist() for folder in (tmp_path / "results/sweep").iterdir()]
+    assert sorted(values) == [[1.0, 2.0], [1.0, 3.0]]
 
 
 def test_a_sample_has_a_row_for_each_run(harness, tmp_path):

@@ -32,11 +32,13 @@ def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path)
         folder = tmp_path / str(many)
         folder.mkdir()
         tracemalloc.start()
-        kept = sweep.journal(folder)
-        with kept.open():
+        journal = sweep.journal(folder)
+        with journal.open():
             for first in range(0, len(sweep.points), 200):
-                kept.add(Block(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"}))
-        (failure,) = writing.write_files(sweep, kept, about, folder)
+                journal.add(
+                    Block(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"})
+                )
+        (failure,) = writing.write_files(sweep, journal, about, folder)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
         assert failure.runs == len(sweep.points) // 200
@@ -50,17 +52,17 @@ def test_a_netcdf_file_written_in_blocks_is_read_correctly(tmp_path):
     values = np.arange(12.0).reshape(3, 4) / 7
     texts = np.array(["", "a", "four", "\u00e9\u00e9", "b"])
     with (tmp_path / "a.nc").open("wb") as stream:
-        said = {"units": "m/s2", "size": 0.1}
+        attributes = {"units": "m/s2", "size": 0.1}
         text = NetCDFVariable("text", ("n", "letters"), {"_Encoding": "utf-8"}, 4)
         sizes = {"y": 3, "x": 4, "n": 5, "letters": 4}
-        whole = NetCDFWriter(stream, sizes, [NetCDFVariable("a", ("y", "x"), said), text], {"b": "c"})
+        dataset = NetCDFWriter(stream, sizes, [NetCDFVariable("a", ("y", "x"), attributes), text], {"b": "c"})
         for first in (8, 0, 4):
-            whole.write_values("a", first, values.ravel()[first : first + 4])
-        whole.write_values("text", 0, np.char.encode(texts))
+            dataset.write_values("a", first, values.ravel()[first : first + 4])
+        dataset.write_values("text", 0, np.char.encode(texts))
     with xarray.open_dataset(tmp_path / "a.nc") as data:
         assert data["a"].dims == ("y", "x")
         assert (data["a"].to_numpy() == values).all()
-        assert data["a"].attrs == said
+        assert data["a"].attrs == attributes
         assert data.attrs == {"b": "c"}
         assert (data["text"].to_numpy() == texts).all()
 
@@ -89,11 +91,11 @@ def test_known_boundaries_are_packed_in_the_fmu_and_depend_on_its_parameters(fmu
         for variable in read_description(fmus / f"{name}.fmu").modelVariables
         if variable.causality == "parameter" and variable.type == "Real"
     }
-    found = read_boundaries(fmus / f"{name}.fmu", tuple(values), {})
-    assert found
-    for each in found:
-        assert each.parameters <= set(values)
-        assert np.isfinite(each.evaluate(values, 1.0))
+    boundaries = read_boundaries(fmus / f"{name}.fmu", tuple(values), {})
+    assert boundaries
+    for item in boundaries:
+        assert item.parameters <= set(values)
+        assert np.isfinite(item.evaluate(values, 1.0))
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def harness(fmus, tmp_path):
 
 
 @pytest.fixture
-def whole(fmus):
+def undisturbed(fmus):
     """Return the files of an undisturbed sweep, by name."""
 
     def make(folder):
@@ -64,16 +64,16 @@ def journal(place):
 
 def blocks(place):
     """Return the number of finished blocks of runs."""
-    found = journal(place)
-    return found.read_bytes().count(b"\n") if found else 0
+    path = journal(place)
+    return path.read_bytes().count(b"\n") if path else 0
 
 
-def begun(place):
+def start_sweep(place):
     """Start the long sweep in a child process and wait for two finished blocks of runs.
 
     Its environment marks its processes, and the file `bound` lists the addresses at which they listen.
     """
-    heard, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), blocks(place)
+    reset_sigint, before = partial(signal.signal, signal.SIGINT, signal.SIG_DFL), blocks(place)
     (place / "sitecustomize.py").write_text(NOTE)
     process = subprocess.Popen(
         [sys.executable, "-m", "harness", *LONG],
@@ -82,7 +82,7 @@ def begun(place):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
-        preexec_fn=heard,  # a test run in the background ignores it
+        preexec_fn=reset_sigint,  # a test run in the background ignores it
     )
     while process.poll() is None:
         if blocks(place) > before + 1:
@@ -91,50 +91,50 @@ def begun(place):
     raise AssertionError(process.communicate()[1])
 
 
-def living(place):
+def sweep_processes(place):
     """Return the processes of the sweeps started there."""
-    found, mark = [], f"PYTHONPATH={place}{os.pathsep}".encode()
+    processes, mark = [], f"PYTHONPATH={place}{os.pathsep}".encode()
     for file in Path("/proc").glob("[0-9]*/environ"):
         try:
-            found += [file.parent.name] if mark in file.read_bytes() else []
+            processes += [file.parent.name] if mark in file.read_bytes() else []
         except OSError:  # of another user, or gone
             continue
-    return found
+    return processes
 
 
-def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, whole, tmp_path):
+def test_a_killed_sweep_resumes_and_leaves_no_worker(harness, undisturbed, tmp_path):
     """A kill reaches only the sweep, Ctrl-C in a terminal also its workers; the last write may be truncated."""
-    process = begun(tmp_path)
-    assert len(living(tmp_path)) >= 3 or not Path("/proc/self/environ").exists()
+    process = start_sweep(tmp_path)
+    assert len(sweep_processes(tmp_path)) >= 3 or not Path("/proc/self/environ").exists()
     process.kill()
     process.communicate(timeout=60)
     late = time.monotonic() + 60
-    while living(tmp_path) and time.monotonic() < late:
+    while sweep_processes(tmp_path) and time.monotonic() < late:
         time.sleep(0.05)
-    assert living(tmp_path) == []
+    assert sweep_processes(tmp_path) == []
     first = Journal(journal(tmp_path), 100, 1).n_done
     with journal(tmp_path).open("a") as file:
         file.write("[299, [0.1")
 
-    process = begun(tmp_path)
+    process = start_sweep(tmp_path)
     os.killpg(process.pid, signal.SIGINT)
-    said = process.communicate(timeout=60)[1]
+    stderr = process.communicate(timeout=60)[1]
     assert process.returncode == 130
-    assert said.startswith("Error: interrupted: ")
-    assert said.count("\n") == 1
-    kept = Journal(journal(tmp_path), 100, 1).n_done
-    assert 0 < first < kept < 100
+    assert stderr.startswith("Error: interrupted: ")
+    assert stderr.count("\n") == 1
+    done_runs = Journal(journal(tmp_path), 100, 1).n_done
+    assert 0 < first < done_runs < 100
 
     done = harness(*LONG)
     assert (done.returncode, done.stderr) == (0, "")
-    assert f"100 runs, {kept} of them resumed" in done.stdout
-    assert files(tmp_path) == whole
+    assert f"100 runs, {done_runs} of them resumed" in done.stdout
+    assert files(tmp_path) == undisturbed
     assert journal(tmp_path) is None
     bound = tmp_path / "bound"  # workers use pipes; a socket whose address is a file is no port
     assert "tuple" not in (bound.read_text() if bound.exists() else "")
 
 
-def test_a_cluster_with_a_killed_worker_finishes(harness, whole, tmp_path):
+def test_a_cluster_with_a_killed_worker_finishes(harness, undisturbed, tmp_path):
     """One worker is in this process, the other in a separate one, until the first blocks are finished."""
     words = ("--no-dashboard", "--nthreads", "2", "--no-nanny")
     options = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": None}
@@ -161,7 +161,7 @@ def test_a_cluster_with_a_killed_worker_finishes(harness, whole, tmp_path):
                 thread.join()
     assert (done.returncode, done.stderr) == (0, "")
     assert 0 < before[0] < 100
-    assert files(tmp_path) == whole
+    assert files(tmp_path) == undisturbed
 
 
 def test_an_unresponsive_scheduler_is_reported(monkeypatch):
@@ -176,10 +176,10 @@ def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(monkeypat
     """In any block, and with any other work in progress."""
     monkeypatch.setattr(study, "work", killed_worker.work)
     sweep = Sweep(SweepSpec("deadly", ("a",), (), ()), SweepPoints((parse_axis("a=0:39:40", False),)), b"", 1)
-    found = {}
+    counts = {}
     with study.open_workers(None, 2, 40) as hands:
         for block in study.Dispatcher(sweep, hands, [(0, 40)]).completed_blocks():
             for i, value in enumerate(block.values[:, 0]):
-                assert block.first + i not in found
-                found[block.first + i] = block.messages.get(i, value)
-    assert found == {i: WORKER_DIED if i in (7, 30) else 2.0 * i for i in range(40)}
+                assert block.first + i not in counts
+                counts[block.first + i] = block.messages.get(i, value)
+    assert counts == {i: WORKER_DIED if i in (7, 30) else 2.0 * i for i in range(40)}

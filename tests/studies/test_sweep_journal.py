@@ -47,16 +47,16 @@ DAMAGED = (
 def test_a_damaged_journal_line_is_skipped_and_counted(tmp_path, damaged):
     file = tmp_path / "journal"
     file.write_bytes(GOOD + damaged + b"\n" + line(7, [[3.0, 4.0]], {}))
-    kept = Journal(file, 10, 2)
-    assert (kept.n_done, kept.damaged, kept.missing_spans) == (3, 1, [(0, 3), (5, 7), (8, 10)])
-    with kept.open():
-        kept.add(Block(0, np.zeros((3, 2)), {}))
+    journal = Journal(file, 10, 2)
+    assert (journal.n_done, journal.damaged, journal.missing_spans) == (3, 1, [(0, 3), (5, 7), (8, 10)])
+    with journal.open():
+        journal.add(Block(0, np.zeros((3, 2)), {}))
     again = Journal(file, 10, 2)
     assert (again.n_done, again.damaged) == (6, 1)
     assert [(block.first, block.messages) for block in again.blocks()] == [(0, {}), (3, {0: "failed"}), (7, {})]
     file.write_bytes(GOOD + line(7, [[3.0, 4.0]], {})[:-5])
-    kept = Journal(file, 10, 2)
-    assert (kept.n_done, kept.damaged) == (2, 0)  # truncated by a kill
+    journal = Journal(file, 10, 2)
+    assert (journal.n_done, journal.damaged) == (2, 0)  # truncated by a kill
 
 
 def test_a_damaged_journal_is_reported_and_its_runs_are_repeated(harness, tmp_path):
@@ -64,8 +64,8 @@ def test_a_damaged_journal_is_reported_and_its_runs_are_repeated(harness, tmp_pa
     assert harness(*arguments, "--out", "whole", blank=True).returncode == 0
     (tmp_path / "results/sweep").mkdir(parents=True)
     points = SweepPoints((parse_axis("m=1:2:4", False),))
-    usual = ("exchange", False), ("lenient", False), ("stop", None), ("timeout", 60.0), ("tolerance", 1e-6)
-    sweep = Sweep(SweepSpec("smd", ("m",), (), (), usual), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
+    defaults = ("exchange", False), ("lenient", False), ("stop", None), ("timeout", 60.0), ("tolerance", 1e-6)
+    sweep = Sweep(SweepSpec("smd", ("m",), (), (), defaults), points, (tmp_path / "fmus/smd.fmu").read_bytes(), 3)
     sweep.journal(tmp_path / "results/sweep").path.write_bytes(b"garbage\n" + line(0, [[1.0]], {}))
     done = harness(*arguments, blank=True)
     assert (done.returncode, done.stderr) == (0, "")

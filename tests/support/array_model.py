@@ -56,11 +56,11 @@ def to_array_model(model):
 
 def store_vectors_as_arrays(thing):
     """Store the vector attributes of an object, and of all objects that it owns, as arrays."""
-    said = {name for one in type(thing).__mro__ for name in vars(one).get("__annotations__", {})}
-    over_contacts = {name for name in said if "modes" in name}
+    annotated = {name for one in type(thing).__mro__ for name in vars(one).get("__annotations__", {})}
+    over_contacts = {name for name in annotated if "modes" in name}
 
     def assign(self, name, value):
-        if name in said or NAMED_VECTOR.fullmatch(name):
+        if name in annotated or NAMED_VECTOR.fullmatch(name):
             long = len(contact_indices) if name in over_contacts or name.startswith("modes") else len(state_indices)
             value = np.full(long, value) if np.ndim(value) == 0 else np.array(value)
         object.__setattr__(self, name, value)
@@ -76,21 +76,21 @@ def call_with_scalars(cls, name):
     """Wrap a method of the model so that it takes and returns vectors."""
 
     def call(self, t, *vectors):
-        found = getattr(cls, name)(self, t, *numbers(vectors))
+        result = getattr(cls, name)(self, t, *numbers(vectors))
         if name == "rates":
-            y, found = vectors[0], iter(found if isinstance(found, tuple) else (found,))
-            return np.array([next(found) if is_dynamic[i] else y[rate_index[i]] for i in state_indices])
+            y, result = vectors[0], iter(result if isinstance(result, tuple) else (result,))
+            return np.array([next(result) if is_dynamic[i] else y[rate_index[i]] for i in state_indices])
         if name == "jacobian":
-            found, f_t, J = iter(found), state_vector(), np.zeros((len(state_indices), len(state_indices)))
+            result, f_t, J = iter(result), state_vector(), np.zeros((len(state_indices), len(state_indices)))
             for i in state_indices:
                 if is_dynamic[i]:
-                    f_t[i], J[i] = next(found), [next(found) for _ in state_indices]
+                    f_t[i], J[i] = next(result), [next(result) for _ in state_indices]
             return f_t, J
         if name in ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses"):
-            found = np.array(found if isinstance(found, tuple) else (found,))
-            parts = len(found) // (len(state_indices) if name == "apply_impulses" else len(contact_indices))
-            return found if parts == 1 else np.split(found, parts)
-        return found
+            result = np.array(result if isinstance(result, tuple) else (result,))
+            parts = len(result) // (len(state_indices) if name == "apply_impulses" else len(contact_indices))
+            return result if parts == 1 else np.split(result, parts)
+        return result
 
     return call
 

@@ -24,22 +24,24 @@ class Browser:
         self.temporary_folder = TemporaryDirectory(
             ignore_cleanup_errors=True
         )  # a child of Chromium may still be writing
-        ours, theirs = zip(*(self.pipe(i) for i in (1, 0)), strict=True)
+        ours, other_table = zip(*(self.pipe(i) for i in (1, 0)), strict=True)
 
-        def place():
-            os.dup2(theirs[0], READS)
-            os.dup2(theirs[1], WRITES)
+        def connect_pipes():
+            os.dup2(other_table[0], READS)
+            os.dup2(other_table[1], WRITES)
 
-        own = (f"--user-data-dir={self.temporary_folder.name}/profile", "--remote-debugging-pipe", "about:blank")
+        arguments = (f"--user-data-dir={self.temporary_folder.name}/profile", "--remote-debugging-pipe", "about:blank")
         quiet = {"stdin": subprocess.DEVNULL, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        self.process = subprocess.Popen([CHROMIUM, *FLAGS, *own], pass_fds=(READS, WRITES), preexec_fn=place, **quiet)
-        for each in theirs:
-            os.close(each)
+        self.process = subprocess.Popen(
+            [CHROMIUM, *FLAGS, *arguments], pass_fds=(READS, WRITES), preexec_fn=connect_pipes, **quiet
+        )
+        for their in other_table:
+            os.close(their)
         self.out, self.into = os.fdopen(ours[0], "wb", 0), os.fdopen(ours[1], "rb")
         self.numbers, self.buffer = itertools.count(1), b""
         self.console, self.requested_urls, self.session = [], [], None
         targets = self.call("Target.getTargets")["targetInfos"]
-        target = next(each["targetId"] for each in targets if each["type"] == "page")
+        target = next(their["targetId"] for their in targets if their["type"] == "page")
         self.session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
@@ -63,10 +65,10 @@ class Browser:
             message["sessionId"] = self.session
         self.out.write(json.dumps(message).encode() + b"\0")
         while True:
-            found = self.receive()
-            if found.get("id") == number:
-                assert "error" not in found, (method, found)
-                return found["result"]
+            message_received = self.receive()
+            if message_received.get("id") == number:
+                assert "error" not in message_received, (method, message_received)
+                return message_received["result"]
 
     def receive(self):
         while b"\0" not in self.buffer:
@@ -74,11 +76,11 @@ class Browser:
             assert piece, "the browser is gone"
             self.buffer += piece
         text, self.buffer = self.buffer.split(b"\0", 1)
-        found = json.loads(text)
-        parameters = found.get("params", {})
-        match found.get("method"):
+        message = json.loads(text)
+        parameters = message.get("params", {})
+        match message.get("method"):
             case "Runtime.consoleAPICalled":
-                self.console.append(str([each.get("value") for each in parameters["args"]]))
+                self.console.append(str([item.get("value") for item in parameters["args"]]))
             case "Runtime.exceptionThrown":
                 self.console.append(parameters["exceptionDetails"].get("exception", {}).get("description", "?"))
             case "Log.entryAdded":
@@ -87,23 +89,23 @@ class Browser:
                 self.requested_urls.append(parameters["request"]["url"])
             case "Page.loadEventFired":
                 self.loaded = True
-        return found
+        return message
 
     def open(self, address):
         """Load an address and wait for the load event. Load an empty page first, so that the same address is loaded
         again."""
-        for each in ("about:blank", address):
+        for item in ("about:blank", address):
             self.loaded, self.console, self.requested_urls = False, [], []
-            self.call("Page.navigate", url=each)
+            self.call("Page.navigate", url=item)
             while not self.loaded:
                 self.receive()
 
     def run(self, script):
         """Evaluate an expression in the page, awaiting a promise."""
         how = {"awaitPromise": True, "returnByValue": True, "userGesture": True}
-        found = self.call("Runtime.evaluate", expression=script, **how)
-        assert "exceptionDetails" not in found, found["exceptionDetails"]
-        return found["result"].get("value")
+        result = self.call("Runtime.evaluate", expression=script, **how)
+        assert "exceptionDetails" not in result, result["exceptionDetails"]
+        return result["result"].get("value")
 
     def size(self, width, height=900, touch=False):
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=touch)

@@ -83,8 +83,8 @@ class ForkServer:
     def run(self, module, words, folder, environment, text, blank):
         for file in self.files:
             file.write_text(text if file.name == "in" else "")
-        asked = {"words": words, "folder": folder, "environment": environment, "files": [*map(str, self.files)]}
-        print(json.dumps([module, blank, asked]), file=self.process.stdin, flush=True)
+        state = {"words": words, "folder": folder, "environment": environment, "files": [*map(str, self.files)]}
+        print(json.dumps([module, blank, state]), file=self.process.stdin, flush=True)
         if not select.select([self.process.stdout], [], [], TIMEOUT)[0]:
             os.killpg(self.process.pid, signal.SIGKILL)
             _server.cache_clear()
@@ -119,16 +119,16 @@ def serve():
     asking.subprocess = SimpleNamespace(**{**vars(subprocess), "Popen": ForkedPopen})
     with style.open_figure(Path(os.devnull), 1.0, 1.0) as figure:  # imports matplotlib and loads its fonts
         figure.subplots().set_title("a title")
-    drawing = [each for each in sys.modules.values() if getattr(each, "open_figure", None) is style.open_figure]
+    drawing = [item for item in sys.modules.values() if getattr(item, "open_figure", None) is style.open_figure]
     gc.freeze()  # reference counts would otherwise copy every memory page in each child
     for line in sys.stdin:
         child = os.fork()
         if not child:
-            module, blank, asked = json.loads(line)
-            set_process_state(**asked)
+            module, blank, state = json.loads(line)
+            set_process_state(**state)
             if blank:
-                for each in drawing:
-                    each.open_figure = partial(stub_sheet, None if blank == UNPLOTTED else style.Figure)
+                for item in drawing:
+                    item.open_figure = partial(stub_sheet, None if blank == UNPLOTTED else style.Figure)
             run(module)
             return
         print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
@@ -157,8 +157,8 @@ class ForkedPopen(subprocess.Popen):
             os.closerange(3, 1024)  # Popen waits for its pipe to close; the limit may be a thousand million descriptors
             atexit._clear()  # skip the exit handlers of the parent
             resource_tracker._resource_tracker._fd = None
-            for number, usual in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
-                signal.signal(number, usual)
+            for number, default in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
+                signal.signal(number, default)
             sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
             try:
                 set_process_state(words, os.getcwd(), env, ())

@@ -12,11 +12,11 @@ OMEGA = 12.566
 
 
 def values(estimates):
-    return {each.name: each.value for each in estimates}
+    return {estimate.name: estimate.value for estimate in estimates}
 
 
-def remarks_text(found):
-    return " ".join(summary_lines(found))
+def remarks_text(fit):
+    return " ".join(summary_lines(fit))
 
 
 def decay_record(

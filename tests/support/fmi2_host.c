@@ -1,9 +1,9 @@
-/* A host without Python: plays a script of FMI calls on the library of an FMU.
+/* A host without Python: runs a script of FMI calls on the library of an FMU.
  *
  *     host LIBRARY GUID THREADS < script
  *
- * Every thread plays the whole script with instances of its own; what they say must agree.  One command a line, with
- * the number of an instance first, and what it answers on a line each: the status, then values as hexadecimal floats.
+ * Every thread runs the whole script with its own instances; all outputs must agree.  Each line is the number of an
+ * instance and a command.  Each command prints a line: the status, then values as hexadecimal floats.
  *
  *     I new [exchange]           instantiate            I setup TOLERANCE START STOP   (nan: not given)
  *     I enter | exit | terminate | reset | free
@@ -12,10 +12,10 @@
  *     I setr REFERENCE VALUE     I seti REFERENCE VALUE               I setb REFERENCE VALUE    I sets REFERENCE TEXT
  *     I getr REFERENCE...        I geti REFERENCE...                  I getb REFERENCE...       I gets REFERENCE...
  *     I save SLOT                I restore SLOT                       I drop SLOT
- *     I serialize SLOT BYTES     I deserialize SLOT BYTES             bytes live in slots too
- *     I truncate BYTES           one byte less                        I spoil BYTES             another FMU's
+ *     I serialize SLOT BYTES     I deserialize SLOT BYTES             bytes are stored in slots too
+ *     I truncate BYTES           one byte less                        I spoil BYTES             change the GUID
  *     I log ON CATEGORY...       I status                             I unsupported
- *     I other                    what instantiation must refuse
+ *     I other                    invalid instantiations
  */
 #define _GNU_SOURCE
 #include <math.h>
@@ -60,13 +60,13 @@ typedef struct {
     size_t sizes[SLOTS];
 } Player;
 
-static void hear(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
+static void on_log(fmi2ComponentEnvironment environment, fmi2String instance, fmi2Status status, fmi2String category,
                  fmi2String message, ...)
 {
     Player *player = environment;
     va_list values;
     va_start(values, message);
-    fprintf(player->out, "heard %s %d %s ", instance, status, category);
+    fprintf(player->out, "log %s %d %s ", instance, status, category);
     vfprintf(player->out, message, values);
     fprintf(player->out, "\n");
     va_end(values);
@@ -80,7 +80,7 @@ static int references(char **words, int count, fmi2ValueReference *out)
     return count;
 }
 
-static void say_reals(Player *player, fmi2Status status, const double *values, int count)
+static void print_reals(Player *player, fmi2Status status, const double *values, int count)
 {
     fprintf(player->out, "%d", status);
     for (int i = 0; i < count; i++) isnan(values[i]) ? fprintf(player->out, " nan") : fprintf(player->out, " %a", values[i]);
@@ -89,34 +89,34 @@ static void say_reals(Player *player, fmi2Status status, const double *values, i
 
 static void run(Player *player, fmi2Component c, char **words, int count)
 {
-    fmi2ValueReference wanted[WORDS];
+    fmi2ValueReference requested[WORDS];
     double values[WORDS], start = strtod(words[0], NULL), stop = strtod(words[1], NULL), t = start;
-    int steps = atoi(words[2]), size = references(words + 3, count - 3, wanted);
-    fmi2Status status = fmi.GetReal(c, wanted, (size_t)size, values);
+    int steps = atoi(words[2]), size = references(words + 3, count - 3, requested);
+    fmi2Status status = fmi.GetReal(c, requested, (size_t)size, values);
     for (int i = 1; i <= steps && status == fmi2OK; i++) {
         double next = start + (stop - start) * i / steps;
         status = fmi.DoStep(c, t, next - t, fmi2True);
-        fmi.GetReal(c, wanted, (size_t)size, values);
+        fmi.GetReal(c, requested, (size_t)size, values);
         t = next;
     }
-    say_reals(player, status, values, size);
+    print_reals(player, status, values, size);
 }
 
-/* From event mode to event mode. */
+/* Starts and ends in event mode. */
 static void euler(Player *player, fmi2Component c, size_t states, char **words, int count)
 {
-    fmi2ValueReference wanted[WORDS];
+    fmi2ValueReference requested[WORDS];
     double values[WORDS], x[WORDS], rates[WORDS], start = strtod(words[0], NULL), stop = strtod(words[1], NULL);
-    int steps = atoi(words[2]), size = references(words + 3, count - 3, wanted), status = fmi2OK;
+    int steps = atoi(words[2]), size = references(words + 3, count - 3, requested), status = fmi2OK;
     fmi2EventInfo event;
     for (int i = 1; i <= steps; i++) {
         status |= fmi.NewDiscreteStates(c, &event) | fmi.EnterContinuousTimeMode(c);
         status |= fmi.GetContinuousStates(c, x, states) | fmi.GetDerivatives(c, rates, states);
         for (size_t k = 0; k < states; k++) x[k] += (stop - start) / steps * rates[k];
         status |= fmi.SetTime(c, start + (stop - start) * i / steps) | fmi.SetContinuousStates(c, x, states);
-        status |= fmi.EnterEventMode(c) | fmi.GetReal(c, wanted, (size_t)size, values);
+        status |= fmi.EnterEventMode(c) | fmi.GetReal(c, requested, (size_t)size, values);
     }
-    say_reals(player, (fmi2Status)status, values, size);
+    print_reals(player, (fmi2Status)status, values, size);
 }
 
 static void refused_instances(Player *player)
@@ -151,25 +151,25 @@ static void unsupported(Player *player, fmi2Component c)
 
 static void values(Player *player, fmi2Component c, const char *command, char **words, int count)
 {
-    fmi2ValueReference wanted[WORDS];
-    fmi2Real reals[WORDS]; /* what a refused call leaves as it was is seen */
+    fmi2ValueReference requested[WORDS];
+    fmi2Real reals[WORDS]; /* shows whether a refused call changes its output */
     fmi2Integer integers[WORDS];
     fmi2String strings[WORDS];
     for (int i = 0; i < WORDS; i++) reals[i] = 77.0, integers[i] = 77, strings[i] = "untouched";
     bool get = command[0] == 'g';
-    size_t size = get ? (size_t)references(words, count, wanted) : (size_t)references(words, 1, wanted);
+    size_t size = get ? (size_t)references(words, count, requested) : (size_t)references(words, 1, requested);
     fmi2Status status;
     if (!get) {
         reals[0] = strtod(words[1], NULL), integers[0] = atoi(words[1]), strings[0] = words[1];
     }
     switch (command[3]) {
     case 'r':
-        if (get) say_reals(player, fmi.GetReal(c, wanted, size, reals), reals, (int)size);
-        else answer(player, fmi.SetReal(c, wanted, 1, reals));
+        if (get) print_reals(player, fmi.GetReal(c, requested, size, reals), reals, (int)size);
+        else answer(player, fmi.SetReal(c, requested, 1, reals));
         return;
-    case 'i': status = get ? fmi.GetInteger(c, wanted, size, integers) : fmi.SetInteger(c, wanted, 1, integers); break;
-    case 'b': status = get ? fmi.GetBoolean(c, wanted, size, integers) : fmi.SetBoolean(c, wanted, 1, integers); break;
-    default: status = get ? fmi.GetString(c, wanted, size, strings) : fmi.SetString(c, wanted, 1, strings); break;
+    case 'i': status = get ? fmi.GetInteger(c, requested, size, integers) : fmi.SetInteger(c, requested, 1, integers); break;
+    case 'b': status = get ? fmi.GetBoolean(c, requested, size, integers) : fmi.SetBoolean(c, requested, 1, integers); break;
+    default: status = get ? fmi.GetString(c, requested, size, strings) : fmi.SetString(c, requested, 1, strings); break;
     }
     fprintf(player->out, "%d", status);
     for (size_t i = 0; get && i < size; i++) {
@@ -245,7 +245,7 @@ static void play(Player *player, char *line)
         double last;
         int terminated;
         fmi2Status status = fmi.GetRealStatus(c, fmi2LastSuccessfulTime, &last);
-        say_reals(player, status, &last, 1);
+        print_reals(player, status, &last, 1);
         status = fmi.GetBooleanStatus(c, fmi2Terminated, &terminated);
         fprintf(player->out, "%d %d\n", status, terminated);
     } else if (IS("unsupported")) {
@@ -257,7 +257,7 @@ static void play(Player *player, char *line)
     }
 }
 
-static void *perform(void *argument)
+static void *run_script(void *argument)
 {
     Player *player = argument;
     char *script = strdup(player->script), *rest = NULL;
@@ -267,13 +267,13 @@ static void *perform(void *argument)
     return NULL;
 }
 
-static char *everything(FILE *file)
+static char *read_all(FILE *file)
 {
-    size_t size = 0, room = 1 << 16;
-    char *text = malloc(room);
-    for (size_t got; (got = fread(text + size, 1, room - size - 1, file)) > 0;) {
-        size += got;
-        if (room - size < 2) text = realloc(text, room *= 2);
+    size_t size = 0, capacity = 1 << 16;
+    char *text = malloc(capacity);
+    for (size_t n_read; (n_read = fread(text + size, 1, capacity - size - 1, file)) > 0;) {
+        size += n_read;
+        if (capacity - size < 2) text = realloc(text, capacity *= 2);
     }
     text[size] = '\0';
     return text;
@@ -281,13 +281,13 @@ static char *everything(FILE *file)
 
 static void load(const char *path)
 {
-    void *library = opened(path);
-#define FIND(name) *(void **)&fmi.name = found(library, "fmi2" #name);
+    void *library = open_library(path);
+#define FIND(name) *(void **)&fmi.name = find_function(library, "fmi2" #name);
     FUNCTIONS(FIND)
 }
 
-/* The libraries in this process, one a line on standard error. */
-static void say_maps(void)
+/* Print the libraries in this process, one per line, to standard error. */
+static void print_libraries(void)
 {
     char line[512];
     FILE *maps = fopen("/proc/self/maps", "r");
@@ -297,12 +297,12 @@ static void say_maps(void)
     if (maps) fclose(maps);
 }
 
-/* All players at once, each in a thread of its own; a single one, which may be anywhere, without threads. */
-static void perform_all(Player *players, int count)
+/* Run all players at once, each in its own thread; a single one without threads, on any platform. */
+static void run_all(Player *players, int count)
 {
     if (count == 1) {
         players[0].out = stdout;
-        perform(&players[0]);
+        run_script(&players[0]);
         return;
     }
 #ifndef _WIN32
@@ -311,7 +311,7 @@ static void perform_all(Player *players, int count)
     pthread_t threads[THREADS];
     for (int i = 0; i < count; i++) {
         players[i].out = open_memstream(&texts[i], &lengths[i]);
-        if (pthread_create(&threads[i], NULL, perform, &players[i])) die("no thread");
+        if (pthread_create(&threads[i], NULL, run_script, &players[i])) die("no thread");
     }
     for (int i = 0; i < count; i++) pthread_join(threads[i], NULL);
     for (int i = 0; i < count; i++) fclose(players[i].out);
@@ -331,16 +331,16 @@ int main(int argc, char **argv)
     int count = argc == 4 ? atoi(argv[3]) : 0;
     if (count < 1 || count > THREADS) die("usage: host LIBRARY GUID THREADS < script");
     load(argv[1]);
-    char *script = everything(stdin);
+    char *script = read_all(stdin);
     for (int i = 0; i < count; i++) {
         players[i].guid = argv[2], players[i].script = script;
-        players[i].callbacks = (fmi2CallbackFunctions){hear, calloc, free, NULL, &players[i]};
+        players[i].callbacks = (fmi2CallbackFunctions){on_log, calloc, free, NULL, &players[i]};
     }
     timespec_get(&from, TIME_UTC);
-    perform_all(players, count);
+    run_all(players, count);
     timespec_get(&to, TIME_UTC);
     free(script);
     fprintf(stderr, "seconds %.9f\n", (double)(to.tv_sec - from.tv_sec) + 1e-9 * (double)(to.tv_nsec - from.tv_nsec));
-    say_maps();
+    print_libraries();
     return 0;
 }

@@ -60,22 +60,22 @@ def factors(path, parameters):
     Returns {reference of the unknown: {reference of the known: [factors]}} with one factor for each point at which the
     unknown responded. The points are at rest and in motion, for every choice of friction law.
     """
-    found = {}
+    responses = {}
     with instance(path) as (fmu, description, _):
-        there = {variable.name: variable for variable in description.modelVariables}
+        by_name = {variable.name: variable for variable in description.modelVariables}
         smooth = [v for v in description.modelVariables if v.variability == "continuous" and v.initial == "calculated"]
         states = [rate.variable.derivative for rate in description.derivatives]
         (push,) = [v for v in description.modelVariables if v.causality == "input"]
         knowns = [*states, push]
-        names = [name for name in ("friction", "pin_load") if name in there]
-        choices = product(*([int(item.value) for item in there[name].declaredType.items] for name in names))
+        names = [name for name in ("friction", "pin_load") if name in by_name]
+        choices = product(*([int(item.value) for item in by_name[name].declaredType.items] for name in names))
         chance = random.Random(5)
         for values in choices:
             fmu.reset()
             for name, value in zip(names, values, strict=True):
-                write(fmu, there[name], value)
+                write(fmu, by_name[name], value)
             for name, value in parameters.items():
-                write(fmu, there[name], value)
+                write(fmu, by_name[name], value)
             fmu.enterInitializationMode()
             fmu.exitInitializationMode()
             settle(fmu)
@@ -88,32 +88,32 @@ def factors(path, parameters):
                 point = (c_double * len(states))()
                 fmu.getContinuousStates(point, len(states))
                 point = [*point, force]
-                here = answers(fmu, smooth, push, point)
-                for place, known in enumerate(knowns):
-                    beside = [value + NUDGE * (number == place) for number, value in enumerate(point)]
-                    nudged = answers(fmu, smooth, push, beside)
-                    for unknown, a, b in zip(smooth, here, nudged, strict=True):
+                values_here = answers(fmu, smooth, push, point)
+                for index, known in enumerate(knowns):
+                    shifted = [value + NUDGE * (number == index) for number, value in enumerate(point)]
+                    nudged = answers(fmu, smooth, push, shifted)
+                    for unknown, a, b in zip(smooth, values_here, nudged, strict=True):
                         if a != b:
-                            row = found.setdefault(unknown.valueReference, {})
+                            row = responses.setdefault(unknown.valueReference, {})
                             row.setdefault(known.valueReference, []).append((b - a) / NUDGE)
-    return found
+    return responses
 
 
 def nominals(path, variable, value):
     """Return the event flag and the nominal values before, at and after an event that sets a variable."""
     with instance(path) as (fmu, description, _):
-        there = {variable.name: variable for variable in description.modelVariables}
+        by_name = {variable.name: variable for variable in description.modelVariables}
         sizes = (c_double * len(description.derivatives))()
         fmu.enterInitializationMode()
         fmu.exitInitializationMode()
-        told = []
+        events = []
         for change in (False, True, False):
             if change:
-                write(fmu, there[variable], value)
+                write(fmu, by_name[variable], value)
             _, _, renewed, *_ = fmu.updateDiscreteStates()
             fmu.getNominalsOfContinuousStates(sizes, len(sizes))
-            told.append((renewed, list(sizes)))
-    return told
+            events.append((renewed, list(sizes)))
+    return events
 
 
 def settle(fmu):

@@ -1,9 +1,8 @@
-/* Every function of FMI 3.0 in every state of every kind of instance, of the sources of a native FMU: this program
- * includes them.
+/* Every function of FMI 3.0 in every state of every kind of instance. This program includes the sources of the FMU.
  *
- *     walk states THREADS | calls SEED TURNS     how many lives there were | nothing
+ *     fmi3_stress states THREADS | random_calls SEED TURNS     prints the number of instances | nothing
  *
- * It ends by abort() where an answer is not the right one, and a sanitizer ends it where memory is.
+ * It aborts on an unexpected result; a sanitizer stops it on a memory error.
  */
 #include "fmi3.c"
 
@@ -11,42 +10,42 @@
 
 #include "stress.h"
 
-enum { FEW = 12, BYTES = sizeof(SavedState), CROWD = 20, STRANGER = VARIABLES + 7 };
-enum { SOLVING, HANDLING, SOLVED, KINDS }; /* co-simulation; with events, early return and looks; model exchange */
+enum { MAX_VALUES = 12, BYTES = sizeof(SavedState), N_INSTANCES = 20, UNKNOWN_REFERENCE = VARIABLES + 7 };
+enum { KIND_CS, KIND_CS_EVENTS, KIND_ME, KINDS }; /* plain; with event mode; model exchange */
 
-/* An instance, and all that its importer hands to it. */
-typedef struct Desk {
+/* An instance, and all arguments that its importer passes. */
+typedef struct Context {
     Instance *it;
-    int kind, heard;
-    void (*look)(struct Desk *desk); /* in an intermediate update */
-    const struct Row *row;           /* what it does there */
-    bool right;
+    int kind, n_messages;
+    void (*intermediate)(struct Context *context); /* in an intermediate update */
+    const struct Row *row;           /* the call made there */
+    bool valid;
     fmi3ValueReference one, unknown, known;
     size_t count, states, limits, size;
-    double t, h, real, reals[FEW], others[FEW];
-    int64_t integers[FEW];
-    int32_t orders[FEW];
-    bool flags[6], wants;
+    double t, h, real, reals[MAX_VALUES], others[MAX_VALUES];
+    int64_t integers[MAX_VALUES];
+    int32_t orders[MAX_VALUES];
+    bool flags[6], requests_return;
     fmi3FMUState state;
-    fmi3ValueReference references[FEW];
+    fmi3ValueReference references[MAX_VALUES];
     fmi3Byte bytes[BYTES];
-    void *room[FEW]; /* for values of any type */
-} Desk;
+    void *buffer[MAX_VALUES]; /* for values of any type */
+} Context;
 
-#define AT ((Desk *)it->host.environment)
+#define AT ((Context *)it->host.environment)
 #define R AT->references, AT->count
-#define ROOM (void *)AT->room
+#define BUFFER (void *)AT->buffer
 
-/* ---- the functions: where the standard allows them, the state they lead to, and a call that is right and one that
- * must be refused.  SOME: where it may be allowed or not; OURS: whatever ends an initialisation. */
+/* ---- the functions: the states in which the standard allows them, the state they lead to, a valid call and one that
+ * must be refused.  SOME: may be allowed or not; AFTER_INIT: the state after initialisation. */
 
-enum { STAYS = -1, OURS = -2 };
+enum { STAYS = -1, AFTER_INIT = -2 };
 enum { SOME = 1 << PHASES, EXCHANGED = 2 << PHASES, STEPPED = 4 << PHASES, HANDLED = 8 << PHASES };
 enum { NEVER = 0, AT_EVENT = 1 << EVENT, GOING = 1 << CONTINUOUS, BEGINNING = 1 << INITIALISING };
 
 #define TRANSITIONS(f)                                                                                                 \
     f(EnterInitializationMode, IN_INSTANTIATED, INITIALISING, (it, true, 1e-5, 0.0, true, 9.0), (NULL, false, 0.0, 0.0, false, 0.0)) \
-    f(ExitInitializationMode, BEGINNING, OURS, (it), (NULL))                                                           \
+    f(ExitInitializationMode, BEGINNING, AFTER_INIT, (it), (NULL))                                                           \
     f(EnterEventMode, (IN_SIMULATION | HANDLED), EVENT, (it), (NULL))                                                          \
     f(UpdateDiscreteStates, AT_EVENT, STAYS,                                                                           \
       (it, AT->flags, AT->flags + 1, AT->flags + 2, AT->flags + 3, AT->flags + 4, &AT->real),                          \
@@ -63,14 +62,14 @@ enum { NEVER = 0, AT_EVENT = 1 << EVENT, GOING = 1 << CONTINUOUS, BEGINNING = 1 
     f(Terminate, IN_SIMULATION, TERMINATED, (it), (NULL))
 
 #define VALUES(f, TYPE)                                                                               \
-    f(Get##TYPE, SOME, STAYS, (it, R, ROOM, AT->count), (it, &AT->one, 1, ROOM, 1))           \
-    f(Set##TYPE, SOME, STAYS, (it, R, ROOM, AT->count), (it, &AT->one, 1, ROOM, 1))
+    f(Get##TYPE, SOME, STAYS, (it, R, BUFFER, AT->count), (it, &AT->one, 1, BUFFER, 1))           \
+    f(Set##TYPE, SOME, STAYS, (it, R, BUFFER, AT->count), (it, &AT->one, 1, BUFFER, 1))
 
 #define OTHERS(f)                                                                                                      \
     VALUES(f, Float32) VALUES(f, Int8) VALUES(f, UInt8) VALUES(f, Int16) VALUES(f, UInt16) VALUES(f, Int32)            \
     VALUES(f, UInt32) VALUES(f, UInt64) VALUES(f, Boolean) VALUES(f, String)                                           \
-    f(GetBinary, SOME, STAYS, (it, R, &AT->size, ROOM, AT->count), (it, &AT->one, 1, &AT->size, ROOM, 1))      \
-    f(SetBinary, SOME, STAYS, (it, R, &AT->size, ROOM, AT->count), (it, &AT->one, 1, &AT->size, ROOM, 1))      \
+    f(GetBinary, SOME, STAYS, (it, R, &AT->size, BUFFER, AT->count), (it, &AT->one, 1, &AT->size, BUFFER, 1))      \
+    f(SetBinary, SOME, STAYS, (it, R, &AT->size, BUFFER, AT->count), (it, &AT->one, 1, &AT->size, BUFFER, 1))      \
     f(GetClock, SOME, STAYS, (it, R, AT->flags), (it, &AT->one, 1, AT->flags))                                         \
     f(SetClock, SOME, STAYS, (it, R, AT->flags), (it, &AT->one, 1, AT->flags))                                         \
     f(GetFloat64, SOME, STAYS, (it, &AT->known, 1, &AT->real, 1), (it, &AT->known, 1, AT->reals, 2))                   \
@@ -102,19 +101,19 @@ enum { NEVER = 0, AT_EVENT = 1 << EVENT, GOING = 1 << CONTINUOUS, BEGINNING = 1 
     f(GetNumberOfVariableDependencies, NEVER, STAYS, (it, AT->known, &AT->size), (it, AT->known, NULL))                \
     f(GetVariableDependencies, NEVER, STAYS, (it, AT->known, NULL, NULL, NULL, NULL, 0),                               \
       (it, AT->one, NULL, NULL, NULL, NULL, 1))                                                                        \
-    f(GetIntervalDecimal, NEVER, STAYS, (it, R, AT->reals, ROOM), (it, R, NULL, NULL))                             \
-    f(GetIntervalFraction, NEVER, STAYS, (it, R, ROOM, ROOM, ROOM), (it, R, NULL, NULL, NULL))             \
+    f(GetIntervalDecimal, NEVER, STAYS, (it, R, AT->reals, BUFFER), (it, R, NULL, NULL))                             \
+    f(GetIntervalFraction, NEVER, STAYS, (it, R, BUFFER, BUFFER, BUFFER), (it, R, NULL, NULL, NULL))             \
     f(GetShiftDecimal, NEVER, STAYS, (it, R, AT->reals), (it, R, NULL))                                                \
-    f(GetShiftFraction, NEVER, STAYS, (it, R, ROOM, ROOM), (it, R, NULL, NULL))                                \
+    f(GetShiftFraction, NEVER, STAYS, (it, R, BUFFER, BUFFER), (it, R, NULL, NULL))                                \
     f(SetIntervalDecimal, NEVER, STAYS, (it, R, AT->reals), (it, R, NULL))                                             \
-    f(SetIntervalFraction, NEVER, STAYS, (it, R, ROOM, ROOM), (it, R, NULL, NULL))                             \
+    f(SetIntervalFraction, NEVER, STAYS, (it, R, BUFFER, BUFFER), (it, R, NULL, NULL))                             \
     f(SetShiftDecimal, NEVER, STAYS, (it, R, AT->reals), (it, R, NULL))                                                \
-    f(SetShiftFraction, NEVER, STAYS, (it, R, ROOM, ROOM), (it, R, NULL, NULL))                                \
+    f(SetShiftFraction, NEVER, STAYS, (it, R, BUFFER, BUFFER), (it, R, NULL, NULL))                                \
     f(ActivateModelPartition, NEVER, STAYS, (it, AT->known, 0.0), (it, AT->one, NAN))
 
 #define DEFINE(name, allowed, to, fine, bad)                             \
-    static fmi3Status right_##name(Instance *it) { return fmi3##name fine; } \
-    static fmi3Status wrong_##name(Instance *it) { (void)it; return fmi3##name bad; }
+    static fmi3Status valid_##name(Instance *it) { return fmi3##name fine; } \
+    static fmi3Status invalid_##name(Instance *it) { (void)it; return fmi3##name bad; }
 
 TRANSITIONS(DEFINE)
 OTHERS(DEFINE)
@@ -122,68 +121,68 @@ OTHERS(DEFINE)
 static const struct Row {
     const char *name;
     int allowed, to;
-    fmi3Status (*right)(Instance *it), (*wrong)(Instance *it);
+    fmi3Status (*valid)(Instance *it), (*invalid)(Instance *it);
 } rows[] = {
-#define ENTRY(name, allowed, to, fine, bad) {#name, allowed, to, right_##name, wrong_##name},
+#define ENTRY(name, allowed, to, fine, bad) {#name, allowed, to, valid_##name, invalid_##name},
     TRANSITIONS(ENTRY) OTHERS(ENTRY)
 };
 
 #define COUNT(name, allowed, to, fine, bad) +1
 enum { LEADING = 0 TRANSITIONS(COUNT), ROWS = sizeof rows / sizeof *rows };
 
-/* ---- lives */
+/* ---- instances in all states */
 
-static void hear(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
+static void on_log(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
 {
-    Desk *desk = environment;
-    HOLDS(status == fmi3Error && !strcmp(category, "logStatusError") && *message);
-    desk->heard++;
+    Context *context = environment;
+    CHECK(status == fmi3Error && !strcmp(category, "logStatusError") && *message);
+    context->n_messages++;
 }
 
-static void look(fmi3InstanceEnvironment environment, fmi3Float64 t, fmi3Boolean set, fmi3Boolean get,
-                 fmi3Boolean finished, fmi3Boolean early, fmi3Boolean *wants, fmi3Float64 *wanted)
+static void intermediate(fmi3InstanceEnvironment environment, fmi3Float64 t, fmi3Boolean set, fmi3Boolean get,
+                 fmi3Boolean finished, fmi3Boolean early, fmi3Boolean *requests_return, fmi3Float64 *return_time)
 {
-    Desk *desk = environment;
+    Context *context = environment;
     (void)finished;
-    HOLDS(set && get && early && isfinite(t));
-    if (desk->look) desk->look(desk);
-    *wants = desk->wants, *wanted = desk->h;
+    CHECK(set && get && early && isfinite(t));
+    if (context->intermediate) context->intermediate(context);
+    *requests_return = context->requests_return, *return_time = context->h;
 }
 
-static Instance *born(Desk *desk, int kind)
+static Instance *new_instance(Context *context, int kind)
 {
-    bool handles = kind == HANDLING;
-    *desk = (Desk){.kind = kind, .one = STRANGER, .states = STATES, .limits = INDICATORS, .h = 0.1};
+    bool handles = kind == KIND_CS_EVENTS;
+    *context = (Context){.kind = kind, .one = UNKNOWN_REFERENCE, .states = STATES, .limits = INDICATORS, .h = 0.1};
     for (fmi3ValueReference i = 0; i < VARIABLES; i++) {
-        if (variables[i].is_state_or_input) desk->known = i;
-        else if (variables[i].tangent_offset != NO_OFFSET && variables[i].is_calculated) desk->unknown = i;
+        if (variables[i].is_state_or_input) context->known = i;
+        else if (variables[i].tangent_offset != NO_OFFSET && variables[i].is_calculated) context->unknown = i;
     }
-    desk->it = kind == SOLVED ? fmi3InstantiateModelExchange("it", MODEL_GUID, NULL, false, true, desk, hear)
+    context->it = kind == KIND_ME ? fmi3InstantiateModelExchange("it", MODEL_GUID, NULL, false, true, context, on_log)
                               : fmi3InstantiateCoSimulation("it", MODEL_GUID, NULL, false, true, handles, handles, NULL,
-                                                            0, desk, hear, handles ? look : NULL);
-    HOLDS(desk->it);
-    return desk->it;
+                                                            0, context, on_log, handles ? intermediate : NULL);
+    CHECK(context->it);
+    return context->it;
 }
 
-/* An instance in a state, with a saved state of it in memory and as bytes; false if its kind knows no such state. */
-static bool lives(Desk *desk, int kind, int phase)
+/* Create an instance in a state, with its saved state in memory and as bytes; false if its kind has no such state. */
+static bool prepare(Context *context, int kind, int phase)
 {
-    Instance *it = born(desk, kind);
-    bool begun = phase > INITIALISING, events = phase == EVENT || phase == CONTINUOUS;
-    if (phase >= INITIALISING) HOLDS(right_EnterInitializationMode(it) == fmi3OK);
-    if (begun) HOLDS(right_ExitInitializationMode(it) == fmi3OK);
-    if (begun && kind == HANDLING && phase != EVENT) HOLDS(right_EnterStepMode(it) == fmi3OK);
-    if (phase == CONTINUOUS && kind == SOLVED) HOLDS(right_EnterContinuousTimeMode(it) == fmi3OK);
-    if (phase == TERMINATED) HOLDS(right_Terminate(it) == fmi3OK);
-    HOLDS(fmi3GetFMUState(it, &desk->state) == fmi3OK && right_SerializeFMUState(it) == fmi3OK);
-    if (kind == SOLVED) return phase != RUNNING && phase != INTERMEDIATE;
-    return kind == HANDLING ? phase != CONTINUOUS : !events && phase != INTERMEDIATE;
+    Instance *it = new_instance(context, kind);
+    bool initialised = phase > INITIALISING, events = phase == EVENT || phase == CONTINUOUS;
+    if (phase >= INITIALISING) CHECK(valid_EnterInitializationMode(it) == fmi3OK);
+    if (initialised) CHECK(valid_ExitInitializationMode(it) == fmi3OK);
+    if (initialised && kind == KIND_CS_EVENTS && phase != EVENT) CHECK(valid_EnterStepMode(it) == fmi3OK);
+    if (phase == CONTINUOUS && kind == KIND_ME) CHECK(valid_EnterContinuousTimeMode(it) == fmi3OK);
+    if (phase == TERMINATED) CHECK(valid_Terminate(it) == fmi3OK);
+    CHECK(fmi3GetFMUState(it, &context->state) == fmi3OK && valid_SerializeFMUState(it) == fmi3OK);
+    if (kind == KIND_ME) return phase != RUNNING && phase != INTERMEDIATE;
+    return kind == KIND_CS_EVENTS ? phase != CONTINUOUS : !events && phase != INTERMEDIATE;
 }
 
-static void dies(Desk *desk)
+static void release(Context *context)
 {
-    if (desk->state) HOLDS(fmi3FreeFMUState(desk->it, &desk->state) == fmi3OK);
-    fmi3FreeInstance(desk->it);
+    if (context->state) CHECK(fmi3FreeFMUState(context->it, &context->state) == fmi3OK);
+    fmi3FreeInstance(context->it);
 }
 
 /* ---- the walk */
@@ -192,120 +191,120 @@ static void dies(Desk *desk)
 static int is_allowed(const struct Row *row, int kind, int phase)
 {
     int only = row->allowed;
-    if ((only & EXCHANGED && kind != SOLVED) || (only & STEPPED && kind == SOLVED)) return 0;
-    if (only & HANDLED && kind == SOLVING) return 0;
+    if ((only & EXCHANGED && kind != KIND_ME) || (only & STEPPED && kind == KIND_ME)) return 0;
+    if (only & HANDLED && kind == KIND_CS) return 0;
     return only >> phase & 1 ? 1 : only & SOME ? -1 : 0;
 }
 
-/* The call of the row is answered as it must be: refused ones change nothing, and say one sentence. */
-static void call(Desk *desk)
+/* Make the call of the row and check its result: a refused call changes nothing and logs one message. */
+static void call(Context *context)
 {
-    Instance *it = desk->it;
-    const struct Row *row = desk->row;
+    Instance *it = context->it;
+    const struct Row *row = context->row;
     State before = it->state;
-    int phase = before.run.phase, allowed = desk->right ? is_allowed(row, desk->kind, phase) : 0;
-    desk->look = NULL;
-    desk->heard = 0;
-    fmi3Status status = (desk->right ? row->right : row->wrong)(it);
-    int to = row->to == OURS ? (it->host.event_mode_used ? EVENT : RUNNING) : row->to == STAYS ? phase : row->to;
-    bool good = status == fmi3OK ? allowed && !desk->heard && it->state.run.phase == to
-                                 : status == fmi3Error && allowed < 1 && desk->heard <= 1 &&
-                                       (desk->heard || !desk->right) && !memcmp(&before, &it->state, sizeof before);
-    if (!good) printf("fmi3%s, kind %d, state %d, right %d: status %d\n", row->name, desk->kind, phase, desk->right, status);
-    HOLDS(good);
+    int phase = before.run.phase, allowed = context->valid ? is_allowed(row, context->kind, phase) : 0;
+    context->intermediate = NULL;
+    context->n_messages = 0;
+    fmi3Status status = (context->valid ? row->valid : row->invalid)(it);
+    int to = row->to == AFTER_INIT ? (it->host.event_mode_used ? EVENT : RUNNING) : row->to == STAYS ? phase : row->to;
+    bool good = status == fmi3OK ? allowed && !context->n_messages && it->state.run.phase == to
+                                 : status == fmi3Error && allowed < 1 && context->n_messages <= 1 &&
+                                       (context->n_messages || !context->valid) && !memcmp(&before, &it->state, sizeof before);
+    if (!good) printf("fmi3%s, kind %d, state %d, valid %d: status %d\n", row->name, context->kind, phase, context->valid, status);
+    CHECK(good);
 }
 
-static void *walk(void *told)
+static void *walk(void *argument)
 {
-    int *count = told;
+    int *count = argument;
     for (int kind = 0; kind < KINDS; kind++) {
         for (int phase = 0; phase < PHASES; phase++) {
             for (int i = 0; i < 2 * ROWS; i++) {
-                Desk desk;
+                Context context;
                 ++*count;
-                if (lives(&desk, kind, phase)) {
-                    desk.row = &rows[i / 2], desk.right = i % 2;
-                    desk.look = call; /* once, in its state */
-                    if (phase != INTERMEDIATE) call(&desk);
-                    else HOLDS(right_DoStep(desk.it) == fmi3OK && !desk.look);
+                if (prepare(&context, kind, phase)) {
+                    context.row = &rows[i / 2], context.valid = i % 2;
+                    context.intermediate = call; /* once, in that state */
+                    if (phase != INTERMEDIATE) call(&context);
+                    else CHECK(valid_DoStep(context.it) == fmi3OK && !context.intermediate);
                 }
-                dies(&desk);
+                release(&context);
             }
         }
     }
     return NULL;
 }
 
-/* In every thread; the number of lives. */
-static int together(int threads)
+/* In every thread; returns the number of instances. */
+static int walk_in_threads(int threads)
 {
     enum { MOST = 16 };
     pthread_t each[MOST];
     int counts[MOST] = {0}, all = 0;
-    HOLDS(threads <= MOST);
-    for (int i = 0; i < threads; i++) HOLDS(!pthread_create(&each[i], NULL, walk, &counts[i]));
-    for (int i = 0; i < threads; all += counts[i++]) HOLDS(!pthread_join(each[i], NULL));
+    CHECK(threads <= MOST);
+    for (int i = 0; i < threads; i++) CHECK(!pthread_create(&each[i], NULL, walk, &counts[i]));
+    for (int i = 0; i < threads; all += counts[i++]) CHECK(!pthread_join(each[i], NULL));
     return all;
 }
 
-/* ---- calls in any order, with anything in them */
+/* ---- random sequences of functions, with random arguments */
 
-static void anything(Desk *desk)
+static void random_call(Context *context)
 {
     const struct Row *row = &rows[draw(2) ? draw(LEADING) : draw(ROWS)];
-    desk->t = draw(4) ? desk->it->state.model.solver.t : number();
-    desk->h = draw(4) ? (double)draw(100) * 1e-4 : number();
-    desk->real = number();
-    desk->wants = draw(3) == 0;
-    desk->count = draw(20) ? 0 : draw(FEW);
-    desk->states = draw(9) ? STATES : draw(FEW), desk->limits = draw(9) ? INDICATORS : draw(FEW);
-    desk->known = (fmi3ValueReference)(draw(40) ? draw(VARIABLES) : draw(UINT64_C(1) << 32));
-    desk->unknown = (fmi3ValueReference)draw(VARIABLES);
-    for (int i = 0; i < FEW; i++) {
-        desk->references[i] = (fmi3ValueReference)(draw(40) ? draw(VARIABLES) : draw(UINT64_C(1) << 32));
-        desk->reals[i] = draw(3) ? (double)draw(1000) / 100.0 : number();
-        desk->integers[i] = (int64_t)draw(draw(9) ? 6 : UINT64_C(1) << 40);
+    context->t = draw(4) ? context->it->state.model.solver.t : number();
+    context->h = draw(4) ? (double)draw(100) * 1e-4 : number();
+    context->real = number();
+    context->requests_return = draw(3) == 0;
+    context->count = draw(20) ? 0 : draw(MAX_VALUES);
+    context->states = draw(9) ? STATES : draw(MAX_VALUES), context->limits = draw(9) ? INDICATORS : draw(MAX_VALUES);
+    context->known = (fmi3ValueReference)(draw(40) ? draw(VARIABLES) : draw(UINT64_C(1) << 32));
+    context->unknown = (fmi3ValueReference)draw(VARIABLES);
+    for (int i = 0; i < MAX_VALUES; i++) {
+        context->references[i] = (fmi3ValueReference)(draw(40) ? draw(VARIABLES) : draw(UINT64_C(1) << 32));
+        context->reals[i] = draw(3) ? (double)draw(1000) / 100.0 : number();
+        context->integers[i] = (int64_t)draw(draw(9) ? 6 : UINT64_C(1) << 40);
     }
-    if (draw(20) == 0) desk->bytes[draw(BYTES)] ^= 1;
-    fmi3Status status = (draw(9) ? row->right : row->wrong)(desk->it);
-    HOLDS(status == fmi3OK || status == fmi3Discard || status == fmi3Error);
+    if (draw(20) == 0) context->bytes[draw(BYTES)] ^= 1;
+    fmi3Status status = (draw(9) ? row->valid : row->invalid)(context->it);
+    CHECK(status == fmi3OK || status == fmi3Discard || status == fmi3Error);
 }
 
-static void calls(uint64_t seed, int turns)
+static void random_calls(uint64_t seed, int turns)
 {
-    static Desk crowd[CROWD], quiet;
-    lives(&quiet, HANDLING, RUNNING);
-    State before = quiet.it->state;
-    chance = seed;
-    for (int i = 0; i < CROWD; i++) lives(&crowd[i], i % KINDS, INSTANTIATED);
+    static Context contexts[N_INSTANCES], bystander;
+    prepare(&bystander, KIND_CS_EVENTS, RUNNING);
+    State before = bystander.it->state;
+    random_state = seed;
+    for (int i = 0; i < N_INSTANCES; i++) prepare(&contexts[i], i % KINDS, INSTANTIATED);
     for (int turn = 0; turn < turns; turn++) {
-        Desk *desk = &crowd[draw(CROWD)], *other = &crowd[draw(CROWD)];
-        if (draw(20) == 0) dies(desk), lives(desk, (int)draw(KINDS), (int)draw(PHASES));
-        fmi3FMUState state = desk->state;
-        desk->state = other->state, other->state = state; /* which may be another's */
-        desk->look = anything;
-        anything(desk);
+        Context *context = &contexts[draw(N_INSTANCES)], *other = &contexts[draw(N_INSTANCES)];
+        if (draw(20) == 0) release(context), prepare(context, (int)draw(KINDS), (int)draw(PHASES));
+        fmi3FMUState state = context->state;
+        context->state = other->state, other->state = state; /* possibly of another instance */
+        context->intermediate = random_call;
+        random_call(context);
     }
-    for (int i = 0; i < CROWD; i++) {
-        Desk *desk = &crowd[i];
+    for (int i = 0; i < N_INSTANCES; i++) {
+        Context *context = &contexts[i];
         fmi3ValueReference energy = reference_of("energy");
-        desk->look = NULL, desk->t = 0.0, desk->h = 0.1, desk->wants = false;
-        HOLDS(right_Reset(desk->it) == fmi3OK && right_EnterInitializationMode(desk->it) == fmi3OK);
-        HOLDS(right_ExitInitializationMode(desk->it) == fmi3OK);
-        if (desk->kind == HANDLING) HOLDS(right_EnterStepMode(desk->it) == fmi3OK);
-        if (desk->kind != SOLVED) HOLDS(right_DoStep(desk->it) == fmi3OK);
-        HOLDS(fmi3GetFloat64(desk->it, &energy, 1, &desk->real, 1) == fmi3OK && isfinite(desk->real));
-        dies(desk);
+        context->intermediate = NULL, context->t = 0.0, context->h = 0.1, context->requests_return = false;
+        CHECK(valid_Reset(context->it) == fmi3OK && valid_EnterInitializationMode(context->it) == fmi3OK);
+        CHECK(valid_ExitInitializationMode(context->it) == fmi3OK);
+        if (context->kind == KIND_CS_EVENTS) CHECK(valid_EnterStepMode(context->it) == fmi3OK);
+        if (context->kind != KIND_ME) CHECK(valid_DoStep(context->it) == fmi3OK);
+        CHECK(fmi3GetFloat64(context->it, &energy, 1, &context->real, 1) == fmi3OK && isfinite(context->real));
+        release(context);
     }
-    HOLDS(!memcmp(&before, &quiet.it->state, sizeof before));
-    dies(&quiet);
+    CHECK(!memcmp(&before, &bystander.it->state, sizeof before));
+    release(&bystander);
 }
 
 int main(int argc, char **argv)
 {
     const char *what = argc > 2 ? argv[1] : "";
-    if (!strcmp(what, "states")) printf("%d\n", together(atoi(argv[2])));
-    else if (!strcmp(what, "calls") && argc == 4) calls(strtoull(argv[2], NULL, 10), atoi(argv[3]));
+    if (!strcmp(what, "states")) printf("%d\n", walk_in_threads(atoi(argv[2])));
+    else if (!strcmp(what, "random_calls") && argc == 4) random_calls(strtoull(argv[2], NULL, 10), atoi(argv[3]));
     else die("usage", __LINE__);
     return 0;
 }

@@ -30,11 +30,11 @@ class ForkedProcess:
     """The part of subprocess.Popen that the tests need; the streams are open files."""
 
     def __init__(self, words, stdin, stdout, stderr, cwd=None):
-        self.link, theirs = socket_pair()
+        self.link, child_link = socket_pair()
         environment = os.environ | {"TMPDIR": str(temporary_folder or tempfile.gettempdir())}
-        asked = json.dumps([[*map(str, words)], str(cwd or os.getcwd()), environment]).encode()
-        with theirs:
-            socket.send_fds(_server(), [asked], [file.fileno() for file in (theirs, stdin, stdout, stderr)])
+        request = json.dumps([[*map(str, words)], str(cwd or os.getcwd()), environment]).encode()
+        with child_link:
+            socket.send_fds(_server(), [request], [file.fileno() for file in (child_link, stdin, stdout, stderr)])
         self.pid, self.returncode = int(self.link.recv(99)), None
 
     def wait(self, timeout=None):
@@ -65,14 +65,16 @@ def socket_pair():
 @cache
 def _server():
     """Start the server process and return the socket to it."""
-    mine, theirs = socket_pair()
-    with theirs:
-        call = [sys.executable, "-I", __file__, str(theirs.fileno())]
+    link, child_link = socket_pair()
+    with child_link:
+        call = [sys.executable, "-I", __file__, str(child_link.fileno())]
         null = subprocess.DEVNULL
-        process = subprocess.Popen(call, stdin=null, stdout=null, pass_fds=[theirs.fileno()], start_new_session=True)
+        process = subprocess.Popen(
+            call, stdin=null, stdout=null, pass_fds=[child_link.fileno()], start_new_session=True
+        )
     atexit.register(process.wait, 30)
-    atexit.register(mine.close)
-    return mine
+    atexit.register(link.close)
+    return link
 
 
 def serve_forks(line):
@@ -84,8 +86,8 @@ def serve_forks(line):
         import_module(name)
     gc.freeze()  # reference counts would otherwise copy every memory page in each child
     while True:
-        asked, (*files,), *_ = socket.recv_fds(line, MAX_REQUEST, 4)
-        if not asked:
+        request, (*files,), *_ = socket.recv_fds(line, MAX_REQUEST, 4)
+        if not request:
             os._exit(0)
         if not os.fork():
             break
@@ -107,7 +109,7 @@ def serve_forks(line):
     for number, file in enumerate(streams):
         os.dup2(file, number)
         os.close(file)
-    return json.loads(asked)
+    return json.loads(request)
 
 
 def run_as(words, folder, environment):

@@ -36,13 +36,13 @@ def check_record(number):
     law, sine, quantised, order = CASES[number % len(CASES)]
     record, truth, _ = random_record(number, law, sine, quantised, SAMPLES, order)
     try:
-        found = fit_decay(record, KnownParameters(pendulum=sine))
+        fit = fit_decay(record, KnownParameters(pendulum=sine))
     except HarnessError as refusal:
         return [], str(refusal)
-    each = {one.name: one for one in found.estimates}
-    off = max(abs(each[name].value - truth[name]) / each[name].error for name in NAMES)
-    wrong = f"off by {off:.1f} errors" if off > FAR and not found.remarks else ""
-    return [each[name].low <= truth[name] <= each[name].high for name in NAMES], wrong
+    by_name = {one.name: one for one in fit.estimates}
+    off = max(abs(by_name[name].value - truth[name]) / by_name[name].error for name in NAMES)
+    wrong = f"off by {off:.1f} errors" if off > FAR and not fit.remarks else ""
+    return [by_name[name].low <= truth[name] <= by_name[name].high for name in NAMES], wrong
 
 
 def table_lines(rows):

@@ -1,4 +1,4 @@
-/* The library of an FMU, on any platform. */
+/* Load the library of an FMU, on any platform. */
 #ifndef LIBRARY_H
 #define LIBRARY_H
 
@@ -17,7 +17,7 @@ static void die(const char *what)
     exit(1);
 }
 
-static void *opened(const char *path)
+static void *open_library(const char *path)
 {
 #ifdef _WIN32
     void *library = LoadLibraryA(path);
@@ -28,7 +28,7 @@ static void *opened(const char *path)
     return library;
 }
 
-static void *found(void *library, const char *name)
+static void *find_function(void *library, const char *name)
 {
 #ifdef _WIN32
     void *function = (void *)GetProcAddress((HMODULE)library, name);
@@ -39,7 +39,7 @@ static void *found(void *library, const char *name)
     return function;
 }
 
-static inline bool closed(void *library)
+static inline bool close_library(void *library)
 {
 #ifdef _WIN32
     return FreeLibrary((HMODULE)library);

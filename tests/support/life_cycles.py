@@ -91,7 +91,7 @@ def run_in_turn(paths, number):
         if i + 1 in (number // 10, number):
             after.append(memory())
     path = [entry for entry in sys.path if entry not in before]
-    return {"runs": [len(found) for found in rows.values()], "memory": after, "path": path}
+    return {"runs": [len(runs) for runs in rows.values()], "memory": after, "path": path}
 
 
 def run_interleaved(paths, number):
@@ -101,7 +101,7 @@ def run_interleaved(paths, number):
     before = memory()
     for lives, folder in zip(fleet, folders, strict=True):
         lives += [LifeCycle(folder, str(i)).begin() for i in range(number)]
-    each = (memory() - before) / (number * len(paths))
+    per_instance = (memory() - before) / (number * len(paths))
     rows = {}
     for t, ahead in pairwise(TIMES):
         for name, lives in enumerate(fleet):
@@ -109,7 +109,7 @@ def run_interleaved(paths, number):
     for lives in reversed(fleet):
         for life in reversed(lives):
             life.end()
-    return {"runs": max(map(len, rows.values())), "each": each}
+    return {"runs": max(map(len, rows.values())), "each": per_instance}
 
 
 def unpack_for_every_run(path, number):
@@ -150,36 +150,40 @@ def run_in_threads(paths, threads, turns):
         worker.start()
     for worker in workers:
         worker.join()
-    return {"runs": [len(found) for found in rows.values()], "errors": errors}
+    return {"runs": [len(runs) for runs in rows.values()], "errors": errors}
 
 
-def continue_instances(given, folders):
+def continue_instances(instances, folders):
     """Return the next step of the given instances, and a complete run of each FMU."""
-    return [life.step(TIMES[1], TIMES[2]) for life in given], [LifeCycle(folder).begin().run() for folder in folders]
+    return [life.step(TIMES[1], TIMES[2]) for life in instances], [
+        LifeCycle(folder).begin().run() for folder in folders
+    ]
 
 
-def run_in_child(answers, *given):
-    answers.put(continue_instances(*given))
+def run_in_child(answers, *arguments):
+    answers.put(continue_instances(*arguments))
 
 
 def run_in_processes(paths, method):
     """Carry instances into two forked children, or none into a spawned one; compare the children with the parent."""
     folders = [extract(path) for path in paths]
-    given = [LifeCycle(folder).begin() for folder in folders]
-    for life in given:
+    instances = [LifeCycle(folder).begin() for folder in folders]
+    for life in instances:
         life.step(TIMES[0], TIMES[1])
     if method == "spawn":
-        given = []
+        instances = []
     context = multiprocessing.get_context(method)
     answers = context.Queue()
-    children = [context.Process(target=run_in_child, args=(answers, given, folders)) for _ in range(2 if given else 1)]
+    children = [
+        context.Process(target=run_in_child, args=(answers, instances, folders)) for _ in range(2 if instances else 1)
+    ]
     for child in children:
         child.start()
-    told = [answers.get(timeout=60) for _ in children]
+    results = [answers.get(timeout=60) for _ in children]
     for child in children:
         child.join(60)
-    expected = continue_instances(given, folders)
-    return {"same": all(answer == expected for answer in told), "codes": [child.exitcode for child in children]}
+    expected = continue_instances(instances, folders)
+    return {"same": all(answer == expected for answer in results), "codes": [child.exitcode for child in children]}
 
 
 def run_beside_sources(root, paths):
@@ -191,9 +195,9 @@ def run_beside_sources(root, paths):
 
     assert fmus.runtime.slave.Fmi2Slave is pythonfmu.fmi2slave.Fmi2Slave
     pythonfmu.fmi2slave.Fmi2Slave.do_step = None  # any use of it by an FMU would fail
-    mine = set(sys.modules)
+    loaded_before = set(sys.modules)
     rows = run_each(paths)
-    new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - mine}
+    new = {getattr(sys.modules[name], "__file__", None) for name in set(sys.modules) - loaded_before}
     places = (os.path.join(root, "fmus", ""), os.path.join(os.path.dirname(pythonfmu.__file__), ""))
     return {"rows": rows, "foreign": [file for file in new if file and file.startswith(places)]}
 

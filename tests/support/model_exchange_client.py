@@ -56,12 +56,12 @@ def handle_event_at(fmu, t, states):
 
 def single_error(fmu):
     """Return the single error message in the log and on standard error, or "" if there is none."""
-    said = [message for message in fmu.messages() if message[0] != 0]
+    messages = [message for message in fmu.messages() if message[0] != 0]
     lines = fmu.worker.read_stderr().splitlines()
-    assert len(said) == len(lines) <= 1
-    if not said:
+    assert len(messages) == len(lines) <= 1
+    if not messages:
         return ""
-    ((status, category, text),) = said
+    ((status, category, text),) = messages
     assert (status, category) == (ERROR, "logStatusError")
     assert lines[0].endswith(text)
     return text

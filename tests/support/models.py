@@ -92,12 +92,12 @@ def experiment(name, values):
 def pairwise_cases(name, many=2):
     """Return a few combinations that contain every pair (`many` = 2) of choices."""
     groups = [(values, {*choose(values.items(), min(many, len(values)))}) for values in combinations(name)]
-    kept, missing = [], set().union(*(each for _, each in groups))
+    selected, missing = [], set().union(*(item for _, item in groups))
     while missing:
         values, met = max(groups, key=lambda group: len(group[1] & missing))
-        kept.append(values)
+        selected.append(values)
         missing -= met
-    return kept
+    return selected
 
 
 CASES = [experiment(name, values) for name in MODELS for values in pairwise_cases(name)]
@@ -112,8 +112,8 @@ def label(case):
 
 def counts(name):
     """Return the names of the counters and of the last event time, as far as the model has them."""
-    wanted = ("solver.steps", "solver.rejected", "solver.evaluations", "solver.h", "events.count", "events.t_last")
-    return [v for v in declared(name) if v in wanted]
+    counters = ("solver.steps", "solver.rejected", "solver.evaluations", "solver.h", "events.count", "events.t_last")
+    return [v for v in declared(name) if v in counters]
 
 
 def push(name):

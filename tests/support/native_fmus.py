@@ -33,4 +33,4 @@ def build_for_all_platforms():
     matter here."""
     require_compiler()
     chosen = ("smd", "--native", "--method", "exact")
-    return build_cache.build_once("everywhere", *chosen, *(word for each in PLATFORMS for word in ("--platform", each)))
+    return build_cache.build_once("everywhere", *chosen, *(word for item in PLATFORMS for word in ("--platform", item)))

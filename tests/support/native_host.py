@@ -25,8 +25,8 @@ SANITIZER_ENVIRONMENT = os.environ | {"ASAN_OPTIONS": "handle_sigill=1:quarantin
 
 def compiler():
     """Return the C compiler of the system."""
-    found = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    return found or pytest.skip("there is no C compiler on this machine: install gcc")
+    path = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+    return path or pytest.skip("there is no C compiler on this machine: install gcc")
 
 
 @cache
@@ -54,8 +54,8 @@ def compile_sanitized(source, fmu, *how, sanitizers=SANITIZERS):
     name, sources = f"{source} {fmu.stem}", unpack_cached(fmu) / "sources"
     dry = ["-DDRY"] if "mode" in declared(fmu.stem) else []
     words = ["-c", "-fPIC", "-fvisibility=hidden", *dry, f"-I{sources}", HOST_SOURCE.with_name(source)]
-    whole = compile_cached(name, *words, sanitizers=sanitizers)
-    return compile_cached(" ".join([name, "linked", *how]), *how, whole, sanitizers=sanitizers)
+    program = compile_cached(name, *words, sanitizers=sanitizers)
+    return compile_cached(" ".join([name, "linked", *how]), *how, program, sanitizers=sanitizers)
 
 
 @cache
@@ -78,10 +78,16 @@ def run_life_cycles(program, fmu, library, number, steps, **options):
 
     Returns the final position and speed in co-simulation and in model exchange, and the lines of standard error.
     """
-    name, place = fmu.stem, unpack_cached(fmu)
-    token = fromstring((place / "modelDescription.xml").read_bytes()).attrib["instantiationToken"]
+    name, folder = fmu.stem, unpack_cached(fmu)
+    token = fromstring((folder / "modelDescription.xml").read_bytes()).attrib["instantiationToken"]
     read = [value_references(name)[variable] for variable in (*outputs(name)[:2], "m")]
-    words = [place / "binaries" / library, token, f"{place / 'resources'}{os.sep}", number, model_class(name).stop_time]
+    words = [
+        folder / "binaries" / library,
+        token,
+        f"{folder / 'resources'}{os.sep}",
+        number,
+        model_class(name).stop_time,
+    ]
     command = [*program, *map(str, (*words, steps, *read))]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, **options)
     assert done.returncode == 0, done.stderr
@@ -107,7 +113,7 @@ def run_host_script(fmu, script, threads=1, sanitizers=""):
 @cache
 def value_references(name):
     """Return the value reference of every variable of a model."""
-    return {variable: place for place, variable in enumerate(declared(name))}
+    return {variable: index for index, variable in enumerate(declared(name))}
 
 
 def begin(instance, values=(), stop="nan"):

@@ -34,10 +34,10 @@ class Body:
 
     def forces(self):
         """Return the load and its derivatives while the body does not move."""
-        found = [*self.course(), Decimal(0), Decimal(0)]
-        found[0] += self.k * (self.u * self.t - self.x)
-        found[1] += self.k * self.u
-        return found
+        derivatives = [*self.course(), Decimal(0), Decimal(0)]
+        derivatives[0] += self.k * (self.u * self.t - self.x)
+        derivatives[1] += self.k * self.u
+        return derivatives
 
     def settled(self):
         """Return the mode from the current time on; without dry friction any mode is right."""
@@ -60,7 +60,7 @@ class Body:
     def release(self):
         """Return the time until breakaway and its direction."""
         load, *others = [one / factorial(n) for n, one in enumerate(self.forces())]
-        found = [(Decimal("inf"), 0)]
+        candidates = [(Decimal("inf"), 0)]
         for side in 1, -1:
             terms = [load - side * self.hold, *others]
             while terms and not terms[-1]:
@@ -70,8 +70,8 @@ class Body:
                 wait = Decimal(root.real)
                 for _ in range(NEWTONS * (abs(root.imag) < 1e-9)):
                     wait -= value(terms[::-1], wait) / value(rates[::-1], wait)
-                found += [(wait, side)] * bool(abs(root.imag) < 1e-9 and wait > TIE)
-        return min(found)
+                candidates += [(wait, side)] * bool(abs(root.imag) < 1e-9 and wait > TIE)
+        return min(candidates)
 
     def go(self, t):
         """Return position and speed at time t."""
@@ -114,10 +114,10 @@ def value(series, h):
 
 def sample_motion(body, pieces, times):
     """Return position, speed and last event time at each of the times, under a force that changes in pieces."""
-    rows, left = [], list(pieces)
+    rows, remaining = [], list(pieces)
     with localcontext(prec=DIGITS):
         for t, end in pairwise([0.0, *times]):
-            if left and left[0][0] == t:
-                body.push(*left.pop(0)[1:])
+            if remaining and remaining[0][0] == t:
+                body.push(*remaining.pop(0)[1:])
             rows.append([*map(float, body.go(end)), float(body.events[-1]) if body.events else 0.0])
     return rows

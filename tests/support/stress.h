@@ -1,28 +1,28 @@
-/* What the programs that abuse a native FMU share; they include its sources, then this. */
-#ifndef ABUSE_H
-#define ABUSE_H
+/* Shared by the stress programs, which include the sources of an FMU first. */
+#ifndef STRESS_H
+#define STRESS_H
 
-#define HOLDS(condition) \
+#define CHECK(condition) \
     if (!(condition)) die(#condition, __LINE__)
 
 static void die(const char *what, int line)
 {
-    printf("line %d: not so: %s\n", line, what);
+    printf("line %d: failed: %s\n", line, what);
     fflush(stdout);
     abort();
 }
 
-/* ---- chance (S. Vigna, xorshift64*) */
+/* ---- random numbers (S. Vigna, xorshift64*) */
 
-static uint64_t chance = 1;
+static uint64_t random_state = 1;
 
 static uint64_t draw(uint64_t below)
 {
-    chance ^= chance >> 12, chance ^= chance << 25, chance ^= chance >> 27;
-    return (chance * UINT64_C(2685821657736338717) >> 20) % below;
+    random_state ^= random_state >> 12, random_state ^= random_state << 25, random_state ^= random_state >> 27;
+    return (random_state * UINT64_C(2685821657736338717) >> 20) % below;
 }
 
-/* A number of the kind that goes wrong. */
+/* A typical problematic number. */
 static double number(void)
 {
     static const double numbers[] = {0.0, -0.0, 1.0, -1.0, 0.5, 0.01, 2.0, -5.0, 1e-3, 1e9, 1e300, -1e300, -5e-324,

@@ -12,5 +12,5 @@ def open_sweep(folder):
 
 def sweep_folder(out, begin):
     """Return the single sweep folder whose name begins with `begin`."""
-    (found,) = (out / "sweep").glob(f"{begin}-????????")
-    return found
+    (folder,) = (out / "sweep").glob(f"{begin}-????????")
+    return folder

@@ -34,9 +34,9 @@ class Page:
 
         An open page follows the link, which resets all settings; `anew` reloads the page instead.
         """
-        there = self.run("globalThis.app && location.href")
+        expected = self.run("globalThis.app && location.href")
         link = f"{self.file.as_uri()}#{hash}"
-        if anew or not there or there.split("#")[0] != self.file.as_uri() or there == link:
+        if anew or not expected or expected.split("#")[0] != self.file.as_uri() or expected == link:
             self.browser.open(link)
         else:
             self.run(FOLLOWED.replace("HASH", json.dumps(hash)))

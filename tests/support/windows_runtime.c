@@ -1,5 +1,5 @@
-/* What the hosts need on Windows beside its C runtime (UCRT): how a program begins, and the functions for which
- * Microsoft's headers have the text.  The compiler's own layer over it would take minutes to make. */
+/* Additions to the C runtime of Windows (UCRT): the program entry point, and functions that Microsoft's headers define
+ * inline.  Building the compiler's own layer would take minutes. */
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -31,11 +31,11 @@ int printf(const char *format, ...)
     return length;
 }
 
-void __main(void) {} /* called first by main: constructors, of which there are none */
+void __main(void) {} /* called first by main: there are no constructors */
 
 void mainCRTStartup(void)
 {
-    _configure_narrow_argv(1); /* the words as they are */
-    setvbuf(stderr, NULL, _IONBF, 0); /* which Wine buffers where it is a pipe */
+    _configure_narrow_argv(1); /* unexpanded arguments */
+    setvbuf(stderr, NULL, _IONBF, 0); /* Wine buffers it if it is a pipe */
     exit(main(*__p___argc(), *__p___argv()));
 }

@@ -26,13 +26,13 @@ from fmpy.fmi2 import (
 from fmpy.logging import addLoggerProxy
 
 
-def signature(thing, told=inspect.signature, known={}, **how):  # noqa: B006 - used as a cache
+def signature(thing, original=inspect.signature, cache={}, **how):  # noqa: B006 - used as a cache
     """Cache inspect.signature, which fmpy calls for every method of every instance and which takes most of
     instantiation."""
     function = getattr(thing, "__func__", None)
     if function is None or how:
-        return told(thing, **how)
-    return known.get(function) or known.setdefault(function, told(thing))
+        return original(thing, **how)
+    return cache.get(function) or cache.setdefault(function, original(thing))
 
 
 inspect.signature = signature
@@ -61,8 +61,8 @@ class Instance:
 
     def messages(self):
         """Return the log since the last call, as [status, category, text]."""
-        heard, self.log = self.log, []
-        return heard
+        log, self.log = self.log, []
+        return log
 
     def set(self, values):
         for name, value in values.items():

@@ -16,8 +16,8 @@ TIMEOUT = 120.0  # s, per request
 def run_script(script, function, *arguments, **how):
     """Return the result of a function of a support script, run in a process that must exit cleanly and print no
     errors."""
-    answer, said = run_script_with_stderr(script, function, *arguments, **how)
-    assert said == ""
+    answer, stderr = run_script_with_stderr(script, function, *arguments, **how)
+    assert stderr == ""
     return answer
 
 
@@ -30,9 +30,9 @@ def run_script_with_stderr(script, function, *arguments, folder=None, timeout=30
             status = process.wait(timeout)
         finally:
             process.kill()
-        answer, said = (file.seek(0) or file.read() for file in (out, err))
-    assert status == 0, f"exit status {status}: {said}"
-    return json.loads(answer), said
+        answer, stderr = (file.seek(0) or file.read() for file in (out, err))
+    assert status == 0, f"exit status {status}: {stderr}"
+    return json.loads(answer), stderr
 
 
 class FmiError(Exception):
@@ -50,9 +50,13 @@ class Worker:
 
     def __init__(self):
         self.stderr_file = tempfile.TemporaryFile("a+b")  # noqa: SIM115 - lives as long as the process
-        script, (asked, self.asking), (self.answers, answering) = Path(__file__).with_name(self.script), pipe(), pipe()
-        with asked, answering:
-            self.process = ForkedProcess([script], asked, answering, self.stderr_file, tempfile.gettempdir())
+        script, (requests, self.asking), (self.answers, answering) = (
+            Path(__file__).with_name(self.script),
+            pipe(),
+            pipe(),
+        )
+        with requests, answering:
+            self.process = ForkedProcess([script], requests, answering, self.stderr_file, tempfile.gettempdir())
         self.heard, self.pending = 0, b""
 
     @property
@@ -136,11 +140,11 @@ class Instance:
 
     def run_with_changes(self, times, names, changes):
         """Like run, but set the values in `changes` at their times, after the row is read."""
-        asked = []
+        requests = []
         for t, end in itertools.pairwise([times[0], *sorted(changes), times[-1]]):
-            asked.append([self.number, "set", [changes.get(t, {})]])
-            asked.append([self.number, "run", [[s for s in times if t <= s <= end], names]])
-        first, *others = self.worker.call(None, "batch", asked)[1::2]
+            requests.append([self.number, "set", [changes.get(t, {})]])
+            requests.append([self.number, "run", [[s for s in times if t <= s <= end], names]])
+        first, *others = self.worker.call(None, "batch", requests)[1::2]
         return first + [row for rows in others for row in rows[1:]]
 
     def free(self):

@@ -47,6 +47,6 @@ def test_random_parameters_and_a_change_during_the_run_match_the_native_fmu(page
         rows = fmu.run_with_changes(sorted({*times, when}), names, {when: {later: change["value"]}})
         at = dict(zip(sorted({*times, when}), rows, strict=True))
         fmu.free()
-        for here, there in zip(columns, zip(*(at[t] for t in times), strict=True), strict=True):
-            apart = max(abs(a - b) for t, a, b in zip(times, here, there, strict=True) if t != when)
-            assert apart <= (EXACT if name in CLOSED else STATED) * max(map(abs, there))
+        for actual, expected in zip(columns, zip(*(at[t] for t in times), strict=True), strict=True):
+            apart = max(abs(a - b) for t, a, b in zip(times, actual, expected, strict=True) if t != when)
+            assert apart <= (EXACT if name in CLOSED else STATED) * max(map(abs, expected))

@@ -74,7 +74,7 @@ def test_every_module_imports_existing_names_from_earlier_modules_only():
         for names, source in re.findall(r'^import \{ ([^}]+) \} from "\./(\w+)\.js";$', text, re.M):
             assert set(names.split(", ")) <= exports[source], (name, source)
             body = re.sub(r"^import .*$", "", text, flags=re.M)
-            assert all(re.search(rf"\b{each}\b", body) for each in names.split(", ")), (name, names)
+            assert all(re.search(rf"\b{item}\b", body) for item in names.split(", ")), (name, names)
         exports[name] = set(re.findall(r"^export (?:async )?(?:function|class|const) (\w+)", text, re.M))
 
 
@@ -88,13 +88,13 @@ def test_no_width_makes_it_scroll_sideways_and_every_control_has_a_name(page, na
         page.browser.size(width)
         assert page.run("document.documentElement.scrollWidth") <= width
     tree = page.browser.call("Accessibility.getFullAXTree")["nodes"]
-    found = [node for node in tree if node.get("role", {}).get("value") in CONTROLS and not node["ignored"]]
-    nameless = [node for node in found if not node.get("name", {}).get("value", "").strip()]
+    controls = [node for node in tree if node.get("role", {}).get("value") in CONTROLS and not node["ignored"]]
+    nameless = [node for node in controls if not node.get("name", {}).get("value", "").strip()]
     assert nameless == []
-    said = " ".join(node["name"]["value"] for node in found)
+    names = " ".join(node["name"]["value"] for node in controls)
     for variable, meaning in parameters(name).items():
         if "." not in variable:
-            assert meaning.text in said
+            assert meaning.text in names
     assert "Mechanism:" in json.dumps(tree)
 
 
@@ -151,16 +151,16 @@ def test_the_next_frame_shows_a_changed_parameter(page):
 def test_a_slow_method_is_previewed_with_a_fast_one(page):
     """For any run time: dragging a slider shows the last value up to the end of the run."""
     page.open(".model=pacejka&x_m=0.001&solver.method=2&solver.rtol=0.001")
-    seen = page.run(
+    values = page.run(
         "new Promise(done => { const e = document.querySelector('.field:has(#field-k) [type=range]');"
         "for (const at of [100, 200, 300]) { e.value = at; e.dispatchEvent(new Event('input')) }"
         "requestAnimationFrame(() => { const { main, preview } = app.session.runs;"
         "const [ghost, own] = app.plots.get('x').panel.content.curves.slice(-2);"
         "done([main.done, main.setting.values.k, preview.setting.values, ghost.x.at(-1), own.x.at(-1)]) }) })"
     )
-    done, k, quick, reached, own = seen
+    done, k, quick, reached, full = values
     assert (done, quick) == (False, {"x_m": 0.001, "k": k})
-    assert own < reached <= 16
+    assert full < reached <= 16
     assert page.when_done("app.plots.get('x').panel.content.curves.slice(-2).map(curve => curve.x.at(-1))") == [
         16,
         16,
@@ -214,7 +214,7 @@ def test_another_model_keeps_values_of_the_same_names(page):
 
 def test_a_change_during_playback_acts_from_then_on_only(page):
     page.open(".model=smd")
-    whole = page.run("[...app.session.runs.main.columns.x]")
+    positions = page.run("[...app.session.runs.main.columns.x]")
     page.click("#play")
     page.wait("app.state().t > 0.2")
     page.type_number("c", "20")
@@ -225,9 +225,9 @@ def test_a_change_during_playback_acts_from_then_on_only(page):
     assert page.run("app.state().values") == {}
     now = page.when_done("({ t: app.session.runs.main.time, x: app.session.runs.main.columns.x })")
     before = [x for t, x in zip(now["t"], now["x"], strict=True) if t < change["t"]]
-    assert before == whole[: len(before)]
-    assert max(map(abs, now["x"][-200:])) < 0.1 * max(map(abs, whole[-200:]))
-    assert page.run("app.session.runs.unchanged.columns.x.length") == len(whole)
+    assert before == positions[: len(before)]
+    assert max(map(abs, now["x"][-200:])) < 0.1 * max(map(abs, positions[-200:]))
+    assert page.run("app.session.runs.unchanged.columns.x.length") == len(positions)
 
 
 def test_playback_repaints_no_curve_and_a_curve_is_limited_by_the_pixels(page):
@@ -329,13 +329,13 @@ def test_a_link_stores_the_complete_setup(page):
     wrong = "mu_d=0.3&solver.method=7&friction=1.5&c=&.stop=&.change=1 nothing 2&.change=x k 2"
     page.open(f".model=coulomb&k=100&{wrong}")
     assert page.run("app.state()") | {"values": {"k": 100}, "changes": [], "stop": 4} == page.run("app.state()")
-    told = "document.getElementById('status').textContent"
-    page.wait(f"{told}.includes('unknown settings: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
+    result = "document.getElementById('status').textContent"
+    page.wait(f"{result}.includes('unknown settings: mu_d, solver.method, friction, c, 1 nothing 2, x k 2. coulomb')")
     page.open(".model=nobody")
-    page.wait(f"{told}.includes('unknown settings: nobody. coulomb')")
+    page.wait(f"{result}.includes('unknown settings: nobody. coulomb')")
     page.run("Object.defineProperty(navigator, 'clipboard', { value: undefined })")
     page.click("#link")
-    page.wait(f"{told}.includes('The link is in the address bar')")
+    page.wait(f"{result}.includes('The link is in the address bar')")
 
 
 def test_a_link_opened_while_the_address_is_written_is_not_lost(page):
@@ -382,7 +382,7 @@ def test_an_invalid_number_is_reported_and_changes_nothing(page):
 def test_extreme_numbers_are_reported_or_drawn_and_never_shown_as_nan(page, name):
     page.open(f".model={name}")
     body = page.run("app.session.models.get(app.state().model).bodies[0]")
-    drawn = "document.getElementById('mechanism').innerHTML + document.querySelector('#panels').textContent"
+    figures = "document.getElementById('mechanism').innerHTML + document.querySelector('#panels').textContent"
     for variable, text in (
         ("start", "1e308"),
         ("start", "1e-320"),
@@ -391,7 +391,7 @@ def test_extreme_numbers_are_reported_or_drawn_and_never_shown_as_nan(page, name
         ("input", "0"),
     ):
         page.type_number(body[variable], text)
-        assert not re.search("NaN|Infinity|undefined", page.when_done(drawn)), (variable, text)
+        assert not re.search("NaN|Infinity|undefined", page.when_done(figures)), (variable, text)
     assert page.run("document.getElementById('alert').hidden")
 
 
@@ -413,17 +413,19 @@ def test_every_published_case_measures_the_same_as_the_terminal(page):
             "app.session.presets.get(app.state().preset).title"
         )
         rows = iter(page.table(scene.title).values())
-        quantities = {each.name: each for kind in scene.analyses for each in ANALYSES[kind](run, scene).quantities}
+        quantities = {item.name: item for kind in scene.analyses for item in ANALYSES[kind](run, scene).quantities}
         for figure, published in scene.published.items():
             if figure == "source":
                 continue
-            measured, beside, _ = next(rows)
+            measured, published_values, _ = next(rows)
             number = published[0] if isinstance(published, tuple) else published
-            assert beside == number if isinstance(number, str) else float(beside.split()[0]) == number, (name, figure)
+            assert (
+                published_values == number if isinstance(number, str) else float(published_values.split()[0]) == number
+            ), (name, figure)
             if figure != "run_time" and not (name == "stickslip-threshold" and "step" in figure):
                 size, *unit = measured.replace("\N{MIDDLE DOT}", ".").replace("²", "2").split()
-                there = quantities[figure]
-                value = there.to_unit(*unit) if unit and unit != [there.unit] else there.value
+                expected = quantities[figure]
+                value = expected.to_unit(*unit) if unit and unit != [expected.unit] else expected.value
                 assert float(size) == pytest.approx(value, rel=1e-3), (name, figure)
     page.choose("preset", "")  # custom: values unchanged, but no published case any more
     assert page.run("[app.state().preset, app.state().model]") == ["", scene.model]
@@ -471,15 +473,15 @@ def test_a_printout_is_white_and_complete(page):
 
 def test_moving_bodies_of_any_model_are_read_from_its_declaration():
     """For models that users might write: the kind of each body, and what acts on it."""
-    drawn = {path.stem: list_bodies(find_model(path).analysis) for path in (*EXAMPLE_MODELS, *LARGER_MODELS)}
-    kinds = {name: [body["kind"] for body in found] for name, found in drawn.items()}
+    bodies_by_model = {path.stem: list_bodies(find_model(path).analysis) for path in (*EXAMPLE_MODELS, *LARGER_MODELS)}
+    kinds = {name: [body["kind"] for body in bodies_of_model] for name, bodies_of_model in bodies_by_model.items()}
     assert kinds["viscous_pendulum"] == ["pendulum"]
     assert kinds["rotor_brake"] == ["rotor"]
     assert kinds["blocks"] == kinds["sleds"] == ["block", "block"]
     assert kinds["clutch"] == ["none"]  # it has no position
-    assert {drawn[name][0]["friction"] for name in ("bumper", "lugre")} == {"F_drag", "F_friction"}  # smooth
-    assert drawn["sleds"][0]["linked"] == ["x2"]
-    assert drawn["viscous_pendulum"][0]["dampers"] == ["d"]
+    assert {bodies_by_model[name][0]["friction"] for name in ("bumper", "lugre")} == {"F_drag", "F_friction"}  # smooth
+    assert bodies_by_model["sleds"][0]["linked"] == ["x2"]
+    assert bodies_by_model["viscous_pendulum"][0]["dampers"] == ["d"]
 
 
 def test_user_models_run_on_a_page_of_their_own(browser):

@@ -50,14 +50,14 @@ def value(function, *arguments):
 def test_mathematical_functions_agree_with_python(library, function):
     points = [(a,) for a in AT] if ARGUMENT_COUNTS.get(function, 1) == 1 else [(a, b) for a in AT for b in AT]
     plain = "(a) => Number.isFinite(a) ? a : String(a)"  # JSON has no other numbers
-    listed = ", ".join("[" + ", ".join(map(js, each)) + "]" for each in points)
-    found = library(f"[{listed}].map((each) => ({plain})(c.{function.__name__}(...each)))")
-    for each, here in zip(points, found, strict=True):
-        there = value(function, *each)
-        if there is None:
-            assert here in ("NaN", "Infinity", "-Infinity"), each
+    listed = ", ".join("[" + ", ".join(map(js, point)) + "]" for point in points)
+    results = library(f"[{listed}].map((each) => ({plain})(c.{function.__name__}(...each)))")
+    for point, actual in zip(points, results, strict=True):
+        expected = value(function, *point)
+        if expected is None:
+            assert actual in ("NaN", "Infinity", "-Infinity"), point
         else:
-            assert float(here) == pytest.approx(there, rel=1e-15, abs=0, nan_ok=True), each
+            assert float(actual) == pytest.approx(expected, rel=1e-15, abs=0, nan_ok=True), point
 
 
 def js(number):
@@ -81,26 +81,26 @@ def js(number):
 def test_strings_and_numbers_are_formatted_as_in_c(library, format, types, values):
     size = {"l": 8, "e": 8}
     method = {"l": "setBigInt64", "e": "setFloat64"}
-    here, steps = 0, []
-    for kind, each in zip(types, values, strict=True):
-        here = -(-here // size.get(kind, 4)) * size.get(kind, 4)
-        given = f"put({json.dumps(each)})" if kind == "s" else f"{each!r}n" if kind == "l" else repr(each)
-        steps.append(f"view().{method.get(kind, 'setInt32')}(values + {here}, {given}, true)")
-        here += size.get(kind, 4)
+    actual, steps = 0, []
+    for kind, item in zip(types, values, strict=True):
+        actual = -(-actual // size.get(kind, 4)) * size.get(kind, 4)
+        settings = f"put({json.dumps(item)})" if kind == "s" else f"{item!r}n" if kind == "l" else repr(item)
+        steps.append(f"view().{method.get(kind, 'setInt32')}(values + {actual}, {settings}, true)")
+        actual += size.get(kind, 4)
     write = f"c.snprintf(place, room, put({json.dumps(format)}), values)"
-    place = "place = c.malloc(100), values = c.malloc(64)"
-    told = format.replace("%lld", "%d") % values
+    folder = "place = c.malloc(100), values = c.malloc(64)"
+    expected = format.replace("%lld", "%d") % values
     for room in (100, 3):
-        done = library(f"(({place}, room = {room}) => [{', '.join(steps)}, {write}, get(place)].slice(-2))()")
-        assert done == [len(told), told[: room - 1]]
+        done = library(f"(({folder}, room = {room}) => [{', '.join(steps)}, {write}, get(place)].slice(-2))()")
+        assert done == [len(expected), expected[: room - 1]]
 
 
 def test_memory_is_allocated_once_and_grows_until_exhausted(library):
     sizes = (1, 100, 70_000, 2**32 - 1, 16)
     *places, none, last = library(f"{list(sizes)}.map((size) => c.malloc(size))")
     assert none == 0
-    for place, size, following in zip(places, sizes, [*places[1:], last], strict=False):
-        assert (bool(place), place % 16, place + size <= following) == (True, 0, True)
+    for address, size, following in zip(places, sizes, [*places[1:], last], strict=False):
+        assert (bool(address), address % 16, address + size <= following) == (True, 0, True)
     assert library("(p => [...new Uint8Array(memory.buffer, p, 15)])(c.calloc(3, 5))") == [0] * 15
 
 
@@ -115,8 +115,8 @@ def test_string_functions_behave_as_in_c(library):
 def test_numbers_in_a_message_are_formatted_as_in_python(page):
     draw = random.Random(3)
     doubles = (struct.unpack("<d", draw.randbytes(8))[0] for _ in range(300))
-    values = [-abs(each) for each in (*NUMBERS, *doubles) if math.isfinite(each)]
+    values = [-abs(item) for item in (*NUMBERS, *doubles) if math.isfinite(item)]
     page.open(".model=stickslip")
-    told = "(m) => { try { app.session.runs.main.fmu.begin({ m }, 1) } catch (error) { return error.message } }"
-    for each, sentence in zip(values, page.run(f"{json.dumps(values)}.map({told})"), strict=True):
-        assert sentence.startswith(f"m = {each!r} kg is refused")
+    result = "(m) => { try { app.session.runs.main.fmu.begin({ m }, 1) } catch (error) { return error.message } }"
+    for item, sentence in zip(values, page.run(f"{json.dumps(values)}.map({result})"), strict=True):
+        assert sentence.startswith(f"m = {item!r} kg is refused")
