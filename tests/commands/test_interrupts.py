@@ -234,7 +234,7 @@ def test_the_interrupt_message_survives_cleanup(monkeypatch):
     monkeypatch.setattr(interrupt, "RECEIVED_SIGNALS", [signal.SIGTERM])
     before = signal.signal(signal.SIGTERM, interrupt.handle_signal)
 
-    def told():
+    def fail():
         try:
             raise CommandInterruptedError("half of it is kept")
         finally:
@@ -243,7 +243,7 @@ def test_the_interrupt_message_survives_cleanup(monkeypatch):
 
     try:
         with pytest.raises(CommandInterruptedError, match="half of it is kept") as ended:
-            told()
+            fail()
     finally:
         signal.signal(signal.SIGTERM, before)
     assert ended.value.status == 143

@@ -293,7 +293,7 @@ from fmus import Contact, Mode, Model, Output, Parameter, State
 
 
 class Puck(Model):
-    """Puck on ice, of which nobody asks where it is: m a = -F."""
+    """Puck on ice, with its speed as the only state: m a = -F."""
 
     m = Parameter(2.0, "kg", "mass", above=0.0)
     f = Parameter(3.0, "N", "force of dry friction", low=0.0)

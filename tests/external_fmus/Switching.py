@@ -12,7 +12,7 @@ class Switching(Fmi2Slave):
         self.default_experiment = DefaultExperiment(0.0, 30.0)
         self.T, self.on, self.switched, self.says = 15.0, True, 0, "cold"
         self.loss, self.enabled, self.most, self.name = 0.1, True, 1000, "hall"
-        self.asked = 0
+        self.checks = 0
         output, parameter, fixed = Fmi2Causality.output, Fmi2Causality.parameter, Fmi2Variability.fixed
         discrete = Fmi2Variability.discrete
         self.register_variable(Real("T", causality=output))
@@ -27,15 +27,15 @@ class Switching(Fmi2Slave):
     def do_step(self, t, h):
         stop = t + h
         while t < stop:
-            end = min(stop, 0.5 * (self.asked + 1))
+            end = min(stop, 0.5 * (self.checks + 1))
             rest = 10.0 + (2.0 / self.loss if self.on else 0.0)
             self.T, t = rest + (self.T - rest) * exp(-self.loss * (end - t)), end
-            if end == 0.5 * (self.asked + 1):
-                self.ask()
+            if end == 0.5 * (self.checks + 1):
+                self.switch()
         return True
 
-    def ask(self):
-        self.asked += 1
+    def switch(self):
+        self.checks += 1
         on = self.enabled and self.switched < self.most and (self.T < 20.0 or (self.on and self.T < 22.0))
         self.switched += on != self.on
         self.on, self.says = on, f"{self.name} {'cold' if self.T < 20.0 else 'warm'}"

@@ -32,7 +32,7 @@ def checked(request, fmus, tmp_path_factory):
     names, source = CHECKED[request.param], fmus if request.param == "python" else native_fmus.build_native_fmus()
 
     def make(out):
-        folder = tmp_path_factory.mktemp("asked")
+        folder = tmp_path_factory.mktemp("checked")
         for name in names:
             (folder / f"{name}.fmu").symlink_to(source / f"{name}.fmu")
         (out / "rows").write_bytes(pickle.dumps(table.run_checks(folder, lambda name, share: None)))

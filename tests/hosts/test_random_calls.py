@@ -56,8 +56,8 @@ class RandomCalls(RuleBasedStateMachine):
         if self.worker is None or not self.worker.alive:
             type(self).worker = self.process()
         path = self.path = self.folder / f"{name}.fmu"
-        self.beside = self.worker.instantiate(path).begin()
-        self.beside.step(0.0, 0.1)
+        self.neighbour = self.worker.instantiate(path).begin()
+        self.neighbour.step(0.0, 0.1)
         self.fmu = self.worker.instantiate(path)
         self.saved = []
         self.anew()
@@ -67,7 +67,7 @@ class RandomCalls(RuleBasedStateMachine):
 
     def collect_messages(self):
         """Return the messages since the run was last healthy."""
-        for instance in (self.fmu, self.beside):  # fmpy passes all messages to the newest instance
+        for instance in (self.fmu, self.neighbour):  # fmpy passes all messages to the newest instance
             self.sentences += [text for status, _, text in instance.messages() if status > 1]
         self.sentences += self.worker.read_stderr().splitlines()
         assert all(sentence for sentence in self.sentences)
@@ -231,12 +231,12 @@ class RandomCalls(RuleBasedStateMachine):
         if not self.worker.alive:
             return  # which has been reported
         self.fmu.free()
-        self.beside.step(0.1, 0.1)
+        self.neighbour.step(0.1, 0.1)
         alone = self.worker.instantiate(self.path).begin()
         alone.step(0.0, 0.1)
         alone.step(0.1, 0.1)
-        assert self.beside.get(*self.outputs) == alone.get(*self.outputs)
-        self.beside.free()
+        assert self.neighbour.get(*self.outputs) == alone.get(*self.outputs)
+        self.neighbour.free()
         alone.free()
 
 

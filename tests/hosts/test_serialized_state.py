@@ -85,15 +85,15 @@ def find_member(state, path):
 @EVERY_MODEL
 def test_own_bytes_are_accepted_and_reproduced(name):
     slave_class, one = running_instance(name)
-    heir = slave_class(instance_name="heir")
+    other = slave_class(instance_name="other")
     for spoil in ([], ["set"], ["set", "step"]):  # healthy, with an invalid value, failed
         if spoil == ["set"]:
             one.set_invalid("m", "m = nan kg is refused: a sentence with a · and brackets [{")
         if "step" in spoil:
             one.do_step(0.3, 0.1)
             assert one.run.has_failed
-        heir._set_fmu_state(slave_class._fmu_state_from_bytes(own_bytes(slave_class, one)))
-        assert own_bytes(slave_class, heir) == own_bytes(slave_class, one)
+        other._set_fmu_state(slave_class._fmu_state_from_bytes(own_bytes(slave_class, one)))
+        assert own_bytes(slave_class, other) == own_bytes(slave_class, one)
 
 
 @EVERY_MODEL

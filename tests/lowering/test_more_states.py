@@ -72,9 +72,9 @@ def test_contacts_stick_and_slip_as_in_an_independent_solver(name, method):
     final, observed_events = run(name, method)
     assert [modes for _, *modes in observed_events] == [modes for _, *modes in events]
     assert observed_events
-    room = max(2e3 * RTOL[method], 1e-10)
-    assert [t for t, *_ in observed_events] == pytest.approx([t for t, *_ in events], abs=room)
-    assert np.abs(np.array(final) - end).max() < room
+    tolerance = max(2e3 * RTOL[method], 1e-10)
+    assert [t for t, *_ in observed_events] == pytest.approx([t for t, *_ in events], abs=tolerance)
+    assert np.abs(np.array(final) - end).max() < tolerance
 
 
 def test_a_stuck_sled_keeps_zero_speed_while_the_other_moves():

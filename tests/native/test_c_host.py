@@ -164,10 +164,10 @@ def test_the_thread_sanitizer_reports_nothing(name):
     run_failures(build_native_fmus() / f"{name}.fmu", "thread", 1)
 
 
-def run_failures(fmu, sanitizers, crowd):
+def run_failures(fmu, sanitizers, n_instances):
     """Run every error, and the life cycles of many instances, in threads."""
-    script = failures(fmu.stem) + [line for i in range(1, crowd) for line in life(i, fmu.stem)]
-    script += [f"{i} free" for i in range(1, crowd)]
+    script = failures(fmu.stem) + [line for i in range(1, n_instances) for line in life(i, fmu.stem)]
+    script += [f"{i} free" for i in range(1, n_instances)]
     answers, noise = run_host_script(fmu, script, threads=8, sanitizers=sanitizers)
     assert "Sanitizer" not in noise
     assert {OK, DISCARD, ERROR} <= {line.split()[0] for line in answers}

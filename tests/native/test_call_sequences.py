@@ -83,7 +83,7 @@ class MatchedCalls(RuleBasedStateMachine):
         requests = [*log, [numbers[0], "get", [self.seen]], *log]
         *before, values, one, other = self.workers[index].call(None, "batch", requests)
         messages = [
-            [text.replace("%%", "%") for lines in heard for *_, text in lines] for heard in (before, [one, other])
+            [text.replace("%%", "%") for lines in texts for *_, text in lines] for texts in (before, [one, other])
         ]
         return json.dumps(values), messages, self.workers[index].read_stderr()  # where NaN equals NaN
 
@@ -139,7 +139,7 @@ class MatchedCalls(RuleBasedStateMachine):
 
     @precondition(lambda self: self.phase == RUNNING)
     @rule(off=OFF)
-    def leap(self, off):
+    def internal_step(self, off):
         """To the end of the internal step, or near it."""
         (ahead, _) = self.both("get", "solver.t_next")
         self.step(ahead - self.t, 0.0, off)

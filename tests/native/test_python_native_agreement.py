@@ -40,7 +40,7 @@ class LifeCycle:
     def __init__(self, worker, path, names):
         self.worker, self.names = worker, names
         self.instances = [worker.instantiate(path, "twin"), worker.instantiate(path, "twin")]
-        self.kept = None
+        self.saved_state = None
         self.t = 0.0
 
     def live(self, events):
@@ -75,7 +75,7 @@ class LifeCycle:
         t, self.t = self.t, self.t + h
         self.instances[0].step(t, h)
 
-    def leap(self):
+    def internal_step(self):
         """Step to the end of the internal step."""
         ahead = self.instances[0].get("solver.t_next")
         if self.t < ahead < inf or ahead != ahead:
@@ -92,10 +92,10 @@ class LifeCycle:
         return self.instances[0].get("solver.t_next")
 
     def save(self):
-        self.kept = self.instances[0].save(), self.t
+        self.saved_state = self.instances[0].save(), self.t
 
     def restore(self):
-        state, self.t = self.kept
+        state, self.t = self.saved_state
         self.instances[0].restore(state)
 
     def move(self):
@@ -103,7 +103,7 @@ class LifeCycle:
         fmu, other = self.instances
         other.restore(other.deserialize(fmu.serialize(fmu.save())))
         self.instances.reverse()
-        self.kept = other.save(), self.t
+        self.saved_state = other.save(), self.t
 
     def reset(self):
         self.instances[0].reset()
@@ -153,7 +153,7 @@ def random_mistake(draw, name, stop):
             ("step", draw.choice([0.0, -stop, inf])),
         ]
     )
-    return [mistake, ("step", 1e-6 * stop), ("leap",), ("restore",)]
+    return [mistake, ("step", 1e-6 * stop), ("internal_step",), ("restore",)]
 
 
 def random_scenario(draw, name, choices):
@@ -163,7 +163,7 @@ def random_scenario(draw, name, choices):
     starts = start_values(name)
     events = {
         "step": lambda: [("step", stop * draw.choice([1e-9, 0.003, 0.02, 0.02, 0.1]))],
-        "leap": lambda: [("leap",)],
+        "internal_step": lambda: [("internal_step",)],
         "look": lambda: [("look",)],
         "set": lambda: [("set", {v: random_value(draw, starts[v]) for v in draw.sample(tunables, 2)})],
         "save": lambda: [("save",)],
@@ -172,7 +172,17 @@ def random_scenario(draw, name, choices):
         "mistake": lambda: random_mistake(draw, name, stop),
         "reset": lambda: [("reset",), *random_start(draw, name, choices, stop)],
     }
-    weights = {"step": 10, "leap": 5, "look": 2, "set": 3, "save": 1, "restore": 1, "move": 1, "mistake": 1, "reset": 1}
+    weights = {
+        "step": 10,
+        "internal_step": 5,
+        "look": 2,
+        "set": 3,
+        "save": 1,
+        "restore": 1,
+        "move": 1,
+        "mistake": 1,
+        "reset": 1,
+    }
     kinds = draw.choices(list(weights), list(weights.values()), k=EVENTS)
     return random_start(draw, name, choices, stop) + [event for kind in kinds for event in events[kind]()]
 
@@ -189,17 +199,17 @@ def random_breakdown(draw, name, choices):
     values["solver.rtol"] = draw.choice([0.0, 1e-2, 1e-5])
     change = {v: far(start_values(name)[v]) for v in draw.sample(list(tunable(name)), 2)}
     stop = draw.choice([1e-3, 1.0, 1e3])
-    return [("begin", values, 0.0, stop, None), *[("leap",)] * 8, ("set", change), *[("leap",)] * 8]
+    return [("begin", values, 0.0, stop, None), *[("internal_step",)] * 8, ("set", change), *[("internal_step",)] * 8]
 
 
 def assert_agree(folders, pair, name, events):
     """Apply the events to a Python FMU and to a native one, and compare."""
     names = [v for v in declared(name) if v != "solver.t_next"]  # which computes the next step: an event of its own
-    lives = [
+    responses = [
         LifeCycle(worker, folder / f"{name}.fmu", names).live(events)
         for worker, folder in zip(pair, folders, strict=True)
     ]
-    for event, python, native in zip(events, *lives, strict=True):
+    for event, python, native in zip(events, *responses, strict=True):
         assert python == native, event
 
 

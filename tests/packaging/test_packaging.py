@@ -34,7 +34,7 @@ import json, os, shutil, sys
 sys.modules["pythonfmu"] = None
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
-told = []
+descriptions = []
 for path in sys.argv[1:]:
     folder = str(extract(path))
     description = read_model_description(folder)
@@ -47,10 +47,10 @@ for path in sys.argv[1:]:
             starts[variable.name] = repr(read([variable.valueReference])[0])
     files = [getattr(module, "__file__", None) or "" for module in sys.modules.values()]
     inside = [os.path.relpath(file, folder).replace(os.sep, "/") for file in files if file.startswith(folder)]
-    told.append({"starts": starts, "inside": inside, "modules": list(sys.modules)})
+    descriptions.append({"starts": starts, "inside": inside, "modules": list(sys.modules)})
     fmu.freeInstance()
     shutil.rmtree(folder)
-print(json.dumps(told))
+print(json.dumps(descriptions))
 """
 
 
@@ -374,7 +374,7 @@ def test_start_values_survive_the_xml_bit_for_bit():
     root = ElementTree.parse(BytesIO(text.encode())).getroot()
     assert root.find("ModelVariables/ScalarVariable/Real").get("start") == "0.30000000000000004"
     assert root.find("ModelVariables/ScalarVariable").get("description") == "A sum <&> 'more'."
-    assert root.get("description") == "A model for the description alone."
+    assert root.get("description") == "A model that only has a description."
 
 
 def test_the_guid_follows_the_content():

@@ -37,12 +37,12 @@ class Tags(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.found, self.open = [], []
+        self.elements, self.open = [], []
         self.feed(text)
         assert self.open == []
 
     def handle_starttag(self, tag, attributes):
-        self.found.append((tag, dict(attributes)))
+        self.elements.append((tag, dict(attributes)))
         if tag not in EMPTY:
             self.open.append(tag)
 
@@ -50,7 +50,7 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
     def of(self, tag):
-        return [attributes for name, attributes in self.found if name == tag]
+        return [attributes for name, attributes in self.elements if name == tag]
 
 
 def test_existing_results_are_shown_and_missing_ones_listed_with_their_command(report_run, page):
@@ -78,7 +78,7 @@ def test_every_picture_has_alternative_text_and_nothing_is_loaded_from_elsewhere
 
 def test_every_link_leads_to_an_existing_anchor_or_file(report_run, page):
     tags = Tags(page)
-    places = {attributes.get("id") for _, attributes in tags.found}
+    places = {attributes.get("id") for _, attributes in tags.elements}
     links = {link["href"] for link in tags.of("a")}
     files = {link for link in links if not link.startswith("#")}
     assert {link[1:] for link in links - files} <= places

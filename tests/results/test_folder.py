@@ -126,7 +126,7 @@ def replace(last):
         sys.setprofile(counted)
     sys.setprofile(None)
 
-seen, status, last = [], 9, 0
+outcomes, status, last = [], 9, 0
 while status:
     last += 1
     child = os.fork()
@@ -134,16 +134,16 @@ while status:
         replace(last)
         os._exit(0)
     status = os.waitpid(child, 0)[1]
-    found = os.listdir(place) if place.exists() else []
+    content = os.listdir(place) if place.exists() else []
     try:
         with folders.replace_folder(place, ours):
             raise folders.HarnessError("the next run, which fails")
     except folders.HarnessError:
         pass
-    seen.append((found, os.listdir(place), os.listdir(place.parent)))
+    outcomes.append((content, os.listdir(place), os.listdir(place.parent)))
     (place / "b.csv").unlink(missing_ok=True)
     (place / "a.csv").write_text("old")
-print(json.dumps(seen))
+print(json.dumps(outcomes))
 """
 
 

@@ -130,11 +130,11 @@ def test_attributes_are_created_in_init_and_keep_their_type(case):
     """So that a flat copy of the numbers is the complete state."""
     name, values, stop = case
     instance = slave(name, values, stop)
-    born = number_paths(model_class(name)(), name, set())
+    initial = number_paths(model_class(name)(), name, set())
     for i in range(8):
         assert instance.do_step(i * stop / 8, stop / 8)
         read(instance, *declared(name))
-        assert number_paths(instance.model, name, set()) == born
+        assert number_paths(instance.model, name, set()) == initial
 
 
 @pytest.mark.parametrize("case", [c for c in CASES if c[1].get("friction") == 1], ids=label)

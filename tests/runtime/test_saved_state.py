@@ -36,7 +36,7 @@ def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
     force, size = push(name)
     other = launch(name, {force: size / 2, outputs(name)[0] + "0": 0.02}, start=-1.0, stop=99.0)
     raw = worker.instantiate(fmus / f"{name}.fmu")
-    fmu, t, look, heirs = launch(name, values, stop=stop), 0, False, cycle((other, raw))
+    fmu, t, look, others = launch(name, values, stop=stop), 0, False, cycle((other, raw))
     for i in sorted(places):
         rows = fmu.run(times[t : i + 1], names if look else names[:-1])
         state = fmu.save()
@@ -44,9 +44,9 @@ def test_a_restored_state_continues_bit_for_bit(launch, worker, fmus, case):
         fmu.restore(state)
         assert_identical(fmu.run(times[i:], names), expected[i:], names)
         text = fmu.serialize(state)
-        heir = next(heirs)
-        heir.restore(heir.deserialize(text))
-        assert_identical(heir.run(times[i:], names), expected[i:], names)
+        other = next(others)
+        other.restore(other.deserialize(text))
+        assert_identical(other.run(times[i:], names), expected[i:], names)
         fmu.restore(state)
         assert_identical([row[: len(names) - 1] for row in rows], [row[:-1] for row in expected[t : i + 1]], names[:-1])
         t, look = i, not look

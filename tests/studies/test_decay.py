@@ -109,14 +109,14 @@ def test_a_record_needs_no_fmu_modules_and_one_drawing(tmp_path):
 import sys
 from matplotlib.figure import Figure
 from pathlib import Path
-from decays import swung
+from decays import decay_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.studies.decay.study import write_results
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
-write_results(identify(swung(0.02), Known()), Path.cwd())
+write_results(identify(decay_record(0.02), Known()), Path.cwd())
 print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harness.scenes") if name in sys.modules])
 """
     done = subprocess.run(

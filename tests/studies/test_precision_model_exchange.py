@@ -212,7 +212,7 @@ def test_the_command_writes_every_point_and_advice_and_keeps_results_of_other_mo
     assert {row["tool"] for row in rows} == tools
     unbuilt = "not built: fmus/native/fmi3/smd.fmu (python build_fmus.py --fmi 3)"
     assert [row["failure"] for row in later if row["tool"] in FMI3_INTERFACES] == [unbuilt, unbuilt]
-    assert [told for told in json.loads(incomplete)["missing"] if unbuilt in told] == [unbuilt]
+    assert [item for item in json.loads(incomplete)["missing"] if unbuilt in item] == [unbuilt]
     inside, outside = ([row for row in rows if row["tool"] == tool] for tool in (FMU, FMPY))
     assert len(inside) == 1 + 4 * len(QUICK.tolerances)
     assert float(inside[0]["largest [1]"]) < 1e-13

@@ -22,11 +22,11 @@ from matplotlib.text import Text
 from harness.scenes.scene import load_scene
 from harness.studies.run import study
 
-told, run = {}, study.any_fmu.run
-def kept(wanted, report):
-    runs.append(run(wanted, report))
+summaries, run = {}, study.runner.run
+def record(spec, report):
+    runs.append(run(spec, report))
     return runs[-1]
-study.any_fmu.run = kept
+study.runner.run = record
 def covered(axes):
     (title,) = (each for each in axes.findobj(Text) if each.get_text() == axes.get_title(loc="left"))
     legend = axes.get_legend()
@@ -37,7 +37,7 @@ for name in sys.argv[1:]:
     study.run_scene(replace(load_scene(name), repeat=1), Path("results"), lambda share: None)
     figures[0].draw_without_rendering()
     events = runs[0].events
-    told[name] = {
+    summaries[name] = {
         "samples": len(runs[0].time),
         "sticks": [] if events is None else events.t[events.mode == 0].tolist(),
         "panels": {
@@ -50,7 +50,7 @@ for name in sys.argv[1:]:
             for axes in figures[0].get_axes()
         },
     }
-print(json.dumps(told))
+print(json.dumps(summaries))
 """
 
 
@@ -67,9 +67,9 @@ def drawn_figures(fmus):
             timeout=120,
         )
         assert done.returncode == 0, done.stderr
-        (folder / "told.json").write_text(done.stdout)
+        (folder / "summaries.json").write_text(done.stdout)
 
-    return json.loads((cached_folder("drawn", make) / "told.json").read_text())
+    return json.loads((cached_folder("drawn", make) / "summaries.json").read_text())
 
 
 def curves(scene):

@@ -118,9 +118,11 @@ def reference_events(name, changes=()):
 
     def make(folder):
         events, end = integrate_events(CONTACT_REFERENCES[name](), changes)
-        (folder / "truth.json").write_text(json.dumps([events, list(end)]))
+        (folder / "reference.json").write_text(json.dumps([events, list(end)]))
 
-    return json.loads((build_cache.cached_folder(f"{name}-by-hand{len(changes)}", make) / "truth.json").read_text())
+    return json.loads(
+        (build_cache.cached_folder(f"{name}-reference{len(changes)}", make) / "reference.json").read_text()
+    )
 
 
 def integrate_events(physics, changes=()):

@@ -383,7 +383,7 @@ static void random_calls(uint64_t seed, int turns)
         if (it && 37 <= call && call <= 38 && is_model_exchange(&it->state)) CHECK(status == fmi2Error);
     }
     for (int i = 0; i < N_INSTANCES; i++) {
-        Instance *it = instances[i] ? instances[i] : instance("heir");
+        Instance *it = instances[i] ? instances[i] : instance("successor");
         CHECK(fmi2Reset(it) == fmi2OK);
         initialise(it, fmi2OK);
         if (!is_model_exchange(&it->state)) CHECK(fmi2DoStep(it, 0.0, 0.3, fmi2True) == fmi2OK);

@@ -45,12 +45,12 @@ def main(resources):
     signal.signal(signal.SIGINT, stop)
     sys.stderr = io.StringIO()
 
-    def born():
+    def new_instance():
         slave = entry.Stickslip(instance_name="embedded", resources=resources, logger=None, visible=False)
         slave.exit_initialization_mode()
         return slave
 
-    return {name: interrupted(born(), name, arguments) for name, arguments in ENTRIES.items()}
+    return {name: interrupted(new_instance(), name, arguments) for name, arguments in ENTRIES.items()}
 
 
 if __name__ == "__main__":

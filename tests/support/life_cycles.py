@@ -99,15 +99,15 @@ def run_interleaved(paths, number):
     folders = [extract(path) for path in paths]
     fleet = [[LifeCycle(folder, str(i)).begin() for i in range(5)] for folder in folders]
     before = memory()
-    for lives, folder in zip(fleet, folders, strict=True):
-        lives += [LifeCycle(folder, str(i)).begin() for i in range(number)]
+    for instances, folder in zip(fleet, folders, strict=True):
+        instances += [LifeCycle(folder, str(i)).begin() for i in range(number)]
     per_instance = (memory() - before) / (number * len(paths))
     rows = {}
     for t, ahead in pairwise(TIMES):
-        for name, lives in enumerate(fleet):
-            rows.setdefault((name, t), set()).update(repr(life.step(t, ahead)) for life in lives)
-    for lives in reversed(fleet):
-        for life in reversed(lives):
+        for name, instances in enumerate(fleet):
+            rows.setdefault((name, t), set()).update(repr(life.step(t, ahead)) for life in instances)
+    for instances in reversed(fleet):
+        for life in reversed(instances):
             life.end()
     return {"runs": max(map(len, rows.values())), "each": per_instance}
 

@@ -57,7 +57,7 @@ class Worker:
         )
         with requests, answering:
             self.process = ForkedProcess([script], requests, answering, self.stderr_file, tempfile.gettempdir())
-        self.heard, self.pending = 0, b""
+        self.stderr_position, self.pending = 0, b""
 
     @property
     def alive(self):
@@ -93,9 +93,9 @@ class Worker:
 
     def read_stderr(self):
         """Return what was written to standard error since the last call."""
-        self.stderr_file.seek(self.heard)
+        self.stderr_file.seek(self.stderr_position)
         text = self.stderr_file.read()
-        self.heard += len(text)
+        self.stderr_position += len(text)
         return text.decode()
 
     def instantiate(self, path, name="test"):

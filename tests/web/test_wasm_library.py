@@ -21,8 +21,8 @@ def library(browser):
     """Return an evaluator of library functions, with a memory of their own and helpers to write and read strings."""
     text = (HERE / "script" / "libc.js").read_text(encoding="utf-8").replace("export ", "")
     setting = """
-        const memory = new WebAssembly.Memory({ initial: 1 }), said = [];
-        const c = libc(() => memory, (bytes) => said.push(...bytes));
+        const memory = new WebAssembly.Memory({ initial: 1 }), output = [];
+        const c = libc(() => memory, (bytes) => output.push(...bytes));
         const view = () => new DataView(memory.buffer);
         const put = (text) => {
           const place = c.malloc(text.length + 1);
@@ -109,7 +109,7 @@ def test_string_functions_behave_as_in_c(library):
     assert library("((a) => [c.strchr(a, 101) - a, c.strchr(a, 120)])(put('1e5e'))") == [1, 0]
     assert library("['b', 'bb', 'a', 'c'].map((other) => Math.sign(c.strcmp(put('b'), put(other))))") == [0, -1, 1, -1]
     assert library("[c.strtod(put('15e-1')), c.atoi(put('-07')), c.atoi(put('+308'))]") == [1.5, -7, 308]
-    assert bytes(library("(c.fwrite(put('tell'), 1, 4, 0), said)")) == b"tell"
+    assert bytes(library("(c.fwrite(put('tell'), 1, 4, 0), output)")) == b"tell"
 
 
 def test_numbers_in_a_message_are_formatted_as_in_python(page):

@@ -29,7 +29,7 @@ class Clutch(Model):
     mode = Mode("-1 driven faster, 0 engaged, 1 driving faster")
 
     T_1 = Output("N.m", "torque on the driving side", T_in - c_1 * omega1)
-    T_2 = Output("N.m", "torque that the driven side asks for", T_load + c_2 * omega2)
+    T_2 = Output("N.m", "torque required by the driven side", T_load + c_2 * omega2)
     T_clutch = Contact(
         "N.m", "torque in the clutch", mode=mode, slip=omega1 - omega2, slide=mu_d * r * F_n, hold=mu_s * r * F_n
     )
