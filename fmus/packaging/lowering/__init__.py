@@ -11,7 +11,7 @@
     lowered_sources.py     lowers all files of the runtime and the model
     import_hook.py         imports the lowered model into this process
 
-A vector is declared by an annotation such as `e: StateVector` of a parameter, result or class attribute.  Results of vector
+An annotation such as `e: StateVector` of a parameter, result or class attribute declares a vector.  Results of vector
 operations are vectors, and so are the attributes y, f and modes, with or without a number.  Their components are
 
     y, y2, step.y0           named after the states: x, v;  x2, v2;  step.x0, step.v0
@@ -20,8 +20,8 @@ operations are vectors, and so are the attributes y, f and modes, with or withou
     e, k3, self.c2           all others: e_x, e_v;  k3_x, k3_v;  self.c2_x, self.c2_v
 
 A loop over contact_indices, state_indices or velocity_indices is unrolled; a function with a parameter
-`i: ContactIndex` is written once for each contact.  A loop over the methods is unrolled for those that
-are offered; one that tests each of them becomes a chain.
+`i: ContactIndex` is written once for each contact.  A loop over the methods is unrolled for the methods that the FMU
+offers; a loop that tests each of them becomes a chain of conditions.
 Tests check that arrays, scalars and C give the same bits (tests/lowering/test_lowering.py).
 """
 

@@ -1,8 +1,8 @@
 """Directional derivatives: differentiates a model's `compute_outputs` statement by statement (forward mode).
 
 For every calculated number z the generated function calculates its tangent _d_z, the change of z when states, driver
-and inputs change in a given direction. It takes the same branches as `compute_outputs`. Where friction sticks, the force equals
-the load, and their tangents are equal as well.
+and inputs change in a given direction. It takes the same branches as `compute_outputs`. Where friction sticks, the
+force equals the load, and their tangents are equal as well.
 
 References
 ----------

@@ -44,8 +44,8 @@ def select_free_motion(record: Record, extrema: Extrema, terms: Terms, pendulum:
     notes = []
     if extrema.segment_start > record.t[0]:
         notes.append(
-            f"The record before the gap that ends at t = {record.format_time(extrema.segment_start)} s has too few cycles and "
-            "is left out."
+            f"The record before the gap that ends at t = {record.format_time(extrema.segment_start)} s has too few "
+            "cycles and is left out."
         )
     start = max(extrema.segment_start - problem.time_origin, p[T0])
     released = problem.subset(problem.t >= start)
@@ -59,7 +59,8 @@ def select_free_motion(record: Record, extrema: Extrema, terms: Terms, pendulum:
         used, p, squares = undisturbed
         used, p, squares = truncate_at_stop(used, p, squares, terms, used)
         notes.append(
-            f"The motion is free from t = {record.format_time(used.t[0] + used.time_origin)} s on; earlier samples are left out."
+            f"The motion is free from t = {record.format_time(used.t[0] + used.time_origin)} s on; earlier samples are "
+            "left out."
         )
 
     if used.exceeds_noise(squares) and squares > len(used.t) * (2 * used.noise) ** 2:

@@ -47,6 +47,7 @@ def summary_lines(identified: DecayIdentification) -> list[str]:
     if n_excluded:
         lines.append(
             f"Fitted to {record.quantity} from t = {record.format_time(used[0])} to {record.format_time(used[-1])} s; "
-            f"{n_excluded} of {len(record.t)} samples are excluded (before release, after the last reliable cycle, or outliers)."
+            f"{n_excluded} of {len(record.t)} samples are excluded (before release, after the last reliable cycle, or "
+            "outliers)."
         )
     return [*lines, *identified.remarks]
