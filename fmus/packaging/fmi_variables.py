@@ -27,7 +27,7 @@ class ContinuousLocal(Local):
 
 def model_exchange_instance(model: type[VariableOwner]) -> Any:
     """Create an instance of a lowered model for model exchange."""
-    exchange = sibling_module(model, "runtime.exchange")
+    exchange = sibling_module(model, "runtime.model_exchange")
     thing = type(model.__name__, (exchange.ModelExchangeMixin, model), {})()
     exchange.update_nominals(thing)
     return thing

@@ -35,7 +35,7 @@ def coupled_contact_methods(f: CodegenContext) -> list[str]:
         return []
     slips = [c.slip for c in f.an.contacts]
     return [
-        method_source("slips", ["t", *f.states], f.return_lines(f.printer(), slips)),
+        method_source("slip_velocities", ["t", *f.states], f.return_lines(f.printer(), slips)),
         slip_scale_method(f),
         forces_method(f),
         force_rates_method(f),
@@ -153,7 +153,7 @@ def slip_scale_method(f: CodegenContext) -> str:
     s = f.printer()
     sizes = emit_scales(f, s, [rounding_scale(c.slip) for c in f.an.contacts])
     f.emit_driver(s, sizes)
-    return method_source("slip_terms", ["t", *f.states], emit_return(s, sizes))
+    return method_source("slip_magnitudes", ["t", *f.states], emit_return(s, sizes))
 
 
 def forces_method(f: CodegenContext) -> str:
@@ -170,7 +170,7 @@ def forces_method(f: CodegenContext) -> str:
     s.count_uses(*u.terms, *limits, *sizes)
     emit_solution(f, s, [u])
     sizes = emit_scales(f, s, sizes)
-    return method_source("forces", f.arguments, emit_return(s, [*an.contacts, *limits, *sizes]))
+    return method_source("contact_forces", f.arguments, emit_return(s, [*an.contacts, *limits, *sizes]))
 
 
 def force_rates_method(f: CodegenContext) -> str:
@@ -191,7 +191,7 @@ def force_rates_method(f: CodegenContext) -> str:
     s.count_uses(*u.terms, *rate.terms, *targets)
     emit_solution(f, s, [u])
     emit_solution(f, s, [rate])
-    return method_source("changes", f.arguments, emit_return(s, targets))
+    return method_source("contact_rates", f.arguments, emit_return(s, targets))
 
 
 def impulse_method(f: CodegenContext) -> str:
@@ -215,4 +215,4 @@ def impulse_method(f: CodegenContext) -> str:
         with s.block(f"if {c.mode.name} == 0:"):
             s.emit(f"{state.name} = {s.text(value)}")
     s.emit(f"return {', '.join(f.states)}")
-    return method_source("struck", f.arguments, s.lines)
+    return method_source("apply_impulses", f.arguments, s.lines)

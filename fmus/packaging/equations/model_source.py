@@ -143,7 +143,11 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
         lines.append(f"contacts = {{{slips}}}")
     lines += [
         f"{word} = True"
-        for word, holds in (("linear", an.closed_form), ("driven", an.drivers), ("ramps", an.ramps))
+        for word, holds in (
+            ("is_linear", an.closed_form),
+            ("has_driver", an.drivers),
+            ("has_input_derivatives", an.ramps),
+        )
         if holds
     ]
     for word in RUN_SETTINGS:

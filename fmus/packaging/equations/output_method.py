@@ -23,4 +23,4 @@ def observe_method(f: CodegenContext) -> str:
         s.emit(f"self.{e.name} = {s.text(e)}")
     sizes = (s.text(e) if e.low >= 0.0 else f"fabs({s.text(e)})" for e in an.overflow_indicators)
     s.emit(f"return {' + '.join(sizes)} < inf")
-    return method_source("observe", f.arguments, s.lines)
+    return method_source("compute_outputs", f.arguments, s.lines)

@@ -110,12 +110,20 @@ def closed_form_methods(f: CodegenContext) -> list[str]:
     targets = [law.expression for law in f.rate_expressions]
     targets = targets if f.single_contact is None else with_sliding_force(f.single_contact, targets)
     at_zero = dict.fromkeys(f.an.states, 0.0)
-    piece = method_source("piece", (), f.return_lines(f.printer(), f.an.closed_form))
+    piece = method_source("linear_coefficients", (), f.return_lines(f.printer(), f.an.closed_form))
     return [
         piece,
-        *[f.nth_derivative_method("push_rate", ["t"], [differentiate(f.rate_expressions[0].expression, f.an.ramps)])]
+        *[
+            f.nth_derivative_method(
+                "applied_acceleration_derivative", ["t"], [differentiate(f.rate_expressions[0].expression, f.an.ramps)]
+            )
+        ]
         * bool(f.an.ramps),
-        method_source("push", ["t", *f.modes], f.return_lines(f.printer(), [substitute(e, at_zero) for e in targets])),
+        method_source(
+            "applied_acceleration",
+            ["t", *f.modes],
+            f.return_lines(f.printer(), [substitute(e, at_zero) for e in targets]),
+        ),
     ]
 
 

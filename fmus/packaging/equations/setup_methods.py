@@ -39,7 +39,7 @@ def initial_method(f: CodegenContext) -> str:
         s.emit("self.t_base, self.x_base = t, 0.0")
     elif f.an.ramps:
         s.emit("self.t_base = t")
-    return method_source("initial", ["t"], f.return_lines(s, [state.start_expression for state in f.an.states]))
+    return method_source("initial_state", ["t"], f.return_lines(s, [state.start_expression for state in f.an.states]))
 
 
 def prepare_method(f: CodegenContext) -> str:
@@ -69,13 +69,15 @@ def prepare_method(f: CodegenContext) -> str:
 def nominal_velocity_method(f: CodegenContext) -> list[str]:
     """Smallest speed that the tolerance must resolve."""
     wanted = [state.nominal_velocity for state in f.an.states if state.nominal_velocity is not None]
-    return [method_source("finest", (), f.return_lines(f.printer(), wanted))] if wanted else []
+    return [method_source("nominal_velocity", (), f.return_lines(f.printer(), wanted))] if wanted else []
 
 
 def driver_method(f: CodegenContext) -> list[str]:
     """Speed of the driver."""
     return (
-        [] if f.driver is None else [method_source("drive", (), f.return_lines(f.printer(), [f.driver.constant_rate]))]
+        []
+        if f.driver is None
+        else [method_source("driver_velocity", (), f.return_lines(f.printer(), [f.driver.constant_rate]))]
     )
 
 

@@ -25,14 +25,16 @@ def load_method(f: CodegenContext, c: Contact) -> str:
         substitute(differentiate(an.load[c], an.coasting_derivatives), {c.slip: 0.0}),
         an.holding_limit[c],
     ]
-    return method_source("hold", ["t", *f.states], f.return_lines(f.printer(), wanted))
+    return method_source("stick_load", ["t", *f.states], f.return_lines(f.printer(), wanted))
 
 
 def load_rate_method(f: CodegenContext, c: Contact) -> list[str]:
     """The n-th derivative of the load caused by inputs."""
     ramps = f.an.ramps
     return (
-        [f.nth_derivative_method("load_rate", ["t", *f.states], [differentiate(f.an.load[c], ramps)])] if ramps else []
+        [f.nth_derivative_method("load_derivative", ["t", *f.states], [differentiate(f.an.load[c], ramps)])]
+        if ramps
+        else []
     )
 
 
@@ -43,7 +45,7 @@ def load_scale_method(f: CodegenContext, c: Contact) -> str:
     f.emit_driver(s, [sizes])
     s.count_uses(sizes)
     s.emit(f"return {s.text(sizes)}")
-    return method_source("terms", ["t", *f.states], s.lines)
+    return method_source("load_magnitude", ["t", *f.states], s.lines)
 
 
 def breakaway_method(f: CodegenContext, c: Contact) -> list[str]:
@@ -52,7 +54,7 @@ def breakaway_method(f: CodegenContext, c: Contact) -> list[str]:
         return []
     less = Term("neg", Term("*", c.mode, Term("-", c.hold, c.slide)))
     jump = differentiate(f.an.rate_outputs[c.slip].expression, {c: less})
-    return [method_source("departure", f.arguments, f.return_lines(f.printer(), [jump]))]
+    return [method_source("breakaway_acceleration", f.arguments, f.return_lines(f.printer(), [jump]))]
 
 
 def emit_friction_force(f: CodegenContext, s: ExpressionPrinter, c: Contact) -> None:

@@ -68,8 +68,9 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
 def lower_with_layout(source: ModelFile, spec: ModelLayout) -> SourceFiles:
     """Lower with the names of a layout."""
     file = f"{source.name}.py"
-    left = {f"runtime/{label}.py" for label in spec.excluded}  # excluded methods
-    texts = {path: text for path, text in runtime_sources().items() if path not in left} | {
+    modules = {label: "linear_closed_form" if label == EXACT else label for label in spec.excluded}
+    excluded = {f"runtime/{module}.py" for module in modules.values()}
+    texts = {path: text for path, text in runtime_sources().items() if path not in excluded} | {
         file: source.generated_source
     }
     declared = runtime_symbols()

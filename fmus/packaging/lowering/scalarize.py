@@ -19,7 +19,7 @@ REDUCTIONS = {"max_of": ">", "min_of": "<"}  # reductions to one component
 ALLOCATORS = ("state_vector", "contact_vector")
 LOOP_RANGES = ("state_indices", "velocity_indices", "contact_indices")  # iterables of loops
 METHOD_LOOP = "methods"  # iterable of (label, module, class)
-INDEX_LOOKUPS = ("slip", "place")
+INDEX_LOOKUPS = {"slip_index": "slip", "position_index": "place"}
 
 
 class LoweringError(BuildError):
@@ -167,7 +167,7 @@ class Scalarizer(ConstantFolder):
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         match node:
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Name(id=i)) if name in INDEX_LOOKUPS:
-                return ast.Constant(getattr(self.spec, name)(self.loop_indices[i]))
+                return ast.Constant(getattr(self.spec, INDEX_LOOKUPS[name])(self.loop_indices[i]))
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Tuple(elts=[tuple_or_single, column])) if (
                 name in self.jacobians
             ):

@@ -82,7 +82,8 @@ def make_remarks(
         remarks.append(
             f"{residuals}, {100 * share:.1f} % of the motion, and largest near "
             f"t = {record.format_time(time_of_largest_residuals(problem, full.p, e))} s, while {noise_level}: "
-            f"{disturbed}. The intervals are widened. If the model does not fit this record, do not rely on these values."
+            f"{disturbed}. The intervals are widened. If the model does not fit this record, do not rely on these "
+            "values."
         )
     elif is_rough and uncertainty.is_correlated:
         remarks.append(f"{residuals}, while {noise_level}: {disturbed}. The intervals are widened.")
