@@ -307,7 +307,7 @@ def sweep(
     import numpy as np
 
     from .process.temporary_directory import temporary_directory
-    from .studies.sweep import result_files as result_files
+    from .studies.sweep import result_files
 
     library = optional("xarray", "a sweep", "sweep")
     if not grid:
@@ -325,7 +325,7 @@ def sweep(
             raise SceneError(f"{name} has {len(numbers)} values: with samples give its lower and its upper bound")
         single = f"{numbers[0]}:{numbers[0]}:1" if len(numbers) == 1 else ",".join(numbers)
         axes.append(f"{name}={single if samples is None else ':'.join(numbers)}")
-    asked = result_files.SweepRequest(
+    request = result_files.SweepRequest(
         model=str(source),
         vary=tuple(axes),
         values=tuple(f"{name}={value}" for name, value in (values or {}).items()),
@@ -335,9 +335,9 @@ def sweep(
         name=None,
         options={name: value for name, value in options.items() if value is not None},
     )
-    with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as place:
-        swept = result_files.run_sweep(asked, place, scheduler, workers, progress or QUIET)
-        with library.open_dataset(swept.folder / "sweep.nc") as data:
+    with temporary_directory("sweep-") if folder is None else nullcontext(Path(folder)) as directory:
+        result = result_files.run_sweep(request, directory, scheduler, workers, progress or QUIET)
+        with library.open_dataset(result.folder / "sweep.nc") as data:
             loaded: xarray.Dataset = data.load()
     return loaded
 
@@ -362,19 +362,19 @@ def load_result(folder: "str | Path") -> "Trajectory | xarray.Dataset | dict[str
     """
     import json
 
-    place = Path(folder)
-    if (place / "sweep.nc").is_file():
+    path = Path(folder)
+    if (path / "sweep.nc").is_file():
         library = optional("xarray", "to read a sweep", "sweep")
-        with library.open_dataset(place / "sweep.nc") as data:
+        with library.open_dataset(path / "sweep.nc") as data:
             loaded: xarray.Dataset = data.load()
         return loaded
     for name in ("decay.json", "compare.json"):
-        if (place / name).is_file():
-            numbers: dict[str, Any] = json.loads((place / name).read_text(encoding="utf-8"))
+        if (path / name).is_file():
+            numbers: dict[str, Any] = json.loads((path / name).read_text(encoding="utf-8"))
             return numbers
-    if not (place / "trajectory.csv").is_file():
+    if not (path / "trajectory.csv").is_file():
         raise SceneError(f"{folder} holds no result: name a folder with trajectory.csv, sweep.nc or decay.json")
-    return stored_run(place)
+    return stored_run(path)
 
 
 # ---- what the functions above share

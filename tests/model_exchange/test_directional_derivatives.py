@@ -139,4 +139,4 @@ def test_nondifferentiable_variables_are_refused(model, capfd):
     ):
         with pytest.raises(FMICallException):
             fmu.getDirectionalDerivative([unknown], [input_reference], [1.0])
-        assert "is not that of a state or an input, or of what follows" in capfd.readouterr().err
+        assert "is neither a state nor an input nor a variable that depends on them" in capfd.readouterr().err

@@ -21,8 +21,8 @@ class CheckedCVode(CVodeSolver):
 
     error: Exception | None = None
 
-    def __init__(self, heed: Callable[[], Any], **options: Any) -> None:
-        self.report_progress = heed
+    def __init__(self, report_progress: Callable[[], Any], **options: Any) -> None:
+        self.report_progress = report_progress
         super().__init__(**options)
 
     def f(self, t: float, *arguments: Any) -> int:
