@@ -72,6 +72,13 @@ def main(
     """Build an FMU for each model NAME or model file FILE.py; without arguments, for all models of the project.
 
     Prints file size, import time in Python, and SHA-256 digest.
+
+    \b
+    Examples:
+      python build_fmus.py
+      python build_fmus.py stickslip --out elsewhere
+      python build_fmus.py cart.py --native --platform linux64
+      python build_fmus.py --release dist
     """
     gc.disable()  # objects of a build live until its end; collecting garbage takes a tenth of the build time
     if web and (compiled or platforms or fmi == "3"):

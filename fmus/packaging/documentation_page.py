@@ -25,13 +25,13 @@ then fails, and all calculated Reals are NaN until reset.</p>
 CAPABILITIES = """\
 | | in Python | native | native, FMI 3.0 |
 | FMI | 2.0 | 2.0 | 3.0 |
-| co-simulation; state saved and serialised | yes | yes | yes |
-| model exchange: indicators, time events, nominals | | yes | yes |
+| co-simulation; save, restore and serialize the state | yes | yes | yes |
+| model exchange: event indicators, time events, nominals | | yes | yes |
 | directional derivatives | | yes | yes, adjoint too |
-| rates of outputs (derivatives of order 1) | | yes | yes |
-| derivatives of inputs up to order 8: polynomials, which the method exact follows through stick and slip | | yes | |
+| derivatives of outputs (order 1) | | yes | yes |
+| derivatives of inputs up to order 8 | | yes | |
 | event mode, early return at stick and slip | | | yes |
-| intermediate update after every internal step, where inputs can be set | | | yes |
+| intermediate update after each internal step, where inputs can be set | | | yes |
 | terminal `flange`: position, speed, force | | | yes |
 """  # capabilities of each kind of FMU; the README has the same table
 UNRESTRICTED = VariableDeclaration("", "").allowed  # the range text of an unbounded variable

@@ -11,9 +11,9 @@ import harness
 
 
 @pytest.fixture(autouse=True)
-def in_place(place, tmp_path, monkeypatch):
+def in_folder(user_folder, tmp_path, monkeypatch):
     """Work in an empty folder with built FMUs."""
-    (tmp_path / "fmus").symlink_to(place / "fmus")
+    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
     monkeypatch.chdir(tmp_path)
 
 

@@ -15,9 +15,9 @@ SMD = {"m": 1.0, "k": 157.9, "c": 2.0}
 
 
 @pytest.fixture(autouse=True)
-def in_place(place, tmp_path, monkeypatch):
+def in_folder(user_folder, tmp_path, monkeypatch):
     """Work in an empty folder with built FMUs."""
-    (tmp_path / "fmus").symlink_to(place / "fmus")
+    (tmp_path / "fmus").symlink_to(user_folder / "fmus")
     monkeypatch.chdir(tmp_path)
 
 
@@ -140,7 +140,7 @@ def test_nothing_is_printed(capfd):
     [
         ({"source": "stickslp"}, "unknown model or scene 'stickslp' (nearest: 'stickslip')"),
         ({"source": "nowhere.fmu"}, "nowhere.fmu"),
-        ({"source": "fmus"}, "holds no result"),
+        ({"source": "fmus"}, "contains no result"),
         ({"values": {"kk": 1.0}}, "'kk' (nearest: 'k')"),
         ({"values": {"m": -1.0}}, "m = -1.0 is outside its range"),
         ({"values": {"m": float("nan")}}, "m = nan"),

@@ -330,8 +330,9 @@ def test_a_scene_imports_only_the_modules_it_needs(user_folder, tmp_path):
     )
     for number, extra in enumerate(extras):
         (tmp_path / f"{number}.toml").write_text(BASE + extra)
+        file = str(tmp_path / f"{number}.toml")
         code += (
-            f"run_scene(load({str(tmp_path / f'{number}.toml')!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
+            f"run_scene(load_scene({file!r}), Path({str(tmp_path)!r}), lambda share: None)\n"
             f"print([name for name in {optional} if name in sys.modules])\n"
         )
     done = python(user_folder, "-c", code)

@@ -98,10 +98,10 @@ def test_the_archive_contents_are_complete(smd):
 
 def test_only_required_code_is_compiled():
     text = entries(build_native_fmus() / "smd.fmu")["sources/model.h"].decode()
-    assert "Exact_overdamped" in text
+    assert "LinearClosedForm_overdamped" in text
     assert "DryFriction" not in text
     text = entries(build_native_fmus() / "pacejka.fmu")["sources/model.h"].decode()
-    assert "Exact" not in text
+    assert "LinearClosedForm" not in text
 
 
 def test_methods_and_laws_can_be_selected_as_for_the_python_fmu(tmp_path):

@@ -358,7 +358,7 @@ class Sketch(VariableOwner):
     """
 
     stop_time, step_size, tolerance = 1.0, 0.1, 1e-6
-    ramps = False
+    has_input_derivatives = False
 
 
 def sketch(**declared):

@@ -45,23 +45,23 @@ def test_a_native_fmu_has_the_same_page_and_states_how_to_run_it(content, name):
 
 CAPABILITIES = {  # names as they begin in the model descriptions of both versions; attributes that are not false
     "FMI": (".", "fmiVersion"),
-    "co-simulation; state saved and serialised": ("CoSimulation", "canSerializeFMU"),
-    "model exchange: indicators, time events, nominals": ("ModelExchange", "modelIdentifier"),
+    "co-simulation; save, restore and serialize the state": ("CoSimulation", "canSerializeFMU"),
+    "model exchange: event indicators, time events, nominals": ("ModelExchange", "modelIdentifier"),
     "directional derivatives": ("CoSimulation", "providesDirectional"),
-    "rates of outputs (derivatives of order 1)": ("CoSimulation", "maxOutputDerivativeOrder"),
-    "derivatives of inputs up to order 8: polynomials, which the method exact follows through stick and slip": (
+    "derivatives of outputs (order 1)": ("CoSimulation", "maxOutputDerivativeOrder"),
+    "derivatives of inputs up to order 8": (
         "CoSimulation",
         "canInterpolateInputs",
     ),
     "event mode, early return at stick and slip": ("CoSimulation", "hasEventMode"),
-    "intermediate update after every internal step, where inputs can be set": (
+    "intermediate update after each internal step, where inputs can be set": (
         "CoSimulation",
         "providesIntermediateUpdate",
     ),
 }
 
 
-def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_readme(content):
+def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_guide(content):
     """For a model with a closed form, which has all capabilities."""
     kinds = [
         content("stickslip"),
@@ -73,11 +73,11 @@ def test_the_capabilities_listed_per_backend_are_true_on_every_page_and_in_the_r
     for files in kinds:
         (table,) = re.findall(r"<table class='offered'>.*?</table>", files[PAGE].decode())
         rows = [re.findall(r"<td>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
-        text = (ROOT / "README.md").read_text(encoding="utf-8")
-        readme_table = text.split("## FMI 3.0 and model exchange")[1].split("|---|---|---|---|\n")[1].split("\n\n")[0]
+        text = (ROOT / "docs" / "how-to" / "fmi3.md").read_text(encoding="utf-8")
+        guide_table = text.split("|---|---|---|---|\n")[1].split("\n\n")[0]
         assert rows == [
             [re.sub("`(.*?)`", r"<code>\1</code>", cell.strip()) for cell in line.split("|")[1:-1]]
-            for line in readme_table.splitlines()
+            for line in guide_table.splitlines()
         ]
     for what, *offered in rows:
         if what.startswith("terminal"):

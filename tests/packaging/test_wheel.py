@@ -13,6 +13,7 @@ import pytest
 from models import ROOT
 from native_fmus import build_for_all_platforms
 
+from fmus.packaging import __date__
 from fmus.packaging.native.compiler import DEFAULT_PLATFORMS, PLATFORMS
 from tests.packaging.test_packaging import entries
 
@@ -105,6 +106,6 @@ def test_native_builds_differ_from_those_of_the_sources_only_in_the_date(run, tm
     again = entries(tmp_path / "fmus" / "native" / "smd.fmu")
     assert {f"binaries/{platform}/smd{PLATFORMS[platform].suffix}" for platform in DEFAULT_PLATFORMS} <= set(again)
     dated = again["modelDescription.xml"]
-    undated = dated.replace(b"2023-11-14T22:13:20Z", b"1980-01-01T00:00:00Z")
+    undated = dated.replace(b"2023-11-14T22:13:20Z", f"{__date__}T00:00:00Z".encode())
     assert dated != undated
     assert again | {"modelDescription.xml": undated} == {name: expected[name] for name in again}

@@ -113,7 +113,7 @@ def test_the_report_shows_every_run(workspace):
     assert "Other runs" in page
     assert all(f"<h3>{name}</h3>" in page for name in ("pacejka", "mine"))
     assert re.search(r"<td[^>]*>x \[m\]</td>\s*<td[^>]*>0.1</td>", page)
-    assert "mine: the plots that its scene names" in page
+    assert "mine: plots of the run" in page
 
 
 def test_a_damaged_provenance_file_is_reported_in_the_page(workspace, first_run):

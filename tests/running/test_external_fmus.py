@@ -190,7 +190,13 @@ def test_a_scene_may_use_any_fmu(external_fmu_folder, tmp_path, name, outputs, m
 )
 def test_an_fmu_that_terminates_is_reported_by_status_and_keeps_its_samples(run, name, arguments, end, message):
     done, rows = run(name, *arguments, blank=True)
-    assert_refused(done, 1, f"{name}.fmu: it terminated the simulation: ", message, f"until then is in results/{name}")
+    assert_refused(
+        done,
+        1,
+        f"{name}.fmu: it terminated the simulation: ",
+        message,
+        f"the results up to that time are in results/{name}",
+    )
     assert rows["t [s]"][-1] == pytest.approx(end, abs=1e-3)
     assert len(rows["t [s]"]) > 60
 
@@ -277,7 +283,7 @@ def test_a_scene_that_requests_invisible_steps_is_refused(external_fmu_folder, t
     scene = SCENE.format(fmu=external_fmu_folder / "Midpoint.fmu", outputs=["x", "v"], more="analyses = ['steps']")
     (tmp_path / "mine.toml").write_text(scene)
     done = commands.harness(tmp_path, "run", "mine.toml", COLUMNS="120")
-    assert_refused(done, 2, "Midpoint.fmu does not show the steps of its solver")
+    assert_refused(done, 2, "Midpoint.fmu does not expose its solver steps")
 
 
 def edited_description(change):

@@ -20,9 +20,8 @@ FMI_SIDE = [
 NUMERICS = {
     path.stem: path.read_text() for path in (ROOT / "fmus" / "runtime").glob("*.py") if path.stem not in FMI_SIDE
 } | {name: find_model(name).generated_source for name in MODELS}
-NUMERICS["methods"] = lowered_files("smd")[
-    "runtime/methods.py"
-]  # which loops over the methods that it is written out for
+# it loops over the methods that it is lowered for
+NUMERICS["active_method"] = lowered_files("smd")["runtime/active_method.py"]
 LIBM = "acos asin atan atan2 copysign cos cosh exp expm1 fabs fmod log log1p pow sin sinh sqrt tan tanh"
 MATH = {*LIBM.split(), "floor", "ceil", "isfinite", "isinf", "isnan", "inf", "nan", "pi", "radians"}
 BANNED = (

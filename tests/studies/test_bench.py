@@ -215,7 +215,7 @@ def test_model_exchange_and_co_simulation_agree_and_count_the_same_events(scene,
 @pytest.mark.skipif(c_host.COMPILER is None, reason="there is no C compiler on this machine: install gcc")
 def test_a_model_exchange_call_is_timed_against_that_of_a_reference_fmu(both_backends, tmp_path, monkeypatch):
     """A project FMU replaces the Reference FMU, whose sources are not available; the table says so."""
-    assert model_exchange.call_overhead("smd").baselines[0].name.startswith("not here: Reference-FMUs")
+    assert model_exchange.call_overhead("smd").baselines[0].name.startswith("not found: Reference-FMUs")
     sled = c_host.load_library(both_backends / "native" / "stickslip.fmu")
     monkeypatch.setattr(model_exchange, "build_bouncing_ball", lambda acceleration: sled)
     monkeypatch.setattr(model_exchange, "REPEATS", 10)

@@ -116,7 +116,7 @@ from harness.studies.decay.study import write_results
 
 draws, draw = [], Figure.draw
 Figure.draw = lambda *arguments: draws.append(draw(*arguments))
-write_results(identify(decay_record(0.02), Known()), Path.cwd())
+write_results(fit_decay(decay_record(0.02), KnownParameters()), Path.cwd())
 print(len(draws), [name for name in ("fmpy", "scipy", "harness.running", "harness.scenes") if name in sys.modules])
 """
     done = subprocess.run(

@@ -112,10 +112,10 @@ def test_no_legend_covers_a_title(drawn_figures, name):
 
 def test_angles_are_in_degrees(drawn_figures):
     angle, speed = (
-        drawn_figures["pendulum"]["panels"][title] for title in ("angle, zero hanging down", "angular speed")
+        drawn_figures["pendulum"]["panels"][title] for title in ("angle, zero when hanging down", "angular speed")
     )
     assert (angle["axis"], speed["axis"]) == ("theta [deg]", "omega [deg/s]")
-    assert curves(drawn_figures["pendulum"])["angle, zero hanging down"][2][0] == pytest.approx(10.02)
+    assert curves(drawn_figures["pendulum"])["angle, zero when hanging down"][2][0] == pytest.approx(10.02)
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_angles_are_in_degrees(drawn_figures):
     [
         ("smd", "position of the mass", ["sample_0", "sample_n"]),
         ("coulomb-sign", "position of the mass", ["sample_0", "sample_n"]),
-        ("pendulum", "angle, zero hanging down", ["x_0", "x_n"]),
+        ("pendulum", "angle, zero when hanging down", ["x_0", "x_n"]),
         ("stickslip", "speed of the sled", ["peak_speed"]),
         ("stickslip", "acceleration of the sled", ["peak_acceleration"]),
         ("stickslip-threshold", "speed of the sled", ["peak_speed"]),

@@ -174,7 +174,7 @@ def test_an_unresponsive_scheduler_is_reported(monkeypatch):
 
 def test_a_run_that_kills_its_worker_is_reported_and_the_others_finish(monkeypatch):
     """In any block, and with any other work in progress."""
-    monkeypatch.setattr(study, "work", killed_worker.work)
+    monkeypatch.setattr(study, "run_block", killed_worker.run_block)
     sweep = Sweep(SweepSpec("deadly", ("a",), (), ()), SweepPoints((parse_axis("a=0:39:40", False),)), b"", 1)
     counts = {}
     with study.open_workers(None, 2, 40) as hands:

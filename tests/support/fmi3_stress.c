@@ -10,7 +10,7 @@
 
 #include "stress.h"
 
-enum { MAX_VALUES = 12, BYTES = sizeof(SavedState), N_INSTANCES = 20, UNKNOWN_REFERENCE = VARIABLES + 7 };
+enum { MAX_VALUES = 12, BYTES = sizeof(SavedState), N_INSTANCES = 20, INVALID_REFERENCE = VARIABLES + 7 };
 enum { KIND_CS, KIND_CS_EVENTS, KIND_ME, KINDS }; /* plain; with event mode; model exchange */
 
 /* An instance, and all arguments that its importer passes. */
@@ -152,7 +152,7 @@ static void intermediate(fmi3InstanceEnvironment environment, fmi3Float64 t, fmi
 static Instance *new_instance(Context *context, int kind)
 {
     bool handles = kind == KIND_CS_EVENTS;
-    *context = (Context){.kind = kind, .one = UNKNOWN_REFERENCE, .states = STATES, .limits = INDICATORS, .h = 0.1};
+    *context = (Context){.kind = kind, .one = INVALID_REFERENCE, .states = STATES, .limits = INDICATORS, .h = 0.1};
     for (fmi3ValueReference i = 0; i < VARIABLES; i++) {
         if (variables[i].is_state_or_input) context->known = i;
         else if (variables[i].tangent_offset != NO_OFFSET && variables[i].is_calculated) context->unknown = i;

@@ -107,7 +107,7 @@ def test_every_parameter_has_a_slider_and_a_field_with_its_start_value_and_unit(
         field = f"document.getElementById('field-{variable}')"
         factor = 180 / pi if meaning.display else 1.0
         assert page.run(f"Number({field}.value)") == pytest.approx(meaning.start * factor, rel=1e-6)
-        unit = meaning.display or meaning.suffix.strip()
+        unit = meaning.display or meaning.unit_suffix.strip()
         assert page.run(f"{field}.closest('.field').querySelector('.unit').textContent") == (
             unit.replace("2", "²").replace(".", "·")
         )
