@@ -34,7 +34,6 @@ SCENE_TEXTS = {
     "tolerance": "Relative tolerance for an FMU that does not show its internal steps.",
     "exchange": "Run such an FMU by model exchange, if it offers both interfaces.",
     "lenient": "Run such an FMU although it violates the FMI standard.",
-    "patience": "Seconds allowed for one call of such an FMU.",
     "timeout": "Seconds allowed for one call of such an FMU.",
     "about": "What the model does; the report prints it.",
     "analyses": "Analyses to perform: `decay`, `slip`, `steps`.",

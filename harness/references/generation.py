@@ -14,7 +14,7 @@ import numpy as np
 from ..running.solution import Solution
 from .certified_reference import POINTS, CertifiedReference, ReferenceCase, event_time_error, max_relative_difference
 from .models import MODEL_MODULES
-from .models.pendulum import Pendulum
+from .models.pendulum import PendulumProblem
 from .ode_problem import OdeProblem
 from .peer_solvers import solve
 from .pendulum_series import solve_pendulum
@@ -43,7 +43,7 @@ def solve_independently(name: str, problem: OdeProblem, times: np.ndarray) -> tu
     if name in CLOSED_FORMS:
         return evaluate_closed_form(name, times), "closed form in 40 digits", UNIT_ROUNDOFF
     explicit = solve("scipy", "DOP853", problem, times, 3e-14, 1e-16)  # the smallest tolerance it can meet
-    if isinstance(problem, Pendulum):
+    if isinstance(problem, PendulumProblem):
         answer = solve_pendulum(problem, times.tolist())
         late = event_time_error(answer.events or [], explicit.events or []) / times[-1]
         difference = max(max_relative_difference(answer, explicit), late)

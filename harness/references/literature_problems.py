@@ -2,11 +2,11 @@
 
 from math import atan, copysign, fabs, pi
 
-from .models.coulomb import Coulomb
+from .models.coulomb import CoulombProblem
 from .ode_problem import JacobianFunction, OdeProblem, RhsFunction
 
 
-class ChatteringOscillator(Coulomb):
+class ChatteringOscillator(CoulombProblem):
     """Classic chattering problem: strong friction stops the mass within half a second and holds it."""
 
     start, stop = (0.0, 5.0), 10.0 * pi

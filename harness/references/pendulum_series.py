@@ -6,13 +6,13 @@ import numpy as np
 from mpmath import cos, findroot, mpf, odefun, sign, sin, sqrt, workdps
 
 from ..running.solution import Solution
-from .models.pendulum import Pendulum, PendulumWithReaction
+from .models.pendulum import PendulumProblem, PendulumReactionProblem
 
 DIGITS = 25
 TURNING_POINT_BRACKET = (0.25, 0.45)  # s: around half a period, so that it holds one turning point
 
 
-def solve_pendulum(problem: Pendulum, times: list[float]) -> Solution:
+def solve_pendulum(problem: PendulumProblem, times: list[float]) -> Solution:
     """Return the motion at rising times in s, and the changes of mode."""
     with workdps(DIGITS):
         weight, arm = mpf(problem.m) * mpf(problem.g), mpf(problem.mu) * mpf(problem.r)
@@ -21,7 +21,7 @@ def solve_pendulum(problem: Pendulum, times: list[float]) -> Solution:
 
         def pin_load(x: mpf, v: mpf, mode: int) -> mpf:
             """Return the load on the pin; N^2 = R^2 + (m g sin(x) + m a alpha)^2, where alpha is linear in N."""
-            if not isinstance(problem, PendulumWithReaction):
+            if not isinstance(problem, PendulumReactionProblem):
                 return weight
             radial = weight * cos(x) + moment * v * v
             b, s = weight * sin(x) * (1 - moment * a / inertia), mode * arm * moment / inertia

@@ -50,8 +50,10 @@ class TableCells:
 
 @dataclass(frozen=True)
 class SectionItem:
-    """A piece of a section: heading, sentences, table and pictures, if any, sentences on
-    their origin, and files of its numbers; `lost` if its results could not be read, which a sentence says."""
+    """A piece of a section: heading, sentences, table and pictures if any, sentences on their origin, and data files.
+
+    `unreadable` marks results that could not be read; a sentence gives the reason.
+    """
 
     title: str
     sentences: tuple[str, ...] = ()

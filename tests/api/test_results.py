@@ -3,6 +3,7 @@
 import ast
 import inspect
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -88,9 +89,11 @@ def test_a_decay_is_identified_from_any_source(tmp_path):
     }
     for name, arguments in sources.items():
         found = harness.identify_decay(**arguments, k=157.9)
-        values = {each.name: each.value for each in found.estimates}
-        assert values["f"] == pytest.approx(0.5, rel=1e-6), name
-        assert values["zeta"] == pytest.approx(0.0, abs=1e-9), name
+        assert found["f"].value == pytest.approx(0.5, rel=1e-6), name
+        assert found["zeta"].value == pytest.approx(0.0, abs=1e-9), name
+    assert len(repr(found)) < 300
+    with pytest.raises(harness.SceneError, match="unknown estimate 'mu'"):
+        _ = found["mu"]
 
 
 @pytest.mark.parametrize(
@@ -127,7 +130,7 @@ def test_samples_are_reproducible_and_stored():
     first = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3, folder="kept")
     again = harness.sweep("smd", {"k": (100.0, 200.0), "c": (0.0, 3.0)}, samples=8, seed=3)
     assert first.equals(again)
-    (folder,) = ((path) for path in __import__("pathlib").Path("kept/sweep").iterdir() if not path.name.startswith("."))
+    (folder,) = (path for path in Path("kept/sweep").iterdir() if not path.name.startswith("."))
     assert harness.load_result(folder).equals(first)
 
 

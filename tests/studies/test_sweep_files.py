@@ -14,7 +14,7 @@ from harness.running.description import read_description
 from harness.studies.sweep import figure
 from harness.studies.sweep import result_files as writing
 from harness.studies.sweep.boundaries import read_boundaries
-from harness.studies.sweep.journal import Block
+from harness.studies.sweep.journal import JournalBlock
 from harness.studies.sweep.runner import SweepSpec
 from harness.studies.sweep.sampling import SweepPoints, parse_axis
 from harness.studies.sweep.study import Sweep
@@ -36,7 +36,7 @@ def test_memory_use_does_not_grow_with_the_number_of_runs(monkeypatch, tmp_path)
         with journal.open():
             for first in range(0, len(sweep.points), 200):
                 journal.add(
-                    Block(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"})
+                    JournalBlock(first, sweep.points.coordinates(first, first + 200)[:, :1], {3: f"failed at {first}"})
                 )
         (failure,) = writing.write_files(sweep, journal, about, folder)
         peaks.append(tracemalloc.get_traced_memory()[1])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.errors import HarnessError
-from harness.studies.sweep.journal import Block, Journal
+from harness.studies.sweep.journal import Journal, JournalBlock
 from harness.studies.sweep.runner import SweepSpec
 from harness.studies.sweep.sampling import SweepAxis, SweepPoints, parse_axis
 from harness.studies.sweep.study import Sweep
@@ -30,7 +30,7 @@ def test_the_fmu_is_part_of_the_identity_of_a_sweep():
 
 
 def line(first, values, messages):
-    return Block(first, np.array(values), messages).to_line()
+    return JournalBlock(first, np.array(values), messages).to_line()
 
 
 GOOD = line(3, [[0.5, np.nan], [1.0, 2.0]], {0: "failed"})
@@ -50,7 +50,7 @@ def test_a_damaged_journal_line_is_skipped_and_counted(tmp_path, damaged):
     journal = Journal(file, 10, 2)
     assert (journal.n_done, journal.damaged, journal.missing_spans) == (3, 1, [(0, 3), (5, 7), (8, 10)])
     with journal.open():
-        journal.add(Block(0, np.zeros((3, 2)), {}))
+        journal.add(JournalBlock(0, np.zeros((3, 2)), {}))
     again = Journal(file, 10, 2)
     assert (again.n_done, again.damaged) == (6, 1)
     assert [(block.first, block.messages) for block in again.blocks()] == [(0, {}), (3, {0: "failed"}), (7, {})]

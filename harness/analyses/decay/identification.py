@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import HarnessError
+from ...errors import HarnessError, check_names
 from ...records.record import Record
 from .estimates import Estimate, KnownParameters, make_estimates
 from .extrema import Extrema, find_extrema
@@ -61,6 +61,17 @@ class DecayIdentification:
     two_peak_estimates: tuple[Estimate, ...]
     unavailable: dict[str, str]
     remarks: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """Describe the result in one line; its arrays may be long."""
+        values = ", ".join(f"{each.name} = {each.value:.4g} {each.unit}" for each in self.estimates)
+        return f"<DecayIdentification of {self.record.name}: {values}>"
+
+    def __getitem__(self, name: str) -> Estimate:
+        """Return the estimate of a constant from the whole signal, as ``result["zeta"]``."""
+        estimates = {each.name: each for each in self.estimates}
+        check_names("estimate", [name], estimates)
+        return estimates[name]
 
     @property
     def best(self) -> FittedLaw:

@@ -8,7 +8,7 @@ from ..certified_reference import ReferenceCase
 from ..ode_problem import LinearOscillator, RhsFunction, closed_form_segments
 
 
-class Coulomb(LinearOscillator):
+class CoulombProblem(LinearOscillator):
     """m v' = -k x - f sign(v)."""
 
     start, stop, has_dry_friction = (0.1, 0.0), 4.0, True
@@ -29,7 +29,7 @@ def friction(value: Mapping[str, Any]) -> tuple[Any, Any]:
 
 solve_segments = partial(closed_form_segments, friction)
 CASES = (
-    ReferenceCase("coulomb", "coulomb", "hybrid", "coulomb", Coulomb()),
-    ReferenceCase("coulomb-sign", "coulomb", "sign", "coulomb", Coulomb(), {"friction": 2}, "coulomb"),
+    ReferenceCase("coulomb", "coulomb", "hybrid", "coulomb", CoulombProblem()),
+    ReferenceCase("coulomb-sign", "coulomb", "sign", "coulomb", CoulombProblem(), {"friction": 2}, "coulomb"),
 )
-CLOSED_FORMS = {"coulomb": lambda stop: solve_segments([(0.0, stop, Coulomb().fmu_values("m", "k", "f"))])}
+CLOSED_FORMS = {"coulomb": lambda stop: solve_segments([(0.0, stop, CoulombProblem().fmu_values("m", "k", "f"))])}

@@ -8,7 +8,7 @@ import numpy as np
 from ..certified_reference import ReferenceCase
 from ..ode_problem import JacobianFunction, OdeProblem, RhsFunction, StateVector
 from ..segments import ParameterSpan, ParameterValues, Segment, shift_time
-from .stickslip import Stickslip
+from .stickslip import StickslipProblem
 
 
 class MagicFormula:
@@ -31,7 +31,7 @@ class MagicFormula:
         return self.D * self.C * cos(self.C * atan(inner)) * rise / (1 + inner * inner)
 
 
-class Pacejka(Stickslip):
+class PacejkaProblem(StickslipProblem):
     """The sled with the magic formula: one smooth equation without modes."""
 
     has_dry_friction, is_stiff = False, True
@@ -82,7 +82,7 @@ def solve_segments(spans: list[ParameterSpan]) -> Iterator[Segment]:
 
 def make_case(x_m: str, reference: str) -> ReferenceCase:
     """Return the case of a curve with its peak at the velocity x_m (m/s)."""
-    law, problem = f"magic formula, x_m = {x_m} m/s", Pacejka(float(x_m))
+    law, problem = f"magic formula, x_m = {x_m} m/s", PacejkaProblem(float(x_m))
     return ReferenceCase(f"pacejka-{x_m}", "pacejka", law, reference, problem, {"x_m": float(x_m)}, "stickslip")
 
 

@@ -14,7 +14,7 @@ REACTION = 2  # the number of pin_load = reaction
 PI_REMAINDER = 1.2246467991473532e-16  # pi minus its double
 
 
-class Pendulum(OdeProblem):
+class PendulumProblem(OdeProblem):
     """Compound pendulum with friction in its pin, loaded by the weight."""
 
     start, stop, unit, has_dry_friction = (radians(10.02), 0.0), 5.0, "rad", True
@@ -34,7 +34,7 @@ class Pendulum(OdeProblem):
         return -self.m * self.g * self.a * sin(x), 0.0, self.mu * self.r * self.m * self.g
 
 
-class PendulumWithReaction(Pendulum):
+class PendulumReactionProblem(PendulumProblem):
     """Pendulum whose pin is loaded by the reaction N, which depends on friction itself:
 
     N^2 = R^2 + (b - mode s N)^2,    R = m g cos(x) + m a v^2,    b = m g sin(x) (1 - m a^2/J),    s = mu r m a/J
@@ -151,13 +151,13 @@ def integrate_to_standstill(
 
 NAME, OUTPUTS = "pendulum-reaction", ("theta", "omega")
 CASES = (
-    ReferenceCase("pendulum", "pendulum", "hybrid, pin load weight", "pendulum", Pendulum(), outputs=OUTPUTS),
+    ReferenceCase("pendulum", "pendulum", "hybrid, pin load weight", "pendulum", PendulumProblem(), outputs=OUTPUTS),
     ReferenceCase(
         NAME,
         "pendulum",
         "hybrid, pin load reaction",
         NAME,
-        PendulumWithReaction(),
+        PendulumReactionProblem(),
         {"pin_load": REACTION},
         outputs=OUTPUTS,
     ),

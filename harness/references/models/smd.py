@@ -6,7 +6,7 @@ from ..certified_reference import ReferenceCase
 from ..ode_problem import LinearOscillator, RhsFunction, closed_form_segments
 
 
-class Smd(LinearOscillator):
+class SmdProblem(LinearOscillator):
     """m v' = -k x - c v."""
 
     start, stop = (0.1, 0.0), 4.0
@@ -19,5 +19,5 @@ class Smd(LinearOscillator):
 
 friction = None
 solve_segments = partial(closed_form_segments, friction)
-CASES = (ReferenceCase("smd", "smd", "linear damping", "smd", Smd()),)
-CLOSED_FORMS = {"smd": lambda stop: solve_segments([(0.0, stop, Smd().fmu_values("m", "k", "c"))])}
+CASES = (ReferenceCase("smd", "smd", "linear damping", "smd", SmdProblem()),)
+CLOSED_FORMS = {"smd": lambda stop: solve_segments([(0.0, stop, SmdProblem().fmu_values("m", "k", "c"))])}

@@ -11,7 +11,7 @@ from ..segments import Segment
 THRESHOLD = "stickslip-threshold"
 
 
-class Stickslip(LinearOscillator):
+class StickslipProblem(LinearOscillator):
     """m v' = k (v_driver t - x) - mu m g sign(v)."""
 
     start, stop, has_dry_friction = (0.0, 0.0), 16.0, True
@@ -25,7 +25,7 @@ class Stickslip(LinearOscillator):
         return self.k * (self.v_driver * t - x), self.k * self.v_driver, self.mu_s * self.m * self.g
 
 
-VALUES = Stickslip().fmu_values("m", "k", "g", "mu_s", "mu_d", "v_driver")
+VALUES = StickslipProblem().fmu_values("m", "k", "g", "mu_s", "mu_d", "v_driver")
 
 
 def friction(value: Mapping[str, Any]) -> tuple[Any, Any]:
@@ -43,8 +43,8 @@ def threshold_motion(eps: float, stop: float) -> Iterator[Segment]:
 
 solve_segments = partial(closed_form_segments, friction)
 CASES = (
-    ReferenceCase("stickslip", "stickslip", "hybrid", "stickslip", Stickslip()),
-    ReferenceCase(THRESHOLD, "stickslip", "threshold", THRESHOLD, Stickslip(), {"friction": 3}, "stickslip"),
+    ReferenceCase("stickslip", "stickslip", "hybrid", "stickslip", StickslipProblem()),
+    ReferenceCase(THRESHOLD, "stickslip", "threshold", THRESHOLD, StickslipProblem(), {"friction": 3}, "stickslip"),
 )
 CLOSED_FORMS = {
     "stickslip": lambda stop: solve_segments([(0.0, stop, VALUES)]),

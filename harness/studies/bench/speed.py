@@ -10,9 +10,9 @@ import numpy as np
 
 from ...references import peer_solvers
 from ...references.models import MODELS
-from ...references.models.pacejka import Pacejka
-from ...references.models.smd import Smd
-from ...references.models.stickslip import Stickslip
+from ...references.models.pacejka import PacejkaProblem
+from ...references.models.smd import SmdProblem
+from ...references.models.stickslip import StickslipProblem
 from ...references.ode_problem import OdeProblem
 from ...running import stepping_loops
 from ...running.description import read_description
@@ -35,8 +35,8 @@ def speed_benchmarks() -> list[Callable[[], Benchmark]]:
         time_in_process, "pacejka", load_model_class(find_fmu("pacejka")), "rodas", 8e-3, ("Radau", "BDF")
     )
     return [
-        partial(time_in_process, "stickslip", sled, "exact", 0.5e-3, ("RK23", "Adams"), Stickslip(), {}),
-        *(partial(pacejka, Pacejka(x_m), {"x_m": x_m}) for x_m in (1e-2, 1e-3)),
+        partial(time_in_process, "stickslip", sled, "exact", 0.5e-3, ("RK23", "Adams"), StickslipProblem(), {}),
+        *(partial(pacejka, PacejkaProblem(x_m), {"x_m": x_m}) for x_m in (1e-2, 1e-3)),
         partial(time_one_step, load_model_class(find_fmu("smd"))),
         *(partial(time_communication_step, model) for model in MODELS),
         partial(time_many_runs, sled),
@@ -77,7 +77,7 @@ def time_one_step(model_class: type) -> Benchmark:
     """Measure one step of ode23 for the smooth model, against scipy's RK23."""
     from scipy.integrate import RK23
 
-    problem, rtol = Smd(), 1e-8
+    problem, rtol = SmdProblem(), 1e-8
     embedded_model = EmbeddedModel.create(model_class, {}, "ode23", rtol, 1e-3 * rtol)
     seconds = time_fastest_call(partial(embedded_model.compute_states, [0.0, problem.stop]), 10)
     solver = embedded_model.model.solver
@@ -137,7 +137,7 @@ def time_many_runs(model_class: type) -> Benchmark:
         return solver.x, solver.v, model.events.count
 
     seconds = time_call(lambda: [one(0.02 + 3e-6 * i) for i in range(RUNS)])
-    problem = Stickslip()
+    problem = StickslipProblem()
     ask = partial(peer_solvers.solve, "scipy", "RK23", problem, np.array([0.0, problem.stop]), RTOL, ATOL)
     rival = Baseline(f"scipy RK23 at {RTOL:g}, one run times {RUNS}", RUNS * time_fastest_call(ask, 5))
     return Benchmark(f"stickslip, exact: {RUNS} runs of {problem.stop:g} s, one core", seconds, "s", 10.0, (rival,))

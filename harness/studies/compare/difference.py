@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import HarnessError
 from ...running.signals import Signals
 from .event_pairs import EventPairs, match_events
-from .interpolation import Interpolant, ValueBounds
+from .interpolation import SignalInterpolant, ValueBounds
 from .trajectory_sources import common_span
 from .units import conversion_factor
 
@@ -61,6 +61,13 @@ class Comparison:
     differences: tuple[Difference, ...]
     left_out: tuple[str, ...]
     pairs: EventPairs | None
+
+    def __repr__(self) -> str:
+        """Describe the comparison in one line; its arrays may be long."""
+        names = ", ".join(variable.name for variable in self.differences)
+        return (
+            f"<Comparison of {self.one.name} and {self.two.name}: {names}; worst relative difference {self.worst:.3g}>"
+        )
 
     @property
     def worst(self) -> float:
@@ -143,13 +150,13 @@ def is_string(path: Signals, name: str) -> bool:
     return path.columns[name].dtype.kind == "U"
 
 
-def encode_strings(one: Signals, two: Signals) -> Iterator[Interpolant]:
+def encode_strings(one: Signals, two: Signals) -> Iterator[SignalInterpolant]:
     """Yield interpolants of both trajectories, with strings replaced by numbers."""
     texts = [name for name in one.columns if name in two.columns and is_string(one, name) and is_string(two, name)]
     values = {name: np.unique(np.concatenate([side.columns[name] for side in (one, two)])) for name in texts}
     for side in (one, two):
         codes = {name: np.searchsorted(values[name], side.columns[name]).astype(float) for name in texts}
-        yield Interpolant(replace(side, columns=side.columns | codes))
+        yield SignalInterpolant(replace(side, columns=side.columns | codes))
 
 
 def closest_values(left: ValueBounds, right: ValueBounds) -> tuple[np.ndarray, np.ndarray]:

@@ -29,7 +29,7 @@ class ValueBounds:
 
 
 @dataclass(frozen=True)
-class Interpolant:
+class SignalInterpolant:
     """Interpolates a trajectory between its samples."""
 
     path: Signals

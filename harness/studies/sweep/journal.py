@@ -18,7 +18,7 @@ from ...errors import HarnessError
 
 
 @dataclass(frozen=True)
-class Block:
+class JournalBlock:
     """Runs from number `first` on: `values` (runs, columns), NaN for failed runs, and error `messages` by index."""
 
     first: int
@@ -36,7 +36,7 @@ class Block:
         return f"{crc32(text.encode()):08x} {text}\n".encode()
 
 
-def parse_block(line: bytes, columns: int) -> Block | None:
+def parse_block(line: bytes, columns: int) -> JournalBlock | None:
     """Parse a line; None if it is damaged."""
     checksum, _, text = line.rstrip(b"\n").partition(b" ")
     if checksum != f"{crc32(text):08x}".encode():
@@ -46,7 +46,7 @@ def parse_block(line: bytes, columns: int) -> Block | None:
         table = np.frombuffer(b64decode(values), "<f8").reshape(count, columns)
     except (ValueError, TypeError):  # a valid checksum, but another content
         return None
-    return Block(first, table, {int(place): sentence for place, sentence in messages.items()})
+    return JournalBlock(first, table, {int(place): sentence for place, sentence in messages.items()})
 
 
 class Journal:
@@ -85,7 +85,7 @@ class Journal:
                     self.damaged += 1
                 self.end += len(line)
 
-    def fits(self, block: Block) -> bool:
+    def fits(self, block: JournalBlock) -> bool:
         """Return whether the runs of a block are in range and not in another block."""
         index = bisect(self.places, (block.first,))
         low = self.places[index - 1][1] if index else 0
@@ -116,7 +116,7 @@ class Journal:
             with suppress(OSError):  # a full disk was reported already
                 self.file.close()
 
-    def add(self, new: Block) -> None:
+    def add(self, new: JournalBlock) -> None:
         line = new.to_line()
         with self.os_errors_reported():
             self.file.write(line)
@@ -124,7 +124,7 @@ class Journal:
         insort(self.places, (new.first, new.last, self.end))
         self.end += len(line)
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[JournalBlock]:
         """Yield all blocks in the order of their runs."""
         with self.os_errors_reported(), self.path.open("rb") as file:
             for *_, position in self.places:

@@ -32,7 +32,7 @@ from ...running.variable_values import REAL_TYPES, variable_unit
 from ...scenes.assignments import parse_assignment
 from ...scenes.fmu_files import check_built, find_fmu
 from .boundaries import Boundary, read_boundaries
-from .journal import Block, Journal
+from .journal import Journal, JournalBlock
 from .measures import MeasureColumn
 from .runner import SweepSpec, open_runner, run_spec_of
 from .sampling import SweepPoints, parse_axis
@@ -243,12 +243,12 @@ def axis_attributes(sweep: Sweep, about: SweepDescription) -> dict[str, dict[str
     return attributes
 
 
-def messages(block: Block) -> list[str]:
+def messages(block: JournalBlock) -> list[str]:
     """Return the error message of each run of a block, empty for successful runs."""
     return [block.messages.get(i, "") for i in range(len(block.values))]
 
 
-def csv_rows(points: np.ndarray, block: Block) -> Any:
+def csv_rows(points: np.ndarray, block: JournalBlock) -> Any:
     """Return the CSV rows of a block; missing values are empty."""
     values = np.column_stack([points, block.values]).astype(object)
     values[values != values] = None

@@ -23,7 +23,7 @@ from ...process.interrupt import RECEIVED_SIGNALS, CommandInterruptedError, chec
 from ...process.temporary_directory import temporary_directory
 from ...process.worker_pool import WorkerPool
 from .cluster import DaskCluster, connect_cluster
-from .journal import Block, Journal
+from .journal import Journal, JournalBlock
 from .runner import SweepSpec
 from .sampling import SweepPoints
 from .worker import BlockResult, run_block, unload
@@ -138,7 +138,7 @@ class Dispatcher:
         self.is_isolated = False  # whether a suspect runs, with no other block
         self.deaths = 0
 
-    def completed_blocks(self) -> Iterator[Block]:
+    def completed_blocks(self) -> Iterator[JournalBlock]:
         """Yield blocks as workers finish them."""
         while self.pending or self.suspects or self.running:
             check_interrupt()
@@ -174,7 +174,7 @@ class Dispatcher:
             span
         )
 
-    def handle_result(self, future: "Future[BlockResult | None]", span: Span) -> Iterator[Block]:
+    def handle_result(self, future: "Future[BlockResult | None]", span: Span) -> Iterator[JournalBlock]:
         """Handle a finished block, or the death of its worker."""
         first, last = span
         try:
@@ -182,7 +182,7 @@ class Dispatcher:
         except self.workers.death_errors:
             if self.is_isolated and last - first == 1:
                 self.requeue([])
-                yield Block(first, np.full((1, self.sweep.columns), np.nan), {0: WORKER_DIED})
+                yield JournalBlock(first, np.full((1, self.sweep.columns), np.nan), {0: WORKER_DIED})
             else:
                 middle = (first + last) // 2
                 self.requeue([(first, middle), (middle, last)] if self.is_isolated else [span])
@@ -197,7 +197,7 @@ class Dispatcher:
             self.is_isolated = False
             elapsed = max(result.seconds, 1e-9)
             self.size = max(1, min(MAX_BLOCK_SIZE, 10 * self.size, round((last - first) / elapsed * BLOCK_TIME)))
-            yield Block(first, result.values, result.messages)
+            yield JournalBlock(first, result.values, result.messages)
 
     def requeue(self, spans: list[Span]) -> None:
         """Put the blocks of a dead worker back into the queue."""
