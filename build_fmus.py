@@ -27,7 +27,7 @@ FMUS = (
 )  # an installed package builds into the current folder
 
 
-@click.command()
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("models", metavar="[NAME | FILE.py]...", nargs=-1)
 @click.option("--fmi", type=click.Choice(["2", "3"]), default="2", help="FMI version; 3 implies --native.")
 @click.option("--native", "compiled", is_flag=True, help="Compile to machine code; the FMU contains no Python.")

@@ -41,7 +41,7 @@ def simulate(
     timeout: float | None = None,
     progress: Progress | None = None,
 ) -> "Trajectory":
-    """Trajectory a model, a scene, an FMU or a stored result once.
+    """Run a model, a scene, an FMU or a stored result once.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def sweep(
     folder: "str | Path | None" = None,
     progress: Progress | None = None,
 ) -> "xarray.Dataset":
-    """Trajectory a model or an FMU at many points of its parameters.
+    """Run a model or an FMU at many points of its parameters.
 
     Parameters
     ----------
