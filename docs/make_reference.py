@@ -224,7 +224,7 @@ def command_text(name: str, command: Any) -> str:
         verbatim = paragraph.startswith("\b\n")
         lines.append(f"```text\n{paragraph[2:]}\n```\n" if verbatim else f"{' '.join(paragraph.split())}\n")
     lines.append(f"```text\n{name} {' '.join(command.collect_usage_pieces(context))}\n```\n")
-    records = [each.get_help_record(context) for each in command.get_params(context) if each.name != "help"]
+    records = [each.get_help_record(context) for each in command.get_params(context) if "--help" not in each.opts]
     return (
         "\n".join(lines)
         + "\n"
