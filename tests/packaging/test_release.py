@@ -1,0 +1,48 @@
+"""The release archive holds every kind of FMU, the page, references and checksums, and has the same bytes each time."""
+
+from hashlib import sha256
+from io import BytesIO
+from zipfile import ZipFile
+
+import pytest
+from build_cache import ROOT
+from click.testing import CliRunner
+from fmpy import read_model_description
+
+import build_fmus
+from fmus.packaging import __version__, release
+
+SCENES = sorted((ROOT / "harness" / "scenes").glob("*.toml"))
+
+
+@pytest.fixture(scope="module")
+def archives(tmp_path_factory):
+    """Two builds of a release that holds the smallest model only, which saves a minute."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(release, "model_names", lambda: ["smd"])
+        paths = [release.build_release(tmp_path_factory.mktemp("release"), SCENES) for _ in range(2)]
+    return [path.read_bytes() for path in paths]
+
+
+def test_two_releases_are_the_same_bytes(archives):
+    assert archives[0] == archives[1]
+
+
+def test_the_release_holds_every_kind_and_correct_checksums(archives, tmp_path):
+    root = f"friction-fmus-{__version__}/"
+    with ZipFile(BytesIO(archives[0])) as archive:
+        files = {name.removeprefix(root): archive.read(name) for name in archive.namelist()}
+    kinds = {"fmus": "2.0", "fmus/native": "2.0", "fmus/native/fmi3": "3.0"}
+    assert {f"{kind}/smd.fmu" for kind in kinds} | {"web/index.html", "references/smd.csv", "README.txt"} <= {*files}
+    assert {"licenses/license.txt", "licenses/pythonfmu.txt"} <= {*files}
+    for kind, version in kinds.items():
+        (tmp_path / "smd.fmu").write_bytes(files[f"{kind}/smd.fmu"])
+        assert read_model_description(str(tmp_path / "smd.fmu")).fmiVersion == version
+    sums = dict(reversed(line.split("  ")) for line in files.pop("SHA256SUMS").decode().splitlines())
+    assert sums == {name: sha256(content).hexdigest() for name, content in files.items()}
+
+
+def test_release_takes_no_other_options(tmp_path):
+    done = CliRunner().invoke(build_fmus.main, ["smd", "--release", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "--release builds everything" in done.output
