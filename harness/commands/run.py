@@ -10,6 +10,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+from ..errors import HarnessError
 from .terminal import Terminal, result_options, run_options
 
 
@@ -60,7 +61,7 @@ def run(
         return
     if scene is None or fmu is not None or values or options["stop"] is not None:
         raise click.UsageError("give one SCENE, or --fmu PATH; --set and --stop require an FMU")
-    from ..results.provenance import load_verified_provenance
+    from ..results.provenance import PYTHON_API, load_verified_provenance
     from ..studies.run import study
     from ..studies.run.table import results_table
 
@@ -68,6 +69,8 @@ def run(
     if folder_path.is_dir() and scene not in scenes:
         stored = load_verified_provenance(folder_path)
         if not (folder_path / study.FILES[0]).is_file() or "title" not in (stored["scene"] or {}):
+            if stored["command"] == PYTHON_API:
+                raise HarnessError(f"{scene} was written from Python: repeat its run by harness.simulate('{scene}')")
             rerun_command(context, stored["command"])
             return
         selected_scene = scene_from_provenance(stored["scene"])

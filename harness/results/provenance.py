@@ -16,6 +16,7 @@ from ..errors import HarnessError
 from .files import to_json
 
 FILE = "provenance.json"
+PYTHON_API = "harness.simulate"  # recorded as the command of results that Trajectory.save writes
 HARNESS = "friction-fmus"
 REPLACED = "replaced"
 IMPLIED_SCENE_KEYS = {

@@ -204,13 +204,18 @@ class Trajectory:
             If the folder holds other files or the result of another FMU.
         """
         from ..results.folder import replace_folder
-        from ..results.provenance import describe_sources, write_provenance
+        from ..results.provenance import PYTHON_API, describe_sources, write_provenance
 
         fmu = self.spec.fmu
         with replace_folder(Path(folder), FILES, describe_sources(str(fmu))) as fresh:
             self.write_tables(fresh)
             write_provenance(
-                fresh, [fmu], self.effective_parameters, self.spec, source=describe_sources(str(fmu)), command=""
+                fresh,
+                [fmu],
+                self.effective_parameters,
+                self.spec,
+                source=describe_sources(str(fmu)),
+                command=PYTHON_API,
             )
 
     def column_of_role(self, role: str) -> np.ndarray:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import harness as harness_command
 
 import harness
 
@@ -52,6 +53,14 @@ def test_a_stored_run_loads_bit_for_bit():
     assert loaded.units == run.units
     assert np.array_equal(loaded.events.t, run.events.t)
     assert np.array_equal(loaded.steps.t, run.steps.t)
+
+
+def test_the_command_line_refers_saved_runs_to_python(tmp_path):
+    run = harness.simulate("stickslip", stop=6.0)
+    run.save("saved")
+    done = harness_command(tmp_path, "run", "saved")
+    assert done.returncode == 1
+    assert done.stderr == "Error: saved was written from Python: repeat its run by harness.simulate('saved')\n"
 
 
 def test_saving_does_not_overwrite_other_files(tmp_path):
