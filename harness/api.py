@@ -520,11 +520,12 @@ def record_from(source: Any, x: Any, columns: Any) -> "Record":
 
     from .records.columns import parse_record
     from .records.table_files import Table
+    from .results.files import column_heading
     from .running.trajectory import Trajectory
 
     name = "the record"
     if isinstance(source, Trajectory):
-        heads = {"time": "t [s]"} | {each: f"{each} [{source.units[each]}]" for each in source.columns}
+        heads = {"time": "t [s]"} | {each: column_heading(each, source.units[each]) for each in source.columns}
         table, name = {"time": source.time, **source.columns}, source.spec.model
         if columns.position is None and columns.quantity is None:
             if "position" not in source.spec.motion_outputs:
@@ -534,7 +535,7 @@ def record_from(source: Any, x: Any, columns: Any) -> "Record":
         frame = source if source.index.name is None else source.reset_index()
         units = frame.attrs.get("units", {})
         table = {str(each): np.asarray(frame[each]) for each in frame.columns}
-        heads = {each: f"{each} [{units[each]}]" if units.get(each) else each for each in table}
+        heads = {each: column_heading(each, units.get(each, "")) for each in table}
     else:
         if x is None:
             raise SceneError("x is missing: identify_decay takes a file, a table, or times and samples, as in (t, x)")
