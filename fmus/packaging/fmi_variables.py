@@ -9,6 +9,7 @@ from ..runtime.variable_declarations import Local, VariableDeclaration, Variable
 from .lowering import sibling_module
 
 TIME, TO_REST, TO_BREAK_AWAY = "time", "events.to_rest", "events.to_break_away"
+CONDITION = "events.condition_{}"  # indicator of a condition of the equations, numbered from 1
 DERIVATIVE_NAME = "der({})"  # derivative of the position of a driver
 Variables = list[tuple[str, VariableDeclaration]]
 
@@ -39,6 +40,8 @@ def attribute_path(name: str) -> str:
         return "solver.t"
     if name.startswith((TO_REST, TO_BREAK_AWAY)):
         return name.replace("events", "model_exchange", 1)
+    if name.startswith(CONDITION[:-2]):
+        return f"model_exchange.conditions[{int(name.removeprefix(CONDITION[:-2])) - 1}]"
     return "model_exchange.driver_rate" if name.startswith(DERIVATIVE_NAME[:4]) else name
 
 
@@ -63,6 +66,9 @@ def all_variables(thing: Any) -> Variables:
             (TO_REST + tail, ContinuousLocal(meanings[slip].unit if slip else speed, stick_text)),
             (TO_BREAK_AWAY + tail, ContinuousLocal(force, slip_text)),
         ]
+    for n in range(thing.n_event_functions - thing.first_condition):
+        text = f"event indicator of condition {n + 1}; falls to zero where {thing.condition_texts[n]}"
+        added.append((CONDITION.format(n + 1), ContinuousLocal(thing.condition_units[n], text)))
     for name, meaning in declared:
         if meaning.rate:
             description = "rate of the " + meaning.text.split(",")[0]
@@ -80,10 +86,10 @@ def derivative_indices(declared: Variables) -> dict[int, int]:
 
 
 def event_indicator_indices(declared: Variables) -> list[int]:
-    """Return the indices of the event indicators: all for coming to rest, then all for breaking away."""
+    """Return the indices of the event indicators: coming to rest, breaking away, conditions."""
     return [
         index
-        for start in (TO_REST, TO_BREAK_AWAY)
+        for start in (TO_REST, TO_BREAK_AWAY, CONDITION[:-2])
         for index, (name, _) in enumerate(declared)
         if name.startswith(start)
     ]

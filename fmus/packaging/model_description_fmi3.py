@@ -10,6 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 from ..runtime.variable_declarations import VariableOwner
 from . import model_description as shared
 from .fmi_variables import (
+    TO_BREAK_AWAY,
     TO_REST,
     Variables,
     all_variables,
@@ -92,9 +93,13 @@ def _add_structure(
     inputs = [place for place, (_, meaning) in enumerate(declared) if meaning.causality == "input"]
     slips = [[places[slip]] if slip else states for slip in thing.contacts.values()]
     at_rest = [state for state in states if not thing.rests_when_stuck or [state] not in slips]
-    for place, slip in zip(event_indicator_indices(declared), slips * 2, strict=True):
-        rests = declared[place][0].startswith(TO_REST)
-        _add_unknown(structure, "EventIndicator", place, slip if rests else at_rest + inputs)
+    slip_of = dict(
+        zip(event_indicator_indices(declared), slips, strict=False)
+    )  # indicators of coming to rest are first
+    for place in event_indicator_indices(declared):
+        name, _ = declared[place]
+        known = slip_of[place] if name.startswith(TO_REST) else at_rest if name.startswith(TO_BREAK_AWAY) else states
+        _add_unknown(structure, "EventIndicator", place, known if name.startswith(TO_REST) else known + inputs)
 
 
 def _add_unknown(structure: Element, kind: str, reference: int, known: list[int], factors: str = "") -> None:

@@ -17,5 +17,6 @@ UNKNOWN_REFERENCE, INVALID_STATE, INTERRUPTED = 13, 14, 15
 OUT_OF_ORDER, NULL_POINTER, NO_MEMORY, NOT_SUPPORTED = 16, 17, 18, 19
 BUFFER_TOO_SMALL, WRONG_TOKEN, WRONG_LENGTH = 20, 21, 22
 NO_PARTIAL_DERIVATIVE, NO_OUTPUT_DERIVATIVE, NO_INPUT_DERIVATIVE = 23, 24, 25
+CHATTERING = 26  # of a condition
 MAX_INPUT_ORDER = 8  # highest derivative of an input: the order of dop853, which gains nothing from more
 FIRST_RULE = 100  # plus the number of the model's rule that the values violate

@@ -9,15 +9,11 @@ those whose load exceeds the limit, and locks again those that would slip agains
 
 from math import fabs, inf
 
-from .codes import STUCK
+from .codes import HYBRID, STUCK
 from .rounding import ROUNDOFF_MARGIN
 from .stick_slip import DryFriction, sign
-from .vectors import ContactIndex, ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
+from .vectors import ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
 
-N_SUBINTERVALS = 5  # parts of a step that are searched for the end of a mode
-NEAR_ZERO_SHARE = 0.25  # share of the change of a guard in a step; smaller values are examined more closely
-# largest ratio of end difference to second difference of a guard; up to 2 a parabola has a minimum inside
-INTERIOR_MINIMUM_RATIO = 3.0
 SLIP_SCALE = 1e-3  # m/s or rad/s: scale of slip velocities whose terms are zero
 TIE_SHARE = 1.0 - 1e-9  # contacts within this share of the highest relative load are released together
 MAX_JOINT_ITERATIONS, MAX_ITERATIONS = 60, 200  # pivots of all contacts at once; then of one at a time
@@ -43,87 +39,25 @@ class CoupledFriction(DryFriction):
 
     # ---- end of modes
 
-    def guards(self, t, y: StateVector, modes: ContactVector) -> ContactVector:
-        """Return the event functions, positive while the modes last.
-
-        Slip: the slip velocity in the direction of the mode.  Stick: holding limit, with a margin for rounding errors,
-        minus absolute load.
-        """
+    def update_contact_event_functions(self, location, t, y: StateVector, modes: ContactVector):
+        """Evaluate the event functions of all contacts, with margins for rounding errors."""
         slips = self.slip_velocities(t, y)
-        values = contact_vector()
+        slip_terms = self.slip_magnitudes(t, y)
         for i in contact_indices:
-            values[i] = modes[i] * slips[i]
-        if any_of(modes == STUCK):
+            location.scales[i] = location.scales[len(modes) + i] = slip_terms[i]
+            location.values[i] = modes[i] * slips[i] + ROUNDOFF_MARGIN * slip_terms[i]
+            location.values[len(modes) + i] = 1.0
+        if self.friction != HYBRID:
+            for i in contact_indices:
+                location.values[i] = 1.0
+        elif any_of(modes == STUCK):
             force, limit, terms = self.contact_forces(t, y, modes)
             for i in contact_indices:
                 if modes[i] == STUCK:
-                    values[i] = limit[i] + ROUNDOFF_MARGIN * (terms[i] + limit[i]) - fabs(force[i])
-        return values
-
-    def guard(self, step, t, i: ContactIndex):
-        """Return the event function of one contact inside a step; loads are computed only if it sticks."""
-        y = step.state_at(self, t)
-        if step.modes0[i] != STUCK:
-            slips = self.slip_velocities(t, y)
-            return step.modes0[i] * slips[i]
-        values = self.guards(t, y, step.modes0)
-        return values[i]
-
-    def may_cross_zero(self, step, g_start: ContactVector, g_end: ContactVector):
-        """Return whether a guard may reach zero inside the step, judged by a parabola through both ends and the middle.
-
-        The state in the middle is that of the cubic Hermite polynomial, so that no interpolant is built.
-        """
-        h = step.t1 - step.t0
-        y2 = 0.5 * (step.y0 + step.y1) + 0.125 * h * (step.f0 - step.f1)
-        g_middle = self.guards(step.t0 + 0.5 * h, y2, step.modes0)
-        crossing = False
-        for i in contact_indices:
-            end = g_start[i] if g_start[i] < g_end[i] else g_end[i]
-            low = end if end < g_middle[i] else g_middle[i]
-            second_difference = g_start[i] + g_end[i] - 2.0 * g_middle[i]
-            end_difference = fabs(g_end[i] - g_start[i])
-            close = low <= NEAR_ZERO_SHARE * (
-                end_difference if end_difference > second_difference else second_difference
-            )
-            crossing = (
-                crossing
-                or g_end[i] <= 0.0
-                or g_middle[i] <= 0.0
-                or (close and end_difference <= INTERIOR_MINIMUM_RATIO * second_difference)
-            )
-        return crossing
-
-    def mode_end_times(self, step) -> ContactVector:
-        """Return when each mode ends within the step, to machine precision; inf if it does not.
-
-        Guards that fall to zero and rise again within the step are detected as well.
-        """
-        ends, g_before = contact_vector(), contact_vector()
-        for i in contact_indices:
-            ends[i], g_before[i] = inf, -inf
-        g = self.guards(step.t0, step.y0, step.modes0)
-        g_end = self.guards(step.t1, step.y1, step.modes0)
-        if self.may_cross_zero(step, g, g_end):
-            step.interpolant.n_event_evals += N_SUBINTERVALS
-            t_before = t_part_start = step.t0
-            for part in range(1, N_SUBINTERVALS + 1):
-                t, g_part = step.t1, g_end
-                if part < N_SUBINTERVALS:
-                    t = step.t0 + (step.t1 - step.t0) * part / N_SUBINTERVALS
-                    y = step.state_at(self, t)
-                    g_part = self.guards(t, y, step.modes0)
-                for i in contact_indices:
-                    if ends[i] == inf and g_part[i] <= 0.0:
-                        ends[i] = self.find_root(step, t_part_start, t, g[i], g_part[i], i)
-                    elif ends[i] == inf and g_before[i] > g[i] and g_part[i] > g[i]:  # minimum in between
-                        t_low = self.find_minimum(step, t_before, t, i)
-                        if t_low < inf:
-                            g_min = self.guard(step, t_low, i)
-                            ends[i] = self.find_root(step, t_before, t_low, g_before[i], g_min, i)
-                g_before, g = g, g_part
-                t_before, t_part_start = t_part_start, t
-        return ends
+                    limit_with_margin = limit[i] + ROUNDOFF_MARGIN * (terms[i] + limit[i])
+                    location.scales[i] = location.scales[len(modes) + i] = terms[i] + limit[i]
+                    location.values[i] = limit_with_margin - force[i]
+                    location.values[len(modes) + i] = limit_with_margin + force[i]
 
     def resolve_after_event(self, step, ends: ContactVector, tie_tolerance) -> tuple[StateVector, ContactVector, bool]:
         """Return states and modes after an event at the end of a step, and whether the modes are consistent."""

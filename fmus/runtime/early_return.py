@@ -4,7 +4,7 @@ No internal step passes an event.  An event may be deferred until the importer h
 those before the event.
 """
 
-from . import call_sequence
+from . import call_sequence, event_location
 from .codes import BAD_STEP, OK, TOO_MANY_STEPS
 from .integrator import MAX_EVALUATIONS, MAX_STEPS
 
@@ -24,7 +24,7 @@ def begin_step(run, model, t, h):
     exchange.max_evals = step.n_rhs + step.interpolant.n_event_evals + MAX_EVALUATIONS
     exchange.event_reached = run.outputs_current = False
     if solver.t >= step.t1:
-        solver.move_to_step_end()
+        solver.move_to_step_end(model)
     return OK
 
 
@@ -48,8 +48,15 @@ def next_internal_step(run, model, defer_events):
     status = solver.advance(model, exchange.step_end if exchange.step_end < step.t1 else step.t1)
     if model.has_dry_friction:
         exchange.event_reached = step.event_at_end and solver.t >= step.t1
-        if defer_events and exchange.event_reached:
+    if model.has_conditions:
+        exchange.event_reached = exchange.event_reached or (
+            solver.t >= step.t1 and event_location.conditions_changed(model)
+        )
+    if defer_events and exchange.event_reached:
+        if model.has_dry_friction:
             solver.modes = step.modes0
+        if model.has_conditions:
+            event_location.select_sides(model, False)
     return status
 
 
@@ -58,4 +65,4 @@ def complete_event(run, model):
     solver = model.solver
     run.outputs_current = False
     if solver.t >= solver.step.t1:
-        solver.move_to_step_end()
+        solver.move_to_step_end(model)

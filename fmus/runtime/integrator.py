@@ -6,7 +6,7 @@ ahead of t does not show.
 
 from math import inf, nan
 
-from . import ode23
+from . import event_location, ode23
 from .active_method import METHOD_ITEMS
 from .codes import DIVERGED, HYBRID, OK, STUCK, TOO_MANY_STEPS
 from .linear_closed_form import HIGHER_ORDER_INPUT
@@ -92,7 +92,7 @@ class Integrator(VariableOwner):
         self.apply_parameters(model)
         step.begin_run(model, t, y)
         self.t_change = nan
-        self.move_to_step_end()
+        self.move_to_step_end(model)
 
     def restart(self, model):
         """Restart at the current time with changed values; discard the internal step beyond it.
@@ -133,7 +133,7 @@ class Integrator(VariableOwner):
         step.start_empty_step(model, self.t, self.y, self.modes_before_change, step.tie_tolerance(model))
         if model.has_dry_friction and any_of(step.modes1 != self.modes_before_change):
             step.count_event()
-        self.move_to_step_end()
+        self.move_to_step_end(model)
 
     def apply_parameters(self, model):
         """Apply parameters: scale floor of the error norm, and constants of the closed form."""
@@ -142,6 +142,8 @@ class Integrator(VariableOwner):
         size = size if size > 1e-300 else 1e-300  # is a divisor, so not zero
         step.error_scale_floor = size
         nominal_velocity = model.nominal_velocity()
+        if model.has_dry_friction:
+            model.event_location.feature_width = nominal_velocity
         if self.atol == 0.0 and nominal_velocity < size:
             for i in velocity_indices:
                 step.error_scale_floor[i] = nominal_velocity
@@ -166,6 +168,8 @@ class Integrator(VariableOwner):
                 return status
         if t < step.t1:
             self.t, self.modes = t, step.modes0
+            if model.has_conditions:
+                event_location.select_sides(model, False)
             interpolant = step.interpolant
             if interpolant.ready:  # as in step.state_at; saves one call in limit communication steps
                 self.y = interpolant.evaluate(t - step.t0)
@@ -174,11 +178,13 @@ class Integrator(VariableOwner):
             if step.t1 == inf and not sum_of(magnitude(self.y)) < OVERFLOW_LIMIT:
                 return DIVERGED  # a step without end was not checked for divergence
         else:
-            self.move_to_step_end()
+            self.move_to_step_end(model)
         return OK
 
-    def move_to_step_end(self):
+    def move_to_step_end(self, model):
         """Set the current time to the end of the internal step."""
+        if model.has_conditions:
+            event_location.select_sides(model, True)
         step = self.step
         self.t, self.y, self.modes = step.t1, step.y1, step.modes1
 

@@ -30,6 +30,8 @@ RUN_MESSAGES = {
     codes.TOO_MANY_STEPS: f"more than {MAX_STEPS} internal steps or {MAX_EVALUATIONS} right-hand sides within one "
     "communication step after t = {now!r} s; choose another solver.method, raise solver.rtol or take shorter "
     "communication steps",
+    codes.CHATTERING: "a condition of choose() changes again and again at t = {t0!r} s, because the motion returns to "
+    "it from both sides; declare dry friction as a Contact, or make the transition continuous",
     codes.BAD_STEP: "a communication step of {h!r} s from t = {t!r} s is refused: it must be positive, start at the "
     "current time, t = {now!r} s, and end by the stop time, t = {t_end!r} s",
     codes.BAD_START: "start time = {start!r} s is refused: it must be a finite number",

@@ -8,13 +8,13 @@ contact falls to zero:
     to_rest          mode * v while sliding, 1 while stuck
     to_break_away    limit - |load| while stuck, 1 while sliding
 
-Both indicators fall to zero slightly beyond the event, because some solvers report a zero at the current time as
-another event.
+or of a condition of the equations falls to zero.  All indicators fall to zero slightly beyond the event, because some
+solvers report a zero at the current time as another event.
 """
 
 from math import fabs, inf, nan
 
-from . import call_sequence
+from . import call_sequence, event_location
 from .codes import DIVERGED, MODEL_EXCHANGE, OK, RUNNING, STUCK
 from .integrator import DEFAULT_NOMINAL
 from .rounding import EPSILON, ROUNDOFF_MARGIN
@@ -43,7 +43,7 @@ class ModelExchange:
     """Buffers of the model-exchange interface.
 
     `states`, `rates` and `nominals` run over the continuous states, `indicators` over the event indicators: first
-    `to_rest` of all contacts, then `to_break_away`.
+    `to_rest` of all contacts, then `to_break_away`, then the conditions of the equations.
     """
 
     to_rest: ContactVector
@@ -58,8 +58,9 @@ class ModelExchange:
         self.states = [*y, 0.0] if model.has_driver else [*y]
         self.rates = [*y, 0.0] if model.has_driver else [*y]
         self.nominals = [*y, 0.0] if model.has_driver else [*y]
-        self.indicators = [*modes, *modes, 1.0]  # the last one is unused: C has no empty arrays
+        self.indicators = [1.0] * (model.n_event_functions + 1)  # the last one is unused: C has no empty arrays
         self.to_rest = self.to_break_away = 1.0
+        self.conditions = [1.0] * (model.n_event_functions - model.first_condition + 1)  # indicators of conditions
         self.driver_rate = self.nominal_velocity = 0.0
         self.states_changed = self.nominals_changed = False
         self.t_next_event = inf  # time of the next break-away, as far as it is known
@@ -195,19 +196,27 @@ def update_indicators(model):
     for i in contact_indices:
         exchange.indicators[i] = to_rest[i]
         exchange.indicators[len(solver.modes) + i] = to_break_away[i]
+    if model.has_conditions:
+        event_location.update_event_functions(model, solver.t, solver.y, solver.modes)
+        for j in range(model.n_event_functions - model.first_condition):
+            k = model.first_condition + j
+            exchange.indicators[k] = model.event_location.values[k]
 
 
 def update_variables(model):
     """Update the buffers that are read as variables: indicators and rate of the driver."""
     exchange = model.model_exchange
     solver = model.solver
-    if model.has_dry_friction:
+    if model.has_dry_friction or model.has_conditions:
         update_indicators(model)
         for i in contact_indices:
             exchange.to_rest[i], exchange.to_break_away[i] = (
                 exchange.indicators[i],
                 exchange.indicators[len(solver.modes) + i],
             )
+    if model.has_conditions:
+        for j in range(model.n_event_functions - model.first_condition):
+            exchange.conditions[j] = exchange.indicators[model.first_condition + j]
     if model.has_driver:
         exchange.driver_rate = model.driver_velocity()
 
@@ -230,6 +239,16 @@ def handle_event(run, model):
     update_nominals(model)
     exchange.nominals_changed = exchange.nominal_velocity != nominal_velocity
     exchange.states_changed, run.values_changed = run.values_changed, False
+    if model.has_conditions:
+        status = event_location.update_at_event(model, solver.t, solver.y, solver.modes, solver.step.h_max)
+        if status != OK:
+            return status
+        if event_location.conditions_changed(model):
+            exchange.states_changed = True
+        event_location.check_limits(model, solver.t, solver.y, solver.modes)
+        status = event_location.violation_status(model)
+        if status != OK:
+            return status
     if model.has_dry_friction and solver.step.is_hybrid:
         if update_modes(model, solver):
             exchange.states_changed = True

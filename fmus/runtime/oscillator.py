@@ -23,6 +23,7 @@ class Oscillator(VariableOwner):
                                        where the friction law evaluates the velocity itself
         jacobian(t, states, modes)     for each of these rates its derivatives by t and by the states (for rodas)
         compute_outputs(t, states, modes)   sets the outputs; returns whether all are finite
+        update_conditions(t, states, modes)   evaluates the conditions into `event_location`, if there are any
 
     A model that is linear between its changes of mode, m v' + c v + k x = F + k u t, also defines
 
@@ -39,6 +40,9 @@ class Oscillator(VariableOwner):
     has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()
     has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1
     is_linear = False  # piecewise linear (linear_closed_form.py)
+    has_conditions = False  # choose() with conditions that change during a step (event_location.py)
+    # event functions: number, first of a condition; conditions that switch (others must hold); rule of the first
+    n_event_functions = first_condition = n_switches = first_condition_rule = 0
     rules: tuple[str, ...] = ()  # message for each rule that several values must satisfy; fields are their names
     own_solver_rule = 0  # number of the rule that concerns this solver only, not an importer's
     stop_time = 4.0

@@ -7,6 +7,7 @@ integration method that meets the tolerance.  The step size is controlled as in 
 
 from math import inf
 
+from . import event_location
 from .active_method import ActiveMethod
 from .codes import DIVERGED, EXACT, OK, STALLED, STUCK
 from .interpolant import Interpolant
@@ -33,6 +34,7 @@ from .vectors import (
 
 OVERFLOW_LIMIT = 1e100  # larger states are treated as divergence: squares, as in an energy, would overflow
 MAX_TRIES = 200  # attempts for one step; each one halves the step size
+MAX_REPEATED_STEPS = 1_000_000  # steps of a motion that is repeated
 MAX_STALLED_STEPS = 100  # consecutive steps that hardly advance the time
 TIE_FACTOR = 30.0  # tolerance for ties between stick and slip, relative to the solver tolerance
 
@@ -112,14 +114,21 @@ class InternalStep:
             roundoff = self.roundoff
             roundoff.t1 = roundoff.x1 = 0.0
         self.t1, self.y1 = t, y
+        if model.has_conditions:
+            event_location.update_sides(model, t, self.y1, modes)
+            event_location.begin_step(model)
         if model.has_dry_friction:
             self.update_end_modes(model, modes, tie_tolerance)
+        if model.has_conditions:
+            event_location.check_limits(model, t, self.y1, self.modes1)
         self.update_end_rates(model)
         if not (model.rests_when_stuck and self.is_hybrid and all_of(self.modes1 == STUCK)):
             if self.h_next == 0.0 and self.active_method.method_number != EXACT:
                 self.h_next = self.initial_step_size()
         self.t0 = t
         self.save_counters()
+        if model.has_dry_friction or model.has_conditions:
+            event_location.begin_phase(model, self)
 
     def save_counters(self):
         """Save the counters at t1, where the next step starts."""
@@ -134,9 +143,36 @@ class InternalStep:
         self.n_rhs, self.h_next = counters.n_rhs, counters.h_next
 
     def compute_next(self, model):
+        """Compute the internal step that starts at t1, or covers it if an event is in doubt.  Returns a status."""
+        if model.has_dry_friction or model.has_conditions:
+            t_reported = self.t1
+            location = model.event_location
+            status, repeats = self.compute_step(model), False
+            for _ in range(MAX_REPEATED_STEPS):
+                if status != OK:
+                    break
+                if location.must_shorten:
+                    event_location.shorten_step(model, self)
+                elif location.must_repeat:
+                    event_location.repeat_phase(model, self)
+                    repeats = True
+                elif not repeats or self.t1 > t_reported:
+                    break
+                status = self.compute_step(model)
+            if model.has_conditions:
+                event_location.select_sides(model, False)
+            return status
+        return self.compute_step(model)
+
+    def compute_step(self, model):
         """Compute the internal step that starts at t1.  Returns a status."""
         if model.has_dry_friction and not self.has_consistent_modes:
             return NO_CONSISTENT_MODES
+        if model.has_conditions:
+            status = event_location.violation_status(model)
+            if status != OK:
+                return status
+            event_location.begin_step(model)
         if model.has_dry_friction and self.event_at_end:
             self.count_event()
             self.event_at_end = False
@@ -249,9 +285,17 @@ class InternalStep:
         """Compute a step of the method that meets the tolerance; end it at a change of mode."""
         t, y, f, modes = self.t0, self.y0, self.f0, self.modes0
         tolerance = self.tolerance
+        if model.has_dry_friction or model.has_conditions:
+            tolerance *= model.event_location.tolerance_factor
         # h_min: fabs(t) would take three times as long in every step
         h_min = 16.0 * EPSILON * (t if t > 0.0 else -t)
         h_new = self.h_next if self.h_next < self.h_max else self.h_max
+        has_features = False
+        if model.has_dry_friction:
+            has_features = self.is_hybrid and model.event_location.feature_width < inf
+        if model.has_dry_friction and has_features:
+            y1 = y + h_new * f
+            h_new *= event_location.step_share(model, self, t + h_new, y1)
         if h_new < h_min:
             h_new = h_min
         remaining = self.t_end - t
@@ -267,8 +311,12 @@ class InternalStep:
             size1 = magnitude(y1)
             e = magnitude(e) / elementwise_max(size1, scale)
             error = h * max_of(e) / tolerance
+            share = 1.0
             if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
-                break
+                if model.has_dry_friction and has_features:
+                    share = event_location.step_share(model, self, t + h, y1)
+                if share >= event_location.MIN_STEP_SHARE or h <= h_min:
+                    break
             self.n_rejected += 1
             attempts += 1
             if h <= h_min or attempts == MAX_TRIES:
@@ -276,6 +324,8 @@ class InternalStep:
             shrink = method.safety * error**-method.power if 1.0 < error < inf and attempts == 1 else 0.5
             shrink_limit = method.shrink if attempts == 1 else 0.5
             h_new = h * (shrink if shrink > shrink_limit else shrink_limit)
+            if share < event_location.MIN_STEP_SHARE:
+                h_new = h * share
             if h_new < h_min:
                 h_new = h_min
             h = h_new
@@ -286,35 +336,48 @@ class InternalStep:
         self.h_next = h_new
         self.h_full = h
         self.t1, self.y1, self.f1 = self.t_end if last else t + h, y1, f1
-        if model.has_dry_friction and self.is_hybrid:
-            ends = contact_vector()
-            if model.is_coupled:
-                ends = model.mode_end_times(self)
-            else:
-                for i in contact_indices:
-                    ends[i] = model.find_slip_reversal(self, i)
+        if (model.has_dry_friction and self.is_hybrid) or model.has_conditions:
+            end = event_location.locate_events(model, self)
             if self.interpolant.ready:  # the event search built the interpolant
                 self.n_rhs += self.active_method.extra
-            end = min_of(ends)
+            event_location.decide_repetition(model, self)
+            if model.event_location.must_shorten or model.event_location.must_repeat:
+                return OK
             if end <= self.t1:
-                self.y1 = self.state_at(model, end)
-                self.t1 = end
-                if model.is_coupled:
-                    self.y1, self.modes1, self.has_consistent_modes = model.resolve_after_event(
-                        self, ends, self.tie_tolerance(model)
-                    )
-                else:
-                    for i in contact_indices:
-                        self.y1[slip_index[i]] = 0.0
-                return self.end_at_event(model)
-            if model.is_coupled:
+                return self.end_at(model, end)
+            if model.is_coupled and self.is_hybrid:
                 self.y1 = model.stop_slips(self.t1, self.y1, modes)
                 self.f1 = select_kinematic(kinematic_rates(self.y1), self.f1)
+            event_location.end_phase_in_doubt(model, self)
         return OK
+
+    def end_at(self, model, end):
+        """End the step at an event."""
+        self.y1 = self.state_at(model, end)
+        self.t1 = end
+        if model.has_conditions:
+            status = event_location.update_at_event(model, end, self.y1, self.modes0, self.h_max)
+            if status != OK:
+                return status
+        if model.has_dry_friction and self.is_hybrid:
+            location = model.event_location
+            ends = contact_vector()
+            for i in contact_indices:
+                other = location.times[len(self.modes0) + i]
+                ends[i] = location.times[i] if location.times[i] < other else other
+            if model.is_coupled:
+                self.y1, self.modes1, self.has_consistent_modes = model.resolve_after_event(
+                    self, ends, self.tie_tolerance(model)
+                )
+            else:
+                for i in contact_indices:
+                    if ends[i] <= end:
+                        self.y1[slip_index[i]] = 0.0
+        return self.end_at_event(model)
 
     def end_at_event(self, model):
         """Resolve the event at t1: a slip velocity is zero, or a load has reached its limit."""
-        if not model.is_coupled:
+        if model.has_dry_friction and not model.is_coupled:
             self.update_end_modes(model, self.modes0, self.tie_tolerance(model))
         self.restart_after_event(model)
         return OK if sum_of(magnitude(self.y1)) < OVERFLOW_LIMIT else DIVERGED
@@ -364,9 +427,13 @@ class InternalStep:
     def restart_after_event(self, model):
         """Restart after an event; the step size of the last slip phase is kept, if there was one."""
         self.event_at_end = any_of(self.modes1 != self.modes0)  # no event if the velocity only touches zero
+        if model.has_conditions:
+            event_location.check_limits(model, self.t1, self.y1, self.modes1)
         self.update_end_rates(model)
         if self.h_next == 0.0 and self.active_method.method_number != EXACT:
             self.h_next = self.initial_step_size()
+        if model.has_dry_friction or model.has_conditions:
+            event_location.begin_phase(model, self)
 
     def initial_step_size(self):
         """Estimate the first step h from the slopes at t1."""

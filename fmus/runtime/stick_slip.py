@@ -9,9 +9,18 @@ principle, CACSD 1999).  contact_lcp.py treats several contacts.
 from math import fabs, inf
 
 from .codes import BACKWARD, EXACT, FIRST_RULE, FORWARD, HYBRID, MAX_INPUT_ORDER, SIGN, STUCK, THRESHOLD
+from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
 from .oscillator import Oscillator
 from .rounding import ROUNDOFF_MARGIN
-from .vectors import ContactIndex, ContactVector, StateVector, contact_vector, position_index, slip_index
+from .vectors import (
+    ContactIndex,
+    ContactVector,
+    StateVector,
+    contact_indices,
+    contact_vector,
+    position_index,
+    slip_index,
+)
 
 HYBRID_LAW = ("hybrid", HYBRID, "stick and slip are modes; every change of mode is an event")
 SIGN_LAW = ("sign", SIGN, "sliding force times sign(v); no events, no sticking; chatters")
@@ -19,8 +28,6 @@ THRESHOLD_LAW = ("threshold", THRESHOLD, "as sign, but friction balances the loa
 
 NO_CONSISTENT_MODES = FIRST_RULE + 2  # status: no modes satisfy the force balance (the second rule below)
 WRONG_WAY_TOLERANCE = 1e-9  # accelerations below this share of that due to friction are rounding errors
-MAX_BISECTIONS = 200
-MAX_TERNARY_STEPS = 25
 
 
 def sign(v):
@@ -100,19 +107,27 @@ class DryFriction(Oscillator):
     def is_grazing(self, t, y: StateVector, modes: ContactVector, tie_tolerance, i: ContactIndex):
         """Return whether the slip velocity only touches zero here and the slip continues.
 
-        This is so if the contact would break away again so soon that a velocity with the relative error
-        `tie_tolerance` might not reach zero.  After s seconds the velocity grows as v = u (1 - cos(w s)), where the
-        load has the rate m w^2 u.
+        A contact that holds more than its sliding force comes to rest.  Another one goes on slipping if it would break
+        away again so soon that a velocity with the relative error `tie_tolerance` might not reach zero.  After s
+        seconds the velocity grows as v = u (1 - cos(w s)), where the load has the rate m w^2 u.
         """
         load, rate, limit = self.stick_load(t, y, i)
         if rate == 0.0:
             return load == 0.0 and limit == 0.0  # no friction: the remaining velocity is the error of the method
-        if modes[i] * rate < 0.0:
+        if modes[i] * rate < 0.0 or self.jumps_at_breakaway(t, y, modes, i):
             return False
         delay = (limit - modes[i] * load) / fabs(rate)
         _, J = self.jacobian(t, y, modes)
         stiffness = J[slip_index[i], position_index[i]]
         return (stiffness < 0.0 or delay == 0.0) and -0.5 * stiffness * delay * delay < tie_tolerance
+
+    def jumps_at_breakaway(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
+        """Return whether the holding force exceeds the sliding force, except for rounding errors."""
+        reverse_modes = contact_vector()
+        reverse_modes[i] = -modes[i]
+        forward, backward = self.slip_acceleration(t, y, modes, i), self.slip_acceleration(t, y, reverse_modes, i)
+        jump = modes[i] * self.breakaway_acceleration(t, y, modes, i)
+        return jump > WRONG_WAY_TOLERANCE * fabs(forward - backward)
 
     def breakaway_acceleration(self, t, y: StateVector, modes: ContactVector, i: ContactIndex):
         """Return the slip acceleration at a break-away, where the load equals the limit."""
@@ -169,68 +184,29 @@ class DryFriction(Oscillator):
             return t + down * duration, BACKWARD
         return t + (up if up < down else down) * duration, STUCK
 
-    def guard(self, step, t, i: ContactIndex):
-        """Return the event function: the slip velocity in the direction of the mode, positive while the mode lasts."""
-        y = step.state_at(self, t)
-        return step.modes0[i] * y[slip_index[i]]
+    def update_contact_event_functions(self, location, t, y: StateVector, modes: ContactVector):
+        """Evaluate the event functions of the contact: the slip velocity in the direction of the mode."""
+        for i in contact_indices:
+            location.values[i] = location.values[len(modes) + i] = 1.0
+            location.scales[i] = location.scales[len(modes) + i] = 0.0
+            if self.friction == HYBRID and modes[i] != STUCK:
+                location.values[i] = modes[i] * y[slip_index[i]]
+                location.scales[i] = fabs(y[slip_index[i]])
 
-    def find_slip_reversal(self, step, i: ContactIndex):
-        """Return when the slip velocity reaches zero within the step, to machine precision; inf if it does not."""
-        mode = step.modes0[i]
-        ahead, behind = mode * step.y0[slip_index[i]], mode * step.y1[slip_index[i]]
-        high = step.t1
-        if behind > 0.0:
-            if mode * step.f0[slip_index[i]] >= 0.0 or mode * step.f1[slip_index[i]] <= 0.0:
-                return inf
-            high = self.find_minimum(step, step.t0, step.t1, i)
-            if not high < inf:
-                return inf
-            behind = self.guard(step, high, i)
-        return self.find_root(step, step.t0, high, ahead, behind, i)
-
-    def find_root(self, step, low, high, g_low, g_high, i: ContactIndex):
-        """Return the first time at which the guard is not positive, by the Illinois method.
-
-        The guard has the value `g_low` > 0 at time `low` and `g_high` <= 0 at time `high`.
-        """
-        kept_end = 0  # end of the bracket that the last iteration kept: 1 high, -1 low
-        evaluations = 0
-        for _ in range(MAX_BISECTIONS):
-            middle = 0.5 * (low + high)
-            if not low < middle < high:
-                break
-            if g_low > 0.0 and g_high < 0.0:
-                secant = low + (high - low) * (g_low / (g_low - g_high))
-                if low < secant < high:
-                    middle = secant
-            g = self.guard(step, middle, i)
-            evaluations += 1
-            if g > 0.0:
-                low, g_low = middle, g
-                if kept_end == 1:
-                    g_high *= 0.5
-                kept_end = 1
-            else:
-                high, g_high = middle, g
-                if kept_end == -1:
-                    g_low *= 0.5
-                kept_end = -1
-        step.interpolant.n_event_evals += evaluations
-        return high
-
-    def find_minimum(self, step, low, high, i: ContactIndex):
-        """Return a time at which a guard with a minimum in between is not positive, by ternary search; else inf."""
-        step.interpolant.n_event_evals += MAX_TERNARY_STEPS
-        for _ in range(MAX_TERNARY_STEPS):
-            third = (high - low) / 3.0
-            left = self.guard(step, low + third, i)
-            right = self.guard(step, high - third, i)
-            if left <= 0.0:
-                return low + third
-            if right <= 0.0:
-                return high - third
-            if left < right:
-                high -= third
-            else:
-                low += third
-        return inf
+    def slip_continues(self, step):
+        """Return whether the slip velocity certainly keeps its direction in the step; most steps end here."""
+        location = self.event_location
+        continues = True
+        for i in contact_indices:
+            mode, third = step.modes0[i], (step.t1 - step.t0) / 3.0
+            start, end = mode * step.y0[slip_index[i]], mode * step.y1[slip_index[i]]
+            early, late = start + mode * third * step.f0[slip_index[i]], end - mode * third * step.f1[slip_index[i]]
+            low = early if early < late else late
+            high = early + late - low
+            high = high if high > end else end
+            if high > location.peaks[i]:
+                location.peaks[i] = high
+            high = high if high > start else start
+            low = low if low < end else end
+            continues = low >= INTERPOLANT_SHARE * high and low >= NEAR_ZERO_SHARE * location.peaks[i]
+        return continues

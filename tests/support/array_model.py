@@ -45,6 +45,7 @@ def to_array_model(model):
         "applied_acceleration",
         "compute_outputs",
         *(all_of_them if cls.is_coupled else ()),
+        *(["update_conditions"] if cls.has_conditions else ()),
     ):
         about[name] = call_with_scalars(cls, name)
     for name in alone if modes and not cls.is_coupled else ():

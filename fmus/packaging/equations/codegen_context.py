@@ -59,7 +59,10 @@ class CodegenContext:
     def printer(self, depth: int = 2) -> ExpressionPrinter:
         """Create a printer for a method, or for a block in it."""
         an = self.an
-        given = {s: s.name for s in an.states} | {m: m.name for m in an.modes} | {TIME: "t"}
+        given: dict[Expression, str] = {s: s.name for s in an.states} | {m: m.name for m in an.modes} | {TIME: "t"}
+        for n, condition in enumerate(an.switches):
+            if condition.is_frozen:
+                given |= dict.fromkeys(condition.comparisons, f"self.event_location.sides[{n}] > 0.0")
         return ExpressionPrinter(given, self.constants, self.used_names, depth)
 
     def emit_driver(self, s: ExpressionPrinter, targets: Sequence[Operand]) -> None:

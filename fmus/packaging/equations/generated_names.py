@@ -11,17 +11,32 @@ IMPORTS = {  # module -> names that generated code may import
     "stick_slip": ("HYBRID_LAW", "SIGN_LAW", "THRESHOLD_LAW", "DryFriction", "sign", "threshold"),
     "codes": ("EXACT", "HYBRID"),
     "input_polynomial": ("InputPolynomial",),
+    "event_location": ("EventLocation",),
     "contact_lcp": ("CoupledFriction",),
     "variable_declarations": ("Choice", "Contact", "Fixed", "Input", "Mode", "Output", "Parameter", "State"),
     "integrator": ("Integrator",),
     "active_method": ("EXACT_ITEM", "METHOD_ITEMS"),
     "oscillator": ("Oscillator",),
 }
-ATTRIBUTES = ("friction", "solver", "events", "exact", "model_exchange", "x_base", "t_base", "time", "method")
+ATTRIBUTES = (
+    "friction",
+    "solver",
+    "events",
+    "exact",
+    "model_exchange",
+    "x_base",
+    "t_base",
+    "time",
+    "method",
+    "event_location",
+    "violation_time",
+    "violation_value",
+)
 METHODS = (  # in addition to inherited ones
     *("initial_state", "rates", "jacobian", "applied_acceleration", "linear_coefficients"),
     *("stick_load", "load_magnitude", "compute_outputs"),
     *("applied_acceleration_derivative", "load_derivative", "set_input_rates", "has_higher_order"),
+    "update_conditions",
 )
 COUPLED_METHODS = ("slip_velocities", "slip_magnitudes", "contact_forces", "contact_rates", "apply_impulses")
 CLASSES = ("Solver", "Model", "Fmi3Slave")

@@ -27,6 +27,7 @@ from .algebra import (
     substitute,
     variables_in,
 )
+from .conditions import HOLD_TOLERANCE, Condition, find_conditions, is_nonnegative
 from .expressions import COMPARISONS, Expression, ModelError, Operand, Term
 from .generated_names import RESERVED, RESERVED_WHERE_COUPLED
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
@@ -72,6 +73,8 @@ class ModelAnalysis:
         self._find_contact_loads()
         self.ramps = {e: rate for e, rate in self.ramps.items() if self._keeps_closed_form(e)}
         self.rules += self._holding_rules()
+        self.switches = find_conditions(self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.ramps))
+        self.limits = self._find_limits()
         for name, e in own if self.contacts and not self.waits else ():
             self._check_name(name, e, RESERVED_WHERE_COUPLED)
 
@@ -92,8 +95,44 @@ class ModelAnalysis:
                 sentence = (
                     f"{c.name}: the sliding force exceeds the holding force ({values}): lower slide or raise hold"
                 )
-                result.append(Rule(c.slide > (1.0 + 1e-9) * c.hold, sentence))
+                result.append(Rule(c.slide > (1.0 + HOLD_TOLERANCE) * c.hold, sentence))
         return tuple(result)
+
+    # ---- conditions
+
+    def _dynamic_expressions(self) -> list[Operand]:
+        """Return the expressions that determine the motion."""
+        forces = [e for c in self.contacts for e in (c.slip, c.slide, c.hold) if e is not None]
+        return [*self.rate_outputs.values(), *forces]
+
+    def _find_limits(self) -> list[Condition]:
+        """Return the limits of friction forces that vary: not negative, and no sliding above the holding force."""
+        varying = (*self.time_varying, *self.inputs)
+        result = []
+        for c in self.contacts:
+            at = "at t = {violation_time!r} s"
+            if c.lifts_off is None and depends_on(c.slide, varying) and not is_nonnegative(c.slide):
+                sentence = (
+                    f"{c.name}: the sliding force becomes negative {at} ({{violation_value!r}} {c.unit}); if the "
+                    "contact lifts off there, declare lifts_off=True"
+                )
+                result.append(Condition(c.slide, (c.slide,), sentence=sentence))
+            at_rest = substitute(c.slide, {c.slip: 0.0}) if isinstance(c.slip, Expression) else c.slide
+            if c.hold is None or depends_on(c.slide, (c.mode,)) or not depends_on(c.hold - at_rest, varying):
+                continue
+            surplus = build_term("-", build_term("*", 1.0 + HOLD_TOLERANCE, c.hold), at_rest)
+            sentence = (
+                f"{c.name}: the sliding force exceeds the holding force {at} (hold - slide = {{violation_value!r}} "
+                f"{c.unit}): lower slide or raise hold"
+            )
+            margin = Term("choose", Term("==", c.mode, 0), surplus, 1.0)
+            result.append(Condition(margin, (c.slide,), sentence=sentence))
+        return result
+
+    @property
+    def conditions(self) -> list[Condition]:
+        """Conditions of choose(), then limits."""
+        return [*self.switches, *self.limits]
 
     def _of_type(self, *kinds: type) -> list[Any]:
         return [e for e in self.declared if isinstance(e, kinds)]
@@ -373,7 +412,9 @@ class ModelAnalysis:
             return False
         (c,), by_time = self.contacts, (TIME, *self.drivers)
         changes = (differentiate(self.load[c], self.explicit_time_derivatives), self.holding_limit[c])
-        return not any(depends_on(e, by_time) for e in changes) and not has_condition_on(self.load[c], by_time)
+        return not any(depends_on(e, by_time) for e in changes) and not any(
+            has_condition_on(e, by_time) for e in (self.load[c], *self._dynamic_expressions())
+        )
 
     @property
     def stick_assignments(self) -> list[tuple[Contact, State, Operand]]:

@@ -131,6 +131,9 @@ class Contact(Variable, variable_declarations.Output):
         (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD).
     eps
         Slip below which the law THRESHOLD holds; required with that law.
+    lifts_off
+        What a negative sliding force means.  None, the default: an error, which ends the run.  True: the contact has
+        lifted off; its force is zero and it does not stick.  False: it never occurs, by the form of the equations.
     """
 
     def __init__(
@@ -143,11 +146,17 @@ class Contact(Variable, variable_declarations.Output):
         hold: Operand = None,
         laws: tuple[str, ...] = (HYBRID,),
         eps: Operand = None,
+        lifts_off: bool | None = None,
         **more: Any,
     ) -> None:
         super().__init__(unit, text, **more)
         self.mode, self.slip, self.slide, self.laws, self.eps = mode, slip, as_operand(slide), laws, eps
         self.hold = None if hold is None else as_operand(hold)
+        self.lifts_off = lifts_off
+        if lifts_off:
+            touches = Term(">", self.slide, 0.0)
+            self.slide = Term("choose", touches, self.slide, 0.0)
+            self.hold = None if hold is None else Term("choose", touches, self.hold, 0.0)
         if laws not in ((HYBRID,), (HYBRID, SIGN), (HYBRID, THRESHOLD)):
             raise ModelError(f"laws must be (HYBRID,), (HYBRID, SIGN) or (HYBRID, THRESHOLD), got {laws!r}")
         if (eps is not None) != (THRESHOLD in laws):

@@ -7,9 +7,13 @@ from textwrap import indent, wrap
 
 from ...runtime.active_method import EXACT_ITEM
 from ...runtime.oscillator import Oscillator
+from ...runtime.stick_slip import DryFriction
 from ..reserved_names import string_literal
 from .codegen_context import CodegenContext
+from .condition_methods import condition_methods
+from .conditions import Condition
 from .coupled_contact_methods import coupled_contact_methods
+from .dimensions import Dimensions, declared_dimensions, dimensions_of, expression_text
 from .expression_printer import INDENT
 from .generated_names import IMPORTS, MATH
 from .model_analysis import ModelAnalysis
@@ -67,6 +71,7 @@ def model_source(an: ModelAnalysis, file: str) -> str:
                 *rate_methods(f),
                 *single_contact_methods(f),
                 *coupled_contact_methods(f),
+                *condition_methods(f),
                 observe_method(f),
             ]
         ),
@@ -147,17 +152,49 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
             ("is_linear", an.closed_form),
             ("has_driver", an.drivers),
             ("has_input_derivatives", an.ramps),
+            ("has_conditions", an.conditions),
         )
         if holds
     ]
+    if n := n_event_functions(an):
+        lines.append(
+            f"n_event_functions, first_condition, n_switches = {n}, {2 * len(an.contacts)}, {len(an.switches)}"
+        )
+    if an.conditions:
+        lines.append(f"condition_texts = ({', '.join(map(string_literal, condition_texts(an)))},)")
+        lines.append(
+            f"condition_units = ({', '.join(string_literal(condition_unit(an, one)) for one in an.conditions)},)"
+        )
+    if an.limits:
+        own_rules = len(DryFriction.rules) + len(an.rules)
+        lines.append(f"first_condition_rule = {own_rules + 1 - len(an.switches)}")
     for word in RUN_SETTINGS:
         if (value := float(getattr(an.model, word))) != getattr(Oscillator, word):
             lines.append(f"{word} = {value!r}")
-    if an.rules:
+    if an.rules or an.limits:
         inherited = [f"{INDENT}*{base_class(an)}.rules,"] if an.contacts else []
-        sentences = [f"{INDENT}{string_lines(rule.sentence)}," for rule in an.rules]
+        messages = [rule.sentence for rule in an.rules] + [limit.sentence for limit in an.limits]
+        sentences = [f"{INDENT}{string_lines(message)}," for message in messages]
         lines += ["rules = (", *inherited, *sentences, ")"]
     return lines
+
+
+def n_event_functions(an: ModelAnalysis) -> int:
+    """Return the number of event functions: two for each contact, and one for each condition."""
+    return 2 * len(an.contacts) + len(an.conditions)
+
+
+def condition_texts(an: ModelAnalysis) -> list[str]:
+    """Return what changes where the event function of a condition falls to zero."""
+    switches = [f"{expression_text(one.comparisons[0])} changes" for one in an.switches]
+    return switches + [one.sentence.partition(" at t =")[0] for one in an.limits]
+
+
+def condition_unit(an: ModelAnalysis, condition: Condition) -> str:
+    """Return the unit of the margin of a condition: that of a variable with the same dimensions, else 1."""
+    known: dict[int, Dimensions | None] = {}
+    dimensions = next((d for e in condition.sides if (d := dimensions_of(e, known)) is not None), None)
+    return next((e.unit for e in an.declared if declared_dimensions(e) == dimensions), "1")
 
 
 def string_lines(text: str) -> str:

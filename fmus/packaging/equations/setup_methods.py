@@ -22,6 +22,10 @@ def setup_methods(f: CodegenContext) -> list[str]:
 def init_method(f: CodegenContext) -> str:
     """Constructor; creates all attributes."""
     lines = ["super().__init__()", "self.solver = Solver()"]
+    if n := 2 * len(f.an.contacts) + len(f.an.conditions):
+        lines.append(f"self.event_location = EventLocation({n})")
+    if f.an.conditions:
+        lines.append("self.violation_time = self.violation_value = 0.0")
     if f.driver is not None:
         lines.append("self.t_base = self.x_base = 0.0")
     for e, rate in f.an.ramps.items():

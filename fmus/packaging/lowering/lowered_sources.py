@@ -43,7 +43,10 @@ def model_layout(model: Any, features: FeatureSelection, name_format: str) -> Mo
     """Return the layout of a model; `name_format` formats the names of states, rates and modes."""
     flags = {
         flag: getattr(model, flag)
-        for flag in ("has_dry_friction", "rests_when_stuck", "is_coupled", "has_driver", "has_input_derivatives")
+        for flag in (
+            *("has_dry_friction", "rests_when_stuck", "is_coupled", "has_driver", "has_input_derivatives"),
+            "has_conditions",
+        )
     }
     flags["is_linear"] = EXACT in features.methods
     states, contacts = (

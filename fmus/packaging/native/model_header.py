@@ -153,7 +153,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {c_literal(ctype is BOOL)}}},\n" for path, ctype in members),
         table="".join(
-            _variable_row(name, meaning, tangent_fields(declared), hasattr(instance, f"{name}_rate"))
+            _variable_row(name, meaning, tangent_fields(declared), hasattr(instance, f"{name}_polynomial"))
             for name, meaning in declared
         ),
         statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(violated_rules, rule_fields),

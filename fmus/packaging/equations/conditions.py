@@ -1,0 +1,131 @@
+"""Conditions of the equations that may change during a step: choose() and limits of friction forces.
+
+A condition of choose() that depends on states or time keeps its value during a step; its change is an event.  So the
+equations are smooth in every step.  Limits must hold during the whole run.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from .algebra import depends_on, is_same_expression, operands, subexpressions
+from .expressions import COMPARISONS, Expression, Operand, Term
+from .model_declaration import Fixed, Input, Parameter
+
+LIMITED_DOMAIN = ("sqrt", "log", "asin", "acos", "/")  # operations that fail for some operands
+HOLD_TOLERANCE = 1e-9  # the sliding force may exceed the holding force by rounding errors
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A condition: its margin, positive while it holds; both sides; comparisons it replaces; message of a limit."""
+
+    margin: Operand
+    sides: tuple[Operand, ...]
+    comparisons: tuple[Term, ...] = ()
+    is_frozen: bool = False  # whether the equations use its value at the start of the step
+    sentence: str = ""
+
+
+def find_conditions(targets: Iterable[Operand], varying: Iterable[Expression]) -> list[Condition]:
+    """Find the conditions of choose() in some equations that depend on `varying`; equal ones are one condition."""
+    varying = tuple(varying)
+    terms = [e for target in targets for e in subexpressions(target).values() if isinstance(e, Term)]
+    terms = list({id(e): e for e in terms}.values())
+    groups: list[list[Term]] = []
+    for e in terms:
+        if e.op in COMPARISONS and depends_on(e, varying):
+            group = next((one for one in groups if is_same_expression(one[0], e)), None)
+            if group is None:
+                groups.append([e])
+            else:
+                group.append(e)
+    protecting = {id(one) for e in terms for one in protected_comparisons(e, varying)}
+    return [
+        Condition(comparison_margin(group[0]), group[0].args, tuple(group), not any(id(e) in protecting for e in group))
+        for group in groups
+    ]
+
+
+def comparison_margin(e: Term) -> Operand:
+    """Return the difference of both sides, positive where the comparison holds."""
+    a, b = e.args
+    larger, smaller = (b, a) if e.op in ("<", "<=") else (a, b)
+    margin = larger if smaller == 0.0 and not isinstance(smaller, Expression) else Term("-", larger, smaller)
+    # equal sides count as a positive margin where the comparison includes them
+    return Term("+", margin, 1e-300) if e.op in ("<=", ">=") else margin
+
+
+def protected_comparisons(e: Term, varying: tuple[Expression, ...]) -> list[Term]:
+    """Return the comparisons that keep an operation inside its domain; they must be evaluated where it is.
+
+    These are the conditions around the operation and those inside its operand.
+    """
+    if e.op == "choose":
+        inside = [one for case in e.args[1:] for one in subexpressions(case).values()]
+        return [e.args[0]] if any(has_limited_domain(one, varying) for one in inside) else []
+    if has_limited_domain(e, varying):
+        return [one for one in subexpressions(e).values() if isinstance(one, Term) and one.op in COMPARISONS]
+    return []
+
+
+def has_limited_domain(e: Operand, varying: tuple[Expression, ...]) -> bool:
+    """Return whether an operation fails for some values of the variables."""
+    return isinstance(e, Term) and e.op in LIMITED_DOMAIN and depends_on(e.args[-1], varying)
+
+
+def is_nonnegative(e: Operand) -> bool:
+    """Return whether the form of an expression shows that it is never negative."""
+    if not isinstance(e, Expression):
+        return e >= 0.0
+    if isinstance(e, (Parameter, Fixed, Input)):
+        return e.low >= 0.0 or e.above >= 0.0
+    if not isinstance(e, Term):
+        return bool(operands(e)) and all(map(is_nonnegative, operands(e)))
+    match e.op:
+        case "fabs" | "sqrt" | "exp" | "cosh":
+            return True
+        case "*" if is_same_expression(e.args[0], e.args[1]):
+            return True
+        case "+" if is_weighted_mean(*e.args):
+            return True
+        case "+" | "*" | "/":
+            return all(map(is_nonnegative, e.args))
+        case "choose":
+            return all(is_nonnegative(case) or is_positive_part(e.args[0], case) for case in e.args[1:])
+    return False
+
+
+def is_weighted_mean(a: Operand, difference: Operand) -> bool:
+    """Return whether a + difference is a + (b - a) * w with nonnegative a and b and a weight w between 0 and 1."""
+    if not (isinstance(difference, Term) and difference.op == "*" and isinstance(difference.args[0], Term)):
+        return False
+    b_minus_a, weight = difference.args
+    return (
+        b_minus_a.op == "-"
+        and is_same_expression(b_minus_a.args[1], a)
+        and is_nonnegative(a)
+        and is_nonnegative(b_minus_a.args[0])
+        and is_decay(weight)
+    )
+
+
+def is_decay(e: Operand) -> bool:
+    """Return whether an expression is exp(-x) with a nonnegative x."""
+    if not (isinstance(e, Term) and e.op == "exp" and isinstance(e.args[0], Term)):
+        return False
+    exponent = e.args[0]
+    if (
+        exponent.op in "*/" and isinstance(exponent.args[0], Term) and exponent.args[0].op == "neg"
+    ):  # -x * x is (-x) * x
+        return is_nonnegative(Term(exponent.op, exponent.args[0].args[0], exponent.args[1]))
+    return exponent.op == "neg" and is_nonnegative(exponent.args[0])
+
+
+def is_positive_part(condition: Operand, case: Operand) -> bool:
+    """Return whether a case is chosen only where it is positive, as in choose(x > 0, x, 0)."""
+    return (
+        isinstance(condition, Term)
+        and condition.op in (">", ">=")
+        and is_nonnegative(condition.args[1])
+        and is_same_expression(condition.args[0], case)
+    )

@@ -1,0 +1,461 @@
+"""Location of events inside an internal step.
+
+Every state that may end in a step has an event function, positive while the state lasts: two for each contact (slip
+velocity in the direction of the mode while it slides, distance of the load from both holding limits while it sticks)
+and one for each condition of the equations.  An event function that falls to zero and rises again within one step is
+located as well: the step is searched along a polynomial whose curvature is bounded, not by samples.
+
+Where the error of the method could decide whether an event function reaches zero, the motion since the last event is
+computed again with a tighter tolerance.
+"""
+
+from math import fabs, inf, sin, sqrt
+
+from .codes import CHATTERING, FIRST_RULE, OK, STUCK
+from .rounding import EPSILON
+from .vectors import (
+    ContactVector,
+    RateVector,
+    StateVector,
+    contact_indices,
+    contact_vector,
+    slip_index,
+)
+
+DEGREE = 8  # of the polynomial through an event function; interpolants have degree 7 at most
+QUARTER_TURN = 1.5707963267948966
+# The interpolant adds less than this share of the range of the cubic Hermite polynomial, except in a search
+INTERPOLANT_SHARE = 1.0 / 12.0
+NEAR_ZERO_SHARE = 0.01  # of the largest value since the last event; larger event functions are in no doubt
+MAX_SEARCH_STEPS, MAX_BISECTIONS = 1000, 200
+START_OF_SLIP = 1e-3  # share of a step after which a slip that starts at zero is larger than its rounding error
+ERROR_FACTOR = 100.0  # bound on the error of an event function, in multiples of the tolerance and of its scale
+REFINEMENT, SMALLEST_TOLERANCE = 1e-3, 1e-13  # factor of the tolerance where an event is in doubt; lower limit
+WORTHWHILE_REFINEMENT = 0.3
+CONDITION_MARGIN, TINY = 4.0 * EPSILON, 1e-300  # margins of conditions: relative and absolute
+SHORTEST_DWELL, MAX_CHATTER = 1e-9, 100  # share of the largest step; number of such short times in succession
+FEATURE_RANGE, MIN_STEP_SHARE = 5.0, 0.6  # features limit the step within so many widths; tolerated excess of a step
+MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial
+SHORTEST_STEP = 1e-6  # share of the largest step; shorter steps are not shortened for an event function
+NO_ZERO, ONE_ZERO, UNKNOWN = 0, 1, 2  # what the cubic polynomial shows
+
+
+class EventLocation:
+    """Event functions, their values in the current step, and the start of the motion since the last event.
+
+    Lists run over the event functions: upper and lower ones of all contacts, then the conditions.
+    """
+
+    phase_y: StateVector
+    phase_f: RateVector
+
+    def __init__(self, n):
+        # value and scale (sum of absolute terms) of each event function at the latest evaluation
+        self.values, self.scales = [0.0] * n, [0.0] * n
+        self.middle = [0.0] * n  # values in the middle of the step
+        # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero
+        self.start, self.early, self.late, self.end = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
+        self.peaks, self.times = [0.0] * n, [0.0] * n
+        # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0: now, before and after t1
+        self.margins, self.margin_scales = [0.0] * n, [0.0] * n
+        self.sides, self.sides_before, self.sides_after = [1.0] * n, [1.0] * n, [1.0] * n
+        self.t_condition = -inf  # time of the last change of a condition
+        self.n_chatter = 0  # changes of a condition in quick succession
+        self.violated = -1  # condition that must hold but does not; -1 if there is none
+        # nodes (fractions of a step) of the polynomial through an event function, and its coefficients
+        self.nodes, self.samples, self.polynomial = [0.0] * (DEGREE + 1), [0.0] * (DEGREE + 1), [0.0] * (DEGREE + 1)
+        for k in range(DEGREE + 1):
+            root = sin(QUARTER_TURN * k / DEGREE)
+            self.nodes[k] = root * root
+        # start of the motion since the last event; factor of the tolerance since then
+        self.phase_t = self.phase_y = self.phase_f = self.phase_h = 0.0
+        self.tolerance_factor = 1.0
+        self.t_doubt = 0.0  # end of the step that was in doubt
+        self.in_doubt = self.must_repeat = self.must_shorten = False
+        self.feature_width = inf  # slip velocity below which friction varies
+
+
+# ---- event functions
+
+
+def update_event_functions(model, t, y: StateVector, modes: ContactVector):
+    """Evaluate all event functions."""
+    location = model.event_location
+    if model.has_dry_friction:
+        model.update_contact_event_functions(location, t, y, modes)
+    if model.has_conditions:
+        model.update_conditions(t, y, modes)
+        for j in range(model.n_event_functions - model.first_condition):
+            k = model.first_condition + j
+            location.scales[k] = location.margin_scales[j]
+            location.values[k] = (
+                location.sides[j] * location.margins[j] + CONDITION_MARGIN * location.margin_scales[j] + TINY
+            )
+
+
+def event_function(model, step, t, j):
+    """Return the value of one event function inside the step."""
+    y = step.state_at(model, t)
+    update_event_functions(model, t, y, step.modes0)
+    return model.event_location.values[j]
+
+
+# ---- search of a step
+
+
+def locate_events(model, step):
+    """Search the step just computed for the first zero of each event function.
+
+    Returns
+    -------
+    float
+        Time of the first event; inf if there is none.
+    """
+    location = model.event_location
+    location.in_doubt = location.must_shorten = False
+    for j in range(model.n_event_functions):
+        location.times[j] = inf
+    if model.has_dry_friction and not model.is_coupled and not model.has_conditions:
+        if model.slip_continues(step):
+            return inf
+    evaluate_on_cubic(model, step)
+    if step.t1 - step.t0 > SHORTEST_STEP * step.h_max:
+        for j in range(model.n_event_functions):
+            if not is_resolved(location, j):
+                location.must_shorten = True
+        if location.must_shorten:
+            return inf
+    first = inf
+    for j in range(model.n_event_functions):
+        found = examine_cubic(location, step, j)
+        if found == ONE_ZERO:
+            location.times[j] = find_root(model, step, step.t0, step.t1, location.start[j], location.end[j], j)
+        elif found == UNKNOWN:
+            location.times[j] = search_polynomial(model, step, j)
+        if location.times[j] < first:
+            first = location.times[j]
+    return first
+
+
+def evaluate_on_cubic(model, step):
+    """Compute the Bernstein coefficients of all event functions on the cubic Hermite polynomial of the step."""
+    location = model.event_location
+    t0, h = step.t0, step.t1 - step.t0
+    y2 = (20.0 * step.y0 + 7.0 * step.y1 + h * (4.0 * step.f0 - 2.0 * step.f1)) / 27.0
+    y3 = (7.0 * step.y0 + 20.0 * step.y1 + h * (2.0 * step.f0 - 4.0 * step.f1)) / 27.0
+    update_event_functions(model, t0, step.y0, step.modes0)
+    for j in range(model.n_event_functions):
+        location.start[j] = location.values[j]
+        if location.scales[j] > location.peaks[j]:
+            location.peaks[j] = location.scales[j]
+    y4 = 0.5 * (step.y0 + step.y1) + 0.125 * h * (step.f0 - step.f1)
+    update_event_functions(model, t0 + 0.5 * h, y4, step.modes0)
+    for j in range(model.n_event_functions):
+        location.middle[j] = location.values[j]
+    update_event_functions(model, t0 + h / 3.0, y2, step.modes0)
+    for j in range(model.n_event_functions):
+        location.early[j] = location.values[j]
+    update_event_functions(model, t0 + h * 2.0 / 3.0, y3, step.modes0)
+    for j in range(model.n_event_functions):
+        location.late[j] = location.values[j]
+    update_event_functions(model, step.t1, step.y1, step.modes0)
+    for j in range(model.n_event_functions):
+        start, third, two_thirds, end = location.start[j], location.early[j], location.late[j], location.values[j]
+        location.end[j] = end
+        location.early[j] = (18.0 * third - 5.0 * start - 9.0 * two_thirds + 2.0 * end) / 6.0
+        location.late[j] = (18.0 * two_thirds - 5.0 * end - 9.0 * third + 2.0 * start) / 6.0
+        if location.scales[j] > location.peaks[j]:
+            location.peaks[j] = location.scales[j]
+
+
+def is_resolved(location, j):
+    """Return whether an event function resembles a cubic polynomial in the step.
+
+    The error control of the method does not see event functions that vary without the states, as a load that
+    follows a clock while nothing moves.
+    """
+    start, early, late, end = location.start[j], location.early[j], location.late[j], location.end[j]
+    low, high = start, start
+    low = low if low < early else early
+    low = low if low < late else late
+    low = low if low < end else end
+    high = high if high > early else early
+    high = high if high > late else late
+    high = high if high > end else end
+    error = fabs(location.middle[j] - 0.125 * (start + 3.0 * early + 3.0 * late + end))
+    return error <= MAX_CUBIC_ERROR * (high - low) + CONDITION_MARGIN * location.peaks[j] + TINY
+
+
+def examine_cubic(location, step, j):
+    """Return how many zeros the cubic Hermite polynomial has; note whether an event is in doubt.
+
+    A polynomial has no more zeros than its Bernstein coefficients have changes of sign, and lies between them.
+    """
+    start, early, late, end = location.start[j], location.early[j], location.late[j], location.end[j]
+    # lowest value, by the parabola at the end of the step if the function still falls there
+    lowest = early if early < late else late
+    if end < late:
+        curvature = end - 2.0 * late + early
+        lowest = end - 0.75 * (end - late) * (end - late) / curvature if curvature > 0.0 else -inf
+    elif not early < start:
+        lowest = inf
+    if fabs(lowest) <= ERROR_FACTOR * step.tolerance * location.peaks[j]:
+        location.in_doubt = True
+    low = early if early < late else late
+    high = early if early > late else late
+    high = high if high > start else start
+    high = high if high > end else end
+    if end > 0.0:
+        least = end if end < start else start
+        least = least if least < low else low
+        inside = late if start <= 0.0 else low  # a slip starts at zero
+        return NO_ZERO if inside >= INTERPOLANT_SHARE * (high - least) else UNKNOWN
+    return UNKNOWN if start > 0.0 and early < INTERPOLANT_SHARE * (high - end) and late > early else ONE_ZERO
+
+
+def search_polynomial(model, step, j):
+    """Return the first zero of one event function in the step; inf if there is none.
+
+    The polynomial of degree 8 through the function is searched from the start.  It stays above the parabola of its
+    largest curvature, so that steps to the zero of that parabola cannot pass a zero.
+    """
+    location = model.event_location
+    fit_polynomial(model, step, j)
+    largest_curvature = 0.0
+    for k in range(DEGREE - 1):
+        largest_curvature += (k + 2.0) * (k + 1.0) * fabs(location.polynomial[k + 2])
+    least = CONDITION_MARGIN * location.peaks[j]  # smaller values are rounding errors
+    u = START_OF_SLIP if location.start[j] <= least else 0.0
+    value, slope, has_zero = inf, 0.0, False
+    for _ in range(MAX_SEARCH_STEPS):
+        value = slope = 0.0
+        for k in range(DEGREE + 1):
+            slope = value + slope * u
+            value = location.polynomial[DEGREE - k] + value * u
+        has_zero = value <= least
+        if has_zero:
+            break
+        descent = sqrt(slope * slope + 2.0 * largest_curvature * value) - slope
+        if not 2.0 * value < (1.0 - u) * descent:
+            break
+        u += 2.0 * value / descent
+    end, g_end = step.t1, location.end[j]
+    if has_zero:
+        end = step.t0 + u * (step.t1 - step.t0)
+        beyond = end - 2.0 * least * (step.t1 - step.t0) / slope if slope < 0.0 else end
+        g_end = event_function(model, step, beyond, j)
+        if g_end > 0.0 or beyond > step.t1:
+            return end  # the function only touches zero
+        end = beyond
+    if g_end > 0.0:
+        return inf
+    return find_root(model, step, step.t0, end, location.start[j], g_end, j)
+
+
+def fit_polynomial(model, step, j):
+    """Compute the coefficients of the polynomial through one event function at the nodes, by divided differences."""
+    location = model.event_location
+    step.interpolant.n_event_evals += DEGREE
+    location.samples[0], location.samples[DEGREE] = location.start[j], location.end[j]
+    for k in range(DEGREE - 1):
+        location.samples[k + 1] = event_function(model, step, step.t0 + location.nodes[k + 1] * (step.t1 - step.t0), j)
+    for order in range(DEGREE):
+        for back in range(DEGREE - order):
+            k = DEGREE - back
+            location.samples[k] = (location.samples[k] - location.samples[k - 1]) / (
+                location.nodes[k] - location.nodes[k - 1 - order]
+            )
+    for k in range(DEGREE + 1):
+        location.polynomial[k] = 0.0
+    for back in range(DEGREE + 1):
+        node = location.nodes[DEGREE - back]
+        for low in range(DEGREE):
+            k = DEGREE - low
+            location.polynomial[k] = location.polynomial[k - 1] - node * location.polynomial[k]
+        location.polynomial[0] = location.samples[DEGREE - back] - node * location.polynomial[0]
+
+
+def find_root(model, step, low, high, g_low, g_high, j):
+    """Return the first time at which an event function is not positive, by the Illinois method.
+
+    The function has the value `g_low` > 0 at time `low` and `g_high` <= 0 at time `high`.
+    """
+    kept_end = 0  # end of the bracket that the last iteration kept: 1 high, -1 low
+    evaluations = 0
+    for _ in range(MAX_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        if g_low > 0.0 and g_high < 0.0:
+            secant = low + (high - low) * (g_low / (g_low - g_high))
+            if low < secant < high:
+                middle = secant
+        g = event_function(model, step, middle, j)
+        evaluations += 1
+        if g > 0.0:
+            low, g_low = middle, g
+            if kept_end == 1:
+                g_high *= 0.5
+            kept_end = 1
+        else:
+            high, g_high = middle, g
+            if kept_end == -1:
+                g_low *= 0.5
+            kept_end = -1
+    step.interpolant.n_event_evals += evaluations
+    return high
+
+
+# ---- events in doubt
+
+
+def begin_phase(model, step):
+    """Note the start of a motion: its state, and the step size to try."""
+    location = model.event_location
+    location.phase_t, location.phase_y, location.phase_f = step.t1, step.y1, step.f1
+    location.phase_h = step.h_next
+    location.tolerance_factor = 1.0
+    location.in_doubt = location.must_repeat = False
+    for j in range(model.n_event_functions):
+        location.peaks[j] = 0.0
+
+
+def decide_repetition(model, step):
+    """Decide whether the motion since the last event must be repeated with a tighter tolerance."""
+    location = model.event_location
+    if location.in_doubt and location.tolerance_factor == 1.0:
+        least = SMALLEST_TOLERANCE / step.tolerance
+        factor = REFINEMENT if REFINEMENT > least else least
+        if factor < WORTHWHILE_REFINEMENT:
+            location.tolerance_factor, location.must_repeat, location.t_doubt = factor, True, step.t1
+
+
+def repeat_phase(model, step):
+    """Go back to the start of the motion, to repeat it with the tighter tolerance."""
+    location = model.event_location
+    location.must_repeat = False
+    step.t1, step.y1, step.f1, step.modes1 = location.phase_t, location.phase_y, location.phase_f, step.modes0
+    step.h_next = location.phase_h * location.tolerance_factor**step.active_method.power
+
+
+def end_phase_in_doubt(model, step):
+    """Return to the usual tolerance after a step without doubt."""
+    location = model.event_location
+    if location.tolerance_factor < 1.0 and step.t1 >= location.t_doubt and not location.in_doubt:
+        step.h_next *= location.tolerance_factor**-step.active_method.power
+        begin_phase(model, step)
+
+
+def shorten_step(model, step):
+    """Go back to the start of the step, to try half of it."""
+    model.event_location.must_shorten = False
+    step.h_next = 0.5 * step.h_full
+    step.t1, step.y1, step.f1, step.modes1 = step.t0, step.y0, step.f0, step.modes0
+    step.n_accepted -= 1
+    step.n_rejected += 1
+
+
+# ---- conditions
+
+
+def update_sides(model, t, y: StateVector, modes: ContactVector):
+    """Determine which conditions hold; a condition may depend on others."""
+    location = model.event_location
+    for _ in range(model.n_event_functions + 1):
+        model.update_conditions(t, y, modes)
+        changed = False
+        for j in range(model.n_switches):
+            side = 1.0 if location.margins[j] > 0.0 else -1.0
+            if side != location.sides[j]:
+                location.sides[j], changed = side, True
+        if not changed:
+            break
+    for j in range(model.n_switches):
+        location.sides_after[j] = location.sides[j]
+
+
+def check_limits(model, t, y: StateVector, modes: ContactVector):
+    """Note the first limit that does not hold."""
+    location = model.event_location
+    location.violated = -1
+    model.update_conditions(t, y, modes)
+    for j in range(model.n_event_functions - model.first_condition - model.n_switches):
+        k = model.n_switches + j
+        if location.violated < 0 and location.margins[k] + CONDITION_MARGIN * location.margin_scales[k] + TINY <= 0.0:
+            location.violated = k
+            model.violation_time, model.violation_value = t, location.margins[k]
+
+
+def begin_step(model):
+    """Begin a step with the conditions after the previous one."""
+    location = model.event_location
+    for j in range(model.n_switches):
+        location.sides[j] = location.sides_before[j] = location.sides_after[j]
+
+
+def update_at_event(model, t, y: StateVector, modes: ContactVector, h_max):
+    """Determine the conditions after an event.
+
+    Returns
+    -------
+    int
+        Status: OK, or CHATTERING if a condition keeps changing.
+    """
+    location = model.event_location
+    for j in range(model.n_switches):
+        location.sides_before[j] = location.sides[j]
+    update_sides(model, t, y, modes)
+    if conditions_changed(model):
+        is_quick = t - location.t_condition <= SHORTEST_DWELL * h_max
+        location.n_chatter = location.n_chatter + 1 if is_quick else 0
+        location.t_condition = t
+    return CHATTERING if location.n_chatter > MAX_CHATTER else OK
+
+
+def violation_status(model):
+    """Return OK, or the status of the rule for a condition that must hold but does not."""
+    location = model.event_location
+    return FIRST_RULE + model.first_condition_rule + location.violated if location.violated >= 0 else OK
+
+
+def select_sides(model, after_event):
+    """Select the conditions before or after the event at the end of the step."""
+    location = model.event_location
+    for j in range(model.n_switches):
+        location.sides[j] = location.sides_after[j] if after_event else location.sides_before[j]
+
+
+def conditions_changed(model):
+    """Return whether a condition changes at the end of the step."""
+    location = model.event_location
+    changed = False
+    for j in range(model.n_switches):
+        changed = changed or location.sides_after[j] != location.sides_before[j]
+    return changed
+
+
+# ---- narrow features
+
+
+def step_share(model, step, t1, y1: StateVector):
+    """Return the share of a step to y1 in which no slip velocity passes more than the width of a feature."""
+    width = model.event_location.feature_width
+    slips0, slips1 = contact_vector(), contact_vector()
+    if model.is_coupled:
+        slips0 = model.slip_velocities(step.t0, step.y0)
+        slips1 = model.slip_velocities(t1, y1)
+    else:
+        for i in contact_indices:
+            slips0[i], slips1[i] = step.y0[slip_index[i]], y1[slip_index[i]]
+    share = 1.0
+    for i in contact_indices:
+        if step.modes0[i] != STUCK:
+            start, end = step.modes0[i] * slips0[i], step.modes0[i] * slips1[i]
+            change, allowed = fabs(end - start), fabs(end - start)
+            if start < FEATURE_RANGE * width:
+                allowed = width
+            elif end < start:
+                allowed = start - (FEATURE_RANGE - 1.0) * width
+            if change * share > allowed:
+                share = allowed / change
+    return share
