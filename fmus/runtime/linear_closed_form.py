@@ -10,17 +10,21 @@ spring or none (L. Meirovitch, Fundamentals of Vibrations, chapters 2 and 4, has
 moves at the velocity u (a driver that pulls the spring) is supported without damping only.  The rate q of the force is
 zero unless inputs have derivatives.  For inputs of higher order the motion is computed by power series, interval by
 interval.
+
+With negative damping or stiffness the motion grows, and x = x0 + v0 G + (p - n^2 x0) I + q J is used instead, because a
+body in an equilibrium then stays there exactly.  q includes the moving equilibrium, n^2 u.
 """
 
-from math import atan2, copysign, cos, exp, expm1, fabs, inf, log1p, pi, sin, sqrt
+from math import atan2, copysign, cos, exp, expm1, fabs, fmod, inf, log1p, pi, sin, sqrt
 
 from .codes import MAX_INPUT_ORDER
 from .power_series import TERMS, PowerSeries
 from .rounding import ROUNDOFF_MARGIN
 from .vectors import StateVector
 
-UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE, HIGHER_ORDER_INPUT = 1, 2, 3, 4, 5
+UNDAMPED, UNDERDAMPED, OVERDAMPED, FREE, HIGHER_ORDER_INPUT, GROWING = 1, 2, 3, 4, 5, 6
 MAX_BISECTIONS, MAX_DOUBLINGS = 200, 1000
+MAX_LOG_GROWTH = 30.0  # of a growing motion in one segment, so that a divergence is noticed before any overflow
 
 
 class LinearClosedForm:
@@ -30,8 +34,11 @@ class LinearClosedForm:
         self.regime = UNDAMPED
         self.has_input_derivatives = True  # code generation inserts the flag of the model
         self.z = self.n2 = self.drift = self.q = 0.0
-        self.w = self.slow_root = 0.0
-        self.x0 = self.v0 = self.a0 = self.p = self.x_roundoff = 0.0
+        self.w = self.slow_root = self.upper_root = self.lower_root = 0.0
+        self.oscillates = self.is_steady = False
+        self.max_rate = 0.0  # bound of the magnitudes of the roots of s^2 + 2 z s + n^2
+        self.max_duration = self.horizon = inf  # of a segment that grows, and of the current one
+        self.x0 = self.v0 = self.a0 = self.p = self.net = self.x_roundoff = 0.0
         self.velocity_series = PowerSeries()  # of the velocity, for inputs of higher order
 
     def prepare(self, m, c, k, drift):
@@ -45,11 +52,16 @@ class LinearClosedForm:
             Velocity of the equilibrium in m/s.
         """
         self.z, self.n2, self.drift = 0.5 * c / m, k / m, drift
-        z, n = self.z, sqrt(self.n2)
-        square = (n - z) * (n + z)
+        z, n = self.z, sqrt(fabs(self.n2))
+        square = (n - z) * (n + z) if self.n2 >= 0.0 else -(z * z + n * n)
         self.w = sqrt(fabs(square))
-        self.slow_root = 0.0
-        if z == 0.0:
+        self.oscillates = square > 0.0
+        self.max_rate = fabs(z) + self.w
+        self.slow_root = self.q = 0.0
+        self.max_duration = self.horizon = inf
+        if z < 0.0 or self.n2 < 0.0:
+            self.prepare_growth()
+        elif z == 0.0:
             self.regime = UNDAMPED if n > 0.0 else FREE
         elif square > 0.0:
             self.regime = UNDERDAMPED
@@ -57,9 +69,25 @@ class LinearClosedForm:
             self.regime = OVERDAMPED
             self.slow_root = -self.n2 / (z + self.w)  # slow root of s^2 + 2 z s + n^2, without cancellation
 
+    def prepare_growth(self):
+        """Set the constants of a motion with negative damping or stiffness."""
+        self.regime = GROWING
+        self.q = self.n2 * self.drift
+        growth_rate = -self.z
+        if not self.oscillates:  # two real roots, the larger one positive, without cancellation
+            if self.z > 0.0:
+                self.lower_root = -self.max_rate
+                self.upper_root = self.n2 / self.lower_root
+            else:
+                self.upper_root = self.max_rate
+                self.lower_root = self.n2 / self.upper_root
+            growth_rate = self.upper_root
+        if growth_rate > 0.0:  # it may underflow to zero
+            self.max_duration = MAX_LOG_GROWTH / growth_rate
+
     def set_force_rate(self, q):
         """Set the constant rate q (m/s3) of the acceleration that is due to the force."""
-        self.q = q
+        self.q += q
         if self.regime == UNDAMPED:
             self.drift += q / self.n2  # the equilibrium moves, too
 
@@ -69,6 +97,13 @@ class LinearClosedForm:
         `p` is the acceleration due to the constant force, `x_roundoff` the rounding error of x.
         """
         self.x0, self.v0, self.a0, self.p, self.x_roundoff = x, v, a, p, x_roundoff
+        if self.regime == GROWING:
+            if v != 0.0 and self.z != 0.0:
+                self.net = p - self.n2 * x  # the acceleration without damping
+            else:
+                self.net = a
+            self.is_steady = a == 0.0 and self.q - self.n2 * v == 0.0
+            self.horizon = inf if self.is_steady else self.max_duration
 
     def evaluate(self, t) -> StateVector:
         """Return position and velocity t seconds after the start of the segment."""
@@ -83,6 +118,8 @@ class LinearClosedForm:
             )
         if self.has_input_derivatives and self.regime == HIGHER_ORDER_INPUT:
             return self.evaluate_series(t)
+        if self.regime == GROWING:
+            return self.evaluate_growth(t)
         if self.has_input_derivatives and self.q != 0.0:
             return self.evaluate_ramp(t)
         if self.regime == FREE:
@@ -140,6 +177,40 @@ class LinearClosedForm:
             (self.p - n2 * self.x0) * g + self.v0 * slope + self.q * g_integral,
         )
 
+    def evaluate_growth(self, t) -> StateVector:
+        """Return position and velocity with negative damping or stiffness, for a force with or without a rate."""
+        if self.is_steady:
+            return self.x0 + self.v0 * t, self.v0
+        z, w = self.z, self.w
+        if self.oscillates:
+            e, half = exp(-z * t), 0.5 * w * t
+            s, c = sin(half), cos(half)
+            g = e * (2.0 * s * c / w)
+            mean = e * (1.0 - 2.0 * s * s)
+            slope = mean - z * g
+        else:
+            e, u = exp(self.upper_root * t), expm1(-2.0 * w * t)
+            g = -0.5 * e * u / w if w > 0.0 else e * t
+            mean = e * (1.0 + 0.5 * u)
+            if z > 0.0:
+                slope = 0.5 * (self.upper_root * e - self.lower_root * exp(self.lower_root * t)) / w
+            else:
+                slope = mean - z * g
+        if self.max_rate * t < 1.0:
+            g_integral = self.integral_series(t, 0.5 * t * t, 2)
+            g_integral2 = self.integral_series(t, t * t * t / 6.0, 3)
+        elif self.oscillates or w <= -0.5 * z:
+            g_integral = (1.0 - mean - z * g) / self.n2
+            g_integral2 = (t - 2.0 * z * g_integral - g) / self.n2
+        else:
+            upper, lower = self.upper_root, self.lower_root
+            g_integral = 0.5 * (exp_integral(upper, t) - exp_integral(lower, t)) / w
+            g_integral2 = 0.5 * (exp_double_integral(upper, t) - exp_double_integral(lower, t)) / w
+        return (
+            self.x0 + (self.v0 * g + self.net * g_integral + self.q * g_integral2),
+            self.v0 * slope + self.net * g + self.q * g_integral,
+        )
+
     def expand_series(self, model, t, duration):
         """Expand v'' + 2 z v' + n^2 v = p' in a power series from t on, over `duration` seconds."""
         series = self.velocity_series
@@ -191,7 +262,7 @@ class LinearClosedForm:
         """
         y, y2 = 2.0 * self.z * t, self.n2 * t * t
         previous, total = 0.0, term
-        for j in range(power, 18):
+        for j in range(power, 24):
             term, previous = -(y * j * term + y2 * previous) / ((j + 1.0) * j), term
             total += term
         return total
@@ -201,16 +272,30 @@ class LinearClosedForm:
         v, a = fabs(self.v0), mode * self.a0  # not mode * v0, which is -0.0 for a body at rest
         if self.regime == UNDAMPED:
             return self.undamped_standstill(v, a / self.w, mode * self.drift)
+        if self.regime == GROWING and self.is_steady:
+            return inf
+        if self.regime == GROWING and self.q == 0.0:
+            return self.decay_time(v, a, mode * self.net)
+        if self.regime == GROWING:
+            return self.growing_standstill(mode, v, a, mode * self.q)
         if self.has_input_derivatives and self.q != 0.0:
             return self.ramped_standstill(mode, v, a, mode * self.q)
         return self.decay_time(v, a, mode * self.p)
 
     def decay_time(self, v, a, p):
-        """Return when a solution of the homogeneous equation with value v >= 0 and rate a next falls to zero."""
+        """Return when a solution of the homogeneous equation with value v >= 0 and rate a next falls to zero.
+
+        `p` is a + 2 z v, without cancellation.
+        """
         b = a + self.z * v
         w = self.w
-        if self.regime == UNDERDAMPED:
+        if self.oscillates:
             return atan2(v * w, -b) / w
+        if self.regime == GROWING:
+            upper_root = p + self.upper_root * v  # weight of the upper root
+            if v == 0.0 or upper_root >= 0.0:
+                return inf
+            return 0.5 * log1p(-2.0 * w * v / upper_root) / w if w > 0.0 else -v / upper_root
         # weight of the slow root; without a spring it is given by p
         slow_root = b + w * v if self.n2 > 0.0 else p
         if v == 0.0 or slow_root >= 0.0:
@@ -228,14 +313,7 @@ class LinearClosedForm:
         if self.regime == FREE:
             return free_standstill(v, a, q)
         z, w = self.z, self.w
-        jerk = q - 2.0 * z * a - self.n2 * v
-        low, high = 0.0, inf
-        if a > 0.0 or (a == 0.0 and jerk > 0.0):
-            low = self.decay_time(fabs(a), jerk, q)
-            if self.regime == UNDERDAMPED:
-                high = low + pi / w
-        else:
-            high = self.decay_time(fabs(a), -jerk, -q)
+        low, high = self.falling_interval(v, a, q)
         if not low < inf or (high == inf and q > 0.0):
             return inf  # it rises forever, or falls towards a positive velocity
         if high < inf:
@@ -250,11 +328,51 @@ class LinearClosedForm:
                 _, v_min = self.evaluate_ramp(high)
                 if mode * v_min <= 0.0:
                     break
+        return self.bisect_standstill(mode, low, high)
+
+    def growing_standstill(self, mode, v, a, q):
+        """Return the same for a growing motion, inf if it is beyond the horizon."""
+        low, high = self.falling_interval(v, a, q)
+        if self.oscillates and high < self.horizon:
+            period = 2.0 * pi / self.w
+            log_growth = -self.z * period
+            _, v_min = self.evaluate(high)
+            swing = q / self.n2 - mode * v_min  # it grows by the same factor in each period
+            if not (swing > 0.0 and log_growth > 0.0):
+                return inf
+            if mode * v_min > ROUNDOFF_MARGIN * v:
+                periods = log1p(mode * v_min / swing) / log_growth
+                high += (periods - fmod(periods, 1.0)) * period  # the minimum at or just before the one below zero
+                _, v_min = self.evaluate(high if high < self.horizon else self.horizon)
+                if mode * v_min > 0.0:
+                    high += period
+                low = high - 0.5 * period
+        if not low < self.horizon:
+            return inf
+        high = high if high < self.horizon else self.horizon
+        _, v_min = self.evaluate(high)
+        return inf if mode * v_min > ROUNDOFF_MARGIN * v else self.bisect_standstill(mode, low, high)
+
+    def falling_interval(self, v, a, q):
+        """Return when the acceleration becomes negative, and when positive again."""
+        jerk = q - 2.0 * self.z * a - self.n2 * v
+        net = q - self.n2 * v  # jerk without damping
+        low, high = 0.0, inf
+        if a > 0.0 or (a == 0.0 and jerk > 0.0):
+            low = self.decay_time(fabs(a), jerk, net)
+            if self.oscillates:
+                high = low + pi / self.w
+        else:
+            high = self.decay_time(fabs(a), -jerk, -net)
+        return low, high
+
+    def bisect_standstill(self, mode, low, high):
+        """Return when the velocity in the direction of the mode, positive at `low` only, reaches zero."""
         for _ in range(MAX_BISECTIONS):
             middle = 0.5 * (low + high)
             if not low < middle < high:
                 break
-            _, v_middle = self.evaluate_ramp(middle)
+            _, v_middle = self.evaluate(middle)
             if mode * v_middle > 0.0:
                 low = middle
             else:
@@ -278,6 +396,11 @@ def lag_series(square):
     """Return 1 - sin(y)/y from y^2 by its series, for y below 0.5."""
     tail = 1.0 - square / 72.0 * (1.0 - square / 110.0 * (1.0 - square / 156.0 * (1.0 - square / 210.0)))
     return square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * tail))
+
+
+def exp_integral(s, t):
+    """Return the integral of exp(s t) from 0 to t."""
+    return expm1(s * t) / s if s != 0.0 else t
 
 
 def exp_double_integral(s, t):

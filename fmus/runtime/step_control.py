@@ -232,17 +232,17 @@ class InternalStep:
         return OK
 
     def advance_linear_segment(self, model):
-        """Follow the closed form up to the next standstill or the end of the run."""
+        """Follow the closed form up to the next standstill, the end of the run, or the horizon of a growing motion."""
         exact = self.active_method.exact
         roundoff = self.roundoff
         roundoff.carry()
         exact.start_segment(self.y0, self.f0, model.applied_acceleration(self.t0, self.modes0), roundoff.x0)
-        self.t1 = self.t_end
+        self.t1 = self.t_end if self.t_end - self.t0 <= exact.horizon else self.t0 + exact.horizon
         if model.has_dry_friction:
             duration = exact.next_standstill(self.modes0)
             elapsed = duration + roundoff.t0
             end = self.t0 + elapsed
-            if end <= self.t_end and end < inf:
+            if end <= self.t1 and end < inf:
                 t_step = end - self.t0
                 roundoff.t1 = (self.t0 - (end - t_step)) + (elapsed - t_step)
                 self.t1 = end
@@ -259,8 +259,7 @@ class InternalStep:
     def advance_power_series(self, model):
         """Follow a power series over one interval or up to the next standstill, for inputs of higher order."""
         exact = self.active_method.exact
-        max_rate = exact.z + exact.w
-        duration = self.h_max if self.h_max * max_rate < 1.0 else 1.0 / max_rate
+        duration = self.h_max if self.h_max * exact.max_rate < 1.0 else 1.0 / exact.max_rate
         remaining = self.t_end - self.t0
         last = duration >= remaining
         if last:
