@@ -18,7 +18,7 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from itertools import count, takewhile
 
-from mpmath import atan2, atanh, exp, factorial, findroot, mp, mpf, pi, re, sign, sqrt
+from mpmath import atan2, atanh, exp, factorial, findroot, im, mp, mpf, pi, re, sign, sqrt
 
 mp.dps = 80
 TOUCH_TOLERANCE = mpf(10) ** -40  # a smaller speed only touches zero; a load closer to the limit equals the limit
@@ -69,21 +69,13 @@ class LinearSegment:
         self.m, self.c, self.k = mpf(system.m), mpf(system.c), mpf(system.k)
         self.net, self.rate, self.v = mpf(net), system.rate, mpf(v)
         spread = sqrt(self.c**2 - 4 * self.m * self.k)
-        self.nodes = [(-self.c - spread) / (2 * self.m), (-self.c + spread) / (2 * self.m), mpf(0), mpf(0)]
+        self.roots = [(-self.c - spread) / (2 * self.m), (-self.c + spread) / (2 * self.m)]
 
     def at(self, s):
         """Return displacement y and speed y' at s."""
-        first = [exp(r * s) for r in self.nodes]
-        row, heads = first, []
-        for n in range(1, 4):
-            row = [
-                (b - a) / (high - low) if high != low else s**n / factorial(n) * start
-                for a, b, low, high, start in zip(row, row[1:], self.nodes, self.nodes[n:], first, strict=False)
-            ]
-            heads.append(row[0])
-        G, I, J = heads  # noqa: E741 - the names of the equations
+        G, I, J = (divided_difference([*self.roots, *[mpf(0)] * zeros], s) for zeros in range(3))  # noqa: E741
         y = self.v * G + (self.net * I + self.rate * J) / self.m
-        v = self.v * (first[0] + self.nodes[1] * G) + (self.net * G + self.rate * I) / self.m
+        v = self.v * (exp(self.roots[0] * s) + self.roots[1] * G) + (self.net * G + self.rate * I) / self.m
         return re(y), re(v)
 
     def flats(self):
@@ -118,9 +110,24 @@ class LinearSegment:
             if catches and abs(self.at(high)[1]) <= TOUCH_TOLERANCE:
                 return high
             if mode * self.at(high)[1] < -TOUCH_TOLERANCE:
+                for _ in range(60):  # the speed may grow by many powers of ten up to `high`
+                    middle = (low + high) / 2
+                    low, high = (middle, high) if mode * self.at(middle)[1] > 0 else (low, middle)
                 return findroot(lambda s: self.at(s)[1], (low, high), solver="anderson", tol=ROUNDING, maxsteps=200)
             low = high
         return None
+
+
+def divided_difference(nodes, s):
+    """Return the divided difference of exp(r s) over the nodes r."""
+    nodes = sorted(nodes, key=lambda r: (re(r), im(r)))  # so that equal nodes are neighbours
+    row = first = [exp(r * s) for r in nodes]
+    for n in range(1, len(nodes)):
+        row = [
+            (b - a) / (high - low) if high != low else s**n / factorial(n) * start
+            for a, b, low, high, start in zip(row, row[1:], nodes, nodes[n:], first, strict=False)
+        ]
+    return row[0]
 
 
 class Stuck:
