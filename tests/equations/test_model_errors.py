@@ -1,10 +1,12 @@
 """Mistakes in a model file are reported at build time in one sentence with the line number."""
 
+import inspect
 import re
 
 import pytest
 from commands import build
 
+import fmus
 from fmus.packaging import BuildError
 from fmus.packaging.model_lookup import find_model
 
@@ -33,7 +35,7 @@ WRONG = {
     "no rate": ("", 15, "v has no derivative: declare an Output or a State with rate_of=v"),
     "two rates": (RATE + RATE.replace("a =", "b ="), 17, "b and a both declare rate_of=v"),
     "two equations": (RATE + RATE, 17, "a is assigned twice: give the second equation another name"),
-    "an unknown name": (RATE.replace("F -", "G -"), 16, "NameError: name 'G' is not defined"),
+    "an unknown name": (RATE.replace("F -", "G -"), 16, "G is not defined: declare it before this line"),
     "no Python": (RATE.replace("F -", "F - -) "), 16, "invalid Python: "),
     "units": (
         RATE.replace("k * x", "k * v"),
@@ -56,7 +58,11 @@ WRONG = {
         17,
         "the argument of sin(x) must be dimensionless, got m",
     ),
-    "an if": (RATE + "    if x > 0.0:\n        pass\n", 17, "an expression has no value at build time: write choose("),
+    "an if": (
+        RATE + "    if x > 0.0:\n        pass\n",
+        17,
+        "an expression has no value at build time, as if, and, or,",
+    ),
     "a loop": (RATE + "    for y in x:\n        pass\n", 17, "x is a scalar: it cannot be iterated over"),
     "a table": (
         RATE + "    table = [1.0, 2.0]\n    y = table[x]\n",
@@ -67,7 +73,7 @@ WRONG = {
     "math.sin": (
         RATE + "    import math\n    y = math.sin(x)\n",
         18,
-        "x has no value at build time: import functions of expressions from fmus",
+        "x has no value at build time, so functions of math and numpy do not take it: import functions from fmus",
     ),
     "a text": (RATE + '    y = x + "1"\n', 17, "'1' is neither a number nor an expression"),
     "infinity": (RATE + '    y = x + float("inf")\n', 17, "inf is not a finite number"),
@@ -152,7 +158,7 @@ WRONG = {
     "a unit for a number": (
         RATE + '    q = Parameter("kg", 1.0, "charge")\n',
         17,
-        "q: unit and description must be strings",
+        "unit of a declaration must be a string, got 1.0: write Parameter(start, unit, text, low=",
     ),
     "a text for a number": (
         RATE + '    q = Parameter("1.0", "kg", "q")\n',
@@ -162,19 +168,19 @@ WRONG = {
     "a variable without a name": (
         RATE.replace("F - k * x", 'Parameter(1.0, "N", "pull") - k * x'),
         16,
-        "a uses a variable without a name, which is not declared in Mine",
+        "a uses a variable without a name: assign the variable to a name first",
     ),
     "an alias of what is calculated": (
         RATE.replace("rate_of=v", 'rate_of=v, alias="b"'),
         16,
-        "a has the alias b: only a Parameter, Fixed or Input may have one",
+        "Output has no argument alias: write Output(unit, text, expression, rate_of=",
     ),
     "an alias that is a name": (
         RATE + '    q = Parameter(1.0, "kg", "mass", alias="m")\n',
         17,
         "q has the alias 'm': it must be an identifier that nothing else uses",
     ),
-    "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is invalid: it must be above 0"),
+    "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is invalid: it must be a number above 0"),
     "a broken rule": (
         RATE + '    rules = Rule(k + k > k, "k = {k!r} is too much")\n',
         4,
@@ -266,6 +272,141 @@ WRONG = {
         17,
         "the name time is reserved by the solver or by C",
     ),
+    "a method": (RATE + "    def rates(self):\n        pass\n", 17, "nothing calls the function rates"),
+    "a constructor": (RATE + "    def __init__(self):\n        pass\n", 17, "nothing calls the function __init__"),
+    "a property": (
+        RATE + "    @property\n    def energy(self):\n        return 1.0\n",
+        18,
+        "nothing calls the function energy",
+    ),
+    "a misspelt stop time": (RATE + "    stoptime = 8.0\n", 17, "nothing uses stoptime: write stop_time, or remove it"),
+    "a misspelt method": (RATE + '    metod = "rodas"\n', 17, "nothing uses metod: write method, or remove it"),
+    "a number that nothing reads": (
+        RATE + "    g = 9.81\n",
+        17,
+        "nothing uses g = 9.81: declare it as Parameter and use it in an equation, or remove it",
+    ),
+    "a list that nothing reads": (RATE + "    masses = [1.0, 2.0]\n", 17, "nothing uses masses: declare it"),
+    "a field of a dataclass": (RATE + "    g: float = 9.81\n", 17, "nothing uses g = 9.81: declare it"),
+    "a type alone": (RATE + "    g: float\n", 17, "g has a type but no value: declare it"),
+    "a rule under another name": (
+        RATE + '    limit = Rule(k > k + k, "too much")\n',
+        17,
+        "nothing uses the rule limit: write rules = Rule(...), or a tuple of rules",
+    ),
+    "a rule without a name": (
+        RATE + '    for n in range(2):\n        Rule(k > n * k, "too much")\n',
+        18,
+        "this Rule belongs to no name, so the model does not have it: write rules = Rule(...)",
+    ),
+    "rules twice": (
+        RATE + '    rules = Rule(k > k + k, "one")\n    rules = Rule(k > k + k, "two")\n',
+        18,
+        "rules is assigned twice",
+    ),
+    "a base that is a model": (
+        RATE + "class More(Mine):\n    pass\n",
+        17,
+        "More derives from Mine, but a model can only derive from Model",
+    ),
+    "a later declaration": (
+        RATE.replace("k * x", "k * y") + '    y = State("m", "late", rate=u)\n',
+        16,
+        "y is used before its declaration in line 17",
+    ),
+    "its own rate": (RATE.replace("rate_of=v", "rate_of=a"), 16, "a is used in its own declaration"),
+    "a misspelt name": (RATE.replace("k * x", "stif * x").replace("    a", "    stiff = k\n    a"), 17, "stif is not"),
+    "a missing import": (RATE.replace("F - ", "F - gamma(x) -"), 16, "gamma is not defined: declare it before this"),
+    "the time in an equation": (RATE.replace("F -", "F * sin(t) -"), 16, "t is not defined: for the time, declare a"),
+    "self": (RATE.replace("k * x", "self.k * x"), 16, "self is not defined: write the names of the variables without"),
+    "the sign of a speed": (RATE.replace("F -", "F * sign(v) -"), 16, "sign is not defined: declare dry friction as"),
+    "a function of numpy": (
+        RATE + "    import numpy as np\n    y = np.sin(x)\n",
+        18,
+        "an expression has no value at build time, so functions of math and numpy do not take it",
+    ),
+    "a square": (
+        RATE + "    y = v**2\n",
+        17,
+        "** is not supported, because its rounding differs between platforms: write v * v",
+    ),
+    "a root": (
+        RATE + "    y = x**0.5\n",
+        17,
+        "** is not supported, because its rounding differs between platforms: write sqrt(x)",
+    ),
+    "a maximum": (
+        RATE + "    y = max(x, 0.0)\n",
+        17,
+        "an expression has no value at build time, as if, and, or, not, max",
+    ),
+    "a chained comparison": (RATE + "    y = choose(0.0 < x < k, x, 0.0)\n", 17, "an expression has no value at build"),
+    "two conditions": (
+        RATE + "    y = choose((x > 0.0) & (v > 0.0), x, 0.0)\n",
+        17,
+        "&, |, ^ and ~ are not supported: nest choose(condition, this, that)",
+    ),
+    "a remainder": (RATE + "    y = x % 2.0\n", 17, "%, // and @ are not supported"),
+    "a comparison as a number": (
+        RATE + '    y = Output("N", "pull", (x > 0.0) * F)\n',
+        17,
+        "a comparison is no number: it can only be the first argument of choose() or of a Rule",
+    ),
+    "the number of a choice": (
+        RATE + '    q = Choice("kind", a="x", b="y")\n    y = Output("N", "pull", q * F)\n',
+        18,
+        "y calculates with the Choice q: write q.choose(a=..., b=...)",
+    ),
+    "an argument of another program": (
+        RATE + '    q = Parameter(1.0, "kg", "q", min=0.0)\n',
+        17,
+        "Parameter has no argument min, the nearest is low: write Parameter(start, unit, text, low=, high=",
+    ),
+    "an argument of an earlier version": (
+        RATE + '    q = State("m", "q", rate=u, finest=1e-3)\n',
+        17,
+        "State has no argument finest, the nearest is nominal_velocity: write State(unit, text, start=",
+    ),
+    "a contact without slide": (
+        DRY.replace(", slide=f", "") + STUCK,
+        17,
+        "Contact lacks the argument slide: write Contact(unit, text, mode, slip, slide, hold=",
+    ),
+    "items in a list": (
+        RATE + '    q = Choice("kind", ["a", "b"])\n',
+        17,
+        "Choice takes at most 1 arguments without a name, got 2: write Choice(text, **items)",
+    ),
+    "two modes": (
+        DRY.replace("mode=mode", "mode=(mode, mode)") + STUCK,
+        17,
+        "mode of a Contact must be a Mode that is declared before it, got an object of type tuple",
+    ),
+    "a position as slip": (
+        DRY.replace("slip=v", "slip=x") + STUCK,
+        17,
+        "slip of R is x, but a slip is a speed: write slip=v",
+    ),
+    "a slip in quotes": (
+        DRY.replace("slip=v", 'slip="v"') + STUCK,
+        17,
+        "slip of a Contact must be an expression of st",
+    ),
+    "the rate of a sum": (
+        RATE.replace("rate_of=v", "rate_of=v + u"),
+        16,
+        "rate_of of a is an expression, which is not a state of the model",
+    ),
+    "no range": (
+        RATE + '    E = Output("N", "pull", k * x, low=3.0, high=1.0)\n',
+        17,
+        "E has an empty range: no number is at least 3.0 N and at most 1.0 N",
+    ),
+    "an expression as start": (
+        RATE + '    q = Parameter(2.0 * m, "kg", "q")\n',
+        17,
+        "q: start value and bounds must be numbers, got an expression",
+    ),
     "a name for the rate of a driver": (
         RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
         17,
@@ -282,6 +423,45 @@ def test_a_mistake_is_reported_in_one_sentence_with_its_line(wrong, tmp_path):
     with pytest.raises(BuildError, match=re.escape(f"{path}, line {line}: {sentence}")) as error:
         find_model(path).model  # noqa: B018
     assert "\n" not in str(error.value)
+
+
+WORKS = """
+    scale, names = 2.0, ("x", "y")
+    __slots__ = ()
+    _note = "names with _ may be unused"
+    import math
+    def pull(stretch, k=k):
+        return k * stretch
+    for _ in range(2):
+        pass
+    body = vars()
+    for n, name in enumerate(names):
+        body[f"{name}_force"] = Output("N", f"force {n}", scale * math.pi * pull(x))
+    alias = k
+    unused = k * x
+    stop_time: float = 8.0
+"""
+
+
+def test_helper_values_of_the_class_body_are_allowed(tmp_path):
+    """Values that the body reads, private names, modules, aliases and terms; real numbers of numpy."""
+    path = tmp_path / "mine.py"
+    numbers = '    q = Parameter(np.int64(2), "kg", "q", low=np.float32(0.5))\n'
+    path.write_text(HEAD.replace("from", "import numpy as np\nfrom", 1) + RATE + WORKS + numbers)
+    model = find_model(path).model
+    assert {"x_force", "y_force"} <= vars(model).keys()
+    assert (model.stop_time, model.q.start, model.q.low) == (8.0, 2.0, 0.5)
+    assert find_model(path).analysis.model.stop_time == 8.0
+
+
+@pytest.mark.parametrize("kind", [fmus.Parameter, fmus.Fixed, fmus.Input, fmus.State, fmus.Output, fmus.Contact])
+def test_the_signature_of_a_declaration_names_all_arguments(kind):
+    """And its documentation describes each of them."""
+    arguments = inspect.signature(kind).parameters
+    assert {"unit", "text", "low", "high", "above", "below", "display"} <= arguments.keys()
+    assert not {"args", "kwargs", "more", "_"} & arguments.keys()
+    described = {word for line in kind.__doc__.splitlines() for word in line.strip().split(", ")}
+    assert arguments.keys() <= described
 
 
 def test_any_docstring_text_survives_unchanged(tmp_path):

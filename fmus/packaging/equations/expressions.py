@@ -2,7 +2,8 @@
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from numbers import Real
 from pathlib import Path
 from typing import Any, Never
 
@@ -27,6 +28,12 @@ FUNCTIONS: dict[str, Callable[[Operand, Operand], Operand]] = {
     "fabs": lambda u, value: Term("copysign", 1.0, u),
 }
 COMPARISONS = ("<", "<=", ">", ">=", "==")
+MAX_VALUE_LENGTH = 60  # characters of a value in a message
+POWERS: dict[object, str] = {2: "{0} * {0}", 3: "{0} * {0} * {0}", 0.5: "sqrt({0})", -1: "1.0 / {0}"}
+NO_VALUE = (
+    "{name} has no value at build time, so functions of math and numpy do not take it: import functions from fmus, "
+    f"which has {', '.join(FUNCTIONS)}"
+)
 
 
 class ModelError(ValueError):
@@ -65,11 +72,6 @@ class Expression:
     name = ""
     location: tuple[str, int]
 
-    def __new__(cls, *_: object, **__: object) -> "Expression":
-        expression = super().__new__(cls)
-        expression.location = author_location()
-        return expression
-
     __add__, __radd__ = _binary_operators("+")
     __sub__, __rsub__ = _binary_operators("-")
     __mul__, __rmul__ = _binary_operators("*")
@@ -90,20 +92,33 @@ class Expression:
         """Compare by identity within this package; raise ModelError in model files."""
         if self is not other and not sys._getframe(1).f_code.co_filename.startswith(PACKAGING_FOLDER):
             raise ModelError(
-                "== and != cannot compare expressions, which have no value yet: write choose(a < b, this, that)"
+                "== and != cannot compare expressions, which have no value yet: write choose(a < b, this, that), or "
+                "name.choose(label=this, ...) for a Choice"
             )
         return self is other
 
     __hash__ = object.__hash__
 
-    __pow__ = __rpow__ = _refusal(
-        "** is not supported, because its rounding differs between platforms: write x * x, or exp and log"
+    def __pow__(self, exponent: Hashable) -> Never:
+        x = self.name or "x"
+        instead = POWERS.get(exponent, "exp(n * log({0}))")
+        raise ModelError(
+            f"** is not supported, because its rounding differs between platforms: write {instead.format(x)}"
+        )
+
+    __rpow__ = _refusal("** is not supported, because its rounding differs between platforms: write exp(x * log(a))")
+    __bool__ = _refusal(
+        "{name} has no value at build time, as if, and, or, not, max, min and a < x < b would need: write "
+        "choose(condition, this, that), for example choose(x > 0.0, x, 0.0) instead of max(x, 0.0)"
     )
-    __bool__ = _refusal("{name} has no value at build time: write choose(condition, this, that) instead of if")
-    __float__ = _refusal(
-        "{name} has no value at build time: import functions of expressions from fmus, which has "
-        f"{', '.join(FUNCTIONS)}"
+    __float__ = _refusal(NO_VALUE)
+    __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __divmod__ = __rdivmod__ = __matmul__ = __rmatmul__ = _refusal(
+        "%, // and @ are not supported: use +, -, *, / and choose(condition, this, that)"
     )
+    __and__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = __invert__ = _refusal(
+        "&, |, ^ and ~ are not supported: nest choose(condition, this, that), one comparison in each"
+    )
+    __round__ = __trunc__ = __floor__ = __ceil__ = _refusal(NO_VALUE)
     __iter__ = _refusal("{name} is a scalar: it cannot be iterated over")
     __index__ = _refusal(
         "{name} has no value at build time and cannot index a table: write a formula, or a piecewise one with "
@@ -115,19 +130,40 @@ class Expression:
 def as_operand(e: Operand) -> Operand:
     """Return an expression unchanged and a number as float; raise ModelError for anything else."""
     if isinstance(e, Expression):
+        if is_comparison(e):
+            raise ModelError("a comparison is no number: it can only be the first argument of choose() or of a Rule")
         return e
-    if isinstance(e, bool) or not isinstance(e, (int, float)):
-        raise ModelError(f"{e!r} is neither a number nor an expression")
+    if not is_number(e):
+        raise ModelError(f"{describe(e)} is neither a number nor an expression")
     if not math.isfinite(e):
         raise ModelError(f"{e!r} is not a finite number")
     return float(e)
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value is a real number, also of numpy; Booleans are not."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def is_comparison(e: Operand) -> bool:
+    """Return whether an operand is a comparison, which has no numerical value."""
+    return isinstance(e, Term) and e.op in COMPARISONS
+
+
+def describe(value: object) -> str:
+    """Return a short text for a value in a message."""
+    if isinstance(value, (str, int, float, complex, type(None))):
+        return text if len(text := repr(value)) <= MAX_VALUE_LENGTH else f"{text[:MAX_VALUE_LENGTH]}..."
+    return "an expression" if isinstance(value, Term) else f"an object of type {type(value).__name__}"
 
 
 class Term(Expression):
     """An operation or function applied to operands."""
 
     def __init__(self, op: str, *args: Operand) -> None:
-        self.op, self.args = op, tuple(map(as_operand, args))
+        self.location = author_location()
+        condition = args[:1] if op == "choose" else ()
+        self.op, self.args = op, (*condition, *map(as_operand, args[len(condition) :]))
 
 
 def _function(name: str) -> Callable[[Operand], Operand]:

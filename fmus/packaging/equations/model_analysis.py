@@ -24,11 +24,12 @@ from .algebra import (
     is_summand,
     negate,
     solve_for,
+    subexpressions,
     substitute,
     variables_in,
 )
 from .conditions import HOLD_TOLERANCE, Condition, find_conditions, is_nonnegative
-from .expressions import COMPARISONS, Expression, ModelError, Operand, Term
+from .expressions import Expression, ModelError, Operand, Term, describe, is_comparison, is_number
 from .generated_names import RESERVED, RESERVED_WHERE_COUPLED
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 
@@ -167,7 +168,7 @@ class ModelAnalysis:
         for e in self.declared:
             if isinstance(e, (State, Output)) and e.integrates is not None:
                 if e.integrates not in self.states:
-                    integrates = getattr(e.integrates, "name", repr(e.integrates))
+                    integrates = getattr(e.integrates, "name", "") or describe(e.integrates)
                     raise ModelError(
                         f"rate_of of {e.name} is {integrates}, which is not a state of the model", e.location
                     )
@@ -193,9 +194,13 @@ class ModelAnalysis:
         for e in self.declared:
             for part in self.declared_expressions(e):
                 for leaf in variables_in(part):
+                    if not leaf.name:
+                        raise ModelError(
+                            f"{e.name} uses a variable without a name: assign the variable to a name first", e.location
+                        )
                     if leaf not in known:
-                        word = leaf.name or "a variable without a name"
-                        raise ModelError(f"{e.name} uses {word}, which is not declared in {self.name}", e.location)
+                        raise ModelError(f"{e.name} uses {leaf.name}, which is not declared in {self.name}", e.location)
+                self._check_choices(e, part)
             self._check_variable(e)
             self._check_alias(e)
         for mode in self.modes:
@@ -216,8 +221,10 @@ class ModelAnalysis:
                         f"{word} of {s.name} varies with time: it must depend on parameters only", s.location
                     )
         for rule in self.rules:
-            if not (isinstance(rule.broken, Term) and rule.broken.op in COMPARISONS):
-                raise ModelError(f"a Rule needs a comparison of parameters first, got {rule.broken!r}", location)
+            if not is_comparison(rule.broken):
+                raise ModelError(
+                    f"a Rule needs a comparison of parameters first, got {describe(rule.broken)}", location
+                )
             if depends_on(rule.broken, (*self.time_varying, *self.inputs)):
                 raise ModelError("a Rule must depend on parameters only", rule.broken.location)
             self._check_printable("the sentence of a Rule", rule.broken.location, rule.sentence)
@@ -233,9 +240,10 @@ class ModelAnalysis:
             )
         for word, most in ("stop_time", inf), ("step_size", inf), ("tolerance", 1.0):
             value = getattr(self.model, word)
-            value = getattr(value, "name", value)
-            if not isinstance(value, (int, float)) or not 0.0 < value < most:
-                raise ModelError(f"{word} = {value!r} is invalid: it must be above 0 and below {most:g}", location)
+            if not is_number(value) or not 0.0 < value < most:
+                raise ModelError(
+                    f"{word} = {describe(value)} is invalid: it must be a number above 0 and below {most:g}", location
+                )
         if not (self.model.__doc__ or "").strip():
             raise ModelError(
                 f"{self.name} has no docstring: its first line becomes the description of the FMU, the rest its page",
@@ -244,25 +252,39 @@ class ModelAnalysis:
         self._check_printable(self.name, location, (self.model.__doc__ or "").replace("\n", " "))
 
     @staticmethod
-    def _check_variable(e: Variable) -> None:
+    def _check_choices(e: Variable, part: Operand) -> None:
+        """Check that an expression does not calculate with the number of a Choice."""
+        for one in subexpressions(part).values():
+            parts = one.args if isinstance(one, Term) and one.op != "==" else ()
+            for choice in (*parts, part):
+                if isinstance(choice, Choice):
+                    cases = ", ".join(f"{label}=..." for label, _, _ in choice.items)
+                    raise ModelError(
+                        f"{e.name} calculates with the Choice {choice.name}: write {choice.name}.choose({cases})",
+                        e.location,
+                    )
+
+    def _check_variable(self, e: Variable) -> None:
         """Check types of texts and numbers, and the range of the start value."""
-        if not all(isinstance(one, str) for one in (e.unit, e.text, e.display, e.alias)) or not e.text:
-            raise ModelError(
-                f"{e.name}: unit and description must be strings, and the description not empty", e.location
-            )
+        if not e.text:
+            raise ModelError(f"{e.name} has an empty description: write a text", e.location)
         ModelAnalysis._check_printable(e.name, e.location, e.text, *(sentence for _, _, sentence in e.items))
         for one in (e.start, e.low, e.high, e.above, e.below):
-            if not isinstance(one, (int, float)) or isinstance(one, bool) or LARGEST_FLOAT < abs(one) < inf:
-                raise ModelError(f"{e.name}: start value and bounds must be numbers", e.location)
+            if not is_number(one) or (isinstance(one, int) and abs(one) > LARGEST_FLOAT):
+                got = "an expression" if isinstance(one, Expression) else describe(one)
+                raise ModelError(f"{e.name}: start value and bounds must be numbers, got {got}", e.location)
+        if not max(e.low, e.above) <= min(e.high, e.below):
+            raise ModelError(f"{e.name} has an empty range: no number is {e.allowed}", e.location)
+        if isinstance(e, Contact) and e.slip in self.positions:
+            raise ModelError(
+                f"slip of {e.name} is {e.slip.name}, but a slip is a speed: write slip={self.rate[e.slip].name}",
+                e.location,
+            )
         if isinstance(e, (Parameter, Fixed, Input)) and not e.accepts(e.start):
             raise ModelError(f"{e.name} has the start value {e.start!r}; it must be {e.allowed}", e.location)
 
     def _check_alias(self, e: Variable) -> None:
-        """Check the alias; calculated variables must not have one, because some validators reject it."""
-        if e.alias and not isinstance(e, (Parameter, Fixed, Input)):
-            raise ModelError(
-                f"{e.name} has the alias {e.alias}: only a Parameter, Fixed or Input may have one", e.location
-            )
+        """Check that the alias is an identifier that nothing else uses."""
         known = [word for each in self.declared for word in (each.name, each.alias)]
         if e.alias and (not e.alias.isidentifier() or known.count(e.alias) > 1 or e.alias in RESERVED):
             raise ModelError(

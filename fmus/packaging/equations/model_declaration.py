@@ -1,22 +1,79 @@
 """Declarations in a model file: variables, contacts, rules and the base class Model."""
 
-from collections.abc import MutableMapping
+from collections.abc import Callable, MutableMapping
+from difflib import get_close_matches
+from functools import cached_property
+from inspect import signature
+from math import inf
+from types import FunctionType, ModuleType
 from typing import Any
 
 from ...runtime import variable_declarations
-from .expressions import Expression, ModelError, Operand, Term, as_operand, author_location
+from .expressions import Expression, ModelError, Operand, Term, as_operand, author_location, describe, is_comparison
 
 HYBRID, SIGN, THRESHOLD = "hybrid", "sign", "threshold"
+SETTINGS = ("rules", "stop_time", "step_size", "tolerance", "method")  # attributes of Model
+FUNCTION_TYPES = (FunctionType, property, staticmethod, classmethod, cached_property)
+
+
+def signature_text(function: Callable[..., object]) -> str:
+    """Return the arguments of a function or class, with those that can be left out as name=."""
+    texts = [
+        str(one).split(":")[0] if one.default is one.empty else f"{one.name}="
+        for one in signature(function).parameters.values()
+    ]
+    return f"({', '.join(texts)})"
 
 
 class Variable(Expression, variable_declarations.VariableDeclaration):
     """A declared variable: name, unit, description and range."""
 
+    def __init__(
+        self,
+        unit: str,
+        text: str,
+        *,
+        low: float = -inf,
+        high: float = inf,
+        above: float = -inf,
+        below: float = inf,
+        display: str = "",
+        alias: str = "",
+    ) -> None:
+        for word, value in ("unit", unit), ("text", text), ("display", display), ("alias", alias):
+            if not isinstance(value, str):
+                raise ModelError(
+                    f"{word} of a declaration must be a string, got {describe(value)}: write "
+                    f"{type(self).__name__}{signature_text(type(self))}"
+                )
+        variable_declarations.VariableDeclaration.__init__(self, unit, text, low, high, above, below, display, alias)
+        self.location = author_location()
+
     def __set_name__(self, owner: object, name: str) -> None:
         """Keep the name of the first assignment; an alias such as D = mu_s does not change it."""
 
 
-class Parameter(Variable, variable_declarations.Parameter):
+class SettableVariable(Variable):
+    """A variable with a value that the user or another FMU sets."""
+
+    def __init__(
+        self,
+        start: float,
+        unit: str,
+        text: str,
+        *,
+        low: float = -inf,
+        high: float = inf,
+        above: float = -inf,
+        below: float = inf,
+        display: str = "",
+        alias: str = "",
+    ) -> None:
+        Variable.__init__(self, unit, text, low=low, high=high, above=above, below=below, display=display, alias=alias)
+        self.start = start
+
+
+class Parameter(SettableVariable, variable_declarations.Parameter):
     """A parameter, tunable at every communication point.
 
     Parameters
@@ -38,21 +95,43 @@ class Parameter(Variable, variable_declarations.Parameter):
     """
 
 
-class Fixed(Variable, variable_declarations.Fixed):
-    """A parameter that is fixed after initialization, such as the start value of a state."""
+class Fixed(SettableVariable, variable_declarations.Fixed):
+    """A parameter that is fixed after initialization, such as the start value of a state.
+
+    Parameters
+    ----------
+    start, unit, text, low, high, above, below, display, alias
+        As for Parameter.
+    """
 
 
-class Input(Variable, variable_declarations.Input):
-    """An input; arguments as for Parameter."""
+class Input(SettableVariable, variable_declarations.Input):
+    """An input, set by another FMU or by the importer during the run.
+
+    Parameters
+    ----------
+    start, unit, text, low, high, above, below, display, alias
+        As for Parameter.
+    """
 
 
 class Choice(Variable, variable_declarations.Choice):
-    """An enumeration with items label=sentence, numbered from 1; the first is the default."""
+    """An enumeration, numbered from 1; the first item is the default.
+
+    Parameters
+    ----------
+    text
+        Short description.
+    **items
+        Items as label="meaning".
+    """
 
     def __init__(self, text: str, **items: str) -> None:
         if not items:
             raise ModelError("a Choice needs at least one item: label=sentence")
-        super().__init__(1, text, tuple((label, n, sentence) for n, (label, sentence) in enumerate(items.items(), 1)))
+        Variable.__init__(self, "", text)
+        self.start = 1
+        self.items = tuple((label, n, sentence) for n, (label, sentence) in enumerate(items.items(), 1))
         self.tests = {label: Term("==", self, n) for n, label in enumerate(items, 1)}
 
     def choose(self, **cases: Operand) -> Operand:
@@ -80,6 +159,8 @@ class State(Variable, variable_declarations.Output):
         Constant rate of this state, such as the speed of a driver: a parameter or an expression of parameters.
     nominal_velocity
         Smallest magnitude that the integrator must resolve, where the friction law defines one.
+    low, high, above, below, display
+        As for Parameter; the range is a property of the solution and is not enforced.
     """
 
     def __init__(
@@ -90,18 +171,47 @@ class State(Variable, variable_declarations.Output):
         rate_of: "State | None" = None,
         rate: Operand = None,
         nominal_velocity: Operand = None,
-        **more: Any,
+        *,
+        low: float = -inf,
+        high: float = inf,
+        above: float = -inf,
+        below: float = inf,
+        display: str = "",
     ) -> None:
-        super().__init__(unit, text, **more)
+        Variable.__init__(self, unit, text, low=low, high=high, above=above, below=below, display=display)
         self.start_expression, self.integrates, self.nominal_velocity = as_operand(start), rate_of, nominal_velocity
         self.constant_rate: Operand = None if rate is None else as_operand(rate)
 
 
 class Output(Variable, variable_declarations.Output):
-    """A calculated variable: unit, description, expression; `rate_of` is the state whose derivative it is."""
+    """A calculated variable.
 
-    def __init__(self, unit: str, text: str, expression: Operand, rate_of: State | None = None, **more: Any) -> None:
-        super().__init__(unit, text, **more)
+    Parameters
+    ----------
+    unit, text
+        As for Parameter.
+    expression
+        The value, an expression of other variables.
+    rate_of
+        The state whose derivative this is.
+    low, high, above, below, display
+        As for Parameter; the range is a property of the solution and is not enforced.
+    """
+
+    def __init__(
+        self,
+        unit: str,
+        text: str,
+        expression: Operand,
+        rate_of: State | None = None,
+        *,
+        low: float = -inf,
+        high: float = inf,
+        above: float = -inf,
+        below: float = inf,
+        display: str = "",
+    ) -> None:
+        Variable.__init__(self, unit, text, low=low, high=high, above=above, below=below, display=display)
         self.expression, self.integrates = as_operand(expression), rate_of
 
 
@@ -109,7 +219,7 @@ class Mode(Variable, variable_declarations.Mode):
     """The direction of sliding: -1, 0 while stuck, or 1."""
 
     def __init__(self, text: str = "-1 sliding backward, 0 stuck, 1 sliding forward") -> None:
-        super().__init__(text)
+        Variable.__init__(self, "", text, low=-1, high=1)
 
 
 class Contact(Variable, variable_declarations.Output):
@@ -134,6 +244,8 @@ class Contact(Variable, variable_declarations.Output):
     lifts_off
         What a negative sliding force means.  None, the default: an error, which ends the run.  True: the contact has
         lifted off; its force is zero and it does not stick.  False: it never occurs, by the form of the equations.
+    low, high, above, below, display
+        As for Parameter; the range is a property of the solution and is not enforced.
     """
 
     def __init__(
@@ -147,10 +259,20 @@ class Contact(Variable, variable_declarations.Output):
         laws: tuple[str, ...] = (HYBRID,),
         eps: Operand = None,
         lifts_off: bool | None = None,
-        **more: Any,
+        *,
+        low: float = -inf,
+        high: float = inf,
+        above: float = -inf,
+        below: float = inf,
+        display: str = "",
     ) -> None:
-        super().__init__(unit, text, **more)
-        self.mode, self.slip, self.slide, self.laws, self.eps = mode, slip, as_operand(slide), laws, eps
+        Variable.__init__(self, unit, text, low=low, high=high, above=above, below=below, display=display)
+        if not isinstance(mode, Mode):
+            raise ModelError(f"mode of a Contact must be a Mode that is declared before it, got {describe(mode)}")
+        if not isinstance(slip, Expression) or is_comparison(slip):
+            raise ModelError(f"slip of a Contact must be an expression of states, got {describe(slip)}")
+        self.mode, self.slide, self.laws, self.eps = mode, as_operand(slide), laws, eps
+        self.slip: Operand = slip
         self.hold = None if hold is None else as_operand(hold)
         self.lifts_off = lifts_off
         if lifts_off:
@@ -164,21 +286,62 @@ class Contact(Variable, variable_declarations.Output):
 
 
 class Rule:
-    """A comparison of parameters that must not be true, and the error message, with values as {name!r}."""
+    """Parameters that the model refuses.
+
+    Parameters
+    ----------
+    broken
+        A comparison of parameters that must not be true.
+    sentence
+        The error message, with values as {name!r}.
+    """
 
     def __init__(self, broken: Operand, sentence: str) -> None:
         self.broken, self.sentence = broken, sentence
 
 
 class _ClassBody(dict[str, Any]):
-    """Namespace of a model class; rejects a second equation for a name."""
+    """Namespace of a model class: rejects a second equation for a name, and records values that nothing reads."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.unread: dict[str, tuple[str, int]] = {}  # name -> file and line
+
+    def __getitem__(self, name: str) -> Any:
+        value = super().__getitem__(name)
+        self.unread.pop(name, None)
+        return value
 
     def __setitem__(self, name: str, value: Any) -> None:
-        if isinstance(self.get(name), Expression):
+        if isinstance(self.get(name), Expression) or (name in SETTINGS and name in self.unread):
             raise ModelError(f"{name} is assigned twice: give the second equation another name")
         if isinstance(value, Expression):
             value.name = value.name or name
+            self.unread.pop(name, None)
+        else:
+            self.unread[name] = author_location()
         super().__setitem__(name, value)
+
+    def check_unread(self) -> None:
+        """Raise ModelError for a value that neither the body reads nor the build, such as a misspelt setting."""
+        for name, location in self.unread.items():
+            value = self.get(name)
+            is_function = isinstance(value, FUNCTION_TYPES) and not name.startswith("__annotate")
+            is_harmless = isinstance(value, (ModuleType, type)) or (name.startswith("_") and not is_function)
+            if name not in self or name in SETTINGS or is_harmless:
+                continue
+            if is_function:
+                sentence = f"nothing calls the function {name}: a model has no methods, write its equation as an Output"
+            elif close := get_close_matches(name, SETTINGS, 1):
+                sentence = f"nothing uses {name}: write {close[0]}, or remove it"
+            elif isinstance(value, Rule):
+                sentence = f"nothing uses the rule {name}: write rules = Rule(...), or a tuple of rules"
+            else:
+                shown = f" = {value!r}" if isinstance(value, (int, float)) else ""
+                sentence = (
+                    f"nothing uses {name}{shown}: declare it as Parameter and use it in an equation, or remove it"
+                )
+            raise ModelError(sentence, location)
 
 
 class _ModelMeta(type):
@@ -188,7 +351,15 @@ class _ModelMeta(type):
     def __prepare__(cls, name: str, bases: tuple[type, ...], /, **_: Any) -> MutableMapping[str, object]:
         return _ClassBody()
 
-    def __new__(cls, name: str, bases: tuple[type, ...], body: dict[str, Any]) -> "_ModelMeta":
+    def __new__(cls, name: str, bases: tuple[type, ...], body: _ClassBody) -> "_ModelMeta":
+        if bases:  # not Model itself
+            if bases != (Model,):
+                others = ", ".join(base.__name__ for base in bases if base is not Model)
+                raise ModelError(
+                    f"{name} derives from {others}, but a model can only derive from Model: copy the declarations "
+                    "into one class"
+                )
+            body.check_unread()
         model = super().__new__(cls, name, bases, dict(body))
         model.location = author_location()
         return model

@@ -3,6 +3,7 @@
 Errors are reported in one sentence with file and line.
 """
 
+import ast
 import linecache
 import sys
 from dataclasses import dataclass
@@ -10,7 +11,6 @@ from functools import cached_property
 from hashlib import sha256
 from keyword import iskeyword
 from pathlib import Path
-from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
@@ -21,6 +21,7 @@ from .expressions import ModelError
 from .model_analysis import ModelAnalysis
 from .model_declaration import Model
 from .model_source import model_source
+from .python_errors import check_statements, explain
 
 PACKAGE = __name__.split(".", 1)[0]
 RESERVED_FILE_NAMES = ("pythonfmu", "pythonfmu_workarounds", "runtime")  # embedded in the same package
@@ -119,9 +120,7 @@ class ModelFile:
         except SyntaxError as error:
             raise ModelError(f"invalid Python: {error.msg}", (str(self.path), error.lineno or 1)) from error
         except (Exception, SystemExit) as error:
-            lines = [frame.lineno or 1 for frame in extract_tb(error.__traceback__) if frame.filename == str(self.path)]
-            description = " ".join(f"{type(error).__name__}: {error}".split())
-            raise ModelError(description, (str(self.path), lines[-1] if lines else 1)) from error
+            raise explain(error, ast.parse(self.source), str(self.path)) from error
         models = [
             one
             for one in vars(module).values()
@@ -132,6 +131,7 @@ class ModelFile:
             raise BuildError(
                 f"{self.path}: a model file must define exactly one class derived from Model; this one {what}."
             )
+        check_statements(ast.parse(self.source), models[0].__name__, str(self.path))
         return models[0]
 
     def _build_error(self, mistake: ModelError) -> BuildError:
