@@ -407,6 +407,19 @@ WRONG = {
         17,
         "q: start value and bounds must be numbers, got an expression",
     ),
+    "a unit without a point": (RATE + '    q = Parameter(1.0, "Nm", "q")\n', 17, "q has the unit 'Nm': write \"N.m\""),
+    "a unit with a power": (
+        RATE + '    q = Parameter(1.0, "m/s^2", "q")\n',
+        17,
+        "q has the unit 'm/s^2': write \"m/s2\"",
+    ),
+    "degrees": (RATE + '    q = Parameter(1.0, "deg", "q")\n', 17, "q has the unit 'deg': use rad instead of deg"),
+    "no unit": (RATE + '    q = Parameter(1.0, "", "q")\n', 17, "q has the unit '': a pure number has the unit \"1\""),
+    "a description for a unit": (
+        RATE + '    q = Parameter(1.0, "mass", "kg")\n',
+        17,
+        "q has the unit 'mass': the unit comes before the description, so exchange them",
+    ),
     "a name for the rate of a driver": (
         RATE + '    q = State("m", "one", start=1.0, rate=u)\n    q_rate = Parameter(1.0, "m/s", "another")\n',
         17,

@@ -1,10 +1,11 @@
 """Checks that the units of expressions agree with the declared units."""
 
+import re
 from fractions import Fraction
 from typing import Any
 
 from .. import BuildError
-from ..units import unit_of
+from ..units import SYMBOLS, parse_unit, unit_of
 from .expression_printer import COMPARISON_OPERATORS
 from .expressions import Expression, ModelError, Operand, Term
 from .model_analysis import ModelAnalysis
@@ -14,6 +15,7 @@ Dimensions = tuple[Fraction, Fraction, Fraction]
 BASE_UNITS = ("kg", "m", "s")  # angles are dimensionless
 DIMENSIONLESS: Dimensions = (Fraction(0), Fraction(0), Fraction(0))
 SECOND: Dimensions = (Fraction(0), Fraction(0), Fraction(1))
+UNIT_SPELLINGS = {symbol.lower(): symbol for symbol in SYMBOLS} | {"sec": "s", "nm": "N.m", "ns": "N.s"}
 PRECEDENCE = {"+": 1, "-": 1, "*": 2, "/": 2, "neg": 3} | dict.fromkeys(COMPARISON_OPERATORS, 0)
 
 
@@ -61,8 +63,24 @@ def declared_dimensions(e: Variable) -> Dimensions:
     try:
         unit = unit_of(e.name, e.unit, e.display)
     except BuildError as error:
-        raise ModelError(str(error).rstrip("."), e.location) from error
+        has_hint = parse_unit(e.unit) is None and (hint := unit_hint(e.unit, e.text))
+        sentence = f"{e.name} has the unit {e.unit!r}: {hint}" if has_hint else str(error).rstrip(".")
+        raise ModelError(sentence, e.location) from error
     return Fraction(unit.kg), Fraction(unit.m), Fraction(unit.s)
+
+
+def unit_hint(unit: str, text: str) -> str:
+    """Return what to write instead of an unknown unit, or an empty text."""
+    if parse_unit(text):
+        return "the unit comes before the description, so exchange them"
+    if "deg" in unit:
+        return 'use rad instead of deg, and display="deg" to show degrees'
+    if unit.strip() in ("", "-"):
+        return 'a pure number has the unit "1"'
+    plain = unit.strip().replace("**", "").replace("^", "")
+    plain = re.sub(r"[ *\u00b7]+", ".", plain)
+    plain = re.sub("[A-Za-z]+", lambda match: UNIT_SPELLINGS.get(match[0].lower(), match[0]), plain)
+    return f'write "{plain}"' if parse_unit(plain) else ""
 
 
 def quotient(a: Dimensions, b: Dimensions) -> Dimensions:
