@@ -1,4 +1,4 @@
-"""Names reserved in C, and string literals that are valid in Python and in C."""
+"""Names reserved in C, and texts in source code of Python and C."""
 
 from json import dumps
 
@@ -14,5 +14,15 @@ C_NAMES = frozenset(
 
 
 def string_literal(text: str) -> str:
-    """Return a string literal for printable text."""
+    """Return a string literal of Python for printable text."""
     return dumps(text, ensure_ascii=False)
+
+
+def c_string_literal(text: str) -> str:
+    """Return a string literal of C for printable text, without trigraphs such as ??/."""
+    return string_literal(text).replace("?", "\\?")
+
+
+def c_comment(text: str) -> str:
+    """Return a text that can be part of a comment of C, without its delimiters and trigraphs."""
+    return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").replace("??", "? ?")

@@ -18,7 +18,7 @@ from ..fmi_variables import (
     model_exchange_instance,
 )
 from ..lowering import sibling_module
-from ..reserved_names import string_literal
+from ..reserved_names import c_comment, c_string_literal
 from .c_types import BOOL, FLOAT, INT, StructPointer, c_literal
 from .call_graph import CallGraph
 from .directional_derivative import Tangent, build_tangent_function, tangent_fields
@@ -137,7 +137,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         for name, ctype in layout.fields[type(instance)].items()
     }
     return HEADER.format(
-        sentence=(inspect.getdoc(model) or "").splitlines()[0],
+        sentence=c_comment((inspect.getdoc(model) or "").splitlines()[0]),
         name=model.__name__,
         file=model.__module__.rsplit(".", 1)[-1],
         codes="".join(f"    {name} = {code},\n" for name, code in vars(codes).items() if name.isupper()),
@@ -159,7 +159,7 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(violated_rules, rule_fields),
         values=_switch_cases(VALUE_MESSAGES, FIELD_CODE),
         calls=_switch_cases(CALL_MESSAGES, FIELD_CODE),
-        phases=", ".join(string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
+        phases=", ".join(c_string_literal(PHASE_NAMES[phase]) for phase in range(len(PHASE_NAMES))),
         count_of_phases=len(PHASE_NAMES),
     )
 
@@ -194,7 +194,7 @@ def _variable_row(
         else "NULL, NULL"
     )
     parts = [
-        *map(string_literal, texts),
+        *map(c_string_literal, texts),
         f"offsetof(Model, {attribute_path(name)})",
         f"offsetof(struct Tangent, {tangent_fields[name]})" if name in tangent_fields else "NO_OFFSET",
         *map(c_literal, flags),
@@ -214,7 +214,7 @@ def _switch_cases(messages: Mapping[int, str], field_code: Mapping[str, str]) ->
         lines.append(f"    case {case}:\n")
         for literal_text, field, _, _ in Formatter().parse(message):
             if literal_text:
-                lines.append(f"        append(text, {string_literal(literal_text)});\n")
+                lines.append(f"        append(text, {c_string_literal(literal_text)});\n")
             if field:
                 lines.append(f"        {field_code[field]};\n")
         lines.append("        break;\n")
