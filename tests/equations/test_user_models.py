@@ -335,3 +335,49 @@ def test_sliding_friction_above_static_friction_is_refused_before_the_run(puck, 
         fmu.begin({"f": 5.0}, stop=1.0).step(0.0, 1.0)
     assert sentence.format(5.0, 4.0) in str(fmu.messages())
     fmu.free()
+
+
+SPECIAL = r"""??= ??/ ??' ??( ??) ??! ??< ??> ??- ???/ " \ \n %s %n { </p> & ' ]]> --> */ /* // é ∂ 漢"""
+TEXTS = f"""
+from fmus import Contact, Mode, Model, Output, Parameter, Rule, State
+
+TEXT = {SPECIAL!r}
+
+
+class Texts(Model):
+    __doc__ = TEXT
+
+    m = Parameter(1.0, "kg", TEXT, above=0.0)
+    k = Parameter(100.0, "N/m", TEXT)
+    k_max = Parameter(200.0, "N/m", TEXT)
+    f = Parameter(1.0, "N", TEXT, low=0.0)
+    x = State("m", TEXT, start=0.1)
+    v = State("m/s", TEXT, rate_of=x)
+    mode = Mode(TEXT)
+    F_friction = Contact("N", TEXT, mode=mode, slip=v, slide=f)
+    a = Output("m/s2", TEXT, (-k * x - F_friction) / m, rate_of=v)
+    rules = Rule(k > k_max, "{{k!r}} " + TEXT.replace("{{", "{{{{"))
+"""
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_printable_text_survives_in_every_backend(kind, tmp_path, worker):
+    """Trigraphs, delimiters and format fields of C, XML and Python; in descriptions and messages."""
+    (tmp_path / "texts.py").write_text(TEXTS, encoding="utf-8")
+    done = command("texts.py", *KINDS[kind], "--method", "ode45", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    described = read_model_description(tmp_path / kind / "texts.fmu")
+    names = ("m", "k", "k_max", "f", "x", "v", "mode", "F_friction", "a")
+    texts = [v.description for v in described.modelVariables if v.name in names]
+    assert [described.description, *texts] == [SPECIAL] * (len(names) + 1)
+    if kind == "native/fmi3":
+        return  # its messages are those of the other native FMU
+    for values, message in (
+        ({"m": -1.0}, f"m = -1.0 kg is refused: {SPECIAL} must be above 0.0 kg"),
+        ({"k": 300.0}, f"300.0 {SPECIAL}"),
+    ):
+        fmu = worker.instantiate(tmp_path / kind / "texts.fmu")
+        with pytest.raises(FmiError):
+            fmu.begin(values, stop=1.0).step(0.0, 1.0)
+        assert message in [text for *_, text in fmu.messages()]
+        fmu.free()
