@@ -183,13 +183,29 @@ WRONG = {
     "no time": (RATE + "    stop_time = 0.0\n", 4, "stop_time = 0.0 is invalid: it must be a number above 0"),
     "a broken rule": (
         RATE + '    rules = Rule(k + k > k, "k = {k!r} is too much")\n',
-        4,
+        17,
         "the start values are invalid: k = 100.0 is too much",
     ),
     "a division by zero": (
         RATE + '    q = Output("m", "shift", x * f / (f - f))\n',
-        4,
-        "the equations cannot be evaluated at the start values: float division by zero",
+        17,
+        "x * f / (f - f) cannot be calculated at the start values, where f - f is 0.0",
+    ),
+    "a parameter of zero that divides": (
+        '    J = Parameter(0.0, "kg", "another mass")\n' + RATE.replace("/ m", "/ J"),
+        17,
+        "(F - k * x) / J cannot be calculated at the start values, where J is 0.0",
+    ),
+    "a root of a negative number": (
+        RATE + '    d = Output("m", "distance", sqrt(x * x - 1.0 * u * u * (m / k)))\n',
+        17,
+        "sqrt(x * x - 1 * u * u * m / k) cannot be calculated at the start values, where x * x - 1 * u * u * m / k "
+        "is -0.01",
+    ),
+    "a start value without a value": (
+        RATE + '    d = Fixed(0.0, "m", "length")\n    z = State("1", "strain", start=d / d, rate=u / (d + d))\n',
+        18,
+        "d / d cannot be calculated at the start values, where d is 0.0",
     ),
     "a squared force in another rate": (
         DRY + STUCK + '    w = State("m/s", "another speed")\n'

@@ -381,3 +381,41 @@ def test_any_printable_text_survives_in_every_backend(kind, tmp_path, worker):
             fmu.begin(values, stop=1.0).step(0.0, 1.0)
         assert message in [text for *_, text in fmu.messages()]
         fmu.free()
+
+
+DIVISORS = '''
+from fmus import Fixed, Model, Output, Parameter, State, choose
+
+
+class Divisors(Model):
+    """Mass on a spring with outputs that divide."""
+
+    m = Parameter(1.0, "kg", "mass")
+    k = Parameter(100.0, "N/m", "stiffness")
+    scale = Parameter(1.0, "m", "length that divides")
+    gap = Parameter(1.0, "m", "length that divides unless it is 0")
+    F_0 = Fixed(10.0, "N", "force at the start")
+    x = State("m", "position", start=F_0 / k)
+    v = State("m/s", "speed", rate_of=x)
+    a = Output("m/s2", "acceleration", -k * x / m, rate_of=v)
+    ratio = Output("1", "ratio", x / (2.0 * scale * scale) * scale)
+    share = Output("1", "share", choose(gap > 0.0, x / gap, 0.0))
+'''
+
+
+@pytest.mark.parametrize("kind", ["", "native"])
+def test_a_parameter_that_divides_is_refused_at_zero(kind, tmp_path, worker):
+    """With its name, unless choose() excludes the division."""
+    (tmp_path / "divisors.py").write_text(DIVISORS)
+    done = command("divisors.py", *KINDS[kind], cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    for name, owner in ("m", "a"), ("k", "x"), ("scale", "ratio"):
+        fmu = worker.instantiate(tmp_path / kind / "divisors.fmu")
+        with pytest.raises(FmiError):
+            fmu.begin({name: 0.0}, stop=1.0).step(0.0, 1.0)
+        assert f"{name} = 0.0 is refused: {owner} divides by {name}" in str(fmu.messages())
+        fmu.free()
+    fmu = worker.instantiate(tmp_path / kind / "divisors.fmu").begin({"gap": 0.0}, stop=1.0)
+    fmu.step(0.0, 1.0)
+    assert fmu.get("share") == 0.0
+    fmu.free()

@@ -52,6 +52,29 @@ def variables_in(e: Operand) -> list[Expression]:
     ]
 
 
+def factors(e: Operand) -> list[Operand]:
+    """Return the factors of a product; e is 0 if one of them is 0."""
+    if isinstance(e, Term) and e.op == "*":
+        return [one for part in e.args for one in factors(part)]
+    return factors(e.args[0]) if isinstance(e, Term) and e.op in ("neg", "/", "fabs", "sqrt") else [e]
+
+
+def unconditional_quotients(targets: Collection[Operand]) -> list[Term]:
+    """Return the quotients that every evaluation of the targets calculates: those outside the cases of choose()."""
+    result: list[Term] = []
+    seen: Memo = {}
+    stack = list(targets)
+    while stack:
+        e = stack.pop()
+        if id(e) not in seen:
+            seen[id(e)] = e
+            is_choose = isinstance(e, Term) and e.op == "choose"
+            stack += operands(e)[:1] if is_choose else operands(e)
+            if isinstance(e, Term) and e.op == "/":
+                result.append(e)
+    return result
+
+
 def count_occurrences(e: Operand, leaf: Expression) -> int:
     """Return how often a variable occurs in an expression."""
     return 1 if e is leaf else sum(count_occurrences(one, leaf) for one in operands(e))

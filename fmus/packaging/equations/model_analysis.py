@@ -18,6 +18,7 @@ from .algebra import (
     count_occurrences,
     depends_on,
     differentiate,
+    factors,
     growth_exponent,
     has_condition_on,
     is_same_expression,
@@ -26,6 +27,7 @@ from .algebra import (
     solve_for,
     subexpressions,
     substitute,
+    unconditional_quotients,
     variables_in,
 )
 from .conditions import HOLD_TOLERANCE, Condition, find_conditions, is_nonnegative
@@ -73,11 +75,26 @@ class ModelAnalysis:
         self._check_declarations()
         self._find_contact_loads()
         self.ramps = {e: rate for e, rate in self.ramps.items() if self._keeps_closed_form(e)}
-        self.rules += self._holding_rules()
+        self.rules = (*self._division_rules(), *self.rules, *self._holding_rules())
         self.switches = find_conditions(self._dynamic_expressions(), (TIME, *self.states, *self.drivers, *self.ramps))
         self.limits = self._find_limits()
         for name, e in own if self.contacts and not self.waits else ():
             self._check_name(name, e, RESERVED_WHERE_COUPLED)
+
+    def _division_rules(self) -> tuple[Rule, ...]:
+        """Return a rule for each parameter that divides in every evaluation and may be 0.
+
+        They come first, because other rules may divide by the same parameters.
+        """
+        result: dict[Expression, Rule] = {}
+        for owner in self.declared:
+            for quotient in unconditional_quotients(self.declared_expressions(owner)):
+                for e in factors(quotient.args[1]):
+                    if isinstance(e, (Parameter, Fixed)) and e.accepts(0.0) and e not in result:
+                        sentence = f"{e.name} = {{{e.name}!r}} is refused: {owner.name} divides by {e.name}"
+                        result[e] = Rule(Term("==", e, 0.0), sentence)
+                        result[e].broken.location = quotient.location
+        return tuple(result.values())
 
     def _holding_rules(self) -> tuple[Rule, ...]:
         """Return a rule for each contact that rejects sliding forces above the holding force.
@@ -97,6 +114,7 @@ class ModelAnalysis:
                     f"{c.name}: the sliding force exceeds the holding force ({values}): lower slide or raise hold"
                 )
                 result.append(Rule(c.slide > (1.0 + HOLD_TOLERANCE) * c.hold, sentence))
+                result[-1].broken.location = c.location
         return tuple(result)
 
     # ---- conditions

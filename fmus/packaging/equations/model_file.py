@@ -22,6 +22,7 @@ from .model_analysis import ModelAnalysis
 from .model_declaration import Model
 from .model_source import model_source
 from .python_errors import check_statements, explain
+from .start_values import check_evaluation
 
 PACKAGE = __name__.split(".", 1)[0]
 RESERVED_FILE_NAMES = ("pythonfmu", "pythonfmu_workarounds", "runtime")  # embedded in the same package
@@ -93,12 +94,17 @@ class ModelFile:
             mistake = ModelError(
                 f"the equations cannot be evaluated at the start values: {error}", self.analysis.model.location
             )
+            try:
+                check_evaluation(self.analysis)
+            except ModelError as named:
+                mistake = named
             raise self._build_error(mistake) from error
         if rule:
             sentence = thing.rules[rule - 1].format_map(vars(thing))
-            raise self._build_error(
-                ModelError(f"the start values are invalid: {sentence}", self.analysis.model.location)
-            )
+            rules = self.analysis.rules
+            number = rule - 1 - (len(thing.rules) - len(rules))  # rules of the runtime come first
+            location = rules[number].broken.location if number >= 0 else self.analysis.model.location
+            raise self._build_error(ModelError(f"the start values are invalid: {sentence}", location))
 
     def _load_class(self) -> type[Model]:
         """Execute the file and return its model class."""

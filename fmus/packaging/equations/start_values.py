@@ -1,0 +1,66 @@
+"""Evaluates the equations at the start values, to name the expression that has no value there."""
+
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from .algebra import ARITHMETIC
+from .dimensions import expression_text
+from .expressions import Expression, ModelError, Operand, Term
+from .model_analysis import ModelAnalysis
+from .model_declaration import Output
+
+MAX_TEXT_LENGTH = 80  # characters of an expression in a message
+OPERATIONS: dict[str, Callable[..., Any]] = {
+    **ARITHMETIC,
+    **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq},
+    "neg": operator.neg,
+}
+
+
+def check_evaluation(an: ModelAnalysis) -> None:
+    """Raise ModelError for the first expression without a value at the start values; contact forces count as 0."""
+    values: dict[Expression, float] = dict.fromkeys(an.time_varying, 0.0)
+    values |= {e: float(e.start) for e in (*an.parameters, *an.choices, *an.inputs)}
+    known: dict[int, float] = {}
+    for s in an.states:
+        values[s] = evaluate(s.start_expression, values, known)
+    for e in an.outputs:
+        evaluate(e, values, known)
+
+
+def evaluate(e: Operand, values: dict[Expression, float], known: dict[int, float]) -> float:
+    """Return the value of an expression; raise ModelError where it has none."""
+    if not isinstance(e, Expression):
+        return float(e)
+    if e in values:
+        return values[e]
+    if id(e) not in known:
+        if isinstance(e, Output):
+            known[id(e)] = evaluate(e.expression, values, known)
+        else:
+            assert isinstance(e, Term)
+            known[id(e)] = _evaluate_term(e, values, known)
+    return known[id(e)]
+
+
+def _evaluate_term(e: Term, values: dict[Expression, float], known: dict[int, float]) -> float:
+    if e.op == "choose":
+        condition, this, that = e.args
+        return evaluate(this if evaluate(condition, values, known) else that, values, known)
+    args = [evaluate(one, values, known) for one in e.args]
+    function = OPERATIONS[e.op] if e.op in OPERATIONS else getattr(math, e.op)
+    try:
+        return float(function(*args))
+    except (ArithmeticError, ValueError) as error:
+        raise ModelError(
+            f"{_short_text(e)} cannot be calculated at the start values, "
+            f"where {_short_text(e.args[-1])} is {args[-1]!r}",
+            e.location,
+        ) from error
+
+
+def _short_text(e: Operand) -> str:
+    text = expression_text(e)
+    return text if len(text) <= MAX_TEXT_LENGTH else f"{text[:MAX_TEXT_LENGTH]}..."
