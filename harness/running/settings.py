@@ -25,5 +25,11 @@ def resolve_settings(run: RunSpec, variables: dict[str, Any]) -> list[tuple[Any,
         if name in run.values and name not in variables:
             setting = f"{key} = {format_value(run.values[name])}"
             raise SceneError(f"{setting}: {run.model} has no such choice; remove {key}")
+    for name, value in run.values.items():
+        if name in variables and name not in settable:
+            raise SceneError(
+                f"{name} = {format_value(value)}: {name} is calculated; to set the start value of a state, "
+                f"declare a Fixed in the model and pass it as start=; allowed: {', '.join(sorted(settable))}"
+            )
     check_names("name in [values]", run.values, settable)
     return [(variables[name], convert_value(variables[name], value)) for name, value in run.values.items()]

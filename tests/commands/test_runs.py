@@ -210,7 +210,11 @@ def test_the_grid_does_not_change_the_solver_steps(scene):
         (BASE + "[values]\nmuu_d = 1", 2, "unknown name in [values] 'muu_d' (nearest: 'mu_d')"),
         (BASE + "[values]\nm = -1", 2, "m = -1 is outside its range; allowed: at least 0.0 kg"),
         (BASE + "[values]\nm = nan", 2, "m = nan is outside its range"),
-        (BASE + "[values]\nx = 1", 2, "unknown name in [values] 'x'"),
+        (
+            BASE + "[values]\nx = 1",
+            2,
+            "x = 1: x is calculated; to set the start value of a state, declare a Fixed in the",
+        ),
         (BASE + 'law = "sgn"', 2, "unknown value of friction 'sgn'; allowed: hybrid, threshold"),
         (BASE.replace("stickslip", "smd") + 'law = "sign"', 2, "law = 'sign': smd has no such choice"),
         (BASE + "stop = -1", 2, "stop = -1 s is not after start = 0.0 s"),
