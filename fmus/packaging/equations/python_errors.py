@@ -8,11 +8,17 @@ from inspect import signature
 from traceback import FrameSummary, extract_tb
 from typing import Any
 
+from ... import __all__ as EXPORTED_NAMES
 from . import expressions, model_declaration
 from .expressions import FUNCTIONS, NO_VALUE, ModelError
 from .model_declaration import Rule, Variable, signature_text
 
-OFFERED = {name: one for module in (expressions, model_declaration) for name, one in vars(module).items()}
+OFFERED = {
+    name: one
+    for module in (expressions, model_declaration)
+    for name, one in vars(module).items()
+    if name in EXPORTED_NAMES
+}
 DECLARATIONS = [name for name, one in OFFERED.items() if isinstance(one, type) and issubclass(one, (Variable, Rule))]
 OTHER_NAMES = {  # arguments of other programs and of earlier versions -> the argument that has this meaning
     **dict.fromkeys(("min", "minimum", "lower"), "low"),
@@ -57,7 +63,7 @@ def explain_name(name: str, tree: ast.Module, line: int) -> str:
         return f'{name} is not defined: for the time, declare a state such as clock = State("s", "time", rate=1.0)'
     if name == "self":
         return "self is not defined: write the names of the variables without self"
-    if name in OFFERED and getattr(OFFERED[name], "__module__", "").startswith(__package__ or ""):
+    if name in EXPORTED_NAMES:
         return f"{name} is not imported: write from fmus import {name}"
     if name == "sign":
         return "sign is not defined: declare dry friction as a Contact, and write other laws with choose or tanh"
