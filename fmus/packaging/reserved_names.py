@@ -9,8 +9,39 @@ C_NAMES = frozenset(
     bool true false fault
     BUFSIZ EOF FILENAME_MAX FOPEN_MAX HUGE_VAL HUGE_VALF HUGE_VALL INFINITY MODEL_GUID MODEL_H MODEL_NAME NAN NULL
     RAND_MAX SEEK_CUR SEEK_END SEEK_SET TMP_MAX TOLERANCE errno offsetof stderr stdin stdout
+    DOMAIN EDOM ERANGE EXIT_FAILURE EXIT_SUCCESS HUGE OVERFLOW PLOSS SING TLOSS UNALIGNED UNDERFLOW environ matherr
+    F_LOCK F_OK F_TEST F_TLOCK F_ULOCK L_INCR L_SET L_XTND L_tmpnam P_DETACH P_NOWAIT P_OVERLAY P_WAIT P_tmpdir R_OK
+    W_OK X_OK M_1_PI M_2_PI M_2_SQRTPI M_E M_LN10 M_LN2 M_LOG10E M_LOG2E M_PI M_PI_2 M_PI_4 M_SQRT1_2 M_SQRT2
+    CHAR_BIT NSIG SIGABRT SIGBREAK SIGFPE SIGILL SIGINT SIGSEGV SIGTERM SIG_DFL SIG_ERR SIG_IGN
     """.split()  # noqa: SIM905
-)
+) | {
+    f"{type_name}_{bound}"
+    for bound in ("MAX", "MIN")
+    for type_name in (
+        *(
+            "CHAR",
+            "SCHAR",
+            "UCHAR",
+            "SHRT",
+            "USHRT",
+            "INT",
+            "UINT",
+            "LONG",
+            "ULONG",
+            "LLONG",
+            "ULLONG",
+            "SIZE",
+            "WCHAR",
+        ),
+        *("PTRDIFF", "INTMAX", "UINTMAX", "INTPTR", "UINTPTR", "WINT", "SIG_ATOMIC", "SSIZE", "PATH"),
+        *(
+            f"{sign}INT{size}{bits}"
+            for sign in ("", "U")
+            for size in ("", "_FAST", "_LEAST")
+            for bits in (8, 16, 32, 64)
+        ),
+    )
+}
 
 
 def string_literal(text: str) -> str:

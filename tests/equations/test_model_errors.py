@@ -145,6 +145,16 @@ WRONG = {
         17,
         "the name NULL is reserved by the solver or by C",
     ),
+    "a limit of C": (
+        RATE + '    INT64_MAX = Parameter(1.0, "1", "ours")\n',
+        17,
+        "the name INT64_MAX is reserved by the solver or by C",
+    ),
+    "a constant of Windows": (
+        RATE + '    M_E = Parameter(1.0, "kg", "mass")\n',
+        17,
+        "the name M_E is reserved by the solver or by C",
+    ),
     "a function of ours": (
         RATE + '    sqrt = Parameter(1.0, "1", "ours")\n',
         17,
