@@ -25,3 +25,26 @@ int __stdcall DllMainCRTStartup(void *library, unsigned long reason, void *reser
     (void)library, (void)reason, (void)reserved;
     return 1;
 }
+
+/* The compiler calls this for functions with more than 4 kB of local variables, which large models have. rax is the size
+ * of the new stack frame. Windows allocates the pages of a stack one by one, so each page must be touched in order.
+ * All registers keep their values. */
+__asm__(".globl ___chkstk_ms\n"
+        "___chkstk_ms:\n"
+        "    pushq %rcx\n"
+        "    pushq %rax\n"
+        "    leaq 24(%rsp), %rcx\n" /* the stack pointer of the caller */
+        "    cmpq $0x1000, %rax\n"
+        "    jb 2f\n"
+        "1:\n"
+        "    subq $0x1000, %rcx\n"
+        "    testq %rcx, (%rcx)\n"
+        "    subq $0x1000, %rax\n"
+        "    cmpq $0x1000, %rax\n"
+        "    ja 1b\n"
+        "2:\n"
+        "    subq %rax, %rcx\n"
+        "    testq %rcx, (%rcx)\n"
+        "    popq %rax\n"
+        "    popq %rcx\n"
+        "    retq\n");
