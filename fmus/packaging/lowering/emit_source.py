@@ -285,34 +285,45 @@ def unparse_bare(node: ast.stmt, text: str) -> str:
     return text.removesuffix(row) + row[1:-1]
 
 
-def wrap_line(text: str, depth: int = 0) -> str:
-    """Break a long line inside its brackets, of which `depth` are already open."""
-    if len(text) <= MAX_LINE_LENGTH:
-        return text
-    blanks, whole = text[: len(text) - len(text.lstrip())], not depth
-    if not depth and text.count(" = ") > 1:  # several targets
-        *targets, value = text.strip().split(" = ")
-        half = len(targets) // 2
-        return "\n".join(
-            wrap_line(f"{blanks}{' = '.join(part)} = {value}") for part in (targets[:half], targets[half:])
-        )
+def wrap_line(text: str) -> str:
+    """Break a long line inside its brackets."""
+    lines: list[str] = []
+    depth = 0  # number of brackets that are open where the text begins
+    while len(text) > MAX_LINE_LENGTH:
+        blanks, whole = text[: len(text) - len(text.lstrip())], not lines
+        if whole and text.count(" = ") > 1:  # several targets
+            *targets, value = text.strip().split(" = ")
+            half = len(targets) // 2
+            return "\n".join(
+                wrap_line(f"{blanks}{' = '.join(part)} = {value}") for part in (targets[:half], targets[half:])
+            )
+        inner = blanks + "    " if whole else blanks
+        places = break_places(text, depth, len(inner))
+        if not places:
+            word = next((word for word in (" = ", "return ", "if ", "while ") if whole and word in text), "")
+            head, _, value = text.partition(word) if word else (text, "", "")
+            value, colon = (value[:-1], ":") if value.endswith(":") else (value, "")
+            if word and not is_bracketed(value):
+                return wrap_line(f"{head}{word}({value}){colon}")
+            break
+        depth = min(places)
+        n = places[depth]
+        lines.append(text[:n])
+        text = inner + text[n + 1 :].lstrip()
+    return "\n".join([*lines, text])
+
+
+def break_places(text: str, depth: int, indent: int) -> dict[int, int]:
+    """Return for each depth of brackets the last place after `indent` where a line may end."""
     quote, places = "", {}
-    inner = blanks if depth else blanks + "    "
     for n, letter in enumerate(text[:MAX_LINE_LENGTH]):
         if letter in "\"'" and quote in ("", letter):
             quote = "" if quote else letter
         depth += 0 if quote else (letter in "([") - (letter in ")]")
         ends = text[n - 1] == "," or text[n - 2 : n] in (" +", " -") or text[n + 1 : n + 4] in ("if ", "and")
-        if letter == " " and depth > 0 and not quote and ends and n > len(inner):
+        if letter == " " and depth > 0 and not quote and ends and n > indent:
             places[depth] = n
-    if not places:
-        word = next((word for word in (" = ", "return ", "if ", "while ") if whole and word in text), "")
-        head, _, value = text.partition(word) if word else (text, "", "")
-        value, colon = (value[:-1], ":") if value.endswith(":") else (value, "")
-        return wrap_line(f"{head}{word}({value}){colon}") if word and not is_bracketed(value) else text
-    shallow = min(places)
-    n = places[shallow]
-    return text[:n] + "\n" + wrap_line(inner + text[n + 1 :].lstrip(), shallow)
+    return places
 
 
 def is_bracketed(text: str) -> bool:
