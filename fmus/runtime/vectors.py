@@ -99,7 +99,8 @@ def elementwise(function):
 
 
 def factorize(g, h, J):
-    """Factorize 1 - g h J; packaging/written/elimination.py generates the same operations in scalars."""
+    """Factorize 1 - g h J; packaging/lowering/elimination.py generates the same operations in scalars, without those on
+    entries that are always zero."""
     w, inverse = np.zeros(J.shape), np.full(len(J), np.nan)
     computed = [i for i in state_indices if is_dynamic[i]]
     for i in computed:

@@ -66,3 +66,22 @@ def test_a_system_is_solved_or_refused_but_never_half_solved(bodies):
         terms = np.abs(k) + np.abs(g * h * J) @ np.abs(k) + np.abs(g * r)
         assert np.all(np.abs(k - g * h * (J @ k) - g * r) <= 1e-8 * terms.max())
     assert 0 < refused < 480
+
+
+@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (2, 0, 4, 1, 3)], ids=["in a row", "shuffled, which fills zeros"])
+def test_entries_that_are_always_zero_are_left_out_and_change_no_number(order):
+    """Five bodies in a chain, each joined to its neighbours by springs and dampers, eliminated in some order."""
+    states = {name: rate for i in order for name, rate in ((f"x{i}", f"v{i}"), (f"v{i}", f"a{i}"))}
+    dense, names, draw = ModelLayout(states, {}), list(states), np.random.default_rng(5)
+    joined = np.array([[abs(int(one[1]) - int(other[1])) < 2 for other in names] for one in names])
+    spec = ModelLayout(
+        states, {}, zeros=frozenset(zip(*(place.tolist() for place in np.nonzero(~joined)), strict=True))
+    )
+    assert len(factorization_lines("s", "g", "h", spec)) < 0.7 * len(factorization_lines("s", "g", "h", dense))
+    for _ in range(100):
+        h, r = 10.0 ** draw.uniform(-4.0, 1.0), draw.normal(0.0, 1.0, len(names))
+        J = np.where(joined, draw.normal(0.0, 1.0, joined.shape), 0.0)
+        k = in_scalars(spec, 0.25, h, J, r)
+        assert np.isfinite(k).all()
+        assert k == in_scalars(dense, 0.25, h, J, r)
+        assert np.array_equal(k, on_arrays(spec, 0.25, h, J, r))

@@ -19,6 +19,7 @@ class ModelLayout:
     choices     attribute -> its possible values: method_number, friction, ...
     excluded    labels of excluded methods and laws
     methods     label -> class of the included methods that take steps
+    zeros       entries of the Jacobian (index of a state, index of a state) that are always zero
     """
 
     states: dict[str, str]
@@ -27,6 +28,7 @@ class ModelLayout:
     choices: dict[str, tuple[int, ...]] = field(default_factory=dict)
     excluded: frozenset[str] = frozenset()
     methods: dict[str, str] = field(default_factory=dict)
+    zeros: frozenset[tuple[int, int]] = frozenset()
 
     def __post_init__(self) -> None:
         names = {*self.states, *self.states.values(), *self.contacts}

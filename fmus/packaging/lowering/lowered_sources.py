@@ -1,5 +1,7 @@
 """Lowers all files of the runtime and the file of a model."""
 
+import ast
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -7,6 +9,7 @@ from typing import Any
 from ...runtime.variable_declarations import variables
 from .. import BuildError, __version__
 from ..equations.model_file import ModelFile
+from ..syntax_trees import all_nodes, parsed_nodes
 from .dead_code import remove_dead_code
 from .emit_source import SourceEmitter, SourceLine
 from .feature_selection import EXACT, FeatureSelection
@@ -39,8 +42,9 @@ def runtime_symbols() -> SourceSymbols:
     return SourceSymbols(runtime_sources().values())
 
 
-def model_layout(model: Any, features: FeatureSelection, name_format: str) -> ModelLayout:
+def model_layout(source: ModelFile, features: FeatureSelection, name_format: str) -> ModelLayout:
     """Return the layout of a model; `name_format` formats the names of states, rates and modes."""
+    model: Any = source.model
     flags = {
         flag: getattr(model, flag)
         for flag in (
@@ -53,7 +57,20 @@ def model_layout(model: Any, features: FeatureSelection, name_format: str) -> Mo
         {name_format.format(name): other and name_format.format(other) for name, other in pairs.items()}
         for pairs in (model.states, model.contacts)
     )
-    return ModelLayout(states, contacts, flags, features.choices, features.excluded, features.stepping_methods)
+    layout = ModelLayout(states, contacts, flags, features.choices, features.excluded, features.stepping_methods)
+    return replace(layout, zeros=zero_jacobian_entries(source.generated_source, layout))
+
+
+def zero_jacobian_entries(text: str, spec: ModelLayout) -> frozenset[tuple[int, int]]:
+    """Return the entries of the Jacobian for which the source of a model returns the number 0.0 on every path."""
+    (method,) = (node for node in parsed_nodes(text) if isinstance(node, ast.FunctionDef) and node.name == "jacobian")
+    returned = [node.value for node in all_nodes(method) if isinstance(node, ast.Return)]
+    rows = [one.elts for one in returned if isinstance(one, ast.Tuple)]
+    is_zero = [
+        all(isinstance(one, ast.Constant) and one.value == 0.0 for one in column) for column in zip(*rows, strict=True)
+    ]
+    places = [(i, j) for i in spec.dynamic_states for j in range(-1, len(spec.states))]  # -1: derivative by time
+    return frozenset(place for place, zero in zip(places, is_zero, strict=True) if zero and place[1] >= 0)
 
 
 @cache
@@ -63,9 +80,9 @@ def lower_all(source: ModelFile, features: FeatureSelection) -> SourceFiles:
     Components have the names of the model unless these clash with names of the runtime.
     """
     try:
-        return lower_with_layout(source, model_layout(source.model, features, PLAIN_NAME))
+        return lower_with_layout(source, model_layout(source, features, PLAIN_NAME))
     except BuildError:
-        return lower_with_layout(source, model_layout(source.model, features, SUFFIXED_NAME))
+        return lower_with_layout(source, model_layout(source, features, SUFFIXED_NAME))
 
 
 def lower_with_layout(source: ModelFile, spec: ModelLayout) -> SourceFiles:

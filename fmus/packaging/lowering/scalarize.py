@@ -171,10 +171,10 @@ class Scalarizer(ConstantFolder):
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Tuple(elts=[tuple_or_single, column])) if (
                 name in self.jacobians
             ):
-                return ast.Name(
-                    self.spec.jacobian_entry(self.constant_index(tuple_or_single), self.constant_index(column)),
-                    ast.Load(),
-                )
+                entry = self.constant_index(tuple_or_single), self.constant_index(column)
+                if entry in self.spec.zeros:
+                    return ast.Constant(0.0)
+                return ast.Name(self.spec.jacobian_entry(*entry), ast.Load())
         return (
             self.component(node.value, self.constant_index(node.slice))
             if self.vector_kind(node.value)
@@ -374,12 +374,11 @@ class Scalarizer(ConstantFolder):
         own = self.spec.dynamic_states
         named = {i: self.spec.component_name(f_t, STATES, i) for i in self.all_indices(STATES)}
         self.known_zeros |= {name for i, name in named.items() if i not in own}
-        names = [
-            name
-            for i in own
-            for name in (named[i], *(self.spec.jacobian_entry(i, j) for j in self.all_indices(STATES)))
-        ]
-        for name in names:
+        names = []
+        for i in own:
+            zero = [(i, j) in self.spec.zeros for j in self.all_indices(STATES)]
+            names += [named[i], *("_" if is_zero else self.spec.jacobian_entry(i, j) for j, is_zero in enumerate(zero))]
+        for name in {*names} - {"_"}:
             if self.component_owner.setdefault(name, J) != J:
                 raise self.error(
                     call, f"has a Jacobian entry {name}, which is also a component of {self.component_owner[name]}"
