@@ -3,6 +3,7 @@
 They follow the declared variables, whose value references do not change.
 """
 
+from copy import copy
 from typing import Any
 
 from ..runtime.variable_declarations import Local, VariableDeclaration, VariableOwner, variables
@@ -45,6 +46,23 @@ def attribute_path(name: str) -> str:
     return "model_exchange.driver_rate" if name.startswith(DERIVATIVE_NAME[:4]) else name
 
 
+def declared_variables(thing: Any) -> Variables:
+    """Return name and declaration of the variables of an instance; the text of a mode names its contact."""
+    declared = variables(thing)
+    forces = [name for name, meaning in declared if meaning.role == "contact"]
+    force_of = dict(zip(thing.contacts, forces, strict=True))
+    return [
+        (name, name_contact(meaning, force_of[name]) if name in force_of else meaning) for name, meaning in declared
+    ]
+
+
+def name_contact(mode: VariableDeclaration, force: str) -> VariableDeclaration:
+    """Return the declaration of a mode with the force of its contact in its text, where importers find it."""
+    named = copy(mode)
+    named.text = f"mode of {force}: {mode.text}"
+    return named
+
+
 def integrated_states(declared: Variables) -> Variables:
     """Return the states that a solver integrates, in order of declaration."""
     return [(name, meaning) for name, meaning in declared if meaning.role == "state" and not meaning.rate]
@@ -52,7 +70,7 @@ def integrated_states(declared: Variables) -> Variables:
 
 def all_variables(thing: Any) -> Variables:
     """Return name and declaration of all variables of a model-exchange instance: declared ones, added ones, time."""
-    declared = variables(thing)
+    declared = declared_variables(thing)
     meanings = dict(declared)
     added: Variables = []
     forces = [meaning.unit for _, meaning in declared if meaning.role == "contact"]

@@ -11,8 +11,8 @@ from uuid import NAMESPACE_OID, uuid5
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 from ..runtime.variable_access import SETTABLE_CAUSALITIES
-from ..runtime.variable_declarations import Output, VariableDeclaration, VariableOwner, variables
-from . import __version__
+from ..runtime.variable_declarations import Output, VariableDeclaration, VariableOwner
+from . import __version__, fmi_variables
 from .fmi_variables import (
     DERIVATIVE_NAME,
     TIME,
@@ -65,7 +65,7 @@ def describe(model: type[VariableOwner], name: str, code: str, date: datetime, e
     """
     root = create_root(model, name, "2.0", "guid")
     thing: Any = model_exchange_instance(model) if exchanging else model()
-    declared = variables(thing)
+    declared = fmi_variables.declared_variables(thing)
     if exchanging:  # FMI 2.0 needs no time variable, and FMILibrary rejects one
         declared = [one for one in all_variables(thing) if one[0] != TIME]
         root.set("numberOfEventIndicators", str(len(event_indicator_indices(declared))))
@@ -120,7 +120,7 @@ def add_log_categories_and_experiment(root: Element, model: type[VariableOwner],
 
 def declared_variables(model: type[VariableOwner]) -> Variables:
     """Return name and declaration of every variable of a model."""
-    return variables(model())
+    return fmi_variables.declared_variables(model())
 
 
 def add_units(root: Element, declared: Variables) -> None:
