@@ -202,7 +202,7 @@ def test_comparing_two_laws_shows_the_difference_and_the_counters(page):
     assert rows["largest error of x against the closed form"][0] == "closed form"
     one, other = (int(cell) for cell in rows["right-hand side evaluations"])
     assert other > 20 * one
-    assert not page.run("document.getElementById('panel-error').hidden")
+    assert not page.run("document.getElementById('panel-.error').hidden")
 
 
 def test_another_model_keeps_values_of_the_same_names(page):
@@ -239,9 +239,9 @@ def test_playback_repaints_no_curve_and_a_curve_is_limited_by_the_pixels(page):
     page.wait("app.state().t > 1.2")
     page.click("#play")
     assert page.run(painted) == before
-    width = page.run("app.plots.get('step').plot.host.clientWidth")
+    width = page.run("app.plots.get('.step').plot.host.clientWidth")
     count = (
-        "(() => { const { plot, panel } = app.plots.get('step'); const [curve] = panel.content.curves;"
+        "(() => { const { plot, panel } = app.plots.get('.step'); const [curve] = panel.content.curves;"
         "let points = 0; const context = { lineTo: () => points++ };"
         "const all = new Proxy(context, { get: (it, key) => it[key] ?? (() => ({ width: 0 })) });"
         "plot.curve(all, curve, plot.scales(plot.host.clientWidth, plot.host.clientHeight)); return points })()"
@@ -498,3 +498,23 @@ def test_user_models_run_on_a_page_of_their_own(browser):
     shown = "[...document.querySelectorAll('figure')].filter(each => !each.hidden).map(each => each.id).slice(0, 3)"
     second = page.run("app.session.models.get('blocks').bodies[1]")
     assert page.when_done(shown) == [f"panel-{second[name]}" for name in ("position", "speed", "acceleration")]
+
+
+def test_several_contacts_are_shaded_and_named_each(browser):
+    """Bands, force panels and events of the lower block, on which two contacts act; its input is plotted if it acts."""
+    files = [ROOT / "tests" / "example_models" / name for name in ("rotor_brake.py", "larger/blocks.py")]
+    page = web_page.Page(browser, web_page.build_page("users", *map(str, files), "--method", "ode45"))
+    page.open(".model=blocks&F_ext=3")
+    content = "app.plots.get({!r}).panel.content"
+    for key, rows in ((".sticking", ["F1", "F2"]), ("x1", ["F1", "F2"]), ("F1", ["F1"]), ("F2", ["F2"])):
+        assert page.run(f"{content.format(key)}.rows") == rows
+    sticks = page.run(f"{content.format('F2')}.bands")
+    speeds = "(({ time, columns: { v1, v2 } }) => time.map((t, i) => [t, v2[i] - v1[i]]))(app.session.runs.main)"
+    for t, slip in page.run(speeds):
+        if any(band["from"] < t < band["to"] for band in sticks):
+            assert abs(slip) < 1e-12
+    assert set(page.run(f"{content.format('F_ext')}.curves.at(-1).y")) == {3.0}
+    page.wait("[...document.querySelectorAll('caption')].some(each => each.textContent === 'Events')")
+    named = [cells[-1] for cells in page.table("Events").values()]
+    assert named[:2] == ["F1 slides forward", "F2 slides forward"]
+    assert {"F1 sticks", "F2 sticks"} <= {*named}

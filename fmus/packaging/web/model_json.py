@@ -29,6 +29,7 @@ def build_model_json(source: ModelFile, model: type[VariableOwner]) -> ModelJson
         "stop": float(model.stop_time),  # type: ignore[attr-defined]
         "tolerance": float(model.tolerance),  # type: ignore[attr-defined]
         "variables": [variable_json(name, meaning) for name, meaning in declared_variables(model)],
+        "contacts": [{"name": c.name, "mode": c.mode.name} for c in source.analysis.contacts],
         "bodies": list_bodies(source.analysis),
     }
 
@@ -59,7 +60,8 @@ def list_bodies(analysis: ModelAnalysis) -> list[ModelJson]:
     """Describe the bodies of a model, one per position; without any, the first state and its derivative."""
     described = [body_json(analysis, x) for x in analysis.positions]
     x = analysis.states[0]
-    return described or [{"kind": "none", "position": x.name, "speed": analysis.rate[x].name}]
+    contacts = [c.name for c in analysis.contacts]
+    return described or [{"kind": "none", "position": x.name, "speed": analysis.rate[x].name, "contacts": contacts}]
 
 
 def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
@@ -85,6 +87,7 @@ def body_json(analysis: ModelAnalysis, x: State) -> ModelJson:
         "spring": not is_nonlinear and not is_same_expression(restoring, 0.0) and bool(drives or not linked),
         "dampers": [] if depends_on(damping, (v,)) else scaling_parameters(damping),
         "friction": next((e.name for e in frictions), ""),
+        "contacts": [c.name for c in frictions if isinstance(c, Contact)],
         "mode": next((c.mode.name for c in frictions if isinstance(c, Contact)), ""),
         "start": x.start_expression.name if isinstance(x.start_expression, Fixed) else "",
         "input": next((e.name for e in analysis.inputs if depends_on(law, (e,))), ""),

@@ -7,21 +7,25 @@ const MAX_MARKS = 400; // event marks
 const ENVELOPE_POINTS = 200;
 const MAX_PLOTTED_ROWS = 8000; // longer runs are plotted at grid points and events only
 
-// Return the diagrams as [{key, title, content}]. A diagram keeps its key from one state to the next.
+// Return the diagrams as [{key, title, content}]. A diagram keeps its key from one state to the next. The key is the name
+// of the variable; other keys start with a dot, which no name does.
 export function buildPanels(session, state, options) {
   const { main, comparison } = session.runs;
   const modelInfo = session.models.get(state.model);
   const body = modelInfo.bodies[state.body];
   const names = [body.position, body.speed, body.acceleration].filter(Boolean);
   const energy = modelInfo.variables.find(({ unit, causality }) => unit === "J" && causality === "output")?.name;
-  const panels = names.map((name) => timePanel(session, state, options, name, name));
+  const forces = [...new Set([body.friction, ...(body.contacts ?? [])].filter(Boolean))];
+  const inputs = main.inputs.filter((name) => !names.includes(name) && main.largestMagnitude(name) > 0);
+  const panels = names.map((name) => timePanel(session, state, options, name));
   panels.push(phasePanel(session, body));
-  panels.push(timePanel(session, state, options, "solver.h", "step", true));
-  if (energy) panels.push(timePanel(session, state, options, energy, "energy"));
-  if (body.friction) panels.push(timePanel(session, state, options, body.friction, "friction"));
+  panels.push(timePanel(session, state, options, "solver.h", ".step", true));
+  if (energy) panels.push(timePanel(session, state, options, energy));
+  panels.push(...[...forces, ...inputs].map((name) => timePanel(session, state, options, name)));
+  if (modelInfo.contacts.length > 1) panels.push(stickingPanel(main, state));
   const error = errorPanel(session, body, state);
   if (error) panels.push(error);
-  for (const panel of panels) panel.content.description = `${panel.title}${comparison ? ", two runs" : ""}: ${describeRange(panel, main)}`;
+  for (const panel of panels) panel.content.description ??= `${panel.title}${comparison ? ", two runs" : ""}: ${describeRange(panel, main)}`;
   return panels;
 }
 
@@ -51,7 +55,7 @@ function runCurves({ main, comparison, unchanged, preview }, curveOf) {
 }
 
 // A variable of all runs over time.
-function timePanel(session, state, options, name, key, log = false) {
+function timePanel(session, state, options, name, key = name, log = false) {
   const { main } = session.runs;
   const variable = main.fmu.variables.get(name);
   const { factor, display_unit, text, symbol } = variable;
@@ -60,8 +64,28 @@ function timePanel(session, state, options, name, key, log = false) {
   const curves = [...extras, ...runCurves(session.runs, (run) => curveData(run, variable))];
   const y = { ...bounds(curves.map((curve) => curve.y), log), log };
   const x = { low: 0, high: state.stop, label: "t in s" };
-  const content = { x, y, curves, bands: main.stuckIntervals(body.mode), marks: findMarks(main, state, name === body.position) };
+  const { contacts } = main.fmu.modelInfo;
+  const own = contacts.filter((contact) => contact.name === name);
+  const shaded = own.length ? own : contacts.filter((contact) => body.contacts?.includes(contact.name));
+  const content = { x, y, curves, ...stickingBands(main, shaded), marks: findMarks(main, state, name === body.position) };
   return { key, name, title: `${text}${display_unit ? ` in ${display_unit}` : ""}`, symbol, factor, content };
+}
+
+// The intervals in which contacts stick as {bands, rows}: each of several contacts has a row with its name.
+function stickingBands(run, contacts) {
+  const bands = contacts.flatMap(({ mode }, row) => run.stuckIntervals(mode).map(([from, to]) => ({ from, to, row })));
+  return { bands, rows: contacts.map(({ name }) => name) };
+}
+
+// The sticking of all contacts over time, in a row for each.
+function stickingPanel(main, state) {
+  const { contacts } = main.fmu.modelInfo;
+  const x = { low: 0, high: state.stop, label: "t in s" };
+  const total = ({ mode }) => main.stuckIntervals(mode).reduce((sum, [from, to]) => sum + to - from, 0);
+  const title = "sticking of each contact";
+  const description = `${title}: ${contacts.map((contact) => `${contact.name} for ${formatNumber(total(contact), 3)} s`).join(", ")}`;
+  const content = { x, y: { low: 0, high: 1, hidden: true }, curves: [], ...stickingBands(main, contacts), description };
+  return { key: ".sticking", title, symbol: "", content };
 }
 
 // Additional curves with the position: the driver, and optionally envelopes and turning points.
@@ -113,7 +137,7 @@ function phasePanel(session, body) {
     x: { ...bounds(curves.map((curve) => curve.x)), label: `${x.name}${x.display_unit ? ` in ${x.display_unit}` : ""}` },
     y: bounds(curves.map((curve) => curve.y)), curves,
   };
-  return { key: "phase", title: `phase plane: ${v.name} in ${v.display_unit} against ${x.name}`, symbol: "", content, phase: [x, v] };
+  return { key: ".phase", title: `phase plane: ${v.name} in ${v.display_unit} against ${x.name}`, symbol: "", content, phase: [x, v] };
 }
 
 // Errors of the runs against the closed form, or else the difference between the two runs.
@@ -137,7 +161,7 @@ function errorPanel(session, body, state) {
   if (!curves.length) return null;
   const y = { ...bounds(curves.map((each) => each.y), true), log: true };
   const x = { low: 0, high: state.stop, label: "t in s" };
-  return { key: "error", title: `${title}${display_unit ? ` in ${display_unit}` : ""}`, symbol: "", content: { x, y, curves } };
+  return { key: ".error", title: `${title}${display_unit ? ` in ${display_unit}` : ""}`, symbol: "", content: { x, y, curves } };
 }
 
 // The cursor of a diagram and the values there: {cursor, readings [{text, colour}]}.

@@ -5,6 +5,7 @@ const RIGHT = 10;
 const TOP = 8;
 const BOTTOM = 22;
 const TICK_COUNT = 5;
+const ROW_GAP = 4; // above and below a shaded row
 const FONT = "11px system-ui, sans-serif";
 
 // Round numbers from low to high, about `count` of them.
@@ -91,8 +92,9 @@ export class Plot {
     this.host.addEventListener("pointermove", (event) => event.buttons && seek(event));
   }
 
-  // content: x and y {low, high, label, log}, curves [{x, y, colour, dash, dots}], bands [[from, to]],
-  // marks [{x, label, colour}] and a description.
+  // content: x and y {low, high, label, log, hidden}, curves [{x, y, colour, dash, dots}], shaded bands [{from, to, row}]
+  // in equally high rows, the names of the rows, marks [{x, label, colour}] and a description. With a hidden y axis, the
+  // names of the rows stand in its place.
   show(content) {
     this.content = content;
     this.curveCanvas.setAttribute("aria-label", content.description);
@@ -142,17 +144,22 @@ export class Plot {
 
   // Draw everything except the cursor, on any canvas.
   draw(context, width, height) {
-    const { x, y, curves, bands = [], marks = [] } = this.content;
+    const { x, y, curves, bands = [], rows = [], marks = [] } = this.content;
     const scale = this.scales(width, height);
     const [right, bottom] = [width - RIGHT, height - BOTTOM];
     context.font = FONT;
     context.lineJoin = "round";
     context.fillStyle = colours.stick;
-    for (const [from, to] of bands) context.fillRect(scale.x(from), TOP, Math.max(scale.x(to) - scale.x(from), 0.5), bottom - TOP);
+    const rowHeight = (bottom - TOP) / Math.max(rows.length, 1);
+    const gap = rows.length > 1 ? Math.min(ROW_GAP, 0.2 * rowHeight) : 0;
+    for (const { from, to, row } of bands) {
+      context.fillRect(scale.x(from), TOP + row * rowHeight + gap, Math.max(scale.x(to) - scale.x(from), 0.5), rowHeight - 2 * gap);
+    }
     context.fillStyle = colours.soft;
     context.textAlign = "right";
     context.textBaseline = "middle";
-    for (const value of y.log ? decades(y.low, y.high) : ticks(y.low, y.high)) {
+    if (y.hidden) rows.forEach((name, row) => context.fillText(name, LEFT - 6, TOP + (row + 0.5) * rowHeight, LEFT - 8));
+    for (const value of y.hidden ? [] : y.log ? decades(y.low, y.high) : ticks(y.low, y.high)) {
       line(context, colours.line, 1, [LEFT, scale.y(value), right, scale.y(value)]);
       context.fillText(y.log ? `1e${Math.round(Math.log10(value))}`.replace("-", "−") : formatNumber(value), LEFT - 6, scale.y(value));
     }
@@ -172,6 +179,11 @@ export class Plot {
     context.clip();
     for (const curve of curves) this.curve(context, curve, scale);
     for (const mark of marks) this.mark(context, mark, scale, right, bottom);
+    if (rows.length > 1 && !y.hidden) {
+      context.fillStyle = colours.soft;
+      context.textAlign = "right";
+      rows.forEach((name, row) => context.fillText(`${name} stuck`, right - 3, TOP + (row + 1) * rowHeight - gap - 4));
+    }
     context.restore();
   }
 

@@ -117,12 +117,13 @@ export function decayTable(session, state) {
 // The events with their times.
 export function eventTable(session, state) {
   const { main } = session.runs;
-  const body = session.models.get(state.model).bodies[state.body];
+  const { contacts } = session.models.get(state.model);
   if (!main.events.length) return null;
   const stateAfter = { "-1": "slides backward", 0: "sticks", 1: "slides forward" };
-  const rows = main.events.slice(0, MAX_LISTED_EVENTS).map(({ t, row }, i) => [String(i + 1), String(t), body.mode ? stateAfter[main.columns[body.mode][row]] : ""]);
+  const describe = ({ name, mode }) => (contacts.length > 1 ? `${name} ${stateAfter[mode]}` : stateAfter[mode]);
+  const rows = main.events.slice(0, MAX_LISTED_EVENTS).map(({ t, row }, i) => [String(i + 1), String(t), main.changedContacts(row).map(describe).join(", ")]);
   const more = main.events.length - rows.length;
-  const eventList = table("Events", ["", "t in s", "then it"], rows);
+  const eventList = table("Events", ["", "t in s", contacts.length > 1 ? "then" : "then it"], rows);
   eventList.classList.add("long");
   if (more > 0) eventList.append(makeElement("p", {}, `${more} more events; the CSV file contains all.`));
   return eventList;
