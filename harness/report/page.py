@@ -4,7 +4,7 @@ import os
 import platform
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
 from urllib.parse import quote
@@ -64,9 +64,13 @@ def write_report(results: Path, scenes: Sequence[PublishedScene]) -> ReportPage:
 def render_page(page_sections: list[Section], sketches: tuple[GalleryEntry, ...], results: Path) -> str:
     """Return the HTML of the page; its links are relative to the results folder."""
     measured = [part.sentences for section in page_sections if section.name == "precision" for part in section.parts]
+    # without results of the shipped models, the page begins with the runs of the user's models
+    runs = [section for section in page_sections if section.name == "runs" and section.parts]
+    leading = [] if sketches else [replace(section, title="Runs") for section in runs]
     return TEMPLATE.render(
         relative_link=lambda file: quote(os.fsencode(Path(os.path.relpath(file, results)).as_posix())),
-        sections=page_sections,
+        leading=leading,
+        sections=[section for section in page_sections if sketches or section not in runs],
         sketches=sketches,
         advice=ADVICE,
         measured=[split_clauses(sentence) for sentences in measured for sentence in sentences],

@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 from itertools import groupby
 
 import pytest
-from build_cache import run_published_cases
+from build_cache import ROOT, build_user_model, run_published_cases
 from commands import harness
 
 EMPTY = {"meta", "link", "img", "br"}
@@ -95,6 +95,17 @@ def test_text_from_results_is_escaped(report_run):
     assert "&lt;b&gt;bold" in (report_run[0] / "results/report.html").read_text()
     (folder / "decay.json").write_text(preserved)
     assert harness(report_run[0], "report", "--quiet").returncode == 0
+
+
+def test_a_report_with_only_users_models_begins_with_them(tmp_path):
+    shutil.copy(build_user_model(ROOT / "tests/example_models/larger/sleds.py") / "sleds.fmu", tmp_path)
+    assert harness(tmp_path, "run", "--fmu", "sleds.fmu", "--quiet").returncode == 0
+    assert harness(tmp_path, "report", "--quiet").returncode == 0
+    page = (tmp_path / "results/report.html").read_text(encoding="utf-8")
+    headings = re.findall(r"<h[23]>(.*?)</h[23]>", page)
+    assert headings[:3] == ["Runs", "sleds", "What to use when"]
+    assert headings.count("sleds") == 1
+    assert "Five oscillators" not in page
 
 
 def test_without_results_there_is_no_report(tmp_path):
