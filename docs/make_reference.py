@@ -38,7 +38,7 @@ SCENE_TEXTS = {
     "about": "What the model does; the report prints it.",
     "analyses": "Analyses to perform: `decay`, `slip`, `steps`.",
     "plots": "Panels of the figure: `position`, `velocity`, `acceleration`, `phase`, `steps`, or the name of an "
-    "output; `[]` for no figure. Default: all outputs and the phase plane.",
+    "output, which takes precedence; `[]` for no figure. Default: the first six outputs and the phase plane.",
     "values": "Parameters and inputs by name, in SI units; enumerations by name.",
     "decay": "Settings of the analysis `decay`, see below.",
     "published": "Published numbers to compare with, see below.",

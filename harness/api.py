@@ -558,7 +558,7 @@ def stored_run(folder: Path) -> "Trajectory":
     from .records.columns import read_numeric
     from .results.provenance import load_provenance
     from .running.run_spec import RunSpec
-    from .running.trajectory import ModeChanges, SolverSteps, Trajectory
+    from .running.trajectory import SolverSteps, Trajectory
     from .studies.compare.trajectory_files import read_trajectory
 
     found, origin = read_trajectory(folder), load_provenance(folder)
@@ -566,12 +566,10 @@ def stored_run(folder: Path) -> "Trajectory":
     units = found.units | {name: each["unit"] for name, each in origin.get("parameters", {}).items()}
     scene = origin.get("scene") or {}
     fmu = Path(scene.get("fmu") or scene.get("file") or f"{folder.name}.fmu")
-    steps = events = None
-    if found.events is not None:
-        events = ModeChanges(found.events[:, 0], found.events[:, 1].astype(int))
+    steps = None
     if (folder / "steps.csv").is_file():
         ends, sizes, rejected = read_numeric(folder / "steps.csv")[1].T
         steps = SolverSteps(np.append(found.time[0], ends), sizes, rejected.astype(int))
     spec = RunSpec(fmu, outputs=tuple(found.columns), values=scene.get("values") or {})
     names = {name: name for name in found.columns}
-    return Trajectory(spec, found.time, found.columns, units, names, parameters, steps, events)
+    return Trajectory(spec, found.time, found.columns, units, names, parameters, steps, found.events)

@@ -113,6 +113,17 @@ def run_fmu_file(path: Path, values: tuple[str, ...], options: dict[str, Any], t
         f"{column_heading(name, signals.units[name])}: from {format_value(first)} to {format_value(last)}"
         for name, (first, last) in ends.items()
     ]
+    if signals.events:
+        stuck = {
+            contact: sum(end - begin for begin, end in signals.events.sticking(contact, float(signals.time[-1])))
+            for contact in signals.events.modes
+        }
+        changes = {contact: len(signals.events.changes(contact)[0]) - 1 for contact in stuck}
+        data["contacts"] = {contact: {"changes": changes[contact], "stuck": stuck[contact]} for contact in stuck}
+        lines += [
+            f"{contact}: {changes[contact]} change{'s' * (changes[contact] != 1)} of mode, sticks for {duration:.6g} s"
+            for contact, duration in stuck.items()
+        ]
     failed = failure_message(signals.failure, folder)
     terminal.print_result(data, *lines, *filter(None, [signals.note]), folder=folder, failed=failed)
 

@@ -21,6 +21,7 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException as FMICallException  # re-exported for callers that step by themselves
 
 from ..errors import HarnessError, SceneError, first_line
+from .contacts import find_contacts
 from .description import read_description, resolve_time_span
 from .inputs import InputSignals, check_inputs
 from .run_spec import RunSpec
@@ -197,18 +198,16 @@ def plan_run(spec: RunSpec, description: Any) -> RunPlan:
         raise SceneError(f"{sentence}; the limit is {MAX_POINTS}: choose a larger grid")
     names = list(spec.outputs)
     if spec.follow:
-        extra = ("solver.t_next", "solver.rejected", "events.count", "events.t_last", find_mode_output(variables))
+        extra = (
+            "solver.t_next",
+            "solver.rejected",
+            "events.count",
+            "events.t_last",
+            *find_contacts(variables).values(),
+        )
         names += [name for name in extra if name in variables and name not in names]
     reals = [name for name in names if variables[name].type == "Real"]
     return RunPlan(spec, variables, start, stop, reals, [name for name in names if name not in reals])
-
-
-def find_mode_output(variables: dict[str, Any]) -> str:
-    """Return the friction mode, which is the only integer output; empty if there is none."""
-    return next(
-        (name for name, variable in variables.items() if (variable.causality, variable.type) == ("output", "Integer")),
-        "",
-    )
 
 
 def run_repeats(plan: RunPlan, fmu: Any, report: ProgressCallback) -> Trajectory:
@@ -333,8 +332,9 @@ def build_trajectory(plan: RunPlan, fmu: Any, trace: RecordedSamples, seconds: f
     effective = read_parameters(plan, fmu)
     if spec.follow and effective.get("friction") == "hybrid":
         at = np.flatnonzero(np.diff(samples["events.count"])) + 1
-        mode = samples[find_mode_output(variables)]
-        events = ModeChanges(np.append(time[0], samples["events.t_last"][at]), np.append(mode[0], mode[at]))
+        rows = np.append(0, at)
+        modes = {contact: samples[mode][rows] for contact, mode in find_contacts(variables).items()}
+        events = ModeChanges(np.append(time[0], samples["events.t_last"][at]), modes)
     accepted, rejected, evaluations = (
         read_integer(plan, fmu, f"solver.{name}") for name in ("steps", "rejected", "evaluations")
     )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .trajectory import Trajectory
+from .trajectory import ModeChanges, Trajectory
 
 
 @dataclass(frozen=True)
@@ -19,8 +19,8 @@ class Signals:
         Time (n,) in s.
     columns, units : dict
         Signals (n,) and units, by name.
-    events : numpy.ndarray or None
-        Times in s and modes (m, 2), start included, if known.
+    events : ModeChanges or None
+        Changes of mode, if known.
     note, file, parameters
         Origin of the signals.
     failure : str
@@ -31,7 +31,7 @@ class Signals:
     time: np.ndarray
     columns: dict[str, np.ndarray]
     units: dict[str, str]
-    events: np.ndarray | None = None
+    events: ModeChanges | None = None
     note: str = ""
     file: Path | None = None
     parameters: Mapping[str, tuple[object, str]] = field(default_factory=dict)
@@ -40,8 +40,7 @@ class Signals:
 
 def signals_from_trajectory(run: Trajectory) -> Signals:
     """Return the signals of a run."""
-    events = None if run.events is None else np.column_stack([run.events.t, run.events.mode])
     note = run.note or (f"solver: {run.settings_label}" if run.settings_label else "")
     units = {name: run.units[name] for name in run.columns}
     fmu, parameters = run.spec.fmu, run.effective_parameters
-    return Signals(run.spec.model, run.time, run.columns, units, events, note, fmu, parameters, run.failure)
+    return Signals(run.spec.model, run.time, run.columns, units, run.events, note, fmu, parameters, run.failure)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import HarnessError, check_names, optional
-from ..results.files import column_heading, write_csv, write_signals
+from ..results.files import write_csv, write_signals
 from ..results.quantity import Quantity
+from .contacts import choose_outputs, contact_of_mode
 from .run_spec import RunSpec
 
 if TYPE_CHECKING:
@@ -31,10 +32,52 @@ class SolverSteps:
 
 @dataclass(frozen=True)
 class ModeChanges:
-    """Changes of mode: `mode` (n,) holds from `t` (n,) in s on. The first entry is the start."""
+    """Changes of mode: the modes hold from the times on. The first entry is the start.
+
+    Attributes
+    ----------
+    t : numpy.ndarray
+        Times (n,) in s.
+    modes : dict
+        Modes (n,) of each contact by the name of its friction force: -1, 0 while it sticks, or 1.
+    """
 
     t: np.ndarray
-    mode: np.ndarray
+    modes: dict[str, np.ndarray]
+
+    @property
+    def mode(self) -> np.ndarray:
+        """Return the modes (n,) of the only contact.
+
+        Raises
+        ------
+        HarnessError
+            If there are several contacts.
+        """
+        if len(self.modes) > 1:
+            names = ", ".join(self.modes)
+            raise HarnessError(
+                f"there are {len(self.modes)} contacts ({names}): name one, as in events.modes['{names.split(',')[0]}']"
+            )
+        (mode,) = self.modes.values()
+        return mode
+
+    @property
+    def headings(self) -> list[str]:
+        """Return the headings of a table of the modes: the names of the contacts, or `mode` for a single contact."""
+        return list(self.modes) if len(self.modes) > 1 else ["mode"]
+
+    def changes(self, contact: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return times (m,) in s and modes (m,) of one contact, without the changes of the others."""
+        modes = self.modes[contact]
+        kept = np.append(True, (np.diff(modes) != 0) | (len(self.modes) == 1))
+        return self.t[kept], modes[kept]
+
+    def sticking(self, contact: str, stop: float) -> list[tuple[float, float]]:
+        """Return the intervals of time in s in which a contact sticks, up to the stop."""
+        times, modes = self.changes(contact)
+        intervals = pairwise([*times.tolist(), stop])
+        return [interval for interval, mode in zip(intervals, modes, strict=True) if mode == 0]
 
 
 @dataclass(frozen=True)
@@ -157,17 +200,20 @@ class Trajectory:
         return dataset
 
     def plot(self, *names: str) -> "np.ndarray":
-        """Plot outputs over time, one panel each; shade the times when the body sticks.
+        """Plot outputs over time, one panel each, and input signals; shade the times when the contact sticks.
+
+        With several contacts, the panel of a friction force is shaded, and a further panel shows when each contact
+        sticks.
 
         Parameters
         ----------
         *names : str
-            The outputs to plot; all that are numbers if none is describe_sources, at most eight of them.
+            The outputs to plot; by default the first that are numbers and all friction forces, eight in all.
 
         Returns
         -------
         numpy.ndarray
-            The matplotlib axes (n,), one for each output.
+            The matplotlib axes (n,), one for each panel.
         """
         from .plot import plot
 
@@ -176,17 +222,30 @@ class Trajectory:
         texts = [name for name in names if name not in numeric]
         if texts:
             raise HarnessError(f"{texts[0]} is a text, which has no curve: name other outputs")
-        chosen = names or tuple(numeric[:MOST_PANELS])
-        labels = {column_heading(name, self.units[name]): self.columns[name] for name in chosen}
-        return plot(self.time, labels, self.sticking, self.spec.model)
+        inputs = [] if names else [name for name in self.spec.inputs if name != "time" and name not in self.columns]
+        return plot(self, names or choose_outputs(numeric, self.contacts, MOST_PANELS), inputs)
 
     @property
-    def sticking(self) -> list[tuple[float, float]]:
-        """The intervals of time in s in which the body sticks; none where the modes are not known."""
+    def contacts(self) -> tuple[str, ...]:
+        """The names of the contacts; none where the modes are not known."""
+        return tuple(self.events.modes) if self.events else ()
+
+    @property
+    def sticking(self) -> dict[str, list[tuple[float, float]]]:
+        """The intervals of time in s in which each contact sticks, by its name."""
         if self.events is None:
-            return []
-        ends = pairwise([*self.events.t.tolist(), float(self.time[-1])])
-        return [interval for interval, mode in zip(ends, self.events.mode, strict=True) if mode == 0]
+            return {}
+        return {contact: self.events.sticking(contact, float(self.time[-1])) for contact in self.contacts}
+
+    def contact_of(self, name: str) -> str:
+        """Return the contact whose sticking belongs to the panel of an output; empty if there is none.
+
+        That is the only contact of the model, or the one whose friction force or mode the output is.
+        """
+        if len(self.contacts) == 1:
+            return self.contacts[0]
+        candidates = (name, contact_of_mode(self.descriptions.get(name)))
+        return next((contact for contact in candidates if contact in self.contacts), "")
 
     def save(self, folder: str | Path) -> None:
         """Write the trajectory, its events, its steps and its provenance into a result folder.
@@ -238,4 +297,5 @@ class Trajectory:
             columns = [self.steps.t[1:], self.steps.h, self.steps.rejected]
             write_csv(directory / "steps.csv", ["t [s]", "h [s]", "rejected"], columns)
         if self.events:
-            write_csv(directory / "events.csv", ["t [s]", "mode"], [self.events.t, self.events.mode])
+            columns = [self.events.t, *self.events.modes.values()]
+            write_csv(directory / "events.csv", ["t [s]", *self.events.headings], columns)

@@ -17,7 +17,8 @@
     timeout = 60              time limit of one FMI call in s
     analyses = ["decay"]      decay, slip, steps
     plots = ["phase"]         position, velocity, acceleration, phase, steps, or any output; [] for none;
-                              default: every output and the phase plane
+                              an output that has one of these names takes precedence;
+                              default: the first six outputs and the phase plane
     [values]                  parameters and inputs by name, SI units; enumerations by label
     [decay]                   gives = "zeta", "f" or "T_f"; first = peaks to skip; cycles = cycles to use (all)
     [published]               source = "..."; published quantities: a number, [number, "unit"] or a text
@@ -25,6 +26,7 @@
 Required are title, outputs, and either model or fmu.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, fields, replace
 from math import inf
 from pathlib import Path
@@ -183,12 +185,18 @@ def build_scene(path: Path, table: dict[str, Any], source: str) -> Scene:
     return scene
 
 
-def default_plots(outputs: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the plots of a scene that names none."""
+def is_panel(name: str, outputs: Collection[str]) -> bool:
+    """Return whether a plot is a panel of this program; an output of the same name takes precedence."""
+    return name in PLOTS and name not in outputs
+
+
+def default_plots(outputs: tuple[str, ...], chosen: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the plots of a scene that names none: the `chosen` outputs or the first ones, and the phase plane."""
     motion = find_roles(outputs)
-    names = {output: role for role, output in motion.items()}
-    phase = ("phase",) if all(role in motion for role in PLOTS["phase"]) else ()
-    return (*[names.get(output, output) for output in outputs][:MAX_DEFAULT_PLOTS], *phase)
+    names = {output: role for role, output in motion.items() if is_panel(role, outputs)}
+    has_phase = is_panel("phase", outputs) and all(role in motion for role in PLOTS["phase"])
+    phase = ("phase",) if has_phase else ()
+    return (*[names.get(output, output) for output in chosen or outputs[:MAX_DEFAULT_PLOTS]], *phase)
 
 
 def check_requirements(scene: Scene) -> None:
@@ -196,7 +204,8 @@ def check_requirements(scene: Scene) -> None:
     motion = find_roles(scene.outputs)
     if not scene.outputs:
         raise SceneError("outputs is empty; give at least one, as in outputs = ['x', 'v']")
-    for category, names, required_roles in ("analysis", scene.analyses, ANALYSES), ("plot", scene.plots, PLOTS):
+    panels = tuple(name for name in scene.plots if is_panel(name, scene.outputs))
+    for category, names, required_roles in ("analysis", scene.analyses, ANALYSES), ("plot", panels, PLOTS):
         for name in names:
             for role in required_roles.get(name, ()):
                 if role not in motion:

@@ -13,7 +13,9 @@ from scipy.io import savemat
 
 from harness.errors import HarnessError
 from harness.running.signals import Signals
+from harness.running.trajectory import ModeChanges
 from harness.studies.compare.difference import compare
+from harness.studies.compare.study import comparison_as_json
 from harness.studies.compare.trajectory_files import read_trajectory
 
 
@@ -111,6 +113,12 @@ def test_an_impossible_comparison_is_one_sentence(harness, arguments, status, se
 UNITS = {"x": "m", "v": "m/s", "y": "m", "mode": ""}
 
 
+def mode_changes(rows, contacts=("mode",)):
+    """Return the changes of mode in rows of a time and the mode of each contact."""
+    t, *modes = np.array(rows, float).T
+    return ModeChanges(t, dict(zip(contacts, modes, strict=True)))
+
+
 def path(name, times, events=None, **columns):
     return Signals(name, times, columns, {name: UNITS.get(name, "") for name in columns}, events)
 
@@ -153,7 +161,7 @@ def test_a_jump_is_compared_as_a_jump(late):
         since = np.where(t >= at, t - at, 0.0)
         columns = {"a": np.where(t >= at, 2.0, 0.0), "v": 2 * since, "x": since**2}
         units = {"a": "m/s2", "v": "m/s", "x": "m"}
-        return Signals(name, t, columns, units, np.array([[0, 0], [at, 1]]))
+        return Signals(name, t, columns, units, mode_changes([[0, 0], [at, 1]]))
 
     comparison = compare(
         motion("one", np.linspace(0, 2, 101), 1.0), motion("two", np.linspace(0, 1.99, 57), 1.0 + late)
@@ -230,19 +238,34 @@ def test_results_without_a_common_variable_are_refused():
 )
 def test_events_are_matched_by_kind_and_time(second, sentence, shift):
     t = np.arange(20.0)
-    one = Signals("one", t, {"x": t}, {"x": "m"}, np.array([[0, 0], [1, 1], [2, 0.0]]))
-    two = Signals("two", t, {"x": t}, {"x": "m"}, np.array([[0, 0], *second], float))
+    one = Signals("one", t, {"x": t}, {"x": "m"}, mode_changes([[0, 0], [1, 1], [2, 0]]))
+    two = Signals("two", t, {"x": t}, {"x": "m"}, mode_changes([[0, 0], *second]))
     pairs = compare(one, two).pairs
     assert pairs.summary(("one", "two")) == sentence
     assert pairs.shift == pytest.approx(shift, nan_ok=True)
 
 
+def test_events_of_several_contacts_are_matched_per_contact_and_named():
+    """Both contacts slide, but not in the same order of contacts; at 3 s one of them sticks on one side only."""
+    t = np.arange(20.0)
+    names = ("F_lower", "F_upper")
+    rows = [[0, 0, 0], [1, 1, 0], [2, 1, 1], [3, 0, 1]]
+    one = Signals("one", t, {"x": t}, {"x": "m"}, mode_changes(rows, names))
+    swapped = [[0, 0, 0], [1.5, 0, 1], [1.75, 1, 1]]
+    two = Signals("two", t, {"x": t}, {"x": "m"}, mode_changes(swapped, names))
+    comparison = compare(one, two)
+    assert comparison.events == (
+        "2 changes of mode in both, at most 0.75 s apart; only in one: F_lower to 0 at t = 3 s"
+    )
+    assert comparison_as_json(comparison)["only_one"] == [[3.0, 0.0, "F_lower"]]
+
+
 def test_a_distant_event_match_hides_no_difference():
     """The other one jumps back in between, so that the values in between belong to no jump."""
     t = np.linspace(0, 3, 301)
-    one = Signals("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, np.array([[0, 0], [1, 1.0]]))
+    one = Signals("one", t, {"y": (t >= 1) + 0.5}, {"y": "m"}, mode_changes([[0, 0], [1, 1]]))
     step = (t >= 0.5) & (t < 0.8) | (t >= 2)
-    two = Signals("two", t, {"y": step + 0.5}, {"y": "m"}, np.array([[0, 0], [0.5, 2], [0.8, 0], [2, 1.0]]))
+    two = Signals("two", t, {"y": step + 0.5}, {"y": "m"}, mode_changes([[0, 0], [0.5, 2], [0.8, 0], [2, 1]]))
     assert compare(one, two).differences[0].largest == 1.0
 
 

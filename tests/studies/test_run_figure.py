@@ -2,13 +2,18 @@
 
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import tomllib
 
+import commands
 import numpy as np
 import pytest
-from build_cache import ROOT, cached_folder
+from build_cache import ROOT, build_user_model, cached_folder
+
+import harness
 
 SCENES = {path.stem: tomllib.loads(path.read_text()) for path in sorted((ROOT / "harness/scenes").glob("*.toml"))}
 SCENES.pop("pacejka-0.001")
@@ -150,3 +155,110 @@ def test_the_envelope_of_the_published_loss_passes_through_the_turning_points(dr
     turning = next(np.abs(y) for text, _, y in lines if text == "turning points")
     upper = next(np.array(y) for text, _, y in lines if text == "published" and len(y) > 1)
     assert upper == pytest.approx(turning, abs=0.02 * turning[0])
+
+
+CONTACTS = ROOT / "tests/example_models/larger"
+
+
+def build_fmu(path):
+    """Return the FMU of a model file."""
+    return build_user_model(path) / f"{path.stem}.fmu"
+
+
+@pytest.fixture(scope="module")
+def blocks_run(tmp_path_factory):
+    """The run of a model of two contacts, by itself, with its result folder."""
+    folder = tmp_path_factory.mktemp("blocks")
+    fmu = build_fmu(CONTACTS / "blocks.py")
+    done = commands.harness(folder, "run", "--fmu", str(fmu))
+    assert done.returncode == 0, done.stderr
+    return done.stdout, folder / "results/blocks"
+
+
+def test_several_contacts_are_named_in_the_events_and_in_the_figure(blocks_run):
+    """The modes in the event list are those of the recorded modes; each contact has a row in each column."""
+    printed, folder = blocks_run
+    events = np.genfromtxt(folder / "events.csv", delimiter=",", names=True, deletechars="")
+    assert events.dtype.names == ("t_[s]", "F1", "F2")
+    columns = np.genfromtxt(folder / "trajectory.csv", delimiter=",", names=True, deletechars="")
+    for contact, mode in (("F1", "mode1"), ("F2", "mode2")):
+        after = np.searchsorted(columns["t_[s]"], events["t_[s]"], side="right") - 1
+        assert (columns[mode][after] == events[contact]).mean() > 0.9  # an event may lie within rounding of its row
+        assert f"{contact}: {np.count_nonzero(np.diff(events[contact]))} change" in printed
+    figure = (folder / "figure.svg").read_text(encoding="utf-8")
+    for text in ("friction on the ground", "friction between the blocks"):
+        assert f">{text}<" in figure
+    assert figure.count(">sticking of each contact<") == 2
+
+
+def test_each_contact_force_is_shaded_where_its_own_contact_sticks(blocks_run):
+    run = harness.load_result(blocks_run[1])
+    for contact, speed in (("F1", run["v1"]), ("F2", run["v2"] - run["v1"])):
+        assert run.contact_of(contact) == contact
+        for begin, end in run.sticking[contact]:
+            inside = (run.time > begin + 1e-6) & (run.time < end - 1e-6)
+            assert np.abs(speed[inside]).max(initial=0.0) < 1e-12
+    assert run.contact_of("v1") == ""
+    with pytest.raises(harness.HarnessError, match=r"2 contacts \(F1, F2\)"):
+        _ = run.events.mode
+
+
+def test_the_order_of_declaration_does_not_exchange_the_contacts(tmp_path):
+    """Modes declared in another order than the contacts belong to the contacts that name them."""
+    source = (CONTACTS / "sleds.py").read_text(encoding="utf-8").replace("mode1, mode2 =", "mode2, mode1 =")
+    (tmp_path / "exchanged.py").write_text(source, encoding="utf-8")
+    plain, other = (harness.simulate(build_fmu(path)) for path in (CONTACTS / "sleds.py", tmp_path / "exchanged.py"))
+    assert {contact: modes.tolist() for contact, modes in other.events.modes.items()} == {
+        contact: plain.events.modes[contact].tolist() for contact in ("F2", "F1")
+    }
+
+
+def test_input_signals_are_plotted_with_the_outputs():
+    run = harness.simulate(
+        build_fmu(CONTACTS / "blocks.py"), inputs={"time": [0.0, 4.0, 8.0], "F_ext": [0.0, 5.0, 0.0]}
+    )
+    labels = [axes.get_ylabel() for axes in run.plot()]
+    assert labels[-2:] == ["F_ext [N]", "sticking"]
+    assert {"F1 [N]", "F2 [N]"} <= {*labels}
+
+
+OUTPUTS_NAMED_LIKE_PANELS = """
+from fmus import Model, Output, Parameter, State
+
+
+class Named(Model):
+    \"\"\"Rotor whose outputs have the names of panels: phase' = speed.\"\"\"
+
+    x = State("m", "a length", start=1.0)
+    v = State("m/s", "its rate", rate_of=x)
+    a = Output("m/s2", "the rate of v", -x * rate, rate_of=v)
+    phase = Output("rad", "phase angle", 2.0 * x * turn)
+    position = Output("m", "another length", 3.0 * x)
+    steps = Output("m", "a length of steps", 4.0 * x)
+"""
+
+
+def test_an_output_takes_precedence_over_the_panel_of_its_name(tmp_path):
+    """Each is drawn as a curve over time, also by a scene, and no panel is drawn in its place."""
+    text = OUTPUTS_NAMED_LIKE_PANELS.replace(
+        "    x = State",
+        '    rate = Parameter(4.0, "1/s2", "rate")\n    turn = Parameter(1.0, "rad/m", "turn")\n    x = State',
+    )
+    (tmp_path / "named.py").write_text(text, encoding="utf-8")
+    fmu = build_fmu(tmp_path / "named.py")
+    plots = '["position", "phase", "steps", "velocity"]'
+    outputs = '["x", "v", "position", "phase", "steps"]'
+    (tmp_path / "named.toml").write_text(
+        f'title = "Names"\nfmu = "{fmu.as_posix()}"\noutputs = {outputs}\nplots = {plots}\ngrid = 0.1\n'
+    )
+    for words, titles in (
+        (("named.toml",), {"another length", "phase angle", "a length of steps", "its rate"}),
+        (("--fmu", str(fmu)), {"another length", "phase angle", "a length of steps", "its rate", "a length"}),
+    ):
+        done = commands.harness(tmp_path, "run", *words)
+        assert done.returncode == 0, done.stderr
+        figure = (tmp_path / "results/named/figure.svg").read_text(encoding="utf-8")
+        shown = {*re.findall(r">([^<>]+)</text>", figure)}
+        assert titles <= shown
+        assert not {"phase plane", "step size of the solver"} & shown
+        shutil.rmtree(tmp_path / "results")

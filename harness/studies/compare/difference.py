@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import HarnessError
 from ...running.signals import Signals
-from .event_pairs import EventPairs, match_events
+from .event_pairs import EventPairs, match_events, stack_events
 from .interpolation import SignalInterpolant, ValueBounds
 from .trajectory_sources import common_span
 from .units import conversion_factor
@@ -200,11 +200,16 @@ def events(
 
     Such an interval extends between the two times of a matched event; an unmatched event is an interval of length zero.
     """
-    event_tables = [np.zeros((1, 2)) if side.events is None else side.events for side in (one, two)]
-    first, second = (rows[1:][(rows[1:, 0] >= begin) & (rows[1:, 0] <= end)] for rows in event_tables)
+    known = [side.events for side in (one, two) if side.events is not None]
+    names = list(dict.fromkeys(contact for changes in known for contact in changes.modes))
+    contacts = names if any(len(changes.modes) > 1 for changes in known) else []
+    first, second = (
+        np.empty((0, 3)) if side.events is None else stack_events(side.events, contacts, begin, end)
+        for side in (one, two)
+    )
     if one.events is None or two.events is None:
         return None, (first[:, [0, 0]], second[:, [0, 0]])
-    pairs = match_events(first, second)
+    pairs = match_events(first, second, contacts)
     intervals = pairs.intervals[pairs.is_isolated(np.sort(np.concatenate([first[:, 0], second[:, 0]])))]
     unmatched = [rows[~np.isin(rows[:, 0], intervals)][:, [0, 0]] for rows in (first, second)]
     left, right = (np.vstack([intervals, rows]) for rows in unmatched)

@@ -1,8 +1,11 @@
 """Matches events of two trajectories by kind and nearest time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from ...running.trajectory import ModeChanges
 
 MAX_LISTED = 3  # unmatched events listed in the summary
 
@@ -11,13 +14,15 @@ MAX_LISTED = 3  # unmatched events listed in the summary
 class EventPairs:
     """Matched changes of mode.
 
-    `one` and `two` (k, 2) hold time in s and new mode, with the same event in each row; `unmatched` holds the other
-    events of each side.
+    `one` and `two` (k, 3) hold time in s, new mode and number of the contact, with the same event in each row;
+    `unmatched` holds the other events of each side. `contacts` are the names of the contacts by number; empty for a
+    single contact.
     """
 
     one: np.ndarray
     two: np.ndarray
     unmatched: tuple[np.ndarray, np.ndarray]
+    contacts: tuple[str, ...] = ()
 
     @property
     def shift(self) -> float:
@@ -44,28 +49,51 @@ class EventPairs:
         count = f"{len(self.one)} change{'s' * (len(self.one) != 1)} of mode in both"
         parts = [f"{count}, at most {self.largest_shift:.3g} s apart" if len(self.one) else count]
         for name, rows in zip(names, self.unmatched, strict=True):
-            listed = [f"to {mode:g} at t = {t:.6g} s" for t, mode in rows[:MAX_LISTED]]
+            listed = [f"{self.state(mode, contact)} at t = {t:.6g} s" for t, mode, contact in rows[:MAX_LISTED]]
             more = [f"{len(rows) - MAX_LISTED} more"] * (len(rows) > MAX_LISTED)
             parts += [f"only in {name}: {', '.join(listed + more)}"] if listed else []
         return "; ".join(parts)
 
+    def state(self, mode: float, contact: float) -> str:
+        """Return what holds after an event, with the name of the contact if there are several."""
+        return f"{self.contacts[int(contact)]} to {mode:g}" if self.contacts else f"to {mode:g}"
 
-def match_events(one: np.ndarray, two: np.ndarray) -> EventPairs:
-    """Match the events of two trajectories, (n, 2) and (m, 2), sorted by time.
+    def listed(self, rows: np.ndarray) -> list[list[float | str]]:
+        """Return time in s and new mode of events (k, 3), and the name of the contact if there are several."""
+        names = [[self.contacts[int(contact)]] if self.contacts else [] for contact in rows[:, 2]]
+        return [[*row, *name] for row, name in zip(rows[:, :2].tolist(), names, strict=True)]
+
+
+def stack_events(changes: ModeChanges, contacts: Sequence[str], begin: float, end: float) -> np.ndarray:
+    """Return the changes of mode between two times as rows of time in s, mode and number of the contact, by time."""
+    rows = np.empty((0, 3))
+    for contact in changes.modes:
+        number = contacts.index(contact) if contacts else 0
+        times, modes = (column[1:] for column in changes.changes(contact))
+        rows = np.vstack([rows, np.column_stack([times, modes, np.full(len(times), number)])])
+    rows = rows[(rows[:, 0] >= begin) & (rows[:, 0] <= end)]
+    return rows[np.argsort(rows[:, 0], kind="stable")]
+
+
+def match_events(one: np.ndarray, two: np.ndarray, contacts: Sequence[str] = ()) -> EventPairs:
+    """Match the events of two trajectories, (n, 3) and (m, 3), sorted by time.
 
     If both sequences of modes are equal, events are matched in order; otherwise mutual nearest neighbours of the same
-    kind are matched.
+    kind are matched, which is the contact and its new mode.
     """
-    if len(one) == len(two) and (one[:, 1] == two[:, 1]).all():
-        return EventPairs(one, two, (one[:0], two[:0]))
+    names = tuple(contacts)
+    if len(one) == len(two) and (one[:, 1:] == two[:, 1:]).all():
+        return EventPairs(one, two, (one[:0], two[:0]), names)
     matches: list[tuple[int, int]] = []
-    for kind in np.intersect1d(one[:, 1], two[:, 1]):
-        i, j = (np.flatnonzero(rows[:, 1] == kind) for rows in (one, two))
+    for kind in np.unique(one[:, 1:], axis=0):
+        i, j = (np.flatnonzero((rows[:, 1:] == kind).all(axis=1)) for rows in (one, two))
+        if not len(j):
+            continue
         to, back = nearest(one[i, 0], two[j, 0]), nearest(two[j, 0], one[i, 0])
         mutual = np.flatnonzero(back[to] == np.arange(len(i)))
         matches += zip(i[mutual].tolist(), j[to[mutual]].tolist(), strict=True)
     left, right = np.array(sorted(matches), int).reshape(-1, 2).T
-    return EventPairs(one[left], two[right], (np.delete(one, left, axis=0), np.delete(two, right, axis=0)))
+    return EventPairs(one[left], two[right], (np.delete(one, left, axis=0), np.delete(two, right, axis=0)), names)
 
 
 def nearest(times: np.ndarray, among: np.ndarray) -> np.ndarray:

@@ -61,16 +61,19 @@ def comparison_as_json(comparison: Comparison) -> dict[str, Any]:
 
 
 def events(comparison: Comparison) -> dict[str, Any]:
-    """Return the events for JSON output: time in s and new mode; the shift is NaN if some are unmatched."""
+    """Return the events for JSON output: time in s, new mode, and the contact if there are several.
+
+    The shift is NaN if some are unmatched.
+    """
     pairs = comparison.pairs
     if pairs is None:
         return {"events": "", "event_shift": None}
     return {
         "events": comparison.events,
         "event_shift": pairs.shift,
-        "matched": {"one": pairs.one.tolist(), "two": pairs.two.tolist(), "shift": pairs.largest_shift},
-        "only_one": pairs.unmatched[0].tolist(),
-        "only_two": pairs.unmatched[1].tolist(),
+        "matched": {"one": pairs.listed(pairs.one), "two": pairs.listed(pairs.two), "shift": pairs.largest_shift},
+        "only_one": pairs.listed(pairs.unmatched[0]),
+        "only_two": pairs.listed(pairs.unmatched[1]),
     }
 
 

@@ -16,6 +16,7 @@ from ...records.table_files import read_content
 from ...records.units import TIMES
 from ...running.external.sample_rows import element_names
 from ...running.signals import Signals
+from ...running.trajectory import ModeChanges
 
 MAX_TIME = 1e100  # s; largest absolute time
 ELEMENT = re.compile(r".*\[\d+(,\d+)*\]")  # name of an array element; its brackets do not contain a unit
@@ -53,15 +54,15 @@ def read_trajectory(path: Path) -> Signals:
     return Signals(path.stem, time, columns, units, read_events(path), file=file)
 
 
-def read_events(path: Path) -> np.ndarray | None:
+def read_events(path: Path) -> ModeChanges | None:
     """Read the events in a result folder, or return None."""
     file = path / "events.csv"
     if not path.is_dir() or not file.is_file():
         return None
-    read_table = read_numeric(file)[1]
-    if read_table.shape[1] != 2 or not np.isfinite(read_table).all():
+    (_, *contacts), rows = read_numeric(file)
+    if not contacts or not np.isfinite(rows).all():
         raise SceneError(f"{file} does not contain times and modes")
-    return read_table
+    return ModeChanges(rows[:, 0], dict(zip(contacts, rows[:, 1:].T.astype(int), strict=True)))
 
 
 def parse_heading(head: str) -> tuple[str, str]:

@@ -1,11 +1,11 @@
 """Figure of a run, with one panel for each plot that the scene names.
 
-Sticking is shaded, reversals are marked, published values are drawn in green, and angles are in degrees.
+Sticking is shaded, reversals are marked, published values are drawn in green, and angles are in degrees.  With several
+contacts, only the panels of their friction forces and modes are shaded; a panel below shows when each contact sticks.
 """
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +29,12 @@ from ...results.style import (
 from ...running import runner
 from ...running.description import read_description
 from ...running.fmi2 import simulate
+from ...running.plot import draw_sticking
 from ...running.trajectory import Trajectory
+from ...scenes.scene import MAX_DEFAULT_PLOTS, is_panel
 
 RIGHT_COLUMN = ("phase", "steps")  # plots in the right column; plots over time are in the left column
+CONTACT_HEIGHT = 0.12  # of a row of the panel with all contacts, in heights of a panel
 LIMITS = np.array([[1.01, -0.01], [-0.01, 1.01]])  # limits of a time axis from start and stop, with a margin of 1 %
 CURVE_POINTS = 1000  # points of a smooth curve
 MAX_MARKED = 100  # most reversals that are marked; more are indistinguishable
@@ -77,26 +80,43 @@ def draw(
     published: Mapping[str, Any] | None = None,
 ) -> None:
     """Save the figure of the named plots; arrays are drawn by element, strings are skipped."""
-    chosen = [panel for name in plots for panel in expand_plot(name, run)]
-    columns = [
-        names for right in (False, True) if (names := [name for name in chosen if (name in RIGHT_COLUMN) == right])
-    ]
+    columns = arrange_columns([panel for name in plots for panel in expand_plot(name, run)], run)
     if not columns:
         return
     plotted = PlottedRun(refine(run), results, published or {})
-    height = HEIGHT * max(2, *map(len, columns), 2)
+    # with several contacts, each column over time ends with a panel of all contacts
+    below = [len(run.contacts) * CONTACT_HEIGHT + 0.2] if len(run.contacts) > 1 else []
+    ratios = [[1.0] * len(names) + below * (not is_right(names[0], run)) for names in columns]
+    height = HEIGHT * max(2, *map(sum, ratios), 2)
     with open_figure(path, WIDTH * len(columns), height) as figure:
         figure.suptitle(f"{title}\n{run.settings_label}".strip(), fontsize=11)
         parts = figure.subfigures(1, len(columns), squeeze=False)[0]
-        for part, names in zip(parts, columns, strict=True):
-            over_time = names[0] not in RIGHT_COLUMN
-            for axes, name in zip(part.subplots(len(names), sharex=over_time, squeeze=False)[:, 0], names, strict=True):
-                PANELS[name](axes, plotted) if name in PANELS else plot_output(axes, plotted, name)
+        for part, names, heights in zip(parts, columns, ratios, strict=True):
+            over_time = not is_right(names[0], run)
+            grid = part.subplots(len(heights), sharex=over_time, squeeze=False, height_ratios=heights)[:, 0]
+            for axes, name in zip(grid, names, strict=False):
+                PANELS.get(name if is_panel(name, run.columns) else "", plot_output)(axes, plotted, name)
+            if len(heights) > len(names):
+                plot_sticking(grid[-1], plotted)
+
+
+def is_right(name: str, run: Trajectory) -> bool:
+    """Return whether a panel belongs to the right column."""
+    return name in RIGHT_COLUMN and is_panel(name, run.columns)
+
+
+def arrange_columns(panels: list[str], run: Trajectory) -> list[list[str]]:
+    """Return the panels of the left and the right column; many panels over time take both if there are no others."""
+    over_time, others = ([name for name in panels if is_right(name, run) == right] for right in (False, True))
+    if len(over_time) > MAX_DEFAULT_PLOTS and not others:
+        half = (len(over_time) + 1) // 2
+        return [over_time[:half], over_time[half:]]
+    return [names for names in (over_time, others) if names]
 
 
 def expand_plot(name: str, run: Trajectory) -> list[str]:
     """Return the panels of one named plot."""
-    if name in PANELS or name in run.spec.motion_outputs:
+    if is_panel(name, run.spec.outputs):
         return [name]
     names = [column for column in run.columns if column == name or column.startswith(f"{name}[")]
     return [column for column in names if run.columns[column].dtype.kind != "U"]
@@ -121,12 +141,13 @@ def refine(run: Trajectory) -> Trajectory:
 
 def plot_output(axes: Axes, plotted: PlottedRun, name: str) -> None:
     """Plot an output, or the output with a role, over time."""
-    run, role = plotted.run, name
-    name = run.spec.motion_outputs.get(role, role)
+    run = plotted.run
+    role = name if is_panel(name, run.columns) else ""
+    name = run.spec.motion_outputs.get(role, name)
     values, (unit, size) = plotted.values(name), plotted.unit(name)
     style = "steps-post" if values.dtype.kind in "iu" else "default"
     axes.plot(run.time, values, color=BLUE, drawstyle=style)
-    mark_modes(axes, run)
+    mark_modes(axes, run, run.contact_of(name))
     level = plotted.published_value(PEAK_LEVELS.get(role, ""))
     if level is not None:
         axes.axhline(level / size, color=GREEN, linestyle=":", label="published peak")
@@ -138,17 +159,14 @@ def plot_output(axes: Axes, plotted: PlottedRun, name: str) -> None:
     axes.label_outer()
 
 
-def mark_modes(axes: Axes, run: Trajectory) -> None:
-    """Shade sticking, and mark reversals without sticking."""
-    if run.events is None:
+def mark_modes(axes: Axes, run: Trajectory, contact: str) -> None:
+    """Shade the sticking of a contact, and mark its reversals without sticking."""
+    if run.events is None or not contact:
         return
-    ends = [*run.events.t.tolist(), float(run.time[-1])]
-    turns = []
-    for (begin, end), mode, before in zip(pairwise(ends), run.events.mode, [0, *run.events.mode], strict=False):
-        if mode == 0:
-            axes.axvspan(begin, end, color=GREY, alpha=0.15, linewidth=0, label="stuck")
-        elif before == -mode:
-            turns.append(begin)
+    for begin, end in run.sticking[contact]:
+        axes.axvspan(begin, end, color=GREY, alpha=0.15, linewidth=0, label="stuck")
+    times, modes = run.events.changes(contact)
+    turns = times[1:][(modes[1:] != 0) & (modes[1:] == -modes[:-1])]
     if 0 < len(turns) <= MAX_MARKED:
         t, y = (
             np.repeat(turns, 3),
@@ -158,7 +176,16 @@ def mark_modes(axes: Axes, run: Trajectory) -> None:
         axes.plot(t, y, color=GREY, linewidth=0.5, linestyle=":", label="reversal", transform=transform)
 
 
-def plot_position(axes: Axes, plotted: PlottedRun) -> None:
+def plot_sticking(axes: Axes, plotted: PlottedRun) -> None:
+    """Plot a row for each contact that shows when it sticks."""
+    draw_sticking(axes, plotted.run, GREY)
+    axes.set_title("sticking of each contact")
+    axes.set_xlabel("t [s]")
+    axes.set_xlim(*LIMITS @ plotted.run.time[[0, -1]])
+    axes.label_outer()
+
+
+def plot_position(axes: Axes, plotted: PlottedRun, name: str) -> None:
     """Plot position over time, with driver position and turning points if available."""
     run, results = plotted.run, plotted.results
     if "x_driver" in run.columns:
@@ -167,8 +194,8 @@ def plot_position(axes: Axes, plotted: PlottedRun) -> None:
         decay = results["decay"]
         _, size = plotted.unit(run.spec.motion_outputs["position"])
         axes.plot(decay.times, decay.positions / size, "o", color=ORANGE, fillstyle="none", label="turning points")
-        for name, index in PUBLISHED_PEAKS.items():
-            peak = plotted.published_value(name)
+        for published, index in PUBLISHED_PEAKS.items():
+            peak = plotted.published_value(published)
             if peak is not None:
                 signed = np.copysign(peak / size, decay.positions[index])
                 axes.plot(decay.times[index], signed, "+", color=GREEN, markersize=11, label="published")
@@ -181,7 +208,7 @@ def plot_position(axes: Axes, plotted: PlottedRun) -> None:
     if first is not None and period is not None:
         for at in np.arange(first, run.time[-1], period):
             axes.axvline(at, color=GREEN, linestyle=":", label="published slip")
-    plot_output(axes, plotted, "position")
+    plot_output(axes, plotted, name)
 
 
 def envelope(decay: Any, value: float) -> np.ndarray:
@@ -203,7 +230,7 @@ def add_legend(axes: Axes) -> None:
             axes.set_title(title, pad=TITLE_PAD)
 
 
-def plot_phase_plane(axes: Axes, plotted: PlottedRun) -> None:
+def plot_phase_plane(axes: Axes, plotted: PlottedRun, name: str) -> None:
     """Plot velocity over position."""
     motion = plotted.run.spec.motion_outputs
     x, v = motion["position"], motion["velocity"]
@@ -213,7 +240,7 @@ def plot_phase_plane(axes: Axes, plotted: PlottedRun) -> None:
     axes.set_ylabel(axis_label(v, plotted.unit(v)[0]))
 
 
-def plot_steps(axes: Axes, plotted: PlottedRun) -> None:
+def plot_steps(axes: Axes, plotted: PlottedRun, name: str) -> None:
     """Plot the internal step sizes over the start times of the steps, with their mean if it was measured."""
     run = plotted.run
     assert run.steps is not None  # ensured by check_steps()
@@ -234,5 +261,5 @@ def plot_steps(axes: Axes, plotted: PlottedRun) -> None:
     axes.set_ylabel("h [s]")
 
 
-Panel = Callable[[Axes, PlottedRun], None]
+Panel = Callable[[Axes, PlottedRun, str], None]
 PANELS: dict[str, Panel] = {"position": plot_position, "phase": plot_phase_plane, "steps": plot_steps}

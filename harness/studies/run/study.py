@@ -11,16 +11,16 @@ from typing import Any
 
 from ...errors import HarnessError, SceneError, unknown_name_message
 from ...process.interrupt import check_interrupt
-from ...results.files import write_signals
 from ...results.folder import replace_folder
 from ...results.provenance import describe_sources, write_provenance
 from ...results.quantity import Quantity
 from ...running import runner
+from ...running.contacts import choose_outputs
 from ...running.run_spec import RunSpec, spec_from_scene
 from ...running.signals import Signals, signals_from_trajectory
 from ...running.trajectory import Trajectory
 from ...scenes.fmu_files import check_built
-from ...scenes.scene import Scene, default_plots, load_scene, shipped_scenes
+from ...scenes.scene import MAX_DEFAULT_PLOTS, Scene, default_plots, is_panel, load_scene, shipped_scenes
 from .table import SceneOutcome, write_quantities
 
 FILES = (
@@ -97,7 +97,8 @@ def run_and_write(scene: Scene, folder: Path, report: Callable[[float], None]) -
 
 def check_steps(scene: Scene, run: Trajectory) -> None:
     """Check that the FMU exposes its solver steps if the scene needs them."""
-    if run.steps is None and "steps" in (*scene.analyses, *scene.plots):
+    panels = [name for name in scene.plots if is_panel(name, scene.outputs)]
+    if run.steps is None and "steps" in (*scene.analyses, *panels):
         raise SceneError(
             f"'steps' in analyses or plots: {scene.file.name} does not expose its solver steps; remove 'steps'"
         )
@@ -148,7 +149,20 @@ def run_fmu(wanted: RunSpec, out: Path, report: Callable[[float], None]) -> tupl
     with replace_folder(folder, FILES, source) as new_folder:
         trajectory = runner.run(wanted, report)
         signals = signals_from_trajectory(trajectory)
-        write_signals(new_folder / FILES[0], signals.time, signals.columns, signals.units)
-        draw(wanted.fmu.name, default_plots(tuple(signals.columns)), trajectory, {}, new_folder / "figure.svg")
+        trajectory.write_tables(new_folder)
+        draw(wanted.fmu.name, choose_plots(trajectory), trajectory, {}, new_folder / "figure.svg")
         write_provenance(new_folder, [wanted.fmu], signals.parameters, wanted, source=source)
     return signals, folder
+
+
+def choose_plots(run: Trajectory) -> tuple[str, ...]:
+    """Return the plots of a run without a scene.
+
+    These are the first outputs, with the friction forces among them.  With several contacts, the forces are additional,
+    and the modes are not plotted as curves.
+    """
+    outputs = run.spec.outputs
+    if len(run.contacts) < 2:
+        return default_plots(outputs, choose_outputs(outputs, run.contacts, MAX_DEFAULT_PLOTS))
+    others = [name for name in outputs if not run.contact_of(name)]
+    return default_plots(outputs, (*others[:MAX_DEFAULT_PLOTS], *run.contacts[:MAX_DEFAULT_PLOTS]))
