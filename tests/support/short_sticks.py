@@ -7,6 +7,7 @@ v', so that no zero of the slip is lost. Nothing here is shared with the code un
 """
 
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from random import Random
 
 import numpy as np
@@ -598,3 +599,16 @@ def first_difference(motion, events, period, bound=0.0):
         nearest = min(motion.dips, key=lambda dip: abs(dip.t - min(t_true, t_found)), default=None)
         return kind, nearest.depth if nearest else float("nan")
     return None
+
+
+def checkpoints(motion, period, bound):
+    """Return (t, number of events, modes) in the middle of every long phase, up to the first dip whose |depth| is below
+    `bound`. Modes are None before the first event.
+    """
+    limit = min((dip.t for dip in motion.dips if abs(dip.depth) < bound), default=motion.stop)
+    times = [0.0, *(event[0] for event in motion.events), motion.stop]
+    return [
+        (0.5 * (start + end), n, motion.events[n - 1][1:] if n else None)
+        for n, (start, end) in enumerate(pairwise(times))
+        if end - start > 0.1 * period and end <= limit
+    ]
