@@ -76,6 +76,31 @@ class Stack(Model):
     stop_time = 20.0
 '''
 
+SHAKEN = '''"""Block at rest under a harmonic force."""
+
+from fmus import Contact, Mode, Model, Output, Parameter, State, sin
+
+
+class Shaken(Model):
+    """Block under a harmonic force: m a = F - F_friction."""
+
+    m = Parameter(1.0, "kg", "mass", above=0.0)
+    f_d = Parameter(2.0, "N", "sliding friction", low=0.0)
+    ratio = Parameter(1.5, "1", "static over sliding friction", low=1.0)
+    F_0 = Parameter(5.0, "N", "amplitude of the force", low=0.0)
+    Omega = Parameter(6.0, "rad/s", "angular frequency of the force", low=0.0)
+
+    x = State("m", "position")
+    v = State("m/s", "speed", rate_of=x)
+    angle = State("rad", "phase angle of the force", rate=Omega)
+    mode = Mode()
+    F = Output("N", "force", F_0 * sin(angle))
+    F_friction = Contact("N", "friction", mode=mode, slip=v, slide=f_d, hold=ratio * f_d)
+    a = Output("m/s2", "acceleration", (F - F_friction) / m, rate_of=v)
+
+    stop_time = 5.0
+'''
+
 
 @dataclass(frozen=True)
 class Belt:
@@ -459,6 +484,41 @@ def stacks(ratio, number=20, seed=1):
     """Return random stacks and their motions."""
     draw = Random(f"stack {ratio} {seed}")
     return [random_stack(draw, ratio) for _ in range(number)]
+
+
+@dataclass(frozen=True)
+class Shaken:
+    """Parameters of the block under a harmonic force, in SI units; its peaks exceed the limit by the share `excess`."""
+
+    m: float
+    f_d: float
+    ratio: float
+    F_0: float
+    Omega: float
+    excess: float
+
+    def values(self):
+        """Return the values to set in the FMU."""
+        return {name: value for name, value in asdict(self).items() if name != "excess"}
+
+    @property
+    def breakaway(self):
+        """Time of the first break-away in s; inf if there is none."""
+        share = mp.mpf(self.ratio) * self.f_d / self.F_0
+        return float(mp.asin(share) / self.Omega) if share < 1 else float("inf")
+
+
+def shaken(number=200, seed=1, excesses=(1e-8, 1e-1)):
+    """Return random blocks under a harmonic force whose amplitude lies above or below the static limit by random
+    shares."""
+    draw = Random(f"shaken {seed}")
+    low, high = (float(mp.log10(excess)) for excess in excesses)
+    found = []
+    for _ in range(number):
+        f_d, ratio, excess = draw.uniform(1.0, 5.0), draw.uniform(1.0, 1.5), 10.0 ** draw.uniform(low, high)
+        excess *= -0.5 if draw.random() < 0.5 else 1.0
+        found.append(Shaken(1.0, f_d, ratio, ratio * f_d * (1.0 + excess), draw.uniform(2.0, 40.0), excess))
+    return found
 
 
 def random_belt(draw, ratio):
