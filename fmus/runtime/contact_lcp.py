@@ -4,21 +4,26 @@ A slip velocity is any expression linear in the velocities.  The forces of all s
 maps contact forces to slip accelerations.  When contacts come to rest, impulses remove the remaining slip velocities
 and conserve momentum.  Which contacts then stick is a linear complementarity problem (F. Pfeiffer, C. Glocker,
 Multibody Dynamics with Unilateral Contacts, chapters 5 and 6).  Its pivoting starts with all contacts stuck, releases
-those whose load exceeds the limit, and locks again those that would slip against their own friction force.
+those whose load exceeds the limit, and locks again those that would slip against their own friction force.  With
+holding limits above the sliding forces, several combinations of modes may be consistent; the solution is the one with
+the most contacts held.
 """
 
 from math import fabs, inf
 
-from .codes import HYBRID, STUCK
-from .rounding import ROUNDOFF_MARGIN
+from .codes import BACKWARD, FORWARD, HYBRID, STUCK
+from .rounding import EPSILON, ROUNDOFF_MARGIN
 from .stick_slip import DryFriction, sign
-from .vectors import ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
+from .vectors import ContactIndex, ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
 
 SLIP_SCALE = 1e-3  # m/s or rad/s: scale of slip velocities whose terms are zero
 TIE_SHARE = 1.0 - 1e-9  # contacts within this share of the highest relative load are released together
 MAX_JOINT_ITERATIONS, MAX_ITERATIONS = 60, 200  # pivots of all contacts at once; then of one at a time
 MAX_IMPULSES = 3  # several, since slip velocities may be nonlinear in the positions
 TINY_FORCE = 1e-300  # N, avoids a division by zero
+EQUAL_SHARE = 1.0 - 1e-9  # of the holding limit: a larger sliding force equals it
+PREDICTION_SHARE = 1e-4  # of the longest step: how far slips are predicted
+MAX_ENUMERATED = 6  # contacts at rest of which all modes are tried
 SLIPPING, RELOCKED, AT_REST, AT_LIMIT = 0, 1, 2, 3  # status of a contact in the pivoting
 
 
@@ -33,6 +38,9 @@ class CoupledFriction(DryFriction):
         contact_rates(t, states, modes)    rates of forces and limits; residual forces (force required to hold a contact
                                            minus present force) and their rates
         apply_impulses(t, states, modes)   states after impulses that stop the slip of stuck contacts
+
+    A contact whose sliding force and holding limit are zero has no friction: it never sticks, and a reversal of its
+    slip is no event.  Its mode, 1 or -1, stays the direction of the last slip with friction, or of the first slip.
     """
 
     is_coupled, rests_when_stuck = True, False
@@ -47,10 +55,9 @@ class CoupledFriction(DryFriction):
             location.scales[i] = location.scales[len(modes) + i] = slip_terms[i]
             location.values[i] = modes[i] * slips[i] + ROUNDOFF_MARGIN * slip_terms[i]
             location.values[len(modes) + i] = 1.0
-        if self.friction != HYBRID:
-            for i in contact_indices:
+            if self.friction != HYBRID or location.is_frictionless[i] > 0.0:
                 location.values[i] = 1.0
-        elif any_of(modes == STUCK):
+        if self.friction == HYBRID and any_of(modes == STUCK):
             force, limit, terms = self.contact_forces(t, y, modes)
             for i in contact_indices:
                 if modes[i] == STUCK:
@@ -59,21 +66,81 @@ class CoupledFriction(DryFriction):
                     location.values[i] = limit_with_margin - force[i]
                     location.values[len(modes) + i] = limit_with_margin + force[i]
 
+    def find_frictionless_contacts(self, location, step):
+        """Note which contacts have no friction in a step: a reversal of their slips is no event."""
+        force, limit, _terms = self.contact_forces(step.t0, step.y0, step.modes0)
+        force_at_end, limit_at_end, _terms_at_end = self.contact_forces(step.t1, step.y1, step.modes0)
+        for i in contact_indices:
+            sizes = fabs(force[i]) + limit[i] + fabs(force_at_end[i]) + limit_at_end[i]
+            location.is_frictionless[i] = 1.0 if step.modes0[i] != STUCK and sizes == 0.0 else 0.0
+
     def resolve_after_event(self, step, ends: ContactVector, tie_tolerance) -> tuple[StateVector, ContactVector, bool]:
         """Return states and modes after an event at the end of a step, and whether the modes are consistent."""
         t = step.t1
         slips = self.slip_velocities(t, step.y1)
         terms = self.slip_magnitudes(t, step.y1)
+        force, limit, _ = self.contact_forces(t, step.y1, step.modes0)
         status, new_modes = contact_vector(), contact_vector()
+        y = step.y1
         for i in contact_indices:
             status[i], new_modes[i] = SLIPPING, step.modes0[i]
             if new_modes[i] == STUCK:
                 status[i] = AT_LIMIT if ends[i] <= t else AT_REST
-            elif ends[i] <= t or new_modes[i] * slips[i] <= ROUNDOFF_MARGIN * terms[i]:
-                status[i], new_modes[i] = AT_REST, STUCK
-        y = self.stop_slips(t, step.y1, new_modes)
-        modes, consistent = self.solve_modes(t, y, new_modes, status, tie_tolerance)
-        return y, modes, consistent
+            elif not (force[i] == 0.0 and limit[i] == 0.0):
+                if ends[i] <= t or new_modes[i] * slips[i] <= ROUNDOFF_MARGIN * terms[i]:
+                    depth = inf
+                    if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
+                        depth = self.reversal_depth(t, y, step.modes0, limit[i], i)
+                    if depth <= tie_tolerance * (terms[i] + self.start_slip(step, i) + SLIP_SCALE):
+                        y = self.raise_slip(t, y, step.modes0, 2.0 * depth + ROUNDOFF_MARGIN * terms[i], i)
+                    else:
+                        status[i], new_modes[i] = AT_REST, STUCK
+        return self.resolve_contacts(t, y, step.modes0, new_modes, status, tie_tolerance)
+
+    def reversal_depth(self, t, y: StateVector, modes: ContactVector, holding_limit, i: ContactIndex):
+        """Return how far a slip velocity, zero now, would go against its mode before it returns; inf if it does not.
+
+        With a holding limit equal to the sliding force, the contact breaks away again when the slip would return; after
+        a slip velocity that only touches zero the depth is zero, except for errors of the method.
+        """
+        _force_rate, _limit_rate, residual_force, residual_force_rate = self.contact_rates(t, y, modes)
+        ahead, rate = modes[i] * residual_force[i], modes[i] * residual_force_rate[i]
+        if fabs(ahead) > holding_limit:  # far from breaking away, or at a dead point
+            return inf
+        if ahead > 0.0:
+            return 0.0
+        if not rate > 0.0:
+            return inf
+        delta = PREDICTION_SHARE * self.solver.step.h_max
+        f = self.rates(t, y, modes)
+        y2 = y + delta * f
+        slips = self.slip_velocities(t, y)
+        slips_ahead = self.slip_velocities(t + delta, y2)
+        return 0.5 * fabs(slips_ahead[i] - slips[i]) / delta * (-ahead / rate)
+
+    def start_slip(self, step, i: ContactIndex):
+        """Return the absolute slip velocity at the start of a step."""
+        slips = self.slip_velocities(step.t0, step.y0)
+        return fabs(slips[i])
+
+    def raise_slip(self, t, y: StateVector, modes: ContactVector, amount, i: ContactIndex) -> StateVector:
+        """Return the states after an impulse in a contact that changes its slip in the direction of its mode."""
+        reverse_modes = contact_vector()
+        for j in contact_indices:
+            reverse_modes[j] = modes[j]
+        reverse_modes[i] = -modes[i]
+        y2 = y
+        f = self.rates(t, y, modes)
+        f2 = self.rates(t, y2, reverse_modes)
+        impulse = f2 - f
+        y3 = y + impulse
+        slips = self.slip_velocities(t, y)
+        slips_after = self.slip_velocities(t, y3)
+        effect = modes[i] * (slips_after[i] - slips[i])
+        if effect > 0.0:
+            share = amount / effect
+            return y + share * impulse
+        return y
 
     def resolve_at_start(
         self, t, y: StateVector, modes: ContactVector, tie_tolerance, reach
@@ -94,14 +161,52 @@ class CoupledFriction(DryFriction):
         """
         slips = self.slip_velocities(t, y)
         terms = self.slip_magnitudes(t, y)
+        force, limit, _ = self.contact_forces(t, y, modes)
         status, new_modes = contact_vector(), contact_vector()
         for i in contact_indices:
             zero_level = ROUNDOFF_MARGIN * terms[i]
             if modes[i] * slips[i] <= 0.0:
                 zero_level = (tie_tolerance if modes[i] == STUCK else reach) * (terms[i] + SLIP_SCALE)
             status[i], new_modes[i] = SLIPPING, sign(slips[i])
-            if fabs(slips[i]) <= zero_level:
+            if modes[i] != STUCK and force[i] == 0.0 and limit[i] == 0.0:
+                new_modes[i] = modes[i]
+            elif fabs(slips[i]) <= zero_level:
                 status[i], new_modes[i] = AT_REST, STUCK
+        return self.resolve_contacts(t, y, modes, new_modes, status, tie_tolerance)
+
+    def resolve_contacts(
+        self, t, y: StateVector, modes: ContactVector, new_modes: ContactVector, status: ContactVector, tie_tolerance
+    ) -> tuple[StateVector, ContactVector, bool]:
+        """Return the states without slip in the contacts at rest, their modes, and whether these are consistent.
+
+        Where levers change, a slip velocity also vanishes at a dead point, where the contact has no lever on anything
+        that moves.  An impulse must not stop the motion there.  So the modes are first determined with the velocities
+        as they are: the load that would hold the slip at zero exceeds every limit at a dead point, and the contact
+        slips on.
+
+        Parameters
+        ----------
+        t, y
+            Time in s; states.
+        modes
+            Modes before.
+        new_modes, status
+            Modes in which contacts at rest are stuck, and the status of each contact.
+        tie_tolerance
+            See `violations`.
+        """
+        if self.has_variable_levers:
+            slips = self.slip_velocities(t, y)
+            _force, limit, terms = self.contact_forces(t, y, new_modes)
+            moving_modes, _consistent = self.solve_modes(t, y, new_modes, status, tie_tolerance)
+            slips_ahead = self.predict_slips(t, y, moving_modes)
+            for i in contact_indices:
+                if status[i] == AT_REST and moving_modes[i] != STUCK:
+                    status[i], new_modes[i] = SLIPPING, moving_modes[i]
+                    if modes[i] * slips[i] > 0.0:
+                        new_modes[i] = modes[i]  # it has not quite reached zero
+                    elif ROUNDOFF_MARGIN * terms[i] > limit[i] and slips_ahead[i] != 0.0:
+                        new_modes[i] = sign(slips_ahead[i])  # at a dead point; the load has rounding errors only
         y = self.stop_slips(t, y, new_modes)
         resolved_modes, consistent = self.solve_modes(t, y, new_modes, status, tie_tolerance)
         return y, resolved_modes, consistent
@@ -116,6 +221,12 @@ class CoupledFriction(DryFriction):
             for i in contact_indices:
                 if modes[i] == STUCK and slips[i] != 0.0:
                     at_rest = False
+            if self.has_variable_levers and not at_rest:  # products with levers have rounding errors
+                terms = self.slip_magnitudes(t, y)
+                at_rest = True
+                for i in contact_indices:
+                    if modes[i] == STUCK and fabs(slips[i]) > 4.0 * EPSILON * terms[i]:
+                        at_rest = False
             if at_rest:
                 break
             y = self.apply_impulses(t, y, modes)
@@ -130,6 +241,10 @@ class CoupledFriction(DryFriction):
         relative to their limit are released together.  If this does not end, one contact changes at a time, the first
         that violates its conditions.
 
+        If more than one contact was released, perhaps a contact could be held that is not.  For up to MAX_ENUMERATED
+        contacts at rest, all combinations of modes are then tried; with more, each released contact is locked again
+        where this is consistent.
+
         Returns
         -------
         tuple
@@ -138,11 +253,13 @@ class CoupledFriction(DryFriction):
         pivot_modes, pivot_status = contact_vector(), contact_vector()
         for i in contact_indices:
             pivot_modes[i], pivot_status[i] = modes[i], status[i]
+        consistent = False
         for iteration in range(MAX_ITERATIONS):
             violation, next_modes = self.violations(t, y, pivot_modes, pivot_status, tie_tolerance)
             highest = max_of(violation)
             if not highest > 0.0:
-                return pivot_modes, True
+                consistent = True
+                break
             release_level = TIE_SHARE * highest if iteration < MAX_JOINT_ITERATIONS else 0.0
             changed = False
             for i in contact_indices:
@@ -150,7 +267,95 @@ class CoupledFriction(DryFriction):
                     pivot_modes[i], changed = next_modes[i], True
                     if next_modes[i] == STUCK:
                         pivot_status[i] = RELOCKED
+        n_at_rest = n_released = 0
+        for i in contact_indices:
+            if status[i] != SLIPPING:
+                n_at_rest += 1
+                if pivot_modes[i] != STUCK:
+                    n_released += 1
+        if consistent and n_released < 2:
+            return pivot_modes, True
+        if n_at_rest > MAX_ENUMERATED:
+            if not consistent:
+                return modes, False
+            relocked_modes = self.relock(t, y, pivot_modes, status, tie_tolerance)
+            return relocked_modes, True
+        best_modes, found = self.most_held(
+            t, y, modes, status, tie_tolerance, n_at_rest, n_released if consistent else n_at_rest + 1
+        )
+        if found:
+            return best_modes, True
+        if consistent:
+            return pivot_modes, True
         return modes, False
+
+    def predict_slips(self, t, y: StateVector, modes: ContactVector) -> ContactVector:
+        """Return the slip velocities a short time ahead, also if the motion only starts."""
+        delta = PREDICTION_SHARE * self.solver.step.h_max
+        f = self.rates(t, y, modes)
+        y2 = y + delta * f
+        f2 = self.rates(t + delta, y2, modes)
+        y3 = y2 + delta * f2
+        return self.slip_velocities(t + 2.0 * delta, y3)
+
+    def relock(self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance) -> ContactVector:
+        """Return consistent modes in which released contacts are locked again, one after another, where this fits."""
+        trial_modes = contact_vector()
+        for i in contact_indices:
+            trial_modes[i] = modes[i]
+        for i in contact_indices:
+            if status[i] != SLIPPING and modes[i] != STUCK:
+                trial_modes[i] = STUCK
+                violation, _next_modes = self.violations(t, y, trial_modes, status, tie_tolerance)
+                if max_of(violation) > 0.0:
+                    trial_modes[i] = modes[i]
+        return trial_modes
+
+    def most_held(
+        self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance, n_at_rest, n_released
+    ) -> tuple[ContactVector, bool]:
+        """Return the consistent modes that release the fewest contacts at rest, fewer than `n_released`, if any.
+
+        Of several such, those count whose held contacts have the lowest load relative to their limit.
+        """
+        n_combinations = 1
+        for _ in range(n_at_rest):
+            n_combinations *= 3
+        best_modes, trial_modes = contact_vector(), contact_vector()
+        for i in contact_indices:
+            best_modes[i] = modes[i]
+        lowest = inf
+        for n in range(n_released):
+            for i in contact_indices:
+                trial_modes[i] = modes[i] if status[i] == SLIPPING else STUCK
+            for _ in range(n_combinations):
+                n_sliding = 0
+                for i in contact_indices:
+                    if status[i] != SLIPPING and trial_modes[i] != STUCK:
+                        n_sliding += 1
+                if n_sliding == n:
+                    violation, _next_modes = self.violations(t, y, trial_modes, status, tie_tolerance)
+                    if not max_of(violation) > 0.0:
+                        force, limit, _terms = self.contact_forces(t, y, trial_modes)
+                        highest = 0.0
+                        for i in contact_indices:
+                            if status[i] != SLIPPING and trial_modes[i] == STUCK:
+                                relative_load = fabs(force[i]) / (limit[i] + TINY_FORCE)
+                                highest = relative_load if relative_load > highest else highest
+                        if highest < lowest:
+                            lowest = highest
+                            for i in contact_indices:
+                                best_modes[i] = trial_modes[i]
+                carry = True  # to the next combination
+                for i in contact_indices:
+                    if carry and status[i] != SLIPPING:
+                        trial_modes[i] = (
+                            FORWARD if trial_modes[i] == STUCK else BACKWARD if trial_modes[i] == FORWARD else STUCK
+                        )
+                        carry = trial_modes[i] == STUCK
+            if lowest < inf:
+                return best_modes, True
+        return best_modes, False
 
     def violations(
         self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
@@ -166,6 +371,8 @@ class CoupledFriction(DryFriction):
         for i in contact_indices:
             violation[i], next_modes[i] = 0.0, STUCK
             slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
+            # without a lever, a load is unknown, except for no load at all
+            can_hold = limit[i] > 0.0 and not (self.has_variable_levers and ROUNDOFF_MARGIN * terms[i] > limit[i])
             if status[i] != SLIPPING and modes[i] == STUCK:
                 next_modes[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
                 outward = next_modes[i] * force_rate[i] - limit_rate[i]
@@ -173,10 +380,17 @@ class CoupledFriction(DryFriction):
                     slack = -slack
                 elif outward < 0.0:
                     slack += tie_tolerance * limit[i]
-                if next_modes[i] != STUCK and fabs(force[i]) > limit[i] + slack:
-                    violation[i] = fabs(force[i]) / (limit[i] + TINY_FORCE)
+                if not can_hold:
+                    violation[i] = inf
+                    if next_modes[i] == STUCK:
+                        next_modes[i] = FORWARD
+                elif next_modes[i] != STUCK and fabs(force[i]) > limit[i] + slack:
+                    violation[i] = fabs(force[i]) / limit[i]
             elif status[i] != SLIPPING:
                 ahead = modes[i] * residual_force[i]
-                if ahead < -slack or (ahead <= slack and modes[i] * residual_force_rate[i] <= 0.0):
+                if not can_hold:
+                    if ahead < -slack:
+                        violation[i], next_modes[i] = inf, -modes[i]
+                elif ahead < -slack or (ahead <= slack and modes[i] * residual_force_rate[i] <= 0.0):
                     violation[i] = inf
         return violation, next_modes

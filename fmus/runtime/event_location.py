@@ -59,6 +59,7 @@ class EventLocation:
         # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0: now, before and after t1
         self.margins, self.margin_scales = [0.0] * n, [0.0] * n
         self.sides, self.sides_before, self.sides_after = [1.0] * n, [1.0] * n, [1.0] * n
+        self.is_frictionless = [0.0] * n  # of each contact: 1.0 if it neither slides nor holds with a force
         self.t_condition = -inf  # time of the last change of a condition
         self.n_chatter = 0  # changes of a condition in quick succession
         self.violated = -1  # condition that must hold but does not; -1 if there is none
@@ -143,6 +144,8 @@ def evaluate_on_cubic(model, step):
     t0, h = step.t0, step.t1 - step.t0
     y2 = (20.0 * step.y0 + 7.0 * step.y1 + h * (4.0 * step.f0 - 2.0 * step.f1)) / 27.0
     y3 = (7.0 * step.y0 + 20.0 * step.y1 + h * (2.0 * step.f0 - 4.0 * step.f1)) / 27.0
+    if model.is_coupled:
+        model.find_frictionless_contacts(location, step)
     update_event_functions(model, t0, step.y0, step.modes0)
     for j in range(model.n_event_functions):
         location.start[j] = location.values[j]

@@ -182,7 +182,8 @@ def update_indicators(model):
             force, limit, terms = model.contact_forces(solver.t, solver.y, solver.modes)
             for i in contact_indices:
                 if solver.modes[i] != STUCK:
-                    to_rest[i] = solver.modes[i] * slips[i] + TINY
+                    if not (force[i] == 0.0 and limit[i] == 0.0):  # without friction, a reversal is no event
+                        to_rest[i] = solver.modes[i] * slips[i] + TINY
                 else:
                     slack = ROUNDOFF_MARGIN * (terms[i] + limit[i])
                     to_break_away[i] = limit[i] + slack + INDICATOR_OFFSET * limit[i] + TINY - fabs(force[i])

@@ -234,6 +234,23 @@ WRONG = {
         19,
         "S and R hold the same motion at rest, so their forces are not determined: remove one or put a",
     ),
+    "contacts in a loop": (
+        DRY + '    w = State("m/s", "second speed")\n    z = State("m/s", "third speed")\n'
+        "    two, three, four = Mode(), Mode(), Mode()\n"
+        '    S = Contact("N", "friction", mode=two, slip=w - v, slide=f)\n'
+        '    U = Contact("N", "friction", mode=three, slip=z - w, slide=f)\n'
+        '    T = Contact("N", "friction", mode=four, slip=v - z, slide=f)\n'
+        "    a = Output('m/s2', 'acceleration', (S - T - R) / m, rate_of=v)\n"
+        "    b = Output('m/s2', 'acceleration', (U - S) / m, rate_of=w)\n"
+        "    c = Output('m/s2', 'acceleration', (T - U) / m, rate_of=z)\n",
+        23,
+        "T and R and S and U hold the same motion at rest, so their forces are not determined: remove one or put a",
+    ),
+    "a slip that is not linear": (
+        DRY.replace("slip=v", "slip=v * fabs(v)") + STUCK,
+        17,
+        "slip of R must be linear in the speeds on which it acts",
+    ),
     "contacts of several laws": (
         DRY + '    other = Mode()\n    w = State("m/s", "another speed")\n'
         '    S = Contact("N", "friction", mode=other, slip=w, slide=f, laws=(HYBRID, SIGN))\n'

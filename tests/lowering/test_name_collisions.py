@@ -88,7 +88,7 @@ def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
     """Two blocks whose modes are named like entries of their matrix."""
     (blocks,) = (path for path in LARGER_MODELS if path.stem == "blocks")
     path, rates = tmp_path / "blocks.py", []
-    for names in ("mode1", "mode2"), ("A_F1_F2", "A_F2_F1"):
+    for names in ("mode1", "mode2"), ("row_F1_F2", "row_F2_F1"):
         path.write_text(blocks.read_text().replace("mode1", names[0]).replace("mode2", names[1]))
         model = find_model(path).model()
         assert model.prepare() == 0

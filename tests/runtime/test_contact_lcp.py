@@ -102,3 +102,45 @@ def test_a_contact_with_more_sliding_than_static_friction_is_reported():
     chain = Chain(np.random.default_rng(1), 1, 1.0, False)
     chain.limit, chain.b = 0.5 * chain.slide, chain.A @ (0.75 * chain.slide)
     assert chain.answer() == ((0,), False)
+
+
+@pytest.mark.parametrize(("n", "jump"), [(n, jump) for n in (2, 3, 4) for jump in (1.3, 2.0)])
+def test_as_many_contacts_are_held_as_can_be(n, jump):
+    """Of all consistent modes, those that hold the most; also where releasing the highest loads lets more go."""
+    draw, n_choices = np.random.default_rng([n, round(10 * jump)]), 0
+    for _ in range(60 if n < 4 else 30):
+        chain = Chain(draw, n, jump, True)
+        held = [modes.count(STUCK) for modes in product((-1, 0, 1), repeat=n) if chain.fits(modes)]
+        modes, fits = chain.answer()
+        assert fits
+        assert modes.count(STUCK) == max(held)
+        n_choices += min(held) < max(held)
+    assert n_choices > 3
+
+
+def test_with_many_contacts_at_rest_none_is_released_that_could_be_held_alone(monkeypatch):
+    """Without trying all combinations."""
+    draw, n_relocked = np.random.default_rng(11), 0
+    for _ in range(150):
+        chain = Chain(draw, 7, 3.0, True)
+        modes, fits = chain.answer()
+        assert fits
+        assert chain.fits(modes)
+        for i in range(7):
+            assert modes[i] == STUCK or not chain.fits([STUCK if j == i else mode for j, mode in enumerate(modes)])
+        with monkeypatch.context() as patch:
+            patch.setattr(Chain, "relock", lambda self, t, y, modes, status, tie_tolerance: modes)
+            n_relocked += chain.answer()[0] != modes
+    assert n_relocked > 0
+
+
+def test_a_contact_without_friction_never_sticks():
+    """It slips in the direction of its acceleration, and the others are as they would be without it."""
+    draw = np.random.default_rng(3)
+    for _ in range(50):
+        chain = Chain(draw, 3, 1.0, True)
+        chain.slide[1] = chain.limit[1] = 0.0
+        modes, fits = chain.answer()
+        assert fits
+        assert modes[1] != STUCK
+        assert chain.fits(modes)

@@ -1,12 +1,15 @@
 """Contacts that share bodies: simultaneous events, order of declaration, loads that peak inside a step, conservation
 laws."""
 
-from math import asin
+from itertools import pairwise
+from math import asin, cos, pi, sin
 
 import numpy as np
 import pytest
+from contact_balance import MASSES, balanced_modes
 from internal_steps import prepared_model, start, state_values
 from models import DOP853, LARGER_MODELS, ODE23, ODE45, RODAS, SIGN, THRESHOLD
+from scipy.integrate import quad
 
 from fmus.packaging.lowering import lowered_model
 from fmus.packaging.lowering.feature_selection import select_features
@@ -206,6 +209,184 @@ def test_several_drivers_each_pull_at_their_own_speed(custom_model):
         assert v == pytest.approx(0.15 * (1.0 + w * np.sin(w * t) - np.cos(w * t)), abs=1e-8)
     model.compute_outputs(0.0, 0.0, 0.0, 0.3)
     assert model.q_rate == 0.1
+
+
+# ---- three blocks in a stack
+
+STACK = [
+    'x1_start = Fixed(0.0, "m", "start of 1")',
+    'x2_start = Fixed(0.0, "m", "start of 2")',
+    'x3_start = Fixed(0.0, "m", "start of 3")',
+    'mu_s = Parameter(0.4, "1", "static", low=0.0)',
+    'mu_d = Parameter(0.25, "1", "sliding", low=0.0)',
+    'g = Parameter(9.81, "m/s2", "gravity")',
+]
+
+
+def stack(without=""):
+    """Return the declarations of three blocks on springs, each on the next; `without` is the contact to leave out."""
+    forces = {name: "0.0" if name in without else f"F{name}" for name in "123"}
+    laws = {"1": "{2} - {1} - k * x1", "2": "{3} - {2} - k * x2", "3": "k * (p - x3) - {3}"}
+    laws = {name: law.format("", *forces.values()) for name, law in laws.items()}
+    bodies = [body(name, laws[name], mass) for name, mass in zip("123", MASSES, strict=True)]
+    states = [
+        line.replace('")', f'", start=x{line[1]}_start)') if line[0] == "x" else line for s, _ in bodies for line in s
+    ]
+    slips = {"1": ("v1", "4.5"), "2": ("v2 - v1", "2.5"), "3": ("v3 - v2", "1.0")}
+    contacts = [
+        line
+        for name, (slip, mass) in slips.items()
+        if name not in without
+        for line in contact(name, slip, f"mu_d * {mass} * m * g", f"mu_s * {mass} * m * g")
+    ]
+    return [*STACK, *states, DRIVER, *contacts, *(law for _, law in bodies)]
+
+
+def test_random_starts_hold_as_many_contacts_as_balance(custom_model):
+    model, draw, n_choices = custom_model(*stack(), methods=["ode45"]), np.random.default_rng(0), 0
+    for _ in range(500):
+        mu_s = draw.uniform(0.2, 0.6)
+        mu_d = mu_s * draw.choice([1.0, draw.uniform(0.4, 1.0)])
+        x = draw.normal(0.0, 0.3, 3) * draw.choice([0.3, 1.0, 2.0])
+        model.mu_s, model.mu_d, model.k = mu_s, mu_d, draw.uniform(20.0, 200.0)
+        model.x1_start, model.x2_start, model.x3_start = x
+        prepared_model(model, {"solver.method": ODE45}, 1.0)
+        start(model, model.initial_state(0.0), 1.0)
+        solutions = balanced_modes(-model.k * x, mu_s, mu_d)
+        modes = tuple(state_values(model.solver.step, model.contacts))
+        assert model.solver.step.has_consistent_modes
+        assert modes in solutions
+        assert modes.count(0) == max(one.count(0) for one in solutions)
+        n_choices += len(solutions) > 1
+    assert n_choices > 30
+
+
+@pytest.mark.parametrize("method", [ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("free", "123")
+def test_a_contact_without_friction_is_no_contact(custom_model, free, method):
+    """The run is that of a model without it; it makes no events."""
+    lines = [
+        line.replace("slide=mu_d", "slide=0.0 * mu_d").replace("hold=mu_s", "hold=0.0 * mu_s")
+        if line.startswith(f"F{free} ")
+        else line
+        for line in stack()
+    ]
+    results = []
+    for declared in lines, stack(without=free):
+        model = custom_model(*declared, methods=["ode45", "dop853", "rodas"])
+        model.x1_start, model.x2_start, model.x3_start = 0.3, -0.2, 0.1
+        changes, rows = events(model, method, 1e-9, 6.0)
+        results.append((changes, rows[-1][1]))
+    (changes, end), (expected_changes, expected_end) = results
+    assert len(changes) > 2
+    assert [[*modes[: int(free) - 1], *modes[int(free) :]] for _, *modes in changes] == [
+        modes for _, *modes in expected_changes
+    ]
+    assert all(modes[int(free) - 1] != 0 for _, *modes in changes)
+    assert np.abs(np.array([t for t, *_ in changes]) - [t for t, *_ in expected_changes]).max() < 1e-6
+    assert np.abs(np.array(end) - expected_end).max() < 1e-6
+
+
+@pytest.mark.parametrize("method", [ODE45, DOP853])
+def test_friction_may_vanish_and_return_in_a_run(custom_model, method):
+    """A block upon a block, pressed by a force that comes and goes: without it, nothing sticks, and the lower block is
+    a free oscillator."""
+    (one, a), (two, b) = body("1", "F2 - k * x1", 4.0), body("2", "k * (p - x2) - F2", 2.0)
+    law = 'N = Output("N", "force", choose(sin(phase) > 0.0, most * sin(phase), 0.0))'
+    lines = [
+        'most = Parameter(40.0, "N", "largest force")',
+        'phase = State("rad", "phase", rate=3.0)',
+        *one,
+        *two,
+        DRIVER,
+        law,
+        *contact("2", "v2 - v1", "N", "1.5 * N"),
+    ]
+    model = custom_model(*lines, a, b, methods=["ode45", "dop853"])
+    changes, rows = events(model, method, 1e-10, 6.0)
+    assert {mode for _, mode in changes} == {-1, 0, 1}
+    free = [(t, y, modes[0]) for t, y, modes in rows if sin(3.0 * t) < -1e-9]
+    assert len(free) > 10
+    assert all(mode != 0 for _, _, mode in free)
+    x, v = list(model.states).index("x1"), list(model.states).index("v1")
+    w, n_compared = (300.0 / 4.0) ** 0.5, 0
+    for (t, y, _), (end, later, _) in pairwise(free):
+        if 3.0 * (end - t) < 1.0:  # within one interval without friction
+            n_compared += 1
+            expected = y[x] * cos(w * (end - t)) + y[v] / w * sin(w * (end - t))
+            assert later[x] == pytest.approx(expected, abs=1e-7)
+    assert n_compared > 10
+
+
+# ---- slips that touch zero, and levers that vanish
+
+
+@pytest.mark.parametrize(
+    ("method", "rtol"), [(ODE23, 1e-6), *((m, r) for m in (ODE45, DOP853) for r in (1e-6, 1e-12)), (RODAS, 1e-6)]
+)
+def test_a_slip_that_only_touches_zero_is_no_event(custom_model, method, rtol):
+    """A block on a belt, with equal holding and sliding force, that starts at rest: its speed touches that of the belt
+    once in each period."""
+    (one, a) = body("1", "-k * x1 - F1", 1.0)
+    model = custom_model(*one, *contact("1", "v1 - u", "2.0", "2.0"), a, methods=["ode23", "ode45", "dop853", "rodas"])
+    model.k = 100.0
+    changes, rows = events(model, method, rtol, 20.0)
+    assert changes == []
+    t, (x, v), _ = rows[-1]
+    assert (x, v) == pytest.approx((0.02 - 0.02 * cos(10.0 * t), 0.2 * sin(10.0 * t)), abs=max(3e3 * rtol, 1e-9) * 0.2)
+
+
+CRANK_BEHIND = {"J": 1.0, "k": 0.0, "r": 0.3, "f_d": 2.0, "f_s": 3.0}
+
+
+@pytest.mark.parametrize("method", [ODE23, ODE45, DOP853, RODAS])
+@pytest.mark.parametrize("start_angle", [0.0, 0.5 * pi])
+def test_a_crank_passes_its_dead_points(method, start_angle):
+    """Without a spring: friction takes the energy f r |cos q| for each angle, and the time follows by quadrature; the
+    mode changes its sign at each dead point."""
+    rtol, stop = {ODE23: 1e-7}.get(method, 1e-10), 5.0
+    model = lowered_model(FILES["crank"])()
+    prepared_model(
+        model, {"solver.method": method, "solver.rtol": rtol, "solver.atol": 1e-3 * rtol, **CRANK_BEHIND}, stop
+    )
+    start(model, (start_angle, 6.0, *model.initial_state(0.0)[2:]), stop)
+    step, changes = model.solver.step, []
+    while step.t1 < stop:
+        assert step.compute_next(model) == 0
+        if step.event_at_end:
+            changes.append((step.q1, step.mode1))
+
+    def speed(q):
+        turns, angle = divmod(q + 0.5 * pi, pi)
+        first, first_angle = divmod(start_angle + 0.5 * pi, pi)
+        lost = 2.0 * (turns - first) - cos(angle) + cos(first_angle)
+        return (36.0 - 2.0 * 2.0 * 0.3 * lost) ** 0.5
+
+    dead_points = [0.5 * pi + n * pi for n in range(1 if start_angle else 0, len(changes) + (1 if start_angle else 0))]
+    assert len(changes) > 5
+    assert [q for q, _ in changes] == pytest.approx(dead_points, abs=1e-9)
+    assert [mode for _, mode in changes] == [1 if cos(q + 0.1) > 0.0 else -1 for q in dead_points]
+    elapsed = quad(lambda q: 1.0 / speed(q), start_angle, step.q1, points=dead_points, limit=200, epsabs=1e-13)[0]
+    assert elapsed == pytest.approx(stop, abs=3e3 * rtol)
+    assert step.w1 == pytest.approx(speed(step.q1), abs=3e3 * rtol)
+
+
+def test_a_crank_at_rest_at_its_dead_point_is_not_held():
+    """Without a torque it stays there."""
+    ends = []
+    for speed_of_driver in 0.0, 3.0:
+        model = lowered_model(FILES["crank"])()
+        model.Omega = speed_of_driver
+        prepared_model(model, {"solver.method": DOP853, "solver.rtol": 1e-9, "solver.atol": 1e-12, "k": 2.0}, 0.5)
+        model.k = 2.0 if speed_of_driver else 0.0
+        assert model.prepare() == 0
+        start(model, (0.5 * pi, 0.0, *model.initial_state(0.0)[2:]), 0.5)
+        while model.solver.step.t1 < 0.5:
+            assert model.solver.step.compute_next(model) == 0
+        ends.append((model.solver.step.q1, model.solver.step.mode1))
+    assert ends[0] == (0.5 * pi, 0)
+    assert ends[1][0] < 0.5 * pi - 0.5
+    assert ends[1][1] in (-1, 0)
 
 
 # ---- laws without modes

@@ -110,7 +110,29 @@ class Lift:
             y[1] = 0.0
 
 
-CONTACT_REFERENCES = {"belt": Belt, "clutch": Clutch, "sleds": Sleds, "blocks": Blocks, "lift": Lift}
+class Crank:
+    """A slider on a crank: at a dead point its slip reverses, while the crank turns on."""
+
+    stop, states, modes, first, start = 8.0, ("q", "w"), ("mode",), [0], [0.0, 0.0]
+    changes = ((2.9, "k", 3.0),)
+    Omega, k = 3.0, 2.0
+
+    def __call__(self, t, y, modes):
+        q, w = y
+        torque, lever = self.k * (self.Omega * t - q), 0.1 * np.cos(q)
+        force = modes[0] * 20.0 if modes[0] else torque / lever
+        return [w, (torque - force * lever) / 0.05 if modes[0] else 0.0], [lever * w], [force], [30.0]
+
+    def rest(self, y, modes):
+        if modes[0] == 0 and fabs(np.cos(y[0])) < 1e-9:
+            modes[0] = -int(np.sign(np.sin(y[0])))
+        elif modes[0] == 0:
+            y[1] = 0.0
+
+
+CONTACT_REFERENCES = {
+    "belt": Belt, "clutch": Clutch, "sleds": Sleds, "blocks": Blocks, "lift": Lift, "crank": Crank,
+}  # fmt: skip
 
 
 def reference_events(name, changes=()):

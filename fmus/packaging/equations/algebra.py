@@ -257,6 +257,15 @@ def is_summand(e: Operand, leaf: Expression) -> bool:
     )
 
 
+def is_factor(e: Operand, leaf: Expression) -> bool:
+    """Return whether the expression is a product of the variable and other factors that do not contain it."""
+    if not isinstance(e, Term):
+        return e is leaf or any(is_factor(one, leaf) for one in operands(e))
+    if count_occurrences(e, leaf) != 1 or e.op not in ("*", "/", "neg"):
+        return False
+    return any(is_factor(one, leaf) for one in (e.args[:1] if e.op == "/" else e.args))
+
+
 def rounding_scale(e: Operand) -> Operand:
     """Return a bound on the magnitude of the terms of e; rounding errors of e are relative to it."""
     if not isinstance(e, Expression):

@@ -12,6 +12,7 @@ from .algebra import build_term, differentiate, is_same_expression, rounding_sca
 from .codegen_context import CodegenContext, emit_return, emit_scales, method_source
 from .expression_printer import ExpressionPrinter
 from .expressions import Expression, Operand, Term
+from .model_analysis import SMALLEST_DIVISOR
 from .model_declaration import SIGN, THRESHOLD, Contact, State
 
 
@@ -85,7 +86,7 @@ def emit_solution(
 ) -> None:
     """Emit the lines that solve for the unknowns; with `law`, the selected law decides which contacts are stuck."""
     shared = f.an.interacting_contacts
-    matrix = {(c, d): s.fresh_name(f"A_{c.name}_{d.name}") for c in shared for d in shared}
+    matrix = {(c, d): s.fresh_name(f"row_{c.name}_{d.name}") for c in shared for d in shared}
     names = {
         (n, c): c.name if e is c else s.fresh_name(e.name)
         for n, u in enumerate(unknowns)
@@ -105,19 +106,27 @@ def emit_solution(
                 for d in shared if c in shared else []:
                     s.emit(f"{matrix[c, d]} = {s.text(f.an.A[c, d] if attribute == 'stuck_values' else float(c is d))}")
     sides = [{c: names[n, c] for c in shared} for n in range(len(unknowns)) if all((n, c) in names for c in shared)]
-    emit_elimination(s, shared, matrix, sides)
+    emit_elimination(s, shared, matrix, sides, any(c in f.an.variable_lever_contacts for c in shared))
     for (n, c), name in names.items():
         s.bound_names[unknowns[n].symbols[c]] = name
 
 
 def emit_elimination(
-    s: ExpressionPrinter, rows: list[Contact], A: dict[tuple[Contact, Contact], str], sides: list[dict[Contact, str]]
+    s: ExpressionPrinter,
+    rows: list[Contact],
+    A: dict[tuple[Contact, Contact], str],
+    sides: list[dict[Contact, str]],
+    has_variable_levers: bool,
 ) -> None:
     """Emit a Gaussian elimination that overwrites the right-hand sides with the solutions.
 
-    It needs no pivoting: the rows of stuck contacts belong to a positive definite matrix, so no pivot is zero.
+    It needs no pivoting: the rows of stuck contacts belong to a positive definite matrix, so no pivot is zero, unless
+    the lever of a contact vanishes.
     """
     for n, k in enumerate(rows):
+        if has_variable_levers:
+            with s.block(f"if not fabs({A[k, k]}) > {SMALLEST_DIVISOR!r}:"):
+                s.emit(f"{A[k, k]} = {SMALLEST_DIVISOR!r}")
         for i in rows[n + 1 :]:
             s.emit(f"{A[i, k]} = {A[i, k]} / {A[k, k]}")
             for j in rows[n + 1 :]:
@@ -162,7 +171,7 @@ def forces_method(f: CodegenContext) -> str:
     sizes = [
         rounding_scale(an.load[c])
         if c in an.independent_contacts
-        else build_term("/", rounding_scale(an.slip_rate[c]), an.A[c, c])
+        else build_term("/", rounding_scale(an.slip_rate[c]), an.divisor(c))
         for c in an.contacts
     ]
     limits = [an.holding_limit[c] for c in an.contacts]
@@ -183,8 +192,8 @@ def force_rates_method(f: CodegenContext) -> str:
             pulls.append(build_term("-", an.load[c], c))
             pull_rates.append(build_term("-", differentiate(an.load[c], an.time_derivatives), rate.symbols[c]))
         else:
-            pulls.append(build_term("/", an.slip_rate[c], an.A[c, c]))
-            pull_rates.append(build_term("/", differentiate(an.slip_rate[c], flow), an.A[c, c]))
+            pulls.append(build_term("/", an.slip_rate[c], an.divisor(c)))
+            pull_rates.append(build_term("/", differentiate(an.slip_rate[c], flow), an.divisor(c)))
     rates = [*rate.symbols.values(), *(differentiate(an.holding_limit[c], an.time_derivatives) for c in an.contacts)]
     targets = [*rates, *pulls, *pull_rates]
     f.emit_driver(s, [*u.terms, *rate.terms, *targets])
@@ -197,7 +206,9 @@ def force_rates_method(f: CodegenContext) -> str:
 def impulse_method(f: CodegenContext) -> str:
     """States after impulses that stop the slips of stuck contacts, exactly where slips are sums of speeds."""
     an, s = f.an, f.printer()
-    ends = {c: c.slip if c not in an.independent_contacts else build_term("/", c.slip, an.A[c, c]) for c in an.contacts}
+    ends = {
+        c: c.slip if c not in an.independent_contacts else build_term("/", c.slip, an.divisor(c)) for c in an.contacts
+    }
     impulse = ContactUnknown(
         {c: local_symbol(f"impulse_{c.name}") for c in an.contacts}, dict.fromkeys(an.contacts, 0.0), ends
     )

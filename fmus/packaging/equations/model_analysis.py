@@ -21,6 +21,7 @@ from .algebra import (
     factors,
     growth_exponent,
     has_condition_on,
+    is_factor,
     is_same_expression,
     is_summand,
     negate,
@@ -36,6 +37,7 @@ from .generated_names import RESERVED, RESERVED_WHERE_COUPLED
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 
 LARGEST_FLOAT = float_info.max
+SMALLEST_DIVISOR = 1e-100  # in place of an inverse mass that vanishes; its square is not zero
 METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
 TIME = Expression()
 TIME.name = "t"
@@ -346,10 +348,19 @@ class ModelAnalysis:
                 self.A[c, d] = negate(acts)
             if is_same_expression(self.A[c, c], 0.0):
                 raise ModelError(f"{c.name} does not act on its own slip, so it can never stick", c.location)
+            moved = [s for s in self.dynamic_states if depends_on(self.rate_outputs[s], (c,))]
+            if any(depends_on(differentiate(c.slip, {s: 1.0}), moved) for s in moved):
+                raise ModelError(f"slip of {c.name} must be linear in the speeds on which it acts", c.location)
         self.independent_contacts = [
             c for c in self.contacts if all(is_same_expression(self.A[c, d], 0.0) for d in self.contacts if d is not c)
         ]
         self.interacting_contacts = [c for c in self.contacts if c not in self.independent_contacts]
+        moving = (*self.time_varying, *self.inputs)
+        self.variable_lever_contacts = [
+            c
+            for c in self.contacts
+            if any(depends_on(differentiate(c.slip, {s: 1.0}), moving) for s in self.dynamic_states)
+        ]
         self.holding_limit: dict[Contact, Operand] = {}
         self.load: dict[Contact, Operand] = {}
         for c in self.contacts:
@@ -361,10 +372,17 @@ class ModelAnalysis:
                 e = self.slip_rate[c]
                 load = (
                     solve_for(e, c)
-                    if count_occurrences(e, c) == 1
-                    else build_term("/", substitute(e, {c: 0.0}), self.A[c, c])
+                    if count_occurrences(e, c) == 1 and c not in self.variable_lever_contacts
+                    else build_term("/", substitute(e, {c: 0.0}), self.divisor(c))
                 )
                 self.load[c] = substitute(load, {c.mode: 0.0} | (at_rest if isinstance(c.slip, State) else {}))
+
+    def divisor(self, c: Contact) -> Operand:
+        """Return how a contact force acts on its own slip, as a divisor: not zero where its lever vanishes."""
+        e = self.A[c, c]
+        if c not in self.variable_lever_contacts:
+            return e
+        return build_term("choose", Term(">", Term("fabs", e), SMALLEST_DIVISOR), e, SMALLEST_DIVISOR)
 
     def load_expressions(self, c: Contact) -> list[Operand]:
         """Return the expressions that determine the load of a contact: for interacting contacts all slip rates."""
@@ -460,7 +478,8 @@ class ModelAnalysis:
     def stick_assignments(self) -> list[tuple[Contact, State, Operand]]:
         """Assignments (contact, speed, value) that make the slips of stuck contacts exactly zero.
 
-        They exist for slips that are sums of speeds, and are ordered so that none changes the slip of an earlier one.
+        They exist for slips that are sums of speeds, and are ordered so that none changes the slip of an earlier one;
+        and for slips that are the product of a lever and a speed.
         """
         result: list[tuple[Contact, State, Operand]] = []
         left = list(self.contacts)
@@ -469,12 +488,13 @@ class ModelAnalysis:
                 (c, s)
                 for c in left
                 for s in self.dynamic_states
-                if is_summand(c.slip, s) and not any(depends_on(d.slip, (s,)) for d in left if d is not c)
+                if (is_summand(c.slip, s) or (is_factor(c.slip, s) and depends_on(self.rate_outputs[s], (c,))))
+                and not any(depends_on(d.slip, (s,)) for d in left if d is not c)
             ]
             if not alone:
                 return result
             c, s = alone[0]
-            result.insert(0, (c, s, solve_for(c.slip, s)))
+            result.insert(0, (c, s, solve_for(c.slip, s) if is_summand(c.slip, s) else 0.0))
             left.remove(c)
 
     def check_solvable(self) -> None:
@@ -506,21 +526,22 @@ class ModelAnalysis:
         A = {key: substitute(e, start) for key, e in self.A.items()}
         if any(isinstance(e, Expression) for e in A.values()):
             return  # depends on a choice: cannot be decided at build time
-        left = {c: A[c, c] for c in self.contacts}
-        for n, c in enumerate(self.contacts):
+        contacts = [c for c in self.contacts if c not in self.variable_lever_contacts or A[c, c] != 0.0]
+        left = {c: A[c, c] for c in contacts}
+        for n, c in enumerate(contacts):
             if not left[c] > 0.0:
                 sentence = f"{c.name} accelerates its own slip instead of opposing it: change its sign in the rates"
                 raise ModelError(sentence, c.location)
             if not A[c, c] > 1e-12 * left[c]:
-                others = " and ".join(d.name for d in self.contacts[:n] if not is_same_expression(self.A[c, d], 0.0))
+                others = " and ".join(d.name for d in contacts[:n] if not is_same_expression(self.A[c, d], 0.0))
                 raise ModelError(
                     f"{c.name} and {others} hold the same motion at rest, so their forces are not determined: remove "
                     "one or put a spring between them",
                     c.location,
                 )
-            for d in self.contacts[n + 1 :]:
+            for d in contacts[n + 1 :]:
                 share = A[d, c] / A[c, c]
-                for e in self.contacts[n + 1 :]:
+                for e in contacts[n + 1 :]:
                     A[d, e] -= share * A[c, e]
 
     @property
