@@ -115,8 +115,9 @@ class ModelAnalysis:
                 sentence = (
                     f"{c.name}: the sliding force exceeds the holding force ({values}): lower slide or raise hold"
                 )
-                result.append(Rule(c.slide > (1.0 + HOLD_TOLERANCE) * c.hold, sentence))
-                result[-1].broken.location = c.location
+                broken = Term(">", c.slide, build_term("*", 1.0 + HOLD_TOLERANCE, c.hold))
+                broken.location = c.location
+                result.append(Rule(broken, sentence))
         return tuple(result)
 
     # ---- conditions
