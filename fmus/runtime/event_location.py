@@ -12,7 +12,7 @@ computed again with a tighter tolerance.
 from math import fabs, inf, sin, sqrt
 
 from .codes import CHATTERING, FIRST_RULE, OK, STUCK
-from .rounding import EPSILON
+from .rounding import EPSILON, ROUNDOFF_MARGIN
 from .vectors import (
     ContactVector,
     RateVector,
@@ -52,7 +52,8 @@ class EventLocation:
     def __init__(self, n):
         # value and scale (sum of absolute terms) of each event function at the latest evaluation
         self.values, self.scales = [0.0] * n, [0.0] * n
-        self.middle = [0.0] * n  # values in the middle of the step
+        self.near_middle = [0.0] * n  # values after 0.4 of the step
+        self.cubic_errors = [0.0] * n  # differences from a cubic polynomial, as shares of the range in the step
         # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero
         self.start, self.early, self.late, self.end = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
         self.peaks, self.times = [0.0] * n, [0.0] * n
@@ -120,12 +121,9 @@ def locate_events(model, step):
         if model.slip_continues(step):
             return inf
     evaluate_on_cubic(model, step)
-    if step.t1 - step.t0 > SHORTEST_STEP * step.h_max:
-        for j in range(model.n_event_functions):
-            if not is_resolved(location, j):
-                location.must_shorten = True
-        if location.must_shorten:
-            return inf
+    limit_step(model, step)
+    if location.must_shorten:
+        return inf
     first = inf
     for j in range(model.n_event_functions):
         found = examine_cubic(location, step, j)
@@ -151,10 +149,10 @@ def evaluate_on_cubic(model, step):
         location.start[j] = location.values[j]
         if location.scales[j] > location.peaks[j]:
             location.peaks[j] = location.scales[j]
-    y4 = 0.5 * (step.y0 + step.y1) + 0.125 * h * (step.f0 - step.f1)
-    update_event_functions(model, t0 + 0.5 * h, y4, step.modes0)
+    y4 = 0.648 * step.y0 + 0.352 * step.y1 + h * (0.144 * step.f0 - 0.096 * step.f1)
+    update_event_functions(model, t0 + 0.4 * h, y4, step.modes0)
     for j in range(model.n_event_functions):
-        location.middle[j] = location.values[j]
+        location.near_middle[j] = location.values[j]
     update_event_functions(model, t0 + h / 3.0, y2, step.modes0)
     for j in range(model.n_event_functions):
         location.early[j] = location.values[j]
@@ -167,26 +165,35 @@ def evaluate_on_cubic(model, step):
         location.end[j] = end
         location.early[j] = (18.0 * third - 5.0 * start - 9.0 * two_thirds + 2.0 * end) / 6.0
         location.late[j] = (18.0 * two_thirds - 5.0 * end - 9.0 * third + 2.0 * start) / 6.0
+        low = start if start < end else end
+        low = third if third < low else low
+        low = two_thirds if two_thirds < low else low
+        high = start if start > end else end
+        high = third if third > high else high
+        high = two_thirds if two_thirds > high else high
+        cubic = 0.216 * start + 0.432 * location.early[j] + 0.288 * location.late[j] + 0.064 * end
+        excess = fabs(location.near_middle[j] - cubic) - ROUNDOFF_MARGIN * location.peaks[j]
+        location.cubic_errors[j] = excess / (high - low) if excess > 0.0 and high > low else 0.0
         if location.scales[j] > location.peaks[j]:
             location.peaks[j] = location.scales[j]
 
 
-def is_resolved(location, j):
-    """Return whether an event function resembles a cubic polynomial in the step.
+def limit_step(model, step):
+    """Limit the step so that every event function resembles a cubic polynomial.
 
     The error control of the method does not see event functions that vary without the states, as a load that
     follows a clock while nothing moves.
     """
-    start, early, late, end = location.start[j], location.early[j], location.late[j], location.end[j]
-    low, high = start, start
-    low = low if low < early else early
-    low = low if low < late else late
-    low = low if low < end else end
-    high = high if high > early else early
-    high = high if high > late else late
-    high = high if high > end else end
-    error = fabs(location.middle[j] - 0.125 * (start + 3.0 * early + 3.0 * late + end))
-    return error <= MAX_CUBIC_ERROR * (high - low) + CONDITION_MARGIN * location.peaks[j] + TINY
+    location = model.event_location
+    largest = 0.0
+    for j in range(model.n_event_functions):
+        error = location.cubic_errors[j]
+        largest = error if error > largest else largest
+    if largest > MAX_CUBIC_ERROR and step.t1 - step.t0 > SHORTEST_STEP * step.h_max:
+        location.must_shorten = True
+    elif largest > 0.0:
+        h = 0.8 * step.h_full * (MAX_CUBIC_ERROR / largest) ** 0.25
+        step.h_next = h if h < step.h_next else step.h_next
 
 
 def examine_cubic(location, step, j):
@@ -220,7 +227,8 @@ def search_polynomial(model, step, j):
     """Return the first zero of one event function in the step; inf if there is none.
 
     The polynomial of degree 8 through the function is searched from the start.  It stays above the parabola of its
-    largest curvature, so that steps to the zero of that parabola cannot pass a zero.
+    largest curvature, so that steps to the zero of that parabola cannot pass a zero.  Where the function is still
+    positive at a zero of the polynomial, the polynomial is raised to the function and the search goes on.
     """
     location = model.event_location
     fit_polynomial(model, step, j)
@@ -229,30 +237,37 @@ def search_polynomial(model, step, j):
         largest_curvature += (k + 2.0) * (k + 1.0) * fabs(location.polynomial[k + 2])
     least = CONDITION_MARGIN * location.peaks[j]  # smaller values are rounding errors
     u = START_OF_SLIP if location.start[j] <= least else 0.0
-    value, slope, has_zero = inf, 0.0, False
     for _ in range(MAX_SEARCH_STEPS):
         value = slope = 0.0
         for k in range(DEGREE + 1):
             slope = value + slope * u
             value = location.polynomial[DEGREE - k] + value * u
-        has_zero = value <= least
-        if has_zero:
-            break
-        descent = sqrt(slope * slope + 2.0 * largest_curvature * value) - slope
-        if not 2.0 * value < (1.0 - u) * descent:
-            break
-        u += 2.0 * value / descent
-    end, g_end = step.t1, location.end[j]
-    if has_zero:
-        end = step.t0 + u * (step.t1 - step.t0)
-        beyond = end - 2.0 * least * (step.t1 - step.t0) / slope if slope < 0.0 else end
-        g_end = event_function(model, step, beyond, j)
-        if g_end > 0.0 or beyond > step.t1:
-            return end  # the function only touches zero
-        end = beyond
-    if g_end > 0.0:
+        if value <= least:
+            t = step.t0 + u * (step.t1 - step.t0)
+            if slope < 0.0:
+                t += 2.0 * least / -slope * (step.t1 - step.t0)
+            if t >= step.t1:
+                break
+            g = event_function(model, step, t, j)
+            if g <= 0.0:
+                return find_crossing(model, step, t, g, j)
+            if g <= least:
+                return t  # the function only touches zero
+            location.polynomial[0] += g - value
+        else:
+            descent = sqrt(slope * slope + 2.0 * largest_curvature * value) - slope
+            if not 2.0 * value < (1.0 - u) * descent:
+                break
+            u += 2.0 * value / descent
+    if location.end[j] > 0.0:
         return inf
-    return find_root(model, step, step.t0, end, location.start[j], g_end, j)
+    return find_crossing(model, step, step.t1, location.end[j], j)
+
+
+def find_crossing(model, step, end, g_end, j):
+    """Return the zero of one event function between the start of the step and a time at which it is not positive."""
+    g_start = model.event_location.start[j]
+    return find_root(model, step, step.t0, end, g_start, g_end, j)
 
 
 def fit_polynomial(model, step, j):
