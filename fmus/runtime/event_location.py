@@ -37,6 +37,7 @@ SHORTEST_DWELL, MAX_CHATTER = 1e-9, 100  # share of the largest step; number of 
 FEATURE_RANGE, MIN_STEP_SHARE = 5.0, 0.6  # features limit the step within so many widths; tolerated excess of a step
 MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial
 SHORTEST_STEP = 1e-6  # share of the largest step; shorter steps are not shortened for an event function
+DIFFERENCE_STEP, FIRST_CHANGE = 1e-5, 0.3  # share of the largest step for differences; change in the first step
 NO_ZERO, ONE_ZERO, UNKNOWN = 0, 1, 2  # what the cubic polynomial shows
 
 
@@ -196,6 +197,40 @@ def limit_step(model, step):
         step.h_next = h if h < step.h_next else step.h_next
 
 
+def limit_first_step(model, step):
+    """Limit the first step after an event, so that no load or condition changes by more than a share of its scale.
+
+    The slopes of the states do not show how fast a load changes that follows a clock.
+    """
+    location = model.event_location
+    delta = DIFFERENCE_STEP * step.h_max
+    update_event_functions(model, step.t1, step.y1, step.modes1)
+    for j in range(model.n_event_functions):
+        location.start[j] = location.values[j]
+        location.peaks[j] = location.scales[j]
+    y2 = step.y1 + delta * step.f1
+    update_event_functions(model, step.t1 + delta, y2, step.modes1)
+    for j in range(model.n_event_functions):
+        location.near_middle[j] = location.values[j]
+    y3 = step.y1 + 2.0 * delta * step.f1
+    update_event_functions(model, step.t1 + 2.0 * delta, y3, step.modes1)
+    for i in contact_indices:
+        if step.modes1[i] != STUCK:
+            location.peaks[i] = location.peaks[len(step.modes1) + i] = 0.0  # the error control resolves slips
+    largest = 0.0
+    for j in range(model.n_event_functions):
+        if location.peaks[j] > 0.0:
+            slope = fabs(location.near_middle[j] - location.start[j]) / delta
+            bend = fabs(location.start[j] - 2.0 * location.near_middle[j] + location.values[j]) / (delta * delta)
+            rate = slope / location.peaks[j] + sqrt(bend / location.peaks[j])
+            largest = rate if rate > largest else largest
+    if largest > 0.0:
+        h = FIRST_CHANGE / largest
+        least = SHORTEST_STEP * step.h_max
+        h = h if h > least else least
+        step.h_next = h if h < step.h_next else step.h_next
+
+
 def examine_cubic(location, step, j):
     """Return how many zeros the cubic Hermite polynomial has; note whether an event is in doubt.
 
@@ -329,6 +364,8 @@ def find_root(model, step, low, high, g_low, g_high, j):
 
 def begin_phase(model, step):
     """Note the start of a motion: its state, and the step size to try."""
+    if model.is_coupled or model.has_conditions:
+        limit_first_step(model, step)
     location = model.event_location
     location.phase_t, location.phase_y, location.phase_f = step.t1, step.y1, step.f1
     location.phase_h = step.h_next
