@@ -16,7 +16,7 @@ from .rounding import EPSILON, ROUNDOFF_MARGIN
 from .stick_slip import DryFriction, sign
 from .vectors import ContactIndex, ContactVector, StateVector, any_of, contact_indices, contact_vector, max_of
 
-SIMULTANEITY_MARGIN = 4.0 * ROUNDOFF_MARGIN  # relative; smaller slips come to rest together with one that is zero
+SIMULTANEITY_MARGIN = 1e-11  # relative; smaller slips come to rest together with one that is zero
 SLIP_SCALE = 1e-3  # m/s or rad/s: scale of slip velocities whose terms are zero
 TIE_SHARE = 1.0 - 1e-9  # contacts within this share of the highest relative load are released together
 MAX_JOINT_ITERATIONS, MAX_ITERATIONS = 60, 200  # pivots of all contacts at once; then of one at a time
