@@ -24,6 +24,7 @@ MAX_IMPULSES = 3  # several, since slip velocities may be nonlinear in the posit
 TINY_FORCE = 1e-300  # N, avoids a division by zero
 EQUAL_SHARE = 1.0 - 1e-9  # of the holding limit: a larger sliding force equals it
 PREDICTION_SHARE = 1e-4  # of the longest step: how far slips are predicted
+REVERSED_SHARE = 1e-8  # relative; larger slips against the mode are no rounding errors
 MAX_ENUMERATED = 6  # contacts at rest of which all modes are tried
 SLIPPING, RELOCKED, AT_REST, AT_LIMIT = 0, 1, 2, 3  # status of a contact in the pivoting
 
@@ -87,6 +88,8 @@ class CoupledFriction(DryFriction):
             status[i], new_modes[i] = SLIPPING, step.modes0[i]
             if new_modes[i] == STUCK:
                 status[i] = AT_LIMIT if ends[i] <= t else AT_REST
+            elif new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + SLIP_SCALE):
+                new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
             elif not (force[i] == 0.0 and limit[i] == 0.0):
                 if ends[i] <= t or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
                     depth = inf

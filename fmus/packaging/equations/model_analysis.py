@@ -36,6 +36,7 @@ from .expressions import Expression, ModelError, Operand, Term, describe, is_com
 from .generated_names import RESERVED, RESERVED_WHERE_COUPLED
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 
+NARROW_FUNCTIONS = ("exp", "tanh", "atan", "sinh", "cosh", "/")
 LARGEST_FLOAT = float_info.max
 SMALLEST_DIVISOR = 1e-100  # in place of an inverse mass that vanishes; its square is not zero
 METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
@@ -150,6 +151,15 @@ class ModelAnalysis:
             margin = Term("choose", Term("==", c.mode, 0), surplus, 1.0)
             result.append(Condition(margin, (c.slide,), sentence=sentence))
         return result
+
+    @property
+    def has_narrow_friction(self) -> bool:
+        """Whether a friction force depends on states by functions that may vary within a small range."""
+        return any(
+            isinstance(e, Term) and e.op in NARROW_FUNCTIONS and depends_on(e.args[-1], self.states)
+            for c in self.contacts
+            for e in subexpressions(c.slide).values()
+        )
 
     @property
     def conditions(self) -> list[Condition]:

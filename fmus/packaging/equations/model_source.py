@@ -153,6 +153,7 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
             ("has_driver", an.drivers),
             ("has_input_derivatives", an.ramps),
             ("has_conditions", an.conditions),
+            ("has_narrow_friction", an.has_narrow_friction),
             ("has_variable_levers", not an.waits and an.variable_lever_contacts),
         )
         if holds
