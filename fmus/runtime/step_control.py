@@ -365,7 +365,7 @@ class InternalStep:
         if h <= event_location.SHORTEST_STEP * self.h_max:
             return True
         y_end = self.state_at(model, end)
-        y2, _f2, e = method.propose(model, self.modes0, self.t0, self.y0, self.f0, h)
+        y2, f2, e = method.propose(model, self.modes0, self.t0, self.y0, self.f0, h)  # noqa: RUF059  named like y2
         self.n_rhs += method.stages
         scale = magnitude(self.y0)
         scale = elementwise_max(self.error_scale_floor, scale)
