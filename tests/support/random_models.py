@@ -39,6 +39,7 @@ class Structure:
     force_0: tuple[bool, ...]
     force_1: tuple[bool, ...]
     contacts: tuple[ContactShape, ...]
+    angle_starts: bool  # the phase at the start is that of the state, not a term of its own
 
     @property
     def name(self):
@@ -100,6 +101,7 @@ def random_structure(seed):
         tuple(rng.random() < 0.4 for _ in range(n)),
         tuple(rng.random() < 0.4 for _ in range(n)),
         tuple(contacts),
+        rng.random() < 0.1,
     )
 
 
@@ -166,9 +168,10 @@ def write_model(structure):
         add(f'x{i} = State("m", "position {i}", start=x{i}_0)')
         add(f'v{i} = State("m/s", "speed {i}", start=v{i}_0, rate_of=x{i})')
     if s.has_angle:
-        add('angle = State("rad", "phase angle", start=angle_0, rate=Omega)')
+        start = "start=angle_0, " * s.angle_starts
+        add(f'angle = State("rad", "phase angle", {start}rate=Omega)')
         functions.add("sin")
-        add("swing = sin(angle)")
+        add(f"swing = sin(angle{'' if s.angle_starts else ' + angle_0'})")
     if s.has_driver:
         add('x_driver = State("m", "position of the driver", rate=v_driver)')
     if s.has_clock:
