@@ -199,8 +199,9 @@ def cached_reference(structure, seed, folder):
 # ---- runs
 
 
-def build(structures, folder, backends=tuple(BACKENDS)):
-    """Write and build the models of structures; return {(seed, backend): path} and the refused ones."""
+def build(structures, folder, backends=tuple(BACKENDS), root=ROOT):
+    """Write and build the models of structures by the sources under `root`; return {(seed, backend): path} and the
+    refused ones."""
     folder.mkdir(parents=True, exist_ok=True)
     paths, refused = {}, []
     for structure in structures:
@@ -209,7 +210,7 @@ def build(structures, folder, backends=tuple(BACKENDS)):
         for backend in backends:
             out = folder / backend
             command = [sys.executable, "build_fmus.py", str(file), *BACKENDS[backend], "--out", str(out)]
-            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=600)
+            done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=600)
             if done.returncode == 0:
                 paths[structure.seed, backend] = out / f"{structure.name}.fmu"
             else:
@@ -380,6 +381,7 @@ def main():
     parser.add_argument("--first", type=int, default=0, help="seed of the first model file")
     parser.add_argument("--first-values", type=int, default=0, help="seed of the first parameter set")
     parser.add_argument("--folder", type=Path, default=Path("/tmp/random-campaign"), help="for FMUs and references")
+    parser.add_argument("--root", type=Path, default=ROOT, help="sources that build the FMUs")
     parser.add_argument("--bits", type=int, default=5, help="compare the backends in every n-th case")
     parser.add_argument("--show", type=int, nargs=2, metavar=("STRUCTURE", "VALUES"), help="print the events of a run")
     parser.add_argument("--method", type=int, default=4, choices=METHODS)
@@ -389,14 +391,14 @@ def main():
     worker = fmi3_fixtures.Worker()
     if arguments.show:
         structure = random_structure(arguments.show[0])
-        paths, _ = build([structure], folder, ("native",))
+        paths, _ = build([structure], folder, ("native",), arguments.root)
         show(worker, paths, structure, arguments.show[1], arguments.method, arguments.rtol)
         worker.close()
         return
     counts, kinds, examples = Counter(), Counter(), {}
     for number in range(arguments.first, arguments.first + arguments.structures):
         structure = random_structure(number)
-        paths, failures = build([structure], folder)
+        paths, failures = build([structure], folder, root=arguments.root)
         for seed in range(arguments.first_values, arguments.first_values + arguments.values):
             reference = cached_reference(structure, seed, folder)
             slow = ("python", "fmi3") if seed % arguments.bits == 0 else ()
