@@ -22,13 +22,14 @@ import numpy as np
 from scipy.optimize import brentq
 
 ORDER = 24  # of the Taylor series between events
-DECISION_ORDER = 8  # of the series that decide between modes
+DECISION_ORDER = 6  # of the series that decide between modes
 STEP_SHARE = 0.2  # step over radius of convergence: 0.2^24 is below rounding errors
 FLAT_RATIO = 6.5  # exp(-ratio^2) is below rounding errors beyond this ratio
 MAX_RATIO_CHANGE = 0.5  # of a step: then 24 terms of exp(-ratio^2) are exact to rounding errors
 TIE = 1e-10  # smaller shares of the scale of a quantity are rounding errors: the quantity is zero
 TOUCH = 1e-12  # a guard that falls to zero within this share of its scale, and rises again, touches zero: no event
 MIN_SPEED = 1e-3  # m/s: floor of the scale of slips
+ORDERS = np.arange(ORDER + 2.0)[:, None]
 GRID = np.linspace(0.0, 1.0, 65)  # points of a step where guards are evaluated
 GRID_POWERS = GRID[:, None] ** np.arange(ORDER + 1)
 MAX_EVENTS = 2000
@@ -180,6 +181,7 @@ class _Run:
             for name in ("mu_d", "mu_p", "mu_s", "load_0", "load_1", "load_t", "v_s", "belt", "belt_1")
         )
         self.load_q = np.array([c.load_q or (0.0,) * n for c in system.contacts])
+        self.has_cubic = bool(np.any(self.h))
         self.has_curve = bool(np.any(self.mu_p != self.mu_d))
         self.t, self.q, self.v = 0.0, np.array(system.q_0, float), np.array(system.v_0, float)
         self.modes = [0] * len(system.contacts)
@@ -200,10 +202,11 @@ class _Run:
             for k in range(order + 2)
         ]
         q, v = np.zeros((order + 2, n)), np.zeros((order + 2, n))
-        slip, force, hold, load, slide, r, u, curve = np.zeros((8, order + 1, n_contacts))
+        slip, force, load, slide, r, u, curve = np.zeros((7, order + 1, n_contacts))
         e, square = np.zeros((2, order + 1, len(s.springs)))
         q[0], v[0] = self.q, self.v
         modes = np.array(modes)
+        direction = modes * self.pressed
         stuck = np.flatnonzero(modes == 0)
         held = self.rows[stuck]
         response = np.linalg.inv(held * self.inverse_masses @ held.T) if len(stuck) else None
@@ -215,8 +218,10 @@ class _Run:
                 spring -= self.c * self.drive * s.v_driver
             elif k == 1:
                 e[k] -= self.drive * s.v_driver
-            square[k] = (e[: k + 1] * e[k::-1]).sum(0)
-            spring += self.k * e[k] + self.h * (square[: k + 1] * e[k::-1]).sum(0)
+            spring += self.k * e[k]
+            if self.has_cubic:
+                square[k] = convolve(e[: k + 1], e[k::-1])
+                spring += self.h * convolve(square[: k + 1], e[k::-1])
             applied = self.force_1 * sines[k] - self.spring_rows.T @ spring
             slip[k] = self.rows @ v[k] - self.belt_1 * sines[k]
             load[k] = self.load_q @ q[k] + self.load_1 * sines[k]
@@ -229,21 +234,20 @@ class _Run:
             slide[k] = self.mu_d * load[k]
             if self.has_curve:
                 r[k] = slip[k] / self.v_s
-                u[k] = -(r[: k + 1] * r[k::-1]).sum(0)
+                u[k] = -convolve(r[: k + 1], r[k::-1])
                 if k == 0:
                     curve[0] = np.exp(u[0])
                 else:
-                    curve[k] = (np.arange(1, k + 1)[:, None] * u[1 : k + 1] * curve[k - 1 :: -1]).sum(0) / k
-                slide[k] += (self.mu_p - self.mu_d) * (load[: k + 1] * curve[k::-1]).sum(0)
-            slide[k] *= self.pressed
-            hold[k] = self.mu_s * load[k] * self.pressed
-            force[k] = modes * slide[k]
+                    curve[k] = convolve(ORDERS[1 : k + 1] * u[1 : k + 1], curve[k - 1 :: -1]) / k
+                slide[k] += (self.mu_p - self.mu_d) * convolve(load[: k + 1], curve[k::-1])
+            force[k] = direction * slide[k]
             if len(stuck):
                 free = self.inverse_masses * (applied - self.rows.T @ force[k])
                 belt_rate = self.belt_1[stuck] * sines[k + 1] * (k + 1)
                 force[k, stuck] = response @ (held @ free - belt_rate)
             v[k + 1] = self.inverse_masses * (applied - self.rows.T @ force[k]) / (k + 1)
             q[k + 1] = v[k] / (k + 1)
+        hold, slide = self.mu_s * load * self.pressed, slide * self.pressed
         self.force_scale = max(np.abs(applied_scale(self, slide)), 1e-12)
         return Series(self.t, tuple(int(m) for m in modes), q, v, slip, force, hold, load)
 
@@ -463,6 +467,11 @@ class _Run:
                 ok = min(sides) >= 0.0
                 verdicts.append((ok, min((s for s in sides if s > 0.0), default=inf) if ok else -min(sides)))
         return verdicts
+
+
+def convolve(a, b):
+    """Return the sums of the products of the rows."""
+    return np.einsum("ij,ij->j", a, b)
 
 
 def applied_scale(run, slide):
