@@ -297,10 +297,10 @@ class _Run:
                 at_event = False
                 continue
             self.note_crossings(guards, roots, end, h_full)
-            arriving = {g.contact for g, root in zip(guards, roots, strict=True) if root == end and g.kind == "slip"}
+            due = [g for g, root in zip(guards, roots, strict=True) if root == end]
             self.advance(series, self.t + end)
             before = tuple(self.modes)
-            self.resolve(arriving)
+            self.resolve({g.contact for g in due if g.kind == "slip"}, {g.contact for g in due if g.kind == "hold"})
             at_event = True
             if tuple(self.modes) != before:
                 self.solution.events.append((self.t, tuple(self.modes)))
@@ -374,20 +374,23 @@ class _Run:
         for g, root in zip(guards, roots, strict=True):
             if g.kind == "load":
                 continue
-            values = g.value(s)
-            rising = np.flatnonzero((np.diff(values) > 0.0) & (values[1:] < 0.0))
-            if root == end and len(rising):
-                self.note("crossing", g.contact, -values[: rising[0] + 1].min(), g.kind, self.t + end)
+            values, rising = g.value(s), np.flatnonzero(g.slope(s) > 0.0)
+            if root == end and len(rising) and rising[0]:
+                j = rising[0]
+                low = brentq(g.slope, s[j - 1], s[j], xtol=1e-16)
+                self.note("crossing", g.contact, -g.value(low), g.kind, self.t + end)
             elif root > end and values[0] > TIE * g.scale and values.min() < 0.0:
                 self.note("order", g.contact, values[0], g.kind, self.t + end)
 
     # ---- modes after an event
 
-    def resolve(self, arriving):
+    def resolve(self, arriving, at_limit=frozenset()):
         """Choose the modes by trying all combinations of the contacts at rest.
 
-        Of the consistent combinations, the one with the most contacts held is chosen, and of several the one that
-        changes the fewest contacts that were stuck.
+        `arriving` are the contacts whose slips have just reached zero, `at_limit` those whose loads have just reached
+        their limits.  Of the consistent combinations, the one with the most contacts held is chosen.  Of several, the
+        one that holds the most contacts that have been stuck below their limits: their loads have not changed, so they
+        do not let go by themselves.
         """
         slips = self.rows @ self.v - self.belt - self.belt_1 * sin(self.system.angle_0 + self.system.omega * self.t)
         at_start = not self.solution.pieces
@@ -402,7 +405,7 @@ class _Run:
                 self.modes[i] = 1 if slips[i] > 0.0 else -1
         self.stop_slips(rest)
         self.update_loads()
-        was_stuck = [i for i in rest if self.modes[i] == 0]
+        below_limit = [i for i in rest if self.modes[i] == 0 and i not in at_limit]
         trials = []
         for trial in product((0, 1, -1), repeat=len(rest)):
             modes = list(self.modes)
@@ -410,18 +413,18 @@ class _Run:
                 modes[i] = mode
             verdicts = self.judge(modes, rest)
             held = sum(mode == 0 for mode in trial)
-            kept = sum(modes[i] == 0 for i in was_stuck)
+            kept = sum(modes[i] == 0 for i in below_limit)
             trials.append((held, kept, modes, verdicts))
         good = [one for one in trials if all(ok for ok, _ in one[3])]
         if not good:
             raise UnsolvableError(f"no consistent modes at {self.t}")
         held, kept, modes, verdicts = max(good, key=lambda one: one[:2])
-        best = [one for one in good if one[0] == held]
+        best = [one for one in good if one[0] == held and (one[1] == kept or arriving)]
         if len(best) > 1:
             self.solution.decisions.append(Decision(self.t, "choice", -1, 0.0))
         margin = min((size for _, size in verdicts), default=inf)
-        for other_held, _, _, others in trials:
-            if other_held >= held and not all(ok for ok, _ in others):
+        for other_held, other_kept, _, others in trials:
+            if other_held >= held and (other_kept >= kept or arriving) and not all(ok for ok, _ in others):
                 margin = min(margin, max(size for ok, size in others if not ok))
         if margin < 0.05:
             self.solution.decisions.append(Decision(self.t, "modes", -1, float(margin)))
