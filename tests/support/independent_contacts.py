@@ -254,11 +254,12 @@ class _Run:
     def step_size(self, series):
         """Return the step that the decay of the last coefficients allows."""
         sizes = []
-        for table, floor in ((series.q, 1e-2), (series.v, 1e-1)):
+        forces = self.force_scale
+        for table, floor in ((series.q, 1e-2), (series.v, 1e-1), (series.force, forces), (series.load, forces)):
             scale = max(np.abs(table[0]).max(), floor)
             sizes += [
                 (scale / last) ** (1.0 / k)
-                for k in (ORDER, ORDER + 1)
+                for k in (ORDER - 1, ORDER)
                 if (last := np.abs(table[k]).max()) > 0.0
             ]  # fmt: skip
         h = min(STEP_SHARE * min(sizes, default=inf), 0.1 * self.system.stop)
