@@ -132,11 +132,19 @@ class Solution:
     events: list = field(default_factory=list)
     decisions: list[Decision] = field(default_factory=list)
     pieces: list[Series] = field(default_factory=list)
+    samples: dict = field(default_factory=dict)
+    kinks: list = field(default_factory=list)  # times at which limited loads begin or end
     end: float = 0.0
     failure: str = ""  # why the motion ends before the stop time
 
+    def sample(self, times):
+        """Keep only the states at these times, which take less memory."""
+        self.samples, self.pieces = {t: self.states(t) for t in times}, []
+
     def states(self, t):
         """Return positions and velocities at a time."""
+        if self.samples:
+            return self.samples[t]
         i = bisect_right(self.pieces, t, key=lambda piece: piece.t) - 1
         return np.concatenate(self.pieces[max(i, 0)].state(t))
 
@@ -300,6 +308,8 @@ class _Run:
             self.note_crossings(guards, roots, end, h_full)
             due = [g for g, root in zip(guards, roots, strict=True) if root == end]
             self.advance(series, self.t + end)
+            if any(g.kind == "load" for g in due):
+                self.solution.kinks.append(self.t)
             before = tuple(self.modes)
             self.resolve({g.contact for g in due if g.kind == "slip"}, {g.contact for g in due if g.kind == "hold"})
             at_event = True
