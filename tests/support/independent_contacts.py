@@ -2,7 +2,8 @@
 
     M v' = f(t, q, v) - G^T F,   q' = v,   slip = G v - belt(t)
 
-A contact slides with F = mode * slide(slip, load), or sticks with slip = 0 while |F| <= hold.  Nothing here is shared
+A contact slides with F = mode * slide(slip, load), or sticks with slip = 0 while |F| <= hold.  While its limit is
+zero it neither sticks nor makes events, and its mode remains that of its last slip with friction.  Nothing here is shared
 with the code under test: the motion between events is a Taylor series of high order, so every guard is a polynomial
 whose first root is located to rounding errors; the modes after an event come from all combinations of stick and slip,
 judged by the first Taylor coefficients that do not vanish.
@@ -133,6 +134,7 @@ class Solution:
     decisions: list[Decision] = field(default_factory=list)
     pieces: list[Series] = field(default_factory=list)
     samples: dict = field(default_factory=dict)
+    free: list = field(default_factory=list)  # (t, which contacts are without friction from then on)
     kinks: list = field(default_factory=list)  # times at which limited loads begin or end
     end: float = 0.0
     failure: str = ""  # why the motion ends before the stop time
@@ -149,9 +151,11 @@ class Solution:
         return np.concatenate(self.pieces[max(i, 0)].state(t))
 
     def modes(self, t):
-        """Return the modes at a time."""
+        """Return the modes at a time, None for contacts without friction."""
         i = bisect_right(self.events, t, key=lambda event: event[0]) - 1
-        return self.events[i][1] if i >= 0 else self.first_modes
+        modes = self.events[i][1] if i >= 0 else self.first_modes
+        free = self.free[bisect_right(self.free, t, key=lambda change: change[0]) - 1][1]
+        return tuple(None if none else mode for mode, none in zip(modes, free, strict=True))
 
     def decided_until(self, bound):
         """Return the time of the first decision with a margin below `bound`, and that decision."""
@@ -313,10 +317,14 @@ class _Run:
             before = tuple(self.modes)
             self.resolve({g.contact for g in due if g.kind == "slip"}, {g.contact for g in due if g.kind == "hold"})
             at_event = True
-            if tuple(self.modes) != before:
+            if any(a != b and not self.is_free(i) for i, (a, b) in enumerate(zip(before, self.modes, strict=True))):
                 self.solution.events.append((self.t, tuple(self.modes)))
                 if len(self.solution.events) > MAX_EVENTS:
                     raise UnsolvableError(f"more than {MAX_EVENTS} events until {self.t}")
+
+    def is_free(self, i):
+        """Return whether a contact has no friction at present."""
+        return self.mu_s[i] == 0.0 or not self.pressed[i]
 
     def advance(self, series, t):
         self.q, self.v = series.state(t)
@@ -327,7 +335,9 @@ class _Run:
         result = []
         for i, mode in enumerate(self.modes):
             slip_scale = self.largest_slip[i]
-            if mode:
+            if self.is_free(i):
+                pass
+            elif mode:
                 result.append(_Guard(i, "slip", mode * series.slip[:, i], slip_scale))
             else:
                 scale = self.force_scale
@@ -405,17 +415,19 @@ class _Run:
         """
         slips = self.rows @ self.v - self.belt - self.belt_1 * sin(self.system.angle_0 + self.system.omega * self.t)
         at_start = not self.solution.pieces
+        self.update_loads()
+        free = tuple(self.is_free(i) for i in range(len(self.modes)))
+        self.solution.free.append((self.t, free))
         rest = [
             i
             for i, mode in enumerate(self.modes)
-            if abs(slips[i]) <= TIE * self.largest_slip[i]
-            or (not at_start and (mode == 0 or i in arriving))
+            if not free[i]
+            and (abs(slips[i]) <= TIE * self.largest_slip[i] or (not at_start and (mode == 0 or i in arriving)))
         ]  # fmt: skip
         for i, mode in enumerate(self.modes):
-            if i not in rest and (at_start or mode == 0):
+            if i not in rest and (at_start or mode == 0 or (mode * slips[i] < 0.0 and not free[i])):
                 self.modes[i] = 1 if slips[i] > 0.0 else -1
         self.stop_slips(rest)
-        self.update_loads()
         below_limit = [i for i in rest if self.modes[i] == 0 and i not in at_limit]
         trials = []
         for trial in product((0, 1, -1), repeat=len(rest)):
