@@ -3,7 +3,7 @@
     M v' = f(t, q, v) - G^T F,   q' = v,   slip = G v - belt(t)
 
 A contact slides with F = mode * slide(slip, load), or sticks with slip = 0 while |F| <= hold.  While its limit is
-zero it neither sticks nor makes events, and its mode remains that of its last slip with friction.  Nothing here is shared
+zero it neither sticks nor makes events, and its mode stays that of its last slip with friction.  Nothing here is shared
 with the code under test: the motion between events is a Taylor series of high order, so every guard is a polynomial
 whose first root is located to rounding errors; the modes after an event come from all combinations of stick and slip,
 judged by the first Taylor coefficients that do not vanish.
