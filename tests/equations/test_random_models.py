@@ -102,7 +102,7 @@ def test_slips_and_rests_of_the_sled_have_their_closed_form(ratio):
     assert 0.01 < depth / (w * lead / v) ** 2 * 4.0 < 20.0 or ratio == 1.5
 
 
-STRUCTURES, VALUES = (1, 13, 28), 4
+STRUCTURES, VALUES = (6, 22, 33), range(2, 6)
 
 
 @pytest.mark.parametrize("number", STRUCTURES)
@@ -118,11 +118,11 @@ def test_random_models_agree_with_an_independent_solver(worker, number):
     folder = build_cache.cached_folder(structure.name, make)
     paths = {(number, backend): folder / backend / f"{structure.name}.fmu" for backend in random_campaign.BACKENDS}
     compared = 0
-    for seed in range(VALUES):
+    for seed in VALUES:
         reference = random_campaign.make_reference(structure, seed)
         failures, counts, _ = random_campaign.run_case(
             worker, paths, structure, seed, reference, slow_backends=("python", "fmi3")
         )
         assert not failures, "\n".join(map(str, failures))
         compared += counts["compared events", 1e-11]
-    assert compared > VALUES
+    assert compared > len(VALUES)
