@@ -18,5 +18,6 @@ OUT_OF_ORDER, NULL_POINTER, NO_MEMORY, NOT_SUPPORTED = 16, 17, 18, 19
 BUFFER_TOO_SMALL, WRONG_TOKEN, WRONG_LENGTH = 20, 21, 22
 NO_PARTIAL_DERIVATIVE, NO_OUTPUT_DERIVATIVE, NO_INPUT_DERIVATIVE = 23, 24, 25
 CHATTERING = 26  # of a condition
+NEEDS_REPETITION = 27  # of an internal step
 MAX_INPUT_ORDER = 8  # highest derivative of an input: the order of dop853, which gains nothing from more
 FIRST_RULE = 100  # plus the number of the model's rule that the values violate

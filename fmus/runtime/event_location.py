@@ -58,6 +58,7 @@ class EventLocation:
         # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero
         self.start, self.early, self.late, self.end = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
         self.peaks, self.times = [0.0] * n, [0.0] * n
+        self.largest_slip = 0.0  # bound on the slip velocity of a single contact since the last event
         # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0: now, before and after t1
         self.margins, self.margin_scales = [0.0] * n, [0.0] * n
         self.sides, self.sides_before, self.sides_after = [1.0] * n, [1.0] * n, [1.0] * n
@@ -72,7 +73,7 @@ class EventLocation:
             self.nodes[k] = root * root
         # start of the motion since the last event; factor of the tolerance since then
         self.phase_t = self.phase_y = self.phase_f = self.phase_h = 0.0
-        self.tolerance_factor = 1.0
+        self.tolerance_factor, self.tolerance = 1.0, 0.0  # now; tolerance of the run, if the factor is less
         self.t_doubt = 0.0  # end of the step that was in doubt
         self.in_doubt = self.must_repeat = self.must_shorten = False
         self.feature_width = inf  # slip velocity below which friction varies
@@ -118,9 +119,6 @@ def locate_events(model, step):
     location.in_doubt = location.must_shorten = False
     for j in range(model.n_event_functions):
         location.times[j] = inf
-    if model.has_dry_friction and not model.is_coupled and not model.has_conditions:
-        if model.slip_continues(step):
-            return inf
     evaluate_on_cubic(model, step)
     limit_step(model, step)
     if location.must_shorten:
@@ -148,6 +146,8 @@ def evaluate_on_cubic(model, step):
     update_event_functions(model, t0, step.y0, step.modes0)
     for j in range(model.n_event_functions):
         location.start[j] = location.values[j]
+        if location.peaks[j] < location.largest_slip < inf:
+            location.peaks[j] = location.largest_slip
         if location.scales[j] > location.peaks[j]:
             location.peaks[j] = location.scales[j]
     y4 = 0.648 * step.y0 + 0.352 * step.y1 + h * (0.144 * step.f0 - 0.096 * step.f1)
@@ -244,7 +244,7 @@ def examine_cubic(location, step, j):
         lowest = end - 0.75 * (end - late) * (end - late) / curvature if curvature > 0.0 else -inf
     elif not early < start:
         lowest = inf
-    if fabs(lowest) <= ERROR_FACTOR * step.tolerance * location.peaks[j]:
+    if fabs(lowest) <= ERROR_FACTOR * step.tolerance / location.tolerance_factor * location.peaks[j]:
         location.in_doubt = True
     low = early if early < late else late
     high = early if early > late else late
@@ -369,10 +369,18 @@ def begin_phase(model, step):
     location = model.event_location
     location.phase_t, location.phase_y, location.phase_f = step.t1, step.y1, step.f1
     location.phase_h = step.h_next
-    location.tolerance_factor = 1.0
+    restore_tolerance(model, step)
     location.in_doubt = location.must_repeat = False
+    location.largest_slip = 0.0
     for j in range(model.n_event_functions):
         location.peaks[j] = 0.0
+
+
+def restore_tolerance(model, step):
+    """Return to the tolerance of the run."""
+    location = model.event_location
+    if location.tolerance_factor < 1.0:
+        step.tolerance, location.tolerance_factor = location.tolerance, 1.0
 
 
 def decide_repetition(model, step):
@@ -383,6 +391,9 @@ def decide_repetition(model, step):
         factor = REFINEMENT if REFINEMENT > least else least
         if factor < WORTHWHILE_REFINEMENT:
             location.tolerance_factor, location.must_repeat, location.t_doubt = factor, True, step.t1
+            location.tolerance = step.tolerance
+            step.tolerance *= factor
+            location.largest_slip = inf  # every step is examined
 
 
 def repeat_phase(model, step):

@@ -8,7 +8,7 @@ from math import inf, nan
 
 from . import event_location, ode23
 from .active_method import METHOD_ITEMS
-from .codes import DIVERGED, HYBRID, OK, STUCK, TOO_MANY_STEPS
+from .codes import DIVERGED, HYBRID, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .step_control import OVERFLOW_LIMIT, InternalStep
 from .variable_declarations import Choice, Count, Fixed, Local, VariableOwner
@@ -125,6 +125,8 @@ class Integrator(VariableOwner):
                 step.h_next,
             )
             self.t_event_before_change, self.modes_before_change = counters.t_event, self.modes
+        if model.has_dry_friction or model.has_conditions:
+            event_location.restore_tolerance(model, step)
         self.apply_parameters(model)
         if model.has_dry_friction and step.is_hybrid and not model.is_coupled:
             for i in contact_indices:
@@ -162,6 +164,8 @@ class Integrator(VariableOwner):
         step = self.step
         if step.t1 < t:
             status = step.compute_next(model)
+            if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
+                status = step.repeat_steps(model)
             if status == OK and step.t1 < t:
                 status = self.advance_past(model, t)
             if status != OK:
@@ -195,6 +199,8 @@ class Integrator(VariableOwner):
         for _ in range(MAX_BATCHES):
             for _ in range(BATCH_STEPS):
                 status = step.compute_next(model)
+                if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
+                    status = step.repeat_steps(model)
                 if status != OK or step.t1 >= t:
                     return status
             if step.n_rhs + step.interpolant.n_event_evals > limit:
@@ -205,7 +211,10 @@ class Integrator(VariableOwner):
         """Set `t_next` to the end of the internal step after the current time; NaN if that step fails."""
         step = self.step
         while self.t >= step.t1 and step.t1 < step.t_end:
-            if step.compute_next(model) != OK:
+            status = step.compute_next(model)
+            if (model.has_dry_friction or model.has_conditions) and status == NEEDS_REPETITION:
+                status = step.repeat_steps(model)
+            if status != OK:
                 self.t_next = nan
                 return
         self.t_next = self.finite_step_end()

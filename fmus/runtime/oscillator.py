@@ -38,6 +38,7 @@ class Oscillator(VariableOwner):
     rests_when_stuck = False  # a single body: nothing moves while its contact sticks
     is_coupled = False  # a contact may stick while something moves (contact_lcp.py)
     has_variable_levers = False  # the lever of a contact force changes with the motion, and may vanish
+    has_nominal_velocity = False  # nominal_velocity() is defined
     has_narrow_friction = False  # friction varies within a small range of slip velocities, as a Stribeck curve does
     has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()
     has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1

@@ -9,7 +9,6 @@ principle, CACSD 1999).  contact_lcp.py treats several contacts.
 from math import fabs, inf
 
 from .codes import BACKWARD, EXACT, FIRST_RULE, FORWARD, HYBRID, MAX_INPUT_ORDER, SIGN, STUCK, THRESHOLD
-from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
 from .oscillator import Oscillator
 from .rounding import ROUNDOFF_MARGIN
 from .vectors import (
@@ -192,21 +191,3 @@ class DryFriction(Oscillator):
             if self.friction == HYBRID and modes[i] != STUCK:
                 location.values[i] = modes[i] * y[slip_index[i]]
                 location.scales[i] = fabs(y[slip_index[i]])
-
-    def slip_continues(self, step):
-        """Return whether the slip velocity certainly keeps its direction in the step; most steps end here."""
-        location = self.event_location
-        continues = True
-        for i in contact_indices:
-            mode, third = step.modes0[i], (step.t1 - step.t0) / 3.0
-            start, end = mode * step.y0[slip_index[i]], mode * step.y1[slip_index[i]]
-            early, late = start + mode * third * step.f0[slip_index[i]], end - mode * third * step.f1[slip_index[i]]
-            low = early if early < late else late
-            high = early + late - low
-            high = high if high > end else end
-            if high > location.peaks[i]:
-                location.peaks[i] = high
-            high = high if high > start else start
-            low = low if low < end else end
-            continues = low >= INTERPOLANT_SHARE * high and low >= NEAR_ZERO_SHARE * location.peaks[i]
-        return continues
