@@ -10,6 +10,7 @@ from math import inf
 from . import event_location
 from .active_method import ActiveMethod
 from .codes import DIVERGED, EXACT, NEEDS_REPETITION, OK, STALLED, STUCK
+from .event_location import INTERPOLANT_SHARE, MIN_STEP_SHARE, NEAR_ZERO_SHARE
 from .interpolant import Interpolant
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .power_series import PowerSeries
@@ -311,11 +312,9 @@ class InternalStep:
             error = h * max_of(e) / tolerance
             share = 1.0
             if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
-                if not (model.has_dry_friction and model.has_nominal_velocity):
-                    break
-                if self.is_hybrid:
+                if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
                     share = event_location.step_share(model, self, t + h, y1)
-                if share >= event_location.MIN_STEP_SHARE or h <= h_min:
+                if not (model.has_dry_friction and model.has_nominal_velocity) or share >= MIN_STEP_SHARE or h <= h_min:
                     break
             self.n_rejected += 1
             attempts += 1
@@ -324,7 +323,7 @@ class InternalStep:
             shrink = method.safety * error**-method.power if 1.0 < error < inf and attempts == 1 else 0.5
             shrink_limit = method.shrink if attempts == 1 else 0.5
             h_new = h * (shrink if shrink > shrink_limit else shrink_limit)
-            if model.has_dry_friction and model.has_nominal_velocity and share < event_location.MIN_STEP_SHARE:
+            if model.has_dry_friction and model.has_nominal_velocity and share < MIN_STEP_SHARE:
                 h_new = h * share
             if h_new < h_min:
                 h_new = h_min
@@ -340,22 +339,17 @@ class InternalStep:
             # Most steps end here.  The Bernstein coefficients of the cubic Hermite polynomial of the slip velocity are
             # compared with their sum, which bounds the largest.  Without calls: these take a tenth of a step of ode23.
             location = model.event_location
-            continues = True
             for i in contact_indices:
-                start, end = modes[i] * y[slip_index[i]], modes[i] * y1[slip_index[i]]
-                early = start + modes[i] * h / 3.0 * f[slip_index[i]]
-                late = end - modes[i] * h / 3.0 * f1[slip_index[i]]
+                start, end, third = modes[i] * y[slip_index[i]], modes[i] * y1[slip_index[i]], modes[i] * h / 3.0
+                early, late = start + third * f[slip_index[i]], end - third * f1[slip_index[i]]
                 total = start + early + late + end
                 if total > location.largest_slip:
                     location.largest_slip = total
                 low = early if early < late else late
                 low = low if low < end else end
-                continues = (
-                    low >= event_location.INTERPOLANT_SHARE * total
-                    and low >= event_location.NEAR_ZERO_SHARE * location.largest_slip
-                )
-            if continues or not self.is_hybrid:
-                return OK
+                continues = low >= INTERPOLANT_SHARE * total and low >= NEAR_ZERO_SHARE * location.largest_slip
+                if continues or not self.is_hybrid:
+                    return OK
         if (model.has_dry_friction and self.is_hybrid) or model.has_conditions:
             end = event_location.locate_events(model, self)
             if self.interpolant.ready:  # the event search built the interpolant
