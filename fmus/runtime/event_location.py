@@ -34,7 +34,9 @@ REFINEMENT, SMALLEST_TOLERANCE = 1e-3, 1e-13  # factor of the tolerance where an
 WORTHWHILE_REFINEMENT = 0.3
 CONDITION_MARGIN, TINY = 4.0 * EPSILON, 1e-300  # margins of conditions: relative and absolute
 SHORTEST_DWELL, MAX_CHATTER = 1e-9, 100  # share of the largest step; number of such short times in succession
-FEATURE_RANGE, MIN_STEP_SHARE = 5.0, 0.6  # features limit the step within so many widths; tolerated excess of a step
+# Narrow features, in widths: slips at which they limit a step; where a step from outside is to end, and may end
+FEATURE_RANGE, APPROACH, NEAREST_APPROACH = 5.0, 4.5, 3.5
+MIN_STEP_SHARE = 0.6  # smallest share to which a step near a feature need not be shortened
 MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial
 SHORTEST_STEP = 1e-6  # share of the largest step; shorter steps are not shortened for an event function
 DIFFERENCE_STEP, FIRST_CHANGE = 1e-5, 0.3  # share of the largest step for differences; change in the first step
@@ -503,25 +505,41 @@ def conditions_changed(model):
 # ---- narrow features
 
 
-def step_share(model, step, t1, y1: StateVector):
-    """Return the share of a step to y1 in which no slip velocity passes more than the width of a feature."""
+def step_share(model, step, h, y1: StateVector, f1: RateVector):
+    """Return the share of a step to which it must be shortened, so that it passes no narrow feature; 1.0 if it fits.
+
+    A step that begins near the zero of a slip may change it by one width; other steps may only come near.  The cubic
+    Hermite polynomial of the step lies between its control points, so that a slip that turns within it is seen too.
+    """
     width = model.event_location.feature_width
-    slips0, slips1 = contact_vector(), contact_vector()
+    third = h / 3.0
+    y2 = step.y0 + third * step.f0
+    y3 = y1 - third * f1
+    slips0, slips1, slips2, slips3 = contact_vector(), contact_vector(), contact_vector(), contact_vector()
     if model.is_coupled:
         slips0 = model.slip_velocities(step.t0, step.y0)
-        slips1 = model.slip_velocities(t1, y1)
+        slips1 = model.slip_velocities(step.t0 + h, y1)
+        slips2 = model.slip_velocities(step.t0 + third, y2)
+        slips3 = model.slip_velocities(step.t0 + h - third, y3)
     else:
         for i in contact_indices:
             slips0[i], slips1[i] = step.y0[slip_index[i]], y1[slip_index[i]]
+            slips2[i], slips3[i] = y2[slip_index[i]], y3[slip_index[i]]
     share = 1.0
     for i in contact_indices:
         if step.modes0[i] != STUCK:
             start, end = step.modes0[i] * slips0[i], step.modes0[i] * slips1[i]
-            change, allowed = fabs(end - start), fabs(end - start)
+            early, late = step.modes0[i] * slips2[i], step.modes0[i] * slips3[i]
+            low, high = start, start
+            low = low if low < early else early
+            low = low if low < late else late
+            low = low if low < end else end
+            high = high if high > early else early
+            high = high if high > late else late
+            high = high if high > end else end
             if start < FEATURE_RANGE * width:
-                allowed = width
-            elif end < start:
-                allowed = start - (FEATURE_RANGE - 1.0) * width
-            if change * share > allowed:
-                share = allowed / change
+                if (high - low) * MIN_STEP_SHARE > width and (high - low) * share > width:
+                    share = width / (high - low)
+            elif low < NEAREST_APPROACH * width and (start - low) * share > start - APPROACH * width:
+                share = (start - APPROACH * width) / (start - low)
     return share

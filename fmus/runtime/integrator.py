@@ -145,8 +145,8 @@ class Integrator(VariableOwner):
         step.error_scale_floor = size
         nominal_velocity = model.nominal_velocity()
         if model.has_dry_friction:
-            model.event_location.feature_width = nominal_velocity
-        if self.atol == 0.0 and nominal_velocity < size:
+            model.event_location.feature_width = nominal_velocity if nominal_velocity > 0.0 else inf
+        if self.atol == 0.0 and nominal_velocity > 0.0 and nominal_velocity < size:
             for i in velocity_indices:
                 step.error_scale_floor[i] = nominal_velocity
         if model.is_linear:

@@ -10,7 +10,7 @@ from math import inf
 from . import event_location
 from .active_method import ActiveMethod
 from .codes import DIVERGED, EXACT, NEEDS_REPETITION, OK, STALLED, STUCK
-from .event_location import INTERPOLANT_SHARE, MIN_STEP_SHARE, NEAR_ZERO_SHARE
+from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
 from .interpolant import Interpolant
 from .linear_closed_form import HIGHER_ORDER_INPUT
 from .power_series import PowerSeries
@@ -294,7 +294,7 @@ class InternalStep:
         h_new = self.h_next if self.h_next < self.h_max else self.h_max
         if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
             y1 = y + h_new * f
-            h_new *= event_location.step_share(model, self, t + h_new, y1)
+            h_new *= event_location.step_share(model, self, h_new, y1, f)
         if h_new < h_min:
             h_new = h_min
         remaining = self.t_end - t
@@ -313,8 +313,8 @@ class InternalStep:
             share = 1.0
             if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
                 if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
-                    share = event_location.step_share(model, self, t + h, y1)
-                if not (model.has_dry_friction and model.has_nominal_velocity) or share >= MIN_STEP_SHARE or h <= h_min:
+                    share = event_location.step_share(model, self, h, y1, f1)
+                if not (model.has_dry_friction and model.has_nominal_velocity) or share == 1.0 or h <= h_min:
                     break
             self.n_rejected += 1
             attempts += 1
@@ -323,7 +323,7 @@ class InternalStep:
             shrink = method.safety * error**-method.power if 1.0 < error < inf and attempts == 1 else 0.5
             shrink_limit = method.shrink if attempts == 1 else 0.5
             h_new = h * (shrink if shrink > shrink_limit else shrink_limit)
-            if model.has_dry_friction and model.has_nominal_velocity and share < MIN_STEP_SHARE:
+            if model.has_dry_friction and model.has_nominal_velocity and share < 1.0:
                 h_new = h * share
             if h_new < h_min:
                 h_new = h_min
