@@ -73,7 +73,12 @@ def prepare_method(f: CodegenContext) -> str:
 def nominal_velocity_method(f: CodegenContext) -> list[str]:
     """Smallest speed that the tolerance must resolve."""
     wanted = [state.nominal_velocity for state in f.an.states if state.nominal_velocity is not None]
-    return [method_source("nominal_velocity", (), f.return_lines(f.printer(), wanted))] if wanted else []
+    if not wanted:
+        return []
+    smallest = wanted[0]
+    for one in wanted[1:]:
+        smallest = Term("choose", Term("<", smallest, one), smallest, one)
+    return [method_source("nominal_velocity", (), f.return_lines(f.printer(), [smallest]))]
 
 
 def driver_method(f: CodegenContext) -> list[str]:
