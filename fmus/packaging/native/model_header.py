@@ -153,7 +153,13 @@ def render_model_header(model: type[VariableOwner], fmi: str) -> str:
         count_of_members=len(members),
         members="".join(f"    {{offsetof(State, {path}), {c_literal(ctype is BOOL)}}},\n" for path, ctype in members),
         table="".join(
-            _variable_row(name, meaning, tangent_fields(declared), hasattr(instance, f"{name}_polynomial"))
+            _variable_row(
+                name,
+                meaning,
+                attribute_path(instance, name),
+                tangent_fields(declared),
+                hasattr(instance, f"{name}_polynomial"),
+            )
             for name, meaning in declared
         ),
         statuses=_switch_cases(statuses, FIELD_CODE) + _switch_cases(violated_rules, rule_fields),
@@ -175,7 +181,7 @@ def _items_array_name(name: str) -> str:
 
 
 def _variable_row(
-    name: str, meaning: VariableDeclaration, tangent_fields: dict[str, str], has_derivatives: bool
+    name: str, meaning: VariableDeclaration, path: str, tangent_fields: dict[str, str], has_derivatives: bool
 ) -> str:
     """Return the table row of a variable."""
     texts = (name, meaning.text, meaning.unit_suffix, meaning.allowed)
@@ -195,7 +201,7 @@ def _variable_row(
     )
     parts = [
         *map(c_string_literal, texts),
-        f"offsetof(Model, {attribute_path(name)})",
+        f"offsetof(Model, {path})",
         f"offsetof(struct Tangent, {tangent_fields[name]})" if name in tangent_fields else "NO_OFFSET",
         *map(c_literal, flags),
         ", ".join(
