@@ -46,7 +46,8 @@ class CodegenContext:
             if isinstance(e, Term) and e.name and not depends_on(e, (*an.time_varying, *an.inputs)):
                 result[id(e)] = e
             else:
-                for one in operands(e):
+                is_choose = isinstance(e, Term) and e.op == "choose"
+                for one in operands(e)[:1] if is_choose else operands(e):  # its cases may be undefined where unused
                     walk(one)
 
         for c in an.contacts:
