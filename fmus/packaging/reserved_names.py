@@ -45,6 +45,14 @@ C_NAMES = frozenset(
 }
 
 
+FMI_PREFIXES = ("fmi2", "fmi3", "FMI2_", "FMI3_")  # of functions, types and macros of the FMI headers
+
+
+def is_reserved_in_c(name: str) -> bool:
+    """Return whether a name is a keyword of C, a macro of its headers, or may be one of the FMI headers."""
+    return name in C_NAMES or name.startswith(FMI_PREFIXES)
+
+
 def string_literal(text: str) -> str:
     """Return a string literal of Python for printable text."""
     return dumps(text, ensure_ascii=False)

@@ -155,6 +155,11 @@ WRONG = {
         17,
         "the name M_E is reserved by the solver or by C",
     ),
+    "a constant of FMI": (
+        RATE + '    fmi2True = Parameter(1.0, "kg", "mass")\n',
+        17,
+        "the name fmi2True is reserved by the solver or by C",
+    ),
     "a function of ours": (
         RATE + '    sqrt = Parameter(1.0, "1", "ours")\n',
         17,
@@ -543,7 +548,7 @@ def test_a_file_holds_one_model(text, sentence, tmp_path):
         find_model(path).generated_source  # noqa: B018
 
 
-@pytest.mark.parametrize("name", ["Solver", "Integrator", "Größe"])
+@pytest.mark.parametrize("name", ["Solver", "Integrator", "Größe", "NULL", "fmi2True", "FMI3_Export"])
 def test_a_class_name_must_be_unique(name, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text((HEAD + RATE).replace("Mine", name))

@@ -12,7 +12,7 @@ from sys import float_info
 from typing import Any
 
 from ...runtime.active_method import EXACT_ITEM, METHOD_ITEMS
-from ..reserved_names import C_NAMES
+from ..reserved_names import is_reserved_in_c
 from .algebra import (
     build_term,
     count_occurrences,
@@ -49,7 +49,7 @@ class ModelAnalysis:
 
     def __init__(self, model: type[Model], ramps: bool = False) -> None:
         self.model, self.name = model, model.__name__
-        if self.name in RESERVED or not self.name.isascii():
+        if self.name in RESERVED or is_reserved_in_c(self.name) or not self.name.isascii():
             raise ModelError(
                 f"the class name {self.name} is reserved or not ASCII: choose another name", model.location
             )
@@ -170,7 +170,7 @@ class ModelAnalysis:
         return [e for e in self.declared if isinstance(e, kinds)]
 
     def _check_name(self, name: str, e: Expression, reserved: Collection[str] = RESERVED) -> None:
-        if name in reserved or name in C_NAMES or iskeyword(name) or name.startswith("_"):
+        if name in reserved or is_reserved_in_c(name) or iskeyword(name) or name.startswith("_"):
             raise ModelError(f"the name {name} is reserved by the solver or by C: choose another name", e.location)
         if not name.isascii():
             raise ModelError(f"the name {name} is not ASCII, as C requires: choose another name", e.location)
