@@ -72,7 +72,8 @@ def prepare_method(f: CodegenContext) -> str:
 
 def nominal_velocity_method(f: CodegenContext) -> list[str]:
     """Smallest speed that the tolerance must resolve."""
-    wanted = [state.nominal_velocity for state in f.an.states if state.nominal_velocity is not None]
+    states = (*f.an.states, *f.an.drivers)
+    wanted = [state.nominal_velocity for state in states if state.nominal_velocity is not None]
     if not wanted:
         return []
     smallest = wanted[0]
