@@ -1,7 +1,7 @@
 """Reference motions of a block on a belt whose friction has a narrow peak at zero slip, by scipy.
 
 The slip is integrated itself, in steps of a fraction of the width while it is small, so that no step passes the peak.
-Nothing here is shared with the code under test.
+While it is large, friction is constant, so that the last step may reach into the peak.  Nothing here is shared with the code under test.
 """
 
 from dataclasses import dataclass
@@ -66,7 +66,8 @@ def phase(block, mode, t, x, slip, stop):
     """Let the block slide up to the next standstill; return positions, end, position, slip and mode there."""
 
     def rates(_, y):
-        return y[1] + block.v_b, (-block.k * y[0] - mode * block.friction(y[1])) / block.m
+        force = block.friction(y[1]) if near else block.f_d
+        return y[1] + block.v_b, (-block.k * y[0] - mode * force) / block.m
 
     def passes(value, direction):
         def event(_, y):
