@@ -1,6 +1,9 @@
 """The results do not depend on the names of the variables of a model."""
 
+import re
+
 import pytest
+from build_cache import build_user_model
 from internal_steps import prepared_model, start
 from models import DOP853, LARGER_MODELS, RODAS
 
@@ -33,6 +36,8 @@ NAMES = {
     SLED: [("y", "v", "e", "modes"), ("x", "x1", "x0", "x_1")],
     BELT: [("h", "size", "end", "i"), ("OVERFLOW_LIMIT", "d_x", "to", "tie_tolerance")],
 }
+NATIVE = ("--native", "--platform", "linux64")
+INDICATORS = [f"events.{kind}_mode{n}" for kind in ("to_rest", "to_break_away") for n in (1, 2)]
 CHOSEN = '{}="stiffer {} times"', "{}={}.0"  # an item, and its case
 
 
@@ -94,3 +99,17 @@ def test_names_used_by_the_contact_solver_change_nothing(tmp_path):
         assert model.prepare() == 0
         rates.append([model.rates(0.3, 0.1, 0.2, -0.1, 0.1, *modes) for modes in ((0, 0), (0, 1), (1, 0), (1, -1))])
     assert rates[0] == rates[1]
+
+
+def test_event_indicators_of_a_native_fmu_do_not_depend_on_names(tmp_path, worker):
+    """Two blocks, one of whose positions is named like a step size of the numerics."""
+    (blocks,) = (path for path in LARGER_MODELS if path.stem == "blocks")
+    results = []
+    for name in "place", "h":
+        path = tmp_path / f"blocks_{name}.py"
+        path.write_text(re.sub(r"\bx1\b", name, blocks.read_text()))
+        fmu = worker.instantiate(build_user_model(path, *NATIVE) / "native" / f"{path.stem}.fmu").begin(stop=2.0)
+        results.append(fmu.run([0.01 * i for i in range(200)], [name, *INDICATORS]))
+        fmu.free()
+    assert results[0] == results[1]
+    assert len({value for row in results[0] for value in row[1:]}) > 10
