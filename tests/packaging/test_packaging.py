@@ -11,6 +11,7 @@ from io import BytesIO
 from math import pi
 from pathlib import Path, PurePosixPath
 from types import SimpleNamespace
+from typing import ClassVar
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
@@ -107,12 +108,13 @@ def test_validation_reports_no_problems(fmu, name):
 @EVERY_MODEL
 def test_the_xml_matches_the_declarations(fmu, name):
     scalars = description_of(fmu(name)).findall("ModelVariables/ScalarVariable")
-    for index, (scalar, (variable, meaning)) in enumerate(
-        zip(scalars, variables(find_model(name).model()), strict=True)
-    ):
+    declared = variables(find_model(name).model())
+    force = next((variable for variable, meaning in declared if meaning.role == "contact"), "")
+    for index, (scalar, (variable, meaning)) in enumerate(zip(scalars, declared, strict=True)):
         value = scalar[0]
+        text = f"mode of {force}: {meaning.text}" if variable == "mode" else meaning.text
         assert (scalar.get("name"), scalar.get("valueReference"), value.tag) == (variable, str(index), meaning.type)
-        assert (scalar.get("description"), scalar.get("causality")) == (meaning.text, meaning.causality)
+        assert (scalar.get("description"), scalar.get("causality")) == (text, meaning.causality)
         assert (scalar.get("variability"), scalar.get("initial", "")) == (meaning.variability, meaning.initial)
         assert value.get("unit", "") == meaning.unit
         assert (value.get("start") is None) == (meaning.initial == "calculated")
@@ -359,6 +361,7 @@ class Sketch(VariableOwner):
 
     stop_time, step_size, tolerance = 1.0, 0.1, 1e-6
     has_input_derivatives = False
+    contacts: ClassVar[dict[str, str]] = {}
 
 
 def sketch(**declared):
