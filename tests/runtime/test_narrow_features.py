@@ -27,7 +27,7 @@ class Narrow(Model):
     f_d = Parameter(2.0, "N", "sliding friction", low=0.0)
     f_s = Parameter(3.0, "N", "static friction", low=0.0)
 '''
-BLOCK = '''
+BLOCK = """
     v_b{0} = Parameter(0.0, "m/s", "speed of the belt")
     v_s{0} = Parameter(1e-3, "m/s", "width of the peak", above=0.0)
     x0{0} = Fixed(0.3, "m", "initial position")
@@ -40,7 +40,7 @@ BLOCK = '''
         "N", "friction", mode=mode{0}, slip=slip{0}, slide=f_d + (f_s - f_d) * exp(-ratio{0} * ratio{0}), hold=f_s
     )
     a{0} = Output("m/s2", "acceleration", (-k * x{0} - F{0}) / m, rate_of=v{0})
-'''
+"""
 WIDTH = ", nominal_velocity=v_s{}"
 OTHER = """
     g = Parameter(1e-3, "m/s2", "acceleration of a driver")

@@ -1,7 +1,8 @@
 """Reference motions of a block on a belt whose friction has a narrow peak at zero slip, by scipy.
 
 The slip is integrated itself, in steps of a fraction of the width while it is small, so that no step passes the peak.
-While it is large, friction is constant, so that the last step may reach into the peak.  Nothing here is shared with the code under test.
+While it is large, friction is constant, so that the last step may reach into the peak.  Nothing here is shared with the
+code under test.
 """
 
 from dataclasses import dataclass
