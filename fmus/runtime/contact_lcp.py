@@ -88,10 +88,10 @@ class CoupledFriction(DryFriction):
             status[i], new_modes[i] = SLIPPING, step.modes0[i]
             if new_modes[i] == STUCK:
                 status[i] = AT_LIMIT if ends[i] <= t else AT_REST
-            elif new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + SLIP_SCALE):
-                new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
             elif not (force[i] == 0.0 and limit[i] == 0.0):
-                if ends[i] <= t or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
+                if new_modes[i] * slips[i] < -REVERSED_SHARE * (terms[i] + SLIP_SCALE):
+                    new_modes[i] = sign(slips[i])  # it reversed without friction, which has returned
+                elif ends[i] <= t or new_modes[i] * slips[i] <= SIMULTANEITY_MARGIN * terms[i]:
                     depth = inf
                     if fabs(force[i]) >= EQUAL_SHARE * limit[i]:
                         depth = self.reversal_depth(t, y, step.modes0, limit[i], i)

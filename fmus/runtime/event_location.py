@@ -59,7 +59,7 @@ class EventLocation:
         self.cubic_errors = [0.0] * n  # differences from a cubic polynomial, as shares of the range in the step
         # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero
         self.start, self.early, self.late, self.end = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
-        self.peaks, self.times = [0.0] * n, [0.0] * n
+        self.peaks, self.times = [0.0] * n, [inf] * n
         self.largest_slip = 0.0  # bound on the slip velocity of a single contact since the last event
         # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0: now, before and after t1
         self.margins, self.margin_scales = [0.0] * n, [0.0] * n
@@ -102,6 +102,9 @@ def update_event_functions(model, t, y: StateVector, modes: ContactVector):
 def event_function(model, step, t, j):
     """Return the value of one event function inside the step."""
     y = step.state_at(model, t)
+    if model.has_dry_friction and not model.is_coupled and not model.has_conditions:
+        for i in contact_indices:
+            return step.modes0[i] * y[slip_index[i]]
     update_event_functions(model, t, y, step.modes0)
     return model.event_location.values[j]
 
@@ -119,14 +122,16 @@ def locate_events(model, step):
     """
     location = model.event_location
     location.in_doubt = location.must_shorten = False
-    for j in range(model.n_event_functions):
-        location.times[j] = inf
-    evaluate_on_cubic(model, step)
-    limit_step(model, step)
-    if location.must_shorten:
-        return inf
+    n = 1  # a single contact without conditions has one function, which the caller has evaluated
+    if model.is_coupled or model.has_conditions:
+        n = model.n_event_functions
+        evaluate_on_cubic(model, step)
+        limit_step(model, step)
+        if location.must_shorten:
+            return inf
     first = inf
-    for j in range(model.n_event_functions):
+    for j in range(n):
+        location.times[j] = inf
         found = examine_cubic(location, step, j)
         if found == ONE_ZERO:
             location.times[j] = find_root(model, step, step.t0, step.t1, location.start[j], location.end[j], j)
@@ -148,8 +153,6 @@ def evaluate_on_cubic(model, step):
     update_event_functions(model, t0, step.y0, step.modes0)
     for j in range(model.n_event_functions):
         location.start[j] = location.values[j]
-        if location.peaks[j] < location.largest_slip < inf:
-            location.peaks[j] = location.largest_slip
         if location.scales[j] > location.peaks[j]:
             location.peaks[j] = location.scales[j]
     y4 = 0.648 * step.y0 + 0.352 * step.y1 + h * (0.144 * step.f0 - 0.096 * step.f1)
@@ -374,8 +377,9 @@ def begin_phase(model, step):
     restore_tolerance(model, step)
     location.in_doubt = location.must_repeat = False
     location.largest_slip = 0.0
-    for j in range(model.n_event_functions):
-        location.peaks[j] = 0.0
+    if model.is_coupled or model.has_conditions:
+        for j in range(model.n_event_functions):
+            location.peaks[j] = 0.0
 
 
 def restore_tolerance(model, step):

@@ -350,6 +350,9 @@ class InternalStep:
                 continues = low >= INTERPOLANT_SHARE * total and low >= NEAR_ZERO_SHARE * location.largest_slip
                 if continues or not self.is_hybrid:
                     return OK
+                location.start[i], location.early[i], location.late[i], location.end[i] = start, early, late, end
+                if location.largest_slip < inf:
+                    location.peaks[i] = location.largest_slip
         if (model.has_dry_friction and self.is_hybrid) or model.has_conditions:
             end = event_location.locate_events(model, self)
             if self.interpolant.ready:  # the event search built the interpolant

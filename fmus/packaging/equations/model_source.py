@@ -154,7 +154,7 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
             ("has_input_derivatives", an.ramps),
             ("has_conditions", an.conditions),
             ("has_narrow_friction", an.has_narrow_friction),
-            ("has_nominal_velocity", any(s.nominal_velocity is not None for s in an.states)),
+            ("has_nominal_velocity", any(s.nominal_velocity is not None for s in (*an.states, *an.drivers))),
             ("has_variable_levers", not an.waits and an.variable_lever_contacts),
         )
         if holds
