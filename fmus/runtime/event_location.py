@@ -26,7 +26,7 @@ DEGREE = 8  # of the polynomial through an event function; interpolants have deg
 QUARTER_TURN = 1.5707963267948966
 # The interpolant adds less than this share of the range of the cubic Hermite polynomial, except in a search
 INTERPOLANT_SHARE = 1.0 / 12.0
-NEAR_ZERO_SHARE = 0.01  # of the largest value since the last event; larger event functions are in no doubt
+NEAR_ZERO_SHARE = 0.002  # of the largest value since the last event; larger event functions are in no doubt
 MAX_SEARCH_STEPS, MAX_BISECTIONS = 1000, 200
 START_OF_SLIP = 1e-3  # share of a step after which a slip that starts at zero is larger than its rounding error
 ERROR_FACTOR = 100.0  # bound on the error of an event function, in multiples of the tolerance and of its scale
