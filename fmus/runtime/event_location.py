@@ -33,7 +33,8 @@ ERROR_FACTOR = 100.0  # bound on the error of an event function, in multiples of
 REFINEMENT, SMALLEST_TOLERANCE = 1e-3, 1e-13  # factor of the tolerance where an event is in doubt; lower limit
 WORTHWHILE_REFINEMENT = 0.3
 CONDITION_MARGIN, TINY = 4.0 * EPSILON, 1e-300  # margins of conditions: relative and absolute
-SHORTEST_DWELL, MAX_CHATTER = 1e-9, 100  # share of the largest step; number of such short times in succession
+# share of the largest step; number of such short times in succession, below the limit of steps that stall
+SHORTEST_DWELL, MAX_CHATTER = 1e-9, 50
 # Narrow features, in widths: slips at which they limit a step; where a step from outside is to end, and may end
 FEATURE_RANGE, APPROACH, NEAREST_APPROACH = 5.0, 4.5, 3.5
 MIN_STEP_SHARE = 0.6  # smallest share to which a step near a feature need not be shortened
@@ -456,6 +457,13 @@ def check_limits(model, t, y: StateVector, modes: ContactVector):
         if location.violated < 0 and location.margins[k] + CONDITION_MARGIN * location.margin_scales[k] + TINY <= 0.0:
             location.violated = k
             model.violation_time, model.violation_value = t, location.margins[k]
+
+
+def start_conditions(model, t, y: StateVector, modes: ContactVector):
+    """Determine the conditions where a run starts or restarts with changed values."""
+    model.event_location.t_condition = -inf  # changes that were computed beyond t have not occurred
+    update_sides(model, t, y, modes)
+    begin_step(model)
 
 
 def begin_step(model):

@@ -117,8 +117,7 @@ class InternalStep:
             roundoff.t1 = roundoff.x1 = 0.0
         self.t1, self.y1 = t, y
         if model.has_conditions:
-            event_location.update_sides(model, t, self.y1, modes)
-            event_location.begin_step(model)
+            event_location.start_conditions(model, t, self.y1, modes)
         if model.has_dry_friction:
             self.update_end_modes(model, modes, tie_tolerance)
         if model.has_conditions:
