@@ -27,7 +27,7 @@ QUARTER_TURN = 1.5707963267948966
 # The interpolant adds less than this share of the range of the cubic Hermite polynomial, except in a search
 INTERPOLANT_SHARE = 1.0 / 12.0
 NEAR_ZERO_SHARE = 0.002  # of the largest value since the last event; larger event functions are in no doubt
-MAX_SEARCH_STEPS, MAX_BISECTIONS = 1000, 200
+MAX_SEARCH_STEPS, MAX_SECANTS, MAX_BISECTIONS = 1000, 200, 200
 START_OF_SLIP = 1e-3  # share of a step after which a slip that starts at zero is larger than its rounding error
 ERROR_FACTOR = 100.0  # bound on the error of an event function, in multiples of the tolerance and of its scale
 REFINEMENT, SMALLEST_TOLERANCE = 1e-3, 1e-13  # factor of the tolerance where an event is in doubt; lower limit
@@ -335,17 +335,17 @@ def fit_polynomial(model, step, j):
 
 
 def find_root(model, step, low, high, g_low, g_high, j):
-    """Return the first time at which an event function is not positive, by the Illinois method.
+    """Return the first time at which an event function is not positive, by the Illinois method, then by bisection.
 
     The function has the value `g_low` > 0 at time `low` and `g_high` <= 0 at time `high`.
     """
     kept_end = 0  # end of the bracket that the last iteration kept: 1 high, -1 low
     evaluations = 0
-    for _ in range(MAX_BISECTIONS):
+    for k in range(MAX_SECANTS + MAX_BISECTIONS):
         middle = 0.5 * (low + high)
         if not low < middle < high:
             break
-        if g_low > 0.0 and g_high < 0.0:
+        if k < MAX_SECANTS and g_low > 0.0 and g_high < 0.0:
             secant = low + (high - low) * (g_low / (g_low - g_high))
             if low < secant < high:
                 middle = secant
