@@ -10,9 +10,12 @@ METHOD_ITEMS = tuple((label, file.NUMBER, file.TEXT) for label, file, _ in metho
 
 
 class ActiveMethod:
-    """Method of a run, with the parameters of its step-size control."""
+    """Method of a run, with the parameters of its step-size control and the scale floor of its error norm."""
+
+    error_scale_floor: StateVector
 
     def __init__(self):
+        self.error_scale_floor = 0.0
         self.exact = LinearClosedForm()
         for label, _, Method in methods:
             setattr(self, label, Method())

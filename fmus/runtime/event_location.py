@@ -12,6 +12,7 @@ computed again with a tighter tolerance.
 from math import fabs, inf, sin, sqrt
 
 from .codes import CHATTERING, FIRST_RULE, OK, STUCK
+from .power_series import PowerSeries
 from .rounding import EPSILON, ROUNDOFF_MARGIN
 from .vectors import (
     ContactVector,
@@ -61,7 +62,6 @@ class EventLocation:
         # Bernstein coefficients of the cubic Hermite polynomial; largest scale since the last event; first zero
         self.start, self.early, self.late, self.end = [0.0] * n, [0.0] * n, [0.0] * n, [0.0] * n
         self.peaks, self.times = [0.0] * n, [inf] * n
-        self.largest_slip = 0.0  # bound on the slip velocity of a single contact since the last event
         # conditions: left minus right side, sum of absolute terms; 1.0 if true else -1.0: now, before and after t1
         self.margins, self.margin_scales = [0.0] * n, [0.0] * n
         self.sides, self.sides_before, self.sides_after = [1.0] * n, [1.0] * n, [1.0] * n
@@ -79,6 +79,7 @@ class EventLocation:
         self.tolerance_factor, self.tolerance = 1.0, 0.0  # now; tolerance of the run, if the factor is less
         self.t_doubt = 0.0  # end of the step that was in doubt
         self.in_doubt = self.must_repeat = self.must_shorten = False
+        self.load_series = PowerSeries()  # of a load, for inputs of higher order
         self.feature_width = inf  # slip velocity below which friction varies
 
 
@@ -377,7 +378,7 @@ def begin_phase(model, step):
     location.phase_h = step.h_next
     restore_tolerance(model, step)
     location.in_doubt = location.must_repeat = False
-    location.largest_slip = 0.0
+    step.largest_slip = 0.0
     if model.is_coupled or model.has_conditions:
         for j in range(model.n_event_functions):
             location.peaks[j] = 0.0
@@ -400,7 +401,7 @@ def decide_repetition(model, step):
             location.tolerance_factor, location.must_repeat, location.t_doubt = factor, True, step.t1
             location.tolerance = step.tolerance
             step.tolerance *= factor
-            location.largest_slip = inf  # every step is examined
+            step.largest_slip = inf  # every step is examined
 
 
 def repeat_phase(model, step):

@@ -142,13 +142,13 @@ class Integrator(VariableOwner):
         step = self.step
         size = self.atol / step.tolerance if self.atol > 0.0 else DEFAULT_NOMINAL
         size = size if size > 1e-300 else 1e-300  # is a divisor, so not zero
-        step.error_scale_floor = size
+        step.active_method.error_scale_floor = size
         nominal_velocity = model.nominal_velocity()
         if model.has_dry_friction:
             model.event_location.feature_width = nominal_velocity if nominal_velocity > 0.0 else inf
         if self.atol == 0.0 and nominal_velocity > 0.0 and nominal_velocity < size:
             for i in velocity_indices:
-                step.error_scale_floor[i] = nominal_velocity
+                step.active_method.error_scale_floor[i] = nominal_velocity
         if model.is_linear:
             mass, damping, stiffness, drift = model.linear_coefficients()
             step.active_method.exact.prepare(mass, damping, stiffness, drift)

@@ -13,7 +13,6 @@ from .codes import DIVERGED, EXACT, NEEDS_REPETITION, OK, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
 from .interpolant import Interpolant
 from .linear_closed_form import HIGHER_ORDER_INPUT
-from .power_series import PowerSeries
 from .rounding import EPSILON, ROUNDOFF_MARGIN
 from .stick_slip import NO_CONSISTENT_MODES
 from .vectors import (
@@ -75,12 +74,10 @@ class InternalStep:
     longer.
     """
 
-    error_scale_floor: StateVector
-
     def __init__(self):
         self.active_method = ActiveMethod()
-        # run: relative tolerance, largest step, scale floor of the error norm; stop time (inf if unknown); hybrid law
-        self.tolerance = self.h_max = self.error_scale_floor = 0.0
+        # run: relative tolerance, largest step; stop time (inf if unknown); hybrid law
+        self.tolerance = self.h_max = 0.0
         self.t_end = inf
         self.is_hybrid = False
         # step: start, end, modes inside and after it
@@ -93,7 +90,7 @@ class InternalStep:
         # step size before an event shortened the step; interpolant
         self.h_full = 0.0
         self.interpolant = Interpolant()
-        self.load_series = PowerSeries()  # of a load, for inputs of higher order
+        self.largest_slip = 0.0  # bound on the slip velocity of a single contact since the last event
         # counters up to t1 and the step size to try next; the same at t0
         self.n_accepted = self.n_rejected = self.n_rhs = 0
         self.h_next = 0.0
@@ -300,9 +297,9 @@ class InternalStep:
         last = 1.1 * h_new >= remaining
         h = remaining if last else h_new
         scale = magnitude(y)
-        scale = elementwise_max(self.error_scale_floor, scale)
-        attempts = 0
         method = self.active_method
+        scale = elementwise_max(method.error_scale_floor, scale)
+        attempts = 0
         while True:
             y1, f1, e = method.propose(model, modes, t, y, f, h)
             self.n_rhs += method.stages
@@ -337,21 +334,21 @@ class InternalStep:
         if model.has_dry_friction and not model.is_coupled and not model.has_conditions:
             # Most steps end here.  The Bernstein coefficients of the cubic Hermite polynomial of the slip velocity are
             # compared with their sum, which bounds the largest.  Without calls: these take a tenth of a step of ode23.
-            location = model.event_location
             for i in contact_indices:
                 start, end, third = modes[i] * y[slip_index[i]], modes[i] * y1[slip_index[i]], modes[i] * h / 3.0
                 early, late = start + third * f[slip_index[i]], end - third * f1[slip_index[i]]
                 total = start + early + late + end
-                if total > location.largest_slip:
-                    location.largest_slip = total
+                if total > self.largest_slip:
+                    self.largest_slip = total
                 low = early if early < late else late
                 low = low if low < end else end
-                continues = low >= INTERPOLANT_SHARE * total and low >= NEAR_ZERO_SHARE * location.largest_slip
+                continues = low >= INTERPOLANT_SHARE * total and low >= NEAR_ZERO_SHARE * self.largest_slip
                 if continues or not self.is_hybrid:
                     return OK
+                location = model.event_location
                 location.start[i], location.early[i], location.late[i], location.end[i] = start, early, late, end
-                if location.largest_slip < inf:
-                    location.peaks[i] = location.largest_slip
+                if self.largest_slip < inf:
+                    location.peaks[i] = self.largest_slip
         if (model.has_dry_friction and self.is_hybrid) or model.has_conditions:
             end = event_location.locate_events(model, self)
             if self.interpolant.ready:  # the event search built the interpolant
@@ -384,7 +381,7 @@ class InternalStep:
         y2, f2, e = method.propose(model, self.modes0, self.t0, self.y0, self.f0, h)  # noqa: RUF059  named like y2
         self.n_rhs += method.stages
         scale = magnitude(self.y0)
-        scale = elementwise_max(self.error_scale_floor, scale)
+        scale = elementwise_max(method.error_scale_floor, scale)
         size2 = magnitude(y2)
         scale = elementwise_max(size2, scale)
         e = magnitude(e) / scale
@@ -480,7 +477,7 @@ class InternalStep:
     def initial_step_size(self):
         """Estimate the first step h from the slopes at t1."""
         size1 = magnitude(self.y1)
-        relative_rate = magnitude(self.f1) / elementwise_max(size1, self.error_scale_floor)
+        relative_rate = magnitude(self.f1) / elementwise_max(size1, self.active_method.error_scale_floor)
         rate = max_of(relative_rate)
         h = self.active_method.safety * self.tolerance**self.active_method.power
         return h / rate if h < rate * self.h_max else self.h_max

@@ -167,7 +167,7 @@ class DryFriction(Oscillator):
 
     def breakaway_time_by_series(self, t, y: StateVector, load, rate, limit, i: ContactIndex):
         """Return the same for inputs of higher order; direction 0 if the search must continue from that time."""
-        series = self.solver.step.load_series
+        series = self.event_location.load_series
         duration = scale = self.solver.step.h_max
         series.c[1] = rate * duration
         for n in range(2, MAX_INPUT_ORDER + 1):

@@ -164,7 +164,7 @@ def test_nominal_values_are_the_error_scales_of_the_own_solver(fmu, name):
     model.prepare()
     model.solver.start(model, 0.0, *model.initial_state(0.0), inf, model.tolerance)
     step = model.solver.step
-    position, speed = (getattr(step, f"error_scale_floor_{state}") for state in model.states)
+    position, speed = (getattr(step.active_method, f"error_scale_floor_{state}") for state in model.states)
     sizes = [position, speed, position][: len(nominals)]
     rates = [unknown.variable for unknown in read_model_description(fmu(name)).derivatives]
     assert nominals == sizes == [float(rate.derivative.nominal) for rate in rates]
