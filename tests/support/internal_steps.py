@@ -6,6 +6,7 @@ import numpy as np
 from array_model import to_array_model
 
 from fmus.runtime import vectors
+from fmus.runtime.codes import NEEDS_REPETITION
 
 COUNTS = ("n_accepted", "n_rejected", "n_rhs")
 
@@ -61,6 +62,12 @@ def array_steps(model, values, stop, most):
         return list(steps(model, row, stop, most))
 
 
+def compute_step(model):
+    """Compute the next internal step of a model, as the integrator does. Returns a status."""
+    status = model.solver.step.compute_next(model)
+    return model.solver.step.repeat_steps(model) if status == NEEDS_REPETITION else status
+
+
 def counts(step):
     return [*(getattr(step, name, 0) for name in COUNTS), getattr(step.interpolant, "n_event_evals", 0)]
 
@@ -68,6 +75,6 @@ def counts(step):
 def steps(model, row, stop, most):
     step = model.solver.step
     while step.t1 < stop and most:
-        assert step.compute_next(model) == 0
+        assert compute_step(model) == 0
         yield bits(row(step))
         most -= 1
