@@ -200,7 +200,7 @@ def limit_step(model, step):
     if largest > MAX_CUBIC_ERROR and step.t1 - step.t0 > SHORTEST_STEP * step.h_max:
         location.must_shorten = True
     elif largest > 0.0:
-        h = 0.8 * step.h_full * (MAX_CUBIC_ERROR / largest) ** 0.25
+        h = 0.8 * step.h_full * sqrt(sqrt(MAX_CUBIC_ERROR / largest))  # the error grows with h^4
         step.h_next = h if h < step.h_next else step.h_next
 
 
