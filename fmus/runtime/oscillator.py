@@ -39,7 +39,7 @@ class Oscillator(VariableOwner):
     is_coupled = False  # a contact may stick while something moves (contact_lcp.py)
     has_variable_levers = False  # the lever of a contact force changes with the motion, and may vanish
     has_nominal_velocity = False  # nominal_velocity() is defined
-    has_narrow_friction = False  # friction varies within a small range of slip velocities, as a Stribeck curve does
+    checks_event_steps = False  # steps to events are checked: see InternalStep.is_accurate_at
     has_driver = False  # the driver is at x_base at time t_base and moves at driver_velocity()
     has_input_derivatives = False  # inputs are polynomials around t_base; has_higher_order() if any order exceeds 1
     is_linear = False  # piecewise linear (linear_closed_form.py)

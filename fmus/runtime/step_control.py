@@ -357,7 +357,7 @@ class InternalStep:
             if model.event_location.must_shorten or model.event_location.must_repeat:
                 return NEEDS_REPETITION
             if end <= self.t1:
-                if model.has_narrow_friction and not self.is_accurate_at(model, end):
+                if model.checks_event_steps and not self.is_accurate_at(model, end):
                     model.event_location.must_shorten = True
                     return NEEDS_REPETITION
                 return self.end_at(model, end)
@@ -370,8 +370,8 @@ class InternalStep:
     def is_accurate_at(self, model, end):
         """Return whether a step to an event agrees with the interpolated state there.
 
-        Friction that varies within a small range of slip velocities may lie between the stages of a long step, whose
-        error estimate does not see it.  A step that ends at zero slip does.
+        Friction that varies within a small range of slip velocities, or a condition that changes, may lie between the
+        stages of a long step, whose error estimate does not see it.  A step that ends at the event does.
         """
         method = self.active_method
         h = end - self.t0

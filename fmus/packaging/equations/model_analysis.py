@@ -36,7 +36,7 @@ from .expressions import Expression, ModelError, Operand, Term, describe, is_com
 from .generated_names import RESERVED, RESERVED_WHERE_COUPLED
 from .model_declaration import Choice, Contact, Fixed, Input, Mode, Model, Output, Parameter, Rule, State, Variable
 
-NARROW_FUNCTIONS = ("exp", "tanh", "atan", "sinh", "cosh", "/")
+STEEP_FUNCTIONS = ("exp", "tanh", "atan", "sinh", "cosh", "/")
 LARGEST_FLOAT = float_info.max
 SMALLEST_DIVISOR = 1e-100  # in place of an inverse mass that vanishes; its square is not zero
 METHODS = [label for label, _, _ in (EXACT_ITEM, *METHOD_ITEMS)]
@@ -153,13 +153,14 @@ class ModelAnalysis:
         return result
 
     @property
-    def has_narrow_friction(self) -> bool:
-        """Whether a friction force depends on states by functions that may vary within a small range."""
-        return any(
-            isinstance(e, Term) and e.op in NARROW_FUNCTIONS and depends_on(e.args[-1], self.states)
+    def checks_event_steps(self) -> bool:
+        """Whether a long step may miss how forces vary: by steep friction laws, or conditions inside of it."""
+        steep_laws = any(
+            isinstance(e, Term) and e.op in STEEP_FUNCTIONS and depends_on(e.args[-1], self.states)
             for c in self.contacts
             for e in subexpressions(c.slide).values()
         )
+        return steep_laws or not all(condition.is_frozen for condition in self.switches)
 
     @property
     def conditions(self) -> list[Condition]:

@@ -153,7 +153,7 @@ def class_attribute_lines(an: ModelAnalysis) -> list[str]:
             ("has_driver", an.drivers),
             ("has_input_derivatives", an.ramps),
             ("has_conditions", an.conditions),
-            ("has_narrow_friction", an.has_narrow_friction),
+            ("checks_event_steps", an.checks_event_steps),
             ("has_nominal_velocity", any(s.nominal_velocity is not None for s in (*an.states, *an.drivers))),
             ("has_variable_levers", not an.waits and an.variable_lever_contacts),
         )

@@ -49,7 +49,7 @@ def model_layout(source: ModelFile, features: FeatureSelection, name_format: str
         flag: getattr(model, flag)
         for flag in (
             *("has_dry_friction", "rests_when_stuck", "is_coupled", "has_variable_levers"),
-            *("has_driver", "has_input_derivatives", "has_conditions", "has_narrow_friction"),
+            *("has_driver", "has_input_derivatives", "has_conditions", "checks_event_steps"),
             "has_nominal_velocity",
         )
     }
