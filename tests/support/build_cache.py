@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 from fcntl import LOCK_EX, flock
+from hashlib import sha256
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -41,7 +42,8 @@ def build_user_model(path, *words):
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout.startswith(f"{path.stem}.fmu ")
 
-    return cached_folder("-".join((path.stem, *words)), make)
+    digest = sha256(path.read_bytes()).hexdigest()[:12]  # tests may have different models of one name
+    return cached_folder("-".join((path.stem, digest, *words)), make)
 
 
 def run_published_cases():
