@@ -1,14 +1,16 @@
 """State and helpers shared by the generators of model methods."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from .algebra import depends_on, operands, subexpressions, substitute
+from .conditions import LIMITED_DOMAIN
 from .expression_printer import INDENT, ExpressionPrinter
 from .expressions import Expression, Operand, Term
 from .model_analysis import TIME, ModelAnalysis
 from .model_declaration import Contact
 
 MAX_RETURN_LENGTH = 100  # characters
+OVERFLOWING = ("exp", "sinh", "cosh")  # functions that raise an error for large arguments
 
 
 class CodegenContext:
@@ -39,22 +41,35 @@ class CodegenContext:
         self.constants = self._constants()
 
     def _constants(self) -> list[Term]:
-        """Return named expressions of parameters that the equations need; prepare() computes them."""
-        an, result = self.an, {}
+        """Return named expressions of parameters that the equations need; prepare() computes them.
 
-        def walk(e: Operand) -> None:
+        Those in cases of choose() may be undefined where the case is not used; they are computed if they cannot fail.
+        """
+        an, result = self.an, {}
+        case_roots: list[Operand] = []
+        safe_divisors: set[int] = set()  # other equations divide by them
+
+        def walk(e: Operand, in_case: bool) -> None:
             if isinstance(e, Term) and e.name and not depends_on(e, (*an.time_varying, *an.inputs)):
-                result[id(e)] = e
-            else:
-                is_choose = isinstance(e, Term) and e.op == "choose"
-                for one in operands(e)[:1] if is_choose else operands(e):  # its cases may be undefined where unused
-                    walk(one)
+                if not in_case or not can_fail(e, safe_divisors):
+                    result[id(e)] = e
+                    return
+            if isinstance(e, Term) and e.op == "choose" and not in_case:
+                case_roots.extend(e.args[1:])
+                walk(e.args[0], in_case)
+                return
+            if isinstance(e, Term) and e.op == "/" and not in_case:
+                safe_divisors.add(id(e.args[1]))
+            for one in operands(e):
+                walk(one, in_case)
 
         for c in an.contacts:
             for e in (c.slide, an.holding_limit[c], c.eps, *(an.A[c, d] for d in an.contacts if not an.waits)):
-                walk(e)
+                walk(e, in_case=False)
         for e in an.outputs:
-            walk(e)
+            walk(e, in_case=False)
+        for e in case_roots:
+            walk(e, in_case=True)
         return list(result.values())
 
     def printer(self, depth: int = 2) -> ExpressionPrinter:
@@ -147,6 +162,15 @@ def is_magnitude_of(e: Operand, drive: Expression) -> bool:
 def method_source(name: str, arguments: Sequence[str], lines: list[str]) -> str:
     """Return the source of a method."""
     return "\n".join([f"{INDENT}def {name}({', '.join(('self', *arguments))}):", *lines])
+
+
+def can_fail(e: Operand, safe_divisors: Collection[int]) -> bool:
+    """Return whether an operation in the expression may raise an error for some values of the parameters."""
+    return any(
+        isinstance(one, Term)
+        and (one.op in OVERFLOWING or (one.op in LIMITED_DOMAIN and id(one.args[-1]) not in safe_divisors))
+        for one in subexpressions(e).values()
+    )
 
 
 def find_choice_test(e: Operand) -> Term | None:
