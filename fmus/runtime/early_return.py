@@ -4,7 +4,7 @@ No internal step passes an event.  An event may be deferred until the importer h
 those before the event.
 """
 
-from . import call_sequence, event_location
+from . import call_sequence, conditions
 from .codes import BAD_STEP, NEEDS_REPETITION, OK, TOO_MANY_STEPS
 from .integrator import MAX_EVALUATIONS, MAX_STEPS
 
@@ -51,14 +51,12 @@ def next_internal_step(run, model, defer_events):
     if model.has_dry_friction:
         exchange.event_reached = step.event_at_end and solver.t >= step.t1
     if model.has_conditions:
-        exchange.event_reached = exchange.event_reached or (
-            solver.t >= step.t1 and event_location.conditions_changed(model)
-        )
+        exchange.event_reached = exchange.event_reached or (solver.t >= step.t1 and conditions.have_changed(model))
     if defer_events and exchange.event_reached:
         if model.has_dry_friction:
             solver.modes = step.modes0
         if model.has_conditions:
-            event_location.select_sides(model, False)
+            conditions.select_sides(model, False)
     return status
 
 

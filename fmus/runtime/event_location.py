@@ -6,42 +6,24 @@ and one for each condition of the equations.  An event function that falls to ze
 located as well: the step is searched along a polynomial whose curvature is bounded, not by samples.
 
 Where the error of the method could decide whether an event function reaches zero, the motion since the last event is
-computed again with a tighter tolerance.
+computed again with a tighter tolerance (phase_repetition.py).
 """
 
-from math import fabs, inf, sin, sqrt
+from math import fabs, inf, pi, sin, sqrt
 
-from .codes import CHATTERING, FIRST_RULE, OK, STUCK
+from .conditions import CONDITION_MARGIN, TINY
+from .extrema import largest_of, smallest_of
 from .power_series import PowerSeries
-from .rounding import EPSILON, ROUNDOFF_MARGIN
-from .vectors import (
-    ContactVector,
-    RateVector,
-    StateVector,
-    contact_indices,
-    contact_vector,
-    slip_index,
-)
+from .rounding import ROUNDOFF_MARGIN
+from .vectors import ContactVector, RateVector, StateVector, contact_indices, slip_index
 
 DEGREE = 8  # of the polynomial through an event function; interpolants have degree 7 at most
-QUARTER_TURN = 1.5707963267948966
 # The interpolant adds less than this share of the range of the cubic Hermite polynomial, except in a search
 INTERPOLANT_SHARE = 1.0 / 12.0
 NEAR_ZERO_SHARE = 0.002  # of the largest value since the last event; larger event functions are in no doubt
 MAX_SEARCH_STEPS, MAX_SECANTS, MAX_BISECTIONS = 1000, 200, 200
 START_OF_SLIP = 1e-3  # share of a step after which a slip that starts at zero is larger than its rounding error
 ERROR_FACTOR = 100.0  # bound on the error of an event function, in multiples of the tolerance and of its scale
-REFINEMENT, SMALLEST_TOLERANCE = 1e-3, 1e-13  # factor of the tolerance where an event is in doubt; lower limit
-WORTHWHILE_REFINEMENT = 0.3
-CONDITION_MARGIN, TINY = 4.0 * EPSILON, 1e-300  # margins of conditions: relative and absolute
-# share of the largest step; number of such short times in succession, below the limit of steps that stall
-SHORTEST_DWELL, MAX_CHATTER = 1e-9, 50
-# Narrow features, in widths: slips at which they limit a step; where a step from outside is to end, and may end
-FEATURE_RANGE, APPROACH, NEAREST_APPROACH = 5.0, 4.5, 3.5
-MIN_STEP_SHARE = 0.6  # smallest share to which a step near a feature need not be shortened
-MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial
-SHORTEST_STEP = 1e-6  # share of the largest step; shorter steps are not shortened for an event function
-DIFFERENCE_STEP, FIRST_CHANGE = 1e-5, 0.3  # share of the largest step for differences; change in the first step
 NO_ZERO, ONE_ZERO, UNKNOWN = 0, 1, 2  # what the cubic polynomial shows
 
 
@@ -72,7 +54,7 @@ class EventLocation:
         # nodes (fractions of a step) of the polynomial through an event function, and its coefficients
         self.nodes, self.samples, self.polynomial = [0.0] * (DEGREE + 1), [0.0] * (DEGREE + 1), [0.0] * (DEGREE + 1)
         for k in range(DEGREE + 1):
-            root = sin(QUARTER_TURN * k / DEGREE)
+            root = sin(0.5 * pi * k / DEGREE)
             self.nodes[k] = root * root
         # start of the motion since the last event; factor of the tolerance since then
         self.phase_t = self.phase_y = self.phase_f = self.phase_h = 0.0
@@ -115,7 +97,7 @@ def event_function(model, step, t, j):
 
 
 def locate_events(model, step):
-    """Search the step just computed for the first zero of each event function.
+    """Search the step just computed for the first zero of each event function, given its Bernstein coefficients.
 
     Returns
     -------
@@ -123,14 +105,9 @@ def locate_events(model, step):
         Time of the first event; inf if there is none.
     """
     location = model.event_location
-    location.in_doubt = location.must_shorten = False
-    n = 1  # a single contact without conditions has one function, which the caller has evaluated
-    if model.is_coupled or model.has_conditions:
-        n = model.n_event_functions
-        evaluate_on_cubic(model, step)
-        limit_step(model, step)
-        if location.must_shorten:
-            return inf
+    location.in_doubt = False
+    # a single contact without conditions has one function
+    n = model.n_event_functions if model.is_coupled or model.has_conditions else 1
     first = inf
     for j in range(n):
         location.times[j] = inf
@@ -173,69 +150,12 @@ def evaluate_on_cubic(model, step):
         location.end[j] = end
         location.early[j] = (18.0 * third - 5.0 * start - 9.0 * two_thirds + 2.0 * end) / 6.0
         location.late[j] = (18.0 * two_thirds - 5.0 * end - 9.0 * third + 2.0 * start) / 6.0
-        low = start if start < end else end
-        low = third if third < low else low
-        low = two_thirds if two_thirds < low else low
-        high = start if start > end else end
-        high = third if third > high else high
-        high = two_thirds if two_thirds > high else high
+        value_range = largest_of(start, third, two_thirds, end) - smallest_of(start, third, two_thirds, end)
         cubic = 0.216 * start + 0.432 * location.early[j] + 0.288 * location.late[j] + 0.064 * end
         excess = fabs(location.near_middle[j] - cubic) - ROUNDOFF_MARGIN * location.peaks[j]
-        location.cubic_errors[j] = excess / (high - low) if excess > 0.0 and high > low else 0.0
+        location.cubic_errors[j] = excess / value_range if excess > 0.0 and value_range > 0.0 else 0.0
         if location.scales[j] > location.peaks[j]:
             location.peaks[j] = location.scales[j]
-
-
-def limit_step(model, step):
-    """Limit the step so that every event function resembles a cubic polynomial.
-
-    The error control of the method does not see event functions that vary without the states, as a load that
-    follows a clock while nothing moves.
-    """
-    location = model.event_location
-    largest = 0.0
-    for j in range(model.n_event_functions):
-        error = location.cubic_errors[j]
-        largest = error if error > largest else largest
-    if largest > MAX_CUBIC_ERROR and step.t1 - step.t0 > SHORTEST_STEP * step.h_max:
-        location.must_shorten = True
-    elif largest > 0.0:
-        h = 0.8 * step.h_full * sqrt(sqrt(MAX_CUBIC_ERROR / largest))  # the error grows with h^4
-        step.h_next = h if h < step.h_next else step.h_next
-
-
-def limit_first_step(model, step):
-    """Limit the first step after an event, so that no load or condition changes by more than a share of its scale.
-
-    The slopes of the states do not show how fast a load changes that follows a clock.
-    """
-    location = model.event_location
-    delta = DIFFERENCE_STEP * step.h_max
-    update_event_functions(model, step.t1, step.y1, step.modes1)
-    for j in range(model.n_event_functions):
-        location.start[j] = location.values[j]
-        location.peaks[j] = location.scales[j]
-    y2 = step.y1 + delta * step.f1
-    update_event_functions(model, step.t1 + delta, y2, step.modes1)
-    for j in range(model.n_event_functions):
-        location.near_middle[j] = location.values[j]
-    y3 = step.y1 + 2.0 * delta * step.f1
-    update_event_functions(model, step.t1 + 2.0 * delta, y3, step.modes1)
-    for i in contact_indices:
-        if step.modes1[i] != STUCK:
-            location.peaks[i] = location.peaks[len(step.modes1) + i] = 0.0  # the error control resolves slips
-    largest = 0.0
-    for j in range(model.n_event_functions):
-        if location.peaks[j] > 0.0:
-            slope = fabs(location.near_middle[j] - location.start[j]) / delta
-            bend = fabs(location.start[j] - 2.0 * location.near_middle[j] + location.values[j]) / (delta * delta)
-            rate = slope / location.peaks[j] + sqrt(bend / location.peaks[j])
-            largest = rate if rate > largest else largest
-    if largest > 0.0:
-        h = FIRST_CHANGE / largest
-        least = SHORTEST_STEP * step.h_max
-        h = h if h > least else least
-        step.h_next = h if h < step.h_next else step.h_next
 
 
 def examine_cubic(location, step, j):
@@ -253,15 +173,11 @@ def examine_cubic(location, step, j):
         lowest = inf
     if fabs(lowest) <= ERROR_FACTOR * step.tolerance / location.tolerance_factor * location.peaks[j]:
         location.in_doubt = True
-    low = early if early < late else late
-    high = early if early > late else late
-    high = high if high > start else start
-    high = high if high > end else end
+    high = largest_of(start, early, late, end)
     if end > 0.0:
-        least = end if end < start else start
-        least = least if least < low else low
-        inside = late if start <= 0.0 else low  # a slip starts at zero
-        return NO_ZERO if inside >= INTERPOLANT_SHARE * (high - least) else UNKNOWN
+        low = smallest_of(start, early, late, end)
+        inside = late if start <= 0.0 or late < early else early  # a slip starts at zero
+        return NO_ZERO if inside >= INTERPOLANT_SHARE * (high - low) else UNKNOWN
     return UNKNOWN if start > 0.0 and early < INTERPOLANT_SHARE * (high - end) and late > early else ONE_ZERO
 
 
@@ -292,7 +208,7 @@ def search_polynomial(model, step, j):
                 break
             g = event_function(model, step, t, j)
             if g <= 0.0:
-                return find_crossing(model, step, t, g, j)
+                return find_root(model, step, step.t0, t, location.start[j], g, j)
             if g <= least:
                 return t  # the function only touches zero
             location.polynomial[0] += g - value
@@ -303,13 +219,7 @@ def search_polynomial(model, step, j):
             u += 2.0 * value / descent
     if location.end[j] > 0.0:
         return inf
-    return find_crossing(model, step, step.t1, location.end[j], j)
-
-
-def find_crossing(model, step, end, g_end, j):
-    """Return the zero of one event function between the start of the step and a time at which it is not positive."""
-    g_start = model.event_location.start[j]
-    return find_root(model, step, step.t0, end, g_start, g_end, j)
+    return find_root(model, step, step.t0, step.t1, location.start[j], location.end[j], j)
 
 
 def fit_polynomial(model, step, j):
@@ -364,195 +274,3 @@ def find_root(model, step, low, high, g_low, g_high, j):
             kept_end = -1
     step.interpolant.n_event_evals += evaluations
     return high
-
-
-# ---- events in doubt
-
-
-def begin_phase(model, step):
-    """Note the start of a motion: its state, and the step size to try."""
-    if model.is_coupled or model.has_conditions:
-        limit_first_step(model, step)
-    location = model.event_location
-    location.phase_t, location.phase_y, location.phase_f = step.t1, step.y1, step.f1
-    location.phase_h = step.h_next
-    restore_tolerance(model, step)
-    location.in_doubt = location.must_repeat = False
-    step.largest_slip = 0.0
-    if model.is_coupled or model.has_conditions:
-        for j in range(model.n_event_functions):
-            location.peaks[j] = 0.0
-
-
-def restore_tolerance(model, step):
-    """Return to the tolerance of the run."""
-    location = model.event_location
-    if location.tolerance_factor < 1.0:
-        step.tolerance, location.tolerance_factor = location.tolerance, 1.0
-
-
-def decide_repetition(model, step):
-    """Decide whether the motion since the last event must be repeated with a tighter tolerance."""
-    location = model.event_location
-    if location.in_doubt and location.tolerance_factor == 1.0:
-        least = SMALLEST_TOLERANCE / step.tolerance
-        factor = REFINEMENT if REFINEMENT > least else least
-        if factor < WORTHWHILE_REFINEMENT:
-            location.tolerance_factor, location.must_repeat, location.t_doubt = factor, True, step.t1
-            location.tolerance = step.tolerance
-            step.tolerance *= factor
-            step.largest_slip = inf  # every step is examined
-
-
-def repeat_phase(model, step):
-    """Go back to the start of the motion, to repeat it with the tighter tolerance."""
-    location = model.event_location
-    location.must_repeat = False
-    step.t1, step.y1, step.f1, step.modes1 = location.phase_t, location.phase_y, location.phase_f, step.modes0
-    step.h_next = location.phase_h * location.tolerance_factor**step.active_method.power
-
-
-def end_phase_in_doubt(model, step):
-    """Return to the usual tolerance after a step without doubt."""
-    location = model.event_location
-    if location.tolerance_factor < 1.0 and step.t1 >= location.t_doubt and not location.in_doubt:
-        step.h_next *= location.tolerance_factor**-step.active_method.power
-        begin_phase(model, step)
-
-
-def shorten_step(model, step):
-    """Go back to the start of the step, to try half of it."""
-    model.event_location.must_shorten = False
-    step.h_next = 0.5 * step.h_full
-    step.t1, step.y1, step.f1, step.modes1 = step.t0, step.y0, step.f0, step.modes0
-    step.n_accepted -= 1
-    step.n_rejected += 1
-
-
-# ---- conditions
-
-
-def update_sides(model, t, y: StateVector, modes: ContactVector):
-    """Determine which conditions hold; a condition may depend on others."""
-    location = model.event_location
-    for _ in range(model.n_event_functions + 1):
-        model.update_conditions(t, y, modes)
-        changed = False
-        for j in range(model.n_switches):
-            side = 1.0 if location.margins[j] > 0.0 else -1.0
-            if side != location.sides[j]:
-                location.sides[j], changed = side, True
-        if not changed:
-            break
-    for j in range(model.n_switches):
-        location.sides_after[j] = location.sides[j]
-
-
-def check_limits(model, t, y: StateVector, modes: ContactVector):
-    """Note the first limit that does not hold."""
-    location = model.event_location
-    location.violated = -1
-    model.update_conditions(t, y, modes)
-    for j in range(model.n_event_functions - model.first_condition - model.n_switches):
-        k = model.n_switches + j
-        if location.violated < 0 and location.margins[k] + CONDITION_MARGIN * location.margin_scales[k] + TINY <= 0.0:
-            location.violated = k
-            model.violation_time, model.violation_value = t, location.margins[k]
-
-
-def start_conditions(model, t, y: StateVector, modes: ContactVector):
-    """Determine the conditions where a run starts or restarts with changed values."""
-    model.event_location.t_condition = -inf  # changes that were computed beyond t have not occurred
-    update_sides(model, t, y, modes)
-    begin_step(model)
-
-
-def begin_step(model):
-    """Begin a step with the conditions after the previous one."""
-    location = model.event_location
-    for j in range(model.n_switches):
-        location.sides[j] = location.sides_before[j] = location.sides_after[j]
-
-
-def update_at_event(model, t, y: StateVector, modes: ContactVector, h_max):
-    """Determine the conditions after an event.
-
-    Returns
-    -------
-    int
-        Status: OK, or CHATTERING if a condition keeps changing.
-    """
-    location = model.event_location
-    for j in range(model.n_switches):
-        location.sides_before[j] = location.sides[j]
-    update_sides(model, t, y, modes)
-    if conditions_changed(model):
-        is_quick = t - location.t_condition <= SHORTEST_DWELL * h_max
-        location.n_chatter = location.n_chatter + 1 if is_quick else 0
-        location.t_condition = t
-    return CHATTERING if location.n_chatter > MAX_CHATTER else OK
-
-
-def violation_status(model):
-    """Return OK, or the status of the rule for a condition that must hold but does not."""
-    location = model.event_location
-    return FIRST_RULE + model.first_condition_rule + location.violated if location.violated >= 0 else OK
-
-
-def select_sides(model, after_event):
-    """Select the conditions before or after the event at the end of the step."""
-    location = model.event_location
-    for j in range(model.n_switches):
-        location.sides[j] = location.sides_after[j] if after_event else location.sides_before[j]
-
-
-def conditions_changed(model):
-    """Return whether a condition changes at the end of the step."""
-    location = model.event_location
-    changed = False
-    for j in range(model.n_switches):
-        changed = changed or location.sides_after[j] != location.sides_before[j]
-    return changed
-
-
-# ---- narrow features
-
-
-def step_share(model, step, h, y1: StateVector, f1: RateVector):
-    """Return the share of a step to which it must be shortened, so that it passes no narrow feature; 1.0 if it fits.
-
-    A step that begins near the zero of a slip may change it by one width; other steps may only come near.  The cubic
-    Hermite polynomial of the step lies between its control points, so that a slip that turns within it is seen too.
-    """
-    width = model.event_location.feature_width
-    third = h / 3.0
-    y2 = step.y0 + third * step.f0
-    y3 = y1 - third * f1
-    slips0, slips1, slips2, slips3 = contact_vector(), contact_vector(), contact_vector(), contact_vector()
-    if model.is_coupled:
-        slips0 = model.slip_velocities(step.t0, step.y0)
-        slips1 = model.slip_velocities(step.t0 + h, y1)
-        slips2 = model.slip_velocities(step.t0 + third, y2)
-        slips3 = model.slip_velocities(step.t0 + h - third, y3)
-    else:
-        for i in contact_indices:
-            slips0[i], slips1[i] = step.y0[slip_index[i]], y1[slip_index[i]]
-            slips2[i], slips3[i] = y2[slip_index[i]], y3[slip_index[i]]
-    share = 1.0
-    for i in contact_indices:
-        if step.modes0[i] != STUCK:
-            start, end = step.modes0[i] * slips0[i], step.modes0[i] * slips1[i]
-            early, late = step.modes0[i] * slips2[i], step.modes0[i] * slips3[i]
-            low, high = start, start
-            low = low if low < early else early
-            low = low if low < late else late
-            low = low if low < end else end
-            high = high if high > early else early
-            high = high if high > late else late
-            high = high if high > end else end
-            if start < FEATURE_RANGE * width:
-                if (high - low) * MIN_STEP_SHARE > width and (high - low) * share > width:
-                    share = width / (high - low)
-            elif low < NEAREST_APPROACH * width and (start - low) * share > start - APPROACH * width:
-                share = (start - APPROACH * width) / (start - low)
-    return share

@@ -6,7 +6,7 @@ ahead of t does not show.
 
 from math import inf, nan
 
-from . import event_location, ode23
+from . import conditions, ode23, phase_repetition
 from .active_method import METHOD_ITEMS
 from .codes import DIVERGED, HYBRID, NEEDS_REPETITION, OK, STUCK, TOO_MANY_STEPS
 from .linear_closed_form import HIGHER_ORDER_INPUT
@@ -126,7 +126,7 @@ class Integrator(VariableOwner):
             )
             self.t_event_before_change, self.modes_before_change = counters.t_event, self.modes
         if model.has_dry_friction or model.has_conditions:
-            event_location.restore_tolerance(model, step)
+            phase_repetition.restore_tolerance(model, step)
         self.apply_parameters(model)
         if model.has_dry_friction and step.is_hybrid and not model.is_coupled:
             for i in contact_indices:
@@ -173,7 +173,7 @@ class Integrator(VariableOwner):
         if t < step.t1:
             self.t, self.modes = t, step.modes0
             if model.has_conditions:
-                event_location.select_sides(model, False)
+                conditions.select_sides(model, False)
             interpolant = step.interpolant
             if interpolant.ready:  # as in step.state_at; saves one call in limit communication steps
                 self.y = interpolant.evaluate(t - step.t0)
@@ -188,7 +188,7 @@ class Integrator(VariableOwner):
     def move_to_step_end(self, model):
         """Set the current time to the end of the internal step."""
         if model.has_conditions:
-            event_location.select_sides(model, True)
+            conditions.select_sides(model, True)
         step = self.step
         self.t, self.y, self.modes = step.t1, step.y1, step.modes1
 

@@ -14,7 +14,7 @@ solvers report a zero at the current time as another event.
 
 from math import fabs, inf, nan
 
-from . import call_sequence, event_location
+from . import call_sequence, conditions, event_location
 from .codes import DIVERGED, MODEL_EXCHANGE, OK, RUNNING, STUCK
 from .integrator import DEFAULT_NOMINAL
 from .rounding import EPSILON, ROUNDOFF_MARGIN
@@ -241,13 +241,13 @@ def handle_event(run, model):
     exchange.nominals_changed = exchange.nominal_velocity != nominal_velocity
     exchange.states_changed, run.values_changed = run.values_changed, False
     if model.has_conditions:
-        status = event_location.update_at_event(model, solver.t, solver.y, solver.modes, solver.step.h_max)
+        status = conditions.update_at_event(model, solver.t, solver.y, solver.modes, solver.step.h_max)
         if status != OK:
             return status
-        if event_location.conditions_changed(model):
+        if conditions.have_changed(model):
             exchange.states_changed = True
-        event_location.check_limits(model, solver.t, solver.y, solver.modes)
-        status = event_location.violation_status(model)
+        conditions.check_limits(model, solver.t, solver.y, solver.modes)
+        status = conditions.violation_status(model)
         if status != OK:
             return status
     if model.has_dry_friction and solver.step.is_hybrid:

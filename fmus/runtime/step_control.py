@@ -7,7 +7,7 @@ integration method that meets the tolerance.  The step size is controlled as in 
 
 from math import inf
 
-from . import event_location
+from . import conditions, event_location, phase_repetition, step_limits
 from .active_method import ActiveMethod
 from .codes import DIVERGED, EXACT, NEEDS_REPETITION, OK, STALLED, STUCK
 from .event_location import INTERPOLANT_SHARE, NEAR_ZERO_SHARE
@@ -114,11 +114,11 @@ class InternalStep:
             roundoff.t1 = roundoff.x1 = 0.0
         self.t1, self.y1 = t, y
         if model.has_conditions:
-            event_location.start_conditions(model, t, self.y1, modes)
+            conditions.initialize(model, t, self.y1, modes)
         if model.has_dry_friction:
             self.update_end_modes(model, modes, tie_tolerance)
         if model.has_conditions:
-            event_location.check_limits(model, t, self.y1, self.modes1)
+            conditions.check_limits(model, t, self.y1, self.modes1)
         self.update_end_rates(model)
         if not (model.rests_when_stuck and self.is_hybrid and all_of(self.modes1 == STUCK)):
             if self.h_next == 0.0 and self.active_method.method_number != EXACT:
@@ -126,7 +126,7 @@ class InternalStep:
         self.t0 = t
         self.save_counters()
         if model.has_dry_friction or model.has_conditions:
-            event_location.begin_phase(model, self)
+            phase_repetition.begin_phase(model, self)
 
     def save_counters(self):
         """Save the counters at t1, where the next step starts."""
@@ -151,10 +151,10 @@ class InternalStep:
         if model.has_dry_friction and not self.has_consistent_modes:
             return NO_CONSISTENT_MODES
         if model.has_conditions:
-            status = event_location.violation_status(model)
+            status = conditions.violation_status(model)
             if status != OK:
                 return status
-            event_location.begin_step(model)
+            conditions.begin_step(model)
         if model.has_dry_friction and self.event_at_end:
             self.count_event()
             self.event_at_end = False
@@ -178,7 +178,7 @@ class InternalStep:
             status = self.advance_with_method(model)
         self.n_accepted += 1
         if model.has_conditions:
-            event_location.select_sides(model, False)
+            conditions.select_sides(model, False)
         t = self.t0
         if self.t1 - t > 16.0 * EPSILON * (t if t > 0.0 else -t):
             counters.n_stalled = 0
@@ -194,9 +194,9 @@ class InternalStep:
         t_reported, status, repeats = self.t0, OK, False
         for _ in range(MAX_REPEATED_STEPS):
             if location.must_shorten:
-                event_location.shorten_step(model, self)
+                step_limits.shorten_step(model, self)
             elif location.must_repeat:
-                event_location.repeat_phase(model, self)
+                phase_repetition.repeat_phase(model, self)
                 repeats = True
             elif not repeats or self.t1 > t_reported:
                 break
@@ -292,7 +292,7 @@ class InternalStep:
         h_new = self.h_next if self.h_next < self.h_max else self.h_max
         if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
             y1 = y + h_new * f
-            h_new *= event_location.step_share(model, self, h_new, y1, f)
+            h_new *= step_limits.narrow_feature_share(model, self, h_new, y1, f)
         if h_new < h_min:
             h_new = h_min
         remaining = self.t_end - t
@@ -311,7 +311,7 @@ class InternalStep:
             share = 1.0
             if error <= 1.0 and sum_of(size1, e) < OVERFLOW_LIMIT:  # False for NaN
                 if model.has_dry_friction and model.has_nominal_velocity and self.is_hybrid:
-                    share = event_location.step_share(model, self, h, y1, f1)
+                    share = step_limits.narrow_feature_share(model, self, h, y1, f1)
                 if not (model.has_dry_friction and model.has_nominal_velocity) or share == 1.0 or h <= h_min:
                     break
             self.n_rejected += 1
@@ -352,11 +352,16 @@ class InternalStep:
                 if self.largest_slip < inf:
                     location.peaks[i] = self.largest_slip
         if (model.has_dry_friction and self.is_hybrid) or model.has_conditions:
+            if model.is_coupled or model.has_conditions:
+                event_location.evaluate_on_cubic(model, self)
+                step_limits.limit_step(model, self)
+                if model.event_location.must_shorten:
+                    return NEEDS_REPETITION
             end = event_location.locate_events(model, self)
             if self.interpolant.ready:  # the event search built the interpolant
                 self.n_rhs += self.active_method.extra
-            event_location.decide_repetition(model, self)
-            if model.event_location.must_shorten or model.event_location.must_repeat:
+            phase_repetition.decide_repetition(model, self)
+            if model.event_location.must_repeat:
                 return NEEDS_REPETITION
             if end <= self.t1:
                 if model.checks_event_steps and not self.is_accurate_at(model, end):
@@ -366,7 +371,7 @@ class InternalStep:
             if model.is_coupled and self.is_hybrid:
                 self.y1 = model.stop_slips(self.t1, self.y1, modes)
                 self.f1 = select_kinematic(kinematic_rates(self.y1), self.f1)
-            event_location.end_phase_in_doubt(model, self)
+            phase_repetition.end_phase_in_doubt(model, self)
         return OK
 
     def is_accurate_at(self, model, end):
@@ -377,7 +382,7 @@ class InternalStep:
         """
         method = self.active_method
         h = end - self.t0
-        if h <= event_location.SHORTEST_STEP * self.h_max:
+        if h <= step_limits.SHORTEST_STEP * self.h_max:
             return True
         y_end = self.state_at(model, end)
         y2, f2, e = method.propose(model, self.modes0, self.t0, self.y0, self.f0, h)  # noqa: RUF059  named like y2
@@ -397,7 +402,7 @@ class InternalStep:
         self.y1 = self.state_at(model, end)
         self.t1 = end
         if model.has_conditions:
-            status = event_location.update_at_event(model, end, self.y1, self.modes0, self.h_max)
+            status = conditions.update_at_event(model, end, self.y1, self.modes0, self.h_max)
             if status != OK:
                 return status
         if model.has_dry_friction and self.is_hybrid:
@@ -469,12 +474,12 @@ class InternalStep:
         """Restart after an event; the step size of the last slip phase is kept, if there was one."""
         self.event_at_end = any_of(self.modes1 != self.modes0)  # no event if the velocity only touches zero
         if model.has_conditions:
-            event_location.check_limits(model, self.t1, self.y1, self.modes1)
+            conditions.check_limits(model, self.t1, self.y1, self.modes1)
         self.update_end_rates(model)
         if self.h_next == 0.0 and self.active_method.method_number != EXACT:
             self.h_next = self.initial_step_size()
         if model.has_dry_friction or model.has_conditions:
-            event_location.begin_phase(model, self)
+            phase_repetition.begin_phase(model, self)
 
     def initial_step_size(self):
         """Estimate the first step h from the slopes at t1."""

@@ -50,10 +50,10 @@ class CodegenContext:
         safe_divisors: set[int] = set()  # other equations divide by them
 
         def walk(e: Operand, in_case: bool) -> None:
-            if isinstance(e, Term) and e.name and not depends_on(e, (*an.time_varying, *an.inputs)):
-                if not in_case or not can_fail(e, safe_divisors):
-                    result[id(e)] = e
-                    return
+            is_constant = isinstance(e, Term) and e.name and not depends_on(e, (*an.time_varying, *an.inputs))
+            if is_constant and not (in_case and can_fail(e, safe_divisors)):
+                result[id(e)] = e
+                return
             if isinstance(e, Term) and e.op == "choose" and not in_case:
                 case_roots.extend(e.args[1:])
                 walk(e.args[0], in_case)

@@ -1,0 +1,114 @@
+"""Limits of internal steps that the error estimate of the method does not provide.
+
+The error estimate does not see event functions that vary while the states do not, nor friction that varies within a
+small range of slip velocities (narrow features).
+"""
+
+from math import fabs, sqrt
+
+from .codes import STUCK
+from .event_location import update_event_functions
+from .extrema import largest_of, smallest_of
+from .vectors import RateVector, StateVector, contact_indices, contact_vector, slip_index
+
+MAX_CUBIC_ERROR = 0.02  # share of the range of an event function by which it may differ from a cubic polynomial
+SHORTEST_STEP = 1e-6  # share of the largest step; shorter steps are not shortened for an event function
+DIFFERENCE_STEP, FIRST_CHANGE = 1e-5, 0.3  # share of the largest step for differences; change in the first step
+# Narrow features, in widths: slips at which they limit a step; where a step from outside is to end, and may end
+FEATURE_RANGE, APPROACH, NEAREST_APPROACH = 5.0, 4.5, 3.5
+MIN_STEP_SHARE = 0.6  # smallest share to which a step near a feature need not be shortened
+
+
+def limit_step(model, step):
+    """Limit the step so that every event function resembles a cubic polynomial.
+
+    The error control of the method does not see event functions that vary without the states, as a load that
+    follows a clock while nothing moves.
+    """
+    location = model.event_location
+    largest = 0.0
+    for j in range(model.n_event_functions):
+        error = location.cubic_errors[j]
+        largest = error if error > largest else largest
+    if largest > MAX_CUBIC_ERROR and step.t1 - step.t0 > SHORTEST_STEP * step.h_max:
+        location.must_shorten = True
+    elif largest > 0.0:
+        h = 0.8 * step.h_full * sqrt(sqrt(MAX_CUBIC_ERROR / largest))  # the error grows with h^4
+        step.h_next = h if h < step.h_next else step.h_next
+
+
+def limit_first_step(model, step):
+    """Limit the first step after an event, so that no load or condition changes by more than a share of its scale.
+
+    The slopes of the states do not show how fast a load changes that follows a clock.
+    """
+    location = model.event_location
+    delta = DIFFERENCE_STEP * step.h_max
+    update_event_functions(model, step.t1, step.y1, step.modes1)
+    for j in range(model.n_event_functions):
+        location.start[j] = location.values[j]
+        location.peaks[j] = location.scales[j]
+    y2 = step.y1 + delta * step.f1
+    update_event_functions(model, step.t1 + delta, y2, step.modes1)
+    for j in range(model.n_event_functions):
+        location.near_middle[j] = location.values[j]
+    y3 = step.y1 + 2.0 * delta * step.f1
+    update_event_functions(model, step.t1 + 2.0 * delta, y3, step.modes1)
+    for i in contact_indices:
+        if step.modes1[i] != STUCK:
+            location.peaks[i] = location.peaks[len(step.modes1) + i] = 0.0  # the error control resolves slips
+    largest = 0.0
+    for j in range(model.n_event_functions):
+        if location.peaks[j] > 0.0:
+            slope = fabs(location.near_middle[j] - location.start[j]) / delta
+            bend = fabs(location.start[j] - 2.0 * location.near_middle[j] + location.values[j]) / (delta * delta)
+            rate = slope / location.peaks[j] + sqrt(bend / location.peaks[j])
+            largest = rate if rate > largest else largest
+    if largest > 0.0:
+        h = FIRST_CHANGE / largest
+        least = SHORTEST_STEP * step.h_max
+        h = h if h > least else least
+        step.h_next = h if h < step.h_next else step.h_next
+
+
+def shorten_step(model, step):
+    """Go back to the start of the step, to try half of it."""
+    model.event_location.must_shorten = False
+    step.h_next = 0.5 * step.h_full
+    step.t1, step.y1, step.f1, step.modes1 = step.t0, step.y0, step.f0, step.modes0
+    step.n_accepted -= 1
+    step.n_rejected += 1
+
+
+def narrow_feature_share(model, step, h, y1: StateVector, f1: RateVector):
+    """Return the share of a step to which it must be shortened, so that it passes no narrow feature; 1.0 if it fits.
+
+    A step that begins near the zero of a slip may change it by one width; other steps may only come near.  The cubic
+    Hermite polynomial of the step lies between its control points, so that a slip that turns within it is seen too.
+    """
+    width = model.event_location.feature_width
+    third = h / 3.0
+    y2 = step.y0 + third * step.f0
+    y3 = y1 - third * f1
+    slips0, slips1, slips2, slips3 = contact_vector(), contact_vector(), contact_vector(), contact_vector()
+    if model.is_coupled:
+        slips0 = model.slip_velocities(step.t0, step.y0)
+        slips1 = model.slip_velocities(step.t0 + h, y1)
+        slips2 = model.slip_velocities(step.t0 + third, y2)
+        slips3 = model.slip_velocities(step.t0 + h - third, y3)
+    else:
+        for i in contact_indices:
+            slips0[i], slips1[i] = step.y0[slip_index[i]], y1[slip_index[i]]
+            slips2[i], slips3[i] = y2[slip_index[i]], y3[slip_index[i]]
+    share = 1.0
+    for i in contact_indices:
+        if step.modes0[i] != STUCK:
+            start, end = step.modes0[i] * slips0[i], step.modes0[i] * slips1[i]
+            early, late = step.modes0[i] * slips2[i], step.modes0[i] * slips3[i]
+            low, high = smallest_of(start, early, late, end), largest_of(start, early, late, end)
+            if start < FEATURE_RANGE * width:
+                if (high - low) * MIN_STEP_SHARE > width and (high - low) * share > width:
+                    share = width / (high - low)
+            elif low < NEAREST_APPROACH * width and (start - low) * share > start - APPROACH * width:
+                share = (start - APPROACH * width) / (start - low)
+    return share
