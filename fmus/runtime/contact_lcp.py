@@ -302,6 +302,15 @@ class CoupledFriction(DryFriction):
         y3 = y2 + delta * f2
         return self.slip_velocities(t + 2.0 * delta, y3)
 
+    def contact_rates_ahead(
+        self, t, y: StateVector, modes: ContactVector
+    ) -> tuple[ContactVector, ContactVector, ContactVector, ContactVector]:
+        """Return the rates a short time ahead, which decide a tie where the rates at t are zero."""
+        delta = PREDICTION_SHARE * self.solver.step.h_max
+        f = self.rates(t, y, modes)
+        y2 = y + delta * f
+        return self.contact_rates(t + delta, y2, modes)
+
     def relock(self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance) -> ContactVector:
         """Return consistent modes in which released contacts are locked again, one after another, where this fits."""
         trial_modes = contact_vector()
@@ -371,6 +380,8 @@ class CoupledFriction(DryFriction):
         """
         force, limit, terms = self.contact_forces(t, y, modes)
         force_rate, limit_rate, residual_force, residual_force_rate = self.contact_rates(t, y, modes)
+        later_force_rate, later_limit_rate, _, later_residual_rate = self.contact_rates_ahead(t, y, modes)
+        delta = PREDICTION_SHARE * self.solver.step.h_max
         violation, next_modes = contact_vector(), contact_vector()
         for i in contact_indices:
             violation[i], next_modes[i] = 0.0, STUCK
@@ -380,6 +391,9 @@ class CoupledFriction(DryFriction):
             if status[i] != SLIPPING and modes[i] == STUCK:
                 next_modes[i] = sign(force[i]) if fabs(force[i]) > slack else sign(force_rate[i])
                 outward = next_modes[i] * force_rate[i] - limit_rate[i]
+                if outward == 0.0:
+                    later = next_modes[i] * later_force_rate[i] - later_limit_rate[i]
+                    outward = later if fabs(later) * delta > slack else 0.0
                 if status[i] == AT_LIMIT or (status[i] == AT_REST and outward > 0.0):
                     slack = -slack
                 elif outward < 0.0:
@@ -395,6 +409,11 @@ class CoupledFriction(DryFriction):
                 if not can_hold:
                     if ahead < -slack:
                         violation[i], next_modes[i] = inf, -modes[i]
-                elif ahead < -slack or (ahead <= slack and modes[i] * residual_force_rate[i] <= 0.0):
-                    violation[i] = inf
+                else:
+                    ahead_rate = modes[i] * residual_force_rate[i]
+                    if ahead_rate == 0.0:
+                        later = modes[i] * later_residual_rate[i]
+                        ahead_rate = later if fabs(later) * delta > slack else 0.0
+                    if ahead < -slack or (ahead <= slack and ahead_rate <= 0.0):
+                        violation[i] = inf
         return violation, next_modes

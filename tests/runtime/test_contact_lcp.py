@@ -1,6 +1,7 @@
 """Which of several contacts stick: random loads, on the vector sources with numpy arrays."""
 
 from itertools import permutations, product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from fmus.runtime.rounding import ROUNDOFF_MARGIN
 
 class Chain(CoupledFriction):
     """n contacts at rest: each body on the ground, or each on the previous one; slips accelerate with b - A F."""
+
+    solver = SimpleNamespace(step=SimpleNamespace(h_max=1.0))
 
     def __init__(self, draw, n, jump, shared):
         bodies = np.eye(n) - (np.eye(n, k=-1) if shared else 0.0)
@@ -41,6 +44,9 @@ class Chain(CoupledFriction):
         force, rate = self.solved(modes, self.b, self.slide), self.solved(modes, self.b_rate, 0.0)
         pulls = [(b - self.A @ f) / np.diag(self.A) for b, f in ((self.b, force), (self.b_rate, rate))]
         return rate, np.zeros(self.n), *pulls
+
+    def contact_rates_ahead(self, t, y, modes):
+        return self.contact_rates(t, y, modes)  # the rates are constant
 
     def answer(self):
         """Return the modes, found from all contacts stuck, and whether they are consistent."""

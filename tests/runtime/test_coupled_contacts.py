@@ -453,3 +453,21 @@ def test_the_jacobian_of_the_threshold_law_includes_the_load_limit(custom_model,
         assert np.abs(actual[:, 1:].T - slopes).max() < 1e-5
         limited += bool(abs(slopes[0][0]) < 300.0)
     assert 20 < limited < 180
+
+
+@pytest.mark.parametrize("hold", [5.0, 8.0])
+@pytest.mark.parametrize(("change", "mode"), [(1.0, 1), (0.0, 0), (-1.0, 0)])
+def test_the_second_derivative_decides_where_a_load_starts_at_its_limit(custom_model, hold, change, mode):
+    """The load is hold + change (1 - cos(p / 1 m)): at the start its rate is zero."""
+    first, acceleration = body(1, f"{hold} * f + {change} * f * (1.0 - cos(p / d)) - F1", 1.0)
+    model = custom_model(
+        'f = Parameter(1.0, "N", "unit of force")',
+        'd = Parameter(1.0, "m", "unit of length")',
+        DRIVER,
+        *first,
+        *contact(1, "v1", "5.0 * f", f"{hold} * f"),
+        acceleration,
+    )
+    prepared_model(model, {}, 5.0)
+    start(model, model.initial_state(0.0), 5.0)
+    assert state_values(model.solver.step, ["mode1"]) == [mode]
