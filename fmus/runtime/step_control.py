@@ -148,13 +148,13 @@ class InternalStep:
         int
             Status; NEEDS_REPETITION if the caller must call `repeat_steps`.
         """
-        if model.has_dry_friction and not self.has_consistent_modes:
-            return NO_CONSISTENT_MODES
         if model.has_conditions:
-            status = conditions.violation_status(model)
+            status = conditions.violation_status(model)  # names the contact if its sliding force exceeds what it holds
             if status != OK:
                 return status
             conditions.begin_step(model)
+        if model.has_dry_friction and not self.has_consistent_modes:
+            return NO_CONSISTENT_MODES
         if model.has_dry_friction and self.event_at_end:
             self.count_event()
             self.event_at_end = False

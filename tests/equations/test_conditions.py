@@ -26,7 +26,7 @@ KINDS = {
 }
 EVERY_KIND = pytest.mark.parametrize("kind", KINDS)
 STOP, K, F, GAP, T_ON, MU = 2.0, 100.0, 5.0, 0.1, 0.3, 0.5  # SI, as in the models
-MODEL = '''from fmus import Contact, Fixed, Input, Mode, Model, Output, Parameter, State, choose, exp, log, sin, sqrt
+MODEL = '''from fmus import Contact, Fixed, Input, Mode, Model, Output, Parameter, State, choose, exp, fabs, log, sin, sqrt
 
 class {name}(Model):
     """Mass on a spring under a force that depends on a condition."""
@@ -73,6 +73,7 @@ CONTACTS = {  # slide and hold
     "slidingposition": "f * (1.0 + x / gap)",
     "slidingangle": "f * (1.0 + 2.0 * sin(angle))",
     "holdingtime": "f, hold=f * (2.0 - clock / t_on)",
+    "holdingspeed": "f, hold=f * (0.5 + fabs(v) / v_s)",
     "lifting": "mu * f * (1.0 + 2.0 * sin(angle)), hold=2.0 * mu * f * (1.0 + 2.0 * sin(angle)), lifts_off=True",
     "switched": "mu * choose(x > 0.0, 2.0 * f, f), hold=f * choose(clock > t_on, 2.0, 1.0)",
 }
@@ -327,10 +328,13 @@ def test_a_sliding_force_that_becomes_negative_ends_the_run(launch, kind):
 
 @EVERY_KIND
 def test_a_sliding_force_above_the_holding_force_ends_the_run(launch, kind):
-    """While the contact sticks."""
-    message = failure(launch("holdingtime", kind, x0=0.01))
-    assert message.startswith("F_f: the sliding force exceeds the holding force at t = 0.30000000")
-    assert message.endswith("): lower slide or raise hold")
+    """While the contact sticks, and where it comes to rest with a load that neither mode can balance."""
+    sentence = "F_f: the sliding force exceeds the holding force at t = "
+    for name, x0, t in ("holdingtime", 0.01, T_ON), ("holdingspeed", 0.14, pi / 10.0):
+        message = failure(launch(name, kind, x0=x0))
+        assert message.startswith(sentence)
+        assert message.endswith("): lower slide or raise hold")
+        assert abs(float(message.removeprefix(sentence).split()[0]) - t) < 1e-6
 
 
 def stop_function(mode, start, t, y):
