@@ -19,6 +19,7 @@ from .codes import DIVERGED, MODEL_EXCHANGE, OK, RUNNING, STUCK
 from .integrator import DEFAULT_NOMINAL
 from .rounding import EPSILON, ROUNDOFF_MARGIN
 from .step_control import OVERFLOW_LIMIT, TIE_FACTOR
+from .stick_slip import NO_CONSISTENT_MODES
 from .vectors import (
     ContactVector,
     all_of,
@@ -246,14 +247,19 @@ def handle_event(run, model):
             return status
         if conditions.have_changed(model):
             exchange.states_changed = True
-        conditions.check_limits(model, solver.t, solver.y, solver.modes)
-        status = conditions.violation_status(model)
-        if status != OK:
-            return status
+    if model.has_dry_friction:
+        solver.step.has_consistent_modes = True
     if model.has_dry_friction and solver.step.is_hybrid:
         if update_modes(model, solver):
             exchange.states_changed = True
         exchange.t_next_event = next_breakaway(model, solver)
+    if model.has_conditions:
+        conditions.check_limits(model, solver.t, solver.y, solver.modes)
+        status = conditions.violation_status(model)
+        if status != OK:
+            return status
+    if model.has_dry_friction and not solver.step.has_consistent_modes:
+        return NO_CONSISTENT_MODES
     return OK if sum_of(magnitude(solver.y)) < OVERFLOW_LIMIT else DIVERGED
 
 
@@ -264,9 +270,9 @@ def update_modes(model, solver):
     """
     tie_tolerance = TIE_FACTOR * solver.step.tolerance
     needs_restart = changed = False
-    consistent = True
+    step = solver.step
     if model.is_coupled:
-        y, modes, consistent = model.resolve_at_start(
+        y, modes, step.has_consistent_modes = model.resolve_at_start(
             solver.t, solver.y, solver.modes, tie_tolerance, OVERSHOOT_TOLERANCE
         )
         needs_restart, changed = any_of(y != solver.y), any_of(modes != solver.modes)
@@ -288,10 +294,7 @@ def update_modes(model, solver):
                 if solver.modes[i] != mode:
                     changed = True
                     if solver.modes[i] != STUCK and solver.y[slip_index[i]] == 0.0:
-                        consistent = consistent and model.is_consistent(solver.t, solver.y, solver.modes, i)
-    if not consistent:
-        for i in state_indices:
-            solver.y[i] = nan  # no modes satisfy the equations
+                        step.has_consistent_modes = model.is_consistent(solver.t, solver.y, solver.modes, i)
     if changed:
         solver.step.start_counters.n_events += 1
         solver.step.start_counters.t_event = solver.t

@@ -26,7 +26,9 @@ KINDS = {
 }
 EVERY_KIND = pytest.mark.parametrize("kind", KINDS)
 STOP, K, F, GAP, T_ON, MU = 2.0, 100.0, 5.0, 0.1, 0.3, 0.5  # SI, as in the models
-MODEL = '''from fmus import Contact, Fixed, Input, Mode, Model, Output, Parameter, State, choose, exp, fabs, log, sin, sqrt
+MODEL = '''from fmus import (
+    Contact, Fixed, Input, Mode, Model, Output, Parameter, State, choose, exp, fabs, log, sin, sqrt
+)
 
 class {name}(Model):
     """Mass on a spring under a force that depends on a condition."""
@@ -433,17 +435,19 @@ def test_the_solver_of_an_importer_locates_the_changes(worker, built, name, kind
 
 @pytest.mark.parametrize("kind", ["native", "native/fmi3"])
 def test_model_exchange_refuses_what_co_simulation_refuses(worker, built, kind):
-    """Chattering and negative sliding forces."""
-    for name, text in (
-        ("chattering", "a condition of choose() changes again and again at t = 0.62831"),
-        ("slidingangle", "F_f: the sliding force becomes negative at t = 0.183259571"),
+    """Chattering, negative sliding forces, and sliding forces above the holding force at rest."""
+    for name, x0, text in (
+        ("chattering", 0.2, "a condition of choose() changes again and again at t = 0.62831"),
+        ("slidingangle", 0.2, "F_f: the sliding force becomes negative at t = 0.183259571"),
+        ("holdingspeed", 0.14, "F_f: the sliding force exceeds the holding force at t = 0.31415"),
     ):
         with pytest.raises(FmpyError, match="failed with status 3"):
-            exchange(worker, built(name, kind), 1e-6)
+            exchange(worker, built(name, kind), 1e-6, x0)
         assert text in worker.read_stderr()
 
 
-def exchange(worker, fmu, rtol):
+def exchange(worker, fmu, rtol, x0=0.2):
     """Simulate with CVode."""
     options = {"output_interval": 0.02, "relative_tolerance": rtol, "record_events": False, "output": ["x", "v"]}
+    options["start_values"] = {"x0": x0}
     return worker.simulate_and_count(fmu, "ModelExchange", stop_time=STOP, **options)
