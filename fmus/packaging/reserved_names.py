@@ -1,7 +1,15 @@
 """Names reserved in C, and texts in source code of Python and C."""
 
 from json import dumps
+from re import sub
 
+INTEGER_TYPES = """
+    CHAR SCHAR UCHAR SHRT USHRT INT UINT LONG ULONG LLONG ULLONG SIZE WCHAR
+    PTRDIFF INTMAX UINTMAX INTPTR UINTPTR WINT SIG_ATOMIC SSIZE PATH
+    INT8 INT16 INT32 INT64 INT_FAST8 INT_FAST16 INT_FAST32 INT_FAST64 INT_LEAST8 INT_LEAST16 INT_LEAST32 INT_LEAST64
+    UINT8 UINT16 UINT32 UINT64 UINT_FAST8 UINT_FAST16 UINT_FAST32 UINT_FAST64
+    UINT_LEAST8 UINT_LEAST16 UINT_LEAST32 UINT_LEAST64
+""".split()  # noqa: SIM905
 C_NAMES = frozenset(
     """
     auto break case char const continue default do double else enum extern float for goto if inline int long register
@@ -15,35 +23,7 @@ C_NAMES = frozenset(
     W_OK X_OK M_1_PI M_2_PI M_2_SQRTPI M_E M_LN10 M_LN2 M_LOG10E M_LOG2E M_PI M_PI_2 M_PI_4 M_SQRT1_2 M_SQRT2
     CHAR_BIT NSIG SIGABRT SIGBREAK SIGFPE SIGILL SIGINT SIGSEGV SIGTERM SIG_DFL SIG_ERR SIG_IGN
     """.split()  # noqa: SIM905
-) | {
-    f"{type_name}_{bound}"
-    for bound in ("MAX", "MIN")
-    for type_name in (
-        *(
-            "CHAR",
-            "SCHAR",
-            "UCHAR",
-            "SHRT",
-            "USHRT",
-            "INT",
-            "UINT",
-            "LONG",
-            "ULONG",
-            "LLONG",
-            "ULLONG",
-            "SIZE",
-            "WCHAR",
-        ),
-        *("PTRDIFF", "INTMAX", "UINTMAX", "INTPTR", "UINTPTR", "WINT", "SIG_ATOMIC", "SSIZE", "PATH"),
-        *(
-            f"{sign}INT{size}{bits}"
-            for sign in ("", "U")
-            for size in ("", "_FAST", "_LEAST")
-            for bits in (8, 16, 32, 64)
-        ),
-    )
-}
-
+) | {f"{name}_{bound}" for name in INTEGER_TYPES for bound in ("MAX", "MIN")}
 
 FMI_PREFIXES = ("fmi2", "fmi3", "FMI2_", "FMI3_")  # of functions, types and macros of the FMI headers
 
@@ -65,4 +45,4 @@ def c_string_literal(text: str) -> str:
 
 def c_comment(text: str) -> str:
     """Return a text that can be part of a comment of C, without its delimiters and trigraphs."""
-    return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").replace("??", "? ?")
+    return sub(r"\?(?=\?)", "? ", text.replace("*/", "* /").replace("/*", "/ *"))

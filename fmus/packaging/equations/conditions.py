@@ -114,11 +114,10 @@ def is_decay(e: Operand) -> bool:
     if not (isinstance(e, Term) and e.op == "exp" and isinstance(e.args[0], Term)):
         return False
     exponent = e.args[0]
-    if (
-        exponent.op in "*/" and isinstance(exponent.args[0], Term) and exponent.args[0].op == "neg"
-    ):  # -x * x is (-x) * x
-        return is_nonnegative(Term(exponent.op, exponent.args[0].args[0], exponent.args[1]))
-    return exponent.op == "neg" and is_nonnegative(exponent.args[0])
+    first = exponent.args[0]
+    if exponent.op in ("*", "/") and isinstance(first, Term) and first.op == "neg":  # -x * x is (-x) * x
+        return is_nonnegative(Term(exponent.op, first.args[0], exponent.args[1]))
+    return exponent.op == "neg" and is_nonnegative(first)
 
 
 def is_positive_part(condition: Operand, case: Operand) -> bool:
