@@ -319,8 +319,7 @@ class CoupledFriction(DryFriction):
         for i in contact_indices:
             if status[i] != SLIPPING and modes[i] != STUCK:
                 trial_modes[i] = STUCK
-                violation, _next_modes = self.violations(t, y, trial_modes, status, tie_tolerance)
-                if max_of(violation) > 0.0:
+                if not self.are_consistent(t, y, trial_modes, status, tie_tolerance):
                     trial_modes[i] = modes[i]
         return trial_modes
 
@@ -347,8 +346,7 @@ class CoupledFriction(DryFriction):
                     if status[i] != SLIPPING and trial_modes[i] != STUCK:
                         n_sliding += 1
                 if n_sliding == n:
-                    violation, _next_modes = self.violations(t, y, trial_modes, status, tie_tolerance)
-                    if not max_of(violation) > 0.0:
+                    if self.are_consistent(t, y, trial_modes, status, tie_tolerance):
                         force, limit, _terms = self.contact_forces(t, y, trial_modes)
                         highest = 0.0
                         for i in contact_indices:
@@ -369,6 +367,11 @@ class CoupledFriction(DryFriction):
             if lowest < inf:
                 return best_modes, True
         return best_modes, False
+
+    def are_consistent(self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance):
+        """Return whether no contact at rest violates the conditions of its mode."""
+        violation, _next_modes = self.violations(t, y, modes, status, tie_tolerance)
+        return not max_of(violation) > 0.0
 
     def violations(
         self, t, y: StateVector, modes: ContactVector, status: ContactVector, tie_tolerance
