@@ -12,30 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import SceneError, unknown_name_message
+from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
 from .record import QUANTITIES, Record, check_record
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
 from .timestamps import parse_timestamps, undo_time_rounding
 from .units import COUNT_NAMES, TIMES, find_unit, parse_per_count, time_unit_size
 
-HEADING = re.compile(r"^\s*(.*?)\s*(?:[\[(]([^\[\]()]*(?:\([^()]*\))?)[\])])?\s*$")
-SLASH_HEADING = re.compile(r"^\s*(.*?)\s+(?:/|in)\s+(\S+)\s*$")
-BRACKET_HEADING = re.compile(r"^(.*?)\s*[\[(]([^\[\]()]+)[\])]\s*(.*)$")  # followed by a run, as in `x (mm) Run #1`
-TIME_NAME = re.compile(
-    r"^(t|times?|zeit|temps|tiempo|tid|timestamp|datetime|date|elapsed|seconds|epoch)(?![^\W_])|(time|zeit|stamp)$",
-    re.I,
-)
-DATE_NAME = re.compile(r"^(date|datum)\b", re.I)
 MAX_PLAUSIBLE_TIME = 1e11  # s: the year 5138
-QUANTITY_NAMES = (
-    re.compile(
-        r"^(x|y|z|s|theta|phi|pos|position|displacement|disp|angle|weg|winkel|laser|encoder|height|distance)\b", re.I
-    ),
-    re.compile(r"^(v|vel|velocity|speed|omega|gyro|gyroscope|rate)\b|velocity|gyroscope|speed", re.I),
-    re.compile(r"^(a|acc|accel|accelerometer|alpha|a[xyz])\b|acceleration|accelerometer|accel|^a_|^acc", re.I),
-)
 EXPONENT = re.compile("[dD](?=[-+0-9])")  # Fortran
-MAGNITUDE_NAME = re.compile(r"\b(abs|absolute|magnitude|norm)\b", re.I)  # of a vector; has no sign
 MAX_MISSING_SHARE = 0.2  # share of the samples
 RATE_SUFFIXES = ("", "/s", "/s2")  # appended to the unit of the position
 
@@ -151,28 +136,6 @@ def read_numeric(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
     return table.column_headings, np.column_stack([parse_numbers(table, i) for i in range(len(table.column_headings))])
 
 
-def split_heading(heading: str) -> tuple[str, str | None]:
-    """Return name and unit of a heading: x [mm], x / mm, x_mm, millis."""
-    match = HEADING.match(heading)
-    name, unit = (match[1], match[2]) if match else (heading, None)
-    if unit is None:
-        for match in (SLASH_HEADING.match(name), BRACKET_HEADING.match(name)):
-            if match and (find_unit(match[2]) or time_unit_size(match[2])):
-                return " ".join(filter(None, (match[1], *match.groups()[2:]))), match[2]
-        words = re.split(r"[ _,:]+|(?<=[a-z])(?=[A-Z])", name)
-        for i in range(1, len(words)):
-            stem, suffix = " ".join(words[:i]), "/".join(words[i:])
-            if (
-                time_unit_size(suffix)
-                if TIME_NAME.search(stem)
-                else len(suffix) > 1 and suffix.lower() != "in" and find_unit(suffix)
-            ):
-                return stem, suffix
-        if len(name) > 1 and name.lower() not in ("in", "min") and (time_unit_size(name) or find_unit(name)):
-            return name, name
-    return name, unit or None
-
-
 def find_column(heading: str, table: Table, candidates: Sequence[Column]) -> Column:
     """Return the column with a heading, given in full or without its unit."""
     for headings in (
@@ -229,11 +192,6 @@ def find_signal_column(
     liveliest = same_unit[int(np.argmax(deviations))]
     names = ", ".join(part.heading for part in same_unit)
     return liveliest, [f"Of {names} the one that varies most is used: {liveliest.heading}; --position selects another."]
-
-
-def order_from_name(name: str) -> int | None:
-    """Return the order of the derivative that a name indicates, or None."""
-    return next((order for order in (2, 1, 0) if QUANTITY_NAMES[order].search(name)), None)
 
 
 def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str) -> tuple[int, str, float, str]:

@@ -12,7 +12,8 @@ from decays import decay_record
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.errors import HarnessError, SceneError
-from harness.records.columns import ColumnOptions, read_record, split_heading
+from harness.records.columns import ColumnOptions, read_record
+from harness.records.headings import split_heading
 from harness.records.units import find_unit, time_unit_size
 
 T = np.arange(600) / 100

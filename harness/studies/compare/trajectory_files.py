@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import SceneError, first_line, format_value
-from ...records.columns import read_numeric, split_heading
+from ...records.columns import read_numeric
+from ...records.headings import split_heading
 from ...records.table_files import read_content
 from ...records.units import TIMES
 from ...running.external.sample_rows import element_names
