@@ -22,6 +22,7 @@ from .terminal import POSITIVE, Terminal, result_options
 @click.option("--per-count", metavar="SIZE", help="Size of one count: 0.36deg, 0.001mm, ...")
 @click.option("--time-unit", help="Unit of time, if the heading has none: ms, or 0.01s for sample numbers. Default: s.")
 @click.option("--columns", "names", metavar="NAMES", help="Headings, if the file has none: 't [s],x [mm]'.")
+@click.option("--rate", type=POSITIVE, metavar="HZ", help="Sampling rate in Hz, which replaces the times in the file.")
 @click.option("--from", "begin", type=click.FLOAT, default=float("-inf"), help="Ignore samples before this time in s.")
 @click.option("--until", "end", type=click.FLOAT, default=float("inf"), help="Ignore samples after this time in s.")
 @click.option("--k", type=POSITIVE, help="Stiffness in N/m or N.m/rad; required for the friction force.")
@@ -43,10 +44,10 @@ def decay(
 ) -> None:
     """Identify damping, dry friction and drag from a measured decay in FILE, or from a run of SCENE.
 
-    FILE is text with any delimiter, a spreadsheet (.xlsx, .ods), a .mat or .npz file; - reads standard input.  Names
-    and units are taken from headings such as "x [mm]" or "Gyroscope z (rad/s)"; the unit determines whether the column
-    is a position, a velocity or an acceleration.  The record may start and end at any time; noise, uneven sampling,
-    gaps and an offset are allowed.
+    FILE is text with any delimiter, a spreadsheet (.xlsx, .ods), a .mat, HDF5, .npy, .npz, Parquet or JSON file, or a
+    .zip archive with one table; - reads standard input.  Names and units are taken from headings such as "x [mm]" or
+    "Gyroscope z (rad/s)"; the unit determines whether the column is a position, a velocity or an acceleration.  The
+    record may start and end at any time; noise, uneven sampling, gaps and an offset are allowed.
 
     The results are zeta, r = f/k and b = q/m with 95 % confidence intervals.  Remarks point out doubtful results.  A
     record that is not the free decay of one oscillator is rejected.
@@ -70,6 +71,8 @@ def decay(
         if columns["position"] is not None or columns["quantity"] not in (None, "velocity"):
             raise click.UsageError("--velocity: only one column is fitted; omit --position and --quantity")
         columns |= {"position": velocity, "quantity": "velocity"}
+    if columns["rate"] is not None and (columns["time"] is not None or columns["time_unit"] is not None):
+        raise click.UsageError("--rate replaces the times in the file: omit --time and --time-unit")
     columns_spec, known = ColumnOptions(**columns), KnownParameters(k, m, pendulum)
     with decays.gc_paused(), terminal.progress(1) as report:
         progress = partial(report, "standard input" if source == "-" else source)

@@ -5,6 +5,7 @@ quantity follows from the unit, otherwise from the name. Options override both.
 """
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from ..errors import SceneError, unknown_name_message
 from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
+from .missing_values import mark_sentinels
 from .record import QUANTITIES, Record, check_record
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
@@ -22,6 +24,8 @@ from .units import COUNT_NAMES, TIMES, find_unit, parse_per_count, time_unit_siz
 MAX_PLAUSIBLE_TIME = 1e11  # s: the year 5138
 EXPONENT = re.compile("[dD](?=[-+0-9])")  # Fortran
 MAX_MISSING_SHARE = 0.2  # share of the samples
+NO_UNIT = "units"  # of a position without a unit
+EXAMPLE_UNITS = ("mm or deg", "mm/s or deg/s", "m/s2 or g")  # by the order of the derivative
 RATE_SUFFIXES = ("", "/s", "/s2")  # appended to the unit of the position
 
 
@@ -41,6 +45,8 @@ class ColumnOptions:
         Size and unit of one count of an encoder.
     names : str or None
         Headings, separated by commas, for a file without headings.
+    rate : float or None
+        Sampling rate in Hz, which replaces the times in the file.
     begin, end : float
         Time interval in s.
     """
@@ -52,6 +58,7 @@ class ColumnOptions:
     time_unit: str | None = None
     per_count: str | None = None
     names: str | None = None
+    rate: float | None = None
     begin: float = -np.inf
     end: float = np.inf
 
@@ -93,29 +100,38 @@ def read_record(source: str, columns: ColumnOptions, name: str) -> Record:
 
 def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     """Return the record in a table; raise SceneError if it contains none."""
-    if len(table.column_headings) < 2:
-        raise SceneError(f"{table.name} has only one column that is not empty; time and position are required")
-    if not any(table.column_headings):
-        raise SceneError(f"{table.name} has no heading; give the names of its columns, as in --columns 't [s],x [mm]'")
-    candidates = [
-        Column(index, heading, *split_heading(heading)) for index, heading in enumerate(table.column_headings)
-    ]
-    time_column = find_time_column(table, candidates, columns)
-    motion_column, notes = find_signal_column(table, candidates, columns, time_column)
+    notes = list(table.notes)
+    candidates = list_columns(table, notes)
+    time_column = None if columns.rate else find_time_column(table, candidates, columns)
+    if time_column is None and not (columns.rate or table.interval):
+        raise SceneError(no_time_message(table))
+    motion_column, choice = find_signal_column(table, candidates, columns, time_column)
+    notes += choice
+    if time_column is not None and columns.time is None:
+        notes += runs_side_by_side(candidates, time_column, motion_column)
     label, unit = motion_column.name or motion_column.heading, columns.unit or motion_column.unit
-    x = parse_numbers(table, motion_column.index)
+    x = parse_numbers(table, motion_column.index).copy()
     order, base, size, assumption = resolve_unit(label, unit, columns, table.name)
-    t = read_times(table, time_column, columns)
-    if columns.time is None and not (TIME_NAME.search(time_column.name) or time_column.unit):
-        notes.append(f"{time_column.heading} is used as time; --time selects another column.")
+    if time_column is None:
+        t = np.arange(len(x)) / columns.rate if columns.rate else np.arange(len(x)) * (table.interval or 0.0)
+        time_label = "the time"
+    else:
+        t, time_label = read_times(table, time_column, columns), time_column.heading
+        if columns.time is None and not (is_time_column(time_column) or notes):
+            notes.append(f"{time_column.heading} is used as time; --time selects another column.")
+    has_cell = np.isfinite(t) | np.isfinite(x)
+    length = int(np.flatnonzero(has_cell)[-1]) + 1 if has_cell.any() else 0  # a run beside it may be longer
+    t, x = t[:length], x[:length]
+    empty = int((~np.isfinite(t) | ~np.isfinite(x)).sum())
+    if empty:
+        notes.append(f"{empty} of {length} rows have a missing cell and are skipped.")
+    for values, column in ((t, time_label), (x, label)):
+        notes += mark_sentinels(values, column)
     is_complete = np.isfinite(t) & np.isfinite(x)
-    missing = int(len(t) - is_complete.sum())
-    if missing > MAX_MISSING_SHARE * len(t):
-        raise SceneError(
-            f"{table.name}: {missing} of {len(t)} rows have no number for {time_column.heading} or {label}"
-        )
-    if missing:
-        notes.append(f"{missing} of {len(t)} rows have a missing cell and are skipped.")
+    missing = int(length - is_complete.sum())
+    if missing > MAX_MISSING_SHARE * length or not length:
+        reason = "" if missing == empty else f": {notes[-1]}".rstrip(".")
+        raise SceneError(f"{table.name}: {missing} of {length} rows have no number for {time_label} or {label}{reason}")
     t, rounding = undo_time_rounding(t)
     notes += filter(None, (rounding, assumption))
     t, x = t[is_complete], size * x[is_complete]
@@ -124,6 +140,44 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     )
     check_record(record)
     return record
+
+
+def list_columns(table: Table, notes: list[str]) -> list[Column]:
+    """Return the columns of a table. Headings that occur twice are numbered; columns without any are named."""
+    headings = list(table.column_headings)
+    if not any(headings):
+        headings = [f"column {i}" for i in range(1, len(headings) + 1)]
+        if len(headings) > 1:
+            notes.append(
+                f"The file has no headings: its first column is used as time in s, and {headings[1]} as the signal; "
+                "--columns names them."
+            )
+    counts: Counter[str] = Counter()
+    candidates = []
+    for index, heading in enumerate(headings):
+        counts[heading] += 1
+        number = f" #{counts[heading]}" if heading and counts[heading] > 1 else ""
+        candidates.append(Column(index, heading + number, *split_heading(heading)))
+    return candidates
+
+
+def no_time_message(table: Table) -> str:
+    """Return the sentence about a table without a column of times."""
+    names = ", ".join(filter(None, table.column_headings))
+    if len(table.column_headings) == 1:
+        return (
+            f"{table.name} has one column of numbers{f', {names},' if names else ''} and no times: set the sampling "
+            "rate in Hz, as in --rate 100"
+        )
+    if not names:
+        return (
+            f"{table.name} has no heading; give the names of its columns, as in --columns 't [s],x [mm]', or the "
+            "sampling rate in Hz, as in --rate 100"
+        )
+    return (
+        f"{table.name} has no column of times (it has {names}): name it, as in --time {table.column_headings[0]!r}, or "
+        "set the sampling rate in Hz, as in --rate 100"
+    )
 
 
 def read_numeric(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
@@ -139,8 +193,8 @@ def read_numeric(path: Path) -> tuple[tuple[str, ...], np.ndarray]:
 def find_column(heading: str, table: Table, candidates: Sequence[Column]) -> Column:
     """Return the column with a heading, given in full or without its unit."""
     for headings in (
-        list(table.column_headings),
-        [text.strip() for text in table.column_headings],
+        [part.heading for part in candidates],
+        [part.heading.strip() for part in candidates],
         [part.name for part in candidates],
     ):
         for normalize in (str, str.lower):
@@ -149,22 +203,69 @@ def find_column(heading: str, table: Table, candidates: Sequence[Column]) -> Col
             ]
             if matches:
                 return matches[0]
-    raise SceneError(f"{table.name}: {unknown_name_message('column', heading, filter(None, table.column_headings))}")
+    names = filter(None, (part.heading for part in candidates))
+    raise SceneError(f"{table.name}: {unknown_name_message('column', heading, names)}")
 
 
-def find_time_column(table: Table, candidates: Sequence[Column], columns: ColumnOptions) -> Column:
-    """Return the requested time column; otherwise one that is named or measured as a time; otherwise the first."""
+def find_time_column(table: Table, candidates: Sequence[Column], columns: ColumnOptions) -> Column | None:
+    """Return the requested time column; otherwise the one named or measured as a time, or the first if it rises.
+
+    Of several, it is the nearest one before the requested signal, or the first.  None if the table has no times.
+    """
     if columns.time is not None:
         return find_column(columns.time, table, candidates)
+    timed = find_time_columns(candidates)
+    if timed:
+        signal = None if columns.position is None else find_column(columns.position, table, candidates)
+        return next((part for part in reversed(timed) if signal and part.index < signal.index), timed[0])
+    first = next((part for part in candidates if part.heading), None)
+    if first is None or len(candidates) < 2 or (first.unit and find_unit(first.unit)):
+        return None
+    cells = table.columns[first.index]
+    if isinstance(cells, list) and any(TIMESTAMP.match(cell) and ":" in cell for cell in cells[:1]):
+        return first
+    t = parse_numbers(table, first.index, strict=False)
+    t = t[np.isfinite(t)]
+    if len(t) < 2 or (np.diff(t) <= 0).any():
+        return None
+    has_no_heading = not any(table.column_headings)
+    return None if has_no_heading and columns.time_unit is None and (t == np.round(t)).all() else first
+
+
+def find_time_columns(candidates: Sequence[Column]) -> list[Column]:
+    """Return the columns that are named and measured as a time, or else named, or else measured as one."""
     by_name = [part for part in candidates if TIME_NAME.search(part.name)]
     by_name = [part for part in by_name if not DATE_NAME.search(part.name)] or by_name
     by_unit = [part for part in candidates if part.unit and time_unit_size(part.unit) and find_unit(part.unit) is None]
-    both = [part for part in by_name if part in by_unit]
-    return (both or by_name or by_unit or [part for part in candidates if part.heading])[0]
+    return [part for part in by_name if part in by_unit] or by_name or by_unit
+
+
+def is_time_column(column: Column) -> bool:
+    """Return whether a column is named as a time or has a unit."""
+    return bool(TIME_NAME.search(column.name) or column.unit)
+
+
+def runs_side_by_side(candidates: Sequence[Column], time_column: Column, motion_column: Column) -> list[str]:
+    """Return a note if the table has several columns of times, each with signals after it."""
+    timed = find_time_columns(candidates)
+    ends = [*(part.index for part in timed[1:]), len(candidates)][: len(timed)]
+    runs = [
+        (part, candidates[part.index + 1])
+        for part, end in zip(timed, ends, strict=True)
+        if end > part.index + 1 and candidates[part.index + 1].heading
+    ]
+    others = [f"{part.heading} with {signal.heading}" for part, signal in runs if part is not time_column]
+    if not others:
+        return []
+    selected = next(part for part, _ in runs if part is not time_column)
+    return [
+        f"The table has {len(others) + 1} runs side by side: {time_column.heading} with {motion_column.heading} is "
+        f"used, beside {', '.join(others)}; --time '{selected.heading}' selects another."
+    ]
 
 
 def find_signal_column(
-    table: Table, candidates: Sequence[Column], columns: ColumnOptions, time_column: Column
+    table: Table, candidates: Sequence[Column], columns: ColumnOptions, time_column: Column | None
 ) -> tuple[Column, list[str]]:
     """Return the motion column and notes on the choice.
 
@@ -174,9 +275,10 @@ def find_signal_column(
         return find_column(columns.position, table, candidates), []
     others = [part for part in candidates if part is not time_column]
     others = [part for part in others if part.heading and not TIME_NAME.search(part.name)] or others
-    next_times = (part.index for part in candidates[time_column.index + 1 :] if TIME_NAME.search(part.name))
-    next_time = next(next_times, len(candidates))  # with several runs side by side, use that of this time column
-    others = [part for part in others if time_column.index < part.index < next_time] or others
+    if time_column is not None:
+        next_times = (part.index for part in candidates[time_column.index + 1 :] if TIME_NAME.search(part.name))
+        next_time = next(next_times, len(candidates))  # with several runs side by side, use that of this time column
+        others = [part for part in others if time_column.index < part.index < next_time] or others
     if columns.quantity is not None:
         order: int | None = QUANTITIES.index(columns.quantity)
     else:
@@ -201,11 +303,14 @@ def resolve_unit(name: str, unit: str | None, columns: ColumnOptions, file: str)
     if columns.per_count is not None:
         size, unit = parse_per_count(columns.per_count)
     if unit is None:
-        hint = {None: "--unit mm or deg", 0: "--unit mm or deg", 1: "--unit mm/s or deg/s", 2: "--unit m/s2 or g"}
-        raise SceneError(
-            f"{name} has no unit in the heading of {file}; set it, as in "
-            f"{hint[order_of_name if requested is None else requested]}"
+        order = requested if requested is not None else order_of_name or 0
+        note = (
+            f"{name} has no unit in {file}: omega and zeta need none, the other values are in its own units, and "
+            f"forces are left out; set it, as in --unit {EXAMPLE_UNITS[order]}."
         )
+        if requested is None and order_of_name is None:
+            note += f" {name} is assumed to be a position; --quantity velocity or acceleration overrides this."
+        return order, NO_UNIT, size, note
     if unit.lower() in COUNT_NAMES:
         raise SceneError(f"{name} is in {unit}; set the size of one count, as in --per-count 0.36deg or 0.001mm")
     known_unit = find_unit(unit)

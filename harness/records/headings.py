@@ -41,7 +41,7 @@ def split_heading(heading: str) -> tuple[str, str | None]:
         return " ".join(filter(None, around)), bracketed[1]
     words = WORD_BOUNDARY.split(name)
     for i in range(max(len(words) - MAX_UNIT_WORDS, 1), len(words)):
-        stem, suffix = " ".join(words[:i]), "/".join(words[i:])
+        stem, suffix = " ".join(words[:i]).strip(), "/".join(words[i:])
         if (
             time_unit_size(suffix)
             if TIME_NAME.search(stem)

@@ -1,12 +1,14 @@
-"""Reads tables from files: text, spreadsheets (.xlsx, .xls, .ods), MATLAB .mat, numpy .npz, or any of them gzipped.
+"""Reads tables from files: text, spreadsheets (.xlsx, .xls, .ods), MATLAB .mat, HDF5, numpy .npy and .npz, Parquet,
+JSON, or any of them gzipped or alone in a .zip archive.
 
 The format is detected from the first bytes, so standard input works for all of them.
 """
 
-import gzip
 import io
+import re
 import sys
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -15,20 +17,37 @@ from zipfile import ZipFile
 import numpy as np
 
 from ..errors import HarnessError, SceneError, first_line, format_value
-from . import text_table
+from . import array_files, text_table
+from .size_limits import check_size, check_zip, unpack_gzip
+from .workbook import read_workbook
 
+TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
 INSTALL_COMMAND = "python -m pip install 'friction-fmus[records]'"
 Cells = list[Any] | np.ndarray
 
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of a file with their headings, which may be empty; `line` is the line number before the first row."""
+    """Columns of a file.
+
+    Attributes
+    ----------
+    column_headings : tuple of str
+        May be empty texts.
+    line : int
+        Line number before the first row.
+    interval : float or None
+        Sampling interval in s, if the file has one and no times.
+    notes : tuple of str
+        What was chosen when reading.
+    """
 
     name: str
     column_headings: tuple[str, ...]
     columns: tuple[Cells, ...]
     line: int = 0
+    interval: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 def load_table(source: str, headings: str | None = None) -> Table:
@@ -66,7 +85,7 @@ def load_table(source: str, headings: str | None = None) -> Table:
         raise SceneError(
             f"--columns names {len(names)} columns, and {name} has {len(table.columns)} that are not empty"
         )
-    return Table(name, names, table.columns, table.line)
+    return replace(table, column_headings=names)
 
 
 def read_content(path: Path) -> bytes:
@@ -85,23 +104,50 @@ def read_content(path: Path) -> bytes:
 def parse_table_file(data: bytes, name: str) -> Table:
     """Parse a table in any format."""
     if data.startswith(b"\x1f\x8b"):
-        return parse_table_file(gzip.decompress(data), name)
-    if data.startswith(b"PK"):
+        data = unpack_gzip(data, name)
+    if data.startswith(b"PK") and b".npy" not in data[:200]:
         with ZipFile(io.BytesIO(data)) as archive:
-            tables = [member for member in archive.namelist() if member.lower().endswith((".csv", ".tsv", ".txt"))]
-        if tables:
-            raise SceneError(
-                f"{name} is an archive: unpack it and specify a file in it, as in {format_value(tables[0])}"
-            )
-        return table_from_arrays(read_npz(data), name) if b".npy" in data[:200] else read_workbook(data, name)
-    if data.startswith(b"\xd0\xcf\x11\xe0"):
-        return read_workbook(data, name)
-    if data.startswith((b"MATLAB 7.3", b"\x89HDF")):
-        return table_from_arrays(read_hdf5(data), name)
-    if data.startswith(b"MATLAB 5.0"):
-        return table_from_arrays(read_mat(data), name)
-    heads, rows, line = text_table.parse_text_table(data, name)
-    return table_from_rows(heads, rows, line, name)
+            check_zip(archive, name)
+            member = find_member(archive.namelist(), name)
+            data = data if member is None else archive.read(member)
+    if data.startswith((b"PK", b"\xd0\xcf\x11\xe0")) and b".npy" not in data[:200]:
+        headings, rows, line, sheets = read_workbook(data, name)
+        others = f"{name} has a table in several sheets ({', '.join(sheets)}): the longest is used."
+        return replace(table_from_rows(headings, rows, line, name), notes=(others,) if len(sheets) > 1 else ())
+    for magics, read in ARRAY_READERS:
+        if data.startswith(magics):
+            return table_from_arrays(read(data, name), name)
+    if data.lstrip()[:1] in (b"{", b"["):
+        arrays = array_files.read_json(text_table.decode_text(data, name))
+        if arrays is not None:
+            return table_from_arrays(arrays, name)
+    headings, rows, line, interval = text_table.parse_text_table(data, name)
+    return replace(table_from_rows(headings, rows, line, name), interval=interval)
+
+
+ARRAY_READERS: tuple[tuple[tuple[bytes, ...], Callable[[bytes, str], dict[str, Any]]], ...] = (
+    ((b"\x93NUMPY",), array_files.read_npy),
+    ((b"PK",), array_files.read_npz),
+    ((b"\x89HDF",), array_files.read_hdf5),
+    ((b"MATLAB",), array_files.read_mat),
+    ((b"PAR1",), array_files.read_parquet),
+)
+
+
+def find_member(names: list[str], name: str) -> str | None:
+    """Return the only table in a .zip archive, or its raw data as phyphox names them; None if it is a workbook."""
+    if any(member in ("[Content_Types].xml", "mimetype") for member in names):
+        return None
+    is_description = re.compile(r"(^|/)(meta|__MACOSX)/", re.I)
+    tables = [
+        member for member in names if member.lower().endswith(TEXT_SUFFIXES) and not is_description.search(member)
+    ]
+    raw = [member for member in tables if Path(member).stem.lower() == "raw data"]
+    if len(tables) != 1 and len(raw) != 1:
+        listed = f"with {len(tables)} tables ({', '.join(tables[:5])})" if tables else "without a table (.csv, .txt)"
+        example = f": unpack it and specify a file in it, as in {format_value(tables[0])}" if tables else ""
+        raise SceneError(f"{name} is an archive {listed}{example}")
+    return tables[0] if len(tables) == 1 else raw[0]
 
 
 def table_from_rows(headings: list[str], rows: list[list[Any]], line: int, name: str) -> Table:
@@ -113,84 +159,25 @@ def table_from_rows(headings: list[str], rows: list[list[Any]], line: int, name:
     columns = zip(*(row if len(row) == width else [*row, *[""] * width][:width] for row in rows), strict=True)
     headings = [*headings, *[""] * (width - len(headings))]
     middle = slice(len(rows) // 2, len(rows) // 2 + text_table.SAMPLE_LINES)
-    columns_with_headings = [(h, list(c)) for h, c in zip(headings, columns, strict=True) if any(c if h else c[middle])]
-    return Table(
-        name, tuple(head for head, _ in columns_with_headings), tuple(cells for _, cells in columns_with_headings), line
-    )
-
-
-def read_workbook(data: bytes, name: str) -> Table:
-    """Return the longest table in the sheets of a workbook."""
-    from python_calamine import CalamineWorkbook
-
-    workbook = CalamineWorkbook.from_filelike(io.BytesIO(data))
-    candidates = []
-    for sheet_name in workbook.sheet_names:
-        rows = [[str(cell).strip() for cell in row] for row in workbook.get_sheet_by_name(sheet_name).to_python()]
-        first_row = text_table.find_first_number_row(rows)
-        if first_row is not None:
-            candidates.append((rows, first_row))
-    if not candidates:
-        raise SceneError(f"{name} has no sheet with a heading and rows of numbers")
-    rows, first_row = max(candidates, key=lambda sheet_name: len(sheet_name[0]) - sheet_name[1])
-    return table_from_rows(
-        text_table.find_headings(rows[:first_row], len(rows[first_row])), rows[first_row:], first_row, name
-    )
-
-
-def read_npz(data: bytes) -> dict[str, Any]:
-    """Return the arrays of a .npz file."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-        return {name: archive[name] for name in archive.files}
-
-
-def read_mat(data: bytes) -> dict[str, Any]:
-    """Return the variables of a .mat file up to version 7.2."""
-    from scipy.io import loadmat
-
-    return {key: value for key, value in loadmat(io.BytesIO(data), simplify_cells=True).items() if key[:2] != "__"}
-
-
-def read_hdf5(data: bytes) -> dict[str, Any]:
-    """Return the numeric data sets of an HDF5 file, such as a .mat file of version 7.3."""
-    import h5py
-
-    datasets: dict[str, Any] = {}
-
-    def visit(path: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu" and not path.startswith("#"):
-            datasets[path.replace("/", ".")] = item[()]
-
-    with h5py.File(io.BytesIO(data), "r") as file:
-        file.visititems(visit)
-    return datasets
+    used = [
+        text_table.separate_units(heading, cells)
+        for heading, cells in zip(headings, columns, strict=True)
+        if any(cells if heading else cells[middle])
+    ]
+    return Table(name, tuple(heading for heading, _ in used), tuple(cells for _, cells in used), line)
 
 
 def table_from_arrays(arrays: dict[str, Any], name: str) -> Table:
     """Return a table from named arrays: vectors and columns of matrices with the most frequent length."""
-    columns: list[tuple[str, np.ndarray]] = []
-    for key, value in flatten_arrays(arrays):
-        if value.ndim == 1 or min(value.shape) == 1:
-            columns.append((key, value.ravel()))
-        elif value.ndim == 2:
-            matrix = value if value.shape[0] >= value.shape[1] else value.T
-            columns += [(f"{key}{i + 1}", matrix[:, i]) for i in range(matrix.shape[1])]
-    lengths = [len(values) for _, values in columns if len(values) > 2]
+    columns = array_files.list_columns(arrays)
+    check_size(8.0 * sum(len(column.values) for column in columns), name)
+    lengths = [len(column.values) for column in columns if len(column.values) > 2]
     length = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
-    selected = [(key, values) for key, values in columns if len(values) == length]
-    if len(selected) < 2:
-        raise SceneError(
-            f"{name} has no two arrays of equal length; time and position are required (it has {', '.join(arrays)})"
-        )
-    return Table(name, tuple(key for key, _ in selected), tuple(values for _, values in selected))
-
-
-def flatten_arrays(values: dict[str, Any], prefix: str = "") -> list[tuple[str, np.ndarray]]:
-    """Return numeric arrays by name, those in structures as structure.field."""
-    arrays = []
-    for key, value in values.items():
-        if isinstance(value, dict):
-            arrays += flatten_arrays(value, f"{prefix}{key}.")
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and 1 <= value.ndim <= 2 and value.size:
-            arrays.append((prefix + key, value.astype(float)))
-    return arrays
+    selected = [column for column in columns if len(column.values) == length]
+    if not selected:
+        raise SceneError(f"{name} has no array of numbers (it has {', '.join(filter(None, arrays)) or 'none'})")
+    parents = {column.name.rpartition(".")[0] for column in selected}
+    prefix = f"{parents.pop()}." if len(parents) == 1 else ""
+    return Table(
+        name, tuple(column.heading(prefix) for column in selected), tuple(column.values for column in selected)
+    )

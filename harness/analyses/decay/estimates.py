@@ -125,9 +125,10 @@ def force_estimates(
 ) -> tuple[Estimate, ...]:
     """Return friction force, damping and drag constants if k or m is known.
 
-    f = k r, c = 2 zeta k/omega, q = b k/omega^2, for the `estimates` of r, zeta and b that are there.
+    f = k r, c = 2 zeta k/omega, q = b k/omega^2, for the `estimates` of r, zeta and b that are there, if the position
+    is in m or rad.
     """
-    if parameters.k is None and parameters.m is None:
+    if (parameters.k is None and parameters.m is None) or record.base not in ("m", "rad"):
         return ()
     omega_error = omega.error / omega.value
     k, k_error = (parameters.k, 0.0) if parameters.k is not None else (parameters.m * omega.value**2, 2 * omega_error)  # type: ignore[operator]

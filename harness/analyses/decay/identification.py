@@ -193,6 +193,11 @@ def identify_record(
     reported = select_reported_law(laws, full, problem)
     estimates = make_estimates(record, problem, reported, full, uncertainty, parameters)
     remarks = [*record.notes, *free_motion.notes, *make_remarks(record, problem, laws, full, uncertainty)]
+    if record.base not in ("m", "rad") and (parameters.k or parameters.m):
+        remarks.append(
+            f"The forces f, c and q need a position in m or rad, and that of {record.name} is in {record.base}: "
+            "they are left out; --unit sets the unit."
+        )
     if uncertainty.is_correlated and uncertainty.rms > ROUGH * problem.noise:
         estimates, disagreements = compare_halves(problem, full, estimates)
         remarks += disagreements
