@@ -16,6 +16,7 @@ from ..errors import SceneError, unknown_name_message
 from .headings import DATE_NAME, MAGNITUDE_NAME, TIME_NAME, order_from_name, split_heading
 from .missing_values import mark_sentinels
 from .record import QUANTITIES, Record, check_record
+from .saturation import leave_out_saturated
 from .table_files import Cells, Table, load_table
 from .text_table import GROUPED_NUMBER, MISSING, TIMESTAMP
 from .timestamps import parse_timestamps, undo_time_rounding
@@ -138,6 +139,7 @@ def parse_record(table: Table, columns: ColumnOptions, name: str) -> Record:
     record = Record(name, t, x, base + RATE_SUFFIXES[order], order, base, tuple(notes)).select(
         columns.begin, columns.end
     )
+    record = leave_out_saturated(record)
     check_record(record)
     return record
 

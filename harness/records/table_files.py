@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import HarnessError, SceneError, first_line, format_value
 from . import array_files, text_table
-from .size_limits import check_size, check_zip, unpack_gzip
+from .size_limits import check_zip, unpack_gzip
 from .workbook import read_workbook
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
@@ -170,7 +170,6 @@ def table_from_rows(headings: list[str], rows: list[list[Any]], line: int, name:
 def table_from_arrays(arrays: dict[str, Any], name: str) -> Table:
     """Return a table from named arrays: vectors and columns of matrices with the most frequent length."""
     columns = array_files.list_columns(arrays)
-    check_size(8.0 * sum(len(column.values) for column in columns), name)
     lengths = [len(column.values) for column in columns if len(column.values) > 2]
     length = max(lengths, key=lambda n: (lengths.count(n), n), default=0)
     selected = [column for column in columns if len(column.values) == length]

@@ -1,0 +1,116 @@
+"""Samples that are no measurements are named and left out: marks of missing samples, and a saturated sensor."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from decays import decay_record, random_record
+
+from harness.analyses.decay.estimates import KnownParameters
+from harness.analyses.decay.identification import fit_decay
+from harness.errors import SceneError
+from harness.records.columns import ColumnOptions, read_record
+from harness.records.missing_values import mark_sentinels
+from harness.records.saturation import leave_out_saturated
+
+T = np.linspace(0.0, 12.0, 2401)
+ZETA = 0.0119
+
+
+def swing(**options):
+    return decay_record(ZETA, a=0.06, turn=0.0, rest=0.0, t=T, noise=2e-4, **options)
+
+
+def read(folder, t, x):
+    path = folder / "record.csv"
+    rows = (f"{a:.6f},{b:.7g}" for a, b in zip(t, x, strict=True))
+    path.write_text("t [s],x [mm]\n" + "\n".join(rows))
+    return read_record(str(path), ColumnOptions(), "record")
+
+
+def zeta(record):
+    return fit_decay(record, KnownParameters(), drag=False)["zeta"].value
+
+
+@pytest.mark.parametrize("mark", [-9999.0, 9999.0, -32768.0, 1e30])
+def test_marks_of_missing_samples_are_named_and_left_out(tmp_path, mark):
+    x = 1e3 * swing().x
+    missing = np.random.default_rng(2).choice(len(x), len(x) // 100, replace=False)
+    x[missing] = mark
+    record = read(tmp_path, T, x)
+    assert f"24 of 2401 values of x are {mark:.15g}, far from all others" in record.notes[0]
+    assert len(record.t) == len(x) - len(missing)
+    fit = fit_decay(record, KnownParameters(), drag=False)
+    assert fit["zeta"].value == pytest.approx(ZETA, rel=0.02)
+    assert len(fit.t) > 0.98 * len(record.t)
+
+
+def test_two_marks_and_a_mark_among_the_times_are_left_out(tmp_path):
+    x, t = 1e3 * swing().x, T.copy()
+    x[100:110], x[500:505], t[[700, 900]] = -9999, 32767, -9999
+    record = read(tmp_path, t, x)
+    assert len(record.t) == len(x) - 17
+    assert [note.split(",")[0] for note in record.notes] == [
+        "2 of 2401 values of t [s] are -9999",
+        "5 of 2401 values of x are 32767",
+        "10 of 2401 values of x are -9999",
+    ]
+
+
+def test_a_single_mark_is_recognised_by_its_nines():
+    signal = np.sin(np.arange(100.0))
+    for value, is_mark in ((-999.0, True), (999.9, True), (99.0, False), (500.0, False)):
+        values = np.append(signal, value)
+        assert bool(mark_sentinels(values, "x")) == is_mark
+        assert np.isnan(values[-1]) == is_mark
+
+
+def test_too_many_marks_are_refused_by_name(tmp_path):
+    x = 1e3 * swing().x
+    x[::3] = -9999
+    with pytest.raises(SceneError, match=r"801 of 2401 rows have no number for t \[s\] or x: 801 of .* are -9999"):
+        read(tmp_path, T, x)
+
+
+@pytest.mark.parametrize("values", [[0.0, 1.0] * 20, [0.0, 1.0, 2.0] * 20, [5.0] * 30, [np.nan] * 20, []])
+def test_coarse_values_are_no_marks(values):
+    assert mark_sentinels(np.array(values), "x") == []
+
+
+def test_values_far_from_the_rest_only_as_the_rest_is_wide_are_no_marks():
+    """Released from a displacement at which it was held, as long as all that follows is wide."""
+    values = np.concatenate([np.full(50, 2.0), np.sin(np.arange(200.0))])
+    assert mark_sentinels(values, "x") == []
+
+
+@pytest.mark.parametrize("level", [0.8, 0.6, 0.4])
+@pytest.mark.parametrize("sides", [1, 2])
+def test_a_saturated_sensor_is_named_and_does_not_change_the_damping(tmp_path, level, sides):
+    x = np.minimum(1e3 * swing().x, 60 * level)
+    x = np.maximum(x, -60 * level) if sides == 2 else x
+    record = read(tmp_path, T, x)
+    levels = f"{0.06 * level:g} or {-0.06 * level:g} m" if sides == 2 else f"{0.06 * level:g} m"
+    assert f"are exactly {levels}. They are left out" in record.notes[-1]
+    assert np.abs(record.x).max() < 0.06 * level or sides == 1
+    assert zeta(record) == pytest.approx(ZETA, rel=0.03)
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_a_rounded_or_held_motion_is_not_saturated(order):
+    rng = np.random.default_rng(order)
+    for seed in range(60):
+        step = 0.2 / rng.integers(3, 300)
+        noise, turn = step * rng.choice([0, 0.1, 0.5]), rng.choice([0.0, 1.0])
+        damping, times = 10 ** rng.uniform(-4, -1.3), np.linspace(0, rng.uniform(2, 40), 1000)
+        record = decay_record(damping, a=0.1, step=step, t=times, turn=turn, noise=noise, seed=seed, order=order)
+        assert leave_out_saturated(record) is record
+        record = random_record(seed, order=order)[0]
+        assert leave_out_saturated(record) is record
+
+
+def test_the_largest_value_of_one_peak_or_of_no_motion_is_not_saturation():
+    record = swing()
+    held = replace(record, x=np.concatenate([np.full(400, record.x.max()), record.x[:-400]]))
+    assert leave_out_saturated(held) is held
+    still = replace(record, x=np.ones_like(record.x))
+    assert leave_out_saturated(still) is still

@@ -1,0 +1,145 @@
+"""A file that unpacks to too much, or describes too much, is refused by a message."""
+
+import gzip
+import io
+import json
+import struct
+import subprocess
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import commands
+import numpy as np
+import pytest
+import record_formats
+
+from harness.errors import HarnessError, SceneError
+from harness.records import size_limits, workbook
+from harness.records.columns import ColumnOptions, read_record
+
+LIMIT = 100_000  # bytes, for these tests
+
+
+def zipped(data):
+    """Return an archive with each member deflated."""
+    file = io.BytesIO()
+    with ZipFile(io.BytesIO(data)) as source, ZipFile(file, "w", ZIP_DEFLATED) as target:
+        for name in source.namelist():
+            target.writestr(name, source.read(name))
+    return file.getvalue()
+
+
+def compressed_hdf5():
+    h5py = pytest.importorskip("h5py", reason="extra records")
+    file = io.BytesIO()
+    with h5py.File(file, "w") as data:
+        data.create_dataset("t", (1_000_000,), "f8", chunks=(10_000,), compression="gzip")
+        data.create_dataset("x", (1_000_000,), "f8", chunks=(10_000,), compression="gzip")
+    return file.getvalue()
+
+
+def compressed_mat():
+    from scipy.io import savemat
+
+    file = io.BytesIO()
+    savemat(file, {"t": np.zeros(50_000), "x": np.zeros(50_000)}, do_compression=True)
+    return file.getvalue()
+
+
+def compressed_parquet():
+    pyarrow = pytest.importorskip("pyarrow", reason="extra records")
+    from pyarrow import parquet
+
+    file = io.BytesIO()
+    parquet.write_table(pyarrow.table([np.zeros(50_000), np.zeros(50_000)], names=["t", "x"]), file)
+    return file.getvalue()
+
+
+def wide_sheet():
+    return record_formats.xlsx(["t [s]", *range(3000)], ["x [mm]", *range(3000)])
+
+
+BOMBS = {
+    "record.csv.gz": lambda: gzip.compress(b"t [s],x [mm]\n" + b"0.1,0.2\n" * 20_000),
+    "record.npz": lambda: zipped(record_formats.npz(t=np.zeros(50_000), x=np.zeros(50_000))),
+    "record.h5": compressed_hdf5,
+    "record.mat": compressed_mat,
+    "record.parquet": compressed_parquet,
+    "record.xlsx": lambda: zipped(wide_sheet()),
+    "phyphox.zip": lambda: zipped(record_formats.archive(Raw_Data="t [s],x [mm]\n" + "0.1,0.2\n" * 20_000)),
+}
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_a_compressed_file_has_a_limit(tmp_path, monkeypatch, name):
+    (tmp_path / name).write_bytes(BOMBS[name]())
+    assert (tmp_path / name).stat().st_size < LIMIT
+    monkeypatch.setattr(size_limits, "MAX_UNPACKED", LIMIT)
+    with pytest.raises(SceneError, match=rf"{name} unpacks to more than .* MB, too much for a record"):
+        read_record(str(tmp_path / name), ColumnOptions(), "record")
+
+
+def test_the_limit_is_that_of_the_whole_file(monkeypatch):
+    """Each of the two compressed elements is below the limit."""
+    data = compressed_mat()
+    monkeypatch.setattr(size_limits, "MAX_UNPACKED", 800_000)
+    with pytest.raises(SceneError):
+        size_limits.check_mat(data, "record.mat")
+    monkeypatch.setattr(size_limits, "MAX_UNPACKED", 900_000)
+    size_limits.check_mat(data, "record.mat")
+
+
+def test_a_cell_far_from_the_table_does_not_end_the_command(tmp_path):
+    """In the last row and column of a sheet, it makes the reader allocate 549 GB, which ends its process."""
+    openpyxl = pytest.importorskip("openpyxl", reason="only tests write spreadsheets")
+    book = openpyxl.load_workbook(io.BytesIO(record_formats.xlsx(["t [s]", *range(50)], ["x [mm]", *range(50)])))
+    book.active["XFD1048576"] = 1
+    book.save(tmp_path / "far.xlsx")
+    done = commands.harness(tmp_path, "decay", "far.xlsx")
+    assert done.returncode == 2
+    assert "far.xlsx cannot be read, or not with 4 GB of memory: delete cells far from its table" in done.stderr
+    assert len(done.stderr.splitlines()) <= 3
+
+
+def test_a_workbook_that_takes_too_long_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(workbook, "TIMEOUT", 0.0)
+    with pytest.raises(SceneError, match="book takes longer than 0 s to read"):
+        workbook.read_workbook(wide_sheet(), "book")
+
+
+def test_the_memory_of_the_reader_is_limited():
+    resource = pytest.importorskip("resource", reason="a module of POSIX")
+    code = f"from {workbook.__name__} import limit_memory; limit_memory(); import resource as r; print(*r.getrlimit(9))"
+    assert resource.RLIMIT_AS == 9
+    done = subprocess.run([commands.sys.executable, "-c", code], capture_output=True, text=True, cwd=commands.ROOT)
+    assert done.stdout.split() == [str(workbook.MAX_MEMORY)] * 2
+
+
+@pytest.mark.parametrize("name", ["record.npy", "record.npz"])
+def test_an_array_of_a_size_that_the_file_does_not_have_is_refused(tmp_path, name):
+    """The header claims 8 TB."""
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }".ljust(117) + b"\n"
+    array = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header + bytes(800)
+    file = io.BytesIO()
+    with ZipFile(file, "w") as archive:
+        archive.writestr("t.npy", array)
+    (tmp_path / name).write_bytes(array if name.endswith("npy") else file.getvalue())
+    with pytest.raises(SceneError, match=rf"{name} cannot be read"):
+        read_record(str(tmp_path / name), ColumnOptions(), "record")
+
+
+def test_a_file_with_too_many_lines_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("harness.records.text_table.MAX_LINES", 100)
+    (tmp_path / "long.csv").write_text("t [s],x [mm]\n" + "1.5,2\n" * 100)
+    with pytest.raises(SceneError, match=r"long.csv has 101 lines, and a record at most 100"):
+        read_record(str(tmp_path / "long.csv"), ColumnOptions(), "record")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[" * 100_000, '{"a":' * 100_000, json.dumps({"t": [1, 2], "x": [[[1]]]}), "[]", "{}", "[1, {}]", "[[1, 2], [3]]"],
+)
+def test_json_without_a_record_is_refused_in_one_sentence(tmp_path, text):
+    (tmp_path / "record.json").write_text(text)
+    with pytest.raises(HarnessError) as refusal:
+        read_record(str(tmp_path / "record.json"), ColumnOptions(), "record")
+    assert "\n" not in str(refusal.value)
