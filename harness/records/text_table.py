@@ -248,7 +248,7 @@ def has_bracketed_unit(heading: str) -> bool:
 
 def looks_like_unit(cell: str) -> bool:
     """Return whether a cell below a heading is a unit: in brackets, known, or empty."""
-    bracketed = cell.strip("[]() ") != cell
+    bracketed = cell.startswith(("[", "(")) and cell.endswith(("]", ")"))
     return bracketed or not cell or is_unit(cell) or cell in (*COUNT_NAMES, "V", "mV", "N", "A", "1")
 
 

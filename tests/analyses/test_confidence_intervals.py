@@ -6,7 +6,7 @@ from scipy.stats import norm
 from scipy.stats import t as student_t
 
 from harness.analyses.decay.intervals import student_t_quantile
-from harness.analyses.decay.nonnegative_intervals import nonnegative_interval
+from harness.analyses.decay.nonnegative_intervals import N_DRAWS, nonnegative_interval, quasirandom_normal
 
 
 def test_nonnegative_intervals_cover_95_percent():
@@ -54,3 +54,15 @@ def test_an_interval_is_continuous_in_the_correlation(rho):
 def test_student_t_quantiles_agree_with_scipy():
     freedom = range(1, 200)
     assert [student_t_quantile(n) for n in freedom] == pytest.approx(student_t.ppf(0.975, list(freedom)), rel=3e-4)
+
+
+def test_the_draws_are_those_of_the_additive_recurrence_of_roberts():
+    """Its generator is the root of g^(k + 1) = g + 1; the draws begin with its first multiple and fill the interval."""
+    for k in (1, 2, 3):
+        g = max(root.real for root in np.roots([1, *[0] * (k - 1), -1, -1]) if abs(root.imag) < 1e-12)
+        uniform = norm.cdf(quasirandom_normal(k))
+        assert uniform.shape == (k, N_DRAWS)
+        for i, row in enumerate(uniform, 1):
+            assert row[0] == pytest.approx((0.5 + g**-i) % 1, abs=1e-12)
+            assert row[-1] == pytest.approx((0.5 + N_DRAWS * g**-i) % 1, abs=1e-9)
+            assert np.abs(np.sort(row) - (np.arange(N_DRAWS) + 0.5) / N_DRAWS).max() < 10 / N_DRAWS

@@ -8,6 +8,7 @@ from harness.analyses.decay.decrement import damping_ratio, friction_from_envelo
 from harness.analyses.decay.estimates import KnownParameters
 from harness.analyses.decay.identification import fit_decay
 from harness.analyses.decay.law import TERMS
+from harness.analyses.decay.noise import find_reversals
 
 
 @pytest.mark.parametrize(("sine", "a"), [(False, 0.1), (True, 0.1), (True, 2.0)])
@@ -50,3 +51,9 @@ def test_two_peaks_of_a_mixed_law_report_the_assumed_loss():
         fit_decay(decay_record(0.02, 0.003, noise=1e-4), KnownParameters())
     )
     assert "two-peak values" not in remarks_text(fit_decay(decay_record(0.02, noise=1e-4), KnownParameters()))
+
+
+def test_of_equal_extremes_the_first_is_the_reversal():
+    x = np.array([0.0, 2.0, 2.0, 1.0, -2.0, -2.0, -1.0, 0.5, 0.5, -1.0, -1.0])
+    for sign in (1.0, -1.0):
+        assert find_reversals(sign * x, 1.0).tolist() == [0, 1, 4, 7]

@@ -13,6 +13,8 @@ from harness.analyses.decay.identification import fit_decay
 from harness.errors import HarnessError, SceneError
 from harness.records.columns import ColumnOptions, read_record
 from harness.records.headings import split_heading
+from harness.records.record import Record, check_record
+from harness.records.text_table import find_headings
 from harness.records.units import find_unit, time_unit_size
 
 T = np.arange(600) / 100
@@ -404,6 +406,8 @@ def test_a_heading_is_matched_literally(tmp_path):
         ("µm", 0, "m", 1e-6),
         ("Degrees", 0, "rad", np.pi / 180),
         ("inches", 0, "m", 0.0254),
+        ("inches/s", 1, "m", 0.0254),
+        ("Degrees/s^2", 2, "rad", np.pi / 180),
     ],
 )
 def test_a_unit_identifies_the_quantity(written, order, base, size):
@@ -434,3 +438,38 @@ def test_an_unknown_unit_is_kept_and_reported(tmp_path):
     record = read_record(str(path), ColumnOptions(), "record")
     assert (record.unit, record.order) == ("V", 0)
     assert "assumed to be a position" in record.notes[0]
+
+
+def test_a_record_has_at_least_twelve_samples():
+    for count in (11, 12, 13):
+        record = Record("swing", np.arange(float(count)), np.sin(np.arange(count)))
+        if count < 12:
+            with pytest.raises(SceneError, match="swing has 11 samples in this interval; at least 12 are required"):
+                check_record(record)
+        else:
+            check_record(record)
+
+
+@pytest.mark.parametrize(
+    ("preceding", "width", "headings"),
+    [
+        ([["t", "x"]], 2, ["t", "x"]),
+        ([["t", "x", "comment"]], 2, ["t", "x"]),
+        ([["t", "x"]], 3, ["t", "x", ""]),
+        ([["t", "x", "y", "z"]], 2, []),
+        ([["title"]], 2, []),
+        ([["x"]], 1, ["x"]),
+        ([["t", "x"], ["note"], ["s", "mm"]], 2, ["t [s]", "x [mm]"]),
+        ([["t", "x"], ["note"], ["note"], ["s", "mm"]], 2, ["s", "mm"]),
+        ([["s", "mm"]], 2, ["s", "mm"]),
+        ([["t", "x"], ["s", "laser"]], 2, ["s", "laser"]),
+        ([["h", "x"], ["s", "mm"]], 2, ["h [s]", "x [mm]"]),
+        ([["s", "m"], ["ms", "mm"]], 2, ["ms", "mm"]),
+        ([["t [ms]", "f(x)"], ["s", "mm"]], 2, ["t [ms]", "f(x) [mm]"]),
+        ([["t", "x"], ["", "nan"]], 2, ["t", "x"]),
+        ([["t", "x"], ["1", "2"]], 2, []),
+        ([], 2, []),
+    ],
+)
+def test_headings_are_the_last_rows_of_the_width_of_the_numbers(preceding, width, headings):
+    assert find_headings(preceding, width) == headings

@@ -70,7 +70,7 @@ def least_squares(
             with np.errstate(all="ignore"):
                 new_r, new_jacobian = residual(new)
                 new_cost = float(new_r @ new_r)
-            better = np.isfinite(new_cost) and bool(np.isfinite(new_jacobian).all()) and new_cost <= cost * (1 + 1e-12)
+            better = bool(np.isfinite(new_jacobian).all()) and new_cost <= cost * (1 + 1e-12)  # False for NaN
         converged = gain < CONVERGED_GAIN * cost / max(len(r) - len(unknowns), 1)
         if better:
             p, r, jacobian, cost = new, new_r, new_jacobian, new_cost

@@ -1,0 +1,55 @@
+"""Steps of the least-squares fit that are accepted and refused."""
+
+import numpy as np
+import pytest
+
+from harness.analyses.decay.law import AMPLITUDE, OMEGA, REST, UNKNOWNS
+from harness.analyses.decay.least_squares import FitError, least_squares
+
+T = np.linspace(0.0, 1.0, 21)
+START = np.zeros(len(UNKNOWNS))
+START[AMPLITUDE] = START[OMEGA] = 1.0
+LINE = 3.0 + 0.1 * np.cos(40 * T)  # no constant fits it exactly
+
+
+def constant(p):
+    """Residuals of a constant, and their Jacobian."""
+    return p[REST] - LINE, np.ones((len(T), 1))
+
+
+def fit(residual):
+    """Return the fitted constant and the number of evaluations."""
+    evaluated = []
+    p = least_squares(lambda p: (evaluated.append(p[REST]), residual(p))[1], START, np.array([REST]))[0]
+    return p[REST], len(evaluated)
+
+
+def test_a_linear_problem_is_solved_by_one_step_and_confirmed_by_another():
+    value, count = fit(constant)
+    assert value == pytest.approx(LINE.mean(), rel=1e-12)
+    assert count <= 3
+
+
+@pytest.mark.parametrize("broken", ["residual", "jacobian"])
+def test_a_step_to_values_that_are_not_finite_is_refused(broken):
+    """Beyond 2, where the least squares are."""
+
+    def residual(p):
+        r, jacobian = constant(p)
+        if p[REST] > 2:
+            (r if broken == "residual" else jacobian)[-1] = np.nan
+        return r, jacobian
+
+    value, _ = fit(residual)
+    assert 0 < value <= 2
+
+
+def test_a_step_that_increases_the_squares_is_refused():
+    """A Jacobian that is too small makes each undamped step 2.2 times too long, so that the squares grow by half."""
+    value, _ = fit(lambda p: (p[REST] - LINE, np.full((len(T), 1), 0.45)))
+    assert value == pytest.approx(LINE.mean(), abs=0.1)
+
+
+def test_a_start_without_a_motion_is_refused():
+    with pytest.raises(FitError, match="does not have the turning points"):
+        fit(lambda p: (np.full(len(T), np.nan), np.ones((len(T), 1))))
