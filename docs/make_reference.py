@@ -1,10 +1,11 @@
-"""Write the generated parts of the reference pages: commands, FMU variables, scene keys, result files.
+"""Write the generated parts of the reference pages: commands, FMU variables, scene keys, result and record files.
 
 `python docs/make_reference.py FMUS` reads the built FMUs in the folder FMUS (default: fmus) and replaces what stands
 between the comments <!-- generated: NAME --> and <!-- end --> in docs/reference.
 """
 
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import MISSING, fields, is_dataclass
@@ -232,6 +233,31 @@ def command_text(name: str, command: Any) -> str:
     )
 
 
+def record_formats() -> str:
+    """Every format of a record that the tests write, and what `decay` does with it."""
+    import importlib.util
+
+    path = DOCS.parent / "tests" / "support" / "record_formats.py"
+    specification = importlib.util.spec_from_file_location(path.stem, path)
+    assert specification and specification.loader
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    rows = []
+    for each in module.FORMATS:
+        words = (f"--{RECORD_OPTIONS.get(key, key)} {shlex.quote(f'{value}')}" for key, value in each.options.items())
+        options = " ".join(f"`{word}`" for word in words)
+        answer = "read" + (f" with {options}" if options else "")
+        if each.base == "units":
+            answer += "; has no unit, `--unit` sets it"
+        rows.append((each.text, f"`{each.file}`", f"refused: {each.refusal}" if each.refusal else answer))
+    return table(("format", "example", "answer"), rows)
+
+
+RECORD_OPTIONS = {
+    "names": "columns",
+    "time_unit": "time-unit",
+    "per_count": "per-count",
+}  # by the field of ColumnOptions
 SAMPLES = (
     "run stickslip",
     "run --fmu fmus/pendulum.fmu",
@@ -258,6 +284,7 @@ def parts(fmus: Path) -> dict[str, Callable[[], str]]:
         "coupled-springs": lambda: keys(schema_within(coupled.CoupledKeys, "springs"), COUPLED_TEXTS),
         "coupled-connections": lambda: keys(schema_within(coupled.CoupledKeys, "connections"), COUPLED_TEXTS),
         "result-files": lambda: result_files(fmus),
+        "record-formats": record_formats,
     }
 
 

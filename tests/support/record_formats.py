@@ -257,8 +257,8 @@ FORMATS = (
     Format("a unit in each cell, columns of blanks", "cells.dat", lambda: lines("Time x\n", "{t:.3f} sec  {x:.9f} mm")),
     Format("sample numbers", "samples.csv", lambda: lines("Sample,x [mm]\n", "{i},{x}"), {"time_unit": "0.01s"}),
     Format("counts of an encoder", "counts.csv", lambda: lines("t [s],count\n", PLAIN), {"per_count": "1mm"}),
-    Format("one column of positions", "column.csv", lambda: lines("x [mm]\n", "{x}"), {"rate": 100.0}),
-    Format("one column with decimal commas", "column.txt", lambda: lines("x [mm]\n", "{x:.9f}", True), {"rate": 100.0}),
+    Format("one column of positions", "column.csv", lambda: lines("x [mm]\n", "{x}"), {"rate": 100}),
+    Format("one column with decimal commas", "column.txt", lambda: lines("x [mm]\n", "{x:.9f}", True), {"rate": 100}),
     Format(
         "one column of positions, no rate",
         "notime.csv",
@@ -298,7 +298,7 @@ FORMATS = (
     ),
     Format("LibreOffice `.ods`", "sheet.ods", ods),
     # arrays
-    Format("numpy `.npy`, one column", "column.npy", lambda: npy(MM), {"rate": 100.0}, base="units"),
+    Format("numpy `.npy`, one column", "column.npy", lambda: npy(MM), {"rate": 100}, base="units"),
     Format("numpy `.npy`, two columns", "columns.npy", lambda: npy(np.stack([T, MM], 1)), base="units"),
     Format(
         "numpy `.npy` with named fields",
