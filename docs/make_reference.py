@@ -235,15 +235,11 @@ def command_text(name: str, command: Any) -> str:
 
 def record_formats() -> str:
     """Every format of a record that the tests write, and what `decay` does with it."""
-    import importlib.util
+    sys.path.append(str(DOCS.parent / "tests" / "support"))
+    from record_formats import FORMATS
 
-    path = DOCS.parent / "tests" / "support" / "record_formats.py"
-    specification = importlib.util.spec_from_file_location(path.stem, path)
-    assert specification and specification.loader
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
     rows = []
-    for each in module.FORMATS:
+    for each in FORMATS:
         words = (f"--{RECORD_OPTIONS.get(key, key)} {shlex.quote(f'{value}')}" for key, value in each.options.items())
         options = " ".join(f"`{word}`" for word in words)
         answer = "read" + (f" with {options}" if options else "")
